@@ -1,0 +1,4 @@
+#pragma once
+
+/// Allan family of frequency-stability estimators.
+namespace ringlock::allan {}

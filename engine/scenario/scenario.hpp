@@ -1,0 +1,89 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <numbers>
+#include <string>
+#include <vector>
+
+/// Plain, validated description of a study. Units are in the names; K is arcsec per fringe (2 pi of optical phase).
+namespace ringlock::scenario {
+
+/// The optical cavity.
+struct Gyro {
+    double scale_factor_arcsec = 0.5;        ///< K: arcsec of rotation per fringe
+    double lockin_threshold_deg_h = 300.0;   ///< Omega_L
+};
+
+/// The mechanical dither, a sinusoid before noise and effects.
+struct Dither {
+    double frequency_hz = 783.4 / (2.0 * std::numbers::pi);  ///< Gao & Deng 2007: 783.4 rad/s
+    double peak_rate_deg_s = 109.1;                          ///< Omega_D
+};
+
+/// Random noise on the dither angle at the turns, for arms that begin with noise_injected.
+struct NoiseInjection {
+    double turn_phase_rms_rad = 3.0;  ///< rms of the noise at each turn, in optical phase (K/(2 pi) arcsec each)
+};
+
+enum class ReadoutModel { ideal, instrument };
+enum class AngleOutput { interpolated, quarter_fringe };
+
+/// What the electronics can know of the phase.
+struct Readout {
+    ReadoutModel model = ReadoutModel::instrument;
+    AngleOutput angle_output = AngleOutput::interpolated;
+    double clock_hz = 100e6;                 ///< counter clock that times pulses and turns
+    double detector_noise_relative = 0.005;  ///< rms noise of each detector sample over the fringe amplitude
+};
+
+/// Rate of the case about the input axis, the dither apart.
+struct InputRate {
+    double rate_deg_h = 15.0;
+    double sweep_stop_deg_h = 15.0;   ///< last rate of a sweep that starts at rate_deg_h
+    std::int64_t sweep_points = 1;    ///< rates in the sweep; each gets ensemble.gyros gyros
+};
+
+/// How many gyros, for how long, and how they differ.
+struct Ensemble {
+    std::int64_t gyros = 64;
+    double duration_s = 600.0;
+    std::uint64_t seed = 1;
+    double initial_phase_spread_rad = 2.0 * std::numbers::pi;  ///< full width of a uniform distribution
+    double dither_asymmetry_sd_ratio = 0.001;
+    double lockin_threshold_sd_relative = 0.0;
+    double dither_amplitude_sd_relative = 0.001;
+};
+
+enum class PropagationMethod { turn_map, direct };
+
+/// How the equation of motion is solved.
+struct Propagation {
+    PropagationMethod method = PropagationMethod::turn_map;
+    double direct_tolerance_rad = 1e-10;    ///< local error per step of the direct integrator
+    double turn_map_tolerance_rad = 1e-10;  ///< interpolation error per turn of the turn map
+};
+
+/// What the result file holds.
+struct Output {
+    double sample_interval_s = 1.0;  ///< of the decimated angle record; rounded to whole dither cycles
+    bool angle_record = true;        ///< store the record of every gyro and arm, not only its statistics
+};
+
+/// Effects beyond the base equation: effect name -> parameter -> value. Holds every effect of the registry with every
+/// one of its parameters, at its default where the scenario does not name it.
+using EffectSettings = std::map<std::string, std::map<std::string, double>>;
+
+struct Scenario {
+    Gyro gyro;
+    Dither dither;
+    NoiseInjection noise_injection;
+    Readout readout;
+    InputRate input;
+    EffectSettings effects;
+    Ensemble ensemble;
+    std::vector<std::string> arms;
+    Propagation propagation;
+    Output output;
+};
+
+}  // namespace ringlock::scenario
