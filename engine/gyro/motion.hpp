@@ -73,6 +73,14 @@ class PhaseSeries {
         return sum / scale_s_;
     }
 
+    /// Phase acceleration after `h_s` [rad/s^2].
+    double acceleration_rad_s2(double h_s) const {
+        const double x = h_s / scale_s_;
+        double sum = 0.0;
+        for (std::size_t n = Order; n >= 2; --n) sum = sum * x + static_cast<double>(n * (n - 1)) * psi_[n];
+        return sum / (scale_s_ * scale_s_);
+    }
+
     /// Longest step [s] whose last two terms stay below `tolerance_rad` (Jorba & Zou 2005, Experimental Mathematics 14).
     double step_s(double tolerance_rad) const {
         const double last = std::pow(tolerance_rad / (std::abs(psi_[Order]) + 1e-300), 1.0 / static_cast<double>(Order));
