@@ -283,9 +283,42 @@ class Reader {
     std::map<std::string, toml::source_position> places_;
 };
 
+/// toml++ 3.3 follows a dotted key by recursion without a limit, and a key of some 30 000 parts overflows the stack.
+/// A key has at most three parts here, so that a run of dots is refused before it is parsed. Dots side by side are
+/// decoration, and so is a line of comment.
+void refuse_deep_keys(std::string_view text, std::string_view name) {
+    constexpr int most = 32;
+    int dots = 0;
+    std::size_t line = 1;
+    std::size_t column = 0;
+    bool blank = true;     // nothing on this line yet
+    bool comment = false;  // the line is one
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const char c = text[i];
+        ++column;
+        comment = comment || (blank && c == '#');
+        blank = blank && (c == ' ' || c == '\t');
+        if (c == '\n') {
+            ++line;
+            column = 0;
+            blank = true;
+            comment = false;
+        }
+        const bool beside = c == '.' && i > 0 && text[i - 1] == '.';
+        if (comment || beside || std::string_view("\n=,{}[]").find(c) != std::string_view::npos) {
+            dots = 0;
+        } else if (c == '.' && ++dots > most) {
+            throw InputError(
+                fmt::format("{}:{}:{}: a key of more than {} parts; the longest, effects.NAME.PARAMETER, have 3", name,
+                            line, column, most));
+        }
+    }
+}
+
 }  // namespace
 
 Scenario parse_string(std::string_view text, std::string_view name) {
+    refuse_deep_keys(text, name);
     toml::table root;
     try {
         root = toml::parse(text, name);

@@ -68,6 +68,7 @@ struct BadCase {
     const char* title;
     const char* text;
     const char* message;
+    friend void PrintTo(const BadCase& bad, std::ostream* out) { *out << bad.title; }
 };
 
 class BadScenario : public testing::TestWithParam<BadCase> {};
@@ -169,6 +170,15 @@ const BadCase bad_cases[] = {
 
 INSTANTIATE_TEST_SUITE_P(All, BadScenario, testing::ValuesIn(bad_cases),
                          [](const auto& bad) { return std::string(bad.param.title); });
+
+TEST(ScenarioText, KeysOfEndlessPartsAreRefusedBeforeTheyOverflowTheStack) {
+    std::string parts;
+    for (int i = 0; i < 300000; ++i) parts += "a.";
+    EXPECT_THAT(complaint(parts + "b = 1"), StartsWith("s.toml:1:66: a key of more than 32 parts"));
+    EXPECT_THAT(complaint("[" + parts + "b]"), StartsWith("s.toml:1:67: a key of more than 32 parts"));
+    EXPECT_THAT(complaint("\nx = " + std::string(100000, '[')), StartsWith("s.toml:2:"));
+    EXPECT_EQ(complaint("# " + parts + "\n# " + std::string(200, '.') + "\n"), "");
+}
 
 TEST(ScenarioText, ReportsEveryProblemInTheOrderOfTheFile) {
     EXPECT_EQ(
