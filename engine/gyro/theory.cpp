@@ -2,6 +2,7 @@
 
 #include <boost/math/special_functions/bessel.hpp>
 #include <cmath>
+#include <numbers>
 
 #include "engine/core/units.hpp"
 
@@ -29,6 +30,14 @@ double modulation_depth_rad(const Setup& setup) {
 
 double band_half_width_deg_h(const Setup& setup, int order) {
     return setup.lockin_threshold_deg_h * std::abs(boost::math::cyl_bessel_j(order, modulation_depth_rad(setup)));
+}
+
+double half_turn_delay_rad(const Setup& setup) {
+    const double w = angular_frequency_rad_s(setup);
+    const double b = units::two_pi / setup.scale_factor_arcsec * setup.lockin_threshold_deg_h;
+    const double acceleration = modulation_depth_rad(setup) * w * w;
+    return b * b / (2.0 * acceleration) *
+           (std::log(2.0 * std::sqrt(acceleration) / w) + 0.5 * (std::numbers::egamma + std::numbers::ln2));
 }
 
 double band_centre_deg_h(const Setup& setup, int order) {

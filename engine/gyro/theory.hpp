@@ -16,6 +16,10 @@ double modulation_depth_rad(const Setup& setup);
 /// Half-width of the n-th locked band [deg/h] to first order in Omega_L: Omega_L |J_n(M)|.
 double band_half_width_deg_h(const Setup& setup, int order);
 
+/// Second-order delay of the phase over half a turn [rad]: (b^2/(2 psi''))(ln(2 sqrt(psi'')/w_D) + (gamma + ln 2)/2).
+/// It cancels over a whole cycle but shortens every half cycle: bands have the half-widths Omega_L |J_n(M - delay)|.
+double half_turn_delay_rad(const Setup& setup);
+
 /// Centre of the n-th locked band [deg/h]: n K w_D / (2 pi).
 double band_centre_deg_h(const Setup& setup, int order);
 

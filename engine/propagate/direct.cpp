@@ -25,7 +25,7 @@ double DirectIntegrator::lockin_gain_rad(double phase_rad, const gyro::HalfCycle
     // About two steps a fringe, each with its share of the tolerance.
     const double per_step = tolerance_rad_ / (4.0 + 2.0 * half.amplitude_rad / units::pi);
     double t = 0.0;
-    double scale = std::sqrt(1.0 / half.end_acceleration_rad_s2());
+    double scale = 1.0 / (coupling_.b_rad_s + std::abs(half.rate_rad_s) + std::sqrt(half.end_acceleration_rad_s2()));
     for (const double end : {middle, half.duration_s}) {
         while (t < end) {
             const Series series(half, coupling_, t, phase.remainder_rad, scale);

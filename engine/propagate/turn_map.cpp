@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "engine/core/error.hpp"
+#include "engine/propagate/circle_map.hpp"
+#include "engine/propagate/constant_rate.hpp"
 
 namespace ringlock::propagate {
 
@@ -16,13 +18,6 @@ constexpr std::size_t most_nodes = 40;
 /// The half cycle seen with its sign turned to +1: psi -> -psi maps the equation onto itself with g -> -g.
 gyro::HalfCycle upright(const gyro::HalfCycle& half) {
     return {1.0, half.amplitude_rad, half.duration_s, half.sign * half.rate_rad_s};
-}
-
-/// 2 arg(1 + z exp(i angle)), |z| < 1.
-double twice_arg(std::complex<double> z, double angle_rad) {
-    const double c = std::cos(angle_rad);
-    const double s = std::sin(angle_rad);
-    return 2.0 * std::atan2(z.real() * s + z.imag() * c, 1.0 + z.real() * c - z.imag() * s);
 }
 
 std::array<double, 3> as_array(const HalfTurn& turn) { return {turn.shift_rad, turn.z.real(), turn.z.imag()}; }
@@ -97,6 +92,7 @@ TurnMap::TurnMap(gyro::Coupling coupling, const gyro::HalfCycle& positive, const
                 HalfTurnTable(upright(negative), coupling.b_rad_s, range.lowest_rad, range.highest_rad, tolerance_rad)} {}
 
 double TurnMap::lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half, double mid_step_rad) {
+    if (half.amplitude_rad == 0.0) return without_dither_rad(phase_rad, half, mid_step_rad);
     const Side& side = half.sign > 0 ? positive_ : negative_;
     HalfTurn turn;
     if (half.rate_rad_s == side.rate_rad_s && half.duration_s == side.duration_s &&
@@ -114,6 +110,13 @@ double TurnMap::lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half, d
     gain += turn.shift_rad;
     const double u = x + half.sign * (half.plain_phase_total_rad() + mid_step_rad) + gain;
     return half.sign * (gain - twice_arg(turn.z, u));
+}
+
+double TurnMap::without_dither_rad(double phase_rad, const gyro::HalfCycle& half, double mid_step_rad) const {
+    const double middle = 0.5 * half.duration_s;
+    const double first = constant_rate_gain_rad(phase_rad, half.rate_rad_s, middle, coupling_);
+    const double there = phase_rad + half.rate_rad_s * middle + first + mid_step_rad;
+    return first + constant_rate_gain_rad(there, half.rate_rad_s, middle, coupling_);
 }
 
 double TurnMap::step_in_frame_rad(const gyro::HalfCycle& half, double gained_rad, double step_rad) const {

@@ -61,6 +61,7 @@ class TurnMap final : public Propagator {
         HalfTurnTable table;
     };
 
+    double without_dither_rad(double phase_rad, const gyro::HalfCycle& half, double mid_step_rad) const;
     /// A step of the phase psi in the middle, seen from the fast frame: what it adds to the frame's phase beyond itself.
     double step_in_frame_rad(const gyro::HalfCycle& half, double gained_rad, double step_rad) const;
 
