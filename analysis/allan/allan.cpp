@@ -35,28 +35,34 @@ double sum_of_squares(const double* x, std::size_t m, std::size_t stride, std::s
     return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
 }
 
-/// Identifies the noise at each factor. Beyond the last one with enough points the redder of what was found there and an
-/// octave below is kept: 30 points tell the noise to about +-1 in alpha, and a false white phase noise would claim thousands
-/// of degrees of freedom where there are a few.
+/// Identifies the noise at each factor; beyond the last one with enough points what was found there is kept. With fewer
+/// than 100 points the redder of what is found there and an octave below is taken: so few points tell alpha to about
+/// +-1, and a false white phase noise would claim thousands of degrees of freedom where there are a few.
 class NoisePerFactor {
    public:
-    explicit NoisePerFactor(std::span<const double> phase) : phase_(phase) {
-        const auto n = static_cast<std::int64_t>(phase.size());
-        last_ = (n - 1) / (noise_identification_points - 1);
-    }
+    explicit NoisePerFactor(std::span<const double> phase)
+        : phase_(phase),
+          steps_(static_cast<std::int64_t>(phase.size()) - 1),
+          last_(steps_ / (noise_identification_points - 1)) {}
+
     int operator()(std::int64_t m) {
         if (last_ < 1) return 0;
-        if (m < last_) return identify_noise(phase_, m).value_or(0);
-        if (!known_) {
-            kept_ = identify_noise(phase_, last_).value_or(0);
-            if (last_ > 1) kept_ = std::min(kept_, identify_noise(phase_, last_ / 2).value_or(0));
-        }
+        if (m < last_) return found_at(m);
+        if (!known_) kept_ = found_at(last_);
         known_ = true;
         return kept_;
     }
 
    private:
+    int found_at(std::int64_t m) const {
+        constexpr std::int64_t sure = 100;
+        const int found = identify_noise(phase_, m).value_or(0);
+        if (m == 1 || steps_ / m >= sure) return found;
+        return std::min(found, identify_noise(phase_, m / 2).value_or(0));
+    }
+
     std::span<const double> phase_;
+    std::int64_t steps_ = 0;
     std::int64_t last_ = 0;
     bool known_ = false;
     int kept_ = 0;
@@ -103,7 +109,7 @@ std::vector<Point> deviation(Estimator estimator, std::span<const double> phase,
     const auto points = static_cast<std::int64_t>(phase.size());
     const std::int64_t largest = largest_factor(estimator, points);
     const bool overlapping = estimator == Estimator::oadev;
-    DegreesOfFreedom degrees({.differences = 2, .modified = false, .overlapping = overlapping});
+    const EstimatorShape shape{.differences = 2, .modified = false, .overlapping = overlapping};
     NoisePerFactor noise(phase);
 
     std::vector<Point> out;
@@ -123,7 +129,7 @@ std::vector<Point> deviation(Estimator estimator, std::span<const double> phase,
                            static_cast<std::size_t>(p.terms));
         p.dev = std::sqrt(sum / (2.0 * static_cast<double>(p.terms))) / p.tau_s;
         p.alpha = noise(m);
-        p.edf = degrees(p.alpha, m, points);
+        p.edf = degrees_of_freedom(shape, p.alpha, m, points);
         const boost::math::chi_squared chi2(p.edf);
         p.lo = p.dev * std::sqrt(p.edf / boost::math::quantile(chi2, 0.5 * (1.0 + options.confidence)));
         p.hi = p.dev * std::sqrt(p.edf / boost::math::quantile(chi2, 0.5 * (1.0 - options.confidence)));

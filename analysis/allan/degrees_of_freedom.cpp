@@ -1,7 +1,6 @@
 #include "analysis/allan/degrees_of_freedom.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -64,32 +63,36 @@ double s_z(double t, double filter, int alpha, int d) {
     return z;
 }
 
-}  // namespace
-
-const std::vector<double>& DegreesOfFreedom::squares(int alpha, double strides, double filter) {
-    auto [place, fresh] = tables_.try_emplace(Key{alpha, strides, filter});
-    if (fresh) {
-        const auto last = static_cast<std::size_t>((shape_.differences + 1) * strides);
-        place->second.resize(last + 1);
-        for (std::size_t j = 0; j <= last; ++j) {
-            const double z = s_z(static_cast<double>(j) / strides, filter, alpha, shape_.differences);
-            place->second[j] = z * z;
-        }
+/// Sum over lags 0 < j < end of (1 - j/terms) s_z(j/strides)^2.
+double sum_over_lags(double terms, std::int64_t strides, std::int64_t end, double filter, int alpha, int d) {
+    constexpr std::int64_t fineness = 16;  // a block spans at most this part of its distance from a singular point
+    double sum = 0.0;
+    for (std::int64_t j = 1; j < end;) {
+        const std::int64_t behind = j % strides;
+        const std::int64_t distance = std::min(behind, strides - behind);
+        const std::int64_t length = std::min(std::max<std::int64_t>(1, distance / fineness), end - j);
+        const double middle = static_cast<double>(j) + 0.5 * static_cast<double>(length - 1);
+        const double z = s_z(middle / static_cast<double>(strides), filter, alpha, d);
+        sum += static_cast<double>(length) * (1.0 - middle / terms) * z * z;
+        j += length;
     }
-    return place->second;
+    return sum;
 }
 
-double DegreesOfFreedom::operator()(int alpha, std::int64_t m, std::int64_t points) {
-    const int d = shape_.differences;
-    if (alpha > 2 || alpha + 2 * d <= 1) {
+}  // namespace
+
+double degrees_of_freedom(const EstimatorShape& shape, int alpha, std::int64_t m, std::int64_t points) {
+    const int d = shape.differences;
+    if (d < 1 || alpha > 2 || alpha + 2 * d <= 1) {
         throw std::domain_error("degrees of freedom: alpha does not suit this difference");
     }
-    const std::int64_t span = shape_.modified ? m * (d + 1) : 1 + m * d;  // phase points under one term
+    const std::int64_t span = shape.modified ? m * (d + 1) : 1 + m * d;  // phase points under one term
     if (m < 1 || points < span) throw std::domain_error("degrees of freedom: no term fits the record");
-    const std::int64_t strides = shape_.overlapping ? m : 1;
-    const auto terms = static_cast<double>(1 + (points - span) / (m / strides));
+    const std::int64_t strides = shape.overlapping ? m : 1;
+    const std::int64_t term_count = 1 + (points - span) / (m / strides);
+    const auto terms = static_cast<double>(term_count);
 
-    if (alpha == 2 && !shape_.modified) {  // only multiples of tau are correlated
+    if (alpha == 2 && !shape.modified) {  // only multiples of tau are correlated
         double sum = 1.0;
         for (int k = 1; k <= d; ++k) {
             const double ratio = binomial(2 * d, d + k) / binomial(2 * d, d);
@@ -97,27 +100,12 @@ double DegreesOfFreedom::operator()(int alpha, std::int64_t m, std::int64_t poin
         }
         return terms / sum;
     }
-
-    double scaled_strides = static_cast<double>(strides);
-    double scaled_terms = terms;
-    if (strides > exact_span_) {
-        scaled_strides = static_cast<double>(exact_span_);
-        scaled_terms = std::max(1.0, terms * scaled_strides / static_cast<double>(strides));
-    }
     double filter = 1.0;
-    if (!shape_.modified) {
-        filter = static_cast<double>(m);
-        if (m > exact_span_) filter = alpha == 1 ? static_cast<double>(exact_span_) : infinity;
-    }
-    const std::vector<double>& z2 = squares(alpha, scaled_strides, filter);
-    const double end = std::min(scaled_terms, (d + 1) * scaled_strides);
-    double sum = z2[0];
-    for (std::size_t j = 1; static_cast<double>(j) < end; ++j) {
-        sum += 2.0 * (1.0 - static_cast<double>(j) / scaled_terms) * z2[j];
-    }
-    // Flicker phase noise depends on the bandwidth through the variance alone, which is known without scaling.
-    const double z0 = alpha == 1 && !shape_.modified ? s_z(0.0, static_cast<double>(m), alpha, d) : std::sqrt(z2[0]);
-    return scaled_terms * z0 * z0 / sum;
+    if (!shape.modified) filter = alpha <= 0 ? infinity : static_cast<double>(m);
+    // Beyond d + 1 taus the terms of the stationary noises are uncorrelated, those of the others nearly.
+    const std::int64_t end = std::min(term_count, (d + 1) * strides);
+    const double z0 = s_z(0.0, filter, alpha, d);
+    return terms * z0 * z0 / (z0 * z0 + 2.0 * sum_over_lags(terms, strides, end, filter, alpha, d));
 }
 
 }  // namespace ringlock::allan

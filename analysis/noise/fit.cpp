@@ -18,7 +18,6 @@ namespace {
 constexpr std::size_t mask_count = std::size_t{1} << (term_count + 1);  // bit term_count: the ramp
 constexpr std::size_t ramp_bit = std::size_t{1} << term_count;
 constexpr std::size_t full_mask = mask_count - 1;
-constexpr double limit_deviance = 2.7055434540954;  // (1.6449)^2: one-sided 95 %
 constexpr double one_sided_95 = 1.6448536269515;
 
 Model model_of(std::size_t mask) {
@@ -56,13 +55,24 @@ class Subsets {
     std::array<Maximum, mask_count> fits_{};
 };
 
-/// Value of theta[term] at which the deviance, all other terms free, has risen by that of a one-sided 95 % limit.
+/// Rise of the deviance at a one-sided 95 % upper limit of a variance known with k degrees of freedom: k chi-squared
+/// ordinates of sum w have deviance w - k - k ln(w/k), and w lies below its 5 % point once in twenty. 2.71 for large
+/// k, 4.54 for one.
+double limit_deviance(double k) {
+    k = std::clamp(k, 1.0, 1e4);
+    const double w = boost::math::quantile(boost::math::chi_squared(k), 0.05);
+    return w - k - k * std::log(w / k);
+}
+
+/// Value of theta[term] at which the deviance, all other terms free, has risen to a one-sided 95 % limit.
 std::optional<double> upper_limit(const Likelihood& likelihood, const Maximum& full, std::size_t term) {
-    const Model model = model_of(full_mask);
+    Model model = model_of(full_mask);
+    model.restricted = true;
     TermValues start = full.theta;
     const auto rise = [&](double value) {
         const Maximum there = likelihood.maximise(model, &start, term, value);
-        return there.deviance - full.deviance - limit_deviance;
+        const double degrees = 2.0 * value * value / there.covariance[term][term];
+        return there.deviance - full.deviance - limit_deviance(std::isfinite(degrees) ? degrees : 1.0);
     };
     double inside = full.theta[term];
     const double spread = std::sqrt(full.covariance[term][term]);
@@ -74,7 +84,7 @@ std::optional<double> upper_limit(const Likelihood& likelihood, const Maximum& f
         outside = 1e-6 * likelihood.maximise(alone).theta[term];
         if (!(outside > 0.0)) return std::nullopt;
     }
-    double rise_inside = -limit_deviance;
+    double rise_inside = -limit_deviance(1e4);
     double rise_outside = rise(outside);
     for (int doubling = 0; rise_outside < 0.0; ++doubling) {
         if (doubling == 60) return std::nullopt;
@@ -196,6 +206,9 @@ NoiseFit fit_noise(std::span<const double> angle_arcsec, double tau0_s, const Op
     }
     const Maximum& chosen = fits[best];
     const Maximum& full = fits[full_mask];
+    Model restricted = model_of(full_mask);
+    restricted.restricted = true;
+    const Maximum full_restricted = likelihood.maximise(restricted, &full.theta);
     const auto supported = [&](std::size_t bit, double price) {
         return (best & bit) != 0 && fits[full_mask & ~bit].deviance - full.deviance >= price;
     };
@@ -213,7 +226,7 @@ NoiseFit fit_noise(std::span<const double> angle_arcsec, double tau0_s, const Op
             c.value = factor * std::sqrt(chosen.theta[i]);
             c.lo = *c.value * std::exp(-spread);
             c.hi = *c.value * std::exp(spread);
-        } else if (const auto limit = upper_limit(likelihood, full, i)) {
+        } else if (const auto limit = upper_limit(likelihood, full_restricted, i)) {
             c.hi = factor * std::sqrt(*limit);
         }
     }

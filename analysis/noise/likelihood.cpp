@@ -22,7 +22,7 @@ struct Likelihood::State {
     std::array<double, 2> corner{};
 };
 
-Likelihood::State Likelihood::evaluate(const TermValues& theta, bool with_ramp, bool derivatives) const {
+Likelihood::State Likelihood::evaluate(const TermValues& theta, const Model& model, bool derivatives) const {
     State s;
     double logs = 0.0;
     double power = 0.0;
@@ -48,8 +48,9 @@ Likelihood::State Likelihood::evaluate(const TermValues& theta, bool with_ramp, 
     }
     const double q = theta[quantisation];
     const std::array<double, 2> k = {1.0 / (1.0 + q * uu[0]), 1.0 / (1.0 + q * uu[1])};
-    if (with_ramp) {
-        const double information = dd - q * k[1] * du * du;
+    double information = 0.0;
+    if (model.ramp) {
+        information = dd - q * k[1] * du * du;
         if (information > 0.0) {
             s.ramp_variance = 1.0 / information;
             s.ramp = (dz - q * k[1] * du * uz[1]) * s.ramp_variance;
@@ -63,11 +64,15 @@ Likelihood::State Likelihood::evaluate(const TermValues& theta, bool with_ramp, 
         s.deviance += std::log1p(q * uu[p]) - q * k[p] * uz[p] * uz[p];
         s.corner[p] = q * k[p] * uz[p];
     }
+    const bool restricted = model.restricted && information > 0.0;
+    if (restricted) s.deviance += std::log(information);
     if (!derivatives) return s;
 
     // By the envelope theorem the ramp may be held while the variances move.
     std::array<Vector, 2> duu = {Vector::Zero(), Vector::Zero()};
     std::array<Vector, 2> duz = {Vector::Zero(), Vector::Zero()};
+    Vector ddd = Vector::Zero();
+    Vector ddu = Vector::Zero();
     for (const Bin& b : bins_) {
         const Eigen::Map<const Vector> g(b.shape.data());
         const double w = 1.0 / g.dot(Eigen::Map<const Vector>(theta.data()));
@@ -75,6 +80,8 @@ Likelihood::State Likelihood::evaluate(const TermValues& theta, bool with_ramp, 
         const double residual_power = b.power + r * (r * b.ramp2 - 2.0 * b.ramp_data);
         s.gradient += (b.count * w - residual_power * w2) * g;
         s.curvature += b.count * w2 * (g * g.transpose());
+        ddd -= b.ramp2 * w2 * g;
+        ddu -= b.ramp_corner * w2 * g;
         for (std::size_t p = 0; p < 2; ++p) {
             duu[p] -= b.corner2[p] * w2 * g;
             duz[p] -= (b.corner_data[p] - (p == 1 ? r * b.ramp_corner : 0.0)) * w2 * g;
@@ -86,6 +93,11 @@ Likelihood::State Likelihood::evaluate(const TermValues& theta, bool with_ramp, 
         denominator[quantisation] += uu[p];
         s.gradient += k[p] * denominator + q * c * c * k[p] * k[p] * denominator - 2.0 * q * k[p] * c * duz[p];
         s.gradient[quantisation] -= k[p] * c * c;
+        if (p == 1 && restricted) {
+            Vector change = ddd + q * k[1] * k[1] * du * du * denominator - 2.0 * q * k[1] * du * ddu;
+            change[quantisation] -= k[1] * du * du;
+            s.gradient += change / information;
+        }
     }
     return s;
 }
@@ -115,7 +127,7 @@ Maximum Likelihood::maximise(const Model& model, const TermValues* start, std::s
     }
     if (fixed < term_count) theta[fixed] = fixed_value;
 
-    State state = evaluate(theta, model.ramp, true);
+    State state = evaluate(theta, model, true);
     for (int iteration = 0; iteration < most_iterations; ++iteration) {
         std::array<Eigen::Index, term_count> free{};
         Eigen::Index count = 0;
@@ -145,7 +157,7 @@ Maximum Likelihood::maximise(const Model& model, const TermValues* start, std::s
                 double& t = trial[static_cast<std::size_t>(free[a])];
                 t = std::max(0.0, t + length * step[a]);
             }
-            const State there = evaluate(trial, model.ramp, false);
+            const State there = evaluate(trial, model, false);
             if (there.deviance < state.deviance) {
                 gain = state.deviance - there.deviance;
                 theta = trial;
@@ -154,7 +166,7 @@ Maximum Likelihood::maximise(const Model& model, const TermValues* start, std::s
             }
         }
         if (!moved) break;
-        state = evaluate(theta, model.ramp, true);
+        state = evaluate(theta, model, true);
         if (gain < enough) break;
     }
 

@@ -9,6 +9,8 @@ namespace ringlock::noise {
 struct Model {
     std::array<bool, term_count> has{};
     bool ramp = false;
+    bool restricted =
+        false;  ///< likelihood of what the ramp leaves free (REML): not for comparing models with and without it
 };
 
 /// A model at the maximum of its likelihood.
@@ -39,7 +41,7 @@ class Likelihood {
 
    private:
     struct State;
-    State evaluate(const TermValues& theta, bool with_ramp, bool derivatives) const;
+    State evaluate(const TermValues& theta, const Model& model, bool derivatives) const;
     TermValues first_guess(const Model& model) const;
 
     const std::vector<Bin>& bins_;

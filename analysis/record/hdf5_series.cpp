@@ -49,7 +49,7 @@ herr_t collect(hid_t root, const char* name, const H5O_info_t* info, void* into)
     const Handle type(H5Dget_type(dataset), H5Tclose);
     const H5T_class_t kind = H5Tget_class(type);
     if (H5Sget_simple_extent_ndims(space) == 1 && (kind == H5T_FLOAT || kind == H5T_INTEGER)) {
-        static_cast<std::vector<std::string>*>(into)->push_back(std::string("/") + name);
+        static_cast<std::vector<std::string>*>(into)->push_back(fmt::format("/{}", name));
     }
     return 0;
 }
@@ -69,7 +69,7 @@ std::string choose(const std::string& path, const std::vector<std::string>& ther
         throw InputError(
             fmt::format("{}: has {} datasets; say which with --column ({})", path, there.size(), listed(there)));
     }
-    const std::string absolute = asked->starts_with("/") ? *asked : "/" + *asked;
+    const std::string absolute = asked->starts_with("/") ? *asked : fmt::format("/{}", *asked);
     std::vector<std::string> matches;
     for (const std::string& name : there) {
         if (name == absolute) return name;

@@ -17,7 +17,7 @@ namespace ringlock::record {
 std::string listed(const std::vector<std::string>& names) {
     constexpr std::size_t most = 20;
     std::string out;
-    for (std::size_t i = 0; i < names.size() && i < most; ++i) out += (i > 0 ? ", " : "") + names[i];
+    for (std::size_t i = 0; i < names.size() && i < most; ++i) out += fmt::format("{}{}", i > 0 ? ", " : "", names[i]);
     if (names.size() > most) out += fmt::format(", ... ({} in all)", names.size());
     return out;
 }
