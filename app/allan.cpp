@@ -105,27 +105,40 @@ std::vector<allan::Estimator> parse_deviations(const std::string& list) {
     return out;
 }
 
-std::vector<std::int64_t> parse_factors(const std::string& tau, std::int64_t largest) {
-    if (tau == "octave") return allan::octave_factors(largest);
-    if (tau == "decade") return allan::decade_factors(largest);
-    if (tau == "all") return allan::all_factors(largest);
-    std::vector<std::int64_t> out;
+/// What --tau asks for: one of the words, or a list.
+struct TauChoice {
+    std::string word;
+    std::vector<std::int64_t> list;  ///< ascending, each once; empty where a word was given
+};
+
+TauChoice parse_tau(const std::string& tau) {
+    if (tau == "octave" || tau == "decade" || tau == "all") return {tau, {}};
+    TauChoice out;
     for (const std::string& part : split(tau)) {
         std::int64_t m = 0;
         const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), m);
-        if (error != std::errc() || end != part.data() + part.size() || part.empty()) {
-            throw InputError(fmt::format(
-                "--tau '{}': must be octave, decade, all or averaging factors (whole numbers of samples, not seconds)",
-                part));
+        if (error != std::errc() || end != part.data() + part.size() || m < 1) {
+            throw InputError(
+                fmt::format("--tau '{}': must be octave, decade, all or averaging factors from 1 (whole numbers of "
+                            "samples, not seconds)",
+                            part));
         }
-        if (m < 1 || m > largest) {
-            throw InputError(fmt::format("--tau {}: this record allows averaging factors 1 to {}", m, largest));
-        }
-        out.push_back(m);
+        out.list.push_back(m);
     }
-    std::sort(out.begin(), out.end());
-    out.erase(std::unique(out.begin(), out.end()), out.end());
+    std::sort(out.list.begin(), out.list.end());
+    out.list.erase(std::unique(out.list.begin(), out.list.end()), out.list.end());
     return out;
+}
+
+std::vector<std::int64_t> factors_for(const TauChoice& choice, std::int64_t largest) {
+    if (choice.word == "octave") return allan::octave_factors(largest);
+    if (choice.word == "decade") return allan::decade_factors(largest);
+    if (choice.word == "all") return allan::all_factors(largest);
+    if (choice.list.back() > largest) {
+        throw InputError(
+            fmt::format("--tau {}: this record allows averaging factors 1 to {}", choice.list.back(), largest));
+    }
+    return choice.list;
 }
 
 void check_rate(const Arguments& a, const record::Series& series) {
@@ -146,8 +159,7 @@ void run(const Arguments& a) {
     if (!(a.confidence > 0.0 && a.confidence < 1.0)) {
         throw InputError(fmt::format("--confidence {}: must lie between 0 and 1, such as 0.6827", a.confidence));
     }
-    parse_factors(a.tau,
-                  std::numeric_limits<std::int32_t>::max() * (a.tau.find_first_of("0123456789") == 0 ? 1LL : 0LL));
+    const TauChoice taus = parse_tau(a.tau);
 
     record::Series series =
         record::read_series(a.data, a.column.empty() ? std::nullopt : std::optional<std::string>(a.column));
@@ -173,7 +185,7 @@ void run(const Arguments& a) {
 
     for (const allan::Estimator estimator : estimators) {
         const std::int64_t largest = allan::largest_factor(estimator, static_cast<std::int64_t>(phase.size()));
-        const std::vector<std::int64_t> factors = parse_factors(a.tau, largest);
+        const std::vector<std::int64_t> factors = factors_for(taus, largest);
         out.deviations.emplace_back(allan::name(estimator), allan::deviation(estimator, phase, out.tau0_s, factors,
                                                                              {.confidence = a.confidence}));
     }

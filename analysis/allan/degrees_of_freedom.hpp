@@ -25,7 +25,7 @@ struct EstimatorShape {
 ///
 /// Where this differs from the paper: for alpha <= 0 the phase is taken as sampled, not averaged over tau0 (F infinite
 /// instead of m). That is what an integrating gyro or a phase counter gives, it makes white frequency noise exact at
-/// every m, and it matters at m below about 8 only.
+/// every m, where the filter is up to 17 % off at m = 1 and 4 % at m = 20.
 double degrees_of_freedom(const EstimatorShape& shape, int alpha, std::int64_t m, std::int64_t points);
 
 }  // namespace ringlock::allan
