@@ -1,0 +1,42 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace ringlock::report {
+
+/// One curve of a figure. Labels and titles are UTF-8 and are shown as they are.
+struct Curve {
+    /// points: markers with error bars; line, dashed: straight lines between the points (dashed: drawn above all
+    /// others, for theory).
+    enum class Style { points, line, dashed };
+
+    std::string label;
+    std::vector<double> x = {};
+    std::vector<double> y = {};
+    std::vector<double> lo =
+        {};  ///< lower ends of the error bars in units of y; empty: no bars. NaN: none on that side
+    std::vector<double> hi = {};  ///< upper ends, likewise
+    Style style = Style::points;
+};
+
+struct Figure {
+    std::string title;
+    std::string x_label;
+    std::string y_label;
+    bool log_x = false;
+    bool log_y = false;
+    std::vector<Curve> curves = {};
+};
+
+/// Draws a figure with gnuplot as SVG 900 wide and 620 high (higher when the legend is long).
+///
+/// Points that an axis cannot show (not finite, or not above zero on a logarithmic one) are left out; a curve that has
+/// no other keeps its place in the legend, which says so. Bars reaching out of the axes end at them. The same figure
+/// always gives the same bytes under the same gnuplot. The file appears complete or not at all.
+///
+/// Throws std::invalid_argument when the vectors of a curve differ in length, and RunError when gnuplot is missing or
+/// fails or the file cannot be written.
+void write_svg(const std::filesystem::path& path, const Figure& figure);
+
+}  // namespace ringlock::report
