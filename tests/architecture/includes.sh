@@ -1,0 +1,126 @@
+#!/usr/bin/env bash
+# The arrows between the rooms: `includes.sh ROOT` fails where an #include points against them.
+# Also: a source stands beside its header, headers have #pragma once, and every include of ours is a path from ROOT.
+set -euo pipefail
+cd "${1:?usage: includes.sh ROOT}"
+
+# What a room may include beside itself. A room that is not here is an error, so that a new one is placed on purpose.
+declare -A may=(
+    [engine/core]=""
+    [engine/gyro]="engine/core"
+    [engine/random]="engine/core"
+    [engine/dither]="engine/core engine/gyro engine/random"
+    [engine/effects]="engine/core engine/gyro engine/random"
+    [engine/propagate]="engine/core engine/gyro"
+    [engine/readout]="engine/core engine/gyro engine/random"
+    [engine/compensate]="engine/core engine/readout"
+    [engine/scenario]="engine/core engine/gyro engine/effects"
+    [engine/store]="engine/core engine/scenario"
+    [engine/ensemble]="engine/core engine/gyro engine/random engine/dither engine/effects engine/propagate
+        engine/readout engine/compensate engine/scenario"
+    [analysis/allan]="engine/core"
+    [analysis/noise]="analysis/allan engine/core engine/random"
+    [analysis/record]="analysis/allan analysis/noise engine/core engine/store"
+    [analysis/study]="analysis/allan analysis/noise engine/*"
+    [analysis/report]="analysis/* engine/*"
+    [app]="analysis/* engine/*"
+    [tests]="app analysis/* engine/*"
+)
+
+bad=0
+complain() {
+    echo "$1"
+    bad=$((bad + 1))
+}
+
+# The room of a path: two folders deep in engine and analysis, one elsewhere.
+room_of() {
+    case "$1" in
+        engine/*/* | analysis/*/*)
+            local rest="${1#*/}"
+            room="${1%%/*}/${rest%%/*}"
+            ;;
+        *) room="${1%%/*}" ;;
+    esac
+}
+
+allowed() {
+    local from="$1" to="$2" pattern
+    [[ $from == "$to" ]] && return 0
+    set -f
+    for pattern in ${may[$from]}; do
+        # shellcheck disable=SC2053  # the right side is meant as a pattern
+        if [[ $to == $pattern ]]; then
+            set +f
+            return 0
+        fi
+    done
+    set +f
+    return 1
+}
+
+sources=()
+for top in engine analysis app tests; do
+    if [[ -d $top ]]; then
+        mapfile -t -O "${#sources[@]}" sources < <(find "$top" -type f \
+            \( -name '*.[ch]' -o -name '*.[ch]pp' -o -name '*.cc' -o -name '*.[ch]xx' -o -name '*.hh' -o -name '*.[it]pp' \
+            -o -name '*.inl' -o -name '*.[ch]pp.in' \) | LC_ALL=C sort)
+    fi
+done
+if [[ ${#sources[@]} -eq 0 ]]; then
+    echo "includes.sh: no sources under $PWD"
+    exit 2
+fi
+
+for file in "${sources[@]}"; do
+    case "$file" in
+        *.cpp | *.cpp.in) ;;
+        *.hpp | *.hpp.in)
+            grep -qx '#pragma once' "$file" || complain "$file: no #pragma once"
+            ;;
+        *) complain "$file: sources are called .cpp and .hpp" ;;
+    esac
+    room_of "$file"
+    from="$room"
+    if [[ -z ${may[$from]+placed} ]]; then
+        complain "$file: room '$from' has no line in the table of tests/architecture/includes.sh"
+        continue
+    fi
+    stem="${file##*/}"
+    stem="${stem%%.*}"
+    first=yes
+
+    while IFS=: read -r line text; do
+        [[ $text =~ ^[[:space:]]*\#[[:space:]]*include[[:space:]]*([\"\<])([^\">]+)[\"\>] ]] || continue
+        mark="${BASH_REMATCH[1]}"
+        target="${BASH_REMATCH[2]}"
+        ours=no
+        case "$target" in engine/* | analysis/* | app/* | tests/*) ours=yes ;; esac
+        if [[ $mark == "<" ]]; then
+            [[ $ours == yes ]] || continue
+            complain "$file:$line: <$target> is ours and wants quotes"
+        fi
+        if [[ $ours == no || /$target/ == */./* || /$target/ == */../* ]]; then
+            complain "$file:$line: \"$target\" is not a path from the top of the repository"
+            continue
+        fi
+        if [[ ! -f $target ]]; then
+            complain "$file:$line: \"$target\" does not exist"
+            continue
+        fi
+        room_of "$target"
+        allowed "$from" "$room" || complain "$file:$line: $from must not include $room ($target)"
+        # A source's own header is its first include and has its name; the two stand in one folder. Tests have none.
+        name="${target##*/}"
+        if [[ $first == yes && $from != tests && $file == *.cpp && ${name%.hpp} == "$stem" && $target != "${file%.cpp}.hpp" ]]; then
+            complain "$file:$line: its header $target is not beside it"
+        fi
+        first=no
+    done < <(grep -nE '^[[:space:]]*#[[:space:]]*include' "$file" || true)
+done
+
+if [[ $bad -ne 0 ]]; then
+    echo "$bad against the rules in ${#sources[@]} files"
+    exit 1
+fi
+echo "${#sources[@]} files, every include along the arrows"

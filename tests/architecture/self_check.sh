@@ -1,0 +1,94 @@
+#!/usr/bin/env bash
+# Shows that the other two can fail: `self_check.sh FOLDER` makes trees in FOLDER/made_up, a clean one that must pass
+# and, one at a time, faults that must each be found and named.
+set -euo pipefail
+here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd -P)"
+mkdir -p "${1:?usage: self_check.sh FOLDER}/made_up"
+folder="$(cd "$1/made_up" && pwd -P)"
+unset GIT_DIR GIT_WORK_TREE GIT_INDEX_FILE
+
+bad=0
+checks=0
+clean_tree() {
+    rm -rf "$folder"
+    mkdir -p "$folder"/{engine/{core,gyro,random,ensemble,store},analysis/{allan,report},app,tests/unit}
+    cd "$folder"
+    echo '#pragma once' | tee engine/core/units.hpp engine/random/stream.hpp engine/store/file.hpp \
+        analysis/allan/allan.hpp app/command.hpp >engine/gyro/device.hpp
+    printf '#include "engine/gyro/device.hpp"\n#include <vector>\n#include "engine/core/units.hpp"\n' \
+        >engine/gyro/device.cpp
+    printf '#include "engine/gyro/device.hpp"\n' >engine/ensemble/run.cpp
+    printf '#include "analysis/allan/allan.hpp"\n#include "engine/core/units.hpp"\n' >analysis/allan/allan.cpp
+    printf '#include "analysis/allan/allan.hpp"\n#include "engine/store/file.hpp"\n' >analysis/report/plot.cpp
+    printf '#include "app/command.hpp"\n' | tee tests/unit/command.cpp >app/main.cpp
+}
+
+# expect STATUS WORDS SCRIPT: SCRIPT on the tree ends with STATUS and its output has WORDS.
+expect() {
+    local status=0 output
+    output="$("$here/$3" "$folder" 2>&1)" || status=$?
+    checks=$((checks + 1))
+    if [[ $status -ne $1 || $output != *"$2"* ]]; then
+        echo "$3: expected status $1 and '$2', got status $status and: $output"
+        bad=1
+    fi
+}
+
+# include_fault WORDS FILE LINE: the clean tree with LINE added to FILE must be refused with WORDS.
+include_fault() {
+    clean_tree
+    mkdir -p "$(dirname "$2")"
+    echo "$3" >>"$2"
+    expect 1 "$1" includes.sh
+}
+
+clean_tree
+expect 0 "12 files" includes.sh
+# Nothing to read is not a success.
+rm -rf "$folder"/{engine,analysis,app,tests}
+expect 2 "no sources" includes.sh
+
+include_fault "engine/gyro must not include analysis/allan" engine/gyro/device.cpp '#include "analysis/allan/allan.hpp"'
+include_fault "engine/gyro must not include app" engine/gyro/device.cpp '#include "app/command.hpp"'
+include_fault "engine/core must not include engine/gyro" engine/core/units.hpp '#include "engine/gyro/device.hpp"'
+include_fault "engine/gyro must not include engine/random" engine/gyro/device.hpp '  #  include "engine/random/stream.hpp"'
+include_fault "engine/ensemble must not include engine/store" engine/ensemble/run.cpp '#include "engine/store/file.hpp"'
+include_fault "analysis/allan must not include engine/gyro" analysis/allan/allan.cpp '#include "engine/gyro/device.hpp"'
+include_fault "analysis/report must not include app" analysis/report/plot.cpp '#include "app/command.hpp"'
+include_fault "is ours and wants quotes" engine/gyro/device.cpp '#include <engine/core/units.hpp>'
+include_fault "engine/gyro must not include app" engine/gyro/device.cpp '#include <app/command.hpp>'
+include_fault "not a path from the top" engine/gyro/device.cpp '#include "device.hpp"'
+include_fault "not a path from the top" engine/gyro/device.cpp '#include "engine/gyro/../core/units.hpp"'
+include_fault "does not exist" engine/gyro/device.cpp '#include "engine/core/unit.hpp"'
+include_fault "no #pragma once" engine/gyro/naked.hpp '// nothing'
+include_fault "sources are called" engine/gyro/device.h '#pragma once'
+include_fault "room 'engine/attic' has no line" engine/attic/old.cpp '// nothing'
+include_fault "room 'engine' has no line" engine/loose.cpp '// nothing'
+include_fault "is not beside it" engine/ensemble/device.cpp '#include "engine/gyro/device.hpp"'
+
+# text_fault STATUS WORDS LINE: a fresh repository whose one file has LINE. Slashes and words are put together here, for
+# this file is read by the same check.
+text_fault() {
+    rm -rf "$folder"
+    mkdir -p "$folder"
+    git -C "$folder" -c init.defaultBranch=main init -q
+    echo "$3" >"$folder/notes.md"
+    expect "$1" "$2" text.sh
+}
+if command -v git >/dev/null; then
+    s=/
+    text_fault 0 "" "engine/home/x, a rate per root/hour, ../work and ~/work are no such paths"
+    text_fault 1 "notes.md:1:" "see ${s}home/someone/x"
+    text_fault 1 "notes.md:1:" "DATA=\"${s}root/data\""
+    text_fault 1 "notes.md:1:" "cd ${s}work"
+    text_fault 1 "notes.md:1:" "// TO""DO: later"
+    text_fault 1 "notes.md:1:" "FIX""ME"
+    text_fault 0 "" "TODOS and fixme-not"
+    mkdir "$folder/below"
+    folder="$folder/below" expect 77 "skipped" text.sh
+fi
+
+if [[ $bad -eq 0 ]]; then
+    echo "$checks checks behave"
+fi
+exit $bad

@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# `text.sh ROOT` fails where a text file of the repository names a folder of one machine or an open end.
+# Ends with 77, which ctest counts as skipped, outside a git checkout.
+set -euo pipefail
+cd "${1:?usage: text.sh ROOT}"
+
+if ! command -v git >/dev/null; then
+    echo "skipped: no git"
+    exit 77
+fi
+if ! git rev-parse --show-toplevel; then
+    echo "skipped: not a git checkout"
+    exit 77
+fi
+# A copy without its own .git inside another checkout would be judged by the other's list of files.
+if [[ $(git rev-parse --show-cdup) != "" ]]; then
+    echo "skipped: not the top of a git checkout"
+    exit 77
+fi
+
+bad=0
+# check WHAT PATTERN: files that git tracks or would add. The brackets in the patterns keep them from matching
+# themselves.
+check() {
+    local found=0
+    git grep --untracked -nIE -e "$2" || found=$?
+    case $found in
+        0)
+            echo "^ $1"
+            bad=1
+            ;;
+        1) ;;
+        *)
+            echo "text.sh: git grep failed"
+            exit 2
+            ;;
+    esac
+}
+check "path of one machine" '(^|[^[:alnum:]_.}~/])/((hom[e]|User[s]|roo[t])/|(wor[k]|workspac[e])($|[^[:alnum:]_]))'
+check "open end; write it into the changelog or do it" '(^|[^[:alnum:]_])(TOD[O]|FIXM[E])($|[^[:alnum:]_])'
+exit $bad
