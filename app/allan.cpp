@@ -1,4 +1,4 @@
-#include "app/allan.hpp"
+#include "app/command.hpp"
 
 #include <fmt/format.h>
 

@@ -1,25 +1,65 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdio>
+#include <exception>
+#include <new>
+#include <string_view>
 
-#include "app/allan.hpp"
+#include "app/command.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/interrupt.hpp"
+#include "engine/core/version.hpp"
+
+namespace {
+
+constexpr int done = 0;
+constexpr int run_failed = 1;
+constexpr int input_wrong = 2;
+
+int complain(int status, std::string_view what) {
+    fmt::print(stderr, "ringlock: error: {}\n", what);
+    return status;
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
-    CLI::App app{"ringlock"};
-    app.require_subcommand(1);
-    ringlock::app::add_allan(app);
+    namespace app = ringlock::app;
+    CLI::App root{
+        "ringlock: which cure for the lock-in of a dithered ring laser gyro, when and how well.\n"
+        "Simulates ensembles of dithered gyros, compares uncompensated, noise-injected and compensated outputs, and\n"
+        "computes Allan deviation and angle random walk.",
+        "ringlock"};
+    root.set_version_flag("--version",
+                          fmt::format("ringlock {} ({})", ringlock::version(), ringlock::git_hash()));
+    root.require_subcommand(1);
+    root.footer("Exit status: 0 done; 1 the run failed; 2 the input or the command line is wrong.");
+    app::add_run(root, {argv, static_cast<std::size_t>(argc)});
+    app::add_analyze(root);
+    app::add_allan(root);
+    app::add_validate(root);
+    app::add_planned(root);
     try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& e) {
-        return app.exit(e) == 0 ? 0 : 2;
-    } catch (const ringlock::InputError& e) {
-        fmt::print(stderr, "ringlock: error: {}\n", e.what());
-        return 2;
-    } catch (const ringlock::RunError& e) {
-        fmt::print(stderr, "ringlock: error: {}\n", e.what());
-        return 1;
+        const ringlock::InterruptGuard guard;
+        root.parse(argc, argv);
+        return done;
+    } catch (const CLI::ParseError& error) {
+        return root.exit(error) == 0 ? done : input_wrong;
+    } catch (const ringlock::InputError& error) {
+        return complain(input_wrong, error.what());
+    } catch (const ringlock::RunError& error) {
+        return complain(run_failed, error.what());
+    } catch (const ringlock::Interrupted&) {
+        fmt::print(stderr, "ringlock: interrupted, nothing written\n");
+    } catch (const std::bad_alloc&) {
+        return complain(run_failed, "out of memory; run fewer gyros at a time, or store fewer samples");
+    } catch (const std::exception& error) {
+        return complain(run_failed, error.what());
     }
-    return 0;
+    // End by the signal itself, as shells and batch systems expect of a program that was interrupted.
+    std::signal(SIGINT, SIG_DFL);
+    std::raise(SIGINT);
+    return run_failed;
 }

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <limits>
 
 #include "analysis/noise/ensemble.hpp"
+#include "engine/core/units.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/gyro/theory.hpp"
 
@@ -15,18 +17,31 @@ namespace {
 constexpr double median_level = 0.95;
 constexpr double confidence = 0.682689492137;
 
+/// 95 % limit of an angle random walk [deg/sqrt(h)] that a record does not show.
+///
+/// The fit gives one; where it cannot (a record too short or without noise), any term is at most the whole Allan
+/// deviation: N^2/tau <= sigma^2(tau), and the upper chi-squared limit of the smallest of these holds.
+double upper_limit(const GyroStatistics& gyro) {
+    if (gyro.noise.arw_deg_rt_h.hi) return *gyro.noise.arw_deg_rt_h.hi;
+    double limit = std::numeric_limits<double>::infinity();
+    for (const allan::Point& point : gyro.allan) {
+        if (!(point.edf > 0.0)) continue;
+        const double hi = point.dev * std::sqrt(point.edf / quantile(boost::math::chi_squared(point.edf), 0.05));
+        limit = std::min(limit, hi * std::sqrt(point.tau_s) * units::deg_rt_h_per_arcsec_rt_s);
+    }
+    return limit;
+}
+
 /// A noise coefficient over the gyros of an arm. It is the ensemble's where most records resolve it; a record that does
 /// not counts as zero among the others.
 Figure figure(const ArmStatistics& arm, noise::Coefficient noise::NoiseFit::* which, std::uint64_t seed) {
     std::vector<double> values;
-    std::vector<double> limits;
     Figure result;
     for (const GyroStatistics& gyro : arm.gyros) {
         const noise::Coefficient& coefficient = gyro.noise.*which;
         const bool shown = coefficient.resolved && gyro.noise.described;
         values.push_back(shown ? *coefficient.value : 0.0);
         if (shown) ++result.resolved;
-        if (coefficient.hi) limits.push_back(*coefficient.hi);
     }
     if (2 * result.resolved > static_cast<std::int64_t>(arm.gyros.size())) {
         const noise::Range range = noise::central_range(values);
@@ -36,7 +51,16 @@ Figure figure(const ArmStatistics& arm, noise::Coefficient noise::NoiseFit::* wh
         result.hi = range.hi;
         result.median_lo = median.lo;
         result.median_hi = median.hi;
-    } else if (!limits.empty()) {
+    }
+    return result;
+}
+
+/// The angle random walk of an arm: never without an upper end.
+Figure angle_random_walk(const ArmStatistics& arm, std::uint64_t seed) {
+    Figure result = figure(arm, &noise::NoiseFit::arw_deg_rt_h, seed);
+    if (!result.median) {
+        std::vector<double> limits;
+        for (const GyroStatistics& gyro : arm.gyros) limits.push_back(upper_limit(gyro));
         result.hi = noise::quantile(limits, 0.5);
     }
     return result;
@@ -78,6 +102,7 @@ std::vector<SweepPoint> sweep(const Study& study, const ArmStatistics& arm) {
         SweepPoint point;
         point.input_rate_deg_h = ensemble::input_rate_deg_h(study.scenario, static_cast<std::int64_t>(first));
         point.gyros = study.scenario.ensemble.gyros;
+        point.can_tell = std::abs(point.input_rate_deg_h) > fringe_rate_deg_h;
         std::vector<double> rates;
         for (std::size_t i = first; i < first + members; ++i) {
             rates.push_back(point.input_rate_deg_h + arm.gyros[i].rate_error_deg_h);
@@ -91,6 +116,16 @@ std::vector<SweepPoint> sweep(const Study& study, const ArmStatistics& arm) {
 
 }  // namespace
 
+std::optional<double> locked_up_to_deg_h(const ArmSummary& arm) {
+    std::optional<double> edge;
+    for (const SweepPoint& point : arm.sweep) {
+        if (!point.can_tell) continue;
+        if (point.locked < point.gyros) break;
+        edge = point.input_rate_deg_h;
+    }
+    return edge;
+}
+
 Summary summarise(const Study& study) {
     Summary summary;
     summary.seed = study.scenario.ensemble.seed;
@@ -102,9 +137,11 @@ Summary summarise(const Study& study) {
         out.name = arm.arm.name;
         out.gyros = static_cast<std::int64_t>(arm.gyros.size());
         out.noise_injected = arm.arm.noise_injected;
-        if (out.noise_injected) out.arw_deg_rt_h = figure(arm, &noise::NoiseFit::arw_deg_rt_h, summary.seed);
-        const Figure floor = figure(arm, &noise::NoiseFit::bias_instability_deg_h, summary.seed);
-        if (floor.median) out.bias_instability_deg_h = floor;
+        if (out.noise_injected) out.arw_deg_rt_h = angle_random_walk(arm, summary.seed);
+        if (arm.arm.ideal || arm.arm.noise_injected) {
+            const Figure floor = figure(arm, &noise::NoiseFit::bias_instability_deg_h, summary.seed);
+            if (floor.median) out.bias_instability_deg_h = floor;
+        }
         std::vector<double> errors;
         for (const GyroStatistics& gyro : arm.gyros) errors.push_back(gyro.rate_error_deg_h);
         out.rate_error_deg_h = mean_figure(errors);

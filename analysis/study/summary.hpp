@@ -38,6 +38,7 @@ struct SweepPoint {
     double input_rate_deg_h = 0.0;
     MeanFigure output_rate_deg_h;
     std::int64_t locked = 0;  ///< gyros whose output moved by less than a fringe over the whole record
+    bool can_tell = true;     ///< the input moves by more than a fringe, so that locked and free differ
     std::int64_t gyros = 0;
 };
 
@@ -64,8 +65,13 @@ struct Summary {
     Theory theory;  ///< of the scenario's device without spread
 };
 
-/// Sums the study up. No angle random walk is claimed for an arm without injected noise (its error is deterministic: a
-/// dead band and a staircase), no bias instability unless most records resolve an Allan floor.
+/// Highest rate of the sweep up to which, from its first rate that can tell on, every gyro of the arm is locked; none
+/// where the first is not.
+std::optional<double> locked_up_to_deg_h(const ArmSummary& arm);
+
+/// Sums the study up. No noise is claimed for a locking arm without injected noise: its error is deterministic, a dead
+/// band and a staircase, whatever spectrum it has. No bias instability is claimed unless most records resolve an Allan
+/// floor. An angle random walk is claimed where noise is injected only.
 Summary summarise(const Study& study);
 
 }  // namespace ringlock::study

@@ -1,0 +1,335 @@
+#include "analysis/study/result_file.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "engine/core/error.hpp"
+#include "engine/scenario/parse.hpp"
+#include "engine/scenario/render.hpp"
+
+namespace ringlock::study {
+
+namespace {
+
+constexpr const char* format_name = "ringlock-result";
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+double or_nan(const std::optional<double>& value) { return value.value_or(nan); }
+std::optional<double> or_nothing(double value) { return std::isnan(value) ? std::nullopt : std::optional(value); }
+
+/// One drawn parameter of a gyro and its dataset.
+struct DrawnParameter {
+    const char* name;
+    const char* unit;
+    const char* description;
+    double gyro::Setup::* field;
+};
+
+constexpr std::array drawn_parameters = {
+    DrawnParameter{"input_rate_deg_h", "deg/h", "input rate", &gyro::Setup::input_rate_deg_h},
+    DrawnParameter{"initial_phase_rad", "rad", "optical phase at the first turn", &gyro::Setup::initial_phase_rad},
+    DrawnParameter{"dither_asymmetry_ratio", "1", "positive half cycles stronger by it, and shorter",
+                   &gyro::Setup::dither_asymmetry_ratio},
+    DrawnParameter{"lockin_threshold_deg_h", "deg/h", "lock-in threshold", &gyro::Setup::lockin_threshold_deg_h},
+    DrawnParameter{"dither_peak_rate_deg_s", "deg/s", "mean peak rate of the dither",
+                   &gyro::Setup::dither_peak_rate_deg_s},
+};
+
+/// One noise coefficient and its datasets NAME, NAME_lo, NAME_hi.
+struct CoefficientColumn {
+    const char* name;
+    const char* unit;
+    const char* description;
+    noise::Coefficient noise::NoiseFit::* field;
+};
+
+constexpr std::array coefficient_columns = {
+    CoefficientColumn{"quantization_arcsec", "arcsec", "white angle noise Q", &noise::NoiseFit::quantization_arcsec},
+    CoefficientColumn{"arw_deg_rt_h", "deg/sqrt(h)", "angle random walk N", &noise::NoiseFit::arw_deg_rt_h},
+    CoefficientColumn{"bias_instability_deg_h", "deg/h", "bias instability B",
+                      &noise::NoiseFit::bias_instability_deg_h},
+    CoefficientColumn{"rrw_deg_h_rt_h", "deg/h/sqrt(h)", "rate random walk K", &noise::NoiseFit::rrw_deg_h_rt_h},
+    CoefficientColumn{"rate_ramp_deg_h_h", "deg/h/h", "rate ramp R", &noise::NoiseFit::rate_ramp_deg_h_h},
+};
+
+/// One column of the Allan deviations of the gyros.
+struct AllanColumn {
+    const char* name;
+    const char* unit;
+    const char* description;
+    double allan::Point::* field;
+};
+
+constexpr std::array allan_columns = {
+    AllanColumn{"deviation_deg_h", "deg/h", "overlapping Allan deviation", &allan::Point::dev},
+    AllanColumn{"deviation_lo_deg_h", "deg/h", "lower end of its 68.27 % interval", &allan::Point::lo},
+    AllanColumn{"deviation_hi_deg_h", "deg/h", "upper end of its 68.27 % interval", &allan::Point::hi},
+    AllanColumn{"edf", "1", "equivalent degrees of freedom", &allan::Point::edf},
+};
+
+const char* compensator_name(scenario::Compensator compensator) {
+    switch (compensator) {
+        case scenario::Compensator::published: return "published";
+        case scenario::Compensator::corrected: return "corrected";
+        case scenario::Compensator::none: break;
+    }
+    return "none";
+}
+
+std::vector<double> over_gyros(const ArmStatistics& arm, const std::function<double(const GyroStatistics&)>& what) {
+    std::vector<double> values;
+    values.reserve(arm.gyros.size());
+    for (const GyroStatistics& gyro : arm.gyros) values.push_back(what(gyro));
+    return values;
+}
+
+void write_noise(store::Group& group, const ArmStatistics& arm) {
+    store::Group noise = group.create_group("noise");
+    for (const CoefficientColumn& column : coefficient_columns) {
+        const std::string name = column.name;
+        const auto get = [&](std::optional<double> noise::Coefficient::* part) {
+            return over_gyros(arm, [&](const GyroStatistics& g) { return or_nan(g.noise.*column.field.*part); });
+        };
+        noise.write(name, get(&noise::Coefficient::value),
+                    {column.unit, fmt::format("{}; NaN where the record does not show it", column.description)});
+        noise.write(name + "_lo", get(&noise::Coefficient::lo),
+                    {column.unit, fmt::format("{}: lower end of its 68.27 % interval", column.description)});
+        noise.write(name + "_hi", get(&noise::Coefficient::hi),
+                    {column.unit, fmt::format("{}: upper end, or a 95 % limit where not shown", column.description)});
+    }
+    std::vector<std::int8_t> described;
+    for (const GyroStatistics& gyro : arm.gyros) described.push_back(gyro.noise.described ? 1 : 0);
+    noise.write("described", described, {"1", "1 where the noise model describes the record"});
+}
+
+void write_allan(store::Group& group, const Study& study, const ArmStatistics& arm, const ArmSummary& summary) {
+    store::Group allan = group.create_group("allan");
+    const std::size_t taus = study.factors.size();
+    const store::Shape shape{arm.gyros.size(), taus};
+    std::vector<double> tau;
+    for (const std::int64_t m : study.factors) tau.push_back(static_cast<double>(m) * study.schedule.sample_interval_s);
+    allan.write("tau_s", tau, {"s", "averaging times"});
+    allan.write("averaging_factor", study.factors, {"1", "averaging times in samples"});
+    for (const AllanColumn& column : allan_columns) {
+        std::vector<double> values;
+        for (const GyroStatistics& gyro : arm.gyros) {
+            for (const allan::Point& point : gyro.allan) values.push_back(point.*column.field);
+        }
+        allan.write(column.name, std::span<const double>(values), shape, {column.unit, column.description});
+    }
+    std::vector<std::int8_t> alpha;
+    std::vector<std::int64_t> terms;
+    for (const GyroStatistics& gyro : arm.gyros) {
+        for (const allan::Point& point : gyro.allan) alpha.push_back(static_cast<std::int8_t>(point.alpha));
+    }
+    for (const allan::Point& point : arm.gyros.front().allan) terms.push_back(point.terms);
+    allan.write("alpha", std::span<const std::int8_t>(alpha), shape, {"1", "power law assumed for edf: S(f) ~ f^alpha"});
+    allan.write("terms", terms, {"1", "squared differences in each deviation"});
+
+    const auto ensemble = [&](double EnsemblePoint::* field) {
+        std::vector<double> values;
+        for (const EnsemblePoint& point : summary.allan) values.push_back(point.*field);
+        return values;
+    };
+    allan.write("ensemble_deviation_deg_h", ensemble(&EnsemblePoint::dev_deg_h),
+                {"deg/h", "root of the mean Allan variance over the gyros"});
+    allan.write("ensemble_deviation_lo_deg_h", ensemble(&EnsemblePoint::lo), {"deg/h", "lower end of its 68.27 % interval"});
+    allan.write("ensemble_deviation_hi_deg_h", ensemble(&EnsemblePoint::hi), {"deg/h", "upper end of its 68.27 % interval"});
+    allan.write("ensemble_edf", ensemble(&EnsemblePoint::edf), {"1", "equivalent degrees of freedom, summed"});
+}
+
+/// The figures of the summary, for readers that want no computing; NaN where nothing is claimed.
+void write_figures(store::Group& group, const ArmSummary& summary) {
+    const auto figure = [&](const std::string& name, const Figure& f) {
+        group.set_attribute(name + "_median", or_nan(f.median));
+        group.set_attribute(name + "_lo", or_nan(f.lo));
+        group.set_attribute(name + "_hi", or_nan(f.hi));
+        group.set_attribute(name + "_median_ci_lo", or_nan(f.median_lo));
+        group.set_attribute(name + "_median_ci_hi", or_nan(f.median_hi));
+    };
+    figure("arw_deg_rt_h", summary.noise_injected ? summary.arw_deg_rt_h : Figure{});
+    figure("bias_instability_deg_h", summary.bias_instability_deg_h.value_or(Figure{}));
+    group.set_attribute("rate_error_deg_h_mean", summary.rate_error_deg_h.mean);
+    group.set_attribute("rate_error_deg_h_lo", summary.rate_error_deg_h.lo);
+    group.set_attribute("rate_error_deg_h_hi", summary.rate_error_deg_h.hi);
+}
+
+void write_gyros(store::Group& root, const Study& study) {
+    store::Group gyros = root.create_group("gyros");
+    for (const DrawnParameter& parameter : drawn_parameters) {
+        std::vector<double> values;
+        for (const gyro::Setup& setup : study.gyros) values.push_back(setup.*parameter.field);
+        gyros.write(parameter.name, values, {parameter.unit, parameter.description});
+    }
+}
+
+bool is_result(const store::File& file) {
+    return file.has_attribute("format") && file.string_attribute("format") == format_name;
+}
+
+/// Keeps results that are there: only a result of this very study may be replaced.
+std::filesystem::path refuse_to_lose(const std::filesystem::path& path, const Study& study) {
+    if (!std::filesystem::exists(path)) return path;
+    bool same = false;
+    try {
+        const store::File file = store::File::open(path);
+        same = is_result(file) && file.dataset("scenario").read<std::string>().at(0) == scenario::to_toml(study.scenario);
+    } catch (const std::exception&) {
+        // Not HDF5 or not readable: somebody's file all the same.
+    }
+    if (!same) {
+        throw InputError(fmt::format("{}: the file is there and is not a result of this scenario and seed; it is kept. Give "
+                                     "another name with -o, or remove it",
+                                     path.string()));
+    }
+    return path;
+}
+
+}  // namespace
+
+std::uint64_t expected_size_bytes(const Study& study) {
+    const auto gyros = static_cast<std::uint64_t>(study.gyros.size());
+    const auto arms = static_cast<std::uint64_t>(study.arms.size());
+    const auto samples = study.scenario.output.angle_record ? static_cast<std::uint64_t>(study.schedule.samples) : 0;
+    const std::uint64_t statistics = 8 * (3 * coefficient_columns.size() + 1 + allan_columns.size() * study.factors.size());
+    return gyros * (8 * drawn_parameters.size() + arms * (8 * samples + statistics));
+}
+
+ResultWriter::ResultWriter(const std::filesystem::path& path, const Study& study)
+    : file_(refuse_to_lose(path, study)) {
+    store::File& root = file_.file();
+    root.set_attribute("format", format_name);
+    root.set_attribute("format_version", result_format_version);
+    root.set_attribute("seed", study.scenario.ensemble.seed);
+    root.write("scenario", std::vector<std::string>{scenario::to_toml(study.scenario)},
+                {"", "the full resolved scenario, TOML"});
+    store::Group arms = root.create_group("arms");
+    for (const ArmStatistics& arm : study.arms) {
+        store::Group group = arms.create_group(arm.arm.name);
+        group.set_attribute("ideal", static_cast<std::int64_t>(arm.arm.ideal));
+        group.set_attribute("noise_injected", static_cast<std::int64_t>(arm.arm.noise_injected));
+        group.set_attribute("compensator", compensator_name(arm.arm.compensator));
+        if (!study.scenario.output.angle_record) continue;
+        records_.push_back(group.create_dataset<double>(
+            "angle_arcsec", {study.gyros.size(), static_cast<std::uint64_t>(study.schedule.samples)},
+            {"arcsec", "angle output with the dither stripped, one row a gyro"}));
+    }
+}
+
+void ResultWriter::write_record(std::int64_t gyro, const std::vector<std::vector<double>>& angle_arcsec) {
+    for (std::size_t arm = 0; arm < records_.size(); ++arm) {
+        records_[arm].write_rows(static_cast<std::uint64_t>(gyro), 1, std::span<const double>(angle_arcsec[arm]));
+    }
+}
+
+void ResultWriter::finish(const Study& study, const Summary& summary, const store::Provenance& provenance) {
+    store::File& root = file_.file();
+    root.set_attribute("turns", study.turns);
+    root.set_attribute("turns_off_table", study.turns_off_table);
+    root.set_attribute("turn_map_error_rad", study.turn_map_error_rad);
+    root.set_attribute("sample_interval_s", study.schedule.sample_interval_s);
+    root.set_attribute("theory_arw_deg_rt_h", summary.theory.arw_deg_rt_h);
+    root.set_attribute("theory_dead_band_deg_h", summary.theory.dead_band_deg_h);
+    store::write_provenance(root, provenance);
+    write_gyros(root, study);
+    for (std::size_t i = 0; i < study.arms.size(); ++i) {
+        store::Group group = root.group("arms").group(study.arms[i].arm.name);
+        group.write("rate_error_deg_h", over_gyros(study.arms[i], [](const GyroStatistics& g) { return g.rate_error_deg_h; }),
+                    {"deg/h", "mean output rate less the input rate"});
+        write_noise(group, study.arms[i]);
+        write_allan(group, study, study.arms[i], summary.arms[i]);
+        write_figures(group, summary.arms[i]);
+    }
+    records_.clear();
+    file_.commit();
+}
+
+namespace {
+
+std::vector<double> read_column(const store::Group& group, const std::string& name, std::size_t expected) {
+    const store::Dataset dataset = group.dataset(name);
+    auto values = dataset.read<double>();
+    if (values.size() != expected) {
+        throw InputError(fmt::format("{}: dataset {} holds {} numbers, {} are wanted: the result is damaged", dataset.file(),
+                                     dataset.path(), values.size(), expected));
+    }
+    return values;
+}
+
+void read_arm(const store::Group& group, const Study& study, ArmStatistics& arm) {
+    const std::size_t gyros = arm.gyros.size();
+    const std::size_t taus = study.factors.size();
+    const auto errors = read_column(group, "rate_error_deg_h", gyros);
+    for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].rate_error_deg_h = errors[g];
+    const store::Group noise = group.group("noise");
+    for (const CoefficientColumn& column : coefficient_columns) {
+        const std::string name = column.name;
+        const auto value = read_column(noise, name, gyros);
+        const auto lo = read_column(noise, name + "_lo", gyros);
+        const auto hi = read_column(noise, name + "_hi", gyros);
+        for (std::size_t g = 0; g < gyros; ++g) {
+            noise::Coefficient& coefficient = arm.gyros[g].noise.*column.field;
+            coefficient = {!std::isnan(value[g]), or_nothing(value[g]), or_nothing(lo[g]), or_nothing(hi[g])};
+        }
+    }
+    const auto described = read_column(noise, "described", gyros);
+    for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].noise.described = described[g] != 0.0;
+    const store::Group allan = group.group("allan");
+    const auto tau = read_column(allan, "tau_s", taus);
+    const auto alpha = read_column(allan, "alpha", gyros * taus);
+    const auto terms = read_column(allan, "terms", taus);
+    for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].allan.resize(taus);
+    for (const AllanColumn& column : allan_columns) {
+        const auto values = read_column(allan, column.name, gyros * taus);
+        for (std::size_t g = 0; g < gyros; ++g) {
+            for (std::size_t t = 0; t < taus; ++t) {
+                allan::Point& point = arm.gyros[g].allan[t];
+                point.*column.field = values[g * taus + t];
+                point.m = study.factors[t];
+                point.tau_s = tau[t];
+                point.terms = static_cast<std::int64_t>(terms[t]);
+                point.alpha = static_cast<int>(alpha[g * taus + t]);
+            }
+        }
+    }
+}
+
+}  // namespace
+
+Study read_result(const std::filesystem::path& path) {
+    const store::File file = store::File::open(path);
+    if (!is_result(file)) {
+        throw InputError(fmt::format("{}: not a ringlock result (attribute \"format\" is not \"{}\"); results are written by "
+                                     "ringlock run",
+                                     path.string(), format_name));
+    }
+    const std::int64_t version = file.int_attribute("format_version");
+    if (version != result_format_version) {
+        throw InputError(fmt::format("{}: format_version is {}, this program reads {}", path.string(), version,
+                                     result_format_version));
+    }
+    const auto text = file.dataset("scenario").read<std::string>();
+    if (text.size() != 1) throw InputError(fmt::format("{}: dataset /scenario must hold one text", path.string()));
+    Study study(scenario::parse_string(text[0], path.string() + ":/scenario"));
+    study.turns = file.int_attribute("turns");
+    study.turns_off_table = file.int_attribute("turns_off_table");
+    study.turn_map_error_rad = file.double_attribute("turn_map_error_rad");
+    const store::Group gyros = file.group("gyros");
+    for (const DrawnParameter& parameter : drawn_parameters) {
+        const auto values = read_column(gyros, parameter.name, study.gyros.size());
+        for (std::size_t g = 0; g < values.size(); ++g) study.gyros[g].*parameter.field = values[g];
+    }
+    for (ArmStatistics& arm : study.arms) read_arm(file.group("arms").group(arm.arm.name), study, arm);
+    return study;
+}
+
+store::Provenance read_provenance(const std::filesystem::path& path) {
+    return store::read_provenance(store::File::open(path));
+}
+
+}  // namespace ringlock::study

@@ -1,0 +1,45 @@
+#pragma once
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "analysis/study/study.hpp"
+#include "analysis/study/summary.hpp"
+#include "engine/store/atomic_file.hpp"
+#include "engine/store/provenance.hpp"
+
+/// The result file; results/FORMAT.md lists every dataset.
+namespace ringlock::study {
+
+inline constexpr std::int64_t result_format_version = 1;
+
+/// Writes a result as the study goes on: angle records as gyros finish, the rest at the end. The file has its name only
+/// after finish().
+class ResultWriter {
+   public:
+    /// Claims the output. Throws InputError where it cannot be written, or where another study's result has the name:
+    /// a result of the same scenario and seed is replaced, anything else is kept.
+    ResultWriter(const std::filesystem::path& path, const Study& study);
+
+    /// Writes the angle records of a gyro, [arm][sample] in arcsec. From any thread.
+    void write_record(std::int64_t gyro, const std::vector<std::vector<double>>& angle_arcsec);
+    /// Writes everything else and gives the file its name.
+    void finish(const Study& study, const Summary& summary, const store::Provenance& provenance);
+
+    const std::filesystem::path& path() const { return file_.target(); }
+
+   private:
+    store::AtomicFile file_;
+    std::vector<store::Dataset> records_;  // one for each arm, or none
+};
+
+/// Bytes a result file of this study will take, but for some kilobytes.
+std::uint64_t expected_size_bytes(const Study& study);
+
+/// Reads a result without its angle records. Throws InputError where the file is no result or is damaged.
+Study read_result(const std::filesystem::path& path);
+
+/// The provenance of a result.
+store::Provenance read_provenance(const std::filesystem::path& path);
+
+}  // namespace ringlock::study

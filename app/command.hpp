@@ -1,0 +1,20 @@
+#pragma once
+#include <span>
+
+namespace CLI {
+class App;
+}
+
+/// The subcommands. Each adds itself to the program; its callback runs it and throws InputError (exit status 2),
+/// RunError (1) or Interrupted.
+namespace ringlock::app {
+
+/// `command_line` begins with the program's name and must outlive the program's options.
+void add_run(CLI::App& root, std::span<const char* const> command_line);
+void add_analyze(CLI::App& root);
+void add_allan(CLI::App& root);
+void add_validate(CLI::App& root);
+/// Commands of the contract that are not built yet: they say so.
+void add_planned(CLI::App& root);
+
+}  // namespace ringlock::app

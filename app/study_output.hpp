@@ -1,0 +1,19 @@
+#pragma once
+#include <string>
+
+#include "analysis/report/plot.hpp"
+#include "analysis/study/summary.hpp"
+#include "engine/store/provenance.hpp"
+
+namespace ringlock::app {
+
+/// What `run` and `analyze` print with --json: one object and a newline; what is not shown by the data is null.
+std::string study_json(const study::Study& study, const study::Summary& summary, const store::Provenance& provenance);
+
+/// The arm comparison with theory beside it, for people.
+std::string study_text(const study::Study& study, const study::Summary& summary, const store::Provenance& provenance);
+
+/// Allan deviations of all arms; of a sweep, output rate against input rate.
+report::Figure study_figure(const study::Study& study, const study::Summary& summary);
+
+}  // namespace ringlock::app

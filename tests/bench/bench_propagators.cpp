@@ -1,0 +1,135 @@
+// Turns per second of the ways to go from turn to turn, side by side in one run, on one thread.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/numeric/odeint/integrate/integrate_adaptive.hpp>
+#include <boost/numeric/odeint/stepper/generation.hpp>
+#include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "analysis/report/table.hpp"
+#include "engine/compensate/first_order.hpp"
+#include "engine/core/phase.hpp"
+#include "engine/dither/drive.hpp"
+#include "engine/ensemble/draw.hpp"
+#include "engine/ensemble/gyro_run.hpp"
+#include "engine/propagate/direct.hpp"
+#include "engine/propagate/turn_map.hpp"
+
+namespace {
+
+using namespace ringlock;
+
+/// Goes through a number of turns and returns something that depends on all of them.
+using Contender = std::function<double(int turns)>;
+
+struct Entry {
+    std::string name;
+    int turns;  ///< of one round, chosen to take some tenths of a second
+    Contender run;
+    std::vector<double> seconds_per_turn;
+};
+
+/// The same noisy dither for all propagators.
+Contender through(std::shared_ptr<propagate::Propagator> propagator, const gyro::Device& device) {
+    return [propagator, device](int turns) {
+        dither::Drive drive(device, 3.0, {1, 0});
+        Phase input(device.initial_phase_rad);
+        double lockin = 0.0;
+        for (int turn = 0; turn < turns; ++turn) {
+            const gyro::HalfCycle half = drive.after();
+            Phase phase = input;
+            phase.add(drive.turn_phase_rad() + lockin);
+            lockin += propagator->lockin_gain_rad(phase.remainder_rad, half, 0.0);
+            input.add(half.rate_rad_s * half.duration_s);
+            drive.advance();
+        }
+        return lockin;
+    };
+}
+
+/// Boost.odeint's Fehlberg 7(8) on the deviation from the plain phase.
+class Odeint final : public propagate::Propagator {
+   public:
+    Odeint(gyro::Coupling coupling, double tolerance_rad) : coupling_(coupling), tolerance_rad_(tolerance_rad) {}
+    double lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half, double /*mid_step_rad*/) override {
+        using Stepper = boost::numeric::odeint::runge_kutta_fehlberg78<double>;
+        double deviation = 0.0;
+        boost::numeric::odeint::integrate_adaptive(
+            boost::numeric::odeint::make_controlled<Stepper>(tolerance_rad_, tolerance_rad_),
+            [&](const double& x, double& rate, double t) {
+                rate = coupling_.b_rad_s * std::sin(phase_rad + half.plain_phase_rad(t) + x + coupling_.phase_rad);
+            },
+            deviation, 0.0, half.duration_s, 1e-8);
+        return deviation;
+    }
+
+   private:
+    gyro::Coupling coupling_;
+    double tolerance_rad_;
+};
+
+Contender read_and_corrected(const scenario::Scenario& scenario) {
+    return [scenario](int turns) {
+        const gyro::Setup setup = ensemble::nominal_setup(scenario);
+        ensemble::Trajectory trajectory(scenario, setup, {1, 0}, ensemble::Trajectory::Kind::noise_injected);
+        compensate::Corrected compensator({gyro::Device(setup).coupling.b_rad_s});
+        for (int turn = 0; turn < turns; ++turn) {
+            compensator.observe(trajectory.read().reading);
+            trajectory.advance();
+        }
+        return compensator.error_rad();
+    };
+}
+
+}  // namespace
+
+int main() {
+    scenario::Scenario scenario;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    const gyro::Device device(ensemble::nominal_setup(scenario));
+    const double a = device.dither_amplitude_rad;
+    const double margin = dither::Drive::amplitude_margin_rad(3.0);
+    const auto map = std::make_shared<propagate::TurnMap>(device.coupling, device.half_cycle(1.0, a), device.half_cycle(-1.0, a),
+                                                          propagate::TurnMap::Range{a - margin, a + margin}, 1e-8);
+    scenario::Scenario ideal = scenario;
+    ideal.readout.model = scenario::ReadoutModel::ideal;
+
+    std::vector<Entry> entries;
+    entries.push_back({"direct integrator, 1e-8 rad", 60,
+                       through(std::make_shared<propagate::DirectIntegrator>(device.coupling, 1e-8), device), {}});
+    entries.push_back({"Boost.odeint Fehlberg 7(8), 1e-8 rad", 60, through(std::make_shared<Odeint>(device.coupling, 1e-8), device), {}});
+    entries.push_back({"turn map, 1e-8 rad", 1000000, through(map, device), {}});
+    entries.push_back({"turn map, ideal readout, corrected", 300000, read_and_corrected(ideal), {}});
+    entries.push_back({"turn map, instrument readout, corrected", 60000, read_and_corrected(scenario), {}});
+
+    constexpr int rounds = 5;
+    double sink = 0.0;
+    for (int round = 0; round < rounds; ++round) {  // in turns, so that a machine that slows down slows all
+        for (Entry& entry : entries) {
+            const auto start = std::chrono::steady_clock::now();
+            sink += entry.run(entry.turns);
+            const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+            entry.seconds_per_turn.push_back(seconds / entry.turns);
+        }
+    }
+    for (Entry& entry : entries) std::sort(entry.seconds_per_turn.begin(), entry.seconds_per_turn.end());
+    const auto median = [](const Entry& entry) { return entry.seconds_per_turn[rounds / 2]; };
+
+    report::Table table({{"one turn by", report::Align::left},
+                         {"microseconds", report::Align::right},
+                         {"turns per second", report::Align::right},
+                         {"over the direct integrator", report::Align::right}});
+    for (const Entry& entry : entries) {
+        table.add_row({entry.name, fmt::format("{:.4g}", median(entry) * 1e6), fmt::format("{:.3g}", 1.0 / median(entry)),
+                       fmt::format("{:.4g}", median(entries.front()) / median(entry))});
+    }
+    fmt::print("{}", table.text());
+    fmt::print("Median of {} rounds, one thread, noise-injected dither of Gao & Deng's device. (checksum {:.6f})\n", rounds, sink);
+    return 0;
+}
