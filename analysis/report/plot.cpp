@@ -37,13 +37,13 @@ std::size_t code_points(std::string_view text) {
         std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
 }
 
-/// A literal of gnuplot. All but letters, digits and blanks is written as octal codes: nothing in it can end the
-/// string, be expanded or be run.
+/// A literal of gnuplot. All but letters and blanks is written as octal codes (digits too, they would prolong a code):
+/// nothing in it can end the string, be expanded or be run.
 std::string literal(std::string_view text) {
     std::string out = "\"";
     for (const char c : text) {
         const auto byte = static_cast<unsigned char>(c);
-        const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == ' ';
+        const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == ' ';
         if (plain || byte < 0x20 || byte == 0x7F) {
             out += plain ? c : ' ';
         } else {
@@ -126,6 +126,7 @@ class Axis {
         const int first = static_cast<int>(std::floor(std::log10(begin_)));
         const int last = static_cast<int>(std::ceil(std::log10(end_)));
         const double decades = std::log10(end_ / begin_);
+        if (decades < 0.5) return even_tics();
         const int every = static_cast<int>(decades / 12.0) + 1;
         const bool plain = first >= -3 && last <= 5;
         std::string out;
@@ -134,7 +135,7 @@ class Axis {
                 // Read from text: the double nearest to the decimal, without rounding of a power.
                 const std::string text = fmt::format("{}e{}", digit, decade);
                 const bool labelled =
-                    digit == 1 ? decade % every == 0 : decades < 0.7 || (decades < 2.5 && (digit == 2 || digit == 5));
+                    digit == 1 ? decade % every == 0 : decades < 1.0 || (decades < 2.5 && (digit == 2 || digit == 5));
                 if (every > 1 && digit > 1) continue;
                 std::string label;
                 if (labelled && plain) {
@@ -145,6 +146,18 @@ class Axis {
                 if (!out.empty()) out += ", ";
                 out += fmt::format("'{}' {} {}", label, text, labelled ? 0 : 1);
             }
+        }
+        return out;
+    }
+
+    /// Some five evenly spaced ones, for an axis so short that it is nearly linear.
+    std::string even_tics() const {
+        const double rough = (end_ - begin_) / 5.0;
+        const double power = std::pow(10.0, std::floor(std::log10(rough)));
+        const double step = power * (rough < 2.0 * power ? 2.0 : rough < 5.0 * power ? 5.0 : 10.0);
+        std::string out;
+        for (double k = std::ceil(begin_ / step); k * step <= end_; ++k) {
+            out += fmt::format("{}'{:.6g}' {}", out.empty() ? "" : ", ", k * step, k * step);
         }
         return out;
     }
@@ -267,8 +280,8 @@ std::string script(const Figure& figure) {
                "set title {} noenhanced font ',19' offset 0,-0.4\n"
                "set xlabel {} noenhanced offset 0,0.3\n"
                "set ylabel {} noenhanced\n"
-               "set key outside below center horizontal Left reverse maxcols {} noenhanced font ',15' width 1 height "
-               "0.6\n"
+               "set key outside below center horizontal Left reverse noenhanced font ',15'\n"
+               "set key maxcols {} width -1 samplen 3 height 0.8\n"
                "set border 3 linecolor '#444444'\n"
                "set tics nomirror textcolor '#000000'\n"
                "set grid xtics ytics linetype 1 linewidth 0.8 linecolor '#DDDDDD'\n",
