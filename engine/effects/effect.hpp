@@ -27,8 +27,7 @@ using Values = std::map<std::string, double>;
 class RateProcess {
    public:
     virtual ~RateProcess() = default;
-    /// Rotation [arcsec] added between `start_s` and `start_s + duration_s`. Called with consecutive intervals, once
-    /// each.
+    /// Rotation [arcsec] added between `start_s` and `start_s + duration_s`. Called with consecutive intervals, once each.
     virtual double angle_arcsec(double start_s, double duration_s) = 0;
 };
 

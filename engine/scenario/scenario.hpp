@@ -10,8 +10,8 @@ namespace ringlock::scenario {
 
 /// The optical cavity.
 struct Gyro {
-    double scale_factor_arcsec = 0.5;       ///< K: arcsec of rotation per fringe
-    double lockin_threshold_deg_h = 300.0;  ///< Omega_L
+    double scale_factor_arcsec = 0.5;        ///< K: arcsec of rotation per fringe
+    double lockin_threshold_deg_h = 300.0;   ///< Omega_L
 };
 
 /// The mechanical dither, a sinusoid before noise and effects.
@@ -39,8 +39,8 @@ struct Readout {
 /// Rate of the case about the input axis, the dither apart.
 struct InputRate {
     double rate_deg_h = 15.0;
-    double sweep_stop_deg_h = 15.0;  ///< last rate of a sweep that starts at rate_deg_h
-    std::int64_t sweep_points = 1;   ///< rates in the sweep; each gets ensemble.gyros gyros
+    double sweep_stop_deg_h = 15.0;   ///< last rate of a sweep that starts at rate_deg_h
+    std::int64_t sweep_points = 1;    ///< rates in the sweep; each gets ensemble.gyros gyros
 };
 
 /// How many gyros, for how long, and how they differ.
