@@ -21,13 +21,15 @@ struct Parameter {
     std::string_view doc;  ///< one line
 };
 
+/// The value of every parameter of one effect.
 using Values = std::map<std::string, double>;
 
 /// A rate that varies in time, given as the angle it adds.
 class RateProcess {
    public:
     virtual ~RateProcess() = default;
-    /// Rotation [arcsec] added between `start_s` and `start_s + duration_s`. Called with consecutive intervals, once each.
+    /// Rotation [arcsec] added between `start_s` and `start_s + duration_s`. Called with consecutive intervals, once
+    /// each.
     virtual double angle_arcsec(double start_s, double duration_s) = 0;
 };
 
@@ -54,5 +56,8 @@ std::span<const Effect* const> registry();
 
 /// The effect of that name or null.
 const Effect* find(std::string_view name);
+
+/// Names of effects that are planned but cannot be simulated yet, in order.
+std::span<const std::string_view> planned();
 
 }  // namespace ringlock::effects

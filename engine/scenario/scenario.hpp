@@ -10,19 +10,22 @@ namespace ringlock::scenario {
 
 /// The optical cavity.
 struct Gyro {
-    double scale_factor_arcsec = 0.5;        ///< K: arcsec of rotation per fringe
-    double lockin_threshold_deg_h = 300.0;   ///< Omega_L
+    double scale_factor_arcsec = 0.5;       ///< K: arcsec of rotation per fringe
+    double lockin_threshold_deg_h = 300.0;  ///< Omega_L
+    bool operator==(const Gyro&) const = default;
 };
 
 /// The mechanical dither, a sinusoid before noise and effects.
 struct Dither {
     double frequency_hz = 783.4 / (2.0 * std::numbers::pi);  ///< Gao & Deng 2007: 783.4 rad/s
     double peak_rate_deg_s = 109.1;                          ///< Omega_D
+    bool operator==(const Dither&) const = default;
 };
 
 /// Random noise on the dither angle at the turns, for arms that begin with noise_injected.
 struct NoiseInjection {
     double turn_phase_rms_rad = 3.0;  ///< rms of the noise at each turn, in optical phase (K/(2 pi) arcsec each)
+    bool operator==(const NoiseInjection&) const = default;
 };
 
 enum class ReadoutModel { ideal, instrument };
@@ -34,13 +37,15 @@ struct Readout {
     AngleOutput angle_output = AngleOutput::interpolated;
     double clock_hz = 100e6;                 ///< counter clock that times pulses and turns
     double detector_noise_relative = 0.005;  ///< rms noise of each detector sample over the fringe amplitude
+    bool operator==(const Readout&) const = default;
 };
 
 /// Rate of the case about the input axis, the dither apart.
 struct InputRate {
     double rate_deg_h = 15.0;
-    double sweep_stop_deg_h = 15.0;   ///< last rate of a sweep that starts at rate_deg_h
-    std::int64_t sweep_points = 1;    ///< rates in the sweep; each gets ensemble.gyros gyros
+    double sweep_stop_deg_h = 15.0;  ///< last rate of a sweep that starts at rate_deg_h
+    std::int64_t sweep_points = 1;   ///< rates in the sweep; each gets ensemble.gyros gyros
+    bool operator==(const InputRate&) const = default;
 };
 
 /// How many gyros, for how long, and how they differ.
@@ -52,6 +57,7 @@ struct Ensemble {
     double dither_asymmetry_sd_ratio = 0.001;
     double lockin_threshold_sd_relative = 0.0;
     double dither_amplitude_sd_relative = 0.001;
+    bool operator==(const Ensemble&) const = default;
 };
 
 enum class PropagationMethod { turn_map, direct };
@@ -61,17 +67,25 @@ struct Propagation {
     PropagationMethod method = PropagationMethod::turn_map;
     double direct_tolerance_rad = 1e-10;    ///< local error per step of the direct integrator
     double turn_map_tolerance_rad = 1e-10;  ///< interpolation error per turn of the turn map
+    bool operator==(const Propagation&) const = default;
 };
 
 /// What the result file holds.
 struct Output {
     double sample_interval_s = 1.0;  ///< of the decimated angle record; rounded to whole dither cycles
     bool angle_record = true;        ///< store the record of every gyro and arm, not only its statistics
+    bool operator==(const Output&) const = default;
 };
 
 /// Effects beyond the base equation: effect name -> parameter -> value. Holds every effect of the registry with every
 /// one of its parameters, at its default where the scenario does not name it.
 using EffectSettings = std::map<std::string, std::map<std::string, double>>;
+
+/// Every effect of the registry at its defaults.
+EffectSettings default_effect_settings();
+
+/// Input rate of one point of the sweep, 0 <= point < sweep_points; the points are evenly spaced, both ends included.
+double input_rate_deg_h(const InputRate& input, std::int64_t point);
 
 struct Scenario {
     Gyro gyro;
@@ -79,11 +93,14 @@ struct Scenario {
     NoiseInjection noise_injection;
     Readout readout;
     InputRate input;
-    EffectSettings effects;
+    EffectSettings effects = default_effect_settings();
     Ensemble ensemble;
-    std::vector<std::string> arms;
+    /// Names that parse_arm() of arm.hpp understands.
+    std::vector<std::string> arms = {"ideal", "uncompensated", "noise_injected", "noise_injected+compensated_published",
+                                     "noise_injected+compensated"};
     Propagation propagation;
     Output output;
+    bool operator==(const Scenario&) const = default;
 };
 
 }  // namespace ringlock::scenario

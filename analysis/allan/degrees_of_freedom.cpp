@@ -1,0 +1,111 @@
+#include "analysis/allan/degrees_of_freedom.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace ringlock::allan {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Generalised autocovariance of the integrated phase, up to a positive constant.
+double s_w(double t, int alpha) {
+    const double a = std::abs(t);
+    if (a == 0.0) return 0.0;
+    const double t2 = a * a;
+    switch (alpha) {
+        case 2:
+            return -a;
+        case 1:
+            return t2 * std::log(a);
+        case 0:
+            return a * t2;
+        case -1:
+            return -t2 * t2 * std::log(a);
+        case -2:
+            return -a * t2 * t2;
+        case -3:
+            return t2 * t2 * t2 * std::log(a);
+        case -4:
+            return a * t2 * t2 * t2;
+        default:
+            throw std::domain_error("degrees of freedom: alpha outside -4...2");
+    }
+}
+
+/// Autocovariance of the phase averaged over tau/F; F infinite is the limit of no averaging.
+double s_x(double t, double filter, int alpha) {
+    if (std::isinf(filter)) return s_w(t, alpha + 2);
+    if (alpha == 1) {
+        // t^2 ln t in units of the filter's length: the factor F^2 cancels and no digits are lost for large F.
+        const double u = std::abs(t) * filter;
+        if (u > 64.0) return -2.0 * std::log(std::abs(t)) - 3.0 + 1.0 / (6.0 * u * u);
+        return 2.0 * s_w(u, 1) - s_w(u - 1.0, 1) - s_w(u + 1.0, 1) + 2.0 * std::log(filter);
+    }
+    return filter * filter * (2.0 * s_w(t, alpha) - s_w(t - 1.0 / filter, alpha) - s_w(t + 1.0 / filter, alpha));
+}
+
+double binomial(int n, int k) {
+    double b = 1.0;
+    for (int i = 1; i <= k; ++i) b = b * (n - k + i) / i;
+    return b;
+}
+
+/// Autocovariance of the d-th difference with step tau.
+double s_z(double t, double filter, int alpha, int d) {
+    double z = 0.0;
+    for (int k = -d; k <= d; ++k) {
+        const double sign = k % 2 == 0 ? 1.0 : -1.0;
+        z += sign * binomial(2 * d, d + k) * s_x(t + k, filter, alpha);
+    }
+    return z;
+}
+
+/// Sum over lags 0 < j < end of (1 - j/terms) s_z(j/strides)^2.
+double sum_over_lags(double terms, std::int64_t strides, std::int64_t end, double filter, int alpha, int d) {
+    constexpr std::int64_t fineness = 16;  // a block spans at most this part of its distance from a singular point
+    double sum = 0.0;
+    for (std::int64_t j = 1; j < end;) {
+        const std::int64_t behind = j % strides;
+        const std::int64_t distance = std::min(behind, strides - behind);
+        const std::int64_t length = std::min(std::max<std::int64_t>(1, distance / fineness), end - j);
+        const double middle = static_cast<double>(j) + 0.5 * static_cast<double>(length - 1);
+        const double z = s_z(middle / static_cast<double>(strides), filter, alpha, d);
+        sum += static_cast<double>(length) * (1.0 - middle / terms) * z * z;
+        j += length;
+    }
+    return sum;
+}
+
+}  // namespace
+
+double degrees_of_freedom(const EstimatorShape& shape, int alpha, std::int64_t m, std::int64_t points) {
+    const int d = shape.differences;
+    if (d < 1 || alpha > 2 || alpha + 2 * d <= 1) {
+        throw std::domain_error("degrees of freedom: alpha does not suit this difference");
+    }
+    const std::int64_t span = shape.modified ? m * (d + 1) : 1 + m * d;  // phase points under one term
+    if (m < 1 || points < span) throw std::domain_error("degrees of freedom: no term fits the record");
+    const std::int64_t strides = shape.overlapping ? m : 1;
+    const std::int64_t term_count = 1 + (points - span) / (m / strides);
+    const auto terms = static_cast<double>(term_count);
+
+    if (alpha == 2 && !shape.modified) {  // only multiples of tau are correlated
+        double sum = 1.0;
+        for (int k = 1; k <= d; ++k) {
+            const double ratio = binomial(2 * d, d + k) / binomial(2 * d, d);
+            sum += 2.0 * std::max(0.0, 1.0 - static_cast<double>(k * strides) / terms) * ratio * ratio;
+        }
+        return terms / sum;
+    }
+    double filter = 1.0;
+    if (!shape.modified) filter = alpha <= 0 ? infinity : static_cast<double>(m);
+    // Beyond d + 1 taus the terms of the stationary noises are uncorrelated, those of the others nearly.
+    const std::int64_t end = std::min(term_count, (d + 1) * strides);
+    const double z0 = s_z(0.0, filter, alpha, d);
+    return terms * z0 * z0 / (z0 * z0 + 2.0 * sum_over_lags(terms, strides, end, filter, alpha, d));
+}
+
+}  // namespace ringlock::allan

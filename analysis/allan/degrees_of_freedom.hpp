@@ -1,0 +1,31 @@
+#pragma once
+#include <cstdint>
+
+namespace ringlock::allan {
+
+/// How an estimator differences, filters and strides the phase (Greenhall & Riley 2003, section II).
+struct EstimatorShape {
+    int differences = 2;      ///< d: 1 first difference, 2 Allan, 3 Hadamard
+    bool modified = false;    ///< phase averaged over tau first (F = 1) or sampled
+    bool overlapping = true;  ///< stride tau0 (S = m) or tau (S = 1)
+};
+
+/// Equivalent degrees of freedom of a variance made of finite differences.
+///
+/// \param shape   the estimator
+/// \param alpha   power-law exponent, integer, 2 ... -4 with alpha + 2 d > 1
+/// \param m       averaging factor >= 1
+/// \param points  number of phase points; at least one term must fit
+/// \return edf > 0, dimensionless; throws std::domain_error outside that
+///
+/// C. Greenhall, W. Riley, "Uncertainty of stability variances based on finite differences", 35th PTTI (2003): with the
+/// generalised autocovariance s_z of the differenced phase, 1/edf = sum over all pairs of terms of s_z^2 / (M
+/// s_z(0))^2. The sum is taken over blocks of lags that grow with the distance from its singular points (multiples of
+/// tau), which is exact at short tau and good to about 1e-3 at any; their tables and scaled sums are not needed.
+///
+/// Where this differs from the paper: for alpha <= 0 the phase is taken as sampled, not averaged over tau0 (F infinite
+/// instead of m). That is what an integrating gyro or a phase counter gives, it makes white frequency noise exact at
+/// every m, where the filter is up to 17 % off at m = 1 and 4 % at m = 20.
+double degrees_of_freedom(const EstimatorShape& shape, int alpha, std::int64_t m, std::int64_t points);
+
+}  // namespace ringlock::allan

@@ -1,0 +1,72 @@
+#include "analysis/allan/noise_identification.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace ringlock::allan {
+namespace {
+
+/// Removes the least-squares parabola, by projection on orthogonal polynomials of the centred index.
+void remove_parabola(std::vector<double>& x) {
+    const double n = static_cast<double>(x.size());
+    const double middle = 0.5 * (n - 1.0);
+    const double mean_square = (n * n - 1.0) / 12.0;
+    double sum = 0.0;
+    double dot1 = 0.0;
+    double dot2 = 0.0;
+    double norm1 = 0.0;
+    double norm2 = 0.0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        const double p1 = static_cast<double>(i) - middle;
+        const double p2 = p1 * p1 - mean_square;
+        sum += x[i];
+        dot1 += p1 * x[i];
+        dot2 += p2 * x[i];
+        norm1 += p1 * p1;
+        norm2 += p2 * p2;
+    }
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        const double p1 = static_cast<double>(i) - middle;
+        const double p2 = p1 * p1 - mean_square;
+        x[i] -= sum / n + dot1 / norm1 * p1 + dot2 / norm2 * p2;
+    }
+}
+
+std::optional<double> lag1_autocorrelation(const std::vector<double>& x) {
+    double mean = 0.0;
+    for (const double v : x) mean += v;
+    mean /= static_cast<double>(x.size());
+    double power = 0.0;
+    double lagged = 0.0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        power += (x[i] - mean) * (x[i] - mean);
+        if (i > 0) lagged += (x[i] - mean) * (x[i - 1] - mean);
+    }
+    if (!(power > 0.0)) return std::nullopt;
+    return lagged / power;
+}
+
+}  // namespace
+
+std::optional<int> identify_noise(std::span<const double> phase, std::int64_t m) {
+    constexpr int most_differences = 2;
+    std::vector<double> x;
+    x.reserve(phase.size() / static_cast<std::size_t>(m) + 1);
+    for (std::size_t i = 0; i < phase.size(); i += static_cast<std::size_t>(m)) x.push_back(phase[i]);
+    if (static_cast<std::int64_t>(x.size()) < noise_identification_points) return std::nullopt;
+    remove_parabola(x);
+    for (int d = 0;; ++d) {
+        const std::optional<double> r = lag1_autocorrelation(x);
+        if (!r) return std::nullopt;
+        const double rho = *r / (1.0 + *r);
+        if (rho < 0.25 || d == most_differences) {
+            const int alpha = 2 - 2 * d - static_cast<int>(std::lround(2.0 * rho));
+            return std::clamp(alpha, -2, 2);
+        }
+        for (std::size_t i = 0; i + 1 < x.size(); ++i) x[i] = x[i + 1] - x[i];
+        x.pop_back();
+    }
+}
+
+}  // namespace ringlock::allan

@@ -1,0 +1,52 @@
+#pragma once
+#include <optional>
+#include <span>
+#include <string>
+
+#include "analysis/noise/goodness.hpp"
+
+namespace ringlock::noise {
+
+/// A noise coefficient or what can be said where the record does not show it.
+struct Coefficient {
+    bool resolved = false;
+    std::optional<double> value;  ///< where resolved; >= 0
+    std::optional<double> lo;     ///< 68.27 % interval, where resolved
+    std::optional<double>
+        hi;  ///< its upper end; where not resolved a one-sided 95 % limit, or nothing if none can be given
+};
+
+struct Options {
+    double significance = 1e-3;       ///< of the likelihood-ratio test that a term must pass
+    double misfit_threshold = 2e-3;   ///< p below which each of the three goodness-of-fit tests rejects
+    std::size_t fewest_samples = 32;  ///< increments below which nothing is fitted
+};
+
+/// The five coefficients of IEEE Std 952: sigma^2(tau) = 3 Q^2/tau^2 + N^2/tau + (2 ln 2/pi) B^2 + K^2 tau/3 + R^2
+/// tau^2/2.
+struct NoiseFit {
+    Coefficient quantization_arcsec;     ///< Q, rms of white angle noise
+    Coefficient arw_deg_rt_h;            ///< N
+    Coefficient bias_instability_deg_h;  ///< B; the flat floor itself is 0.664 B
+    Coefficient rrw_deg_h_rt_h;          ///< K
+    Coefficient rate_ramp_deg_h_h;       ///< |R|
+    bool described = false;              ///< the model describes the record; false: do not print coefficients as truth
+    std::string reason;                  ///< where not: why (misfit, too short, no noise)
+    Goodness goodness;
+    std::size_t samples = 0;  ///< increments used
+};
+
+/// Noise coefficients from a record of angle by maximum likelihood on its cosine spectrum.
+///
+/// \param angle_arcsec  accumulated angle at uniform instants, length n + 1 for n increments, any offset and slope;
+/// finite \param tau0_s        sampling interval [s], > 0 \return every coefficient with interval or limit; see
+/// docs/allan.md for the method
+///
+/// A term is resolved if it belongs to the best subset of the five (deviance plus the test's threshold for each term)
+/// and if all the others together cannot take its place (likelihood ratio against the full model without it, half
+/// chi-squared for a variance on its boundary). Bias instability moreover must dominate the Allan variance somewhere
+/// between tau0 and a quarter of the record. A record without noise (all equal increments, a pure ramp) resolves
+/// nothing. Thread-safe and deterministic; throws InputError where tau0 is not positive or a value not finite.
+NoiseFit fit_noise(std::span<const double> angle_arcsec, double tau0_s, const Options& options = {});
+
+}  // namespace ringlock::noise

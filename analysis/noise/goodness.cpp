@@ -1,0 +1,116 @@
+#include "analysis/noise/goodness.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+
+namespace ringlock::noise {
+namespace {
+
+/// Chance that the Kolmogorov statistic sqrt(n) D exceeds t.
+double kolmogorov_tail(double t) {
+    if (t < 0.2) return 1.0;
+    double sum = 0.0;
+    for (int k = 1; k < 100; ++k) {
+        const double term = std::exp(-2.0 * k * k * t * t);
+        sum += k % 2 == 1 ? term : -term;
+        if (term < 1e-18) break;
+    }
+    return std::clamp(2.0 * sum, 0.0, 1.0);
+}
+
+/// Variances of all coefficients: of each bin's middle, interpolated on logarithmic scales between.
+std::vector<double> variances(const Spectrum& spectrum, const TermValues& theta) {
+    std::vector<double> at_bin;
+    for (const Bin& b : spectrum.bins) {
+        double v = 0.0;
+        for (std::size_t i = 0; i < term_count; ++i) v += theta[i] * b.shape[i];
+        at_bin.push_back(std::log(v));
+    }
+    std::vector<double> out(spectrum.z.size());
+    std::size_t right = 0;
+    for (std::size_t j = 1; j <= out.size(); ++j) {
+        const double x = spectrum.x(j);
+        while (right + 1 < spectrum.bins.size() && spectrum.bins[right].x < x) ++right;
+        double v = at_bin[right];
+        if (right > 0) {
+            const double x0 = spectrum.bins[right - 1].x;
+            const double x1 = spectrum.bins[right].x;
+            v = at_bin[right - 1] + (at_bin[right] - at_bin[right - 1]) * (x - x0) / (x1 - x0);
+        }
+        out[j - 1] = std::exp(v);
+    }
+    return out;
+}
+
+}  // namespace
+
+Goodness goodness_of_fit(const Spectrum& spectrum, const Maximum& best, double tau0_s, double threshold) {
+    const std::size_t n = spectrum.z.size();
+    std::vector<double> w = variances(spectrum, best.theta);
+    double total = 0.0;
+    for (std::size_t j = 1; j <= n; ++j) {
+        const double e = spectrum.z[j - 1] - best.ramp * spectrum.ramp(j) - best.corner[j % 2] * spectrum.corner(j);
+        w[j - 1] = e * e / w[j - 1];
+        total += w[j - 1];
+    }
+    const auto frequency = [&](std::size_t j) { return spectrum.x(j) / tau0_s; };
+    const auto count = static_cast<double>(n);
+    Goodness out;
+
+    double sum = 0.0;
+    double distance = 0.0;
+    std::size_t farthest = 1;
+    std::size_t largest = 1;
+    for (std::size_t j = 1; j <= n; ++j) {
+        sum += w[j - 1];
+        const double d = std::abs(sum / total - static_cast<double>(j) / count);
+        if (d > distance) {
+            distance = d;
+            farthest = j;
+        }
+        if (w[j - 1] > w[largest - 1]) largest = j;
+    }
+    // Squares of normal deviates have variance 2: the bridge is sqrt(2) wider than that of uniform order statistics.
+    out.p_cumulative = kolmogorov_tail(distance * std::sqrt(0.5 * count));
+
+    const double one = std::erfc(std::sqrt(0.5 * w[largest - 1]));
+    out.p_line = -std::expm1(count * std::log1p(-std::min(one, 1.0 - 1e-16)));
+
+    double chi2 = 0.0;
+    double bands = 0.0;
+    double worst = 0.0;
+    std::size_t worst_band = 1;
+    for (std::size_t begin = 1; begin <= n;) {
+        std::size_t end = std::max(begin + 15, begin + begin / 4);
+        if (n < end + 16) end = n;
+        double s = 0.0;
+        for (std::size_t j = begin; j <= end; ++j) s += w[j - 1];
+        const auto k = static_cast<double>(end - begin + 1);
+        const double deviate = (std::cbrt(s / k) - (1.0 - 2.0 / (9.0 * k))) / std::sqrt(2.0 / (9.0 * k));
+        chi2 += deviate * deviate;
+        bands += 1.0;
+        if (std::abs(deviate) > worst) {
+            worst = std::abs(deviate);
+            worst_band = (begin + end) / 2;
+        }
+        begin = end + 1;
+    }
+    out.p_bands = boost::math::cdf(boost::math::complement(boost::math::chi_squared(bands), std::min(chi2, 1e6)));
+
+    if (out.p_line < threshold) {
+        out.reason = fmt::format("a spectral line at {:.4g} Hz (p = {:.1e})", frequency(largest), out.p_line);
+    } else if (out.p_bands < threshold) {
+        out.reason = fmt::format("the spectrum departs from the model, most near {:.3g} Hz (p = {:.1e})",
+                                 frequency(worst_band), out.p_bands);
+    } else if (out.p_cumulative < threshold) {
+        out.reason = fmt::format("the cumulative spectrum departs from the model, most at {:.3g} Hz (p = {:.1e})",
+                                 frequency(farthest), out.p_cumulative);
+    }
+    out.accepted = out.reason.empty();
+    return out;
+}
+
+}  // namespace ringlock::noise

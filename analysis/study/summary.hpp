@@ -1,0 +1,71 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/study/study.hpp"
+
+namespace ringlock::study {
+
+/// A figure over the ensemble; what the data do not show is absent.
+struct Figure {
+    std::optional<double> median;
+    std::optional<double> lo;  ///< central 68.27 % of the gyros
+    std::optional<double> hi;  ///< its upper end; a 95 % upper limit where there is no median
+    std::optional<double> median_lo;  ///< bootstrap 95 % interval of the median
+    std::optional<double> median_hi;
+    std::int64_t resolved = 0;  ///< gyros whose record shows the figure
+};
+
+struct MeanFigure {
+    double mean = 0.0;
+    double lo = 0.0;  ///< central 68.27 % of the gyros
+    double hi = 0.0;
+};
+
+/// Allan deviation over the ensemble at one averaging time.
+struct EnsemblePoint {
+    double tau_s = 0.0;
+    double dev_deg_h = 0.0;  ///< root of the mean Allan variance of the gyros
+    double edf = 0.0;        ///< sum of the gyros'
+    double lo = 0.0;         ///< 68.27 % chi-squared interval
+    double hi = 0.0;
+};
+
+/// One rate of a sweep.
+struct SweepPoint {
+    double input_rate_deg_h = 0.0;
+    MeanFigure output_rate_deg_h;
+    std::int64_t locked = 0;  ///< gyros whose output moved by less than a fringe over the whole record
+    std::int64_t gyros = 0;
+};
+
+struct ArmSummary {
+    std::string name;
+    std::int64_t gyros = 0;
+    bool noise_injected = false;
+    Figure arw_deg_rt_h;  ///< meaningful only where noise_injected
+    std::optional<Figure> bias_instability_deg_h;
+    MeanFigure rate_error_deg_h;
+    std::vector<EnsemblePoint> allan;
+    std::vector<SweepPoint> sweep;  ///< empty without a sweep
+};
+
+struct Theory {
+    double arw_deg_rt_h = 0.0;
+    double dead_band_deg_h = 0.0;
+};
+
+struct Summary {
+    std::uint64_t seed = 0;
+    std::int64_t turns = 0;
+    std::vector<ArmSummary> arms;
+    Theory theory;  ///< of the scenario's device without spread
+};
+
+/// Sums the study up. No angle random walk is claimed for an arm without injected noise (its error is deterministic: a
+/// dead band and a staircase), no bias instability unless most records resolve an Allan floor.
+Summary summarise(const Study& study);
+
+}  // namespace ringlock::study

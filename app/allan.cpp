@@ -1,0 +1,216 @@
+#include "app/allan.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "analysis/allan/allan.hpp"
+#include "analysis/noise/fit.hpp"
+#include "analysis/record/series.hpp"
+#include "app/allan_output.hpp"
+#include "engine/core/error.hpp"
+
+namespace ringlock::app {
+namespace {
+
+struct Arguments {
+    std::string data;
+    double rate_hz = 0.0;
+    std::string kind;
+    std::string unit;
+    std::string column;
+    std::string dev = "oadev";
+    std::string tau = "octave";
+    double confidence = allan::Options{}.confidence;
+    bool json = false;
+};
+
+constexpr std::array<std::string_view, 12> contract_deviations = {
+    "adev", "oadev", "mdev", "tdev", "hdev", "ohdev", "totdev", "mtotdev", "ttotdev", "htotdev", "mtie", "tierms"};
+
+struct Unit {
+    std::string_view name;
+    bool is_rate;
+    double to_arcsec;  ///< or to arcsec/s = deg/h
+};
+
+constexpr std::array<Unit, 6> units_known = {{{"arcsec", false, 1.0},
+                                              {"deg", false, 3600.0},
+                                              {"rad", false, 648000.0 / 3.141592653589793238462643},
+                                              {"deg/h", true, 1.0},
+                                              {"deg/s", true, 3600.0},
+                                              {"rad/s", true, 648000.0 / 3.141592653589793238462643}}};
+
+std::vector<std::string> split(const std::string& text) {
+    std::vector<std::string> parts;
+    std::size_t begin = 0;
+    for (;;) {
+        const std::size_t comma = text.find(',', begin);
+        std::string part = text.substr(begin, comma == std::string::npos ? comma : comma - begin);
+        part.erase(0, part.find_first_not_of(' '));
+        part.erase(part.find_last_not_of(' ') + 1);
+        parts.push_back(part);
+        if (comma == std::string::npos) return parts;
+        begin = comma + 1;
+    }
+}
+
+allan::Kind parse_kind(const std::string& kind) {
+    if (kind == "phase") return allan::Kind::phase;
+    if (kind == "increment") return allan::Kind::increment;
+    if (kind == "rate") return allan::Kind::rate;
+    const std::string found = kind.empty() ? "is missing" : fmt::format("'{}'", kind);
+    throw InputError(
+        fmt::format("--kind {}: say phase (accumulated angle), increment (angle gained in each sample) or rate. It is "
+                    "never guessed: "
+                    "the same numbers give a different, plausible-looking deviation for each",
+                    found));
+}
+
+const Unit* parse_unit(const std::string& unit, allan::Kind kind) {
+    if (unit.empty()) return nullptr;
+    for (const Unit& u : units_known) {
+        if (u.name != unit) continue;
+        if (u.is_rate != (kind == allan::Kind::rate)) {
+            throw InputError(fmt::format("--unit {} is a unit of {}, but --kind says {}; allowed are {}", unit,
+                                         u.is_rate ? "rate" : "angle", u.is_rate ? "angle" : "rate",
+                                         u.is_rate ? "arcsec, deg, rad" : "deg/h, deg/s, rad/s"));
+        }
+        return &u;
+    }
+    throw InputError(fmt::format(
+        "--unit '{}' is not known; allowed are arcsec, deg, rad (phase, increment) and deg/h, deg/s, rad/s (rate)",
+        unit));
+}
+
+std::vector<allan::Estimator> parse_deviations(const std::string& list) {
+    std::vector<allan::Estimator> out;
+    for (const std::string& part : split(list)) {
+        if (std::find(contract_deviations.begin(), contract_deviations.end(), part) == contract_deviations.end()) {
+            throw InputError(fmt::format("--dev '{}' is not known; there are adev and oadev", part));
+        }
+        if (part != "adev" && part != "oadev") {
+            throw InputError(fmt::format("--dev {}: not there yet; for now adev and oadev", part));
+        }
+        const auto estimator = part == "adev" ? allan::Estimator::adev : allan::Estimator::oadev;
+        if (std::find(out.begin(), out.end(), estimator) == out.end()) out.push_back(estimator);
+    }
+    return out;
+}
+
+/// What --tau asks for: one of the words, or a list.
+struct TauChoice {
+    std::string word;
+    std::vector<std::int64_t> list;  ///< ascending, each once; empty where a word was given
+};
+
+TauChoice parse_tau(const std::string& tau) {
+    if (tau == "octave" || tau == "decade" || tau == "all") return {tau, {}};
+    TauChoice out;
+    for (const std::string& part : split(tau)) {
+        std::int64_t m = 0;
+        const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), m);
+        if (error != std::errc() || end != part.data() + part.size() || m < 1) {
+            throw InputError(
+                fmt::format("--tau '{}': must be octave, decade, all or averaging factors from 1 (whole numbers of "
+                            "samples, not seconds)",
+                            part));
+        }
+        out.list.push_back(m);
+    }
+    std::sort(out.list.begin(), out.list.end());
+    out.list.erase(std::unique(out.list.begin(), out.list.end()), out.list.end());
+    return out;
+}
+
+std::vector<std::int64_t> factors_for(const TauChoice& choice, std::int64_t largest) {
+    if (choice.word == "octave") return allan::octave_factors(largest);
+    if (choice.word == "decade") return allan::decade_factors(largest);
+    if (choice.word == "all") return allan::all_factors(largest);
+    if (choice.list.back() > largest) {
+        throw InputError(
+            fmt::format("--tau {}: this record allows averaging factors 1 to {}", choice.list.back(), largest));
+    }
+    return choice.list;
+}
+
+void check_rate(const Arguments& a, const record::Series& series) {
+    if (!series.rate_hz) return;
+    if (std::abs(*series.rate_hz - a.rate_hz) > 1e-9 * a.rate_hz) {
+        throw InputError(
+            fmt::format("{}: says rate_hz = {}, which contradicts --rate {}", a.data, *series.rate_hz, a.rate_hz));
+    }
+}
+
+void run(const Arguments& a) {
+    const allan::Kind kind = parse_kind(a.kind);
+    const Unit* unit = parse_unit(a.unit, kind);
+    const std::vector<allan::Estimator> estimators = parse_deviations(a.dev);
+    if (!(a.rate_hz > 0.0) || !std::isfinite(a.rate_hz)) {
+        throw InputError(fmt::format("--rate {}: must be a positive number of samples a second", a.rate_hz));
+    }
+    if (!(a.confidence > 0.0 && a.confidence < 1.0)) {
+        throw InputError(fmt::format("--confidence {}: must lie between 0 and 1, such as 0.6827", a.confidence));
+    }
+    const TauChoice taus = parse_tau(a.tau);
+
+    record::Series series =
+        record::read_series(a.data, a.column.empty() ? std::nullopt : std::optional<std::string>(a.column));
+    check_rate(a, series);
+    AllanOutput out;
+    out.data = a.data;
+    out.column = series.column;
+    out.kind = a.kind;
+    out.input_unit = a.unit;
+    out.gyro = unit != nullptr;
+    out.n = series.values.size();
+    out.tau0_s = 1.0 / a.rate_hz;
+    out.confidence = a.confidence;
+    if (unit != nullptr && unit->to_arcsec != 1.0) {
+        for (double& v : series.values) v *= unit->to_arcsec;
+    }
+    const std::vector<double> phase = allan::centred_phase(series.values, kind, out.tau0_s);
+    if (phase.size() < 3) {
+        throw InputError(fmt::format("{}: {} data; a deviation needs at least {}", a.data, out.n,
+                                     kind == allan::Kind::phase ? 3 : 2));
+    }
+    std::vector<double>().swap(series.values);
+
+    for (const allan::Estimator estimator : estimators) {
+        const std::int64_t largest = allan::largest_factor(estimator, static_cast<std::int64_t>(phase.size()));
+        const std::vector<std::int64_t> factors = factors_for(taus, largest);
+        out.deviations.emplace_back(allan::name(estimator), allan::deviation(estimator, phase, out.tau0_s, factors,
+                                                                             {.confidence = a.confidence}));
+    }
+    if (unit != nullptr) out.noise = noise::fit_noise(phase, out.tau0_s);
+    const std::string text = a.json ? allan_json(out) : allan_text(out);
+    fmt::print("{}", text);
+}
+
+}  // namespace
+
+void add_allan(CLI::App& root) {
+    auto a = std::make_shared<Arguments>();
+    CLI::App* sub =
+        root.add_subcommand("allan", "Allan deviation with intervals, and gyro noise coefficients, of a data file");
+    sub->add_option("DATA", a->data, "Text, HDF5 or rlg-record")->required();
+    sub->add_option("--rate", a->rate_hz, "Samples a second [Hz]")->required();
+    sub->add_option("--kind", a->kind, "phase | increment | rate: what the numbers are (never guessed)");
+    sub->add_option("--unit", a->unit,
+                    "arcsec, deg, rad (phase, increment); deg/h, deg/s, rad/s (rate); none: dimensionless");
+    sub->add_option("--column", a->column, "Name or number (from 1) of the column, or path of an HDF5 dataset");
+    sub->add_option("--dev", a->dev, "Deviations, comma between: adev, oadev")->capture_default_str();
+    sub->add_option("--tau", a->tau, "octave | decade | all | averaging factors M,M,...")->capture_default_str();
+    sub->add_option("--confidence", a->confidence, "Level of the intervals of the deviation")->capture_default_str();
+    sub->add_flag("--json", a->json, "One JSON object on standard output");
+    sub->callback([a] { run(*a); });
+}
+
+}  // namespace ringlock::app

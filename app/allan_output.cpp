@@ -1,0 +1,130 @@
+#include "app/allan_output.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+namespace ringlock::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double v) { return std::isfinite(v) ? Json(v) : Json(nullptr); }
+Json number(const std::optional<double>& v) { return v ? number(*v) : Json(nullptr); }
+
+struct Line {
+    std::string_view key;
+    std::string_view name;
+    std::string_view unit;
+    noise::Coefficient noise::NoiseFit::*member;
+};
+
+constexpr std::array<Line, 5> lines = {{
+    {"quantization_arcsec", "angle white noise Q", "arcsec", &noise::NoiseFit::quantization_arcsec},
+    {"arw_deg_rt_h", "angle random walk N", "deg/sqrt(h)", &noise::NoiseFit::arw_deg_rt_h},
+    {"bias_instability_deg_h", "bias instability B", "deg/h", &noise::NoiseFit::bias_instability_deg_h},
+    {"rrw_deg_h_rt_h", "rate random walk K", "(deg/h)/sqrt(h)", &noise::NoiseFit::rrw_deg_h_rt_h},
+    {"rate_ramp_deg_h_h", "rate ramp R", "(deg/h)/h", &noise::NoiseFit::rate_ramp_deg_h_h},
+}};
+
+std::string_view noise_name(int alpha) {
+    switch (alpha) {
+        case 2:
+            return "white phase";
+        case 1:
+            return "flicker phase";
+        case 0:
+            return "white rate";
+        case -1:
+            return "flicker rate";
+        default:
+            return "random walk rate";
+    }
+}
+
+}  // namespace
+
+std::string allan_json(const AllanOutput& out) {
+    Json json;
+    json["n"] = out.n;
+    json["tau0_s"] = number(out.tau0_s);
+    json["kind"] = out.kind;
+    json["column"] = out.column;
+    json["unit"] = out.gyro ? Json("deg/h") : Json(nullptr);
+    json["confidence"] = number(out.confidence);
+    json["deviations"] = Json::object();
+    for (const auto& [name, points] : out.deviations) {
+        Json list = Json::array();
+        for (const allan::Point& p : points) {
+            list.push_back({{"m", p.m},
+                            {"tau_s", number(p.tau_s)},
+                            {"dev", number(p.dev)},
+                            {"terms", p.terms},
+                            {"alpha", p.alpha},
+                            {"edf", number(p.edf)},
+                            {"lo", number(p.lo)},
+                            {"hi", number(p.hi)}});
+        }
+        json["deviations"][name] = std::move(list);
+    }
+    json["noise"] = nullptr;
+    if (out.noise) {
+        Json noise = Json::object();
+        Json limits = Json::object();
+        for (const Line& line : lines) {
+            const noise::Coefficient& c = (*out.noise).*line.member;
+            const bool shown = out.noise->described && c.resolved;
+            noise[line.key] =
+                shown ? Json({{"value", number(c.value)}, {"lo", number(c.lo)}, {"hi", number(c.hi)}}) : Json(nullptr);
+            limits[line.key] = out.noise->described && !c.resolved ? number(c.hi) : Json(nullptr);
+        }
+        json["noise"] = std::move(noise);
+        json["noise_upper_limits_95"] = std::move(limits);
+        json["noise_withheld"] = out.noise->described ? Json(nullptr) : Json(out.noise->reason);
+    }
+    return json.dump() + "\n";
+}
+
+std::string allan_text(const AllanOutput& out) {
+    const std::string unit = out.gyro ? " [deg/h]" : "";
+    std::string text = fmt::format("{}, column {}: {} data ({}{}{}), tau0 = {:.6g} s\n", out.data, out.column, out.n,
+                                   out.kind, out.input_unit.empty() ? "" : ", ", out.input_unit, out.tau0_s);
+    for (const auto& [name, points] : out.deviations) {
+        text += fmt::format("\n{:>9} {:>12} {:>17} {:>27} {:>10} {:>10}  {}\n", "m", "tau [s]", name + unit,
+                            fmt::format("{:.4g} % interval", 100.0 * out.confidence), "edf", "terms", "noise");
+        for (const allan::Point& p : points) {
+            text += fmt::format("{:>9} {:>12.6g} {:>17.6e} {:>13.5e} {:>13.5e} {:>10.4g} {:>10}  {}\n", p.m, p.tau_s,
+                                p.dev, p.lo, p.hi, p.edf, p.terms, noise_name(p.alpha));
+        }
+    }
+    if (!out.noise) {
+        text += "\nNo gyro coefficients: say the unit of the data with --unit to have them.\n";
+        return text;
+    }
+    if (!out.noise->described) {
+        text += fmt::format(
+            "\nGyro coefficients withheld: {}.\nQ, N, B, K and R would not describe this record; find and remove the "
+            "cause "
+            "before quoting any.\n",
+            out.noise->reason);
+        return text;
+    }
+    text += "\nGyro coefficients (68.27 % interval; limits 95 %)\n";
+    for (const Line& line : lines) {
+        const noise::Coefficient& c = (*out.noise).*line.member;
+        if (c.resolved) {
+            text += fmt::format("  {:<20} {:>11.5g}  ({:.5g} to {:.5g}) {}\n", line.name, *c.value, *c.lo, *c.hi,
+                                line.unit);
+        } else if (c.hi) {
+            text += fmt::format("  {:<20} not resolved, < {:.3g} {}\n", line.name, *c.hi, line.unit);
+        } else {
+            text += fmt::format("  {:<20} not resolved\n", line.name);
+        }
+    }
+    return text;
+}
+
+}  // namespace ringlock::app

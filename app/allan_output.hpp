@@ -1,0 +1,32 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/allan/allan.hpp"
+#include "analysis/noise/fit.hpp"
+
+namespace ringlock::app {
+
+/// Everything `ringlock allan` has to say.
+struct AllanOutput {
+    std::string data;
+    std::string column;
+    std::string kind;
+    std::string input_unit;  ///< empty: dimensionless
+    bool gyro = false;       ///< the input has a unit: deviations in deg/h, noise fitted
+    std::size_t n = 0;
+    double tau0_s = 0.0;
+    double confidence = 0.0;
+    std::vector<std::pair<std::string, std::vector<allan::Point>>> deviations;
+    std::optional<noise::NoiseFit> noise;
+};
+
+/// One JSON object and a newline; numbers that are not finite are null.
+std::string allan_json(const AllanOutput& out);
+
+/// Tables for people.
+std::string allan_text(const AllanOutput& out);
+
+}  // namespace ringlock::app

@@ -1,0 +1,37 @@
+#include <array>
+
+#include "engine/core/units.hpp"
+#include "engine/effects/effect.hpp"
+
+namespace ringlock::effects {
+namespace {
+
+constexpr std::array parameters_of = {
+    Parameter{"phase_rad", 0.0, -units::pi, units::pi, "phase of the coupling against the sine detector"},
+};
+
+class DetectorPhaseOffset final : public Effect {
+   public:
+    std::string_view name() const override { return "detector_phase_offset"; }
+    std::string_view summary() const override {
+        return "The coupling acts at another phase than the one the detectors see.";
+    }
+    std::string_view equation() const override {
+        return "psi' = C (rate + dither rate) + b sin(psi + phase), psi as the detectors see it (Gao and Deng 2007, "
+               "equation 1, with a phase).";
+    }
+    std::span<const Parameter> parameters() const override { return parameters_of; }
+    bool active(const Values& values) const override { return values.at("phase_rad") != 0.0; }
+    void configure(const Values& values, gyro::Setup& setup) const override {
+        setup.coupling_phase_rad = values.at("phase_rad");
+    }
+};
+
+}  // namespace
+
+const Effect& detector_phase_offset() {
+    static const DetectorPhaseOffset effect;
+    return effect;
+}
+
+}  // namespace ringlock::effects

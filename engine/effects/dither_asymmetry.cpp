@@ -1,0 +1,38 @@
+#include <array>
+
+#include "engine/effects/effect.hpp"
+
+namespace ringlock::effects {
+namespace {
+
+constexpr std::array parameters_of = {
+    Parameter{"ratio", 0.0, -0.5, 0.5, "positive half cycles stronger by it, and shorter"},
+};
+
+class DitherAsymmetry final : public Effect {
+   public:
+    std::string_view name() const override { return "dither_asymmetry"; }
+    std::string_view summary() const override {
+        return "Half cycles of unequal strength, beside what ensemble.dither_asymmetry_sd_ratio spreads over the "
+               "gyros.";
+    }
+    std::string_view equation() const override {
+        return "Peak rate Omega_D (1 + ratio) in positive and Omega_D (1 - ratio) in negative half cycles; the "
+               "stronger are "
+               "shorter, so that the dither angle stays bounded.";
+    }
+    std::span<const Parameter> parameters() const override { return parameters_of; }
+    bool active(const Values& values) const override { return values.at("ratio") != 0.0; }
+    void configure(const Values& values, gyro::Setup& setup) const override {
+        setup.dither_asymmetry_ratio += values.at("ratio");
+    }
+};
+
+}  // namespace
+
+const Effect& dither_asymmetry() {
+    static const DitherAsymmetry effect;
+    return effect;
+}
+
+}  // namespace ringlock::effects

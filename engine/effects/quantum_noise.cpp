@@ -1,0 +1,54 @@
+#include <array>
+#include <cmath>
+
+#include "engine/core/units.hpp"
+#include "engine/effects/effect.hpp"
+
+namespace ringlock::effects {
+namespace {
+
+constexpr std::array parameters_of = {
+    Parameter{"deg_rt_h", 1e-4, 0.0, 10.0, "angle random walk of the quantum noise floor"},
+};
+
+class Process final : public RateProcess {
+   public:
+    Process(double deg_rt_h, const random::Identity& who)
+        : arcsec_rt_s_(deg_rt_h / units::deg_rt_h_per_arcsec_rt_s), normal_(who, random::Purpose::quantum_noise) {}
+
+    double angle_arcsec(double /*start_s*/, double duration_s) override {
+        return arcsec_rt_s_ * std::sqrt(duration_s) * normal_();
+    }
+
+   private:
+    double arcsec_rt_s_;
+    random::NormalStream normal_;
+};
+
+class QuantumNoise final : public Effect {
+   public:
+    std::string_view name() const override { return "quantum_noise"; }
+    std::string_view summary() const override {
+        return "White rate noise of spontaneous emission, independent of the phase at the turns: the floor under every "
+               "arm.";
+    }
+    std::string_view equation() const override {
+        return "The angle gained in an interval dt is normal with variance N^2 dt and independent from interval to "
+               "interval "
+               "(IEEE Std 952-1997, annex C, angle random walk).";
+    }
+    std::span<const Parameter> parameters() const override { return parameters_of; }
+    bool active(const Values& values) const override { return values.at("deg_rt_h") != 0.0; }
+    std::unique_ptr<RateProcess> rate_process(const Values& values, const random::Identity& who) const override {
+        return std::make_unique<Process>(values.at("deg_rt_h"), who);
+    }
+};
+
+}  // namespace
+
+const Effect& quantum_noise() {
+    static const QuantumNoise effect;
+    return effect;
+}
+
+}  // namespace ringlock::effects

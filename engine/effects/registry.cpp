@@ -1,0 +1,47 @@
+#include <algorithm>
+#include <array>
+
+#include "engine/effects/effect.hpp"
+
+/// Every effect, one line each, in the order of their names; NAME.cpp defines `const Effect& NAME()`.
+#define RINGLOCK_EFFECTS(X)  \
+    X(base_vibration)        \
+    X(bias_instability)      \
+    X(bias_ramp)             \
+    X(bias_step)             \
+    X(detector_phase_offset) \
+    X(dither_asymmetry)      \
+    X(quantum_noise)         \
+    X(rate_random_walk)      \
+    X(readout_ellipse)
+
+namespace ringlock::effects {
+
+#define RINGLOCK_DECLARE(effect) const Effect& effect();
+RINGLOCK_EFFECTS(RINGLOCK_DECLARE)
+#undef RINGLOCK_DECLARE
+
+std::span<const Effect* const> registry() {
+#define RINGLOCK_ADDRESS(effect) &effect(),
+    static const std::array all = {RINGLOCK_EFFECTS(RINGLOCK_ADDRESS)};
+#undef RINGLOCK_ADDRESS
+    return all;
+}
+
+const Effect* find(std::string_view name) {
+    const auto all = registry();
+    const auto found = std::find_if(all.begin(), all.end(), [name](const Effect* e) { return e->name() == name; });
+    return found == all.end() ? nullptr : *found;
+}
+
+std::span<const std::string_view> planned() {
+    static constexpr std::array<std::string_view, 11> names = {"bias_temperature",       "case_motion",
+                                                               "count_quantization",     "dither_residue",
+                                                               "dither_second_harmonic", "lockin_second_harmonic",
+                                                               "lockin_temperature",     "lockin_turn_asymmetry",
+                                                               "missed_counts",          "resampling",
+                                                               "scale_factor_error"};
+    return names;
+}
+
+}  // namespace ringlock::effects

@@ -1,0 +1,55 @@
+#include "engine/ensemble/draw.hpp"
+
+#include <boost/random/uniform_real_distribution.hpp>
+
+#include "engine/effects/effect.hpp"
+
+namespace ringlock::ensemble {
+
+std::int64_t total_gyros(const scenario::Scenario& scenario) {
+    return scenario.ensemble.gyros * scenario.input.sweep_points;
+}
+
+double input_rate_deg_h(const scenario::Scenario& scenario, std::int64_t gyro) {
+    const auto& input = scenario.input;
+    if (input.sweep_points == 1) return input.rate_deg_h;
+    const double fraction = static_cast<double>(gyro / scenario.ensemble.gyros) / static_cast<double>(input.sweep_points - 1);
+    return input.rate_deg_h + fraction * (input.sweep_stop_deg_h - input.rate_deg_h);
+}
+
+random::Identity identity(const scenario::Scenario& scenario, std::int64_t gyro) {
+    return {scenario.ensemble.seed, static_cast<std::uint64_t>(gyro % scenario.ensemble.gyros)};
+}
+
+gyro::Setup nominal_setup(const scenario::Scenario& scenario) {
+    gyro::Setup setup;
+    setup.scale_factor_arcsec = scenario.gyro.scale_factor_arcsec;
+    setup.lockin_threshold_deg_h = scenario.gyro.lockin_threshold_deg_h;
+    setup.dither_frequency_hz = scenario.dither.frequency_hz;
+    setup.dither_peak_rate_deg_s = scenario.dither.peak_rate_deg_s;
+    setup.input_rate_deg_h = scenario.input.rate_deg_h;
+    for (const effects::Effect* effect : effects::registry()) {
+        const auto values = scenario.effects.find(std::string(effect->name()));
+        if (values != scenario.effects.end() && effect->active(values->second)) effect->configure(values->second, setup);
+    }
+    return setup;
+}
+
+gyro::Setup draw_setup(const scenario::Scenario& scenario, std::int64_t gyro) {
+    const auto who = identity(scenario, gyro);
+    const auto& spread = scenario.ensemble;
+    const auto normal = [&](random::Purpose purpose) { return random::NormalStream(who, purpose)(); };
+
+    gyro::Setup setup = nominal_setup(scenario);
+    setup.input_rate_deg_h = input_rate_deg_h(scenario, gyro);
+    random::Engine engine = random::make_engine(who, random::Purpose::initial_phase);
+    // In [-0.5, 0.5) of the spread, so that a spread of 0 means a phase of 0 for all.
+    setup.initial_phase_rad =
+        spread.initial_phase_spread_rad * boost::random::uniform_real_distribution<double>(-0.5, 0.5)(engine);
+    setup.dither_asymmetry_ratio += spread.dither_asymmetry_sd_ratio * normal(random::Purpose::dither_asymmetry);
+    setup.lockin_threshold_deg_h *= 1.0 + spread.lockin_threshold_sd_relative * normal(random::Purpose::lockin_threshold);
+    setup.dither_peak_rate_deg_s *= 1.0 + spread.dither_amplitude_sd_relative * normal(random::Purpose::dither_amplitude);
+    return setup;
+}
+
+}  // namespace ringlock::ensemble

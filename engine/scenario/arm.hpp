@@ -1,0 +1,30 @@
+#pragma once
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// Arms of a study: what is done to the gyros whose random numbers they share.
+namespace ringlock::scenario {
+
+enum class Compensator {
+    none,
+    published,  ///< equations of Gao and Deng 2007 as printed
+    corrected,  ///< the same with corrected coefficients
+};
+
+struct Arm {
+    std::string name;
+    bool ideal = false;           ///< no lock-in at all
+    bool noise_injected = false;  ///< random noise on the dither angle at the turns
+    Compensator compensator = Compensator::none;
+    bool operator==(const Arm&) const = default;
+};
+
+/// The arm of that name.
+/// @throws InputError that says which arms there are, without a place in a file.
+Arm parse_arm(std::string_view name);
+
+/// Every name that parse_arm() understands.
+std::vector<std::string> arm_names();
+
+}  // namespace ringlock::scenario

@@ -1,0 +1,160 @@
+#include "engine/scenario/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "engine/core/units.hpp"
+#include "engine/scenario/arm.hpp"
+
+namespace ringlock::scenario {
+namespace {
+
+using Finding = std::optional<Complaint>;
+
+/// Draws further out than this from their mean are treated as impossible.
+constexpr double sigmas = 6.0;
+
+double peak_rate_deg_h(const Scenario& s) { return s.dither.peak_rate_deg_s * units::deg_h_per_deg_s; }
+
+double dither_rad_s(const Scenario& s) { return units::two_pi * s.dither.frequency_hz; }
+
+/// Amplitude M = 2 pi Omega_D / (K w_D) of the optical phase under the dither.
+double phase_amplitude_rad(const Scenario& s) {
+    return units::two_pi * peak_rate_deg_h(s) / (s.gyro.scale_factor_arcsec * dither_rad_s(s));
+}
+
+/// Largest first-order kick of one turn, kappa = 2 pi Omega_L / sqrt(K Omega_D w_D).
+double kick_rad(const Scenario& s) {
+    return units::two_pi * s.gyro.lockin_threshold_deg_h /
+           std::sqrt(s.gyro.scale_factor_arcsec * peak_rate_deg_h(s) * dither_rad_s(s));
+}
+
+Finding dither_reverses_the_rate(const Scenario& s) {
+    const double asymmetry =
+        std::abs(s.effects.at("dither_asymmetry").at("ratio")) + sigmas * s.ensemble.dither_asymmetry_sd_ratio;
+    const double smallest =
+        peak_rate_deg_h(s) * (1.0 - sigmas * s.ensemble.dither_amplitude_sd_relative) * (1.0 - asymmetry);
+    const bool sweep = s.input.sweep_points > 1;
+    const bool stop_is_larger = sweep && std::abs(s.input.sweep_stop_deg_h) > std::abs(s.input.rate_deg_h);
+    const double rate = stop_is_larger ? s.input.sweep_stop_deg_h : s.input.rate_deg_h;
+    if (std::abs(rate) < 0.5 * smallest) return {};
+    return Complaint{{stop_is_larger ? "input.sweep_stop_deg_h" : "input.rate_deg_h", "dither.peak_rate_deg_s",
+                      "effects.dither_asymmetry.ratio", "ensemble.dither_asymmetry_sd_ratio",
+                      "ensemble.dither_amplitude_sd_relative"},
+                     fmt::format("the input rate of {:g} deg/h must stay below {:g} deg/h, half of the smallest peak "
+                                 "rate of the dither (the rate must reverse in every half cycle)",
+                                 rate, 0.5 * smallest)};
+}
+
+Finding sweep_goes_somewhere(const Scenario& s) {
+    if (s.input.sweep_points == 1 || s.input.sweep_stop_deg_h != s.input.rate_deg_h) return {};
+    return Complaint{{"input.sweep_points", "input.sweep_stop_deg_h"},
+                     fmt::format("a sweep of {} points must end at another rate than it starts from ({:g} deg/h); set "
+                                 "input.sweep_stop_deg_h",
+                                 s.input.sweep_points, s.input.rate_deg_h)};
+}
+
+Finding sweep_is_not_too_large(const Scenario& s) {
+    constexpr std::int64_t most = 100'000'000;
+    if (s.input.sweep_points * s.ensemble.gyros <= most) return {};
+    return Complaint{{"ensemble.gyros", "input.sweep_points"},
+                     fmt::format("{} gyros at each of {} rates are more than the {} gyros that a run can hold",
+                                 s.ensemble.gyros, s.input.sweep_points, most)};
+}
+
+Finding turn_map_has_fringes(const Scenario& s) {
+    constexpr double fewest = 100.0;
+    const double fringes = phase_amplitude_rad(s) / units::pi;
+    if (s.propagation.method != PropagationMethod::turn_map || fringes >= fewest) return {};
+    return Complaint{
+        {"dither.peak_rate_deg_s", "dither.frequency_hz", "gyro.scale_factor_arcsec", "propagation.method"},
+        fmt::format("{:.3g} fringes in a half cycle of the dither; the turn map needs at least {:g} (turns "
+                    "must be far apart in phase); set propagation.method = \"direct\" or a stronger dither",
+                    fringes, fewest)};
+}
+
+Finding turn_map_has_small_kicks(const Scenario& s) {
+    constexpr double largest = 1.0;
+    const double kick = kick_rad(s);
+    if (s.propagation.method != PropagationMethod::turn_map || kick < largest) return {};
+    return Complaint{
+        {"gyro.lockin_threshold_deg_h", "dither.peak_rate_deg_s", "dither.frequency_hz", "gyro.scale_factor_arcsec",
+         "propagation.method"},
+        fmt::format("lock-in moves the phase by up to {:.3g} rad at a turn; the turn map needs less than {:g} "
+                    "rad; set propagation.method = \"direct\" or a stronger dither",
+                    kick, largest)};
+}
+
+Finding noise_leaves_the_dither(const Scenario& s) {
+    const bool injected = std::any_of(s.arms.begin(), s.arms.end(),
+                                      [](const std::string& name) { return parse_arm(name).noise_injected; });
+    const double most = phase_amplitude_rad(s) / (sigmas * std::numbers::sqrt2);
+    if (!injected || s.noise_injection.turn_phase_rms_rad <= most) return {};
+    return Complaint{
+        {"noise_injection.turn_phase_rms_rad", "dither.peak_rate_deg_s", "dither.frequency_hz",
+         "gyro.scale_factor_arcsec"},
+        fmt::format("noise of {:g} rad at the turns must not exceed {:.4g} rad (or it halves the swing of a "
+                    "half cycle within {:g} sigma)",
+                    s.noise_injection.turn_phase_rms_rad, most, sigmas)};
+}
+
+Finding sample_holds_a_cycle(const Scenario& s) {
+    const double cycle = 1.0 / s.dither.frequency_hz;
+    if (s.output.sample_interval_s >= cycle) return {};
+    return Complaint{{"output.sample_interval_s", "dither.frequency_hz"},
+                     fmt::format("samples every {:g} s must be at least one dither cycle apart, {:.6g} s",
+                                 s.output.sample_interval_s, cycle)};
+}
+
+Finding run_holds_samples(const Scenario& s) {
+    constexpr double fewest = 3.0;
+    if (s.ensemble.duration_s >= fewest * s.output.sample_interval_s) return {};
+    return Complaint{
+        {"ensemble.duration_s", "output.sample_interval_s"},
+        fmt::format("a run of {:g} s must hold at least {:g} samples of {:g} s each (an Allan deviation needs "
+                    "them)",
+                    s.ensemble.duration_s, fewest, s.output.sample_interval_s)};
+}
+
+struct Rule {
+    std::string_view doc;
+    Finding (*find)(const Scenario&);
+};
+
+constexpr std::array all_rules = {
+    Rule{"The input rate, over the whole sweep, stays below half of the dither's smallest peak rate (six standard "
+         "deviations of its spread and the asymmetry taken off), so that the rate reverses in every half cycle.",
+         dither_reverses_the_rate},
+    Rule{"A sweep of more than one point ends at another rate than it starts from.", sweep_goes_somewhere},
+    Rule{"The gyros of all points of the sweep are at most 100000000.", sweep_is_not_too_large},
+    Rule{"The turn map needs at least 100 fringes in a half cycle: 2 Omega_D / (K w_D) >= 100.", turn_map_has_fringes},
+    Rule{"The turn map needs kicks below 1 rad: 2 pi Omega_L / sqrt(K Omega_D w_D) < 1.", turn_map_has_small_kicks},
+    Rule{"Injected noise leaves at least half of each half cycle's swing within six standard deviations (checked where "
+         "an arm injects noise).",
+         noise_leaves_the_dither},
+    Rule{"A sample of the output is at least one dither cycle long.", sample_holds_a_cycle},
+    Rule{"A run holds at least three samples.", run_holds_samples},
+};
+
+}  // namespace
+
+std::vector<Complaint> check(const Scenario& scenario) {
+    std::vector<Complaint> complaints;
+    for (const Rule& rule : all_rules) {
+        if (Finding finding = rule.find(scenario)) complaints.push_back(std::move(*finding));
+    }
+    return complaints;
+}
+
+std::vector<std::string_view> rules() {
+    std::vector<std::string_view> docs;
+    for (const Rule& rule : all_rules) docs.push_back(rule.doc);
+    return docs;
+}
+
+}  // namespace ringlock::scenario

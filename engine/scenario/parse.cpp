@@ -1,0 +1,350 @@
+#include "engine/scenario/parse.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <optional>
+
+#include "engine/core/error.hpp"
+#include "engine/effects/effect.hpp"
+#include "engine/scenario/arm.hpp"
+#include "engine/scenario/check.hpp"
+#include "engine/scenario/schema.hpp"
+#include "engine/scenario/text.hpp"
+
+namespace ringlock::scenario {
+namespace {
+
+constexpr std::string_view effects_prefix = "effects.";
+
+std::string type_text(const toml::node& node) {
+    switch (node.type()) {
+        case toml::node_type::table:
+            return "a table";
+        case toml::node_type::array:
+            return "a list";
+        case toml::node_type::string:
+            return "a string";
+        case toml::node_type::integer:
+            return "a whole number";
+        case toml::node_type::floating_point:
+            return "a float";
+        case toml::node_type::boolean:
+            return "a boolean";
+        default:
+            return "a date or time";
+    }
+}
+
+std::string value_text(const toml::node& node) {
+    if (const auto* v = node.as_string()) return in_quotes(v->get());
+    if (const auto* v = node.as_integer()) return fmt::format("{}", v->get());
+    if (const auto* v = node.as_floating_point()) return format_real(v->get());
+    if (const auto* v = node.as_boolean()) return v->get() ? "true" : "false";
+    return type_text(node);
+}
+
+/// A name as it may stand in a message: bare, or quoted where it holds anything unusual.
+std::string name_text(std::string_view name) {
+    const bool bare = !name.empty() && name.size() <= 60 && std::all_of(name.begin(), name.end(), [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
+               c == '.';
+    });
+    return bare ? std::string(name) : in_quotes(name);
+}
+
+/// Walks a parsed file, sets what is right and notes what is wrong.
+class Reader {
+   public:
+    explicit Reader(std::string_view file) : file_(file) {}
+
+    Scenario read(const toml::table& root) {
+        for (const auto& [name, node] : root) read_top(name, node);
+        if (problems_.empty()) apply_rules();
+        if (!problems_.empty()) throw InputError(report());
+        return std::move(scenario_);
+    }
+
+   private:
+    struct Problem {
+        toml::source_position where;
+        std::string text;
+    };
+
+    void note(toml::source_position where, std::string text) { problems_.push_back({where, std::move(text)}); }
+
+    std::string report() {
+        std::stable_sort(problems_.begin(), problems_.end(),
+                         [](const Problem& a, const Problem& b) { return a.where < b.where; });
+        std::vector<std::string> lines;
+        for (const Problem& p : problems_) {
+            lines.push_back(p.where ? fmt::format("{}:{}:{}: {}", file_, p.where.line, p.where.column, p.text)
+                                    : fmt::format("{}: {}", file_, p.text));
+        }
+        return fmt::format("{}", fmt::join(lines, "\n"));
+    }
+
+    void read_top(const toml::key& name, const toml::node& node) {
+        if (name == "effects") return read_effects(name, node);
+        const Section* section = find_section(name);
+        if (section == nullptr) return unknown_top(name, node);
+        const toml::table* table = as_table(*section, name, node);
+        if (table != nullptr) read_section(*section, *table);
+    }
+
+    void read_effects(const toml::key& name, const toml::node& node) {
+        const toml::table* table = node.as_table();
+        if (table == nullptr) {
+            return note(name.source().begin, fmt::format("key \"effects\" = {}: must be tables [effects.NAME], not {}",
+                                                         value_text(node), type_text(node)));
+        }
+        for (const auto& [effect, settings] : *table) {
+            const Section* section = find_section(fmt::format("{}{}", effects_prefix, effect.str()));
+            if (section == nullptr) {
+                unknown_effect(effect);
+            } else if (const toml::table* values = as_table(*section, effect, settings)) {
+                read_section(*section, *values);
+            }
+        }
+    }
+
+    const toml::table* as_table(const Section& section, const toml::key& name, const toml::node& node) {
+        const toml::table* table = node.as_table();
+        if (table == nullptr) {
+            note(name.source().begin,
+                 fmt::format("key \"{}\" = {}: must be a table, not {}; write [{}] and its keys below", section.name,
+                             value_text(node), type_text(node), section.name));
+        }
+        return table;
+    }
+
+    void read_section(const Section& section, const toml::table& table) {
+        for (const auto& [name, node] : table) {
+            const auto found = std::find_if(section.keys.begin(), section.keys.end(),
+                                            [&k = name](const Key& key) { return key.name == k.str(); });
+            if (found == section.keys.end()) {
+                unknown_key(section, name, node);
+            } else {
+                places_[found->path()] = node.source().begin;
+                read_value(*found, node);
+            }
+        }
+    }
+
+    void read_value(const Key& key, const toml::node& node) {
+        if (key.type == Type::arms) return read_arms(key, node);
+        const std::optional<Value> value = convert(key, node);
+        if (!value) {
+            return wrong(key, node, fmt::format("must be {}, not {}", allowed_text(key), type_text(node)));
+        }
+        if (const auto* word = std::get_if<std::string>(&*value)) {
+            if (std::find(key.words.begin(), key.words.end(), *word) == key.words.end()) {
+                return wrong(key, node, fmt::format("must be {}{}", range_text(key), did_you_mean(*word, key.words)));
+            }
+        } else if (key.type != Type::boolean && !within_bounds(key, *value)) {
+            const auto* real = std::get_if<double>(&*value);
+            const std::string_view finite = real != nullptr && !std::isfinite(*real) ? "finite and " : "";
+            const std::string why = key.bounds.why.empty() ? "" : fmt::format(" ({})", key.bounds.why);
+            return wrong(key, node, fmt::format("must be {}{}{}", finite, range_text(key), why));
+        }
+        key.set(scenario_, *value);
+    }
+
+    /// The node's value where it has the key's type; a whole number counts as a float.
+    static std::optional<Value> convert(const Key& key, const toml::node& node) {
+        const auto* integer = node.as_integer();
+        if (key.type == Type::boolean && node.is_boolean()) return node.as_boolean()->get();
+        if (key.type == Type::integer && integer != nullptr) return integer->get();
+        if (key.type == Type::real && integer != nullptr) return static_cast<double>(integer->get());
+        if (key.type == Type::real && node.is_floating_point()) return node.as_floating_point()->get();
+        if (key.type == Type::word && node.is_string()) return node.as_string()->get();
+        return {};
+    }
+
+    void read_arms(const Key& key, const toml::node& node) {
+        const toml::array* list = node.as_array();
+        if (list == nullptr) {
+            return wrong(key, node, fmt::format("must be {}, not {}", allowed_text(key), type_text(node)));
+        }
+        if (list->empty()) return wrong(key, node, fmt::format("is empty; must be {}", allowed_text(key)));
+        std::vector<std::string> names;
+        for (const toml::node& element : *list) {
+            if (!element.is_string()) {
+                wrong(key, element, fmt::format("must be the name of an arm, not {}", type_text(element)));
+                continue;
+            }
+            const std::string& name = element.as_string()->get();
+            try {
+                parse_arm(name);
+            } catch (const InputError& error) {
+                wrong(key, element, error.what());
+                continue;
+            }
+            if (std::find(names.begin(), names.end(), name) != names.end()) {
+                wrong(key, element, "stands twice; an arm is run once");
+            }
+            names.push_back(name);
+        }
+        key.set(scenario_, names);
+    }
+
+    void wrong(const Key& key, const toml::node& node, std::string_view problem) {
+        note(node.source().begin, fmt::format("key \"{}\" = {}: {}", key.path(), value_text(node), problem));
+    }
+
+    void unknown_key(const Section& section, const toml::key& name, const toml::node& node) {
+        std::vector<std::string> known;
+        for (const Key& key : section.keys) known.push_back(key.name);
+        std::string hint = did_you_mean(name.str(), known);
+        if (hint.empty()) hint = elsewhere(name.str());
+        note(name.source().begin,
+             fmt::format("key \"{}.{}\" = {}: unknown key{}; keys of [{}]: {}", section.name, name_text(name.str()),
+                         value_text(node), hint, section.name, fmt::join(known, ", ")));
+    }
+
+    /// Says where a key of that name does stand.
+    static std::string elsewhere(std::string_view name) {
+        for (const Section& section : schema()) {
+            for (const Key& key : section.keys) {
+                if (key.path() == name) return fmt::format(" (write {} without quotes)", name);
+                if (key.name == name) return fmt::format(" (\"{}\" belongs to [{}])", name, section.name);
+            }
+        }
+        return "";
+    }
+
+    void unknown_top(const toml::key& name, const toml::node& node) {
+        std::vector<std::string> known;
+        for (const Section& section : schema()) {
+            if (!section.name.starts_with(effects_prefix)) known.push_back(section.name);
+        }
+        known.emplace_back("effects");
+        const std::string sections = fmt::format("{}", fmt::join(known, ", "));
+        if (node.is_table()) {
+            return note(name.source().begin,
+                        fmt::format("section [{}]: unknown section{}; sections are: {}", name_text(name.str()),
+                                    did_you_mean(name.str(), known), sections));
+        }
+        std::string hint = elsewhere(name.str());
+        if (hint.empty()) hint = did_you_mean(name.str(), known);
+        note(name.source().begin, fmt::format("key \"{}\" = {}: unknown key outside of any section{}; sections are: {}",
+                                              name_text(name.str()), value_text(node), hint, sections));
+    }
+
+    void unknown_effect(const toml::key& name) {
+        std::vector<std::string> known;
+        for (const effects::Effect* effect : effects::registry()) known.emplace_back(effect->name());
+        const auto planned = effects::planned();
+        const bool is_planned = std::find(planned.begin(), planned.end(), name.str()) != planned.end();
+        note(name.source().begin,
+             fmt::format("section [effects.{}]: {}; effects are: {}", name_text(name.str()),
+                         is_planned ? "known but not there yet" : "unknown effect" + did_you_mean(name.str(), known),
+                         fmt::join(known, ", ")));
+    }
+
+    static const Section* find_section(std::string_view name) {
+        const auto& all = schema();
+        const auto found = std::find_if(all.begin(), all.end(), [name](const Section& s) { return s.name == name; });
+        return found == all.end() ? nullptr : &*found;
+    }
+
+    /// Each broken rule is reported at the first of its keys that the file names.
+    void apply_rules() {
+        for (const Complaint& complaint : check(scenario_)) {
+            const auto named = std::find_if(complaint.keys.begin(), complaint.keys.end(), [this](std::string_view key) {
+                return places_.contains(std::string(key));
+            });
+            const std::string key(named == complaint.keys.end() ? complaint.keys.front() : *named);
+            const auto place = places_.find(key);
+            note(place == places_.end() ? toml::source_position{} : place->second,
+                 fmt::format("key \"{}\" = {}: {}", key, current_value(key), complaint.problem));
+        }
+    }
+
+    std::string current_value(std::string_view path) const {
+        for (const Section& section : schema()) {
+            for (const Key& key : section.keys) {
+                if (key.path() == path) return to_toml(key.get(scenario_));
+            }
+        }
+        return "";
+    }
+
+    std::string file_;
+    Scenario scenario_;
+    std::vector<Problem> problems_;
+    std::map<std::string, toml::source_position> places_;
+};
+
+/// toml++ 3.3 follows a dotted key by recursion without a limit, and a key of some 30 000 parts overflows the stack.
+/// A key has at most three parts here, so that a run of dots is refused before it is parsed. Dots side by side are
+/// decoration, and so is a line of comment.
+void refuse_deep_keys(std::string_view text, std::string_view name) {
+    constexpr int most = 32;
+    int dots = 0;
+    std::size_t line = 1;
+    std::size_t column = 0;
+    bool blank = true;     // nothing on this line yet
+    bool comment = false;  // the line is one
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const char c = text[i];
+        ++column;
+        comment = comment || (blank && c == '#');
+        blank = blank && (c == ' ' || c == '\t');
+        if (c == '\n') {
+            ++line;
+            column = 0;
+            blank = true;
+            comment = false;
+        }
+        const bool beside = c == '.' && i > 0 && text[i - 1] == '.';
+        if (comment || beside || std::string_view("\n=,{}[]").find(c) != std::string_view::npos) {
+            dots = 0;
+        } else if (c == '.' && ++dots > most) {
+            throw InputError(
+                fmt::format("{}:{}:{}: a key of more than {} parts; the longest, effects.NAME.PARAMETER, have 3", name,
+                            line, column, most));
+        }
+    }
+}
+
+}  // namespace
+
+Scenario parse_string(std::string_view text, std::string_view name) {
+    refuse_deep_keys(text, name);
+    toml::table root;
+    try {
+        root = toml::parse(text, name);
+    } catch (const toml::parse_error& error) {
+        const toml::source_position where = error.source().begin;
+        throw InputError(
+            fmt::format("{}:{}:{}: not valid TOML: {}", name, where.line, where.column, error.description()));
+    }
+    return Reader(name).read(root);
+}
+
+Scenario parse_file(const std::filesystem::path& path) {
+    constexpr std::size_t largest = 16 << 20;
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored)) {
+        throw InputError(fmt::format("{}: is a directory; a scenario is a TOML file", path.string()));
+    }
+    std::ifstream file(path, std::ios::binary);
+    if (!file) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+    std::string text(largest + 1, '\0');
+    file.read(text.data(), static_cast<std::streamsize>(text.size()));
+    if (file.bad()) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+    text.resize(static_cast<std::size_t>(file.gcount()));
+    if (text.size() > largest)
+        throw InputError(fmt::format("{}: is larger than 16 MiB: not a scenario", path.string()));
+    return parse_string(text, path.string());
+}
+
+}  // namespace ringlock::scenario

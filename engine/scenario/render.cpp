@@ -1,0 +1,128 @@
+#include "engine/scenario/render.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <nlohmann/json.hpp>
+
+#include "engine/scenario/arm.hpp"
+#include "engine/scenario/check.hpp"
+#include "engine/scenario/schema.hpp"
+
+namespace ringlock::scenario {
+namespace {
+
+/// Comment lines of at most 120 columns.
+std::string comment(std::string_view text) {
+    constexpr std::size_t columns = 118;
+    std::string out;
+    while (text.size() > columns) {
+        std::size_t end = text.rfind(' ', columns);
+        if (end == std::string_view::npos) end = columns;
+        out += fmt::format("# {}\n", text.substr(0, end));
+        text.remove_prefix(std::min(text.size(), end + 1));
+    }
+    return out + fmt::format("# {}\n", text);
+}
+
+/// "A number between 1 and 100000: mechanical dither runs at some hundred Hz."
+std::string allowed_sentence(const Key& key) {
+    std::string text = allowed_text(key);
+    text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+    return key.bounds.why.empty() ? text + "." : fmt::format("{}: {}.", text, key.bounds.why);
+}
+
+std::string write(const Scenario& scenario, bool commented) {
+    std::string out;
+    for (const Section& section : schema()) {
+        if (!out.empty()) out += '\n';
+        if (commented) out += comment(section.doc);
+        out += fmt::format("[{}]\n", section.name);
+        for (const Key& key : section.keys) {
+            if (commented) out += comment(fmt::format("{} {}", key.doc, allowed_sentence(key)));
+            out += fmt::format("{} = {}\n", key.name, to_toml(key.get(scenario)));
+        }
+    }
+    return out;
+}
+
+std::string_view type_name(Type type) {
+    switch (type) {
+        case Type::boolean:
+            return "boolean";
+        case Type::integer:
+            return "integer";
+        case Type::real:
+            return "float";
+        case Type::word:
+            return "string";
+        case Type::arms:
+            break;
+    }
+    return "list of strings";
+}
+
+nlohmann::ordered_json json_of(const Value& value) {
+    return std::visit([](const auto& v) { return nlohmann::ordered_json(v); }, value);
+}
+
+}  // namespace
+
+std::string to_toml(const Scenario& scenario) { return write(scenario, false); }
+
+std::string schema_text() {
+    return comment("Every key of a ringlock scenario at its default. A scenario needs to name only what differs.") +
+           '\n' + write(Scenario{}, true);
+}
+
+std::string schema_markdown() {
+    std::string out =
+        "# Scenario keys\n\n"
+        "<!-- Made by `ringlock run --print-schema=markdown`; a test compares the two. -->\n\n"
+        "A scenario is a TOML file. A key that is not named has its default, so an empty file is valid: it is the "
+        "device "
+        "of\nGao and Deng (2007) with the default ensemble. Every key carries its unit in its name. An unknown key, a "
+        "wrong "
+        "type or a\nvalue out of bounds is an error that names file, line, column, key and value; all of a file's "
+        "errors "
+        "are reported at\nonce. Integers are accepted where a float is wanted. `ringlock run --print-schema` prints a "
+        "commented file with every\ndefault.\n";
+    for (const Section& section : schema()) {
+        out += fmt::format("\n## `[{}]`\n\n{}\n\n", section.name, section.doc);
+        out += "| key | type | default | allowed | meaning |\n|---|---|---|---|---|\n";
+        for (const Key& key : section.keys) {
+            out += fmt::format("| `{}` | {} | `{}` | {} | {} |\n", key.name, type_name(key.type),
+                               to_toml(key.default_value()), allowed_sentence(key), key.doc);
+        }
+    }
+    out += "\n## Rules between keys\n\n";
+    for (const std::string_view rule : rules()) out += fmt::format("- {}\n", rule);
+    return out;
+}
+
+std::string schema_json() {
+    using Json = nlohmann::ordered_json;
+    Json sections = Json::array();
+    for (const Section& section : schema()) {
+        Json keys = Json::array();
+        for (const Key& key : section.keys) {
+            Json entry = {{"name", key.name},
+                          {"type", type_name(key.type)},
+                          {"default", json_of(key.default_value())},
+                          {"allowed", allowed_text(key)},
+                          {"doc", key.doc}};
+            if (key.type == Type::integer || key.type == Type::real) {
+                entry["min"] = json_of(key.bounds.min);
+                entry["max"] = json_of(key.bounds.max);
+            }
+            if (key.type == Type::word) entry["words"] = key.words;
+            if (key.type == Type::arms) entry["words"] = arm_names();
+            keys.push_back(std::move(entry));
+        }
+        sections.push_back({{"name", section.name}, {"doc", section.doc}, {"keys", std::move(keys)}});
+    }
+    return Json{{"sections", std::move(sections)}, {"rules", rules()}}.dump(2) + "\n";
+}
+
+}  // namespace ringlock::scenario

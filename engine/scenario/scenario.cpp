@@ -1,0 +1,23 @@
+#include "engine/scenario/scenario.hpp"
+
+#include "engine/effects/effect.hpp"
+
+namespace ringlock::scenario {
+
+EffectSettings default_effect_settings() {
+    EffectSettings settings;
+    for (const effects::Effect* effect : effects::registry()) {
+        auto& values = settings[std::string(effect->name())];
+        for (const effects::Parameter& p : effect->parameters()) values.emplace(p.name, p.default_value);
+    }
+    return settings;
+}
+
+double input_rate_deg_h(const InputRate& input, std::int64_t point) {
+    if (point == 0) return input.rate_deg_h;
+    if (point == input.sweep_points - 1) return input.sweep_stop_deg_h;
+    const double fraction = static_cast<double>(point) / static_cast<double>(input.sweep_points - 1);
+    return input.rate_deg_h + fraction * (input.sweep_stop_deg_h - input.rate_deg_h);
+}
+
+}  // namespace ringlock::scenario

@@ -1,0 +1,276 @@
+#include "engine/scenario/schema.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
+#include "engine/core/units.hpp"
+#include "engine/effects/effect.hpp"
+#include "engine/scenario/arm.hpp"
+#include "engine/scenario/text.hpp"
+
+namespace ringlock::scenario {
+namespace {
+
+/// Words of each enumeration, in the order of its values.
+std::vector<std::string> words_of(ReadoutModel) { return {"ideal", "instrument"}; }
+std::vector<std::string> words_of(AngleOutput) { return {"interpolated", "quarter_fringe"}; }
+std::vector<std::string> words_of(PropagationMethod) { return {"turn_map", "direct"}; }
+
+template <class Number>
+Bounds between(Number min, Number max, std::string why) {
+    return {.min = min, .max = max, .why = std::move(why)};
+}
+Bounds above(double min, double max, std::string why) {
+    return {.min = min, .max = max, .min_excluded = true, .why = std::move(why)};
+}
+Bounds zero_or(double min, double max, std::string why) {
+    return {.min = min, .max = max, .or_zero = true, .why = std::move(why)};
+}
+
+/// A key bound to a field; its type follows from the field's.
+template <class Access>
+Key key(std::string section, std::string name, Access access, Bounds bounds, std::string doc) {
+    using Field = std::remove_cvref_t<decltype(access(std::declval<Scenario&>()))>;
+    Key k{.section = std::move(section),
+          .name = std::move(name),
+          .type{},
+          .bounds = std::move(bounds),
+          .words{},
+          .doc = std::move(doc),
+          .get{},
+          .set{}};
+    if constexpr (std::is_enum_v<Field>) {
+        k.type = Type::word;
+        k.words = words_of(Field{});
+        k.get = [access, words = k.words](const Scenario& s) { return words.at(static_cast<std::size_t>(access(s))); };
+        k.set = [access, words = k.words](Scenario& s, const Value& v) {
+            for (std::size_t i = 0; i < words.size(); ++i) {
+                if (words[i] == std::get<std::string>(v)) access(s) = static_cast<Field>(i);
+            }
+        };
+    } else if constexpr (std::is_same_v<Field, std::vector<std::string>>) {
+        k.type = Type::arms;
+        k.get = [access](const Scenario& s) -> Value { return access(s); };
+        k.set = [access](Scenario& s, const Value& v) { access(s) = std::get<Field>(v); };
+    } else {
+        // Unsigned fields are signed in TOML.
+        using Plain = std::conditional_t<std::is_same_v<Field, std::uint64_t>, std::int64_t, Field>;
+        k.type = std::is_same_v<Plain, bool>     ? Type::boolean
+                 : std::is_same_v<Plain, double> ? Type::real
+                                                 : Type::integer;
+        k.get = [access](const Scenario& s) -> Value { return static_cast<Plain>(access(s)); };
+        k.set = [access](Scenario& s, const Value& v) { access(s) = static_cast<Field>(std::get<Plain>(v)); };
+    }
+    return k;
+}
+
+/// Key NAME of section SECTION, bound to the field of the same name.
+#define RINGLOCK_KEY(section, name) \
+#section, #name, [](auto& s) -> auto& { return s.section.name; }
+
+std::vector<Section> base_sections() {
+    constexpr std::int64_t largest_integer = std::numeric_limits<std::int64_t>::max();
+    constexpr const char* six_sigma = "six sigma must not reach zero";
+    const Bounds none;
+    return {
+        {"gyro",
+         "The optical cavity.",
+         {
+             key(RINGLOCK_KEY(gyro, scale_factor_arcsec), between(1e-3, 1e3, "real fringes are 0.1 to 10 arcsec"),
+                 "K: arcsec of rotation per fringe, that is per 2 pi of optical phase."),
+             key(RINGLOCK_KEY(gyro, lockin_threshold_deg_h),
+                 between(0.0, 1e5, "0 is a gyro free of lock-in; no usable one locks above 28 deg/s"),
+                 "Omega_L: half width of the lock-in band without dither."),
+         }},
+        {"dither",
+         "The mechanical dither, a sinusoid before noise and effects.",
+         {
+             key(RINGLOCK_KEY(dither, frequency_hz), between(1.0, 1e5, "mechanical dither runs at some hundred Hz"),
+                 "Frequency; the default is 783.4 rad/s."),
+             key(RINGLOCK_KEY(dither, peak_rate_deg_s), above(0.0, 1e4, "without dither there are no turns to follow"),
+                 "Omega_D: peak rate of the case against the cavity."),
+         }},
+        {"noise_injection",
+         "Random noise on the dither angle, in arms that begin with noise_injected.",
+         {
+             key(RINGLOCK_KEY(noise_injection, turn_phase_rms_rad),
+                 between(0.0, 1e4, "far more than it takes to randomise the turns"),
+                 "Rms of the noise at each turn, independent from turn to turn, in optical phase; 3 rad randomise the "
+                 "turns fully."),
+         }},
+        {"readout",
+         "What the electronics can know of the phase; compensators see nothing else.",
+         {
+             key(RINGLOCK_KEY(readout, model), none,
+                 "ideal: phases and times without error; instrument: pulse clock, quadrature detectors with noise, "
+                 "quarter-fringe counter."),
+             key(RINGLOCK_KEY(readout, angle_output), none,
+                 "interpolated: the angle from the quadrature phase; quarter_fringe: from the up/down counter alone, "
+                 "in steps of K/4."),
+             key(RINGLOCK_KEY(readout, clock_hz), zero_or(1e3, 1e12, "0 is continuous time"),
+                 "Clock that times pulses and turns."),
+             key(RINGLOCK_KEY(readout, detector_noise_relative),
+                 between(0.0, 0.5, "beyond it the fringe cannot be followed"),
+                 "Rms noise of each detector sample over the amplitude of the fringe."),
+         }},
+        {"input",
+         "Rate of the case about the input axis, the dither apart.",
+         {
+             key(RINGLOCK_KEY(input, rate_deg_h), between(-1e7, 1e7, "the dither must reverse it"),
+                 "The rate, or the first one of a sweep."),
+             key(RINGLOCK_KEY(input, sweep_stop_deg_h), between(-1e7, 1e7, "the dither must reverse it"),
+                 "Last rate of a sweep; not used where sweep_points is 1."),
+             key(RINGLOCK_KEY(input, sweep_points), between<std::int64_t>(1, 100'000, "1 is no sweep"),
+                 "Evenly spaced rates of the sweep, both ends included; each gets ensemble.gyros gyros."),
+         }},
+        {"ensemble",
+         "How many gyros, for how long, and how they differ.",
+         {
+             key(RINGLOCK_KEY(ensemble, gyros),
+                 between<std::int64_t>(1, 10'000'000, "a study needs a gyro, and each one's results are kept"),
+                 "Independent gyros at each input rate."),
+             key(RINGLOCK_KEY(ensemble, duration_s), above(0.0, 1e9, "30 years"), "Simulated time of each gyro."),
+             key(RINGLOCK_KEY(ensemble, seed), between<std::int64_t>(0, largest_integer, "integers of TOML are signed"),
+                 "Seed of every random number; the same seed gives the same result."),
+             key(RINGLOCK_KEY(ensemble, initial_phase_spread_rad),
+                 between(0.0, units::two_pi, "more than a whole fringe is the same"),
+                 "Full width of the uniform distribution of the optical phase at the first turn; 0 starts all gyros "
+                 "alike."),
+             key(RINGLOCK_KEY(ensemble, dither_asymmetry_sd_ratio),
+                 between(0.0, 0.05, "six sigma must leave both half cycles"),
+                 "Standard deviation of the dither asymmetry over the gyros."),
+             key(RINGLOCK_KEY(ensemble, lockin_threshold_sd_relative), between(0.0, 0.16, six_sigma),
+                 "Standard deviation of the lock-in threshold over the gyros, relative to its mean."),
+             key(RINGLOCK_KEY(ensemble, dither_amplitude_sd_relative), between(0.0, 0.16, six_sigma),
+                 "Standard deviation of the dither's peak rate over the gyros, relative to its mean."),
+         }},
+        {"propagation",
+         "How the equation of motion is solved.",
+         {
+             key(RINGLOCK_KEY(propagation, method), none,
+                 "turn_map: one exact map for each turn, the fast way; direct: adaptive integration through every "
+                 "fringe, the reference."),
+             key(RINGLOCK_KEY(propagation, direct_tolerance_rad),
+                 between(1e-14, 1e-3, "double precision ends below it"),
+                 "Error per step that the direct integrator allows."),
+             key(RINGLOCK_KEY(propagation, turn_map_tolerance_rad),
+                 between(1e-14, 1e-3, "double precision ends below it"),
+                 "Interpolation error per turn that the turn map allows."),
+         }},
+        {"output",
+         "What the result file holds.",
+         {
+             key(RINGLOCK_KEY(output, sample_interval_s), above(0.0, 1e6, "it is rounded to whole dither cycles"),
+                 "Time between samples of the decimated angle."),
+             key(RINGLOCK_KEY(output, angle_record), none,
+                 "Store the angle record of every gyro and arm, not only its statistics."),
+         }},
+        {"arms",
+         "What is done to the gyros; all arms share their random numbers gyro by gyro.",
+         {
+             key(
+                 "arms", "names", [](auto& s) -> auto& { return s.arms; }, none,
+                 "Arms of the run, in the order of the result."),
+         }},
+    };
+}
+
+#undef RINGLOCK_KEY
+
+Section effect_section(const effects::Effect& effect) {
+    const std::string name(effect.name());
+    const auto sentence = [](std::string_view text) {
+        std::string out(text);
+        out[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(out[0])));
+        return out + ".";
+    };
+    Section section{"effects." + name, fmt::format("{} {}", effect.summary(), effect.equation()), {}};
+    for (const effects::Parameter& p : effect.parameters()) {
+        const auto access = [ name, parameter = std::string(p.name) ](auto& s) -> auto& {
+            return s.effects.at(name).at(parameter);
+        };
+        section.keys.push_back(
+            key(section.name, std::string(p.name), access, between(p.min, p.max, ""), sentence(p.doc)));
+    }
+    return section;
+}
+
+template <class Number>
+bool number_within(const Bounds& bounds, Number value) {
+    if (bounds.or_zero && value == Number{0}) return true;
+    const Number min = std::get<Number>(bounds.min);
+    return (bounds.min_excluded ? value > min : value >= min) && value <= std::get<Number>(bounds.max);
+}
+
+/// A bound as one would write it: 0.5, 100000, 1e12.
+std::string number_text(const Value& value) {
+    if (!std::holds_alternative<double>(value)) return to_toml(value);
+    const double real = std::get<double>(value);
+    if (std::abs(real) < 1e6) return fmt::format("{}", real);
+    const int exponent = static_cast<int>(std::floor(std::log10(std::abs(real))));
+    return fmt::format("{}e{}", real / std::pow(10.0, exponent), exponent);
+}
+
+std::string list_text(const std::vector<std::string>& words) {
+    std::vector<std::string> items;
+    for (const std::string& word : words) items.push_back(in_quotes(word));
+    return fmt::format("{}", fmt::join(items, ", "));
+}
+
+}  // namespace
+
+const std::vector<Section>& schema() {
+    static const std::vector<Section> all = [] {
+        std::vector<Section> sections = base_sections();
+        for (const effects::Effect* effect : effects::registry()) sections.push_back(effect_section(*effect));
+        return sections;
+    }();
+    return all;
+}
+
+bool within_bounds(const Key& key, const Value& value) {
+    if (key.type == Type::integer) return number_within(key.bounds, std::get<std::int64_t>(value));
+    const double real = std::get<double>(value);
+    return std::isfinite(real) && number_within(key.bounds, real);
+}
+
+std::string range_text(const Key& key) {
+    switch (key.type) {
+        case Type::boolean:
+            return "true or false";
+        case Type::word:
+            return fmt::format("one of {}", list_text(key.words));
+        case Type::arms:
+            return fmt::format("a list of different arms of {}", list_text(arm_names()));
+        case Type::integer:
+        case Type::real:
+            break;
+    }
+    return fmt::format("{}{} {} and {}{}", key.bounds.or_zero ? "0 or " : "",
+                       key.bounds.min_excluded ? "above" : "between", number_text(key.bounds.min),
+                       key.bounds.min_excluded ? "at most " : "", number_text(key.bounds.max));
+}
+
+std::string allowed_text(const Key& key) {
+    if (key.type == Type::integer) return "a whole number " + range_text(key);
+    if (key.type == Type::real) return (key.bounds.or_zero ? "a number, " : "a number ") + range_text(key);
+    return range_text(key);
+}
+
+std::string to_toml(const Value& value) {
+    struct Writer {
+        std::string operator()(bool v) const { return v ? "true" : "false"; }
+        std::string operator()(std::int64_t v) const { return fmt::format("{}", v); }
+        std::string operator()(double v) const { return format_real(v); }
+        std::string operator()(const std::string& v) const { return in_quotes(v); }
+        std::string operator()(const std::vector<std::string>& v) const { return fmt::format("[{}]", list_text(v)); }
+    };
+    return std::visit(Writer{}, value);
+}
+
+}  // namespace ringlock::scenario

@@ -1,0 +1,171 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/unit/allan_support.hpp"
+
+namespace {
+
+using namespace ringlock;
+using testing::HasSubstr;
+
+struct Outcome {
+    int status = -1;
+    std::string out;
+    std::string err;
+};
+
+class AllanCommand : public testing::Test {
+   protected:
+    void SetUp() override {
+        const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+        directory_ = std::filesystem::temp_directory_path() /
+                     ("ringlock-allan-cli-" + std::string(info->name()) + "-" + std::to_string(::getpid()));
+        std::filesystem::create_directories(directory_);
+    }
+    void TearDown() override { std::filesystem::remove_all(directory_); }
+
+    static std::string contents(const std::filesystem::path& path) {
+        std::ifstream in(path);
+        return {std::istreambuf_iterator<char>(in), {}};
+    }
+    Outcome run(const std::string& arguments) {
+        const std::string command = std::string("'") + RINGLOCK_PROGRAM + "' allan " + arguments + " >'" +
+                                    (directory_ / "out").string() + "' 2>'" + (directory_ / "err").string() + "'";
+        const int raw = std::system(command.c_str());
+        return {WIFEXITED(raw) ? WEXITSTATUS(raw) : -1, contents(directory_ / "out"), contents(directory_ / "err")};
+    }
+    std::string write(const std::vector<double>& values, const std::string& before = "") {
+        const auto path = directory_ / "data.txt";
+        std::ofstream out(path);
+        out.precision(17);
+        out << before;
+        for (const double v : values) out << v << '\n';
+        return path.string();
+    }
+
+    std::filesystem::path directory_;
+};
+
+TEST_F(AllanCommand, JsonHasTheFieldsAndPublishedFigures) {
+    const Outcome r =
+        run(write(test::sp1065_frequencies()) + " --rate 1 --kind rate --tau 1,10,100 --dev oadev,adev --json");
+    ASSERT_EQ(r.status, 0) << r.err;
+    EXPECT_EQ(r.err, "");
+    const auto json = nlohmann::json::parse(r.out);
+    EXPECT_EQ(json["n"], 1000);
+    EXPECT_EQ(json["tau0_s"], 1.0);
+    EXPECT_TRUE(json["noise"].is_null());
+    const auto& points = json["deviations"]["oadev"];
+    ASSERT_EQ(points.size(), 3u);
+    EXPECT_NEAR(points[1]["dev"], 9.159953e-2, 5e-9);
+    EXPECT_EQ(points[1]["m"], 10);
+    EXPECT_EQ(points[1]["terms"], 1001 - 20);
+    EXPECT_EQ(points[1]["alpha"], 0);
+    EXPECT_LT(points[1]["lo"], points[1]["dev"]);
+    EXPECT_GT(points[1]["hi"], points[1]["dev"]);
+    EXPECT_GT(points[1]["edf"], 100.0);
+    EXPECT_NEAR(json["deviations"]["adev"][2]["dev"], 3.897804e-2, 5e-9);
+}
+
+// One record in every kind and unit gives one answer.
+TEST_F(AllanCommand, KindsAndUnitsAgree) {
+    const auto angle = test::simulate_angle({.n = 0.3}, 1200, 0.5, 1);
+    std::vector<double> increments;
+    std::vector<double> rate_deg_s;
+    std::vector<double> radians;
+    for (std::size_t i = 0; i < angle.size(); ++i) {
+        radians.push_back(angle[i] / 3600.0 * 3.14159265358979323846 / 180.0);
+        if (i == 0) continue;
+        increments.push_back(angle[i] - angle[i - 1]);
+        rate_deg_s.push_back(increments.back() / 0.5 / 3600.0);
+    }
+    const auto a =
+        nlohmann::json::parse(run(write(increments) + " --rate 2 --kind increment --unit arcsec --json").out);
+    const auto b = nlohmann::json::parse(run(write(rate_deg_s) + " --rate 2 --kind rate --unit deg/s --json").out);
+    const auto c = nlohmann::json::parse(run(write(radians) + " --rate 2 --kind phase --unit rad --json").out);
+    EXPECT_EQ(a["n"], 1200);
+    EXPECT_EQ(c["n"], 1201);
+    EXPECT_EQ(a["unit"], "deg/h");
+    const double dev = a["deviations"]["oadev"][3]["dev"];
+    EXPECT_NEAR(dev, 0.3 / 2.0, 0.3 / 2.0 * 0.2);  // N/sqrt(tau) at 4 s, in deg/h
+    for (const auto* other : {&b, &c}) {
+        EXPECT_NEAR((*other)["deviations"]["oadev"][3]["dev"], dev, 1e-8 * dev);
+        EXPECT_NEAR((*other)["noise"]["arw_deg_rt_h"]["value"], a["noise"]["arw_deg_rt_h"]["value"], 1e-6);
+    }
+    EXPECT_NEAR(a["noise"]["arw_deg_rt_h"]["value"], 0.005, 0.0005);
+    for (const char* key : {"quantization_arcsec", "bias_instability_deg_h", "rrw_deg_h_rt_h", "rate_ramp_deg_h_h"}) {
+        EXPECT_TRUE(a["noise"].contains(key)) << key;
+        EXPECT_TRUE(a["noise"][key].is_null()) << key;
+        EXPECT_GT(a["noise_upper_limits_95"][key], 0.0) << key;
+    }
+    const Outcome text = run(write(increments) + " --rate 2 --kind increment --unit arcsec");
+    EXPECT_THAT(text.out, HasSubstr("bias instability B   not resolved, < "));
+    EXPECT_THAT(text.out, HasSubstr("oadev [deg/h]"));
+}
+
+TEST_F(AllanCommand, WithholdsCoefficientsThatDoNotDescribeTheRecord) {
+    auto angle = test::simulate_angle({.n = 0.3}, 4000, 1.0, 1);
+    for (std::size_t i = 0; i < angle.size(); ++i) angle[i] += 0.3 * std::sin(1.1 * static_cast<double>(i));
+    const auto json = nlohmann::json::parse(run(write(angle) + " --rate 1 --kind phase --unit arcsec --json").out);
+    EXPECT_THAT(json["noise_withheld"].get<std::string>(), HasSubstr("line at 0.175"));
+    for (const auto& [key, value] : json["noise"].items()) EXPECT_TRUE(value.is_null()) << key;
+    EXPECT_EQ(json["noise"].size(), 5u);
+}
+
+TEST_F(AllanCommand, WrongInputEndsWithTwoAndSaysWhy) {
+    const std::string data = write({1, 2, 4, 3, 5, 9}, "# rate_hz = 10\n");
+    const auto expect = [&](const std::string& arguments, const std::string& words) {
+        const Outcome r = run(arguments);
+        EXPECT_EQ(r.status, 2) << arguments;
+        EXPECT_EQ(r.out, "") << arguments;
+        EXPECT_THAT(r.err, HasSubstr(words)) << arguments;
+    };
+    expect(data + " --rate 10", "never guessed");
+    expect(data + " --rate 10 --kind freq", "'freq'");
+    expect(data + " --rate 20 --kind rate", "contradicts --rate 20");
+    expect(data + " --rate 0 --kind rate", "positive");
+    expect(data + " --rate 10 --kind rate --unit arcsec", "deg/h, deg/s, rad/s");
+    expect(data + " --rate 10 --kind rate --unit furlong", "'furlong'");
+    expect(data + " --rate 10 --kind rate --dev hdev", "not there yet");
+    expect(data + " --rate 10 --kind rate --dev xdev", "not known");
+    expect(data + " --rate 10 --kind rate --tau 1,9", "1 to 3");
+    expect(data + " --rate 10 --kind rate --tau 0.5", "not seconds");
+    expect(data + " --rate 10 --kind rate --confidence 2", "between 0 and 1");
+    expect(data + " --kind rate", "--rate");
+    expect("absent.txt --rate 10 --kind rate", "absent.txt");
+    expect(write({1}) + " --rate 10 --kind rate", "at least 2");
+}
+
+// A constant record is all zeros and no noise: figures, not NaN, and null where there is none.
+TEST_F(AllanCommand, ConstantRecordsHaveNoNan) {
+    const Outcome r = run(write(std::vector<double>(100, 0.25)) + " --rate 1 --kind increment --unit arcsec --json");
+    ASSERT_EQ(r.status, 0) << r.err;
+    const auto json = nlohmann::json::parse(r.out);
+    for (const auto& p : json["deviations"]["oadev"]) EXPECT_EQ(p["dev"], 0.0);
+    EXPECT_TRUE(json["noise"]["arw_deg_rt_h"].is_null());
+    EXPECT_THAT(json["noise_withheld"].get<std::string>(), HasSubstr("no noise"));
+}
+
+TEST_F(AllanCommand, MeasuredRecordIsNotGivenCoefficients) {
+    const char* folder = std::getenv("RINGLOCK_TEST_DATA");
+    const std::filesystem::path path =
+        std::filesystem::path(folder != nullptr ? folder : RINGLOCK_SHARED_DATA) / "laser-gyro-triad-x.csv";
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there; set RINGLOCK_TEST_DATA to its folder";
+    const Outcome r =
+        run("'" + path.string() + "' --column angle_increment_arcsec --rate 100 --kind increment --unit arcsec --json");
+    ASSERT_EQ(r.status, 0) << r.err;
+    const auto json = nlohmann::json::parse(r.out);
+    EXPECT_EQ(json["n"], 184718);
+    EXPECT_TRUE(json["noise"]["arw_deg_rt_h"].is_null());
+    EXPECT_TRUE(json["noise"]["bias_instability_deg_h"].is_null());
+    EXPECT_FALSE(json["noise_withheld"].is_null());
+}
+
+}  // namespace

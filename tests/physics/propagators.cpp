@@ -1,0 +1,130 @@
+// The two ways to solve the equation of motion against each other and against an integrator that is not ours.
+#include <boost/numeric/odeint/integrate/integrate_adaptive.hpp>
+#include <boost/numeric/odeint/stepper/generation.hpp>
+#include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
+
+#include "engine/core/error.hpp"
+#include "engine/propagate/half_turn.hpp"
+#include "tests/physics/support.hpp"
+
+namespace ringlock::test {
+namespace {
+
+/// Worst difference [rad] between turn map and direct integrator over random half cycles: +-5 % of amplitude,
+/// +-`rate_deg_h`, +-5 % asymmetry, any coupling phase, phase steps in the middle.
+double worst_difference(int half_cycles, double rate_deg_h, std::uint64_t seed) {
+    Uniform uniform(seed);
+    double worst = 0.0;
+    for (int i = 0; i < half_cycles; ++i) {
+        gyro::Setup setup = paper_device();
+        setup.dither_asymmetry_ratio = uniform(-0.05, 0.05);
+        setup.input_rate_deg_h = uniform(-rate_deg_h, rate_deg_h);
+        setup.coupling_phase_rad = uniform(-3.0, 3.0);
+        const gyro::Device device(setup);
+        const auto direct = make_propagator(Method::direct, device, 0.0, 1e-12);
+        const auto map = make_propagator(Method::turn_map, device, 0.05 * device.dither_amplitude_rad, 1e-10);
+        const auto half = device.half_cycle(i % 2 == 0 ? 1.0 : -1.0, device.dither_amplitude_rad * uniform(0.95, 1.05));
+        const double phase = uniform(-3.14, 3.14);
+        const double step = i % 3 == 0 ? 0.0 : uniform(-3.0, 3.0);
+        worst = std::max(worst, std::abs(direct->lockin_gain_rad(phase, half, step) - map->lockin_gain_rad(phase, half, step)));
+    }
+    return worst;
+}
+
+TEST(Propagators, TurnMapAgreesWithDirectIntegratorTo1e8RadATurn) {
+    // A turn is two half turns, as a half cycle is. Reached: some 5e-11.
+    EXPECT_LT(worst_difference(60, 500.0, 11), 1e-8);
+    EXPECT_LT(worst_difference(60, 50000.0, 12), 1e-8);
+}
+
+TEST(LongPropagators, TurnMapAgreesWithDirectIntegratorOverTenThousandTurns) {
+    EXPECT_LT(worst_difference(10000, 50000.0, 13), 1e-9);
+}
+
+TEST(Propagators, DirectIntegratorAgreesWithAnIndependentIntegrator) {
+    // Boost.odeint's Fehlberg 7(8) on the deviation from the plain phase, which is known in closed form.
+    Uniform uniform(21);
+    for (int i = 0; i < 8; ++i) {
+        gyro::Setup setup = paper_device();
+        setup.input_rate_deg_h = uniform(-1000.0, 1000.0);
+        setup.coupling_phase_rad = uniform(-3.0, 3.0);
+        const gyro::Device device(setup);
+        const auto half = device.half_cycle(i % 2 == 0 ? 1.0 : -1.0, device.dither_amplitude_rad);
+        const double phase = uniform(-3.0, 3.0);
+        double deviation = 0.0;
+        using Stepper = boost::numeric::odeint::runge_kutta_fehlberg78<double>;
+        boost::numeric::odeint::integrate_adaptive(
+            boost::numeric::odeint::make_controlled<Stepper>(1e-13, 1e-13),
+            [&](const double& x, double& rate, double t) {
+                rate = device.coupling.b_rad_s *
+                       std::sin(phase + half.plain_phase_rad(t) + x + device.coupling.phase_rad);
+            },
+            deviation, 0.0, half.duration_s, 1e-8);
+        propagate::DirectIntegrator direct(device.coupling, 1e-13);
+        EXPECT_NEAR(direct.lockin_gain_rad(phase, half, 0.0), deviation, 2e-9);
+    }
+}
+
+TEST(Propagators, DirectIntegratorKeepsItsTolerance) {
+    const gyro::Device device(paper_device());
+    const auto half = device.half_cycle(1.0, device.dither_amplitude_rad);
+    for (const double phase : {-2.0, 0.3, 2.5}) {
+        propagate::DirectIntegrator fine(device.coupling, 1e-14);
+        const double exact = fine.lockin_gain_rad(phase, half, 0.0);
+        for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
+            propagate::DirectIntegrator coarse(device.coupling, tolerance);
+            EXPECT_NEAR(coarse.lockin_gain_rad(phase, half, 0.0), exact, tolerance);
+            EXPECT_LT(coarse.steps(), fine.steps());
+        }
+    }
+}
+
+TEST(Propagators, TurnMapOutsideItsTableIsExactAndCounted) {
+    const gyro::Device device(paper_device());
+    const double a = device.dither_amplitude_rad;
+    propagate::TurnMap map(device.coupling, device.half_cycle(1.0, a), device.half_cycle(-1.0, a), {a - 5.0, a + 5.0},
+                           1e-10);
+    const auto half = device.half_cycle(1.0, 1.2 * a);
+    propagate::DirectIntegrator direct(device.coupling, 1e-12);
+    EXPECT_EQ(map.outside(), 0);
+    EXPECT_NEAR(map.lockin_gain_rad(1.0, half, 0.0), direct.lockin_gain_rad(1.0, half, 0.0), 1e-9);
+    EXPECT_EQ(map.outside(), 1);
+}
+
+TEST(Propagators, TurnMapMeasuresTheErrorOfItsTables) {
+    const gyro::Device device(paper_device());
+    const double a = device.dither_amplitude_rad;
+    for (const double tolerance : {1e-6, 1e-8, 1e-10}) {
+        const propagate::TurnMap map(device.coupling, device.half_cycle(1.0, a), device.half_cycle(-1.0, a),
+                                     {0.95 * a, 1.05 * a}, tolerance);
+        EXPECT_LE(map.measured_error_rad(), tolerance);
+        EXPECT_GT(map.measured_error_rad(), 0.0);
+    }
+}
+
+TEST(Propagators, TurnMapRefusesADitherWithTooFewFringes) {
+    gyro::Setup setup = paper_device();
+    setup.dither_peak_rate_deg_s = 1.0;  // 18 fringes a half cycle
+    const gyro::Device device(setup);
+    EXPECT_THROW(make_propagator(Method::turn_map, device), RunError);
+}
+
+TEST(Propagators, TheSlowSolutionSolvesTheRiccatiEquation) {
+    // K = (b/2)(1 + K^2)/g - i K'/g, with K' by central differences.
+    const gyro::Device device(paper_device());
+    const auto half = device.half_cycle(1.0, device.dither_amplitude_rad);
+    const double b = device.coupling.b_rad_s;
+    for (const double t : {3e-4, 5e-4, 1e-3, 2e-3}) {
+        const double h = 1e-3 * t;
+        const auto k = propagate::slow_solution(half, b, t);
+        const auto slope = (propagate::slow_solution(half, b, t - 2.0 * h) - 8.0 * propagate::slow_solution(half, b, t - h) +
+                            8.0 * propagate::slow_solution(half, b, t + h) - propagate::slow_solution(half, b, t + 2.0 * h)) /
+                           (12.0 * h);
+        const double g = half.drive_rate_rad_s(t);
+        const auto right = 0.5 * b * (1.0 + k * k) / g - std::complex<double>(0.0, 1.0) * slope / g;
+        EXPECT_LT(std::abs(k - right), 1e-11 * std::abs(k)) << "t = " << t;
+    }
+}
+
+}  // namespace
+}  // namespace ringlock::test

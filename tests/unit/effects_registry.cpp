@@ -1,0 +1,94 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "engine/effects/effect.hpp"
+
+namespace ringlock::effects {
+namespace {
+
+Values defaults_of(const Effect& effect) {
+    Values values;
+    for (const Parameter& p : effect.parameters()) values.emplace(p.name, p.default_value);
+    return values;
+}
+
+TEST(EffectRegistry, IsSortedByNameWithoutDuplicates) {
+    const auto all = registry();
+    ASSERT_FALSE(all.empty());
+    EXPECT_TRUE(std::is_sorted(all.begin(), all.end(),
+                               [](const Effect* a, const Effect* b) { return a->name() <= b->name(); }));
+    EXPECT_TRUE(std::is_sorted(planned().begin(), planned().end(), std::less_equal<>()));
+}
+
+TEST(EffectRegistry, FindsEachByItsNameAndNothingElse) {
+    for (const Effect* effect : registry()) EXPECT_EQ(find(effect->name()), effect);
+    EXPECT_EQ(find("nonsense"), nullptr);
+    for (const std::string_view name : planned()) EXPECT_EQ(find(name), nullptr) << name;
+}
+
+TEST(EffectRegistry, DescribesEveryEffect) {
+    for (const Effect* effect : registry()) {
+        EXPECT_FALSE(effect->summary().empty()) << effect->name();
+        EXPECT_FALSE(effect->equation().empty()) << effect->name();
+        ASSERT_FALSE(effect->parameters().empty()) << effect->name();
+        for (const Parameter& p : effect->parameters()) {
+            EXPECT_FALSE(p.doc.empty()) << effect->name() << "." << p.name;
+            EXPECT_LT(p.min, p.max) << effect->name() << "." << p.name;
+            EXPECT_GE(p.default_value, p.min) << effect->name() << "." << p.name;
+            EXPECT_LE(p.default_value, p.max) << effect->name() << "." << p.name;
+        }
+    }
+}
+
+TEST(EffectRegistry, OnlyQuantumNoiseActsUnasked) {
+    for (const Effect* effect : registry()) {
+        EXPECT_EQ(effect->active(defaults_of(*effect)), effect->name() == "quantum_noise") << effect->name();
+    }
+}
+
+TEST(EffectRegistry, AnEffectAtItsDefaultsAddsNoAngle) {
+    for (const Effect* effect : registry()) {
+        if (effect->name() == "quantum_noise") continue;
+        const auto process = effect->rate_process(defaults_of(*effect), {.seed = 1, .gyro = 0});
+        if (process) {
+            EXPECT_EQ(process->angle_arcsec(0.0, 10.0), 0.0) << effect->name();
+        }
+    }
+}
+
+gyro::Setup configured(std::string_view name, const Values& values, gyro::Setup setup = {}) {
+    find(name)->configure(values, setup);
+    return setup;
+}
+
+TEST(DetectorPhaseOffset, SetsTheCouplingPhase) {
+    EXPECT_EQ(configured("detector_phase_offset", {{"phase_rad", 0.3}}).coupling_phase_rad, 0.3);
+}
+
+TEST(ReadoutEllipse, SetsTheDetectorsErrors) {
+    const gyro::Setup setup = configured(
+        "readout_ellipse", {{"gain", 0.1}, {"offset_sin", 0.2}, {"offset_cos", -0.3}, {"orthogonality_rad", 0.04}});
+    EXPECT_EQ(setup.ellipse.gain, 0.1);
+    EXPECT_EQ(setup.ellipse.offset_sin, 0.2);
+    EXPECT_EQ(setup.ellipse.offset_cos, -0.3);
+    EXPECT_EQ(setup.ellipse.orthogonality_rad, 0.04);
+}
+
+TEST(ReadoutEllipse, IsActiveByAnyOfItsParameters) {
+    const Effect& effect = *find("readout_ellipse");
+    for (const Parameter& p : effect.parameters()) {
+        Values values = defaults_of(effect);
+        values[std::string(p.name)] = 0.01;
+        EXPECT_TRUE(effect.active(values)) << p.name;
+    }
+}
+
+TEST(DitherAsymmetry, AddsToWhatTheGyroHasDrawn) {
+    gyro::Setup drawn;
+    drawn.dither_asymmetry_ratio = 0.001;
+    EXPECT_DOUBLE_EQ(configured("dither_asymmetry", {{"ratio", 0.02}}, drawn).dither_asymmetry_ratio, 0.021);
+}
+
+}  // namespace
+}  // namespace ringlock::effects

@@ -1,0 +1,97 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "engine/core/error.hpp"
+#include "engine/scenario/check.hpp"
+#include "engine/scenario/parse.hpp"
+
+namespace ringlock::scenario {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+std::string complaint(std::string_view text) {
+    try {
+        parse_string(text, "s.toml");
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return "";
+}
+
+TEST(ScenarioRules, TheDefaultsBreakNone) {
+    EXPECT_THAT(check(Scenario{}), IsEmpty());
+    EXPECT_FALSE(rules().empty());
+}
+
+TEST(ScenarioRules, TheDitherMustReverseTheRate) {
+    // Half of 109.1 deg/s is 196380 deg/h, less six sigma of amplitude and asymmetry: 0.994^2 of it.
+    EXPECT_EQ(complaint("[input]\nrate_deg_h = 194000"), "");
+    EXPECT_THAT(complaint("[input]\nrate_deg_h = -194100"),
+                AllOf(HasSubstr("s.toml:2:14: key \"input.rate_deg_h\" = -194100.0: "), HasSubstr("below 194031 deg/h"),
+                      HasSubstr("the rate must reverse")));
+    EXPECT_THAT(complaint("[effects.dither_asymmetry]\nratio = 0.2\n[input]\nrate_deg_h = 180000"),
+                HasSubstr("s.toml:4:14: key \"input.rate_deg_h\""));
+}
+
+TEST(ScenarioRules, TheCulpritIsAKeyThatTheFileNames) {
+    EXPECT_THAT(complaint("[dither]\npeak_rate_deg_s = 0.005"),
+                HasSubstr("s.toml:2:19: key \"dither.peak_rate_deg_s\""));
+}
+
+TEST(ScenarioRules, TheSweepsEndCounts) {
+    const std::string sweep = "[input]\nsweep_stop_deg_h = 3e5\n";
+    EXPECT_EQ(complaint(sweep), "");  // not used without a sweep
+    EXPECT_THAT(complaint(sweep + "sweep_points = 3"),
+                HasSubstr("s.toml:2:20: key \"input.sweep_stop_deg_h\" = 300000.0"));
+}
+
+TEST(ScenarioRules, ASweepGoesSomewhere) {
+    EXPECT_THAT(complaint("[input]\nsweep_points = 3"),
+                AllOf(HasSubstr("s.toml:2:16: key \"input.sweep_points\" = 3: "), HasSubstr("another rate")));
+    EXPECT_EQ(complaint("[input]\nrate_deg_h = 0\nsweep_stop_deg_h = 5\nsweep_points = 51"), "");
+}
+
+TEST(ScenarioRules, ASweepIsNotTooLarge) {
+    EXPECT_THAT(complaint("[input]\nsweep_points = 100000\nsweep_stop_deg_h = 0\n[ensemble]\ngyros = 1001"),
+                AllOf(HasSubstr("s.toml:5:9: key \"ensemble.gyros\" = 1001: "), HasSubstr("100000000 gyros")));
+}
+
+TEST(ScenarioRules, TheTurnMapNeedsFringes) {
+    // 2 Omega_D / (K w_D) is 2005 at the default: 100 are left at a twentieth of the dither's peak rate.
+    const std::string weak = "[dither]\npeak_rate_deg_s = 5.4\n[gyro]\nlockin_threshold_deg_h = 100\n";
+    EXPECT_THAT(complaint(weak), AllOf(HasSubstr("key \"dither.peak_rate_deg_s\" = 5.4: 99.3 fringes in a half cycle"),
+                                       HasSubstr("propagation.method = \"direct\"")));
+    EXPECT_EQ(complaint(weak + "[propagation]\nmethod = \"direct\""), "");
+    EXPECT_EQ(complaint("[dither]\npeak_rate_deg_s = 5.5\n[gyro]\nlockin_threshold_deg_h = 100\n"), "");
+}
+
+TEST(ScenarioRules, TheTurnMapNeedsSmallKicks) {
+    // kappa is 0.152 rad at 300 deg/h.
+    EXPECT_EQ(complaint("[gyro]\nlockin_threshold_deg_h = 1970"), "");
+    EXPECT_THAT(complaint("[gyro]\nlockin_threshold_deg_h = 2000"),
+                AllOf(HasSubstr("s.toml:2:26: key \"gyro.lockin_threshold_deg_h\" = 2000.0: "), HasSubstr("1.01 rad"),
+                      HasSubstr("propagation.method = \"direct\"")));
+    EXPECT_EQ(complaint("[gyro]\nlockin_threshold_deg_h = 2000\n[propagation]\nmethod = \"direct\""), "");
+}
+
+TEST(ScenarioRules, InjectedNoiseLeavesTheDither) {
+    const std::string noisy = "[noise_injection]\nturn_phase_rms_rad = 800\n";
+    EXPECT_THAT(complaint(noisy), HasSubstr("s.toml:2:22: key \"noise_injection.turn_phase_rms_rad\" = 800.0: "));
+    EXPECT_EQ(complaint(noisy + "[arms]\nnames = [\"ideal\", \"uncompensated\"]"), "");
+}
+
+TEST(ScenarioRules, ASampleHoldsACycleAndARunHoldsSamples) {
+    EXPECT_THAT(complaint("[output]\nsample_interval_s = 0.008"),
+                AllOf(HasSubstr("s.toml:2:21: key \"output.sample_interval_s\" = 0.008: "), HasSubstr("0.00802041 s")));
+    EXPECT_EQ(complaint("[ensemble]\nduration_s = 3"), "");
+    EXPECT_THAT(complaint("[ensemble]\nduration_s = 2.9"),
+                AllOf(HasSubstr("s.toml:2:14: key \"ensemble.duration_s\" = 2.9: "), HasSubstr("at least 3 samples")));
+}
+
+}  // namespace
+}  // namespace ringlock::scenario
