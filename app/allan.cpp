@@ -1,4 +1,4 @@
-#include "app/command.hpp"
+#include "analysis/allan/allan.hpp"
 
 #include <fmt/format.h>
 
@@ -11,10 +11,10 @@
 #include <string>
 #include <string_view>
 
-#include "analysis/allan/allan.hpp"
 #include "analysis/noise/fit.hpp"
 #include "analysis/record/series.hpp"
 #include "app/allan_output.hpp"
+#include "app/command.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::app {

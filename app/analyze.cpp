@@ -16,7 +16,8 @@ void add_analyze(CLI::App& root) {
         std::string plot;
         bool json = false;
     };
-    CLI::App* command = root.add_subcommand("analyze", "Compare the arms of a result: Allan deviation, noise, rate error");
+    CLI::App* command =
+        root.add_subcommand("analyze", "Compare the arms of a result: Allan deviation, noise, rate error");
     auto arguments = std::make_shared<Arguments>();
     command->add_option("OUT.h5", arguments->file, "result of ringlock run")->required();
     command->add_option("--plot", arguments->plot, "also draw the figure into this SVG file");
@@ -26,7 +27,8 @@ void add_analyze(CLI::App& root) {
         const store::Provenance provenance = study::read_provenance(arguments->file);
         const study::Summary summary = study::summarise(study);
         if (!arguments->plot.empty()) report::write_svg(arguments->plot, study_figure(study, summary));
-        fmt::print("{}", arguments->json ? study_json(study, summary, provenance) : study_text(study, summary, provenance));
+        fmt::print("{}",
+                   arguments->json ? study_json(study, summary, provenance) : study_text(study, summary, provenance));
     });
 }
 

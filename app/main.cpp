@@ -32,8 +32,7 @@ int main(int argc, char** argv) {
         "Simulates ensembles of dithered gyros, compares uncompensated, noise-injected and compensated outputs, and\n"
         "computes Allan deviation and angle random walk.",
         "ringlock"};
-    root.set_version_flag("--version",
-                          fmt::format("ringlock {} ({})", ringlock::version(), ringlock::git_hash()));
+    root.set_version_flag("--version", fmt::format("ringlock {} ({})", ringlock::version(), ringlock::git_hash()));
     root.require_subcommand(1);
     root.footer("Exit status: 0 done; 1 the run failed; 2 the input or the command line is wrong.");
     app::add_run(root, {argv, static_cast<std::size_t>(argc)});

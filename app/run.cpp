@@ -18,7 +18,6 @@
 #include "engine/core/interrupt.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/progress.hpp"
-#include "engine/scenario/check.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/render.hpp"
 
@@ -69,14 +68,15 @@ int thread_count(int asked) {
 
 void run(const Arguments& arguments, std::span<const char* const> command_line) {
     if (!arguments.print_schema.empty()) return print_schema(arguments.print_schema);
-    if (arguments.scenario.empty()) throw InputError("run: give a scenario file, or --print-schema for an example of one");
+    if (arguments.scenario.empty())
+        throw InputError("run: give a scenario file, or --print-schema for an example of one");
     if (!arguments.shard.empty()) throw InputError("--shard is not there yet; run the whole ensemble");
     if (arguments.resume) throw InputError("--resume is not there yet; run the whole ensemble");
     const int threads = thread_count(arguments.threads);
     const scenario::Scenario scenario = load(arguments);
-    const std::filesystem::path out = arguments.out.empty()
-                                          ? std::filesystem::path(arguments.scenario).filename().replace_extension(".h5")
-                                          : std::filesystem::path(arguments.out);
+    const std::filesystem::path out =
+        arguments.out.empty() ? std::filesystem::path(arguments.scenario).filename().replace_extension(".h5")
+                              : std::filesystem::path(arguments.out);
 
     store::Provenance provenance = store::collect_provenance(command_line, threads, arguments.scenario);
     const auto start = std::chrono::steady_clock::now();
@@ -86,8 +86,8 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     if (!arguments.quiet) {
         fmt::print(stderr, "{}: {} gyros x {:.6g} s, {} arms, {} threads; the result will take about {:.1f} MB\n",
                    arguments.scenario, gyros,
-                   plan.schedule.sample_interval_s * static_cast<double>(plan.schedule.samples - 1), scenario.arms.size(),
-                   threads, static_cast<double>(study::expected_size_bytes(plan)) * 1e-6);
+                   plan.schedule.sample_interval_s * static_cast<double>(plan.schedule.samples - 1),
+                   scenario.arms.size(), threads, static_cast<double>(study::expected_size_bytes(plan)) * 1e-6);
     }
     ensemble::Progress progress(gyros, {.quiet = arguments.quiet});
     study::Observer observer;
@@ -110,7 +110,8 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
 void add_run(CLI::App& root, std::span<const char* const> command_line) {
     CLI::App* command = root.add_subcommand("run", "Simulate the ensemble of a scenario and compare its arms");
     auto arguments = std::make_shared<Arguments>();
-    command->add_option("SCENARIO.toml", arguments->scenario, "what to simulate; an empty file is the device of Gao & Deng 2007");
+    command->add_option("SCENARIO.toml", arguments->scenario,
+                        "what to simulate; an empty file is the device of Gao & Deng 2007");
     command->add_option("-o,--output", arguments->out, "result file (default: the scenario's name with .h5, here)");
     command->add_option("--threads", arguments->threads, "threads (default: all cores); results do not depend on it");
     command->add_option("--seed", arguments->seed, "replaces ensemble.seed");

@@ -25,9 +25,10 @@ void add_validate(CLI::App& root) {
             const study::Study study = study::read_result(path);
             fmt::print("{}: a valid result of {} gyros and {} arms\n", *file, study.gyros.size(), study.arms.size());
         } else {
-            throw InputError(fmt::format("{}: \"{}\" is no extension that validate knows; scenarios end in .toml, results "
-                                         "in .h5 (records are not there yet)",
-                                         *file, path.extension().string()));
+            throw InputError(
+                fmt::format("{}: \"{}\" is no extension that validate knows; scenarios end in .toml, results "
+                            "in .h5 (records are not there yet)",
+                            *file, path.extension().string()));
         }
     });
 }

@@ -27,7 +27,7 @@ struct DrawnParameter {
     const char* name;
     const char* unit;
     const char* description;
-    double gyro::Setup::* field;
+    double gyro::Setup::*field;
 };
 
 constexpr std::array drawn_parameters = {
@@ -45,7 +45,7 @@ struct CoefficientColumn {
     const char* name;
     const char* unit;
     const char* description;
-    noise::Coefficient noise::NoiseFit::* field;
+    noise::Coefficient noise::NoiseFit::*field;
 };
 
 constexpr std::array coefficient_columns = {
@@ -57,12 +57,33 @@ constexpr std::array coefficient_columns = {
     CoefficientColumn{"rate_ramp_deg_h_h", "deg/h/h", "rate ramp R", &noise::NoiseFit::rate_ramp_deg_h_h},
 };
 
+/// One column of what decides over the gyros together.
+struct PoolingColumn {
+    const char* name;
+    const char* unit;
+    const char* description;
+    double noise::Pooling::*field;
+};
+
+constexpr std::array pooling_columns = {
+    PoolingColumn{"arw_evidence", "1", "rise of the deviance without N, all other terms free",
+                  &noise::Pooling::arw_evidence},
+    PoolingColumn{"angle_noise_evidence", "1", "rise of the deviance without Q in the model of Q and N",
+                  &noise::Pooling::angle_noise_evidence},
+    PoolingColumn{"arw_alone_deg_rt_h", "deg/sqrt(h)", "N in the model of N alone",
+                  &noise::Pooling::arw_alone_deg_rt_h},
+    PoolingColumn{"arw_beside_angle_noise_deg_rt_h", "deg/sqrt(h)", "N in the model of Q and N",
+                  &noise::Pooling::arw_beside_angle_noise_deg_rt_h},
+    PoolingColumn{"arw_best_deg_rt_h", "deg/sqrt(h)", "N in the best model that has it",
+                  &noise::Pooling::arw_best_deg_rt_h},
+};
+
 /// One column of the Allan deviations of the gyros.
 struct AllanColumn {
     const char* name;
     const char* unit;
     const char* description;
-    double allan::Point::* field;
+    double allan::Point::*field;
 };
 
 constexpr std::array allan_columns = {
@@ -74,9 +95,12 @@ constexpr std::array allan_columns = {
 
 const char* compensator_name(scenario::Compensator compensator) {
     switch (compensator) {
-        case scenario::Compensator::published: return "published";
-        case scenario::Compensator::corrected: return "corrected";
-        case scenario::Compensator::none: break;
+        case scenario::Compensator::published:
+            return "published";
+        case scenario::Compensator::corrected:
+            return "corrected";
+        case scenario::Compensator::none:
+            break;
     }
     return "none";
 }
@@ -92,7 +116,7 @@ void write_noise(store::Group& group, const ArmStatistics& arm) {
     store::Group noise = group.create_group("noise");
     for (const CoefficientColumn& column : coefficient_columns) {
         const std::string name = column.name;
-        const auto get = [&](std::optional<double> noise::Coefficient::* part) {
+        const auto get = [&](std::optional<double> noise::Coefficient::*part) {
             return over_gyros(arm, [&](const GyroStatistics& g) { return or_nan(g.noise.*column.field.*part); });
         };
         noise.write(name, get(&noise::Coefficient::value),
@@ -102,6 +126,14 @@ void write_noise(store::Group& group, const ArmStatistics& arm) {
         noise.write(name + "_hi", get(&noise::Coefficient::hi),
                     {column.unit, fmt::format("{}: upper end, or a 95 % limit where not shown", column.description)});
     }
+    for (const PoolingColumn& column : pooling_columns) {
+        noise.write(column.name,
+                    over_gyros(arm, [&](const GyroStatistics& g) { return g.noise.pooling.*column.field; }),
+                    {column.unit, column.description});
+    }
+    std::vector<std::int8_t> red;
+    for (const GyroStatistics& gyro : arm.gyros) red.push_back(gyro.noise.pooling.red ? 1 : 0);
+    noise.write("red", red, {"1", "1 where the best model has flicker, rate random walk or a ramp"});
     std::vector<std::int8_t> described;
     for (const GyroStatistics& gyro : arm.gyros) described.push_back(gyro.noise.described ? 1 : 0);
     noise.write("described", described, {"1", "1 where the noise model describes the record"});
@@ -128,18 +160,21 @@ void write_allan(store::Group& group, const Study& study, const ArmStatistics& a
         for (const allan::Point& point : gyro.allan) alpha.push_back(static_cast<std::int8_t>(point.alpha));
     }
     for (const allan::Point& point : arm.gyros.front().allan) terms.push_back(point.terms);
-    allan.write("alpha", std::span<const std::int8_t>(alpha), shape, {"1", "power law assumed for edf: S(f) ~ f^alpha"});
+    allan.write("alpha", std::span<const std::int8_t>(alpha), shape,
+                {"1", "power law assumed for edf: S(f) ~ f^alpha"});
     allan.write("terms", terms, {"1", "squared differences in each deviation"});
 
-    const auto ensemble = [&](double EnsemblePoint::* field) {
+    const auto ensemble = [&](double EnsemblePoint::*field) {
         std::vector<double> values;
         for (const EnsemblePoint& point : summary.allan) values.push_back(point.*field);
         return values;
     };
     allan.write("ensemble_deviation_deg_h", ensemble(&EnsemblePoint::dev_deg_h),
                 {"deg/h", "root of the mean Allan variance over the gyros"});
-    allan.write("ensemble_deviation_lo_deg_h", ensemble(&EnsemblePoint::lo), {"deg/h", "lower end of its 68.27 % interval"});
-    allan.write("ensemble_deviation_hi_deg_h", ensemble(&EnsemblePoint::hi), {"deg/h", "upper end of its 68.27 % interval"});
+    allan.write("ensemble_deviation_lo_deg_h", ensemble(&EnsemblePoint::lo),
+                {"deg/h", "lower end of its 68.27 % interval"});
+    allan.write("ensemble_deviation_hi_deg_h", ensemble(&EnsemblePoint::hi),
+                {"deg/h", "upper end of its 68.27 % interval"});
     allan.write("ensemble_edf", ensemble(&EnsemblePoint::edf), {"1", "equivalent degrees of freedom, summed"});
 }
 
@@ -178,14 +213,16 @@ std::filesystem::path refuse_to_lose(const std::filesystem::path& path, const St
     bool same = false;
     try {
         const store::File file = store::File::open(path);
-        same = is_result(file) && file.dataset("scenario").read<std::string>().at(0) == scenario::to_toml(study.scenario);
+        same =
+            is_result(file) && file.dataset("scenario").read<std::string>().at(0) == scenario::to_toml(study.scenario);
     } catch (const std::exception&) {
         // Not HDF5 or not readable: somebody's file all the same.
     }
     if (!same) {
-        throw InputError(fmt::format("{}: the file is there and is not a result of this scenario and seed; it is kept. Give "
-                                     "another name with -o, or remove it",
-                                     path.string()));
+        throw InputError(
+            fmt::format("{}: the file is there and is not a result of this scenario and seed; it is kept. Give "
+                        "another name with -o, or remove it",
+                        path.string()));
     }
     return path;
 }
@@ -196,18 +233,18 @@ std::uint64_t expected_size_bytes(const Study& study) {
     const auto gyros = static_cast<std::uint64_t>(study.gyros.size());
     const auto arms = static_cast<std::uint64_t>(study.arms.size());
     const auto samples = study.scenario.output.angle_record ? static_cast<std::uint64_t>(study.schedule.samples) : 0;
-    const std::uint64_t statistics = 8 * (3 * coefficient_columns.size() + 1 + allan_columns.size() * study.factors.size());
+    const std::uint64_t statistics =
+        8 * (3 * coefficient_columns.size() + 1 + allan_columns.size() * study.factors.size());
     return gyros * (8 * drawn_parameters.size() + arms * (8 * samples + statistics));
 }
 
-ResultWriter::ResultWriter(const std::filesystem::path& path, const Study& study)
-    : file_(refuse_to_lose(path, study)) {
+ResultWriter::ResultWriter(const std::filesystem::path& path, const Study& study) : file_(refuse_to_lose(path, study)) {
     store::File& root = file_.file();
     root.set_attribute("format", format_name);
     root.set_attribute("format_version", result_format_version);
     root.set_attribute("seed", study.scenario.ensemble.seed);
     root.write("scenario", std::vector<std::string>{scenario::to_toml(study.scenario)},
-                {"", "the full resolved scenario, TOML"});
+               {"", "the full resolved scenario, TOML"});
     store::Group arms = root.create_group("arms");
     for (const ArmStatistics& arm : study.arms) {
         store::Group group = arms.create_group(arm.arm.name);
@@ -239,7 +276,8 @@ void ResultWriter::finish(const Study& study, const Summary& summary, const stor
     write_gyros(root, study);
     for (std::size_t i = 0; i < study.arms.size(); ++i) {
         store::Group group = root.group("arms").group(study.arms[i].arm.name);
-        group.write("rate_error_deg_h", over_gyros(study.arms[i], [](const GyroStatistics& g) { return g.rate_error_deg_h; }),
+        group.write("rate_error_deg_h",
+                    over_gyros(study.arms[i], [](const GyroStatistics& g) { return g.rate_error_deg_h; }),
                     {"deg/h", "mean output rate less the input rate"});
         write_noise(group, study.arms[i]);
         write_allan(group, study, study.arms[i], summary.arms[i]);
@@ -255,8 +293,8 @@ std::vector<double> read_column(const store::Group& group, const std::string& na
     const store::Dataset dataset = group.dataset(name);
     auto values = dataset.read<double>();
     if (values.size() != expected) {
-        throw InputError(fmt::format("{}: dataset {} holds {} numbers, {} are wanted: the result is damaged", dataset.file(),
-                                     dataset.path(), values.size(), expected));
+        throw InputError(fmt::format("{}: dataset {} holds {} numbers, {} are wanted: the result is damaged",
+                                     dataset.file(), dataset.path(), values.size(), expected));
     }
     return values;
 }
@@ -277,8 +315,16 @@ void read_arm(const store::Group& group, const Study& study, ArmStatistics& arm)
             coefficient = {!std::isnan(value[g]), or_nothing(value[g]), or_nothing(lo[g]), or_nothing(hi[g])};
         }
     }
+    for (const PoolingColumn& column : pooling_columns) {
+        const auto values = read_column(noise, column.name, gyros);
+        for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].noise.pooling.*column.field = values[g];
+    }
+    const auto red = read_column(noise, "red", gyros);
     const auto described = read_column(noise, "described", gyros);
-    for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].noise.described = described[g] != 0.0;
+    for (std::size_t g = 0; g < gyros; ++g) {
+        arm.gyros[g].noise.pooling.red = red[g] != 0.0;
+        arm.gyros[g].noise.described = described[g] != 0.0;
+    }
     const store::Group allan = group.group("allan");
     const auto tau = read_column(allan, "tau_s", taus);
     const auto alpha = read_column(allan, "alpha", gyros * taus);
@@ -304,9 +350,10 @@ void read_arm(const store::Group& group, const Study& study, ArmStatistics& arm)
 Study read_result(const std::filesystem::path& path) {
     const store::File file = store::File::open(path);
     if (!is_result(file)) {
-        throw InputError(fmt::format("{}: not a ringlock result (attribute \"format\" is not \"{}\"); results are written by "
-                                     "ringlock run",
-                                     path.string(), format_name));
+        throw InputError(
+            fmt::format("{}: not a ringlock result (attribute \"format\" is not \"{}\"); results are written by "
+                        "ringlock run",
+                        path.string(), format_name));
     }
     const std::int64_t version = file.int_attribute("format_version");
     if (version != result_format_version) {
