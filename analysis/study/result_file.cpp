@@ -31,7 +31,7 @@ struct DrawnParameter {
     const char* name;
     const char* unit;
     const char* description;
-    double gyro::Setup::* field;
+    double gyro::Setup::*field;
 };
 
 constexpr std::array drawn_parameters = {
@@ -49,7 +49,7 @@ struct CoefficientColumn {
     const char* name;
     const char* unit;
     const char* description;
-    noise::Coefficient noise::NoiseFit::* field;
+    noise::Coefficient noise::NoiseFit::*field;
 };
 
 constexpr std::array coefficient_columns = {
@@ -66,7 +66,7 @@ struct AllanColumn {
     const char* name;
     const char* unit;
     const char* description;
-    double allan::Point::* field;
+    double allan::Point::*field;
 };
 
 constexpr std::array allan_columns = {
@@ -78,9 +78,12 @@ constexpr std::array allan_columns = {
 
 const char* compensator_name(scenario::Compensator compensator) {
     switch (compensator) {
-        case scenario::Compensator::published: return "published";
-        case scenario::Compensator::corrected: return "corrected";
-        case scenario::Compensator::none: break;
+        case scenario::Compensator::published:
+            return "published";
+        case scenario::Compensator::corrected:
+            return "corrected";
+        case scenario::Compensator::none:
+            break;
     }
     return "none";
 }
@@ -96,7 +99,7 @@ void write_noise(store::Group& group, const ArmStatistics& arm) {
     store::Group noise = group.create_group("noise");
     for (const CoefficientColumn& column : coefficient_columns) {
         const std::string name = column.name;
-        const auto get = [&](std::optional<double> noise::Coefficient::* part) {
+        const auto get = [&](std::optional<double> noise::Coefficient::*part) {
             return over_gyros(arm, [&](const GyroStatistics& g) { return or_nan(g.noise.*column.field.*part); });
         };
         noise.write(name, get(&noise::Coefficient::value),
@@ -132,18 +135,21 @@ void write_allan(store::Group& group, const Study& study, const ArmStatistics& a
         for (const allan::Point& point : gyro.allan) alpha.push_back(static_cast<std::int8_t>(point.alpha));
     }
     for (const allan::Point& point : arm.gyros.front().allan) terms.push_back(point.terms);
-    allan.write("alpha", std::span<const std::int8_t>(alpha), shape, {"1", "power law assumed for edf: S(f) ~ f^alpha"});
+    allan.write("alpha", std::span<const std::int8_t>(alpha), shape,
+                {"1", "power law assumed for edf: S(f) ~ f^alpha"});
     allan.write("terms", terms, {"1", "squared differences in each deviation"});
 
-    const auto ensemble = [&](double EnsemblePoint::* field) {
+    const auto ensemble = [&](double EnsemblePoint::*field) {
         std::vector<double> values;
         for (const EnsemblePoint& point : summary.allan) values.push_back(point.*field);
         return values;
     };
     allan.write("ensemble_deviation_deg_h", ensemble(&EnsemblePoint::dev_deg_h),
                 {"deg/h", "root of the mean Allan variance over the gyros"});
-    allan.write("ensemble_deviation_lo_deg_h", ensemble(&EnsemblePoint::lo), {"deg/h", "lower end of its 68.27 % interval"});
-    allan.write("ensemble_deviation_hi_deg_h", ensemble(&EnsemblePoint::hi), {"deg/h", "upper end of its 68.27 % interval"});
+    allan.write("ensemble_deviation_lo_deg_h", ensemble(&EnsemblePoint::lo),
+                {"deg/h", "lower end of its 68.27 % interval"});
+    allan.write("ensemble_deviation_hi_deg_h", ensemble(&EnsemblePoint::hi),
+                {"deg/h", "upper end of its 68.27 % interval"});
     allan.write("ensemble_edf", ensemble(&EnsemblePoint::edf), {"1", "equivalent degrees of freedom, summed"});
 }
 
@@ -178,19 +184,21 @@ bool is_result(const store::File& file) {
 
 /// Keeps results that are there: only a result of this very study may be replaced.
 std::filesystem::path refuse_to_lose(const std::filesystem::path& path, const Study& study) {
-    std::error_code unreachable;  // claiming the output says what is wrong with the path
-    if (!std::filesystem::exists(path, unreachable)) return path;
+    std::error_code unreachable;  // claiming the output says what is wrong with what is no file
+    if (!std::filesystem::is_regular_file(path, unreachable)) return path;
     bool same = false;
     try {
         const store::File file = store::File::open(path);
-        same = is_result(file) && file.dataset("scenario").read<std::string>().at(0) == scenario::to_toml(study.scenario);
+        same =
+            is_result(file) && file.dataset("scenario").read<std::string>().at(0) == scenario::to_toml(study.scenario);
     } catch (const std::exception&) {
         // Not HDF5 or not readable: somebody's file all the same.
     }
     if (!same) {
-        throw InputError(fmt::format("{}: the file is there and is not a result of this scenario and seed; it is kept. Give "
-                                     "another name with -o, or remove it",
-                                     path.string()));
+        throw InputError(
+            fmt::format("{}: the file is there and is not a result of this scenario and seed; it is kept. Give "
+                        "another name with -o, or remove it",
+                        path.string()));
     }
     return path;
 }
@@ -201,18 +209,18 @@ std::uint64_t expected_size_bytes(const Study& study) {
     const auto gyros = static_cast<std::uint64_t>(study.gyros.size());
     const auto arms = static_cast<std::uint64_t>(study.arms.size());
     const auto samples = study.scenario.output.angle_record ? static_cast<std::uint64_t>(study.schedule.samples) : 0;
-    const std::uint64_t statistics = 8 * (3 * coefficient_columns.size() + 1 + allan_columns.size() * study.factors.size());
+    const std::uint64_t statistics =
+        8 * (3 * coefficient_columns.size() + 1 + allan_columns.size() * study.factors.size());
     return gyros * (8 * drawn_parameters.size() + arms * (8 * samples + statistics));
 }
 
-ResultWriter::ResultWriter(const std::filesystem::path& path, const Study& study)
-    : file_(refuse_to_lose(path, study)) {
+ResultWriter::ResultWriter(const std::filesystem::path& path, const Study& study) : file_(refuse_to_lose(path, study)) {
     store::File& root = file_.file();
     root.set_attribute("format", format_name);
     root.set_attribute("format_version", result_format_version);
     root.set_attribute("seed", study.scenario.ensemble.seed);
     root.write("scenario", std::vector<std::string>{scenario::to_toml(study.scenario)},
-                {"", "the full resolved scenario, TOML"});
+               {"", "the full resolved scenario, TOML"});
     store::Group arms = root.create_group("arms");
     for (const ArmStatistics& arm : study.arms) {
         store::Group group = arms.create_group(arm.arm.name);
@@ -244,7 +252,8 @@ void ResultWriter::finish(const Study& study, const Summary& summary, const stor
     write_gyros(root, study);
     for (std::size_t i = 0; i < study.arms.size(); ++i) {
         store::Group group = root.group("arms").group(study.arms[i].arm.name);
-        group.write("rate_error_deg_h", over_gyros(study.arms[i], [](const GyroStatistics& g) { return g.rate_error_deg_h; }),
+        group.write("rate_error_deg_h",
+                    over_gyros(study.arms[i], [](const GyroStatistics& g) { return g.rate_error_deg_h; }),
                     {"deg/h", "mean output rate less the input rate"});
         write_noise(group, study.arms[i]);
         write_allan(group, study, study.arms[i], summary.arms[i]);
@@ -310,9 +319,10 @@ void read_arm(const store::Group& group, const Study& study, ArmStatistics& arm)
 Study read_result(const std::filesystem::path& path) {
     const store::File file = store::File::open(path);
     if (!is_result(file)) {
-        throw InputError(fmt::format("{}: not a ringlock result (attribute \"format\" is not \"{}\"); results are written by "
-                                     "ringlock run",
-                                     path.string(), format_name));
+        throw InputError(
+            fmt::format("{}: not a ringlock result (attribute \"format\" is not \"{}\"); results are written by "
+                        "ringlock run",
+                        path.string(), format_name));
     }
     const std::int64_t version = file.int_attribute("format_version");
     if (version != result_format_version) {

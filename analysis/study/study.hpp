@@ -37,9 +37,9 @@ struct Study {
     std::vector<std::int64_t> factors;  ///< averaging factors of the Allan deviations: octaves
     std::vector<gyro::Setup> gyros;     ///< parameters as drawn
     std::vector<ArmStatistics> arms;
-    std::int64_t turns = 0;             ///< zero-rate points of distinct physical trajectories
+    std::int64_t turns = 0;  ///< zero-rate points of distinct physical trajectories
     std::int64_t turns_off_table = 0;
-    double turn_map_error_rad = 0.0;    ///< largest error measured between the nodes of the turn maps
+    double turn_map_error_rad = 0.0;  ///< largest error measured between the nodes of the turn maps
 };
 
 /// Allan deviations, noise coefficients and rate error of one record.

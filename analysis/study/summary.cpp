@@ -34,7 +34,7 @@ double upper_limit(const GyroStatistics& gyro) {
 
 /// A noise coefficient over the gyros of an arm. It is the ensemble's where most records resolve it; a record that does
 /// not counts as zero among the others.
-Figure figure(const ArmStatistics& arm, noise::Coefficient noise::NoiseFit::* which, std::uint64_t seed) {
+Figure figure(const ArmStatistics& arm, noise::Coefficient noise::NoiseFit::*which, std::uint64_t seed) {
     std::vector<double> values;
     Figure result;
     for (const GyroStatistics& gyro : arm.gyros) {

@@ -11,8 +11,8 @@ namespace ringlock::study {
 /// A figure over the ensemble; what the data do not show is absent.
 struct Figure {
     std::optional<double> median;
-    std::optional<double> lo;  ///< central 68.27 % of the gyros
-    std::optional<double> hi;  ///< its upper end; a 95 % upper limit where there is no median
+    std::optional<double> lo;         ///< central 68.27 % of the gyros
+    std::optional<double> hi;         ///< its upper end; a 95 % upper limit where there is no median
     std::optional<double> median_lo;  ///< bootstrap 95 % interval of the median
     std::optional<double> median_hi;
     std::int64_t resolved = 0;  ///< gyros whose record shows the figure
