@@ -1,4 +1,4 @@
-#include "app/command.hpp"
+#include "analysis/allan/allan.hpp"
 
 #include <fmt/format.h>
 
@@ -11,10 +11,11 @@
 #include <string>
 #include <string_view>
 
-#include "analysis/allan/allan.hpp"
 #include "analysis/noise/fit.hpp"
 #include "analysis/record/series.hpp"
 #include "app/allan_output.hpp"
+#include "app/command.hpp"
+#include "app/output.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::app {
@@ -191,7 +192,7 @@ void run(const Arguments& a) {
     }
     if (unit != nullptr) out.noise = noise::fit_noise(phase, out.tau0_s);
     const std::string text = a.json ? allan_json(out) : allan_text(out);
-    fmt::print("{}", text);
+    put(text);
 }
 
 }  // namespace
