@@ -23,8 +23,8 @@ void add_planned(CLI::App& root) {
         command->allow_extras();
         const std::string text = name;
         command->callback([text] {
-            throw InputError(fmt::format("the command \"{}\" is not there yet; there are run, analyze, allan and validate",
-                                         text));
+            throw InputError(
+                fmt::format("the command \"{}\" is not there yet; there are run, analyze, allan and validate", text));
         });
     }
 }

@@ -13,7 +13,9 @@
 #include "analysis/report/plot.hpp"
 #include "analysis/study/result_file.hpp"
 #include "app/command.hpp"
+#include "app/output.hpp"
 #include "app/study_output.hpp"
+#include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/ensemble/draw.hpp"
@@ -27,7 +29,7 @@ namespace {
 
 struct Arguments {
     std::string scenario;
-    std::string out;
+    std::optional<std::string> out;
     std::string plot;
     std::string shard;
     std::string print_schema;
@@ -40,11 +42,11 @@ struct Arguments {
 
 void print_schema(const std::string& form) {
     if (form == "toml") {
-        fmt::print("{}", scenario::schema_text());
+        put(scenario::schema_text());
     } else if (form == "markdown") {
-        fmt::print("{}", scenario::schema_markdown());
+        put(scenario::schema_markdown());
     } else {
-        fmt::print("{}", scenario::schema_json());
+        put(scenario::schema_json());
     }
 }
 
@@ -62,20 +64,25 @@ scenario::Scenario load(const Arguments& arguments) {
 
 int thread_count(int asked) {
     constexpr int most = 4096;
-    if (asked < 0 || asked > most) throw InputError(fmt::format("--threads {}: must be between 1 and {}", asked, most));
+    if (asked < 0 || asked > most) {
+        throw InputError(fmt::format("--threads {}: must be between 1 and {}, or 0 for all cores", asked, most));
+    }
     return asked > 0 ? asked : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 }
 
 void run(const Arguments& arguments, std::span<const char* const> command_line) {
     if (!arguments.print_schema.empty()) return print_schema(arguments.print_schema);
-    if (arguments.scenario.empty()) throw InputError("run: give a scenario file, or --print-schema for an example of one");
+    if (arguments.scenario.empty())
+        throw InputError("run: give a scenario file, or --print-schema for an example of one");
     if (!arguments.shard.empty()) throw InputError("--shard is not there yet; run the whole ensemble");
     if (arguments.resume) throw InputError("--resume is not there yet; run the whole ensemble");
     const int threads = thread_count(arguments.threads);
     const scenario::Scenario scenario = load(arguments);
-    const std::filesystem::path out = arguments.out.empty()
-                                          ? std::filesystem::path(arguments.scenario).filename().replace_extension(".h5")
-                                          : std::filesystem::path(arguments.out);
+    const std::filesystem::path out =
+        arguments.out ? std::filesystem::path(*arguments.out)
+                      : std::filesystem::path(arguments.scenario).filename().replace_extension(".h5");
+    // A figure that cannot be written is better found out now than after the run.
+    if (!arguments.plot.empty()) const AtomicPath probe(arguments.plot);
 
     store::Provenance provenance = store::collect_provenance(command_line, threads, arguments.scenario);
     const auto start = std::chrono::steady_clock::now();
@@ -85,8 +92,8 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     if (!arguments.quiet) {
         fmt::print(stderr, "{}: {} gyros x {:.6g} s, {} arms, {} threads; the result will take about {:.1f} MB\n",
                    arguments.scenario, gyros,
-                   plan.schedule.sample_interval_s * static_cast<double>(plan.schedule.samples - 1), scenario.arms.size(),
-                   threads, static_cast<double>(study::expected_size_bytes(plan)) * 1e-6);
+                   plan.schedule.sample_interval_s * static_cast<double>(plan.schedule.samples - 1),
+                   scenario.arms.size(), threads, static_cast<double>(study::expected_size_bytes(plan)) * 1e-6);
     }
     study::Observer observer;
     observer.on_record = [&](std::int64_t gyro, const auto& angle_arcsec) { writer.write_record(gyro, angle_arcsec); };
@@ -97,7 +104,7 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     const study::Summary summary = study::summarise(study);
     writer.finish(study, summary, provenance);
     if (!arguments.plot.empty()) report::write_svg(arguments.plot, study_figure(study, summary));
-    fmt::print("{}", arguments.json ? study_json(study, summary, provenance) : study_text(study, summary, provenance));
+    put(arguments.json ? study_json(study, summary, provenance) : study_text(study, summary, provenance));
     if (!arguments.quiet) fmt::print(stderr, "result: {}\n", writer.path().string());
 }
 
@@ -106,25 +113,24 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
 void add_run(CLI::App& root, std::span<const char* const> command_line) {
     CLI::App* command = root.add_subcommand("run", "Simulate the ensemble of a scenario and compare its arms");
     auto arguments = std::make_shared<Arguments>();
-    command->add_option("SCENARIO.toml", arguments->scenario, "what to simulate; an empty file is the device of Gao & Deng 2007");
+    command->add_option("SCENARIO.toml", arguments->scenario,
+                        "what to simulate; an empty file is the device of Gao & Deng 2007");
     command->add_option("-o,--output", arguments->out, "result file (default: the scenario's name with .h5, here)");
-    command->add_option("--threads", arguments->threads, "threads (default: all cores); results do not depend on it");
+    command->add_option("--threads", arguments->threads, "threads (default 0: all cores); results do not depend on it");
     command->add_option("--seed", arguments->seed, "replaces ensemble.seed");
     command->add_option("--plot", arguments->plot, "also draw the figure into this SVG file");
     command->add_option("--shard", arguments->shard, "I/N: part I of N (not there yet)");
     command->add_flag("--resume", arguments->resume, "go on with an interrupted run (not there yet)");
     command->add_flag("--json", arguments->json, "print one JSON object instead of a table");
     command->add_flag("-q,--quiet", arguments->quiet, "no progress on standard error");
+    // A flag, so that it does not take the word after it for its value.
     command
-        ->add_option("--print-schema", arguments->print_schema,
-                     "print every key of a scenario with default, bounds and meaning: toml, markdown or json")
-        ->expected(0, 1)
-        ->default_str("toml")
+        ->add_flag(
+            "--print-schema{toml}", arguments->print_schema,
+            "print every key of a scenario with default, bounds and meaning, and end; =toml (default), =markdown "
+            "or =json")
         ->check(CLI::IsMember({"toml", "markdown", "json"}));
-    command->callback([arguments, command, command_line] {
-        if (command->count("--print-schema") > 0 && arguments->print_schema.empty()) arguments->print_schema = "toml";
-        run(*arguments, command_line);
-    });
+    command->callback([arguments, command_line] { run(*arguments, command_line); });
 }
 
 }  // namespace ringlock::app

@@ -89,11 +89,12 @@ report::Table arm_table(const study::Summary& summary) {
         const bool shown = arm.noise_injected && arw.median;
         const auto& floor = arm.bias_instability_deg_h;
         table.add_row({arm.name, arw_cell(arm), shown ? interval_cell(arw.median_lo, arw.median_hi) : "-",
-                   shown && summary.theory.arw_deg_rt_h > 0.0
-                       ? fmt::format("{:.4f}", *arw.median / summary.theory.arw_deg_rt_h)
-                       : "-",
-                   floor ? fmt::format("{:.3g}", *floor->median) : "none claimed", rate_cell(arm.rate_error_deg_h.mean),
-                   rate_cell(arm.rate_error_deg_h.lo) + " .. " + rate_cell(arm.rate_error_deg_h.hi)});
+                       shown && summary.theory.arw_deg_rt_h > 0.0
+                           ? fmt::format("{:.4f}", *arw.median / summary.theory.arw_deg_rt_h)
+                           : "-",
+                       floor ? fmt::format("{:.3g}", *floor->median) : "none claimed",
+                       rate_cell(arm.rate_error_deg_h.mean),
+                       rate_cell(arm.rate_error_deg_h.lo) + " .. " + rate_cell(arm.rate_error_deg_h.hi)});
     }
     return table;
 }
@@ -118,14 +119,15 @@ std::string sweep_text(const study::Study& study, const study::Summary& summary)
     for (const study::ArmSummary& arm : summary.arms) {
         const auto edge = study::locked_up_to_deg_h(arm);
         if (edge) {
-            text += fmt::format("{}: all gyros locked (output moves by less than a fringe) up to {:.4g} deg/h\n", arm.name, *edge);
+            text += fmt::format("{}: all gyros locked (output moves by less than a fringe) up to {:.4g} deg/h\n",
+                                arm.name, *edge);
         } else {
             text += fmt::format("{}: not locked at any rate of the sweep\n", arm.name);
         }
     }
     const auto& input = study.scenario.input;
-    text += fmt::format("Rates are {:.4g} deg/h apart.\n",
-                        std::abs(input.sweep_stop_deg_h - input.rate_deg_h) / static_cast<double>(input.sweep_points - 1));
+    text += fmt::format("Rates are {:.4g} deg/h apart.\n", std::abs(input.sweep_stop_deg_h - input.rate_deg_h) /
+                                                               static_cast<double>(input.sweep_points - 1));
     return text;
 }
 
@@ -152,14 +154,16 @@ std::string study_text(const study::Study& study, const study::Summary& summary,
                                    provenance.scenario_file, study.gyros.size(), duration_s, summary.turns,
                                    provenance.wall_s, turns_per_s(summary, provenance), summary.seed);
     text += arm_table(summary).text();
-    text += fmt::format("{}\n", fmt::format("theory: angle random walk with turns fully randomised {:.5g} deg/sqrt(h), dead "
-                                            "band +-{:.4g} deg/h (first order)",
-                                            summary.theory.arw_deg_rt_h, summary.theory.dead_band_deg_h));
+    text += fmt::format("{}\n",
+                        fmt::format("theory: angle random walk with turns fully randomised {:.5g} deg/sqrt(h), dead "
+                                    "band +-{:.4g} deg/h (first order)",
+                                    summary.theory.arw_deg_rt_h, summary.theory.dead_band_deg_h));
     const bool deterministic =
         std::any_of(summary.arms.begin(), summary.arms.end(), [](const auto& arm) { return !arm.noise_injected; });
     if (deterministic) {
-        text += "No random walk is claimed without injected noise: the lock-in error is then a dead band and a staircase,\n"
-                "not noise.\n";
+        text +=
+            "No random walk is claimed without injected noise: the lock-in error is then a dead band and a staircase,\n"
+            "not noise.\n";
     }
     if (!summary.arms.front().sweep.empty()) text += "\n" + sweep_text(study, summary);
     return text;
