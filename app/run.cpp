@@ -1,13 +1,19 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
+#include <system_error>
 #include <thread>
 
 #include "analysis/report/plot.hpp"
@@ -33,8 +39,8 @@ struct Arguments {
     std::string plot;
     std::string shard;
     std::string print_schema;
-    int threads = 0;
-    std::optional<std::int64_t> seed;
+    std::string threads = "0";
+    std::optional<std::string> seed;
     bool resume = false;
     bool json = false;
     bool quiet = false;
@@ -50,24 +56,34 @@ void print_schema(const std::string& form) {
     }
 }
 
+/// A whole number in plain decimal digits. CLI11 would take 010 for eight and cut what is too large without a word.
+std::int64_t whole_number(std::string_view option, const std::string& text, std::int64_t largest,
+                          std::string_view allowed) {
+    std::int64_t value = -1;
+    const char* const last = text.data() + text.size();
+    const auto [end, error] = std::from_chars(text.data(), last, value);
+    if (error != std::errc() || end != last || value < 0 || value > largest) {
+        throw InputError(fmt::format("{} {}: must be a whole number {}", option, text, allowed));
+    }
+    return value;
+}
+
 /// The scenario with what the command line changes, checked again.
 scenario::Scenario load(const Arguments& arguments) {
     scenario::Scenario scenario = scenario::parse_file(arguments.scenario);
     if (arguments.seed) {
-        if (*arguments.seed < 0) {
-            throw InputError(fmt::format("--seed {}: must be between 0 and 9223372036854775807", *arguments.seed));
-        }
-        scenario.ensemble.seed = static_cast<std::uint64_t>(*arguments.seed);
+        constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();  // integers of TOML are signed
+        scenario.ensemble.seed = static_cast<std::uint64_t>(
+            whole_number("--seed", *arguments.seed, largest, fmt::format("between 0 and {}", largest)));
     }
     return scenario;
 }
 
-int thread_count(int asked) {
+int thread_count(const std::string& asked) {
     constexpr int most = 4096;
-    if (asked < 0 || asked > most) {
-        throw InputError(fmt::format("--threads {}: must be between 1 and {}, or 0 for all cores", asked, most));
-    }
-    return asked > 0 ? asked : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+    const auto threads = static_cast<int>(
+        whole_number("--threads", asked, most, fmt::format("between 1 and {}, or 0 for all cores", most)));
+    return threads > 0 ? threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 }
 
 void run(const Arguments& arguments, std::span<const char* const> command_line) {
@@ -116,8 +132,10 @@ void add_run(CLI::App& root, std::span<const char* const> command_line) {
     command->add_option("SCENARIO.toml", arguments->scenario,
                         "what to simulate; an empty file is the device of Gao & Deng 2007");
     command->add_option("-o,--output", arguments->out, "result file (default: the scenario's name with .h5, here)");
-    command->add_option("--threads", arguments->threads, "threads (default 0: all cores); results do not depend on it");
-    command->add_option("--seed", arguments->seed, "replaces ensemble.seed");
+    command->add_option("--threads", arguments->threads, "threads (0: all cores); results do not depend on it")
+        ->capture_default_str()
+        ->type_name("N");
+    command->add_option("--seed", arguments->seed, "replaces ensemble.seed")->type_name("S");
     command->add_option("--plot", arguments->plot, "also draw the figure into this SVG file");
     command->add_option("--shard", arguments->shard, "I/N: part I of N (not there yet)");
     command->add_flag("--resume", arguments->resume, "go on with an interrupted run (not there yet)");
