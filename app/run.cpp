@@ -25,6 +25,7 @@
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/ensemble/draw.hpp"
+#include "engine/ensemble/progress.hpp"
 #include "engine/scenario/check.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/render.hpp"
@@ -111,9 +112,12 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
                    plan.schedule.sample_interval_s * static_cast<double>(plan.schedule.samples - 1),
                    scenario.arms.size(), threads, static_cast<double>(study::expected_size_bytes(plan)) * 1e-6);
     }
+    ensemble::Progress progress(gyros, {.quiet = arguments.quiet});
     study::Observer observer;
     observer.on_record = [&](std::int64_t gyro, const auto& angle_arcsec) { writer.write_record(gyro, angle_arcsec); };
+    observer.on_progress = [&](std::int64_t turns) { progress.advance(1, turns); };
     const study::Study study = study::run(scenario, threads, observer, interrupted);
+    progress.finish();
     check_interrupt();
 
     provenance.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

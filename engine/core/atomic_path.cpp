@@ -15,18 +15,25 @@ namespace {
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
+/// Where a symbolic link leads, also if nothing is there yet. A circle of links comes back as one of its links.
+fs::path follow(fs::path path) {
+    constexpr int most_links = 40;
+    std::error_code error;
+    for (int i = 0; i < most_links && fs::is_symlink(fs::symlink_status(path, error)); ++i)
+        path = path.parent_path() / fs::read_symlink(path, error);
+    return path;
+}
+
 fs::path resolve(const fs::path& target) {
     if (target.empty()) throw InputError("the name of the output file is empty; give one");
+    const fs::path resolved = follow(fs::absolute(target));
     std::error_code error;
-    fs::path resolved = fs::absolute(target, error);
-    std::error_code missing;  // a target that is not there yet is no fault
-    if (!error && fs::is_symlink(resolved, missing)) resolved = fs::weakly_canonical(resolved, error);
-    if (error) throw InputError(fmt::format("cannot write {}: {}", target.string(), error.message()));
     const fs::file_status status = fs::status(resolved, error);
     if (fs::is_directory(status))
         throw InputError(fmt::format("cannot write {}: it is a directory; name a file in it", target.string()));
     if (fs::exists(status) && !fs::is_regular_file(status))
-        throw InputError(fmt::format("cannot write {}: it is there and no regular file; name another", target.string()));
+        throw InputError(
+            fmt::format("cannot write {}: it is there and no regular file; name another", target.string()));
     return resolved;
 }
 

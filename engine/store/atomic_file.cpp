@@ -2,7 +2,8 @@
 
 namespace ringlock::store {
 
-AtomicFile::AtomicFile(const std::filesystem::path& target) : path_(target), file_(File::create(path_.partial())) {}
+AtomicFile::AtomicFile(const std::filesystem::path& target)
+    : path_(target), file_(File::create(path_.partial(), target)) {}
 
 void AtomicFile::commit() {
     file_.close();

@@ -107,7 +107,9 @@ void Node::set_attribute(const std::string& name, const std::vector<double>& val
     const Lock lock;
     const hsize_t size = values.size();
     const Id space(values.empty() ? H5Screate(H5S_NULL) : H5Screate_simple(1, &size, nullptr));
-    write_attribute(*this, id_.get(), name, space, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values.data());
+    constexpr double nothing = 0.0;  // HDF5 wants an address even where there is nothing to write
+    write_attribute(*this, id_.get(), name, space, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE,
+                    values.empty() ? &nothing : values.data());
 }
 
 bool Node::has_attribute(const std::string& name) const {

@@ -117,22 +117,21 @@ std::vector<std::string> Group::children() const {
 File::File(Id file, Id root, std::string path)
     : Group(std::move(root), std::move(path), "/"), file_id_(std::move(file)) {}
 
-File File::create(const std::filesystem::path& path) {
+File File::create(const std::filesystem::path& path, const std::filesystem::path& shown_as) {
     const Lock lock;
     const Id creation(H5Pcreate(H5P_FILE_CREATE));
     H5Pset_obj_track_times(creation.get(), false);
     Id file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), file_access().get()));
-    if (!file.valid()) detail::fail_run(path.string(), "HDF5 file", "cannot be created");
+    if (!file.valid()) detail::fail_run(shown_as.string(), "HDF5 file", "cannot be created");
     Id root(H5Gopen2(file.get(), "/", H5P_DEFAULT));
-    return File(std::move(file), std::move(root), path.string());
+    return File(std::move(file), std::move(root), shown_as.string());
 }
 
 File File::open(const std::filesystem::path& path) {
     const Lock lock;
     std::error_code error;
     const auto status = std::filesystem::status(path, error);
-    if (!std::filesystem::exists(status))
-        detail::fail_input(path.string(), "", error ? error.message() : "no such file");
+    if (!std::filesystem::exists(status)) detail::fail_input(path.string(), "", error.message());
     if (!std::filesystem::is_regular_file(status)) detail::fail_input(path.string(), "", "is not a file");
     Id file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, file_access().get()));
     if (!file.valid())

@@ -164,8 +164,9 @@ class Group : public Node {
 /// An HDF5 file and its root group.
 class File : public Group {
    public:
-    /// Creates the file, or empties one that is there. See AtomicFile for results.
-    static File create(const std::filesystem::path& path);
+    /// Creates the file, or empties one that is there. Errors call it `shown_as`. See AtomicFile for results.
+    static File create(const std::filesystem::path& path, const std::filesystem::path& shown_as);
+    static File create(const std::filesystem::path& path) { return create(path, path); }
     /// Opens for reading.
     static File open(const std::filesystem::path& path);
 

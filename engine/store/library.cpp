@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <string_view>
 #include <utility>
 
 #include "engine/core/error.hpp"
@@ -12,6 +13,12 @@ namespace {
 
 std::recursive_mutex library_mutex;
 
+constexpr std::string_view system_mark = "error message = '";
+
+/// HDF5 1.10 crashes when it closes a file that the disk has refused to take, at the latest when the process ends.
+/// So after such a failure, which ends the run anyway, nothing is closed any more.
+bool abandoned = false;
+
 herr_t keep_first(unsigned /*n*/, const H5E_error2_t* error, void* text) {
     *static_cast<std::string*>(text) = error->desc != nullptr ? error->desc : "";
     return 1;
@@ -20,6 +27,7 @@ herr_t keep_first(unsigned /*n*/, const H5E_error2_t* error, void* text) {
 }  // namespace
 
 Lock::Lock() : lock_(library_mutex) {
+    [[maybe_unused]] static const herr_t left_at_exit = H5dont_atexit();
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     H5Eclear2(H5E_DEFAULT);
 }
@@ -28,10 +36,9 @@ std::string last_error() {
     std::string text;
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_first, &text);
     // A failed system call is told with the time and addresses of buffers; what matters is the system's own message.
-    const std::string mark = "error message = '";
-    if (const auto start = text.find(mark); start != std::string::npos) {
-        const auto end = text.find('\'', start + mark.size());
-        return text.substr(start + mark.size(), end - start - mark.size());
+    if (const auto start = text.find(system_mark); start != std::string::npos) {
+        const auto message = start + system_mark.size();
+        return text.substr(message, text.find('\'', message) - message);
     }
     return text.empty() ? "no reason given by HDF5" : text;
 }
@@ -42,6 +49,7 @@ void fail_input(const std::string& file, const std::string& where, const std::st
 }
 
 void fail_run(const std::string& file, const std::string& where, const std::string& problem) {
+    abandoned = true;
     throw RunError(fmt::format("{}: {}: {} ({})", file, where, problem, last_error()));
 }
 
@@ -64,6 +72,7 @@ Id& Id::operator=(Id&& other) noexcept {
 Id::~Id() {
     if (!valid()) return;
     const detail::Lock lock;
+    if (detail::abandoned) return;
     // Closing a file closes what was open in it: the number may stand for nothing any more.
     if (H5Iis_valid(value_) > 0) H5Idec_ref(value_);
 }

@@ -57,8 +57,11 @@ Provenance collect_provenance(std::span<const char* const> arguments, std::int64
     p.program_version = version();
     p.git_hash = git_hash();
     p.compiler = "GCC " __VERSION__;
-    p.hdf5_version = H5_VERS_INFO;
-    for (const char* argument : arguments) p.command_line += (p.command_line.empty() ? "" : " ") + quoted(argument);
+    p.hdf5_version = fmt::format("{}.{}.{}", H5_VERS_MAJOR, H5_VERS_MINOR, H5_VERS_RELEASE);
+    for (const char* argument : arguments) {
+        if (!p.command_line.empty()) p.command_line += ' ';
+        p.command_line += quoted(argument);
+    }
     p.scenario_file = std::move(scenario_file);
     p.host = host_name();
     p.date_utc = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
