@@ -15,6 +15,7 @@
 #include "analysis/record/series.hpp"
 #include "app/allan_output.hpp"
 #include "app/command.hpp"
+#include "app/output.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::app {
@@ -191,7 +192,7 @@ void run(const Arguments& a) {
     }
     if (unit != nullptr) out.noise = noise::fit_noise(phase, out.tau0_s);
     const std::string text = a.json ? allan_json(out) : allan_text(out);
-    fmt::print("{}", text);
+    put(text);
 }
 
 }  // namespace

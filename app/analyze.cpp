@@ -6,6 +6,7 @@
 #include "analysis/report/plot.hpp"
 #include "analysis/study/result_file.hpp"
 #include "app/command.hpp"
+#include "app/output.hpp"
 #include "app/study_output.hpp"
 
 namespace ringlock::app {
@@ -27,8 +28,7 @@ void add_analyze(CLI::App& root) {
         const store::Provenance provenance = study::read_provenance(arguments->file);
         const study::Summary summary = study::summarise(study);
         if (!arguments->plot.empty()) report::write_svg(arguments->plot, study_figure(study, summary));
-        fmt::print("{}",
-                   arguments->json ? study_json(study, summary, provenance) : study_text(study, summary, provenance));
+        put(arguments->json ? study_json(study, summary, provenance) : study_text(study, summary, provenance));
     });
 }
 

@@ -4,7 +4,9 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <new>
+#include <string>
 #include <string_view>
 
 #include "app/command.hpp"
@@ -23,6 +25,18 @@ int complain(int status, std::string_view what) {
     return status;
 }
 
+/// A mistyped command is named; CLI11 would only say that one is missing.
+void refuse_unknown_command(const CLI::App& root, int argc, char** argv) {
+    if (argc < 2 || std::string_view(argv[1]).starts_with('-')) return;
+    std::string known;
+    for (const CLI::App* command : root.get_subcommands({})) {
+        if (command->get_name() == argv[1]) return;
+        known += (known.empty() ? "" : ", ") + command->get_name();
+    }
+    throw ringlock::InputError(
+        fmt::format("\"{}\" is no command; there are {}; ringlock --help says what they do", argv[1], known));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -34,6 +48,9 @@ int main(int argc, char** argv) {
         "ringlock"};
     root.set_version_flag("--version", fmt::format("ringlock {} ({})", ringlock::version(), ringlock::git_hash()));
     root.require_subcommand(1);
+    root.failure_message([](const CLI::App*, const CLI::Error& error) {
+        return fmt::format("ringlock: error: {}; --help says what there is\n", error.what());
+    });
     root.footer("Exit status: 0 done; 1 the run failed; 2 the input or the command line is wrong.");
     app::add_run(root, {argv, static_cast<std::size_t>(argc)});
     app::add_analyze(root);
@@ -42,10 +59,12 @@ int main(int argc, char** argv) {
     app::add_planned(root);
     try {
         const ringlock::InterruptGuard guard;
+        refuse_unknown_command(root, argc, argv);
         root.parse(argc, argv);
         return done;
     } catch (const CLI::ParseError& error) {
-        return root.exit(error) == 0 ? done : input_wrong;
+        if (root.exit(error) != 0) return input_wrong;
+        return std::cout.flush() ? done : complain(run_failed, "standard output cannot be written");  // help, version
     } catch (const ringlock::InputError& error) {
         return complain(input_wrong, error.what());
     } catch (const ringlock::RunError& error) {
@@ -58,7 +77,7 @@ int main(int argc, char** argv) {
         return complain(run_failed, error.what());
     }
     // End by the signal itself, as shells and batch systems expect of a program that was interrupted.
-    std::signal(SIGINT, SIG_DFL);
-    std::raise(SIGINT);
+    std::signal(ringlock::interrupt_signal(), SIG_DFL);
+    std::raise(ringlock::interrupt_signal());
     return run_failed;
 }

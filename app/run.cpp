@@ -1,19 +1,27 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
+#include <system_error>
 #include <thread>
 
 #include "analysis/report/plot.hpp"
 #include "analysis/study/result_file.hpp"
 #include "app/command.hpp"
+#include "app/output.hpp"
 #include "app/study_output.hpp"
+#include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/ensemble/draw.hpp"
@@ -27,12 +35,12 @@ namespace {
 
 struct Arguments {
     std::string scenario;
-    std::string out;
+    std::optional<std::string> out;
     std::string plot;
     std::string shard;
     std::string print_schema;
-    int threads = 0;
-    std::optional<std::int64_t> seed;
+    std::string threads = "0";
+    std::optional<std::string> seed;
     bool resume = false;
     bool json = false;
     bool quiet = false;
@@ -40,30 +48,42 @@ struct Arguments {
 
 void print_schema(const std::string& form) {
     if (form == "toml") {
-        fmt::print("{}", scenario::schema_text());
+        put(scenario::schema_text());
     } else if (form == "markdown") {
-        fmt::print("{}", scenario::schema_markdown());
+        put(scenario::schema_markdown());
     } else {
-        fmt::print("{}", scenario::schema_json());
+        put(scenario::schema_json());
     }
+}
+
+/// A whole number in plain decimal digits. CLI11 would take 010 for eight and cut what is too large without a word.
+std::int64_t whole_number(std::string_view option, const std::string& text, std::int64_t largest,
+                          std::string_view allowed) {
+    std::int64_t value = -1;
+    const char* const last = text.data() + text.size();
+    const auto [end, error] = std::from_chars(text.data(), last, value);
+    if (error != std::errc() || end != last || value < 0 || value > largest) {
+        throw InputError(fmt::format("{} {}: must be a whole number {}", option, text, allowed));
+    }
+    return value;
 }
 
 /// The scenario with what the command line changes, checked again.
 scenario::Scenario load(const Arguments& arguments) {
     scenario::Scenario scenario = scenario::parse_file(arguments.scenario);
     if (arguments.seed) {
-        if (*arguments.seed < 0) {
-            throw InputError(fmt::format("--seed {}: must be between 0 and 9223372036854775807", *arguments.seed));
-        }
-        scenario.ensemble.seed = static_cast<std::uint64_t>(*arguments.seed);
+        constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();  // integers of TOML are signed
+        scenario.ensemble.seed = static_cast<std::uint64_t>(
+            whole_number("--seed", *arguments.seed, largest, fmt::format("between 0 and {}", largest)));
     }
     return scenario;
 }
 
-int thread_count(int asked) {
+int thread_count(const std::string& asked) {
     constexpr int most = 4096;
-    if (asked < 0 || asked > most) throw InputError(fmt::format("--threads {}: must be between 1 and {}", asked, most));
-    return asked > 0 ? asked : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+    const auto threads = static_cast<int>(
+        whole_number("--threads", asked, most, fmt::format("between 1 and {}, or 0 for all cores", most)));
+    return threads > 0 ? threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 }
 
 void run(const Arguments& arguments, std::span<const char* const> command_line) {
@@ -75,8 +95,10 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     const int threads = thread_count(arguments.threads);
     const scenario::Scenario scenario = load(arguments);
     const std::filesystem::path out =
-        arguments.out.empty() ? std::filesystem::path(arguments.scenario).filename().replace_extension(".h5")
-                              : std::filesystem::path(arguments.out);
+        arguments.out ? std::filesystem::path(*arguments.out)
+                      : std::filesystem::path(arguments.scenario).filename().replace_extension(".h5");
+    // A figure that cannot be written is better found out now than after the run.
+    if (!arguments.plot.empty()) const AtomicPath probe(arguments.plot);
 
     store::Provenance provenance = store::collect_provenance(command_line, threads, arguments.scenario);
     const auto start = std::chrono::steady_clock::now();
@@ -101,7 +123,7 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     const study::Summary summary = study::summarise(study);
     writer.finish(study, summary, provenance);
     if (!arguments.plot.empty()) report::write_svg(arguments.plot, study_figure(study, summary));
-    fmt::print("{}", arguments.json ? study_json(study, summary, provenance) : study_text(study, summary, provenance));
+    put(arguments.json ? study_json(study, summary, provenance) : study_text(study, summary, provenance));
     if (!arguments.quiet) fmt::print(stderr, "result: {}\n", writer.path().string());
 }
 
@@ -113,23 +135,23 @@ void add_run(CLI::App& root, std::span<const char* const> command_line) {
     command->add_option("SCENARIO.toml", arguments->scenario,
                         "what to simulate; an empty file is the device of Gao & Deng 2007");
     command->add_option("-o,--output", arguments->out, "result file (default: the scenario's name with .h5, here)");
-    command->add_option("--threads", arguments->threads, "threads (default: all cores); results do not depend on it");
-    command->add_option("--seed", arguments->seed, "replaces ensemble.seed");
+    command->add_option("--threads", arguments->threads, "threads (0: all cores); results do not depend on it")
+        ->capture_default_str()
+        ->type_name("N");
+    command->add_option("--seed", arguments->seed, "replaces ensemble.seed")->type_name("S");
     command->add_option("--plot", arguments->plot, "also draw the figure into this SVG file");
     command->add_option("--shard", arguments->shard, "I/N: part I of N (not there yet)");
     command->add_flag("--resume", arguments->resume, "go on with an interrupted run (not there yet)");
     command->add_flag("--json", arguments->json, "print one JSON object instead of a table");
     command->add_flag("-q,--quiet", arguments->quiet, "no progress on standard error");
+    // A flag, so that it does not take the word after it for its value.
     command
-        ->add_option("--print-schema", arguments->print_schema,
-                     "print every key of a scenario with default, bounds and meaning: toml, markdown or json")
-        ->expected(0, 1)
-        ->default_str("toml")
+        ->add_flag(
+            "--print-schema{toml}", arguments->print_schema,
+            "print every key of a scenario with default, bounds and meaning, and end; =toml (default), =markdown "
+            "or =json")
         ->check(CLI::IsMember({"toml", "markdown", "json"}));
-    command->callback([arguments, command, command_line] {
-        if (command->count("--print-schema") > 0 && arguments->print_schema.empty()) arguments->print_schema = "toml";
-        run(*arguments, command_line);
-    });
+    command->callback([arguments, command_line] { run(*arguments, command_line); });
 }
 
 }  // namespace ringlock::app

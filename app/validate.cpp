@@ -7,6 +7,7 @@
 
 #include "analysis/study/result_file.hpp"
 #include "app/command.hpp"
+#include "app/output.hpp"
 #include "engine/core/error.hpp"
 #include "engine/scenario/parse.hpp"
 
@@ -20,10 +21,11 @@ void add_validate(CLI::App& root) {
         const std::filesystem::path path = *file;
         if (path.extension() == ".toml") {
             scenario::parse_file(path);
-            fmt::print("{}: a valid scenario\n", *file);
+            put(fmt::format("{}: a valid scenario\n", *file));
         } else if (path.extension() == ".h5" || path.extension() == ".hdf5") {
             const study::Study study = study::read_result(path);
-            fmt::print("{}: a valid result of {} gyros and {} arms\n", *file, study.gyros.size(), study.arms.size());
+            put(fmt::format("{}: a valid result of {} gyros and {} arms\n", *file, study.gyros.size(),
+                            study.arms.size()));
         } else {
             throw InputError(
                 fmt::format("{}: \"{}\" is no extension that validate knows; scenarios end in .toml, results "

@@ -1,14 +1,18 @@
 #include "analysis/study/result_file.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <string>
+#include <system_error>
 
 #include "engine/core/error.hpp"
+#include "engine/ensemble/draw.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/render.hpp"
 
@@ -209,7 +213,8 @@ bool is_result(const store::File& file) {
 
 /// Keeps results that are there: only a result of this very study may be replaced.
 std::filesystem::path refuse_to_lose(const std::filesystem::path& path, const Study& study) {
-    if (!std::filesystem::exists(path)) return path;
+    std::error_code unreachable;  // claiming the output says what is wrong with what is no file
+    if (!std::filesystem::is_regular_file(path, unreachable)) return path;
     bool same = false;
     try {
         const store::File file = store::File::open(path);
@@ -289,49 +294,50 @@ void ResultWriter::finish(const Study& study, const Summary& summary, const stor
 
 namespace {
 
-std::vector<double> read_column(const store::Group& group, const std::string& name, std::size_t expected) {
+/// A dataset of the shape that the study asks for.
+std::vector<double> read_column(const store::Group& group, const std::string& name, const store::Shape& expected) {
     const store::Dataset dataset = group.dataset(name);
-    auto values = dataset.read<double>();
-    if (values.size() != expected) {
-        throw InputError(fmt::format("{}: dataset {} holds {} numbers, {} are wanted: the result is damaged",
-                                     dataset.file(), dataset.path(), values.size(), expected));
+    if (dataset.shape() != expected) {
+        throw InputError(fmt::format("{}: dataset {} has the shape [{}], [{}] is wanted: the result is damaged",
+                                     dataset.file(), dataset.path(), fmt::join(dataset.shape(), ", "),
+                                     fmt::join(expected, ", ")));
     }
-    return values;
+    return dataset.read<double>();
 }
 
 void read_arm(const store::Group& group, const Study& study, ArmStatistics& arm) {
     const std::size_t gyros = arm.gyros.size();
     const std::size_t taus = study.factors.size();
-    const auto errors = read_column(group, "rate_error_deg_h", gyros);
+    const auto errors = read_column(group, "rate_error_deg_h", {gyros});
     for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].rate_error_deg_h = errors[g];
     const store::Group noise = group.group("noise");
     for (const CoefficientColumn& column : coefficient_columns) {
         const std::string name = column.name;
-        const auto value = read_column(noise, name, gyros);
-        const auto lo = read_column(noise, name + "_lo", gyros);
-        const auto hi = read_column(noise, name + "_hi", gyros);
+        const auto value = read_column(noise, name, {gyros});
+        const auto lo = read_column(noise, name + "_lo", {gyros});
+        const auto hi = read_column(noise, name + "_hi", {gyros});
         for (std::size_t g = 0; g < gyros; ++g) {
             noise::Coefficient& coefficient = arm.gyros[g].noise.*column.field;
             coefficient = {!std::isnan(value[g]), or_nothing(value[g]), or_nothing(lo[g]), or_nothing(hi[g])};
         }
     }
     for (const PoolingColumn& column : pooling_columns) {
-        const auto values = read_column(noise, column.name, gyros);
+        const auto values = read_column(noise, column.name, {gyros});
         for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].noise.pooling.*column.field = values[g];
     }
-    const auto red = read_column(noise, "red", gyros);
-    const auto described = read_column(noise, "described", gyros);
+    const auto red = read_column(noise, "red", {gyros});
+    const auto described = read_column(noise, "described", {gyros});
     for (std::size_t g = 0; g < gyros; ++g) {
         arm.gyros[g].noise.pooling.red = red[g] != 0.0;
         arm.gyros[g].noise.described = described[g] != 0.0;
     }
     const store::Group allan = group.group("allan");
-    const auto tau = read_column(allan, "tau_s", taus);
-    const auto alpha = read_column(allan, "alpha", gyros * taus);
-    const auto terms = read_column(allan, "terms", taus);
+    const auto tau = read_column(allan, "tau_s", {taus});
+    const auto alpha = read_column(allan, "alpha", {gyros, taus});
+    const auto terms = read_column(allan, "terms", {taus});
     for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].allan.resize(taus);
     for (const AllanColumn& column : allan_columns) {
-        const auto values = read_column(allan, column.name, gyros * taus);
+        const auto values = read_column(allan, column.name, {gyros, taus});
         for (std::size_t g = 0; g < gyros; ++g) {
             for (std::size_t t = 0; t < taus; ++t) {
                 allan::Point& point = arm.gyros[g].allan[t];
@@ -366,9 +372,11 @@ Study read_result(const std::filesystem::path& path) {
     study.turns = file.int_attribute("turns");
     study.turns_off_table = file.int_attribute("turns_off_table");
     study.turn_map_error_rad = file.double_attribute("turn_map_error_rad");
+    // What is not drawn is in the scenario.
+    std::fill(study.gyros.begin(), study.gyros.end(), ensemble::nominal_setup(study.scenario));
     const store::Group gyros = file.group("gyros");
     for (const DrawnParameter& parameter : drawn_parameters) {
-        const auto values = read_column(gyros, parameter.name, study.gyros.size());
+        const auto values = read_column(gyros, parameter.name, {study.gyros.size()});
         for (std::size_t g = 0; g < values.size(); ++g) study.gyros[g].*parameter.field = values[g];
     }
     for (ArmStatistics& arm : study.arms) read_arm(file.group("arms").group(arm.arm.name), study, arm);

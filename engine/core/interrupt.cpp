@@ -17,6 +17,7 @@ namespace {
 constexpr int watched[] = {SIGINT, SIGTERM, SIGHUP};
 
 std::atomic<bool> stop_requested{false};
+std::atomic<int> signal_number{SIGINT};
 
 /// A path in static storage, so that the handler never meets freed memory.
 struct Slot {
@@ -29,9 +30,11 @@ constexpr std::size_t no_slot = 16;
 std::array<Slot, no_slot> slots;
 std::mutex slots_mutex;
 
-static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may only touch lock-free atomics");
+static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free,
+              "a signal handler may only touch lock-free atomics");
 
 extern "C" void on_signal(int number) {
+    signal_number = number;
     if (!stop_requested.exchange(true)) return;
     const int saved = errno;
     for (Slot& slot : slots)
@@ -49,6 +52,8 @@ bool interrupted() { return stop_requested.load(std::memory_order_relaxed); }
 void check_interrupt() {
     if (interrupted()) throw Interrupted();
 }
+
+int interrupt_signal() { return signal_number; }
 
 InterruptGuard::InterruptGuard() {
     static_assert(std::size(watched) == signals_);

@@ -12,6 +12,9 @@ bool interrupted();
 /// Throws Interrupted where interrupted() holds.
 void check_interrupt();
 
+/// The signal that interrupted() is about, also after the guard is gone; SIGINT where there was none.
+int interrupt_signal();
+
 /// Turns SIGINT, SIGTERM and SIGHUP into a flag for as long as it lives; the handlers it found return on destruction.
 ///
 /// The first signal only sets the flag. The second ends the process at once, by that signal, after removing the

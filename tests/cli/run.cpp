@@ -1,0 +1,348 @@
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "engine/store/hdf5.hpp"
+#include "tests/cli/program.hpp"
+
+namespace ringlock {
+namespace {
+
+using nlohmann::json;
+using test::Outcome;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+/// Four gyros for some seconds in all ways of sharing a trajectory.
+constexpr const char* small_scenario = R"([ensemble]
+gyros = 4
+duration_s = 50.0
+[arms]
+names = ["ideal", "uncompensated", "noise_injected", "noise_injected+compensated"]
+)";
+
+class RunCommand : public test::ProgramTest {
+   protected:
+    void SetUp() override {
+        ProgramTest::SetUp();
+        write("s.toml", small_scenario);
+    }
+    /// Bad input: status 2, nothing on standard output, no file left.
+    void expect_refused(const Arguments& arguments, const testing::Matcher<std::string>& message) const {
+        const auto before = left();
+        const Outcome r = run(arguments);
+        const std::string shown = arguments.size() > 1 ? arguments[0] + " " + arguments[1] : "";
+        EXPECT_EQ(r.status, 2) << shown << "\n" << r.err;
+        EXPECT_EQ(r.out, "") << shown;
+        EXPECT_THAT(r.err, AllOf(StartsWith("ringlock: error: "), message)) << shown;
+        EXPECT_EQ(left(), before) << shown;
+    }
+    void expect_scenario_refused(const std::string& text, const testing::Matcher<std::string>& message) const {
+        SCOPED_TRACE(text);
+        write("bad.toml", text);
+        expect_refused({"run", "bad.toml", "-o", "out.h5"}, message);
+        expect_refused({"validate", "bad.toml"}, message);
+    }
+};
+
+TEST_F(RunCommand, BadScenariosAreRefusedWithPlaceKeyValueAndWhatIsAllowed) {
+    const auto says = [](auto... parts) { return AllOf(HasSubstr(parts)...); };
+    expect_scenario_refused("[gyro]\nlockin_treshold_deg_h = 300.0\n",
+                            says("bad.toml:2:1", "gyro.lockin_treshold_deg_h", "300.0", "lockin_threshold_deg_h"));
+    expect_scenario_refused("\n[giro]\nscale_factor_arcsec = 1.0\n", says("bad.toml:2:", "giro", "gyro"));
+    expect_scenario_refused("[ensemble]\ngyros = \"many\"\n",
+                            says("bad.toml:2:9", "ensemble.gyros", "\"many\"", "a whole number between 1 and"));
+    expect_scenario_refused("[ensemble]\ngyros = 1.5\n", says("bad.toml:2:9", "ensemble.gyros", "1.5", "whole number"));
+    expect_scenario_refused("[ensemble]\n  gyros = 0\n", says("bad.toml:2:11", "ensemble.gyros", "0", "between 1 and"));
+    expect_scenario_refused("[ensemble]\ngyros = -3\n", says("bad.toml:2:9", "-3", "between 1 and"));
+    expect_scenario_refused("[ensemble]\ngyros = 99999999999999999999\n", says("bad.toml:2:"));
+    expect_scenario_refused("[gyro]\nscale_factor_arcsec = nan\n",
+                            says("bad.toml:2:23", "gyro.scale_factor_arcsec", "nan", "finite"));
+    expect_scenario_refused("[gyro]\nscale_factor_arcsec = inf\n", says("bad.toml:2:23", "inf", "finite"));
+    expect_scenario_refused("[gyro]\nscale_factor_arcsec = -inf\n", says("bad.toml:2:23", "-inf", "finite"));
+    expect_scenario_refused("[gyro]\nscale_factor_arcsec = 0.0\n", says("bad.toml:2:23", "between 0.001 and 1000"));
+    expect_scenario_refused("[gyro\n", says("bad.toml:1:", "not valid TOML"));
+    expect_scenario_refused("[gyro]\na = 1\na = 2\n", says("bad.toml:3:", "not valid TOML"));
+    expect_scenario_refused(std::string("\xff\xfe[gyro]\n"), says("bad.toml:1:", "not valid TOML"));
+    expect_scenario_refused("[readout]\nmodel = \"perfect\"\n",
+                            says("bad.toml:2:9", "readout.model", "perfect", "ideal", "instrument"));
+    expect_scenario_refused("[output]\nangle_record = 1\n",
+                            says("bad.toml:2:16", "output.angle_record", "true or false"));
+    expect_scenario_refused("[arms]\nnames = [\"uncompensatd\"]\n",
+                            says("bad.toml:2:10", "arms.names", "uncompensatd", "did you mean \"uncompensated\"?"));
+    expect_scenario_refused("[arms]\nnames = [\"compensated_exact\"]\n",
+                            says("bad.toml:2:10", "compensated_exact", "not there yet", "arms are: ideal"));
+    expect_scenario_refused("[arms]\nnames = []\n", says("bad.toml:2:9", "arms.names", "empty"));
+    expect_scenario_refused("[arms]\nnames = [\"ideal\", \"ideal\"]\n", says("bad.toml:2:19", "stands twice"));
+    expect_scenario_refused("[effects.missed_counts]\nprobability_per_turn = 0.1\n",
+                            says("bad.toml:1:", "effects.missed_counts", "not there yet"));
+    expect_scenario_refused("[effects.gremlins]\nnumber = 3\n", says("bad.toml:1:", "gremlins", "unknown effect"));
+    expect_scenario_refused("[input]\nrate_deg_h = 250000.0\n",
+                            says("bad.toml:2:14", "input.rate_deg_h", "250000", "must stay below", "deg/h"));
+    expect_scenario_refused("[ensemble]\nduration_s = 1.0\n", says("bad.toml:2:14", "ensemble.duration_s", "samples"));
+}
+
+TEST_F(RunCommand, AllProblemsOfAFileAreToldAtOnce) {
+    expect_scenario_refused("[ensemble]\ngyros = 0\nseed = -1\n[gyro]\nfoo = 1\n",
+                            AllOf(HasSubstr("bad.toml:2:9"), HasSubstr("bad.toml:3:8"), HasSubstr("bad.toml:5:1")));
+}
+
+TEST_F(RunCommand, FilesThatAreNoScenarioAreRefused) {
+    expect_refused({"run", "missing.toml"}, AllOf(HasSubstr("missing.toml"), HasSubstr("No such file")));
+    expect_refused({"run", "."}, HasSubstr("is a directory"));
+    expect_refused({"validate", "missing.toml"}, HasSubstr("missing.toml"));
+    expect_refused({"validate", "missing.h5"}, HasSubstr("missing.h5"));
+    expect_refused({"analyze", "missing.h5"}, HasSubstr("missing.h5"));
+    write("text.h5", "this is text\n");
+    expect_refused({"analyze", "text.h5"}, AllOf(HasSubstr("text.h5"), HasSubstr("HDF5")));
+    expect_refused({"validate", "text.h5"}, AllOf(HasSubstr("text.h5"), HasSubstr("HDF5")));
+    expect_refused({"validate", "s.txt"}, HasSubstr("s.txt"));
+    store::File::create(directory_ / "other.h5").set_attribute("format", "something");
+    expect_refused({"analyze", "other.h5"}, AllOf(HasSubstr("other.h5"), HasSubstr("not a ringlock result")));
+}
+
+TEST_F(RunCommand, AnEmptyScenarioIsValid) {
+    write("empty.toml", "");
+    const Outcome r = run({"validate", "empty.toml"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    EXPECT_EQ(r.out, "empty.toml: a valid scenario\n");
+}
+
+TEST_F(RunCommand, OutputsThatCannotBeWrittenAreRefusedBeforeTheRun) {
+    expect_refused({"run", "s.toml", "-o", "missing/out.h5"}, AllOf(HasSubstr("missing/out.h5"), HasSubstr("No such")));
+    expect_refused({"run", "s.toml", "-o", "."}, HasSubstr("is a directory"));
+    expect_refused({"run", "s.toml", "-o", ""}, HasSubstr("the name of the output file is empty"));
+    expect_refused({"run", "s.toml", "-o", std::string(300, 'x')}, HasSubstr("File name too long"));
+    expect_refused({"run", "s.toml", "-o", "/dev/null"}, HasSubstr("no regular file"));
+    expect_refused({"run", "s.toml", "-o", "out.h5", "--plot", "missing/out.svg"}, HasSubstr("missing/out.svg"));
+    if (geteuid() != 0) {
+        std::filesystem::create_directory(directory_ / "closed");
+        std::filesystem::permissions(directory_ / "closed", std::filesystem::perms::owner_read);
+        expect_refused({"run", "s.toml", "-o", "closed/out.h5"}, HasSubstr("Permission denied"));
+        std::filesystem::permissions(directory_ / "closed", std::filesystem::perms::owner_all);
+    }
+}
+
+TEST_F(RunCommand, ForeignFilesAreKept) {
+    expect_refused({"run", "s.toml", "-o", "s.toml"}, AllOf(HasSubstr("s.toml"), HasSubstr("it is kept")));
+    EXPECT_EQ(read("s.toml"), small_scenario);
+    write("notes.h5", "notes\n");
+    expect_refused({"run", "s.toml", "-o", "notes.h5"}, HasSubstr("it is kept"));
+    EXPECT_EQ(read("notes.h5"), "notes\n");
+    ASSERT_EQ(run({"run", "s.toml"}).status, 0);
+    const std::string before = read("s.h5");
+    expect_refused({"run", "s.toml", "--seed", "77"}, AllOf(HasSubstr("s.h5"), HasSubstr("it is kept")));
+    EXPECT_EQ(read("s.h5"), before);
+    EXPECT_EQ(run({"run", "s.toml"}).status, 0) << "the same scenario may run again";
+}
+
+TEST_F(RunCommand, WrongCommandLinesAreRefused) {
+    expect_refused({"run", "s.toml", "--threads", "-1"}, AllOf(HasSubstr("--threads -1"), HasSubstr("between 1 and")));
+    expect_refused({"run", "s.toml", "--threads", "100000"}, HasSubstr("between 1 and"));
+    expect_refused({"run", "s.toml", "--threads", "two"}, HasSubstr("two"));
+    expect_refused({"run", "s.toml", "--seed", "-1"}, AllOf(HasSubstr("--seed -1"), HasSubstr("between 0 and")));
+    expect_refused({"run", "s.toml", "--seed", "1.5"}, HasSubstr("1.5"));
+    expect_refused({"run", "s.toml", "--seed", "0x10"}, HasSubstr("0x10"));
+    expect_refused({"run", "s.toml", "--seed", ""}, HasSubstr("--seed"));
+    expect_refused({"run", "s.toml", "--seed", "99999999999999999999"}, HasSubstr("99999999999999999999"));
+    expect_refused({"run", "s.toml", "--nonsense"}, HasSubstr("--nonsense"));
+    expect_refused({"run", "s.toml", "s.toml"}, HasSubstr("s.toml"));
+    expect_refused({"run"}, HasSubstr("scenario"));
+    expect_refused({"run", "s.toml", "--shard", "1/4"}, AllOf(HasSubstr("--shard"), HasSubstr("not there yet")));
+    expect_refused({"run", "s.toml", "--resume"}, AllOf(HasSubstr("--resume"), HasSubstr("not there yet")));
+    expect_refused({"run", "--print-schema=xml"}, AllOf(HasSubstr("xml"), HasSubstr("markdown")));
+    expect_refused({}, HasSubstr("--help"));
+    expect_refused({"rum", "s.toml"}, AllOf(HasSubstr("\"rum\""), HasSubstr("run, analyze, allan, validate")));
+    expect_refused({"--nonsense"}, HasSubstr("--help"));
+}
+
+TEST_F(RunCommand, PlannedCommandsSayThatTheyAreNotThereYet) {
+    for (const char* command : {"merge", "replay", "record", "closure", "report", "import"}) {
+        expect_refused({command}, AllOf(HasSubstr(command), HasSubstr("not there yet")));
+        expect_refused({command, "a.h5", "-o", "b.h5", "--json"},
+                       AllOf(HasSubstr(command), HasSubstr("not there yet")));
+    }
+}
+
+TEST_F(RunCommand, HelpListsTheCommands) {
+    const Outcome help = run({"--help"});
+    EXPECT_EQ(help.status, 0);
+    for (const char* command : {"run", "analyze", "allan", "validate", "merge", "closure", "Exit status"}) {
+        EXPECT_THAT(help.out, HasSubstr(command));
+    }
+    EXPECT_EQ(help.err, "");
+    const Outcome of_run = run({"run", "--help"});
+    EXPECT_EQ(of_run.status, 0);
+    for (const char* option : {"--output", "--threads", "--seed", "--shard", "--resume", "--json", "--print-schema"}) {
+        EXPECT_THAT(of_run.out, HasSubstr(option));
+    }
+    const Outcome version = run({"--version"});
+    EXPECT_EQ(version.status, 0);
+    EXPECT_THAT(version.out, testing::MatchesRegex("ringlock [0-9]+\\.[0-9]+\\.[0-9]+ \\(.+\\)\n"));
+}
+
+TEST_F(RunCommand, PrintedSchemaIsAScenario) {
+    const Outcome schema = run({"run", "--print-schema"});
+    ASSERT_EQ(schema.status, 0) << schema.err;
+    write("schema.toml", schema.out);
+    EXPECT_EQ(run({"validate", "schema.toml"}).status, 0);
+    EXPECT_EQ(run({"run", "--print-schema=toml"}).out, schema.out);
+    EXPECT_EQ(run({"run", "--print-schema", "s.toml"}).out, schema.out) << "the next word is no form of the schema";
+    EXPECT_EQ(run({"run", "s.toml", "--print-schema"}).out, schema.out);
+    EXPECT_EQ(run({"run", "--print-schema=markdown"}).out, contents(RINGLOCK_SOURCE_DIR "/docs/scenario.md"));
+    EXPECT_TRUE(json::parse(run({"run", "--print-schema=json"}).out).contains("sections"));
+    EXPECT_EQ(left(), (std::set<std::string>{"s.toml", "schema.toml"}));
+}
+
+void expect_numbers(const json& object, std::initializer_list<const char*> names) {
+    ASSERT_TRUE(object.is_object()) << object;
+    for (const char* name : names) {
+        ASSERT_TRUE(object.contains(name)) << name;
+        EXPECT_TRUE(object[name].is_number()) << name << " = " << object[name];
+    }
+}
+
+TEST_F(RunCommand, JsonIsOneObjectWithTheFieldsOfTheContract) {
+    const Outcome r = run({"run", "s.toml", "-o", "out.h5", "--json", "--seed", "11"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.err, HasSubstr("out.h5"));
+    const json out = json::parse(r.out);  // throws on anything before or after the one object
+    EXPECT_EQ(out["scenario"], "s.toml");
+    EXPECT_EQ(out["seed"], 11);
+    expect_numbers(out, {"turns", "wall_s", "turns_per_s"});
+    EXPECT_TRUE(out["turns"].is_number_integer());
+    expect_numbers(out["theory"], {"arw_deg_rt_h", "dead_band_deg_h"});
+    EXPECT_NEAR(out["theory"]["arw_deg_rt_h"], 0.0022506, 1e-7);
+    EXPECT_NEAR(out["theory"]["dead_band_deg_h"], 2.632, 1e-3);
+    ASSERT_EQ(out["arms"].size(), 4U);
+    for (const auto& [name, arm] : out["arms"].items()) {
+        SCOPED_TRACE(name);
+        EXPECT_EQ(arm["gyros"], 4);
+        expect_numbers(arm["rate_error_deg_h"], {"mean", "lo", "hi"});
+        EXPECT_LE(arm["rate_error_deg_h"]["lo"], arm["rate_error_deg_h"]["hi"]);
+        ASSERT_TRUE(arm.contains("bias_instability_deg_h"));
+        EXPECT_TRUE(arm["bias_instability_deg_h"].is_null()) << "no flicker was simulated";
+        ASSERT_TRUE(arm.contains("arw_deg_rt_h"));
+        if (name.starts_with("noise_injected")) {
+            const json& arw = arm["arw_deg_rt_h"];
+            ASSERT_TRUE(arw.is_object());
+            for (const char* key : {"median", "lo", "hi", "median_ci"}) EXPECT_TRUE(arw.contains(key)) << key;
+            EXPECT_TRUE(arw["hi"].is_number()) << "an upper end or limit is always given";
+            EXPECT_EQ(arw["median"].is_null(), arw["median_ci"].is_null());
+        } else {
+            EXPECT_TRUE(arm["arw_deg_rt_h"].is_null());
+        }
+    }
+    EXPECT_EQ(left(), (std::set<std::string>{"out.h5", "s.toml"}));
+}
+
+TEST_F(RunCommand, TurnsOfSharedTrajectoriesCountOnce) {
+    const auto turns = [&](const std::string& arms) -> std::int64_t {
+        write("t.toml", "[ensemble]\ngyros = 3\nduration_s = 10.0\n[arms]\nnames = [" + arms + "]\n");
+        std::filesystem::remove(directory_ / "t.h5");
+        return json::parse(run({"run", "t.toml", "--json"}).out)["turns"];
+    };
+    const std::int64_t one = turns("\"noise_injected\"");
+    EXPECT_GT(one, 3 * 2 * 8 * 124);  // three gyros, two turns a cycle
+    EXPECT_LE(one, 3 * (2 * 10 * 125 + 1));
+    EXPECT_EQ(turns("\"noise_injected\", \"noise_injected+compensated\""), one);
+    EXPECT_EQ(turns("\"uncompensated\", \"compensated\", \"compensated_published\""), one);
+    EXPECT_EQ(turns("\"uncompensated\", \"noise_injected\", \"noise_injected+compensated\""), 2 * one);
+}
+
+TEST_F(RunCommand, TableComparesTheArms) {
+    const Outcome r = run({"run", "s.toml", "--quiet"});
+    ASSERT_EQ(r.status, 0);
+    EXPECT_EQ(r.err, "");
+    for (const char* text : {"ideal", "uncompensated", "noise_injected+compensated", "0.0022506", "2.632", "4 gyros"}) {
+        EXPECT_THAT(r.out, HasSubstr(text));
+    }
+    EXPECT_THAT(r.out, testing::Not(HasSubstr("nan")));
+    EXPECT_THAT(r.out, testing::Not(HasSubstr("inf ")));
+    EXPECT_EQ(left(), (std::set<std::string>{"s.h5", "s.toml"}));
+}
+
+TEST_F(RunCommand, AnalyzeSaysWhatRunSaid) {
+    const Outcome r = run({"run", "s.toml", "-o", "out.h5", "--json"});
+    const Outcome again = run({"analyze", "out.h5", "--json"});
+    ASSERT_EQ(again.status, 0) << again.err;
+    EXPECT_EQ(again.err, "");
+    EXPECT_EQ(json::parse(again.out), json::parse(r.out));
+    const Outcome table = run({"analyze", "out.h5"});
+    EXPECT_THAT(table.out, HasSubstr("noise_injected+compensated"));
+    const Outcome valid = run({"validate", "out.h5"});
+    EXPECT_EQ(valid.status, 0);
+    EXPECT_EQ(valid.out, "out.h5: a valid result of 4 gyros and 4 arms\n");
+}
+
+TEST_F(RunCommand, DamagedResultsAreRefusedByName) {
+    ASSERT_EQ(run({"run", "s.toml", "-o", "out.h5"}).status, 0);
+    const std::string whole = read("out.h5");
+    write("out.h5", whole.substr(0, whole.size() / 2));
+    expect_refused({"analyze", "out.h5"}, HasSubstr("out.h5"));
+    expect_refused({"validate", "out.h5"}, HasSubstr("out.h5"));
+    expect_refused({"run", "s.toml", "-o", "out.h5"}, HasSubstr("it is kept"));
+}
+
+/// Every dataset outside /provenance, as text of bytes.
+void collect(const store::Group& group, const std::string& path, std::map<std::string, std::vector<double>>& out) {
+    for (const std::string& name : group.children()) {
+        if (name == "provenance") continue;
+        if (group.has_group(name)) {
+            collect(group.group(name), path + "/" + name, out);
+        } else if (path + "/" + name != "/scenario") {
+            out[path + "/" + name] = group.dataset(name).read<double>();
+        }
+    }
+    for (const std::string& name : group.attribute_names()) {
+        if (name == "format" || name == "compensator") continue;
+        out[path + "@" + name] = {group.double_attribute(name)};
+    }
+}
+
+std::map<std::string, std::vector<double>> data(const std::filesystem::path& path) {
+    std::map<std::string, std::vector<double>> out;
+    collect(store::File::open(path), "", out);
+    return out;
+}
+
+bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
+    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+}
+
+TEST_F(RunCommand, DataAreTheSameToTheBitForAnyNumberOfThreads) {
+    for (const char* threads : {"1", "2", "8"}) {
+        const Outcome r = run({"run", "s.toml", "-o", std::string(threads) + ".h5", "--threads", threads});
+        ASSERT_EQ(r.status, 0) << r.err;
+    }
+    const auto one = data(directory_ / "1.h5");
+    EXPECT_GT(one.size(), 100U);
+    for (const char* other : {"2.h5", "8.h5"}) {
+        const auto found = data(directory_ / other);
+        ASSERT_EQ(found.size(), one.size());
+        for (const auto& [name, values] : one) EXPECT_TRUE(same_bits(values, found.at(name))) << other << name;
+    }
+    ASSERT_EQ(run({"run", "s.toml", "-o", "seed.h5", "--seed", "2"}).status, 0);
+    const auto seed = data(directory_ / "seed.h5");
+    for (const char* name : {"/gyros/initial_phase_rad", "/arms/noise_injected/angle_arcsec",
+                             "/arms/noise_injected+compensated/rate_error_deg_h"}) {
+        EXPECT_FALSE(same_bits(one.at(name), seed.at(name))) << name;
+    }
+
+    if (std::system("h5diff --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "h5diff is not there (hdf5-tools)";
+    const auto h5diff = [&](const std::string& a, const std::string& b) {
+        const std::string command =
+            "cd '" + directory_.string() + "' && h5diff -q --exclude-path /provenance " + a + " " + b;
+        return std::system(command.c_str());
+    };
+    EXPECT_EQ(h5diff("1.h5", "2.h5"), 0);
+    EXPECT_EQ(h5diff("1.h5", "8.h5"), 0);
+    EXPECT_NE(h5diff("1.h5", "seed.h5"), 0);
+}
+
+}  // namespace
+}  // namespace ringlock
