@@ -15,6 +15,7 @@
 #include <string_view>
 #include <system_error>
 #include <thread>
+#include <vector>
 
 #include "analysis/report/plot.hpp"
 #include "analysis/study/result_file.hpp"
@@ -111,11 +112,16 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
                          arguments.scenario, gyros, duration_s, scenario.arms.size(), threads,
                          static_cast<double>(study::expected_size_bytes(plan)) * 1e-6));
     }
-    ensemble::Progress progress(gyros, {.quiet = arguments.quiet});
-    study::Observer observer;
-    observer.on_record = [&](std::int64_t gyro, const auto& angle_arcsec) { writer.write_record(gyro, angle_arcsec); };
-    observer.on_progress = [&](std::int64_t turns) { progress.advance(1, turns); };
-    const study::Study study = study::run(scenario, threads, observer, interrupted);
+    std::vector<scenario::Arm> arms;
+    for (const study::ArmStatistics& arm : plan.arms) arms.push_back(arm.arm);
+    ensemble::Progress progress(gyros,
+                                {.quiet = arguments.quiet, .total_turns = ensemble::expected_turns(scenario, arms)});
+    const auto on_record = [&](std::int64_t gyro, const auto& angle_arcsec) {
+        writer.write_record(gyro, angle_arcsec);
+        progress.advance(1, 0);
+    };
+    const ensemble::Monitor monitor{interrupted, [&](std::int64_t turns) { progress.advance(0, turns); }};
+    const study::Study study = study::run(scenario, threads, on_record, monitor);
     progress.finish();
     check_interrupt();
 

@@ -29,8 +29,8 @@ GyroStatistics analyse_record(std::span<const double> angle_arcsec, double inter
     return result;
 }
 
-Study run(const scenario::Scenario& scenario, int threads, const Observer& observer,
-          const ensemble::Cancelled& cancelled) {
+Study run(const scenario::Scenario& scenario, int threads, const OnRecord& on_record,
+          const ensemble::Monitor& monitor) {
     Study study(scenario);
     std::vector<scenario::Arm> arms;
     for (const ArmStatistics& arm : study.arms) arms.push_back(arm.arm);
@@ -43,16 +43,13 @@ Study run(const scenario::Scenario& scenario, int threads, const Observer& obser
             study.arms[arm].gyros[slot] = analyse_record(record.angle_arcsec[arm], study.schedule.sample_interval_s,
                                                          record.setup.input_rate_deg_h, study.factors);
         }
-        if (observer.on_record) observer.on_record(gyro, record.angle_arcsec);
-        {
-            const std::lock_guard lock(mutex);
-            study.turns += record.turns;
-            study.turns_off_table += record.turns_off_table;
-            study.turn_map_error_rad = std::max(study.turn_map_error_rad, record.turn_map_error_rad);
-        }
-        if (observer.on_progress) observer.on_progress(record.turns);
+        if (on_record) on_record(gyro, record.angle_arcsec);
+        const std::lock_guard lock(mutex);
+        study.turns += record.turns;
+        study.turns_off_table += record.turns_off_table;
+        study.turn_map_error_rad = std::max(study.turn_map_error_rad, record.turn_map_error_rad);
     };
-    ensemble::run(scenario, arms, 0, ensemble::total_gyros(scenario), threads, sink, cancelled);
+    ensemble::run(scenario, arms, 0, ensemble::total_gyros(scenario), threads, sink, monitor);
     return study;
 }
 

@@ -49,16 +49,11 @@ struct Study {
 GyroStatistics analyse_record(std::span<const double> angle_arcsec, double interval_s, double input_rate_deg_h,
                               std::span<const std::int64_t> factors);
 
-/// What is told while a study runs; both may be called from any thread, one call at a time for each gyro.
-struct Observer {
-    /// A gyro is done: its angle records, [arm][sample] in arcsec.
-    std::function<void(std::int64_t gyro, const std::vector<std::vector<double>>& angle_arcsec)> on_record;
-    /// A gyro is done: turns simulated for it.
-    std::function<void(std::int64_t turns)> on_progress;
-};
+/// Told when a gyro is done and analysed: its angle records, [arm][sample] in arcsec. From any thread.
+using OnRecord = std::function<void(std::int64_t gyro, const std::vector<std::vector<double>>& angle_arcsec)>;
 
 /// Runs the whole study. Throws RunError, Interrupted.
-Study run(const scenario::Scenario& scenario, int threads, const Observer& observer,
-          const ensemble::Cancelled& cancelled);
+Study run(const scenario::Scenario& scenario, int threads, const OnRecord& on_record = nullptr,
+          const ensemble::Monitor& monitor = {});
 
 }  // namespace ringlock::study

@@ -46,7 +46,7 @@ class Failures {
 }  // namespace
 
 void run(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first, std::int64_t last,
-         int threads, const Sink& sink, const Cancelled& cancelled) {
+         int threads, const Sink& sink, const Monitor& monitor) {
     // An arena alone gets no more workers than there are cores; asked for more threads, give more.
     const oneapi::tbb::global_control control(oneapi::tbb::global_control::max_allowed_parallelism,
                                               static_cast<std::size_t>(threads));
@@ -61,7 +61,7 @@ void run(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms
                 for (std::int64_t gyro = block.begin(); gyro != block.end(); ++gyro) {
                     GyroRecord record;
                     try {
-                        record = simulate_gyro(scenario, arms, gyro, cancelled);
+                        record = simulate_gyro(scenario, arms, gyro, monitor);
                     } catch (const RunError& error) {
                         failures.add(gyro, error.what());
                         continue;

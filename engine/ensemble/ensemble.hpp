@@ -18,6 +18,6 @@ using Sink = std::function<void(std::int64_t gyro, GyroRecord&& record)>;
 /// that fail do not stop the others; their failures are reported together in one RunError at the end. Cancellation
 /// stops all and throws Interrupted.
 void run(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first, std::int64_t last,
-         int threads, const Sink& sink, const Cancelled& cancelled);
+         int threads, const Sink& sink, const Monitor& monitor);
 
 }  // namespace ringlock::ensemble

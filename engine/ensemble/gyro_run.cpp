@@ -148,8 +148,14 @@ Kind kind_of(const scenario::Arm& arm) {
     return arm.ideal ? Kind::ideal : arm.noise_injected ? Kind::noise_injected : Kind::plain;
 }
 
+/// Turns between two looks at the monitor: some milliseconds of work.
+std::int64_t turns_between_looks(const scenario::Scenario& scenario) {
+    return scenario.propagation.method == scenario::PropagationMethod::direct ? 8 : 4096;
+}
+
 void follow(Trajectory& trajectory, std::vector<Listener>& listeners, const Schedule& schedule, GyroRecord& record,
-            const Cancelled& cancelled) {
+            std::int64_t look, const std::function<bool()>& cancelled,
+            const std::function<void(std::int64_t)>& on_turns) {
     const bool compensated =
         std::any_of(listeners.begin(), listeners.end(), [](const Listener& l) { return l.compensator != nullptr; });
     const std::int64_t turns = schedule.turns();
@@ -171,16 +177,28 @@ void follow(Trajectory& trajectory, std::vector<Listener>& listeners, const Sche
                 }
             }
         }
-        if (turn + 1 == turns) return;
-        if (turn % 1024 == 0 && cancelled && cancelled()) throw Interrupted();
+        const bool last = turn + 1 == turns;
+        if (last || (turn + 1) % look == 0) {
+            if (on_turns) on_turns(last && turns % look != 0 ? turns % look : look);
+            if (cancelled && cancelled()) throw Interrupted();
+        }
+        if (last) return;
         trajectory.advance();
     }
 }
 
 }  // namespace
 
+std::int64_t expected_turns(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms) {
+    const auto any = [&](Kind kind) {
+        return std::any_of(arms.begin(), arms.end(), [&](const scenario::Arm& arm) { return kind_of(arm) == kind; });
+    };
+    const std::int64_t trajectories = (any(Kind::plain) ? 1 : 0) + (any(Kind::noise_injected) ? 1 : 0);
+    return total_gyros(scenario) * trajectories * Schedule(scenario).turns();
+}
+
 GyroRecord simulate_gyro(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t gyro,
-                         const Cancelled& cancelled) {
+                         const Monitor& monitor) {
     const Schedule schedule(scenario);
     const auto who = identity(scenario, gyro);
     GyroRecord record;
@@ -197,7 +215,8 @@ GyroRecord simulate_gyro(const scenario::Scenario& scenario, std::span<const sce
         }
         if (listeners.empty()) continue;
         Trajectory trajectory(scenario, record.setup, who, kind);
-        follow(trajectory, listeners, schedule, record, cancelled);
+        follow(trajectory, listeners, schedule, record, turns_between_looks(scenario), monitor.cancelled,
+               kind != Kind::ideal ? monitor.on_turns : nullptr);
         if (kind != Kind::ideal) record.turns += schedule.turns();
         if (const auto* map = dynamic_cast<const propagate::TurnMap*>(trajectory.propagator())) {
             record.turns_off_table += map->outside();

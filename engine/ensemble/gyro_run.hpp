@@ -25,13 +25,19 @@ struct GyroRecord {
     double turn_map_error_rad = 0.0;   ///< largest interpolation error measured when the tables were made; 0: no tables
 };
 
-/// Asked now and then; true stops the simulation with Interrupted.
-using Cancelled = std::function<bool()>;
+/// What a simulation tells while it runs, and asks; both may be empty, and are called from any thread.
+struct Monitor {
+    std::function<bool()> cancelled;              ///< true stops the simulation with Interrupted
+    std::function<void(std::int64_t)> on_turns;   ///< so many turns more are done, of those that GyroRecord::turns counts
+};
+
+/// Turns that the whole ensemble will count.
+std::int64_t expected_turns(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms);
 
 /// Simulates gyro g of the scenario. The result depends on the scenario, its seed and g alone.
 /// Throws RunError where the trajectory cannot be finished, Interrupted when cancelled.
 GyroRecord simulate_gyro(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t gyro,
-                         const Cancelled& cancelled);
+                         const Monitor& monitor);
 
 /// One physical trajectory, turn after turn, with its readings.
 ///

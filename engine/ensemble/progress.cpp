@@ -74,12 +74,19 @@ void Progress::finish() {
     }
 }
 
+double Progress::share_done() const {
+    const double share = options_.total_turns > 0 ? static_cast<double>(turns_) / static_cast<double>(options_.total_turns)
+                         : total_ > 0             ? static_cast<double>(gyros_) / static_cast<double>(total_)
+                                                  : 1.0;
+    return std::clamp(share, 0.0, 1.0);
+}
+
 void Progress::show(Time now, bool last) {
     const double elapsed = Seconds(now - start_).count();
-    const double done = total_ > 0 ? static_cast<double>(gyros_) / static_cast<double>(total_) : 1.0;
+    const double done = share_done();
     // Cut off, not rounded: 100 % means that all is done.
     std::string status =
-        fmt::format("{:3} %  {}/{} gyros", static_cast<int>(100.0 * std::clamp(done, 0.0, 1.0)), gyros_, total_);
+        fmt::format("{:3} %  {}/{} gyros", static_cast<int>(100.0 * done), gyros_, total_);
     if (elapsed > 0.0) status += fmt::format("  {:.3g} turns/s", static_cast<double>(turns_) / elapsed);
     if (last) {
         status += "  in " + duration(elapsed);
@@ -101,8 +108,7 @@ void Progress::draw_bar(const std::string& status) {
     std::string line = status;
     const int room = std::min(longest_bar, width - static_cast<int>(status.size()) - 3);
     if (room >= shortest_bar) {
-        const double done = total_ > 0 ? static_cast<double>(gyros_) / static_cast<double>(total_) : 1.0;
-        const int full = static_cast<int>(room * std::clamp(done, 0.0, 1.0));
+        const int full = static_cast<int>(room * share_done());
         line = fmt::format("[{}{}] {}", std::string(full, '='), std::string(room - full, ' '), status);
     }
     line.resize(std::min(line.size(), static_cast<std::size_t>(std::max(0, width))));

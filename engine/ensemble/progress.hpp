@@ -14,6 +14,7 @@ struct ProgressOptions {
     using Clock = std::function<std::chrono::steady_clock::time_point()>;
 
     bool quiet = false;
+    std::int64_t total_turns = 0;              ///< the share done is told by turns where given, else by gyros
     std::ostream* out = nullptr;               ///< with one given, is_terminal is as said below
     bool is_terminal = false;                  ///< read only when `out` is given
     Clock clock = {};                          ///< must not go back
@@ -41,6 +42,7 @@ class Progress {
    private:
     using Time = std::chrono::steady_clock::time_point;
 
+    double share_done() const;
     void show(Time now, bool last);
     void draw_bar(const std::string& status);
     void clear_bar();

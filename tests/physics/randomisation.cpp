@@ -38,7 +38,7 @@ Outcome injected(double rms_rad, double rate_deg_h, std::int64_t gyros, double d
             rate[static_cast<std::size_t>(gyro)] = mean / schedule.sample_interval_s - rate_deg_h;
             variance[static_cast<std::size_t>(gyro)] = sum / (n - 1.0) / schedule.sample_interval_s;
         },
-        nullptr);
+        {});
     Outcome outcome{0.0, 0.0, 0.0};
     const auto count = static_cast<double>(gyros);
     for (std::size_t i = 0; i < rate.size(); ++i) {

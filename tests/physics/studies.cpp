@@ -15,7 +15,7 @@ scenario::Scenario from_file(const std::string& name) {
 }
 
 study::Summary run(const scenario::Scenario& scenario) {
-    return study::summarise(study::run(scenario, 2, {}, nullptr));
+    return study::summarise(study::run(scenario, 2));
 }
 
 const study::ArmSummary& arm(const study::Summary& summary, const std::string& name) {

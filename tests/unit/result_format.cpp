@@ -36,9 +36,8 @@ scenario::Scenario small(bool angle_record, std::uint64_t seed = 5) {
 
 void write(const fs::path& path, const scenario::Scenario& scenario) {
     ResultWriter writer(path, Study(scenario));
-    Observer observer;
-    observer.on_record = [&](std::int64_t gyro, const auto& angle) { writer.write_record(gyro, angle); };
-    const Study study = run(scenario, 2, observer, {});
+    const OnRecord on_record = [&](std::int64_t gyro, const auto& angle) { writer.write_record(gyro, angle); };
+    const Study study = run(scenario, 2, on_record);
     writer.finish(study, summarise(study), store::collect_provenance({}, 2, "small.toml"));
 }
 
@@ -333,13 +332,12 @@ TEST_F(ResultFile, GivesTheStudyBack) {
     scenario.arms = {"ideal", "noise_injected", "noise_injected+compensated"};
     scenario.input = {.rate_deg_h = 1.0, .sweep_stop_deg_h = 2.0, .sweep_points = 2};
     ResultWriter writer(path_, Study(scenario));
-    Observer observer;
     std::map<std::int64_t, std::vector<std::vector<double>>> records;
-    observer.on_record = [&](std::int64_t gyro, const auto& angle) {
+    const OnRecord on_record = [&](std::int64_t gyro, const auto& angle) {
         writer.write_record(gyro, angle);
         records[gyro] = angle;  // one thread
     };
-    const Study study = run(scenario, 1, observer, {});
+    const Study study = run(scenario, 1, on_record);
     store::Provenance provenance = store::collect_provenance({}, 1, "small.toml");
     provenance.wall_s = 1.5;
     writer.finish(study, summarise(study), provenance);
