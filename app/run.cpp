@@ -25,7 +25,6 @@
 #include "engine/core/interrupt.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/progress.hpp"
-#include "engine/scenario/check.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/render.hpp"
 

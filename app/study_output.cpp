@@ -63,7 +63,7 @@ std::string arw_cell(const study::ArmSummary& arm) {
     if (!arm.noise_injected) return "none claimed";
     const study::Figure& figure = arm.arw_deg_rt_h;
     if (figure.median) return fmt::format("{:.4g}", *figure.median);
-    return figure.hi ? fmt::format("< {:.2g} (95 %)", *figure.hi) : "not resolved";
+    return figure.hi ? fmt::format("< {:.2g}", *figure.hi) : "not resolved";
 }
 
 std::string interval_cell(std::optional<double> lo, std::optional<double> hi) {
@@ -72,18 +72,17 @@ std::string interval_cell(std::optional<double> lo, std::optional<double> hi) {
 
 /// Rate errors in one notation down the column.
 std::string rate_cell(double rate_deg_h) {
-    constexpr double half_a_digit = 5e-6;
-    return fmt::format("{:+.5f}", std::abs(rate_deg_h) < half_a_digit ? 0.0 : rate_deg_h);
+    constexpr double half_a_digit = 5e-5;
+    return fmt::format("{:.4f}", std::abs(rate_deg_h) < half_a_digit ? 0.0 : rate_deg_h);
 }
 
 report::Table arm_table(const study::Summary& summary) {
     report::Table table({{"arm", report::Align::left},
-                         {"ARW deg/sqrt(h)", report::Align::right},
+                         {"ARW [deg/sqrt(h)]", report::Align::right},
                          {"95 % of median", report::Align::right},
                          {"of theory", report::Align::right},
-                         {"bias inst. deg/h", report::Align::right},
-                         {"rate error deg/h", report::Align::right},
-                         {"68 % of gyros", report::Align::right}});
+                         {"bias inst. [deg/h]", report::Align::right},
+                         {"rate error [deg/h], 68 % of gyros", report::Align::right}});
     for (const study::ArmSummary& arm : summary.arms) {
         const study::Figure& arw = arm.arw_deg_rt_h;
         const bool shown = arm.noise_injected && arw.median;
@@ -93,8 +92,8 @@ report::Table arm_table(const study::Summary& summary) {
                            ? fmt::format("{:.4f}", *arw.median / summary.theory.arw_deg_rt_h)
                            : "-",
                        floor ? fmt::format("{:.3g}", *floor->median) : "none claimed",
-                       rate_cell(arm.rate_error_deg_h.mean),
-                       rate_cell(arm.rate_error_deg_h.lo) + " .. " + rate_cell(arm.rate_error_deg_h.hi)});
+                       fmt::format("{} ({} .. {})", rate_cell(arm.rate_error_deg_h.mean),
+                                   rate_cell(arm.rate_error_deg_h.lo), rate_cell(arm.rate_error_deg_h.hi))});
     }
     return table;
 }

@@ -193,8 +193,11 @@ NoiseFit fit_noise(std::span<const double> angle_arcsec, double tau0_s, const Op
     const double variance_price = boost::math::quantile(boost::math::complement(one, 2.0 * options.significance));
     const double ramp_price = boost::math::quantile(boost::math::complement(one, options.significance));
 
+    constexpr std::size_t arw_bit = std::size_t{1} << angle_random_walk;
     std::size_t best = 0;
+    std::size_t best_with_arw = 0;
     double best_score = std::numeric_limits<double>::infinity();
+    double best_score_with_arw = std::numeric_limits<double>::infinity();
     for (std::size_t mask = 1; mask < mask_count; ++mask) {
         if ((mask & ~ramp_bit) == 0) continue;
         double score = fits[mask].deviance + ((mask & ramp_bit) != 0 ? ramp_price : 0.0);
@@ -202,6 +205,10 @@ NoiseFit fit_noise(std::span<const double> angle_arcsec, double tau0_s, const Op
         if (score < best_score) {
             best_score = score;
             best = mask;
+        }
+        if ((mask & arw_bit) != 0 && score < best_score_with_arw) {
+            best_score_with_arw = score;
+            best_with_arw = mask;
         }
     }
     const Maximum& chosen = fits[best];
@@ -230,6 +237,17 @@ NoiseFit fit_noise(std::span<const double> angle_arcsec, double tau0_s, const Op
             c.hi = factor * std::sqrt(*limit);
         }
     }
+
+    const auto arw_of = [&](std::size_t mask) {
+        return unit_factor(angle_random_walk, tau0_s) * std::sqrt(fits[mask].theta[angle_random_walk]);
+    };
+    constexpr std::size_t angle_noise_bit = std::size_t{1} << quantisation;
+    out.pooling.arw_evidence = std::max(0.0, fits[full_mask & ~arw_bit].deviance - full.deviance);
+    out.pooling.angle_noise_evidence = std::max(0.0, fits[arw_bit].deviance - fits[arw_bit | angle_noise_bit].deviance);
+    out.pooling.arw_alone_deg_rt_h = arw_of(arw_bit);
+    out.pooling.arw_beside_angle_noise_deg_rt_h = arw_of(arw_bit | angle_noise_bit);
+    out.pooling.arw_best_deg_rt_h = arw_of(best_with_arw);
+    out.pooling.red = (best & ~(arw_bit | angle_noise_bit)) != 0;
 
     Coefficient& ramp = out.rate_ramp_deg_h_h;
     const double per_hour = 3600.0 / tau0_s;

@@ -22,6 +22,19 @@ struct Options {
     std::size_t fewest_samples = 32;  ///< increments below which nothing is fitted
 };
 
+/// What is needed to decide over many records of like gyros together, where each by itself is too short to.
+///
+/// Evidence is the rise of the deviance when a term is left out: under the null 0 in half of the records, chi-squared
+/// with one degree of freedom in the others. All 0 where nothing was fitted.
+struct Pooling {
+    double arw_evidence = 0.0;                     ///< for N, all other terms being free
+    double angle_noise_evidence = 0.0;             ///< for Q in the model of Q and N
+    double arw_alone_deg_rt_h = 0.0;               ///< N in the model of N alone
+    double arw_beside_angle_noise_deg_rt_h = 0.0;  ///< N in the model of Q and N
+    double arw_best_deg_rt_h = 0.0;                ///< N in the best subset that has it
+    bool red = false;                              ///< the best subset has flicker, rate random walk or a ramp
+};
+
 /// The five coefficients of IEEE Std 952: sigma^2(tau) = 3 Q^2/tau^2 + N^2/tau + (2 ln 2/pi) B^2 + K^2 tau/3 + R^2
 /// tau^2/2.
 struct NoiseFit {
@@ -30,8 +43,9 @@ struct NoiseFit {
     Coefficient bias_instability_deg_h;  ///< B; the flat floor itself is 0.664 B
     Coefficient rrw_deg_h_rt_h;          ///< K
     Coefficient rate_ramp_deg_h_h;       ///< |R|
-    bool described = false;              ///< the model describes the record; false: do not print coefficients as truth
-    std::string reason;                  ///< where not: why (misfit, too short, no noise)
+    Pooling pooling;
+    bool described = false;  ///< the model describes the record; false: do not print coefficients as truth
+    std::string reason;      ///< where not: why (misfit, too short, no noise)
     Goodness goodness;
     std::size_t samples = 0;  ///< increments used
 };

@@ -61,6 +61,27 @@ constexpr std::array coefficient_columns = {
     CoefficientColumn{"rate_ramp_deg_h_h", "deg/h/h", "rate ramp R", &noise::NoiseFit::rate_ramp_deg_h_h},
 };
 
+/// One column of what decides over the gyros together.
+struct PoolingColumn {
+    const char* name;
+    const char* unit;
+    const char* description;
+    double noise::Pooling::*field;
+};
+
+constexpr std::array pooling_columns = {
+    PoolingColumn{"arw_evidence", "1", "rise of the deviance without N, all other terms free",
+                  &noise::Pooling::arw_evidence},
+    PoolingColumn{"angle_noise_evidence", "1", "rise of the deviance without Q in the model of Q and N",
+                  &noise::Pooling::angle_noise_evidence},
+    PoolingColumn{"arw_alone_deg_rt_h", "deg/sqrt(h)", "N in the model of N alone",
+                  &noise::Pooling::arw_alone_deg_rt_h},
+    PoolingColumn{"arw_beside_angle_noise_deg_rt_h", "deg/sqrt(h)", "N in the model of Q and N",
+                  &noise::Pooling::arw_beside_angle_noise_deg_rt_h},
+    PoolingColumn{"arw_best_deg_rt_h", "deg/sqrt(h)", "N in the best model that has it",
+                  &noise::Pooling::arw_best_deg_rt_h},
+};
+
 /// One column of the Allan deviations of the gyros.
 struct AllanColumn {
     const char* name;
@@ -109,6 +130,14 @@ void write_noise(store::Group& group, const ArmStatistics& arm) {
         noise.write(name + "_hi", get(&noise::Coefficient::hi),
                     {column.unit, fmt::format("{}: upper end, or a 95 % limit where not shown", column.description)});
     }
+    for (const PoolingColumn& column : pooling_columns) {
+        noise.write(column.name,
+                    over_gyros(arm, [&](const GyroStatistics& g) { return g.noise.pooling.*column.field; }),
+                    {column.unit, column.description});
+    }
+    std::vector<std::int8_t> red;
+    for (const GyroStatistics& gyro : arm.gyros) red.push_back(gyro.noise.pooling.red ? 1 : 0);
+    noise.write("red", red, {"1", "1 where the best model has flicker, rate random walk or a ramp"});
     std::vector<std::int8_t> described;
     for (const GyroStatistics& gyro : arm.gyros) described.push_back(gyro.noise.described ? 1 : 0);
     noise.write("described", described, {"1", "1 where the noise model describes the record"});
@@ -292,8 +321,16 @@ void read_arm(const store::Group& group, const Study& study, ArmStatistics& arm)
             coefficient = {!std::isnan(value[g]), or_nothing(value[g]), or_nothing(lo[g]), or_nothing(hi[g])};
         }
     }
+    for (const PoolingColumn& column : pooling_columns) {
+        const auto values = read_column(noise, column.name, {gyros});
+        for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].noise.pooling.*column.field = values[g];
+    }
+    const auto red = read_column(noise, "red", {gyros});
     const auto described = read_column(noise, "described", {gyros});
-    for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].noise.described = described[g] != 0.0;
+    for (std::size_t g = 0; g < gyros; ++g) {
+        arm.gyros[g].noise.pooling.red = red[g] != 0.0;
+        arm.gyros[g].noise.described = described[g] != 0.0;
+    }
     const store::Group allan = group.group("allan");
     const auto tau = read_column(allan, "tau_s", {taus});
     const auto alpha = read_column(allan, "alpha", {gyros, taus});

@@ -32,35 +32,72 @@ double upper_limit(const GyroStatistics& gyro) {
     return limit;
 }
 
-/// A noise coefficient over the gyros of an arm. It is the ensemble's where most records resolve it; a record that does
-/// not counts as zero among the others.
-Figure figure(const ArmStatistics& arm, noise::Coefficient noise::NoiseFit::*which, std::uint64_t seed) {
+/// Fills in median, range and bootstrap interval.
+void describe(Figure& figure, const std::vector<double>& values, std::uint64_t seed) {
+    const noise::Range range = noise::central_range(values);
+    const noise::Range median = noise::bootstrap_median_interval(values, median_level, seed);
+    figure.median = range.median;
+    figure.lo = range.lo;
+    figure.hi = range.hi;
+    figure.median_lo = median.lo;
+    figure.median_hi = median.hi;
+}
+
+bool most(std::int64_t count, const ArmStatistics& arm) {
+    return 2 * count > static_cast<std::int64_t>(arm.gyros.size());
+}
+
+/// Bias instability is the ensemble's where most records by themselves resolve it; one that does not counts as zero.
+Figure bias_instability(const ArmStatistics& arm, std::uint64_t seed) {
     std::vector<double> values;
     Figure result;
     for (const GyroStatistics& gyro : arm.gyros) {
-        const noise::Coefficient& coefficient = gyro.noise.*which;
+        const noise::Coefficient& coefficient = gyro.noise.bias_instability_deg_h;
         const bool shown = coefficient.resolved && gyro.noise.described;
         values.push_back(shown ? *coefficient.value : 0.0);
         if (shown) ++result.resolved;
     }
-    if (2 * result.resolved > static_cast<std::int64_t>(arm.gyros.size())) {
-        const noise::Range range = noise::central_range(values);
-        const noise::Range median = noise::bootstrap_median_interval(values, median_level, seed);
-        result.median = range.median;
-        result.lo = range.lo;
-        result.hi = range.hi;
-        result.median_lo = median.lo;
-        result.median_hi = median.hi;
-    }
+    if (most(result.resolved, arm)) describe(result, values, seed);
     return result;
 }
 
-/// The angle random walk of an arm: never without an upper end.
+/// Whether the summed evidence of a term is beyond chance: four standard deviations above the mean of half
+/// chi-squareds, and no less than a single record has to show.
+bool beyond_chance(double evidence, std::size_t records) {
+    constexpr double price_of_one = 9.55;  // half chi-squared, p = 1e-3
+    const auto n = static_cast<double>(records);
+    return evidence > std::max(price_of_one, 0.5 * n + 4.0 * std::sqrt(1.25 * n));
+}
+
+/// Angle random walk is the ensemble's where all records together resolve it: gyros of an arm are alike, and a record
+/// too short to tell white noise from flicker by itself is not alone. Together they also decide whether white angle
+/// noise stands beside it; left to each record, those that miss it would read N too high.
 Figure angle_random_walk(const ArmStatistics& arm, std::uint64_t seed) {
-    Figure result = figure(arm, &noise::NoiseFit::arw_deg_rt_h, seed);
-    if (!result.median) {
-        std::vector<double> limits;
-        for (const GyroStatistics& gyro : arm.gyros) limits.push_back(upper_limit(gyro));
+    Figure result;
+    double evidence = 0.0;
+    double angle_noise_evidence = 0.0;
+    std::int64_t described = 0;
+    std::int64_t red = 0;
+    for (const GyroStatistics& gyro : arm.gyros) {
+        evidence += gyro.noise.pooling.arw_evidence;
+        angle_noise_evidence += gyro.noise.pooling.angle_noise_evidence;
+        if (gyro.noise.pooling.red) ++red;
+        if (gyro.noise.described) ++described;
+        if (gyro.noise.described && gyro.noise.arw_deg_rt_h.resolved) ++result.resolved;
+    }
+    const bool angle_noise = beyond_chance(angle_noise_evidence, arm.gyros.size());
+    std::vector<double> values;
+    std::vector<double> limits;
+    for (const GyroStatistics& gyro : arm.gyros) {
+        const noise::Pooling& pooling = gyro.noise.pooling;
+        values.push_back(most(red, arm) ? pooling.arw_best_deg_rt_h
+                         : angle_noise  ? pooling.arw_beside_angle_noise_deg_rt_h
+                                        : pooling.arw_alone_deg_rt_h);
+        limits.push_back(upper_limit(gyro));
+    }
+    if (most(described, arm) && beyond_chance(evidence, arm.gyros.size())) {
+        describe(result, values, seed);
+    } else {
         result.hi = noise::quantile(limits, 0.5);
     }
     return result;
@@ -139,7 +176,7 @@ Summary summarise(const Study& study) {
         out.noise_injected = arm.arm.noise_injected;
         if (out.noise_injected) out.arw_deg_rt_h = angle_random_walk(arm, summary.seed);
         if (arm.arm.ideal || arm.arm.noise_injected) {
-            const Figure floor = figure(arm, &noise::NoiseFit::bias_instability_deg_h, summary.seed);
+            const Figure floor = bias_instability(arm, summary.seed);
             if (floor.median) out.bias_instability_deg_h = floor;
         }
         std::vector<double> errors;

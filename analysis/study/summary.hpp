@@ -15,7 +15,7 @@ struct Figure {
     std::optional<double> hi;         ///< its upper end; a 95 % upper limit where there is no median
     std::optional<double> median_lo;  ///< bootstrap 95 % interval of the median
     std::optional<double> median_hi;
-    std::int64_t resolved = 0;  ///< gyros whose record shows the figure
+    std::int64_t resolved = 0;  ///< gyros whose record shows the figure by itself
 };
 
 struct MeanFigure {

@@ -24,8 +24,8 @@ struct Phase {
     double value_rad() const { return static_cast<double>(fringes) * units::two_pi + remainder_rad; }
 
    private:
-    /// Counts the whole fringes of `angle_rad` and returns the rest. 2 pi is taken in three parts of 24, 24 and 53 bits:
-    /// products with up to 2^29 fringes are exact, so that neither one large angle nor a long run loses digits.
+    /// Counts the whole fringes of `angle_rad` and returns the rest. 2 pi is taken in three parts of 24, 24 and 53
+    /// bits: products with up to 2^29 fringes are exact, so that neither one large angle nor a long run loses digits.
     double wrap(double angle_rad) {
         const double whole = std::nearbyint(angle_rad / units::two_pi);
         fringes += static_cast<std::int64_t>(whole);

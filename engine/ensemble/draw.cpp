@@ -13,7 +13,8 @@ std::int64_t total_gyros(const scenario::Scenario& scenario) {
 double input_rate_deg_h(const scenario::Scenario& scenario, std::int64_t gyro) {
     const auto& input = scenario.input;
     if (input.sweep_points == 1) return input.rate_deg_h;
-    const double fraction = static_cast<double>(gyro / scenario.ensemble.gyros) / static_cast<double>(input.sweep_points - 1);
+    const double fraction =
+        static_cast<double>(gyro / scenario.ensemble.gyros) / static_cast<double>(input.sweep_points - 1);
     return input.rate_deg_h + fraction * (input.sweep_stop_deg_h - input.rate_deg_h);
 }
 
@@ -30,7 +31,8 @@ gyro::Setup nominal_setup(const scenario::Scenario& scenario) {
     setup.input_rate_deg_h = scenario.input.rate_deg_h;
     for (const effects::Effect* effect : effects::registry()) {
         const auto values = scenario.effects.find(std::string(effect->name()));
-        if (values != scenario.effects.end() && effect->active(values->second)) effect->configure(values->second, setup);
+        if (values != scenario.effects.end() && effect->active(values->second))
+            effect->configure(values->second, setup);
     }
     return setup;
 }
@@ -47,8 +49,10 @@ gyro::Setup draw_setup(const scenario::Scenario& scenario, std::int64_t gyro) {
     setup.initial_phase_rad =
         spread.initial_phase_spread_rad * boost::random::uniform_real_distribution<double>(-0.5, 0.5)(engine);
     setup.dither_asymmetry_ratio += spread.dither_asymmetry_sd_ratio * normal(random::Purpose::dither_asymmetry);
-    setup.lockin_threshold_deg_h *= 1.0 + spread.lockin_threshold_sd_relative * normal(random::Purpose::lockin_threshold);
-    setup.dither_peak_rate_deg_s *= 1.0 + spread.dither_amplitude_sd_relative * normal(random::Purpose::dither_amplitude);
+    setup.lockin_threshold_deg_h *=
+        1.0 + spread.lockin_threshold_sd_relative * normal(random::Purpose::lockin_threshold);
+    setup.dither_peak_rate_deg_s *=
+        1.0 + spread.dither_amplitude_sd_relative * normal(random::Purpose::dither_amplitude);
     return setup;
 }
 

@@ -39,14 +39,14 @@ std::unique_ptr<propagate::Propagator> make_propagator(const scenario::Scenario&
                                                        Kind kind) {
     if (kind == Kind::ideal) return nullptr;
     if (scenario.propagation.method == scenario::PropagationMethod::direct) {
-        return std::make_unique<propagate::DirectIntegrator>(device.coupling, scenario.propagation.direct_tolerance_rad);
+        return std::make_unique<propagate::DirectIntegrator>(device.coupling,
+                                                             scenario.propagation.direct_tolerance_rad);
     }
     const double amplitude = device.dither_amplitude_rad;
     const double margin = dither::Drive::amplitude_margin_rad(injected_rms_rad(scenario, kind));
-    return std::make_unique<propagate::TurnMap>(device.coupling, device.half_cycle(1.0, amplitude),
-                                                device.half_cycle(-1.0, amplitude),
-                                                propagate::TurnMap::Range{amplitude - margin, amplitude + margin},
-                                                scenario.propagation.turn_map_tolerance_rad);
+    return std::make_unique<propagate::TurnMap>(
+        device.coupling, device.half_cycle(1.0, amplitude), device.half_cycle(-1.0, amplitude),
+        propagate::TurnMap::Range{amplitude - margin, amplitude + margin}, scenario.propagation.turn_map_tolerance_rad);
 }
 
 }  // namespace
@@ -134,9 +134,12 @@ struct Listener {
 std::unique_ptr<compensate::Compensator> make_compensator(scenario::Compensator kind, const gyro::Device& device) {
     const compensate::Calibration calibration{device.coupling.b_rad_s};
     switch (kind) {
-        case scenario::Compensator::published: return std::make_unique<compensate::Published>(calibration);
-        case scenario::Compensator::corrected: return std::make_unique<compensate::Corrected>(calibration);
-        case scenario::Compensator::none: break;
+        case scenario::Compensator::published:
+            return std::make_unique<compensate::Published>(calibration);
+        case scenario::Compensator::corrected:
+            return std::make_unique<compensate::Corrected>(calibration);
+        case scenario::Compensator::none:
+            break;
     }
     return nullptr;
 }

@@ -20,9 +20,9 @@ struct GyroRecord {
     gyro::Setup setup;
     /// [arm][sample]: angle output of the gyro with the dither stripped [arcsec], sampled as Schedule says.
     std::vector<std::vector<double>> angle_arcsec;
-    std::int64_t turns = 0;             ///< zero-rate points of the trajectories simulated, without that of `ideal`
-    std::int64_t turns_off_table = 0;   ///< half cycles that the turn map solved outside its tables
-    double turn_map_error_rad = 0.0;    ///< largest interpolation error measured when the tables were made; 0: no tables
+    std::int64_t turns = 0;            ///< zero-rate points of the trajectories simulated, without that of `ideal`
+    std::int64_t turns_off_table = 0;  ///< half cycles that the turn map solved outside its tables
+    double turn_map_error_rad = 0.0;   ///< largest interpolation error measured when the tables were made; 0: no tables
 };
 
 /// Asked now and then; true stops the simulation with Interrupted.

@@ -10,8 +10,8 @@ struct Schedule {
     explicit Schedule(const scenario::Scenario& scenario);
 
     std::int64_t cycles_per_sample;
-    std::int64_t samples;        ///< of one record, the one at time 0 included
-    double sample_interval_s;    ///< cycles_per_sample periods of the nominal dither
+    std::int64_t samples;      ///< of one record, the one at time 0 included
+    double sample_interval_s;  ///< cycles_per_sample periods of the nominal dither
 
     /// Zero-rate points of one trajectory.
     std::int64_t turns() const { return 2 * cycles_per_sample * (samples - 1) + 1; }

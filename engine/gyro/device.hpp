@@ -11,12 +11,12 @@ namespace ringlock::gyro {
 struct Device {
     explicit Device(const Setup& setup);
 
-    double phase_per_arcsec;       ///< C = 2 pi / K [rad/arcsec]
-    Coupling coupling;             ///< b = C Omega_L
-    double dither_amplitude_rad;   ///< half the swing between turns
-    double positive_duration_s;    ///< of a half cycle with positive rate
+    double phase_per_arcsec;      ///< C = 2 pi / K [rad/arcsec]
+    Coupling coupling;            ///< b = C Omega_L
+    double dither_amplitude_rad;  ///< half the swing between turns
+    double positive_duration_s;   ///< of a half cycle with positive rate
     double negative_duration_s;
-    double input_rate_rad_s;       ///< C times the input rate
+    double input_rate_rad_s;  ///< C times the input rate
     double initial_phase_rad;
 
     double period_s() const { return positive_duration_s + negative_duration_s; }

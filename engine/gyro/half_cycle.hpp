@@ -8,10 +8,10 @@ namespace ringlock::gyro {
 /// One half cycle of the dither, from the turn at time 0 to the turn at `duration_s`: the dither angle goes along a
 /// cosine from one turn's angle to the next, so its rate is zero at both ends. All in radians of optical phase.
 struct HalfCycle {
-    double sign = 1.0;            ///< +1: the dither rate is positive (from a minimum to a maximum), -1: negative
-    double amplitude_rad = 0.0;   ///< half the swing
+    double sign = 1.0;           ///< +1: the dither rate is positive (from a minimum to a maximum), -1: negative
+    double amplitude_rad = 0.0;  ///< half the swing
     double duration_s = 0.0;
-    double rate_rad_s = 0.0;      ///< phase rate of the input rotation, constant over the half cycle
+    double rate_rad_s = 0.0;  ///< phase rate of the input rotation, constant over the half cycle
 
     double angular_frequency_rad_s() const { return units::pi / duration_s; }
     /// Phase acceleration at either end [rad/s^2], a magnitude.

@@ -10,7 +10,8 @@ namespace ringlock::gyro {
 
 /// Taylor series in time of the solution of the equation of motion
 ///
-///     psi' = g(t) + b sin(psi + e),   g(t) = rate + sign A w sin(w t),   w = pi / duration       (Gao & Deng 2007, eq. 1)
+///     psi' = g(t) + b sin(psi + e),   g(t) = rate + sign A w sin(w t),   w = pi / duration       (Gao & Deng 2007, eq.
+///     1)
 ///
 /// around a point (t, psi). With S = sin(psi + e) and Q = cos(psi + e) the coefficients follow from
 /// S' = Q psi', Q' = -S psi':
@@ -81,9 +82,11 @@ class PhaseSeries {
         return sum / (scale_s_ * scale_s_);
     }
 
-    /// Longest step [s] whose last two terms stay below `tolerance_rad` (Jorba & Zou 2005, Experimental Mathematics 14).
+    /// Longest step [s] whose last two terms stay below `tolerance_rad` (Jorba & Zou 2005, Experimental Mathematics
+    /// 14).
     double step_s(double tolerance_rad) const {
-        const double last = std::pow(tolerance_rad / (std::abs(psi_[Order]) + 1e-300), 1.0 / static_cast<double>(Order));
+        const double last =
+            std::pow(tolerance_rad / (std::abs(psi_[Order]) + 1e-300), 1.0 / static_cast<double>(Order));
         const double before =
             std::pow(tolerance_rad / (std::abs(psi_[Order - 1]) + 1e-300), 1.0 / static_cast<double>(Order - 1));
         return scale_s_ * std::min(last, before);
@@ -92,10 +95,18 @@ class PhaseSeries {
    private:
     void set_sine_derivative(std::size_t n, double sin_wt, double cos_wt) {
         switch (n % 4) {  // n-th derivative of sine
-            case 0: sine_ = sin_wt; break;
-            case 1: sine_ = cos_wt; break;
-            case 2: sine_ = -sin_wt; break;
-            default: sine_ = -cos_wt; break;
+            case 0:
+                sine_ = sin_wt;
+                break;
+            case 1:
+                sine_ = cos_wt;
+                break;
+            case 2:
+                sine_ = -sin_wt;
+                break;
+            default:
+                sine_ = -cos_wt;
+                break;
         }
     }
 

@@ -3,7 +3,8 @@
 /// The device: what one gyro is, in the units of the edges.
 namespace ringlock::gyro {
 
-/// Errors of the quadrature detectors: sin = (1 + gain) sin(psi) + offset_sin, cos = cos(psi + orthogonality_rad) + offset_cos.
+/// Errors of the quadrature detectors: sin = (1 + gain) sin(psi) + offset_sin, cos = cos(psi + orthogonality_rad) +
+/// offset_cos.
 struct Ellipse {
     double gain = 0.0;
     double offset_sin = 0.0;
@@ -17,10 +18,10 @@ struct Setup {
     double lockin_threshold_deg_h = 300.0;  ///< Omega_L
     double coupling_phase_rad = 0.0;        ///< the coupling acts on sin(psi + coupling_phase_rad)
     double dither_frequency_hz = 0.0;
-    double dither_peak_rate_deg_s = 0.0;    ///< mean of the peak rates of positive and negative half cycles
-    double dither_asymmetry_ratio = 0.0;    ///< positive half cycles stronger by it, and shorter
+    double dither_peak_rate_deg_s = 0.0;  ///< mean of the peak rates of positive and negative half cycles
+    double dither_asymmetry_ratio = 0.0;  ///< positive half cycles stronger by it, and shorter
     double input_rate_deg_h = 0.0;
-    double initial_phase_rad = 0.0;         ///< optical phase at the first turn
+    double initial_phase_rad = 0.0;  ///< optical phase at the first turn
     Ellipse ellipse;
 };
 

@@ -31,9 +31,10 @@ double DirectIntegrator::lockin_gain_rad(double phase_rad, const gyro::HalfCycle
             const Series series(half, coupling_, t, phase.remainder_rad, scale);
             double h = series.step_s(per_step);
             if (!(h > shortest)) {
-                throw RunError(fmt::format("direct integrator: the step fell below {:.3g} s at a tolerance of {:.3g} rad; "
-                                           "raise propagation.direct_tolerance_rad",
-                                           shortest, tolerance_rad_));
+                throw RunError(
+                    fmt::format("direct integrator: the step fell below {:.3g} s at a tolerance of {:.3g} rad; "
+                                "raise propagation.direct_tolerance_rad",
+                                shortest, tolerance_rad_));
             }
             // The step actually taken is the difference of two representable times: a time that is off by half a unit
             // in its last place is worth 1e-12 rad at full rate.

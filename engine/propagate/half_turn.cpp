@@ -129,9 +129,10 @@ bool has_fast_middle(const gyro::HalfCycle& half) { return choose_fast_from_s(ha
 HalfTurn exact_half_turn(const gyro::HalfCycle& half, double b_rad_s) {
     const double start = choose_fast_from_s(half);
     if (!(start == start)) {
-        throw RunError(fmt::format("turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s has no fast middle; "
-                                   "use propagation.method = \"direct\"",
-                                   half.amplitude_rad / units::pi, half.rate_rad_s));
+        throw RunError(
+            fmt::format("turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s has no fast middle; "
+                        "use propagation.method = \"direct\"",
+                        half.amplitude_rad / units::pi, half.rate_rad_s));
     }
     const double middle = 0.5 * half.duration_s;
     const auto [x, y] = flow(half, b_rad_s, start);

@@ -46,9 +46,10 @@ HalfTurnTable::HalfTurnTable(const gyro::HalfCycle& half, double b_rad_s, double
         }
         if (2.0 * measured_error_rad_ <= tolerance_rad) return;  // two half turns to a turn
     }
-    throw RunError(fmt::format("turn map: {} nodes over amplitudes {:.6g} to {:.6g} rad leave an error of {:.3g} rad, above "
-                               "{:.3g}; raise propagation.turn_map_tolerance_rad or narrow the spread of amplitudes",
-                               most_nodes, lowest_rad_, highest_rad_, measured_error_rad_, tolerance_rad));
+    throw RunError(
+        fmt::format("turn map: {} nodes over amplitudes {:.6g} to {:.6g} rad leave an error of {:.3g} rad, above "
+                    "{:.3g}; raise propagation.turn_map_tolerance_rad or narrow the spread of amplitudes",
+                    most_nodes, lowest_rad_, highest_rad_, measured_error_rad_, tolerance_rad));
 }
 
 void HalfTurnTable::fit(const gyro::HalfCycle& half, double b_rad_s, std::size_t nodes) {
@@ -88,8 +89,9 @@ TurnMap::TurnMap(gyro::Coupling coupling, const gyro::HalfCycle& positive, const
     : coupling_(coupling),
       positive_{positive.duration_s, positive.rate_rad_s,
                 HalfTurnTable(upright(positive), coupling.b_rad_s, range.lowest_rad, range.highest_rad, tolerance_rad)},
-      negative_{negative.duration_s, negative.rate_rad_s,
-                HalfTurnTable(upright(negative), coupling.b_rad_s, range.lowest_rad, range.highest_rad, tolerance_rad)} {}
+      negative_{
+          negative.duration_s, negative.rate_rad_s,
+          HalfTurnTable(upright(negative), coupling.b_rad_s, range.lowest_rad, range.highest_rad, tolerance_rad)} {}
 
 double TurnMap::lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half, double mid_step_rad) {
     if (half.amplitude_rad == 0.0) return without_dither_rad(phase_rad, half, mid_step_rad);

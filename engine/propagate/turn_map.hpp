@@ -62,7 +62,8 @@ class TurnMap final : public Propagator {
     };
 
     double without_dither_rad(double phase_rad, const gyro::HalfCycle& half, double mid_step_rad) const;
-    /// A step of the phase psi in the middle, seen from the fast frame: what it adds to the frame's phase beyond itself.
+    /// A step of the phase psi in the middle, seen from the fast frame: what it adds to the frame's phase beyond
+    /// itself.
     double step_in_frame_rad(const gyro::HalfCycle& half, double gained_rad, double step_rad) const;
 
     gyro::Coupling coupling_;

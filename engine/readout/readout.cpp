@@ -14,8 +14,7 @@ Readout::Readout(const Electronics& electronics, random::Identity who) : electro
     }
 }
 
-ReadTurn Readout::read(const TurnPath& path, const Phase& phase, std::int64_t turn, double turn_time_s,
-                       int direction) {
+ReadTurn Readout::read(const TurnPath& path, const Phase& phase, std::int64_t turn, double turn_time_s, int direction) {
     Phase truth;
     truth.fringes = phase.fringes;
     truth.add(path.zero_rate_phase_rad());
@@ -83,7 +82,8 @@ double Readout::tick(double turn_time_s, double offset_s) const {
 }
 
 Phase joined_phase(const Reading& reading) {
-    const std::int64_t fringe = reading.quarter_count >= 0 ? reading.quarter_count / 4 : -((3 - reading.quarter_count) / 4);
+    const std::int64_t fringe =
+        reading.quarter_count >= 0 ? reading.quarter_count / 4 : -((3 - reading.quarter_count) / 4);
     const double middle = (static_cast<double>(reading.quarter_count - 4 * fringe) + 0.5) * quarter_rad;
     const double wrapped = std::atan2(reading.sin, reading.cos);
     Phase phase;

@@ -12,10 +12,10 @@ namespace ringlock::readout {
 
 /// Properties of the electronics.
 struct Electronics {
-    bool ideal = false;                      ///< exact phase, time and acceleration at every zero-rate point
-    bool interpolate = true;                 ///< angle from count and quadrature; otherwise whole quarter fringes
-    double clock_hz = 0.0;                   ///< times are whole ticks; 0: continuous
-    double detector_noise_relative = 0.0;    ///< rms of each detector sample over the fringe amplitude
+    bool ideal = false;                    ///< exact phase, time and acceleration at every zero-rate point
+    bool interpolate = true;               ///< angle from count and quadrature; otherwise whole quarter fringes
+    double clock_hz = 0.0;                 ///< times are whole ticks; 0: continuous
+    double detector_noise_relative = 0.0;  ///< rms of each detector sample over the fringe amplitude
     gyro::Ellipse ellipse;
 };
 

@@ -16,7 +16,8 @@ constexpr double extremum_tolerance_rad = 1e-14;
 constexpr double pulse_tolerance_rad = 1e-10;
 constexpr int most_steps = 2000;
 
-/// Root of `value` with slope `slope` between 0 and `end`, where `value` changes sign: Newton, kept inside by bisection.
+/// Root of `value` with slope `slope` between 0 and `end`, where `value` changes sign: Newton, kept inside by
+/// bisection.
 template <class Value, class Slope>
 double root(Value value, Slope slope, double guess, double end) {
     double low = 0.0;

@@ -32,8 +32,8 @@ class TurnPath {
     /// Half cycle and time in it that hold at `time_s` when going towards `side`.
     struct Place {
         const gyro::HalfCycle* half;
-        double t_s;       ///< within the half cycle
-        double limit_s;   ///< how far the half cycle goes on in that direction
+        double t_s;      ///< within the half cycle
+        double limit_s;  ///< how far the half cycle goes on in that direction
     };
     Place place(double time_s, int side) const;
 

@@ -95,15 +95,21 @@ int main() {
     const gyro::Device device(ensemble::nominal_setup(scenario));
     const double a = device.dither_amplitude_rad;
     const double margin = dither::Drive::amplitude_margin_rad(3.0);
-    const auto map = std::make_shared<propagate::TurnMap>(device.coupling, device.half_cycle(1.0, a), device.half_cycle(-1.0, a),
-                                                          propagate::TurnMap::Range{a - margin, a + margin}, 1e-8);
+    const auto map =
+        std::make_shared<propagate::TurnMap>(device.coupling, device.half_cycle(1.0, a), device.half_cycle(-1.0, a),
+                                             propagate::TurnMap::Range{a - margin, a + margin}, 1e-8);
     scenario::Scenario ideal = scenario;
     ideal.readout.model = scenario::ReadoutModel::ideal;
 
     std::vector<Entry> entries;
-    entries.push_back({"direct integrator, 1e-8 rad", 60,
-                       through(std::make_shared<propagate::DirectIntegrator>(device.coupling, 1e-8), device), {}});
-    entries.push_back({"Boost.odeint Fehlberg 7(8), 1e-8 rad", 60, through(std::make_shared<Odeint>(device.coupling, 1e-8), device), {}});
+    entries.push_back({"direct integrator, 1e-8 rad",
+                       60,
+                       through(std::make_shared<propagate::DirectIntegrator>(device.coupling, 1e-8), device),
+                       {}});
+    entries.push_back({"Boost.odeint Fehlberg 7(8), 1e-8 rad",
+                       60,
+                       through(std::make_shared<Odeint>(device.coupling, 1e-8), device),
+                       {}});
     entries.push_back({"turn map, 1e-8 rad", 1000000, through(map, device), {}});
     entries.push_back({"turn map, ideal readout, corrected", 300000, read_and_corrected(ideal), {}});
     entries.push_back({"turn map, instrument readout, corrected", 60000, read_and_corrected(scenario), {}});
@@ -126,10 +132,12 @@ int main() {
                          {"turns per second", report::Align::right},
                          {"over the direct integrator", report::Align::right}});
     for (const Entry& entry : entries) {
-        table.add_row({entry.name, fmt::format("{:.4g}", median(entry) * 1e6), fmt::format("{:.3g}", 1.0 / median(entry)),
+        table.add_row({entry.name, fmt::format("{:.4g}", median(entry) * 1e6),
+                       fmt::format("{:.3g}", 1.0 / median(entry)),
                        fmt::format("{:.4g}", median(entries.front()) / median(entry))});
     }
     fmt::print("{}", table.text());
-    fmt::print("Median of {} rounds, one thread, noise-injected dither of Gao & Deng's device. (checksum {:.6f})\n", rounds, sink);
+    fmt::print("Median of {} rounds, one thread, noise-injected dither of Gao & Deng's device. (checksum {:.6f})\n",
+               rounds, sink);
     return 0;
 }

@@ -1,14 +1,13 @@
 // What the compensators take away, and what they leave.
 #include "engine/compensate/first_order.hpp"
-
 #include "engine/ensemble/gyro_run.hpp"
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
 namespace {
 
-/// Standard deviations [rad] of the lock-in error gained over blocks of cycles, before and after compensation. The error
-/// of the reading at the ends of a block, which does not add up, is left out.
+/// Standard deviations [rad] of the lock-in error gained over blocks of cycles, before and after compensation. The
+/// error of the reading at the ends of a block, which does not add up, is left out.
 struct Spread {
     double raw = 0.0;
     double compensated = 0.0;

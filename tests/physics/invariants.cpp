@@ -39,7 +39,8 @@ TEST_P(Invariants, WithoutDitherTheMeanRateIsAdlers) {
             const gyro::Device device(paper_device());
             const double a = device.dither_amplitude_rad;
             propagator = std::make_unique<propagate::TurnMap>(gyro::Coupling{b, 0.4}, device.half_cycle(1.0, a),
-                                                              device.half_cycle(-1.0, a), propagate::TurnMap::Range{a, a}, 1e-10);
+                                                              device.half_cycle(-1.0, a),
+                                                              propagate::TurnMap::Range{a, a}, 1e-10);
         }
         Phase phase(0.3);
         const int intervals = 40;

@@ -26,7 +26,8 @@ double worst_difference(int half_cycles, double rate_deg_h, std::uint64_t seed) 
         const auto half = device.half_cycle(i % 2 == 0 ? 1.0 : -1.0, device.dither_amplitude_rad * uniform(0.95, 1.05));
         const double phase = uniform(-3.14, 3.14);
         const double step = i % 3 == 0 ? 0.0 : uniform(-3.0, 3.0);
-        worst = std::max(worst, std::abs(direct->lockin_gain_rad(phase, half, step) - map->lockin_gain_rad(phase, half, step)));
+        worst = std::max(
+            worst, std::abs(direct->lockin_gain_rad(phase, half, step) - map->lockin_gain_rad(phase, half, step)));
     }
     return worst;
 }
@@ -56,12 +57,37 @@ TEST(Propagators, DirectIntegratorAgreesWithAnIndependentIntegrator) {
         boost::numeric::odeint::integrate_adaptive(
             boost::numeric::odeint::make_controlled<Stepper>(1e-13, 1e-13),
             [&](const double& x, double& rate, double t) {
-                rate = device.coupling.b_rad_s *
-                       std::sin(phase + half.plain_phase_rad(t) + x + device.coupling.phase_rad);
+                rate =
+                    device.coupling.b_rad_s * std::sin(phase + half.plain_phase_rad(t) + x + device.coupling.phase_rad);
             },
             deviation, 0.0, half.duration_s, 1e-8);
         propagate::DirectIntegrator direct(device.coupling, 1e-13);
         EXPECT_NEAR(direct.lockin_gain_rad(phase, half, 0.0), deviation, 2e-9);
+    }
+}
+
+TEST(Propagators, TheErrorIsTheIntegralOfTheSineOfTheMeasuredPhase) {
+    // error(t) = b int sin(psi) dt: the phase itself is integrated, by Boost.odeint, and the integral kept beside it.
+    Uniform uniform(22);
+    for (int i = 0; i < 4; ++i) {
+        gyro::Setup setup = paper_device();
+        setup.input_rate_deg_h = uniform(-1000.0, 1000.0);
+        const gyro::Device device(setup);
+        const auto half = device.half_cycle(i % 2 == 0 ? 1.0 : -1.0, device.dither_amplitude_rad);
+        using State = std::array<double, 2>;
+        State state{uniform(-3.0, 3.0), 0.0};
+        const double start = state[0];
+        using Stepper = boost::numeric::odeint::runge_kutta_fehlberg78<State>;
+        boost::numeric::odeint::integrate_adaptive(
+            boost::numeric::odeint::make_controlled<Stepper>(1e-13, 1e-13),
+            [&](const State& x, State& rate, double t) {
+                rate[1] = device.coupling.b_rad_s * std::sin(x[0]);
+                rate[0] = half.drive_rate_rad_s(t) + rate[1];
+            },
+            state, 0.0, half.duration_s, 1e-8);
+        for (const Method method : {Method::turn_map, Method::direct}) {
+            EXPECT_NEAR(make_propagator(method, device)->lockin_gain_rad(start, half, 0.0), state[1], 1e-7);
+        }
     }
 }
 
@@ -117,9 +143,10 @@ TEST(Propagators, TheSlowSolutionSolvesTheRiccatiEquation) {
     for (const double t : {3e-4, 5e-4, 1e-3, 2e-3}) {
         const double h = 1e-3 * t;
         const auto k = propagate::slow_solution(half, b, t);
-        const auto slope = (propagate::slow_solution(half, b, t - 2.0 * h) - 8.0 * propagate::slow_solution(half, b, t - h) +
-                            8.0 * propagate::slow_solution(half, b, t + h) - propagate::slow_solution(half, b, t + 2.0 * h)) /
-                           (12.0 * h);
+        const auto slope =
+            (propagate::slow_solution(half, b, t - 2.0 * h) - 8.0 * propagate::slow_solution(half, b, t - h) +
+             8.0 * propagate::slow_solution(half, b, t + h) - propagate::slow_solution(half, b, t + 2.0 * h)) /
+            (12.0 * h);
         const double g = half.drive_rate_rad_s(t);
         const auto right = 0.5 * b * (1.0 + k * k) / g - std::complex<double>(0.0, 1.0) * slope / g;
         EXPECT_LT(std::abs(k - right), 1e-11 * std::abs(k)) << "t = " << t;

@@ -39,7 +39,8 @@ struct Scene {
         boost::numeric::odeint::integrate_adaptive(
             boost::numeric::odeint::make_controlled<Stepper>(1e-14, 1e-14),
             [&](const double& x, double& rate, double t) {
-                const double drive = time_s > 0.0 ? after.drive_rate_rad_s(t) : before.drive_rate_rad_s(before.duration_s + t);
+                const double drive =
+                    time_s > 0.0 ? after.drive_rate_rad_s(t) : before.drive_rate_rad_s(before.duration_s + t);
                 rate = drive + device.coupling.b_rad_s * std::sin(x + device.coupling.phase_rad);
             },
             psi, 0.0, time_s, 1e-8 * (time_s > 0.0 ? 1.0 : -1.0));

@@ -1,0 +1,137 @@
+// Whole studies: what the scenarios say in their first lines, and what may not be claimed.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "analysis/study/summary.hpp"
+#include "engine/scenario/parse.hpp"
+
+namespace ringlock::test {
+namespace {
+
+scenario::Scenario from_file(const std::string& name) {
+    return scenario::parse_file(std::filesystem::path(RINGLOCK_SOURCE_DIR) / "scenarios" / name);
+}
+
+study::Summary run(const scenario::Scenario& scenario) {
+    return study::summarise(study::run(scenario, 2, {}, nullptr));
+}
+
+const study::ArmSummary& arm(const study::Summary& summary, const std::string& name) {
+    for (const study::ArmSummary& each : summary.arms) {
+        if (each.name == name) return each;
+    }
+    throw std::runtime_error("no arm " + name);
+}
+
+TEST(Scenarios, AllAreValid) {
+    int found = 0;
+    for (const auto& entry :
+         std::filesystem::directory_iterator(std::filesystem::path(RINGLOCK_SOURCE_DIR) / "scenarios")) {
+        if (entry.path().extension() != ".toml") continue;
+        EXPECT_NO_THROW(scenario::parse_file(entry.path())) << entry.path();
+        ++found;
+    }
+    EXPECT_GE(found, 2);
+}
+
+/// The answer of gao-deng-2007.toml, for an ensemble of that duration.
+void expect_answer_of_gao_deng(double duration_s) {
+    scenario::Scenario scenario = from_file("gao-deng-2007.toml");
+    scenario.ensemble.duration_s = duration_s;
+    const study::Summary summary = run(scenario);
+    EXPECT_NEAR(summary.theory.arw_deg_rt_h, 0.0022506, 5e-8);
+    EXPECT_NEAR(summary.theory.dead_band_deg_h, 2.632, 5e-4);
+    const study::Figure& injected = arm(summary, "noise_injected").arw_deg_rt_h;
+    const study::Figure& published = arm(summary, "noise_injected+compensated_published").arw_deg_rt_h;
+    const study::Figure& corrected = arm(summary, "noise_injected+compensated").arw_deg_rt_h;
+    ASSERT_TRUE(injected.median && published.median && corrected.median);
+    EXPECT_LE(*injected.median_lo, summary.theory.arw_deg_rt_h);
+    EXPECT_GE(*injected.median_hi, summary.theory.arw_deg_rt_h);
+    EXPECT_LT(*injected.median_hi - *injected.median_lo, 0.1 * *injected.median);
+    EXPECT_NEAR(*published.median / *injected.median, 1.0, 0.01);
+    // The readout's 0.5 % of detector noise is what is left.
+    EXPECT_NEAR(*corrected.median / *injected.median, 0.005, 0.0007);
+    for (const study::ArmSummary& each : summary.arms) EXPECT_FALSE(each.bias_instability_deg_h) << each.name;
+    EXPECT_FALSE(arm(summary, "uncompensated").arw_deg_rt_h.median);
+}
+
+TEST(Scenarios, GaoDeng2007ShortensToItsAnswer) { expect_answer_of_gao_deng(60.0); }
+TEST(LongScenarios, GaoDeng2007) { expect_answer_of_gao_deng(600.0); }
+
+TEST(Scenarios, DeadBandEndsWhereItSays) {
+    scenario::Scenario scenario = from_file("dead-band.toml");
+    EXPECT_EQ(scenario.input.rate_deg_h, 0.0);
+    EXPECT_EQ(scenario.input.sweep_stop_deg_h, 5.0);
+    EXPECT_EQ(scenario.ensemble.dither_amplitude_sd_relative, 0.0);
+    // The same study where it matters.
+    scenario.input.rate_deg_h = 2.5;
+    scenario.input.sweep_stop_deg_h = 2.8;
+    scenario.input.sweep_points = 16;
+    const study::Summary summary = run(scenario);
+    const auto edge = study::locked_up_to_deg_h(arm(summary, "uncompensated"));
+    ASSERT_TRUE(edge);
+    EXPECT_NEAR(*edge, 2.64, 1e-9);
+    EXPECT_FALSE(study::locked_up_to_deg_h(arm(summary, "compensated")));
+    EXPECT_FALSE(study::locked_up_to_deg_h(arm(summary, "ideal")));
+    for (const study::SweepPoint& point : arm(summary, "compensated").sweep) {
+        EXPECT_NEAR(point.output_rate_deg_h.mean, point.input_rate_deg_h, 2e-3);
+    }
+}
+
+TEST(Claims, NoBiasInstabilityWithoutFlickerHoweverWellTheTurnsAreRandomised) {
+    for (const double rms : {0.3, 1.0, 1.5, 2.1, 3.0}) {
+        scenario::Scenario scenario;
+        scenario.noise_injection.turn_phase_rms_rad = rms;
+        scenario.ensemble.gyros = 8;
+        scenario.ensemble.duration_s = 120.0;
+        const study::Summary summary = run(scenario);
+        for (const study::ArmSummary& each : summary.arms) {
+            EXPECT_FALSE(each.bias_instability_deg_h) << each.name << " at " << rms << " rad";
+            EXPECT_EQ(each.arw_deg_rt_h.median.has_value() || each.arw_deg_rt_h.hi.has_value(), each.noise_injected);
+        }
+    }
+}
+
+TEST(Claims, BiasInstabilityIsFoundWhereThereIsFlicker) {
+    scenario::Scenario scenario;
+    scenario.effects["bias_instability"]["deg_h"] = 0.05;
+    scenario.arms = {"ideal", "noise_injected+compensated"};
+    scenario.ensemble.gyros = 16;
+    scenario.ensemble.duration_s = 400.0;
+    const study::Summary summary = run(scenario);
+    for (const study::ArmSummary& each : summary.arms) {
+        ASSERT_TRUE(each.bias_instability_deg_h) << each.name;
+        EXPECT_NEAR(*each.bias_instability_deg_h->median, 0.05, 0.01) << each.name;
+    }
+}
+
+TEST(Claims, TheQuantumNoiseFloorIsWhatACorrectedGyroIsLeftWith) {
+    scenario::Scenario scenario;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 3e-4;
+    scenario.readout.model = scenario::ReadoutModel::ideal;
+    scenario.arms = {"noise_injected+compensated"};
+    scenario.ensemble.gyros = 16;
+    scenario.ensemble.duration_s = 200.0;
+    const study::Figure& arw = run(scenario).arms.at(0).arw_deg_rt_h;
+    ASSERT_TRUE(arw.median);
+    EXPECT_NEAR(*arw.median, 3e-4, 0.05 * 3e-4);
+}
+
+TEST(Claims, AGyroWithoutLockInHasNoRandomWalkOnlyALimit) {
+    scenario::Scenario scenario;
+    scenario.gyro.lockin_threshold_deg_h = 0.0;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    scenario.readout.model = scenario::ReadoutModel::ideal;
+    scenario.arms = {"noise_injected"};
+    scenario.ensemble.gyros = 4;
+    scenario.ensemble.duration_s = 60.0;
+    const study::Figure arw = run(scenario).arms.at(0).arw_deg_rt_h;
+    EXPECT_FALSE(arw.median);
+    ASSERT_TRUE(arw.hi);
+    EXPECT_LT(*arw.hi, 1e-9);
+}
+
+}  // namespace
+}  // namespace ringlock::test
