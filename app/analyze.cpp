@@ -24,6 +24,7 @@ void add_analyze(CLI::App& root) {
     command->add_option("--plot", arguments->plot, "also draw the figure into this SVG file");
     command->add_flag("--json", arguments->json, "print one JSON object instead of a table");
     command->callback([arguments] {
+        check_figure(arguments->plot);
         const study::Study study = study::read_result(arguments->file);
         const store::Provenance provenance = study::read_provenance(arguments->file);
         const study::Summary summary = study::summarise(study);

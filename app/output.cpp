@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <system_error>
 
+#include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::app {
@@ -19,6 +20,14 @@ void put(std::string_view text) {
 
 void tell(std::string_view text) {
     if (std::fwrite(text.data(), 1, text.size(), stderr) != text.size()) std::clearerr(stderr);
+}
+
+void check_figure(const std::filesystem::path& path) {
+    if (path.empty()) return;
+    if (path.extension() != ".svg") {
+        throw InputError(fmt::format("--plot {}: the name of a figure must end in .svg", path.string()));
+    }
+    const AtomicPath probe(path);
 }
 
 void hold_standard_streams() {

@@ -1,4 +1,5 @@
 #pragma once
+#include <filesystem>
 #include <string_view>
 
 namespace ringlock::app {
@@ -9,6 +10,10 @@ void put(std::string_view text);
 
 /// Writes to standard error what people may want to know. What nobody can read changes nothing about the run.
 void tell(std::string_view text);
+
+/// Finds out before a run, not after it, that the figure of --plot cannot be written; no name is none. It must end in
+/// .svg: a figure replaces the file it finds, which had better not be the scenario or the result. Throws InputError.
+void check_figure(const std::filesystem::path& path);
 
 /// Opens standard streams that the caller has closed (on nothing), so that no file of ours gets their numbers and what
 /// is told ends up in it.

@@ -22,7 +22,6 @@
 #include "app/command.hpp"
 #include "app/output.hpp"
 #include "app/study_output.hpp"
-#include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/ensemble/draw.hpp"
@@ -98,8 +97,7 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     const std::filesystem::path out =
         arguments.out ? std::filesystem::path(*arguments.out)
                       : std::filesystem::path(arguments.scenario).filename().replace_extension(".h5");
-    // A figure that cannot be written is better found out now than after the run.
-    if (!arguments.plot.empty()) const AtomicPath probe(arguments.plot);
+    check_figure(arguments.plot);
 
     store::Provenance provenance = store::collect_provenance(command_line, threads, arguments.scenario);
     const auto start = std::chrono::steady_clock::now();

@@ -119,6 +119,9 @@ TEST_F(RunCommand, OutputsThatCannotBeWrittenAreRefusedBeforeTheRun) {
     expect_refused({"run", "s.toml", "-o", std::string(300, 'x')}, HasSubstr("File name too long"));
     expect_refused({"run", "s.toml", "-o", "/dev/null"}, HasSubstr("no regular file"));
     expect_refused({"run", "s.toml", "-o", "out.h5", "--plot", "missing/out.svg"}, HasSubstr("missing/out.svg"));
+    expect_refused({"run", "s.toml", "-o", "out.h5", "--plot", "s.toml"}, HasSubstr("must end in .svg"));
+    expect_refused({"analyze", "out.h5", "--plot", "out.h5"}, HasSubstr("must end in .svg"));
+    EXPECT_EQ(read("s.toml"), small_scenario);
     if (geteuid() != 0) {
         std::filesystem::create_directory(directory_ / "closed");
         std::filesystem::permissions(directory_ / "closed", std::filesystem::perms::owner_read);
