@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "app/command.hpp"
+#include "app/output.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/core/version.hpp"
@@ -21,7 +22,7 @@ constexpr int run_failed = 1;
 constexpr int input_wrong = 2;
 
 int complain(int status, std::string_view what) {
-    fmt::print(stderr, "ringlock: error: {}\n", what);
+    ringlock::app::tell(fmt::format("ringlock: error: {}\n", what));
     return status;
 }
 
@@ -41,6 +42,7 @@ void refuse_unknown_command(const CLI::App& root, int argc, char** argv) {
 
 int main(int argc, char** argv) {
     namespace app = ringlock::app;
+    app::hold_standard_streams();
     CLI::App root{
         "ringlock: which cure for the lock-in of a dithered ring laser gyro, when and how well.\n"
         "Simulates ensembles of dithered gyros, compares uncompensated, noise-injected and compensated outputs, and\n"
@@ -70,7 +72,7 @@ int main(int argc, char** argv) {
     } catch (const ringlock::RunError& error) {
         return complain(run_failed, error.what());
     } catch (const ringlock::Interrupted&) {
-        fmt::print(stderr, "ringlock: interrupted, nothing written\n");
+        app::tell("ringlock: interrupted, nothing written\n");
     } catch (const std::bad_alloc&) {
         return complain(run_failed, "out of memory; run fewer gyros at a time, or store fewer samples");
     } catch (const std::exception& error) {

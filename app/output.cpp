@@ -1,6 +1,8 @@
 #include "app/output.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
@@ -13,6 +15,19 @@ namespace ringlock::app {
 void put(std::string_view text) {
     if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0) return;
     throw RunError(fmt::format("standard output cannot be written: {}", std::generic_category().message(errno)));
+}
+
+void tell(std::string_view text) {
+    if (std::fwrite(text.data(), 1, text.size(), stderr) != text.size()) std::clearerr(stderr);
+}
+
+void hold_standard_streams() {
+    // The lowest number that is free is given. Standard output is opened for reading, so that writing to it fails.
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+        if (fcntl(stream, F_GETFD) < 0 && errno == EBADF) {
+            static_cast<void>(open("/dev/null", stream == STDERR_FILENO ? O_WRONLY : O_RDONLY));
+        }
+    }
 }
 
 }  // namespace ringlock::app

@@ -7,4 +7,11 @@ namespace ringlock::app {
 /// nobody can read are no success.
 void put(std::string_view text);
 
+/// Writes to standard error what people may want to know. What nobody can read changes nothing about the run.
+void tell(std::string_view text);
+
+/// Opens standard streams that the caller has closed (on nothing), so that no file of ours gets their numbers and what
+/// is told ends up in it.
+void hold_standard_streams();
+
 }  // namespace ringlock::app

@@ -106,10 +106,10 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     study::ResultWriter writer(out, plan);
     const std::int64_t gyros = ensemble::total_gyros(scenario);
     if (!arguments.quiet) {
-        fmt::print(stderr, "{}: {} gyros x {:.6g} s, {} arms, {} threads; the result will take about {:.1f} MB\n",
-                   arguments.scenario, gyros,
-                   plan.schedule.sample_interval_s * static_cast<double>(plan.schedule.samples - 1),
-                   scenario.arms.size(), threads, static_cast<double>(study::expected_size_bytes(plan)) * 1e-6);
+        const double duration_s = plan.schedule.sample_interval_s * static_cast<double>(plan.schedule.samples - 1);
+        tell(fmt::format("{}: {} gyros x {:.6g} s, {} arms, {} threads; the result will take about {:.1f} MB\n",
+                         arguments.scenario, gyros, duration_s, scenario.arms.size(), threads,
+                         static_cast<double>(study::expected_size_bytes(plan)) * 1e-6));
     }
     ensemble::Progress progress(gyros, {.quiet = arguments.quiet});
     study::Observer observer;
@@ -124,7 +124,7 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     writer.finish(study, summary, provenance);
     if (!arguments.plot.empty()) report::write_svg(arguments.plot, study_figure(study, summary));
     put(arguments.json ? study_json(study, summary, provenance) : study_text(study, summary, provenance));
-    if (!arguments.quiet) fmt::print(stderr, "result: {}\n", writer.path().string());
+    if (!arguments.quiet) tell(fmt::format("result: {}\n", writer.path().string()));
 }
 
 }  // namespace

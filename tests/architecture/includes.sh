@@ -110,9 +110,11 @@ for file in "${sources[@]}"; do
         fi
         room_of "$target"
         allowed "$from" "$room" || complain "$file:$line: $from must not include $room ($target)"
-        # A source's own header is its first include and has its name; the two stand in one folder. Tests have none.
+        # A source's own header is its first include and has its name; the two stand in one folder. Tests have none, and
+        # a command may be called as the room it serves.
         name="${target##*/}"
-        if [[ $first == yes && $from != tests && $file == *.cpp && ${name%.hpp} == "$stem" && $target != "${file%.cpp}.hpp" ]]; then
+        if [[ $first == yes && $from != tests && $file == *.cpp && ${name%.hpp} == "$stem" &&
+            ${target%%/*} == "${file%%/*}" && $target != "${file%.cpp}.hpp" ]]; then
             complain "$file:$line: its header $target is not beside it"
         fi
         first=no
