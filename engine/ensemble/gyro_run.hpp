@@ -27,8 +27,9 @@ struct GyroRecord {
 
 /// What a simulation tells while it runs, and asks; both may be empty, and are called from any thread.
 struct Monitor {
-    std::function<bool()> cancelled;              ///< true stops the simulation with Interrupted
-    std::function<void(std::int64_t)> on_turns;   ///< so many turns more are done, of those that GyroRecord::turns counts
+    std::function<bool()> cancelled;  ///< true stops the simulation with Interrupted
+    std::function<void(std::int64_t)>
+        on_turns;  ///< so many turns more are done, of those that GyroRecord::turns counts
 };
 
 /// Turns that the whole ensemble will count.

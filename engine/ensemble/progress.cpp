@@ -75,9 +75,10 @@ void Progress::finish() {
 }
 
 double Progress::share_done() const {
-    const double share = options_.total_turns > 0 ? static_cast<double>(turns_) / static_cast<double>(options_.total_turns)
-                         : total_ > 0             ? static_cast<double>(gyros_) / static_cast<double>(total_)
-                                                  : 1.0;
+    const double share = options_.total_turns > 0
+                             ? static_cast<double>(turns_) / static_cast<double>(options_.total_turns)
+                         : total_ > 0 ? static_cast<double>(gyros_) / static_cast<double>(total_)
+                                      : 1.0;
     return std::clamp(share, 0.0, 1.0);
 }
 
@@ -85,8 +86,7 @@ void Progress::show(Time now, bool last) {
     const double elapsed = Seconds(now - start_).count();
     const double done = share_done();
     // Cut off, not rounded: 100 % means that all is done.
-    std::string status =
-        fmt::format("{:3} %  {}/{} gyros", static_cast<int>(100.0 * done), gyros_, total_);
+    std::string status = fmt::format("{:3} %  {}/{} gyros", static_cast<int>(100.0 * done), gyros_, total_);
     if (elapsed > 0.0) status += fmt::format("  {:.3g} turns/s", static_cast<double>(turns_) / elapsed);
     if (last) {
         status += "  in " + duration(elapsed);

@@ -15,13 +15,14 @@ struct Spread {
 
 template <class MakeCompensator>
 Spread spread(const scenario::Scenario& scenario, int gyros, int blocks, int block, MakeCompensator make,
-              double coupling_phase_rad = 0.0) {
+              double coupling_phase_rad = 0.0, double threshold_deg_h = 300.0) {
     Spread result;
     for (int g = 0; g < gyros; ++g) {
         gyro::Setup setup = paper_device();
         setup.input_rate_deg_h = 15.0;
         setup.initial_phase_rad = 0.4 * g;
         setup.coupling_phase_rad = coupling_phase_rad;
+        setup.lockin_threshold_deg_h = threshold_deg_h;
         const gyro::Device device(setup);
         ensemble::Trajectory trajectory(scenario, setup, {7, static_cast<std::uint64_t>(g)},
                                         ensemble::Trajectory::Kind::noise_injected);
@@ -65,6 +66,19 @@ TEST(Compensation, CorrectedCoefficientsTakeTheErrorAwayAndPrintedOnesTurnItRoun
     EXPECT_NEAR(published.compensated / published.raw, 1.0, 0.02);
     // Printed: error minus twice the error. The two residuals add up to what the corrected one leaves, twice.
     EXPECT_EQ(published.raw, corrected.raw);
+}
+
+TEST(Compensation, WithAnIdealReadoutTheCorrectionLeavesThirdOrderOnly) {
+    // The kick of a whole turn, in the phase at its extremum, has no second order (docs/physics.md): the gain goes with
+    // kappa^-2. A second order of the kick, (kappa^2/16) cos 2 psi_0 a turn, would hold it at 16/kappa = 105 and make
+    // it go with 1/kappa.
+    // At small thresholds the averaged acceleration takes over: it misses what the injected noise does to each swing.
+    const auto make = [](auto c) { return compensate::Corrected(c); };
+    const auto once = spread(base(), 8, 60, 500, make);
+    const auto twice = spread(base(), 8, 60, 500, make, 0.0, 600.0);
+    const double gain = once.raw / once.compensated;
+    EXPECT_GT(gain, 1000.0);
+    EXPECT_NEAR(gain / (twice.raw / twice.compensated), 4.0, 0.6);
 }
 
 TEST(Compensation, DetectorNoiseLeavesItsOwnShare) {

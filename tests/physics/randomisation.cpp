@@ -27,18 +27,17 @@ Outcome injected(double rms_rad, double rate_deg_h, std::int64_t gyros, double d
     const ensemble::Schedule schedule(scenario);
     std::vector<double> rate(static_cast<std::size_t>(gyros));
     std::vector<double> variance(rate.size());
-    ensemble::run(
-        scenario, arms, 0, gyros, 2,
-        [&](std::int64_t gyro, ensemble::GyroRecord&& record) {
-            const auto& x = record.angle_arcsec[0];
-            const auto n = static_cast<double>(x.size() - 1);
-            const double mean = (x.back() - x.front()) / n;
-            double sum = 0.0;
-            for (std::size_t i = 1; i < x.size(); ++i) sum += std::pow(x[i] - x[i - 1] - mean, 2);
-            rate[static_cast<std::size_t>(gyro)] = mean / schedule.sample_interval_s - rate_deg_h;
-            variance[static_cast<std::size_t>(gyro)] = sum / (n - 1.0) / schedule.sample_interval_s;
-        },
-        {});
+    ensemble::run(scenario, arms, 0, gyros, 2,
+                  [&](std::int64_t gyro, ensemble::GyroRecord&& record) {
+                      const auto& x = record.angle_arcsec[0];
+                      const auto n = static_cast<double>(x.size() - 1);
+                      const double mean = (x.back() - x.front()) / n;
+                      double sum = 0.0;
+                      for (std::size_t i = 1; i < x.size(); ++i) sum += std::pow(x[i] - x[i - 1] - mean, 2);
+                      rate[static_cast<std::size_t>(gyro)] = mean / schedule.sample_interval_s - rate_deg_h;
+                      variance[static_cast<std::size_t>(gyro)] = sum / (n - 1.0) / schedule.sample_interval_s;
+                  },
+                  {});
     Outcome outcome{0.0, 0.0, 0.0};
     const auto count = static_cast<double>(gyros);
     for (std::size_t i = 0; i < rate.size(); ++i) {

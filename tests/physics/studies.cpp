@@ -14,9 +14,7 @@ scenario::Scenario from_file(const std::string& name) {
     return scenario::parse_file(std::filesystem::path(RINGLOCK_SOURCE_DIR) / "scenarios" / name);
 }
 
-study::Summary run(const scenario::Scenario& scenario) {
-    return study::summarise(study::run(scenario, 2));
-}
+study::Summary run(const scenario::Scenario& scenario) { return study::summarise(study::run(scenario, 2)); }
 
 const study::ArmSummary& arm(const study::Summary& summary, const std::string& name) {
     for (const study::ArmSummary& each : summary.arms) {
@@ -77,6 +75,37 @@ TEST(Scenarios, DeadBandEndsWhereItSays) {
     EXPECT_FALSE(study::locked_up_to_deg_h(arm(summary, "ideal")));
     for (const study::SweepPoint& point : arm(summary, "compensated").sweep) {
         EXPECT_NEAR(point.output_rate_deg_h.mean, point.input_rate_deg_h, 2e-3);
+    }
+}
+
+TEST(Scenarios, TheDirectIntegratorGivesTheSameStudyAsTheTurnMap) {
+    // Everything a scenario can ask for at once; 500 turns and two trajectories of two gyros.
+    scenario::Scenario scenario;
+    scenario.ensemble.gyros = 2;
+    scenario.ensemble.duration_s = 1.0;
+    scenario.ensemble.dither_asymmetry_sd_ratio = 0.01;
+    scenario.ensemble.lockin_threshold_sd_relative = 0.05;
+    scenario.output.sample_interval_s = 0.1;
+    scenario.effects["detector_phase_offset"]["phase_rad"] = 0.3;
+    scenario.effects["readout_ellipse"]["gain"] = 0.03;
+    scenario.effects["bias_ramp"]["deg_h_per_h"] = 1000.0;
+    scenario.effects["base_vibration"] = {{"frequency_hz", 7.0}, {"rate_deg_h", 50.0}, {"phase_rad", 1.0}};
+    const auto angles = [&](scenario::PropagationMethod method) {
+        scenario.propagation.method = method;
+        std::vector<std::vector<std::vector<double>>> all(2);
+        study::run(scenario, 2, [&](std::int64_t gyro, const auto& angle_arcsec) {
+            all[static_cast<std::size_t>(gyro)] = angle_arcsec;
+        });
+        return all;
+    };
+    const auto map = angles(scenario::PropagationMethod::turn_map);
+    const auto direct = angles(scenario::PropagationMethod::direct);
+    for (std::size_t g = 0; g < 2; ++g) {
+        for (std::size_t a = 0; a < map[g].size(); ++a) {
+            for (std::size_t i = 0; i < map[g][a].size(); ++i) {
+                EXPECT_NEAR(map[g][a][i], direct[g][a][i], 1e-8) << scenario.arms[a] << " sample " << i;
+            }
+        }
     }
 }
 
