@@ -11,6 +11,7 @@
 #include <string>
 #include <system_error>
 
+#include "analysis/study/columns.hpp"
 #include "engine/core/error.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/scenario/parse.hpp"
@@ -25,77 +26,6 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 double or_nan(const std::optional<double>& value) { return value.value_or(nan); }
 std::optional<double> or_nothing(double value) { return std::isnan(value) ? std::nullopt : std::optional(value); }
-
-/// One drawn parameter of a gyro and its dataset.
-struct DrawnParameter {
-    const char* name;
-    const char* unit;
-    const char* description;
-    double gyro::Setup::*field;
-};
-
-constexpr std::array drawn_parameters = {
-    DrawnParameter{"input_rate_deg_h", "deg/h", "input rate", &gyro::Setup::input_rate_deg_h},
-    DrawnParameter{"initial_phase_rad", "rad", "optical phase at the first turn", &gyro::Setup::initial_phase_rad},
-    DrawnParameter{"dither_asymmetry_ratio", "1", "positive half cycles stronger by it, and shorter",
-                   &gyro::Setup::dither_asymmetry_ratio},
-    DrawnParameter{"lockin_threshold_deg_h", "deg/h", "lock-in threshold", &gyro::Setup::lockin_threshold_deg_h},
-    DrawnParameter{"dither_peak_rate_deg_s", "deg/s", "mean peak rate of the dither",
-                   &gyro::Setup::dither_peak_rate_deg_s},
-};
-
-/// One noise coefficient and its datasets NAME, NAME_lo, NAME_hi.
-struct CoefficientColumn {
-    const char* name;
-    const char* unit;
-    const char* description;
-    noise::Coefficient noise::NoiseFit::*field;
-};
-
-constexpr std::array coefficient_columns = {
-    CoefficientColumn{"quantization_arcsec", "arcsec", "white angle noise Q", &noise::NoiseFit::quantization_arcsec},
-    CoefficientColumn{"arw_deg_rt_h", "deg/sqrt(h)", "angle random walk N", &noise::NoiseFit::arw_deg_rt_h},
-    CoefficientColumn{"bias_instability_deg_h", "deg/h", "bias instability B",
-                      &noise::NoiseFit::bias_instability_deg_h},
-    CoefficientColumn{"rrw_deg_h_rt_h", "deg/h/sqrt(h)", "rate random walk K", &noise::NoiseFit::rrw_deg_h_rt_h},
-    CoefficientColumn{"rate_ramp_deg_h_h", "deg/h/h", "rate ramp R", &noise::NoiseFit::rate_ramp_deg_h_h},
-};
-
-/// One column of what decides over the gyros together.
-struct PoolingColumn {
-    const char* name;
-    const char* unit;
-    const char* description;
-    double noise::Pooling::*field;
-};
-
-constexpr std::array pooling_columns = {
-    PoolingColumn{"arw_evidence", "1", "rise of the deviance without N, all other terms free",
-                  &noise::Pooling::arw_evidence},
-    PoolingColumn{"angle_noise_evidence", "1", "rise of the deviance without Q in the model of Q and N",
-                  &noise::Pooling::angle_noise_evidence},
-    PoolingColumn{"arw_alone_deg_rt_h", "deg/sqrt(h)", "N in the model of N alone",
-                  &noise::Pooling::arw_alone_deg_rt_h},
-    PoolingColumn{"arw_beside_angle_noise_deg_rt_h", "deg/sqrt(h)", "N in the model of Q and N",
-                  &noise::Pooling::arw_beside_angle_noise_deg_rt_h},
-    PoolingColumn{"arw_best_deg_rt_h", "deg/sqrt(h)", "N in the best model that has it",
-                  &noise::Pooling::arw_best_deg_rt_h},
-};
-
-/// One column of the Allan deviations of the gyros.
-struct AllanColumn {
-    const char* name;
-    const char* unit;
-    const char* description;
-    double allan::Point::*field;
-};
-
-constexpr std::array allan_columns = {
-    AllanColumn{"deviation_deg_h", "deg/h", "overlapping Allan deviation", &allan::Point::dev},
-    AllanColumn{"deviation_lo_deg_h", "deg/h", "lower end of its 68.27 % interval", &allan::Point::lo},
-    AllanColumn{"deviation_hi_deg_h", "deg/h", "upper end of its 68.27 % interval", &allan::Point::hi},
-    AllanColumn{"edf", "1", "equivalent degrees of freedom", &allan::Point::edf},
-};
 
 const char* compensator_name(scenario::Compensator compensator) {
     switch (compensator) {
@@ -118,7 +48,7 @@ std::vector<double> over_gyros(const ArmStatistics& arm, const std::function<dou
 
 void write_noise(store::Group& group, const ArmStatistics& arm) {
     store::Group noise = group.create_group("noise");
-    for (const CoefficientColumn& column : coefficient_columns) {
+    for (const auto& column : coefficient_columns) {
         const std::string name = column.name;
         const auto get = [&](std::optional<double> noise::Coefficient::*part) {
             return over_gyros(arm, [&](const GyroStatistics& g) { return or_nan(g.noise.*column.field.*part); });
@@ -130,7 +60,7 @@ void write_noise(store::Group& group, const ArmStatistics& arm) {
         noise.write(name + "_hi", get(&noise::Coefficient::hi),
                     {column.unit, fmt::format("{}: upper end, or a 95 % limit where not shown", column.description)});
     }
-    for (const PoolingColumn& column : pooling_columns) {
+    for (const auto& column : pooling_columns) {
         noise.write(column.name,
                     over_gyros(arm, [&](const GyroStatistics& g) { return g.noise.pooling.*column.field; }),
                     {column.unit, column.description});
@@ -151,7 +81,7 @@ void write_allan(store::Group& group, const Study& study, const ArmStatistics& a
     for (const std::int64_t m : study.factors) tau.push_back(static_cast<double>(m) * study.schedule.sample_interval_s);
     allan.write("tau_s", tau, {"s", "averaging times"});
     allan.write("averaging_factor", study.factors, {"1", "averaging times in samples"});
-    for (const AllanColumn& column : allan_columns) {
+    for (const auto& column : allan_columns) {
         std::vector<double> values;
         for (const GyroStatistics& gyro : arm.gyros) {
             for (const allan::Point& point : gyro.allan) values.push_back(point.*column.field);
@@ -200,7 +130,7 @@ void write_figures(store::Group& group, const ArmSummary& summary) {
 
 void write_gyros(store::Group& root, const Study& study) {
     store::Group gyros = root.create_group("gyros");
-    for (const DrawnParameter& parameter : drawn_parameters) {
+    for (const auto& parameter : drawn_parameters) {
         std::vector<double> values;
         for (const gyro::Setup& setup : study.gyros) values.push_back(setup.*parameter.field);
         gyros.write(parameter.name, values, {parameter.unit, parameter.description});
@@ -311,7 +241,7 @@ void read_arm(const store::Group& group, const Study& study, ArmStatistics& arm)
     const auto errors = read_column(group, "rate_error_deg_h", {gyros});
     for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].rate_error_deg_h = errors[g];
     const store::Group noise = group.group("noise");
-    for (const CoefficientColumn& column : coefficient_columns) {
+    for (const auto& column : coefficient_columns) {
         const std::string name = column.name;
         const auto value = read_column(noise, name, {gyros});
         const auto lo = read_column(noise, name + "_lo", {gyros});
@@ -321,7 +251,7 @@ void read_arm(const store::Group& group, const Study& study, ArmStatistics& arm)
             coefficient = {!std::isnan(value[g]), or_nothing(value[g]), or_nothing(lo[g]), or_nothing(hi[g])};
         }
     }
-    for (const PoolingColumn& column : pooling_columns) {
+    for (const auto& column : pooling_columns) {
         const auto values = read_column(noise, column.name, {gyros});
         for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].noise.pooling.*column.field = values[g];
     }
@@ -336,7 +266,7 @@ void read_arm(const store::Group& group, const Study& study, ArmStatistics& arm)
     const auto alpha = read_column(allan, "alpha", {gyros, taus});
     const auto terms = read_column(allan, "terms", {taus});
     for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].allan.resize(taus);
-    for (const AllanColumn& column : allan_columns) {
+    for (const auto& column : allan_columns) {
         const auto values = read_column(allan, column.name, {gyros, taus});
         for (std::size_t g = 0; g < gyros; ++g) {
             for (std::size_t t = 0; t < taus; ++t) {
@@ -375,7 +305,7 @@ Study read_result(const std::filesystem::path& path) {
     // What is not drawn is in the scenario.
     std::fill(study.gyros.begin(), study.gyros.end(), ensemble::nominal_setup(study.scenario));
     const store::Group gyros = file.group("gyros");
-    for (const DrawnParameter& parameter : drawn_parameters) {
+    for (const auto& parameter : drawn_parameters) {
         const auto values = read_column(gyros, parameter.name, {study.gyros.size()});
         for (std::size_t g = 0; g < values.size(); ++g) study.gyros[g].*parameter.field = values[g];
     }
