@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/report/table.hpp"
+#include "engine/core/units.hpp"
 
 namespace ringlock::app {
 

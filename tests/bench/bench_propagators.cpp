@@ -17,7 +17,7 @@
 #include "engine/core/phase.hpp"
 #include "engine/dither/drive.hpp"
 #include "engine/ensemble/draw.hpp"
-#include "engine/ensemble/gyro_run.hpp"
+#include "engine/ensemble/trajectory.hpp"
 #include "engine/propagate/direct.hpp"
 #include "engine/propagate/turn_map.hpp"
 

@@ -1,6 +1,6 @@
 // What the compensators take away, and what they leave.
 #include "engine/compensate/first_order.hpp"
-#include "engine/ensemble/gyro_run.hpp"
+#include "engine/ensemble/trajectory.hpp"
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {

@@ -2,6 +2,7 @@
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/ensemble.hpp"
 #include "engine/ensemble/schedule.hpp"
+#include "engine/ensemble/trajectory.hpp"
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
