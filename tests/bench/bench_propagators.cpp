@@ -32,7 +32,8 @@ struct Entry {
     std::string name;
     int turns;  ///< of one round, chosen to take some tenths of a second
     Contender run;
-    std::vector<double> seconds_per_turn;
+    double worst_error_rad = 0.0;  ///< of a half cycle, against the direct integrator at 1e-13; 0: not asked for
+    std::vector<double> seconds_per_turn = {};
 };
 
 /// The same noisy dither for all propagators.
@@ -51,6 +52,20 @@ Contender through(std::shared_ptr<propagate::Propagator> propagator, const gyro:
         }
         return lockin;
     };
+}
+
+/// Worst error of some half cycles of the noisy dither against the direct integrator at a tolerance of 1e-13 rad.
+double worst_error_rad(propagate::Propagator& propagator, const gyro::Device& device) {
+    propagate::DirectIntegrator reference(device.coupling, 1e-13);
+    dither::Drive drive(device, 3.0, {2, 0});
+    double worst = 0.0;
+    for (int turn = 0; turn < 40; ++turn) {
+        const double phase_rad = -3.0 + 0.15 * turn;
+        worst = std::max(worst, std::abs(propagator.lockin_gain_rad(phase_rad, drive.after(), 0.0) -
+                                         reference.lockin_gain_rad(phase_rad, drive.after(), 0.0)));
+        drive.advance();
+    }
+    return worst;
 }
 
 /// Boost.odeint's Fehlberg 7(8) on the deviation from the plain phase.
@@ -102,17 +117,18 @@ int main() {
     ideal.readout.model = scenario::ReadoutModel::ideal;
 
     std::vector<Entry> entries;
-    entries.push_back({"direct integrator, 1e-8 rad",
-                       60,
-                       through(std::make_shared<propagate::DirectIntegrator>(device.coupling, 1e-8), device),
-                       {}});
-    entries.push_back({"Boost.odeint Fehlberg 7(8), 1e-8 rad",
-                       60,
-                       through(std::make_shared<Odeint>(device.coupling, 1e-8), device),
-                       {}});
-    entries.push_back({"turn map, 1e-8 rad", 1000000, through(map, device), {}});
-    entries.push_back({"turn map, ideal readout, corrected", 300000, read_and_corrected(ideal), {}});
-    entries.push_back({"turn map, instrument readout, corrected", 60000, read_and_corrected(scenario), {}});
+    const auto add_propagator = [&](const std::string& name, int turns,
+                                    std::shared_ptr<propagate::Propagator> propagator) {
+        const double error = worst_error_rad(*propagator, device);
+        entries.push_back({name, turns, through(std::move(propagator), device), error});
+    };
+    add_propagator("direct integrator, 1e-8 rad", 60,
+                   std::make_shared<propagate::DirectIntegrator>(device.coupling, 1e-8));
+    add_propagator("Boost.odeint Fehlberg 7(8), 1e-8 a step", 60, std::make_shared<Odeint>(device.coupling, 1e-8));
+    add_propagator("Boost.odeint Fehlberg 7(8), 1e-11 a step", 60, std::make_shared<Odeint>(device.coupling, 1e-11));
+    add_propagator("turn map, 1e-8 rad", 1000000, map);
+    entries.push_back({"turn map, ideal readout, corrected", 300000, read_and_corrected(ideal)});
+    entries.push_back({"turn map, instrument readout, corrected", 60000, read_and_corrected(scenario)});
 
     constexpr int rounds = 5;
     double sink = 0.0;
@@ -130,10 +146,12 @@ int main() {
     report::Table table({{"one turn by", report::Align::left},
                          {"microseconds", report::Align::right},
                          {"turns per second", report::Align::right},
+                         {"worst error [rad]", report::Align::right},
                          {"over the direct integrator", report::Align::right}});
     for (const Entry& entry : entries) {
         table.add_row({entry.name, fmt::format("{:.4g}", median(entry) * 1e6),
                        fmt::format("{:.3g}", 1.0 / median(entry)),
+                       entry.worst_error_rad > 0.0 ? fmt::format("{:.1e}", entry.worst_error_rad) : "-",
                        fmt::format("{:.4g}", median(entries.front()) / median(entry))});
     }
     fmt::print("{}", table.text());

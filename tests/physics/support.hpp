@@ -57,13 +57,11 @@ struct CircleMap {
 
     /// Locked: the map has a fixed point, |trace| > 2.
     bool locked() const { return std::norm(z) >= std::pow(std::sin(0.5 * shift_rad), 2); }
-    /// Mean phase advance per application, modulo 2 pi, of the unlocked map: its rotation number.
+    /// Mean phase advance per application, in [0, 2 pi), of the unlocked map: its rotation number.
     double rotation_rad() const {
         if (locked()) return 0.0;
-        const double cosine = std::cos(0.5 * shift_rad) / std::sqrt(1.0 - std::norm(z));
-        const double angle = 2.0 * std::acos(cosine);  // in (0, 2 pi), as is the shift modulo 2 pi
         const double shift = shift_rad - units::two_pi * std::floor(shift_rad / units::two_pi);
-        return std::sin(0.5 * shift) >= 0.0 ? angle : units::two_pi - angle;
+        return 2.0 * std::acos(std::cos(0.5 * shift) / std::sqrt(1.0 - std::norm(z)));
     }
 };
 
