@@ -43,6 +43,8 @@ void refuse_unknown_command(const CLI::App& root, int argc, char** argv) {
 int main(int argc, char** argv) {
     namespace app = ringlock::app;
     app::hold_standard_streams();
+    // A file that outgrows its limit (ulimit -f) is an error of writing, told and cleaned up after like a full disk.
+    std::signal(SIGXFSZ, SIG_IGN);
     CLI::App root{
         "ringlock: which cure for the lock-in of a dithered ring laser gyro, when and how well.\n"
         "Simulates ensembles of dithered gyros, compares uncompensated, noise-injected and compensated outputs, and\n"

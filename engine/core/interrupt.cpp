@@ -67,13 +67,10 @@ InterruptGuard::InterruptGuard() {
         const bool stays_ignored = watched[i] == SIGHUP && before_[i].sa_handler == SIG_IGN;
         if (!stays_ignored) sigaction(watched[i], &action, nullptr);
     }
-    action.sa_handler = SIG_IGN;
-    sigaction(SIGXFSZ, &action, &before_file_size_);
 }
 
 InterruptGuard::~InterruptGuard() {
     for (std::size_t i = 0; i < signals_; ++i) sigaction(watched[i], &before_[i], nullptr);
-    sigaction(SIGXFSZ, &before_file_size_, nullptr);
     stop_requested = false;
 }
 

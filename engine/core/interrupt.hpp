@@ -18,8 +18,7 @@ int interrupt_signal();
 /// Turns SIGINT, SIGTERM and SIGHUP into a flag for as long as it lives; the handlers it found return on destruction.
 ///
 /// The first signal only sets the flag. The second ends the process at once, by that signal, after removing the
-/// files announced by RemoveOnKill. SIGHUP stays ignored where it was (nohup). SIGXFSZ (`ulimit -f`) is ignored, so
-/// that a file too large is an error of writing and not the end of the process. One guard at a time, made in main().
+/// files announced by RemoveOnKill. SIGHUP stays ignored where it was (nohup). One guard at a time, made in main().
 class InterruptGuard {
    public:
     InterruptGuard();
@@ -30,7 +29,6 @@ class InterruptGuard {
    private:
     static constexpr std::size_t signals_ = 3;
     struct sigaction before_[signals_] = {};
-    struct sigaction before_file_size_ = {};
 };
 
 /// Announces a file that the signal handler removes before it ends the process. Up to 16 at a time; more are not

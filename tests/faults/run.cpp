@@ -40,8 +40,8 @@ class RunFaults : public test::ProgramTest {
     const std::set<std::string> untouched_ = {"long.toml", "short.toml"};
 };
 
-void ignore_size_signal(rlim_t bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
+/// As `ulimit -f` does; the program itself must cope with the signal that comes with it.
+void limit_file_size(rlim_t bytes) {
     const rlimit limit{bytes, bytes};
     setrlimit(RLIMIT_FSIZE, &limit);
 }
@@ -95,7 +95,7 @@ TEST_F(RunFaults, AResultThatTheDiskCannotHoldFailsTheRunAndLeavesNothing) {
     for (const rlim_t bytes : {0, 1, 100, 2048, 4096, 8192, 16384, 24576, 32768}) {
         const Outcome r = run({"run", "short.toml", "-o", "out.h5"}, [&] {
             // The limit holds for the files behind the standard streams, too.
-            ignore_size_signal(bytes);
+            limit_file_size(bytes);
             dup2(open("/dev/null", O_WRONLY), STDOUT_FILENO);
         });
         if (r.status == 0) {
@@ -115,7 +115,7 @@ TEST_F(RunFaults, AResultThatTheDiskCannotHoldFailsTheRunAndLeavesNothing) {
 TEST_F(RunFaults, AFullDiskKeepsTheResultOfAnEarlierRun) {
     ASSERT_EQ(run({"run", "short.toml", "-o", "out.h5"}).status, 0);
     const std::string before = read("out.h5");
-    EXPECT_EQ(run({"run", "short.toml", "-o", "out.h5"}, [] { ignore_size_signal(4096); }).status, 1);
+    EXPECT_EQ(run({"run", "short.toml", "-o", "out.h5"}, [] { limit_file_size(4096); }).status, 1);
     EXPECT_EQ(read("out.h5"), before);
     EXPECT_FALSE(has_partial());
 }
