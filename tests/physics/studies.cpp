@@ -143,7 +143,7 @@ TEST(Claims, TheQuantumNoiseFloorIsWhatACorrectedGyroIsLeftWith) {
     scenario.arms = {"noise_injected+compensated"};
     scenario.ensemble.gyros = 16;
     scenario.ensemble.duration_s = 200.0;
-    const study::Figure& arw = run(scenario).arms.at(0).arw_deg_rt_h;
+    const study::Figure arw = run(scenario).arms.at(0).arw_deg_rt_h;
     ASSERT_TRUE(arw.median);
     EXPECT_NEAR(*arw.median, 3e-4, 0.05 * 3e-4);
 }
