@@ -9,8 +9,9 @@ namespace ringlock::readout {
 
 namespace {
 
-// The extremum is a microsecond away, the pulses tens of them; 1e-10 rad there is 1e-15 s.
-using ExtremumSeries = gyro::PhaseSeries<10>;
+// The extremum is a microsecond away unless the input is fast, the pulses tens of them; 1e-10 rad there is 1e-15 s.
+using NearSeries = gyro::PhaseSeries<10>;
+using FarSeries = gyro::PhaseSeries<20>;
 using PulseSeries = gyro::PhaseSeries<18>;
 constexpr double extremum_tolerance_rad = 1e-14;
 constexpr double pulse_tolerance_rad = 1e-10;
@@ -49,12 +50,24 @@ TurnPath::TurnPath(const gyro::HalfCycle& before, const gyro::HalfCycle& after, 
     const double rate = after_.rate_rad_s + coupling_.b_rad_s * std::sin(phase_rad + coupling_.phase_rad);
     if (rate == 0.0) return;
     const int side = rate * after_.sign < 0.0 ? 1 : -1;
+    // Fringes between the dither's turn and the phase's: a fast input needs long steps.
+    const double distance_rad = 0.5 * rate * rate / after_.end_acceleration_rad_s2();
+    const bool found =
+        distance_rad < 1.0 ? walk_to_zero_rate<NearSeries>(rate, side) : walk_to_zero_rate<FarSeries>(rate, side);
+    if (!found) {
+        throw RunError(
+            "readout: the phase does not reverse near a turn of the dither; the input rate is too high for it");
+    }
+}
+
+template <class Series>
+bool TurnPath::walk_to_zero_rate(double rate_rad_s, int side) {
     for (int step = 0; step < most_steps; ++step) {
         const Place here = place(zero_time_s_, side);
-        if (here.limit_s <= 0.0) break;
-        const ExtremumSeries series(*here.half, coupling_, here.t_s, zero_phase_rad_, scale_s_);
+        if (here.limit_s <= 0.0) return false;
+        const Series series(*here.half, coupling_, here.t_s, zero_phase_rad_, scale_s_);
         const double h = side * std::min(series.step_s(extremum_tolerance_rad), here.limit_s);
-        if (series.rate_rad_s(h) * rate > 0.0) {
+        if (series.rate_rad_s(h) * rate_rad_s > 0.0) {
             zero_phase_rad_ = series.phase_rad(h);
             zero_time_s_ += h;
             continue;
@@ -63,9 +76,9 @@ TurnPath::TurnPath(const gyro::HalfCycle& before, const gyro::HalfCycle& after, 
                                [&](double x) { return series.acceleration_rad_s2(x); }, 0.0, h);
         zero_phase_rad_ = series.phase_rad(at);
         zero_time_s_ += at;
-        return;
+        return true;
     }
-    throw RunError("readout: the phase does not reverse near a turn of the dither; the input rate is too high for it");
+    return false;
 }
 
 TurnPath::Place TurnPath::place(double time_s, int side) const {

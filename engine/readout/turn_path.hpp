@@ -36,6 +36,10 @@ class TurnPath {
         double limit_s;  ///< how far the half cycle goes on in that direction
     };
     Place place(double time_s, int side) const;
+    /// Goes from the dither's turn, where the phase rate is `rate_rad_s`, to where it vanishes; false where it does not
+    /// before the middle of the half cycle.
+    template <class Series>
+    bool walk_to_zero_rate(double rate_rad_s, int side);
 
     gyro::HalfCycle before_;
     gyro::HalfCycle after_;

@@ -50,13 +50,15 @@ struct Scene {
 
 TEST(TurnPath, FindsTheZeroRatePointAndThePulses) {
     Uniform uniform(31);
-    for (const double rate : {0.0, 100.0, 5000.0, 50000.0}) {
+    for (const double rate : {0.0, 100.0, 5000.0, 50000.0, 190000.0}) {
         for (int i = 0; i < 40; ++i) {
             const Scene scene(uniform, i, rate);
             const readout::TurnPath path(scene.before, scene.after, scene.device.coupling, scene.phase);
             const double t0 = path.zero_rate_time_s();
             const double psi0 = path.zero_rate_phase_rad();
-            EXPECT_NEAR(scene.phase_at(t0), psi0, 1e-10);
+            // The other integrator carries the phase itself and loses digits over hundreds of radians.
+            const double lost = 1e-11 * std::abs(psi0 - scene.phase);
+            EXPECT_NEAR(scene.phase_at(t0), psi0, 1e-10 + lost);
             // An extremum: the phase moves off to the same side a microsecond before and after.
             EXPECT_GT(scene.after.sign * (scene.phase_at(t0 + 1e-6) - psi0), 0.0);
             EXPECT_GT(scene.after.sign * (scene.phase_at(t0 - 1e-6) - psi0), 0.0);
@@ -65,8 +67,8 @@ TEST(TurnPath, FindsTheZeroRatePointAndThePulses) {
                 EXPECT_GT(side * (times[0] - t0), 0.0);
                 EXPECT_GT(side * (times[1] - times[0]), 0.0);
                 // The phase runs at 1e5 rad/s there: 1e-9 rad is 1e-14 s.
-                EXPECT_NEAR(scene.after.sign * (scene.phase_at(times[0]) - psi0), 0.8, 2e-9);
-                EXPECT_NEAR(scene.after.sign * (scene.phase_at(times[1]) - psi0), 2.3, 2e-9);
+                EXPECT_NEAR(scene.after.sign * (scene.phase_at(times[0]) - psi0), 0.8, 2e-9 + lost);
+                EXPECT_NEAR(scene.after.sign * (scene.phase_at(times[1]) - psi0), 2.3, 2e-9 + lost);
             }
         }
     }
