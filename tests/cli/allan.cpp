@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -158,8 +159,8 @@ TEST_F(AllanCommand, MeasuredRecordIsNotGivenCoefficients) {
     const std::filesystem::path path =
         std::filesystem::path(folder != nullptr ? folder : RINGLOCK_SHARED_DATA) / "laser-gyro-triad-x.csv";
     if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not there; set RINGLOCK_TEST_DATA to its folder";
-    const Outcome r =
-        run("'" + path.string() + "' --column angle_increment_arcsec --rate 100 --kind increment --unit arcsec --json");
+    const Outcome r = run(fmt::format(
+        "'{}' --column angle_increment_arcsec --rate 100 --kind increment --unit arcsec --json", path.string()));
     ASSERT_EQ(r.status, 0) << r.err;
     const auto json = nlohmann::json::parse(r.out);
     EXPECT_EQ(json["n"], 184718);
