@@ -1,4 +1,6 @@
 // What the compensators take away, and what they leave.
+#include <cstdio>
+
 #include "engine/compensate/first_order.hpp"
 #include "engine/ensemble/trajectory.hpp"
 #include "tests/physics/support.hpp"
@@ -77,6 +79,7 @@ TEST(Compensation, WithAnIdealReadoutTheCorrectionLeavesThirdOrderOnly) {
     const auto once = spread(base(), 8, 60, 500, make);
     const auto twice = spread(base(), 8, 60, 500, make, 0.0, 600.0);
     const double gain = once.raw / once.compensated;
+    std::printf("gain %.0f, at twice the threshold %.0f\n", gain, twice.raw / twice.compensated);
     EXPECT_GT(gain, 1000.0);
     EXPECT_NEAR(gain / (twice.raw / twice.compensated), 4.0, 0.6);
 }
