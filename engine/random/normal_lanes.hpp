@@ -1,0 +1,34 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "engine/random/stream.hpp"
+#include "engine/simd/lanes.hpp"
+
+/// Standard normal deviates for many gyros at once.
+namespace ringlock::random {
+
+/// Who draws in each lane.
+struct LaneIdentities {
+    std::uint64_t seed = 0;
+    std::array<std::uint64_t, simd::lanes> gyro{};
+};
+
+/// Fills out[i][lane], i < steps, with the standard normal deviates of steps first_step + i of the gyros' streams of
+/// that purpose. Any step can be asked for at any time and always has the same deviate, whatever the lanes beside it,
+/// the instruction set and the steps asked for together.
+///
+/// Philox 4x32-10 (Salmon, Moraes, Dror, Shaw, SC11) with the seed as key and the counter {step / 2, gyro, purpose};
+/// the 128 bits of a counter make two deviates by the method of Box and Muller (Ann. Math. Stat. 29, 610, 1958), with 52
+/// bits for the radius (at most 8.49) and 52 for the angle.
+///
+/// \param lanes  lanes to fill, 1...simd::lanes; rounded up to whole vectors, all of which are written
+/// \param out    steps rows of simd::lanes, aligned to simd::alignment
+void normals(const LaneIdentities& who, Purpose purpose, std::uint64_t first_step, std::size_t steps, std::size_t lanes,
+             double* out);
+
+/// The deviate of one step of one gyro: what normals() gives.
+double normal(Identity who, Purpose purpose, std::uint64_t step);
+
+}  // namespace ringlock::random
