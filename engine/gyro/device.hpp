@@ -18,11 +18,15 @@ struct Device {
     double negative_duration_s;
     double input_rate_rad_s;  ///< C times the input rate
     double initial_phase_rad;
+    double harmonic_ratio;  ///< second harmonic of the dither rate
+    double harmonic_phase_rad;
 
     double period_s() const { return positive_duration_s + negative_duration_s; }
     /// Half cycle of that sign (+1, -1) and amplitude [rad].
     HalfCycle half_cycle(double sign, double amplitude_rad) const {
-        return {sign, amplitude_rad, sign > 0 ? positive_duration_s : negative_duration_s, input_rate_rad_s};
+        return {
+            sign,           amplitude_rad,     sign > 0 ? positive_duration_s : negative_duration_s, input_rate_rad_s,
+            harmonic_ratio, harmonic_phase_rad};
     }
 };
 

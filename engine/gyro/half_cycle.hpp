@@ -5,37 +5,52 @@
 
 namespace ringlock::gyro {
 
-/// One half cycle of the dither, from the turn at time 0 to the turn at `duration_s`: the dither angle goes along a
-/// cosine from one turn's angle to the next, so its rate is zero at both ends. All in radians of optical phase.
+/// One half cycle of the dither, from the turn at time 0 to the turn at `duration_s`. The dither angle goes along a
+/// cosine from one turn's angle to the next; a second harmonic of the dither rate may be added. The rate of drive and
+/// input is, with w = pi / duration,
+///
+///     g(t) = rate + A w (sign sin(w t) + ratio sin(2 w t + harmonic_phase)).
+///
+/// All in radians of optical phase.
 struct HalfCycle {
     double sign = 1.0;           ///< +1: the dither rate is positive (from a minimum to a maximum), -1: negative
-    double amplitude_rad = 0.0;  ///< half the swing
+    double amplitude_rad = 0.0;  ///< A: half the swing
     double duration_s = 0.0;
-    double rate_rad_s = 0.0;  ///< phase rate of the input rotation, constant over the half cycle
+    double rate_rad_s = 0.0;      ///< phase rate of the input rotation, constant over the half cycle
+    double harmonic_ratio = 0.0;  ///< second harmonic of the dither rate over the first
+    double harmonic_phase_rad = 0.0;
 
     double angular_frequency_rad_s() const { return units::pi / duration_s; }
-    /// Phase acceleration at either end [rad/s^2], a magnitude.
-    double end_acceleration_rad_s2() const {
+    /// Phase acceleration of the drive at the turn at its beginning (end 0) or end (1) [rad/s^2], a magnitude.
+    double end_acceleration_rad_s2(int end = 0) const {
         const double w = angular_frequency_rad_s();
-        return amplitude_rad * w * w;
+        const double harmonic = 2.0 * harmonic_ratio * std::cos(harmonic_phase_rad);
+        return amplitude_rad * w * w * std::abs(1.0 + (end == 0 ? sign : -sign) * harmonic);
     }
     /// Phase that drive and input alone add by time `t_s` (no lock-in).
     double plain_phase_rad(double t_s) const {
-        const double s = std::sin(0.5 * angular_frequency_rad_s() * t_s);
-        return rate_rad_s * t_s + sign * amplitude_rad * 2.0 * s * s;  // 1 - cos x = 2 sin^2(x/2) keeps its digits
+        const double x = angular_frequency_rad_s() * t_s;
+        const double s = std::sin(0.5 * x);
+        // 1 - cos x = 2 sin^2(x/2) and cos f - cos(2 x + f) = 2 sin(x + f) sin x keep their digits
+        return rate_rad_s * t_s +
+               amplitude_rad * (sign * 2.0 * s * s + harmonic_ratio * std::sin(x + harmonic_phase_rad) * std::sin(x));
     }
     double plain_phase_total_rad() const { return rate_rad_s * duration_s + 2.0 * sign * amplitude_rad; }
     /// Phase rate of drive and input, g(t) [rad/s].
     double drive_rate_rad_s(double t_s) const {
         const double w = angular_frequency_rad_s();
-        return rate_rad_s + sign * amplitude_rad * w * std::sin(w * t_s);
+        return rate_rad_s +
+               amplitude_rad * w *
+                   (sign * std::sin(w * t_s) + harmonic_ratio * std::sin(2.0 * w * t_s + harmonic_phase_rad));
     }
 };
 
-/// The lock-in term b sin(psi + phase).
+/// The lock-in term b (1 + turn_asymmetry cos(dither angle's phase)) sin(psi + phase): the cosine is 1 at minima of the
+/// phase and -1 at maxima.
 struct Coupling {
     double b_rad_s = 0.0;  ///< b = (2 pi / K) Omega_L
     double phase_rad = 0.0;
+    double turn_asymmetry = 0.0;
 };
 
 }  // namespace ringlock::gyro

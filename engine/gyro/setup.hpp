@@ -20,6 +20,9 @@ struct Setup {
     double dither_frequency_hz = 0.0;
     double dither_peak_rate_deg_s = 0.0;  ///< mean of the peak rates of positive and negative half cycles
     double dither_asymmetry_ratio = 0.0;  ///< positive half cycles stronger by it, and shorter
+    double dither_harmonic_ratio = 0.0;   ///< second harmonic of the dither rate over the first
+    double dither_harmonic_phase_rad = 0.0;
+    double lockin_turn_asymmetry = 0.0;  ///< threshold (1 + it) times at minima of the phase, (1 - it) times at maxima
     double input_rate_deg_h = 0.0;
     double initial_phase_rad = 0.0;  ///< optical phase at the first turn
     Ellipse ellipse;

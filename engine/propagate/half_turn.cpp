@@ -7,44 +7,256 @@
 #include <boost/math/quadrature/gauss.hpp>
 #include <cmath>
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/propagate/half_turn.cpp"
 #include "engine/core/error.hpp"
+#include "engine/simd/lanes.hpp"
+#include "engine/simd/targets.hpp"
+// The above must come first.
+#include "engine/simd/math-inl.hpp"
 
+#ifndef RINGLOCK_HALF_TURN_BATCH
+#define RINGLOCK_HALF_TURN_BATCH
 namespace ringlock::propagate {
-
 namespace {
 
-using Complex = std::complex<double>;
+constexpr std::size_t quadrature_nodes = 20;
+
+/// Problems side by side, one in each lane, with what is decided about each beforehand.
+struct Batch {
+    simd::Lanes amplitude_rad, angular_frequency_rad_s, rate_rad_s, harmonic_ratio, harmonic_phase_fringes;
+    simd::Lanes b_rad_s, turn_asymmetry;
+    simd::Lanes fast_from_s;
+    simd::Lanes longest_step_s;
+    simd::Lanes quadrature_time_s[quadrature_nodes];
+    simd::Lanes quadrature_weight_s[quadrature_nodes];
+    // Results
+    simd::Lanes alpha_re, alpha_im, z_re, z_im;
+    simd::Lanes slowed_rad;
+};
+
+}  // namespace
+}  // namespace ringlock::propagate
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace ringlock::propagate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+namespace sm = simd::HWY_NAMESPACE;
 
 constexpr std::size_t slow_terms = 10;    // terms of the asymptotic series, and Taylor terms that its derivatives need
 constexpr std::size_t matrix_order = 24;  // Taylor order of the 2x2 flow
+/// Taylor terms of the drive. A step is at most 1/sqrt(a) long: with 100 fringes in a half cycle, the fewest allowed,
+/// the twelfth term of the second harmonic is (0.16)^12/12! of the first.
+constexpr std::size_t drive_terms = 12;
+
+/// The drive and the coupling of a vector of problems.
+template <class D, class V = hn::Vec<D>>
+struct Problems {
+    D d;
+    V amplitude, w, rate, ratio, harmonic_phase, b, asymmetry;
+
+    Problems(D tag, const Batch& batch, std::size_t lane)
+        : d(tag),
+          amplitude(hn::Load(d, batch.amplitude_rad.data() + lane)),
+          w(hn::Load(d, batch.angular_frequency_rad_s.data() + lane)),
+          rate(hn::Load(d, batch.rate_rad_s.data() + lane)),
+          ratio(hn::Load(d, batch.harmonic_ratio.data() + lane)),
+          harmonic_phase(hn::Load(d, batch.harmonic_phase_fringes.data() + lane)),
+          b(hn::Load(d, batch.b_rad_s.data() + lane)),
+          asymmetry(hn::Load(d, batch.turn_asymmetry.data() + lane)) {}
+
+    /// Taylor coefficients of g(t + scale x) scale and b(t + scale x) scale in powers of x.
+    template <std::size_t N>
+    HWY_INLINE void series(V t, V scale, V (&g)[N], V (&coupling)[N]) const {
+        const V fringes = w * t * hn::Set(d, 0.15915494309189535);
+        V s1, c1, s2, c2;
+        sm::sincos(d, fringes, s1, c1);
+        sm::sincos(d, fringes + fringes + harmonic_phase, s2, c2);
+        const V x = w * scale;
+        V first = amplitude * x;
+        V second = first * ratio;
+        V swing = b * asymmetry * scale;
+        for (std::size_t n = 0; n < N; ++n) {
+            const V sine = n % 4 == 0 ? s1 : n % 4 == 1 ? c1 : n % 4 == 2 ? hn::Neg(s1) : hn::Neg(c1);
+            const V cosine = n % 4 == 0 ? c1 : n % 4 == 1 ? hn::Neg(s1) : n % 4 == 2 ? hn::Neg(c1) : s1;
+            const V doubled = n % 4 == 0 ? s2 : n % 4 == 1 ? c2 : n % 4 == 2 ? hn::Neg(s2) : hn::Neg(c2);
+            g[n] = sm::fma(d, first, sine, second * doubled);
+            coupling[n] = swing * cosine;
+            const V step = x * hn::Set(d, 1.0 / static_cast<double>(n + 1));
+            first = first * step;
+            second = second * (step + step);
+            swing = swing * step;
+        }
+        g[0] = sm::fma(d, rate, scale, g[0]);
+        coupling[0] = sm::fma(d, b, scale, coupling[0]);
+    }
+};
+
+/// First column (x, y) of the flow of x' = (i g/2) x - (b/2) y, y' = -(b/2) x - (i g/2) y from time 0 to `end`: the
+/// Moebius map w -> (x w + conj y)/(y w + conj x).
+template <class D, class V>
+HWY_INLINE void flow(D d, const Problems<D>& problems, V end, V longest, sm::Complex<V>& x, sm::Complex<V>& y) {
+    const V zero = hn::Zero(d);
+    x = {hn::Set(d, 1.0), zero};
+    y = {zero, zero};
+    V t = zero;
+    while (!hn::AllTrue(d, t >= end)) {
+        // Terms of order 24 of exp(i (g h/2 + a h^2/4)) below 1e-17.
+        V g[drive_terms];
+        V b[drive_terms];
+        V now_g[1];
+        V now_b[1];
+        problems.series(t, hn::Set(d, 1.0), now_g, now_b);
+        const V rate = hn::Abs(now_g[0]) + now_b[0];
+        const V next = hn::Min(t + hn::Min(hn::Set(d, 3.6) / rate, longest), end);
+        const V h = next - t;
+        problems.series(t, h, g, b);
+        sm::Complex<V> xs[matrix_order + 1];
+        sm::Complex<V> ys[matrix_order + 1];
+        xs[0] = x;
+        ys[0] = y;
+        for (std::size_t n = 0; n < matrix_order; ++n) {
+            sm::Complex<V> gx{zero, zero};
+            sm::Complex<V> gy{zero, zero};
+            sm::Complex<V> bx{zero, zero};
+            sm::Complex<V> by{zero, zero};
+            for (std::size_t j = 0; j <= n && j < drive_terms; ++j) {
+                gx = {sm::fma(d, g[j], xs[n - j].re, gx.re), sm::fma(d, g[j], xs[n - j].im, gx.im)};
+                gy = {sm::fma(d, g[j], ys[n - j].re, gy.re), sm::fma(d, g[j], ys[n - j].im, gy.im)};
+                bx = {sm::fma(d, b[j], xs[n - j].re, bx.re), sm::fma(d, b[j], xs[n - j].im, bx.im)};
+                by = {sm::fma(d, b[j], ys[n - j].re, by.re), sm::fma(d, b[j], ys[n - j].im, by.im)};
+            }
+            const V scale = hn::Set(d, 0.5 / static_cast<double>(n + 1));
+            xs[n + 1] = {hn::Neg(scale * (gx.im + by.re)), scale * (gx.re - by.im)};
+            ys[n + 1] = {scale * (gy.im - bx.re), hn::Neg(scale * (gy.re + bx.im))};
+        }
+        x = {zero, zero};
+        y = {zero, zero};
+        for (std::size_t n = matrix_order + 1; n-- > 0;) {
+            x = {x.re + xs[n].re, x.im + xs[n].im};
+            y = {y.re + ys[n].re, y.im + ys[n].im};
+        }
+        t = next;
+    }
+}
+
+/// The slow solution K(t) of the fast flow, to which the Riccati equation w' = i g w + (b/2)(w^2 - 1) is pinned between
+/// turns: w = -i K, K = (b/2)(1 + K^2)/g - i K'/g, as an asymptotic series in 1/(t g).
+template <class D, class V>
+HWY_INLINE sm::Complex<V> slow_solution(D d, const Problems<D>& problems, V t) {
+    // K is iterated as a truncated Taylor series in w (t' - t); each pass makes one more order of the asymptotic series
+    // right and uses up one Taylor coefficient for the derivative.
+    const V zero = hn::Zero(d);
+    V g[slow_terms];
+    V b[slow_terms];
+    problems.series(t, hn::Set(d, 1.0) / problems.w, g, b);
+    const V inverse = hn::Set(d, 1.0) / g[0];
+    sm::Complex<V> k[slow_terms];
+    for (auto& term : k) term = {zero, zero};
+    for (std::size_t pass = 0; pass < slow_terms; ++pass) {
+        // Of pass p the first slow_terms - p coefficients are of use to the next ones.
+        const std::size_t terms = slow_terms - pass;
+        sm::Complex<V> square[slow_terms];  // 1 + K^2
+        for (std::size_t n = 0; n < terms; ++n) {
+            sm::Complex<V> sum{n == 0 ? hn::Set(d, 1.0) : zero, zero};
+            for (std::size_t j = 0; j <= n; ++j) sum = sm::mul_add(d, k[j], k[n - j], sum);
+            square[n] = sum;
+        }
+        sm::Complex<V> next[slow_terms];
+        for (std::size_t n = 0; n < terms; ++n) {
+            sm::Complex<V> right{zero, zero};
+            for (std::size_t j = 0; j <= n; ++j) {
+                right = {sm::fma(d, b[j], square[n - j].re, right.re), sm::fma(d, b[j], square[n - j].im, right.im)};
+            }
+            right = {right.re * hn::Set(d, 0.5), right.im * hn::Set(d, 0.5)};
+            if (n + 1 < slow_terms) {  // - i K'
+                const V factor = hn::Set(d, static_cast<double>(n + 1));
+                right = {sm::fma(d, factor, k[n + 1].im, right.re), sm::fnma(d, factor, k[n + 1].re, right.im)};
+            }
+            for (std::size_t j = 1; j <= n; ++j) {
+                right = {sm::fnma(d, g[j], next[n - j].re, right.re), sm::fnma(d, g[j], next[n - j].im, right.im)};
+            }
+            next[n] = {right.re * inverse, right.im * inverse};
+        }
+        for (std::size_t n = 0; n < terms; ++n) k[n] = next[n];
+    }
+    return k[0];
+}
+
+void solve(Batch& batch, std::size_t lanes) {
+    using D = hn::CappedTag<double, simd::lanes>;
+    using V = hn::Vec<D>;
+    const D d;
+    for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+        const Problems<D> problems(d, batch, lane);
+        const V start = hn::Load(d, batch.fast_from_s.data() + lane);
+        sm::Complex<V> x;
+        sm::Complex<V> y;
+        flow(d, problems, start, hn::Load(d, batch.longest_step_s.data() + lane), x, y);
+        const sm::Complex<V> k = slow_solution(d, problems, start);
+        // z = (w + i K)/(1 - i conj(K) w) after w -> (x w + conj y)/(y w + conj x); the common factor 1/sqrt(1 - |K|^2)
+        // is real and drops out. alpha = x + i K y, beta = conj y + i K conj x.
+        const sm::Complex<V> ik{hn::Neg(k.im), k.re};
+        const sm::Complex<V> alpha = sm::mul_add(d, ik, y, x);
+        const sm::Complex<V> beta =
+            sm::mul_add(d, ik, sm::Complex<V>{x.re, hn::Neg(x.im)}, sm::Complex<V>{y.re, hn::Neg(y.im)});
+        const V inverse = hn::Set(d, 1.0) / sm::norm(d, alpha);
+        const sm::Complex<V> z = sm::mul(d, beta, sm::Complex<V>{alpha.re, hn::Neg(alpha.im)});
+        hn::Store(alpha.re, d, batch.alpha_re.data() + lane);
+        hn::Store(alpha.im, d, batch.alpha_im.data() + lane);
+        hn::Store(z.re * inverse, d, batch.z_re.data() + lane);
+        hn::Store(z.im * inverse, d, batch.z_im.data() + lane);
+        // From `start` to the middle the frame turns at g - b Re K.
+        V slowed = hn::Zero(d);
+        for (std::size_t node = 0; node < quadrature_nodes; ++node) {
+            const V t = hn::Load(d, batch.quadrature_time_s[node].data() + lane);
+            V g[1];
+            V b[1];
+            problems.series(t, hn::Set(d, 1.0), g, b);
+            const V weight = hn::Load(d, batch.quadrature_weight_s[node].data() + lane) * b[0];
+            slowed = sm::fma(d, weight, slow_solution(d, problems, t).re, slowed);
+        }
+        hn::Store(slowed, d, batch.slowed_rad.data() + lane);
+    }
+}
+
+}  // namespace ringlock::propagate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ringlock::propagate {
+
+HWY_EXPORT(solve);
+
+namespace {
+
 constexpr double least_adiabaticity = 100.0;
 constexpr double full_adiabaticity = 300.0;
 constexpr double latest_sine = 0.9;  // the slow solution must hold from here to the middle
 
-/// Taylor coefficients of g(t_s + scale_s x) scale_s in powers of x.
-template <std::size_t N>
-std::array<double, N> drive_series(const gyro::HalfCycle& half, double t_s, double scale_s) {
-    std::array<double, N> g{};
+double greatest_acceleration_rad_s2(const gyro::HalfCycle& half) {
     const double w = half.angular_frequency_rad_s();
-    const double sine = std::sin(w * t_s);
-    const double cosine = std::cos(w * t_s);
-    double power = half.amplitude_rad * w * scale_s;
-    for (std::size_t n = 0; n < N; ++n) {
-        const double derivative = n % 4 == 0 ? sine : n % 4 == 1 ? cosine : n % 4 == 2 ? -sine : -cosine;
-        g[n] = power * derivative;
-        power *= w * scale_s / static_cast<double>(n + 1);
-    }
-    g[0] += half.rate_rad_s * scale_s;
-    return g;
+    return half.amplitude_rad * w * w * (1.0 + 2.0 * std::abs(half.harmonic_ratio));
 }
 
-/// Time from which the motion is fast: g^2 >= adiabaticity * (greatest phase acceleration). NaN where there is none.
+/// Time from which the motion is fast: g^2 >= adiabaticity * (greatest phase acceleration), up to the middle. NaN where
+/// there is none. It need not be exact: any time at which the motion is fast will do.
 double fast_from_s(const gyro::HalfCycle& half, double adiabaticity) {
+    const double fast = std::sqrt(adiabaticity * greatest_acceleration_rad_s2(half));
     const double w = half.angular_frequency_rad_s();
-    const double peak = half.amplitude_rad * w;
-    const double sine = (std::sqrt(adiabaticity * half.end_acceleration_rad_s2()) - half.rate_rad_s) / peak;
-    if (!(sine <= latest_sine) || std::abs(half.rate_rad_s) >= peak) return std::nan("");
-    return std::asin(std::max(sine, 0.0)) / w;
+    double late = std::asin(latest_sine) / w;
+    for (int i = 0; i <= 8; ++i) {
+        if (!(half.drive_rate_rad_s(late + 0.125 * i * (0.5 * half.duration_s - late)) >= fast)) return std::nan("");
+    }
+    if (half.drive_rate_rad_s(0.0) >= fast) return 0.0;
+    double early = 0.0;
+    for (int i = 0; i < 30; ++i) {
+        const double middle = 0.5 * (early + late);
+        (half.drive_rate_rad_s(middle) >= fast ? late : early) = middle;
+    }
+    return late;
 }
 
 double choose_fast_from_s(const gyro::HalfCycle& half) {
@@ -55,107 +267,86 @@ double choose_fast_from_s(const gyro::HalfCycle& half) {
     return std::nan("");
 }
 
-/// First column (x, y) of the flow of x' = (i g/2) x - (b/2) y, y' = -(b/2) x - (i g/2) y from time 0 to `end_s`:
-/// the Moebius map w -> (x w + conj y)/(y w + conj x).
-std::array<Complex, 2> flow(const gyro::HalfCycle& half, double b_rad_s, double end_s) {
-    Complex x = 1.0;
-    Complex y = 0.0;
-    const double acceleration = half.end_acceleration_rad_s2();
-    double t = 0.0;
-    while (t < end_s) {
-        // Terms of order 24 of exp(i (g h/2 + a h^2/4)) below 1e-17.
-        const double rate = std::abs(half.drive_rate_rad_s(t)) + b_rad_s;
-        const double h_wanted = std::min(3.6 / rate, std::sqrt(0.8 / acceleration));
-        const double next = t + h_wanted >= end_s ? end_s : t + h_wanted;
-        const double h = next - t;
-        const auto g = drive_series<matrix_order>(half, t, h);
-        const double b = b_rad_s * h;
-        std::array<Complex, matrix_order + 1> xs{};
-        std::array<Complex, matrix_order + 1> ys{};
-        xs[0] = x;
-        ys[0] = y;
-        for (std::size_t n = 0; n < matrix_order; ++n) {
-            Complex gx = 0.0;
-            Complex gy = 0.0;
-            for (std::size_t j = 0; j <= n; ++j) {
-                gx += g[j] * xs[n - j];
-                gy += g[j] * ys[n - j];
-            }
-            const double scale = 0.5 / static_cast<double>(n + 1);
-            xs[n + 1] = scale * (Complex(-gx.imag(), gx.real()) - b * ys[n]);
-            ys[n + 1] = scale * (-b * xs[n] - Complex(-gy.imag(), gy.real()));
-        }
-        x = 0.0;
-        y = 0.0;
-        for (std::size_t n = matrix_order + 1; n-- > 0;) {
-            x += xs[n];
-            y += ys[n];
-        }
-        t = next;
+/// Fills one lane. K goes as 1/(t - zero), and the substitution t - zero = (start - zero) stretch^u takes that out of
+/// the quadrature.
+void prepare(Batch& batch, std::size_t lane, const HalfTurnProblem& problem, double start_s) {
+    const gyro::HalfCycle& half = problem.half;
+    const double w = half.angular_frequency_rad_s();
+    batch.amplitude_rad[lane] = half.amplitude_rad;
+    batch.angular_frequency_rad_s[lane] = w;
+    batch.rate_rad_s[lane] = half.rate_rad_s;
+    batch.harmonic_ratio[lane] = half.harmonic_ratio;
+    batch.harmonic_phase_fringes[lane] = half.harmonic_phase_rad / units::two_pi;
+    batch.b_rad_s[lane] = problem.b_rad_s;
+    batch.turn_asymmetry[lane] = problem.turn_asymmetry;
+    batch.fast_from_s[lane] = start_s;
+    batch.longest_step_s[lane] = std::sqrt(0.8 / greatest_acceleration_rad_s2(half));
+    const double sine = half.drive_rate_rad_s(0.0) / (half.amplitude_rad * w);
+    const double zero = -std::asin(std::clamp(sine, -1.0, 1.0)) / w;
+    const double stretch = std::log((0.5 * half.duration_s - zero) / (start_s - zero));
+    using Gauss = boost::math::quadrature::gauss<double, quadrature_nodes>;
+    for (std::size_t node = 0; node < quadrature_nodes; ++node) {
+        const std::size_t pair = node / 2;  // Boost keeps the positive abscissas of a symmetric rule
+        const double side = node % 2 == 0 ? 1.0 : -1.0;
+        const double u = 0.5 + 0.5 * side * Gauss::abscissa()[pair];
+        const double since = (start_s - zero) * std::exp(stretch * u);
+        batch.quadrature_time_s[node][lane] = zero + since;
+        batch.quadrature_weight_s[node][lane] = 0.5 * Gauss::weights()[pair] * since * stretch;
     }
-    return {x, y};
 }
 
 }  // namespace
 
-Complex slow_solution(const gyro::HalfCycle& half, double b_rad_s, double t_s) {
-    // K is iterated as a truncated Taylor series in x, t = t_s + x/|g|; each pass makes one more order of the
-    // asymptotic series right and uses up one Taylor coefficient for the derivative.
-    const double scale = 1.0 / half.angular_frequency_rad_s();
-    const auto g = drive_series<slow_terms>(half, t_s, scale);
-    const double b = b_rad_s * scale;
-    std::array<Complex, slow_terms> k{};
-    for (std::size_t pass = 0; pass < slow_terms; ++pass) {
-        std::array<Complex, slow_terms> right{};
-        for (std::size_t n = 0; n < slow_terms; ++n) {
-            Complex square = n == 0 ? 1.0 : 0.0;
-            for (std::size_t j = 0; j <= n; ++j) square += k[j] * k[n - j];
-            const Complex derivative = n + 1 < slow_terms ? static_cast<double>(n + 1) * k[n + 1] : Complex(0.0);
-            right[n] = 0.5 * b * square - Complex(0.0, 1.0) * derivative;
-        }
-        std::array<Complex, slow_terms> next{};  // right / g
-        for (std::size_t n = 0; n < slow_terms; ++n) {
-            Complex rest = right[n];
-            for (std::size_t j = 1; j <= n; ++j) rest -= g[j] * next[n - j];
-            next[n] = rest / g[0];
-        }
-        k = next;
-    }
-    return k[0];
+HalfTurnProblem beginning(const gyro::HalfCycle& half, const gyro::Coupling& coupling) {
+    return {{1.0, half.amplitude_rad, half.duration_s, half.sign * half.rate_rad_s, half.sign * half.harmonic_ratio,
+             half.harmonic_phase_rad},
+            coupling.b_rad_s,
+            half.sign * coupling.turn_asymmetry};
+}
+
+HalfTurnProblem ending(const gyro::HalfCycle& half, const gyro::Coupling& coupling) {
+    // sin(2 w (T - t) + f) = -sin(2 w t - f), cos(w (T - t)) = -cos(w t)
+    HalfTurnProblem problem = beginning(half, coupling);
+    problem.half.harmonic_ratio = -problem.half.harmonic_ratio;
+    problem.half.harmonic_phase_rad = -problem.half.harmonic_phase_rad;
+    problem.turn_asymmetry = -problem.turn_asymmetry;
+    return problem;
 }
 
 bool has_fast_middle(const gyro::HalfCycle& half) { return choose_fast_from_s(half) == choose_fast_from_s(half); }
 
-HalfTurn exact_half_turn(const gyro::HalfCycle& half, double b_rad_s) {
-    const double start = choose_fast_from_s(half);
-    if (!(start == start)) {
-        throw RunError(
-            fmt::format("turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s has no fast middle; "
-                        "use propagation.method = \"direct\"",
-                        half.amplitude_rad / units::pi, half.rate_rad_s));
+void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfTurn> turns) {
+    Batch batch;
+    for (std::size_t first = 0; first < problems.size(); first += simd::lanes) {
+        const std::size_t count = std::min(simd::lanes, problems.size() - first);
+        for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+            const HalfTurnProblem& problem = problems[first + std::min(lane, count - 1)];
+            const double start = choose_fast_from_s(problem.half);
+            if (!(start == start)) {
+                throw RunError(fmt::format(
+                    "turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s has no fast middle; "
+                    "use propagation.method = \"direct\"",
+                    problem.half.amplitude_rad / units::pi, problem.half.rate_rad_s));
+            }
+            prepare(batch, lane, problem, start);
+        }
+        HWY_DYNAMIC_DISPATCH(solve)(batch, count);
+        for (std::size_t lane = 0; lane < count; ++lane) {
+            HalfTurn& turn = turns[first + lane];
+            const double plain = problems[first + lane].half.plain_phase_rad(batch.fast_from_s[lane]);
+            const double angle = 2.0 * std::atan2(batch.alpha_im[lane], batch.alpha_re[lane]);
+            turn.shift_rad = std::remainder(angle - plain, units::two_pi) - batch.slowed_rad[lane];
+            turn.z = {batch.z_re[lane], batch.z_im[lane]};
+        }
     }
-    const double middle = 0.5 * half.duration_s;
-    const auto [x, y] = flow(half, b_rad_s, start);
-    const Complex k = slow_solution(half, b_rad_s, start);
-    // z = (w + i K)/(1 - i conj(K) w) after w -> (x w + conj y)/(y w + conj x); the common factor 1/sqrt(1 - |K|^2)
-    // is real and drops out.
-    const Complex ik = Complex(0.0, 1.0) * k;
-    const Complex alpha = x + ik * y;
-    const Complex beta = std::conj(y) + ik * std::conj(x);
-    // From `start` to the middle the frame turns at g - b Re K. K goes as 1/(t - zero), and the substitution
-    // t - zero = (start - zero) stretch^u takes that out.
-    const double w = half.angular_frequency_rad_s();
-    const double zero = std::asin(-half.rate_rad_s / (half.amplitude_rad * w)) / w;
-    const double stretch = std::log((middle - zero) / (start - zero));
-    const auto slow_rate = [&](double u) {
-        const double since = (start - zero) * std::exp(stretch * u);
-        return since * stretch * slow_solution(half, b_rad_s, zero + since).real();
-    };
-    const double slowed = b_rad_s * boost::math::quadrature::gauss<double, 20>::integrate(slow_rate, 0.0, 1.0);
+}
+
+HalfTurn exact_half_turn(const gyro::HalfCycle& half, double b_rad_s) {
+    const HalfTurnProblem problem{half, b_rad_s, 0.0};
     HalfTurn turn;
-    turn.shift_rad = std::remainder(2.0 * std::arg(alpha) - half.plain_phase_rad(start), units::two_pi) - slowed;
-    turn.z = beta / alpha;
+    exact_half_turns({&problem, 1}, {&turn, 1});
     return turn;
 }
 
 }  // namespace ringlock::propagate
+#endif

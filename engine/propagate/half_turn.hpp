@@ -1,5 +1,6 @@
 #pragma once
 #include <complex>
+#include <span>
 
 #include "engine/gyro/half_cycle.hpp"
 
@@ -16,16 +17,29 @@ struct HalfTurn {
     std::complex<double> z;
 };
 
-/// Computes the map from the equation of motion, to rounding. `half.sign` must be +1.
+/// A half turn to be solved.
+struct HalfTurnProblem {
+    gyro::HalfCycle half;         ///< sign +1
+    double b_rad_s = 0.0;         ///< coupling at the middle
+    double turn_asymmetry = 0.0;  ///< the coupling is b (1 + turn_asymmetry cos(w t))
+};
+
+/// The first half of a half cycle, turned upright: psi -> -psi maps the equation onto itself with g -> -g.
+HalfTurnProblem beginning(const gyro::HalfCycle& half, const gyro::Coupling& coupling);
+
+/// The second half of a half cycle, turned upright and reversed in time: psi(t) -> pi - psi(T - t).
+HalfTurnProblem ending(const gyro::HalfCycle& half, const gyro::Coupling& coupling);
+
+/// Computes the maps from the equation of motion, to rounding, several at once. Each result depends on its own problem
+/// alone. `turns` has as many elements as `problems`.
 ///
-/// Throws RunError where the half cycle has too few fringes for fast motion to exist between the turns.
+/// Throws RunError where a half cycle has too few fringes for fast motion to exist between the turns.
+void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfTurn> turns);
+
+/// One of them. `half.sign` must be +1.
 HalfTurn exact_half_turn(const gyro::HalfCycle& half, double b_rad_s);
 
 /// Whether exact_half_turn can be formed: enough fringes between the turn and the middle.
 bool has_fast_middle(const gyro::HalfCycle& half);
-
-/// The slow solution K(t) of the fast flow, to which i times the Riccati equation w' = i g w + (b/2)(w^2 - 1) is
-/// pinned between turns: w = -i K, K = (b/2)(1 + K^2)/g - i K'/g, as an asymptotic series in 1/(t g).
-std::complex<double> slow_solution(const gyro::HalfCycle& half, double b_rad_s, double t_s);
 
 }  // namespace ringlock::propagate

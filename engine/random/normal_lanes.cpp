@@ -46,7 +46,8 @@ HWY_INLINE Words<V> philox(D d, Words<V> c, std::uint32_t key0, std::uint32_t ke
 template <class D, class V>
 HWY_INLINE hn::Vec<hn::Rebind<double, D>> one_to_two(D d, V high, V low) {
     const hn::Rebind<double, D> real;
-    const V bits = hn::Or(hn::ShiftRight<12>(hn::ShiftLeft<32>(high)), hn::ShiftRight<12>(hn::And(low, hn::Set(d, 0xFFFFFFFFU))));
+    const V bits =
+        hn::Or(hn::ShiftRight<12>(hn::ShiftLeft<32>(high)), hn::ShiftRight<12>(hn::And(low, hn::Set(d, 0xFFFFFFFFU))));
     return hn::BitCast(real, hn::Or(bits, hn::Set(d, 0x3FF0000000000000U)));
 }
 
@@ -60,13 +61,14 @@ void fill_normals(const LaneIdentities& who, Purpose purpose, std::uint64_t firs
     for (std::size_t lane = 0; lane < lanes; lane += width) {
         const auto gyro = hn::LoadU(bits, who.gyro.data() + lane);
         // Gyros beyond 2^32 go on in the upper bits of the last word, above the purpose.
-        const auto last = hn::Or(hn::ShiftLeft<8>(hn::ShiftRight<32>(gyro)),
-                                 hn::Set(bits, static_cast<std::uint64_t>(purpose)));
+        const auto last =
+            hn::Or(hn::ShiftLeft<8>(hn::ShiftRight<32>(gyro)), hn::Set(bits, static_cast<std::uint64_t>(purpose)));
         const std::uint64_t end = first_step + steps;
         for (std::uint64_t step = first_step & ~std::uint64_t{1}; step < end; step += 2) {
             const std::uint64_t pair = step >> 1;
             using Bits = hn::Vec<decltype(bits)>;
-            const auto words = philox<Bits>(bits, {hn::Set(bits, pair), hn::Set(bits, pair >> 32), gyro, last}, key0, key1);
+            const auto words =
+                philox<Bits>(bits, {hn::Set(bits, pair), hn::Set(bits, pair >> 32), gyro, last}, key0, key1);
             const auto uniform = hn::Set(d, 2.0) - one_to_two(bits, words.w0, words.w1);  // in (0, 1]
             const auto angle = one_to_two(bits, words.w2, words.w3);
             const auto radius = hn::Sqrt(hn::Set(d, -2.0) * sm::log(d, uniform));

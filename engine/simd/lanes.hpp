@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <cstdint>
 
 /// Many gyros at once: every array of a block of gyros has one column for each of `lanes` of them.
 namespace ringlock::simd {
@@ -16,6 +17,15 @@ struct alignas(alignment) Lanes {
     double operator[](std::size_t lane) const { return values[lane]; }
     double* data() { return values; }
     const double* data() const { return values; }
+};
+
+/// One whole number for each gyro of a block.
+struct alignas(alignment) LaneCounts {
+    std::int64_t values[lanes] = {};
+    std::int64_t& operator[](std::size_t lane) { return values[lane]; }
+    std::int64_t operator[](std::size_t lane) const { return values[lane]; }
+    std::int64_t* data() { return values; }
+    const std::int64_t* data() const { return values; }
 };
 
 }  // namespace ringlock::simd

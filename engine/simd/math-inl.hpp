@@ -79,17 +79,11 @@ HWY_INLINE V fraction(D d, V fringes) {
 template <class D, class V>
 HWY_INLINE void sincos(D d, V fringes, V& sine, V& cosine) {
     // sin(x)/x and cos(x) as Taylor series in x^2 for |x| <= pi/4: the last terms are below 1e-17.
-    static constexpr double of_sine[] = {-1.0 / 6,         1.0 / 120,           -1.0 / 5040,
-                                         1.0 / 362880,     -1.0 / 39916800,     1.0 / 6227020800.0,
-                                         -1.0 / 1307674368000.0};
-    static constexpr double of_cosine[] = {-0.5,
-                                           1.0 / 24,
-                                           -1.0 / 720,
-                                           1.0 / 40320,
-                                           -1.0 / 3628800,
-                                           1.0 / 479001600,
-                                           -1.0 / 87178291200.0,
-                                           1.0 / 20922789888000.0};
+    static constexpr double of_sine[] = {-1.0 / 6,        1.0 / 120,          -1.0 / 5040,           1.0 / 362880,
+                                         -1.0 / 39916800, 1.0 / 6227020800.0, -1.0 / 1307674368000.0};
+    static constexpr double of_cosine[] = {
+        -0.5,           1.0 / 24,        -1.0 / 720,           1.0 / 40320,
+        -1.0 / 3628800, 1.0 / 479001600, -1.0 / 87178291200.0, 1.0 / 20922789888000.0};
     const hn::Rebind<std::uint64_t, D> bits;
     const V magic = hn::Set(d, 0x1.8p52);
     const V shifted = fma(d, fringes, hn::Set(d, 4.0), magic);
@@ -110,10 +104,10 @@ HWY_INLINE void sincos(D d, V fringes, V& sine, V& cosine) {
 /// precision.
 template <class D, class V>
 HWY_INLINE V atan_small(D d, V t) {
-    static constexpr double coefficients[] = {
-        -0x1.55555555551e4p-2, 0x1.9999999934e5p-3,   -0x1.2492490095732p-3, 0x1.c71c648aca6a2p-4,
-        -0x1.745baa2843f92p-4, 0x1.3afb01bbe7601p-4,  -0x1.0ffbe63b09941p-4, 0x1.d1fd545f28ae3p-5,
-        -0x1.64314395b2626p-5, 0x1.5a482e20112ecp-6};
+    static constexpr double coefficients[] = {-0x1.55555555551e4p-2, 0x1.9999999934e5p-3,   -0x1.2492490095732p-3,
+                                              0x1.c71c648aca6a2p-4,  -0x1.745baa2843f92p-4, 0x1.3afb01bbe7601p-4,
+                                              -0x1.0ffbe63b09941p-4, 0x1.d1fd545f28ae3p-5,  -0x1.64314395b2626p-5,
+                                              0x1.5a482e20112ecp-6};
     const V t2 = t * t;
     return fma(d, t * t2, polynomial(d, t2, coefficients), t);
 }
@@ -143,6 +137,29 @@ HWY_INLINE V arg(D d, V re, V im) {
     const V second = hn::IfThenElse(steep, hn::Set(d, 0x1.921fb54442d18p0) - first, first);
     const V third = hn::IfThenElse(re < hn::Zero(d), hn::Set(d, 0x1.921fb54442d18p1) - second, second);
     return hn::CopySign(third, im);
+}
+
+/// A complex number in each lane.
+template <class V>
+struct Complex {
+    V re;
+    V im;
+};
+
+template <class D, class V>
+HWY_INLINE Complex<V> mul(D d, Complex<V> a, Complex<V> b) {
+    return {fnma(d, a.im, b.im, a.re * b.re), fma(d, a.im, b.re, a.re * b.im)};
+}
+
+/// a b + c.
+template <class D, class V>
+HWY_INLINE Complex<V> mul_add(D d, Complex<V> a, Complex<V> b, Complex<V> c) {
+    return {fnma(d, a.im, b.im, fma(d, a.re, b.re, c.re)), fma(d, a.im, b.re, fma(d, a.re, b.im, c.im))};
+}
+
+template <class D, class V>
+HWY_INLINE V norm(D d, Complex<V> a) {
+    return fma(d, a.im, a.im, a.re * a.re);
 }
 
 /// Natural logarithm of normal positive numbers, error below 3e-16 + 2e-16 |log|.

@@ -1,0 +1,137 @@
+#include "engine/dither/lane_dither.hpp"
+
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/dither/lane_dither.cpp"
+#include "engine/simd/targets.hpp"
+// The above must come first.
+#include "engine/simd/math-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace ringlock::dither::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+namespace sm = simd::HWY_NAMESPACE;
+
+using D = hn::CappedTag<double, simd::lanes>;
+using V = hn::Vec<D>;
+
+/// `deviates`: of the turns after each turn of the piece; null: no noise.
+void fill(const LaneDither::Constants& constants, double noise_rms_rad, const simd::Lanes* deviates,
+          std::span<const simd::Lanes> angle_arcsec, std::span<const simd::Lanes> threshold_factor, std::size_t lanes,
+          LaneDither::State& state, gyro::LaneDrive& drive) {
+    const D d;
+    const V rms = hn::Set(d, noise_rms_rad);
+    const V per_rad = hn::Set(d, 0.15915494309189535);
+    for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+        const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
+        const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
+        V rotation = load(state.rotation_fringes);
+        V whole = load(state.rotation_whole);
+        V noise = load(state.noise_rad);
+        V rate = load(state.rate_rad_s);
+        V b = load(state.b_rad_s);
+        const V amplitude = load(constants.amplitude_rad);
+        store(load(state.amplitude_rad), drive.amplitude_rad[0]);
+        store(rate, drive.rate_rad_s[0]);
+        store(b, drive.b_rad_s[0]);
+        V swing = amplitude;
+        for (std::size_t i = 0; i < drive.turns; ++i) {
+            const int direction = drive.direction(i);
+            const std::size_t side = direction > 0 ? 0 : 1;
+            store(rotation, drive.rotation_fringes[i]);
+            store(whole, drive.rotation_whole[i]);
+            store(sm::fma(d, noise, per_rad, rotation + load(constants.start_fringes[side])), drive.plain_fringes[i]);
+            const V next = deviates != nullptr ? rms * load(deviates[i]) : hn::Zero(d);
+            swing = sm::fma(d, hn::Set(d, 0.5 * direction), next - noise, amplitude);
+            store(swing, drive.amplitude_rad[i + 1]);
+            V added = load(constants.turn_fringes[side]);
+            V added_whole = load(constants.turn_whole[side]);
+            if (!angle_arcsec.empty()) {
+                const V angle = load(angle_arcsec[i]);
+                rate = sm::fma(d, angle, load(constants.rate_per_arcsec[side]), load(constants.input_rate_rad_s));
+                const V fringes = angle * load(constants.fringes_per_arcsec);
+                const V nearest = sm::nearest(d, fringes);
+                added = added + (fringes - nearest);
+                added_whole = added_whole + nearest;
+            }
+            if (!threshold_factor.empty()) b = load(threshold_factor[i]) * load(constants.b_rad_s);
+            store(rate, drive.rate_rad_s[i + 1]);
+            store(b, drive.b_rad_s[i + 1]);
+            rotation = rotation + added;
+            const V carry = sm::nearest(d, rotation);
+            rotation = rotation - carry;
+            whole = whole + added_whole + carry;
+            noise = next;
+        }
+        store(rotation, state.rotation_fringes);
+        store(whole, state.rotation_whole);
+        store(noise, state.noise_rad);
+        store(swing, state.amplitude_rad);
+        store(rate, state.rate_rad_s);
+        store(b, state.b_rad_s);
+    }
+}
+
+}  // namespace ringlock::dither::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ringlock::dither {
+
+HWY_EXPORT(fill);
+
+LaneDither::LaneDither(std::span<const gyro::Device> devices, double noise_rms_rad, const random::LaneIdentities& who)
+    : lanes_(devices.size()), noise_rms_rad_(noise_rms_rad), who_(who) {
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+        // Lanes without a gyro go through the motions of the last one.
+        const gyro::Device& device = devices[std::min(lane, devices.size() - 1)];
+        constants_.amplitude_rad[lane] = device.dither_amplitude_rad;
+        constants_.input_rate_rad_s[lane] = device.input_rate_rad_s;
+        constants_.b_rad_s[lane] = device.coupling.b_rad_s;
+        constants_.fringes_per_arcsec[lane] = device.phase_per_arcsec / units::two_pi;
+        const double start = device.initial_phase_rad / units::two_pi;
+        const double peak = 2.0 * device.dither_amplitude_rad / units::two_pi;
+        constants_.start_fringes[0][lane] = start;
+        constants_.start_fringes[1][lane] = start + (peak - std::nearbyint(peak));
+        for (const std::size_t side : {0U, 1U}) {
+            const double duration_s = side == 0 ? device.positive_duration_s : device.negative_duration_s;
+            const double turned = device.input_rate_rad_s * duration_s / units::two_pi;
+            constants_.turn_whole[side][lane] = std::nearbyint(turned);
+            constants_.turn_fringes[side][lane] = turned - std::nearbyint(turned);
+            constants_.rate_per_arcsec[side][lane] = device.phase_per_arcsec / duration_s;
+        }
+    }
+    simd::Lanes first;
+    if (noise_rms_rad_ > 0.0) random::normals(who_, random::Purpose::noise_injection, 0, 1, lanes_, first.data());
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+        state_.noise_rad[lane] = noise_rms_rad_ * first[lane];
+        state_.amplitude_rad[lane] = constants_.amplitude_rad[lane] - 0.5 * state_.noise_rad[lane];
+    }
+    state_.rate_rad_s = constants_.input_rate_rad_s;
+    state_.b_rad_s = constants_.b_rad_s;
+}
+
+void LaneDither::next(std::size_t turns, std::span<const simd::Lanes> extra_angle_arcsec,
+                      std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive) {
+    drive.resize(turns);
+    drive.first_turn = turn_;
+    if (noise_rms_rad_ > 0.0) {
+        deviates_.resize(turns);
+        random::normals(who_, random::Purpose::noise_injection, static_cast<std::uint64_t>(turn_) + 1, turns, lanes_,
+                        deviates_.front().data());
+    }
+    HWY_DYNAMIC_DISPATCH(fill)
+    (constants_, noise_rms_rad_, noise_rms_rad_ > 0.0 ? deviates_.data() : nullptr, extra_angle_arcsec,
+     threshold_factor, lanes_, state_, drive);
+    turn_ += static_cast<std::int64_t>(turns);
+}
+
+double LaneDither::amplitude_margin_rad(double noise_rms_rad) {
+    // Half the difference of two deviates has an rms of rms/sqrt(2); 8 of these.
+    return 8.0 * noise_rms_rad / std::sqrt(2.0);
+}
+
+}  // namespace ringlock::dither
+#endif

@@ -1,0 +1,57 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/gyro/device.hpp"
+#include "engine/gyro/lane_drive.hpp"
+#include "engine/random/normal_lanes.hpp"
+
+namespace ringlock::dither {
+
+/// Drive of a block of gyros, piece after piece: the dither, optionally with random noise on its angle at each turn,
+/// and the rotation of the case.
+///
+/// Noise is on the angle, not on the rate: the case swings between noisy turns and stays where it is. Before turn 0 the
+/// drive is free of noise. Rates that vary in time are constant over each half cycle: at their mean.
+class LaneDither {
+   public:
+    /// `devices`: of each gyro, at most simd::lanes. `noise_rms_rad`: of each turn's angle in optical phase; 0: none.
+    LaneDither(std::span<const gyro::Device> devices, double noise_rms_rad, const random::LaneIdentities& who);
+
+    /// Fills in the next `turns` turns. `extra_angle_arcsec`: what varying rates add over the half cycle that begins at
+    /// each of them, [turn][gyro], or none; the half cycle's mean rate grows by it. `threshold_factor`: b of these half
+    /// cycles over the device's, or none.
+    void next(std::size_t turns, std::span<const simd::Lanes> extra_angle_arcsec,
+              std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive);
+
+    /// Amplitude that a half cycle can have with noise of this rms, beyond the device's, but for one in 1e15.
+    static double amplitude_margin_rad(double noise_rms_rad);
+
+    /// What the kernel needs, one value for each gyro; index 0 of a pair: half cycles of positive sign.
+    struct Constants {
+        simd::Lanes amplitude_rad, input_rate_rad_s, b_rad_s;
+        simd::Lanes start_fringes[2];  ///< phase at minima and maxima without noise and rotation
+        simd::Lanes turn_fringes[2];   ///< rotation of the input over a half cycle, less ...
+        simd::Lanes turn_whole[2];     ///< ... these whole fringes
+        simd::Lanes fringes_per_arcsec;
+        simd::Lanes rate_per_arcsec[2];  ///< mean phase rate of 1 arcsec over a half cycle [rad/s]
+    };
+    struct State {
+        simd::Lanes rotation_fringes, rotation_whole;
+        simd::Lanes noise_rad;                           ///< at the next turn
+        simd::Lanes amplitude_rad, rate_rad_s, b_rad_s;  ///< of the half cycle that ends there
+    };
+
+   private:
+    std::size_t lanes_;
+    double noise_rms_rad_;
+    random::LaneIdentities who_;
+    Constants constants_;
+    State state_;
+    std::int64_t turn_ = 0;
+    std::vector<simd::Lanes> deviates_;
+};
+
+}  // namespace ringlock::dither

@@ -1,0 +1,50 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "engine/simd/lanes.hpp"
+
+namespace ringlock::gyro {
+
+/// What the dither and the input do to a block of gyros over some consecutive turns: one row for each turn or half
+/// cycle, one column for each gyro. Turn 0 of a run is a minimum of the phase.
+///
+/// Half cycle i ends at turn i of the piece, half cycle i + 1 begins there.
+struct LaneDrive {
+    std::int64_t first_turn = 0;
+    std::size_t turns = 0;
+    std::vector<simd::Lanes> plain_fringes;     ///< [turns] phase of drive and input at the turn, less whole fringes
+    std::vector<simd::Lanes> amplitude_rad;     ///< [turns + 1] amplitude of the half cycle: half its swing
+    std::vector<simd::Lanes> rate_rad_s;        ///< [turns + 1] phase rate of the input over the half cycle
+    std::vector<simd::Lanes> b_rad_s;           ///< [turns + 1] coupling over the half cycle
+    std::vector<simd::Lanes> rotation_fringes;  ///< [turns] rotation of the case since turn 0 of the run, less ...
+    std::vector<simd::Lanes> rotation_whole;    ///< [turns] ... these whole fringes
+
+    void resize(std::size_t wanted) {
+        turns = wanted;
+        plain_fringes.resize(wanted);
+        amplitude_rad.resize(wanted + 1);
+        rate_rad_s.resize(wanted + 1);
+        b_rad_s.resize(wanted + 1);
+        rotation_fringes.resize(wanted);
+        rotation_whole.resize(wanted);
+    }
+    /// +1 where turn i of the piece is a minimum, -1 where it is a maximum.
+    int direction(std::size_t i) const { return (first_turn + static_cast<std::int64_t>(i)) % 2 == 0 ? 1 : -1; }
+};
+
+/// What the phase does at these turns of the dither.
+struct LaneTurns {
+    std::vector<simd::Lanes> cosine;  ///< [turns] of psi + coupling phase
+    std::vector<simd::Lanes> sine;
+    std::vector<simd::Lanes> lockin_fringes;  ///< [turns] phase that the lock-in has added, beyond `lockin_whole`
+    simd::Lanes lockin_whole;                 ///< whole fringes that the lock-in had added when the piece began
+
+    void resize(std::size_t turns) {
+        cosine.resize(turns);
+        sine.resize(turns);
+        lockin_fringes.resize(turns);
+    }
+};
+
+}  // namespace ringlock::gyro

@@ -1,0 +1,159 @@
+#include "engine/propagate/turn_kernel.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/propagate/turn_kernel.cpp"
+#include "engine/simd/targets.hpp"
+// The above must come first.
+#include "engine/simd/math-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace ringlock::propagate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+namespace sm = simd::HWY_NAMESPACE;
+
+using D = hn::CappedTag<double, simd::lanes>;
+using V = hn::Vec<D>;
+
+/// One half of a half cycle.
+struct HalfMap {
+    V shift, z_re, z_im;
+};
+
+/// Polynomials of one part at the scaled variables.
+HWY_INLINE HalfMap evaluate(D d, const TurnTables::Part& part, std::size_t lane, V amplitude, V rate, V coupling) {
+    const auto [amplitudes, rates, couplings] = part.terms;
+    const simd::Lanes* row = part.coefficients.data() + 3 * amplitudes * rates * couplings;
+    // Terms that a gyro does not have are zeros: 0 x + c is c to the bit.
+    const V zero = hn::Zero(d);
+    V sum[3] = {zero, zero, zero};
+    for (std::size_t c = 0; c < couplings; ++c) {
+        V over_rate[3] = {zero, zero, zero};
+        for (std::size_t b = 0; b < rates; ++b) {
+            row -= 3;
+            V over_amplitude[3];
+            for (std::size_t k = 0; k < 3; ++k) over_amplitude[k] = hn::Load(d, row[k].data() + lane);
+            for (std::size_t a = 1; a < amplitudes; ++a) {
+                row -= 3;
+                for (std::size_t k = 0; k < 3; ++k) {
+                    over_amplitude[k] = sm::fma(d, over_amplitude[k], amplitude, hn::Load(d, row[k].data() + lane));
+                }
+            }
+            for (std::size_t k = 0; k < 3; ++k) over_rate[k] = sm::fma(d, over_rate[k], rate, over_amplitude[k]);
+        }
+        for (std::size_t k = 0; k < 3; ++k) sum[k] = sm::fma(d, sum[k], coupling, over_rate[k]);
+    }
+    return {sum[0], sum[1], sum[2]};
+}
+
+/// `group` vectors side by side: the turns of one hide the latency of the other's.
+template <std::size_t group, bool turns_wanted>
+void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t first_lane, TurnState& state,
+          gyro::LaneTurns* turns) {
+    const D d;
+    const std::size_t width = hn::Lanes(d);
+    const V one = hn::Set(d, 1.0);
+    const V per_half_pi = hn::Set(d, 0.3183098861837907);  // 2 rad in fringes
+    V lockin[group], phase[group], shift_before[group], re_before[group], im_before[group];
+    for (std::size_t g = 0; g < group; ++g) {
+        const std::size_t lane = first_lane + g * width;
+        lockin[g] = hn::Load(d, state.lockin_fringes.data() + lane);
+        phase[g] = hn::Load(d, state.coupling_phase_fringes.data() + lane);
+        shift_before[g] = hn::Load(d, state.shift_fringes.data() + lane);
+        re_before[g] = hn::Load(d, state.z_re.data() + lane);
+        im_before[g] = hn::Load(d, state.z_im.data() + lane);
+        if constexpr (turns_wanted) {
+            hn::Store(hn::Load(d, state.whole.data() + lane), d, turns->lockin_whole.data() + lane);
+        }
+    }
+    const bool both = !tables.symmetric();
+    for (std::size_t i = 0; i < drive.turns; ++i) {
+        const double direction = drive.direction(i);
+        const TurnTables::Part& begin = tables.part(direction, 0);
+        const TurnTables::Part& end = tables.part(direction, 1);
+        const V sign = hn::Set(d, direction);
+        for (std::size_t g = 0; g < group; ++g) {
+            const std::size_t lane = first_lane + g * width;
+            const auto scaled = [&](const std::vector<simd::Lanes>& rows, std::size_t variable) HWY_ATTR {
+                const V value = hn::Load(d, rows[i + 1].data() + lane);
+                const V centre = hn::Load(d, tables.centre()[variable].data() + lane);
+                return (value - centre) * hn::Load(d, tables.inverse_half_width()[variable].data() + lane);
+            };
+            const V x = scaled(drive.amplitude_rad, 0);
+            const V y = scaled(drive.rate_rad_s, 1);
+            const V c = scaled(drive.b_rad_s, 2);
+            const HalfMap after = evaluate(d, begin, lane, x, y, c);
+            const HalfMap next = both ? evaluate(d, end, lane, x, y, c) : after;
+
+            // u is the phase at the turn but for the second half's own bend; p = exp(-i sign u).
+            const V before_turn = sm::fnma(d, sign, shift_before[g], lockin[g]);
+            const V u = hn::Load(d, drive.plain_fringes[i].data() + lane) + phase[g] + before_turn;
+            V sine, cosine;
+            sm::sincos(d, u, sine, cosine);
+            const sm::Complex<V> p{cosine, hn::Neg(sign * sine)};
+            const sm::Complex<V> z_before{re_before[g], im_before[g]};
+            const sm::Complex<V> z_after{after.z_re, after.z_im};
+            const sm::Complex<V> v = sm::mul_add(d, z_before, p, sm::Complex<V>{one, hn::Zero(d)});
+            const sm::Complex<V> w = sm::mul(d, p, sm::Complex<V>{v.re, hn::Neg(v.im)});
+            if constexpr (turns_wanted) {
+                // exp(-i sign psi) = p conj(v)/v
+                const V inverse = one / sm::norm(d, v);
+                const sm::Complex<V> e = sm::mul(d, w, sm::Complex<V>{v.re, hn::Neg(v.im)});
+                hn::Store(e.re * inverse, d, turns->cosine[i].data() + lane);
+                hn::Store(hn::Neg(sign * e.im * inverse), d, turns->sine[i].data() + lane);
+                const V bend = sm::arg_right(d, v.re, v.im) * per_half_pi;
+                hn::Store(sm::fma(d, sign, bend, before_turn), d, turns->lockin_fringes[i].data() + lane);
+            }
+            const sm::Complex<V> q = sm::mul_add(d, z_after, w, v);
+            const V gain = sm::fma(d, sm::arg_right(d, q.re, q.im), per_half_pi, after.shift);
+            lockin[g] = sm::fma(d, sign, gain, before_turn);
+            shift_before[g] = next.shift;
+            re_before[g] = next.z_re;
+            im_before[g] = next.z_im;
+        }
+    }
+    for (std::size_t g = 0; g < group; ++g) {
+        const std::size_t lane = first_lane + g * width;
+        const V whole = sm::nearest(d, lockin[g]);
+        hn::Store(lockin[g] - whole, d, state.lockin_fringes.data() + lane);
+        hn::Store(hn::Load(d, state.whole.data() + lane) + whole, d, state.whole.data() + lane);
+        hn::Store(shift_before[g], d, state.shift_fringes.data() + lane);
+        hn::Store(re_before[g], d, state.z_re.data() + lane);
+        hn::Store(im_before[g], d, state.z_im.data() + lane);
+    }
+}
+
+template <bool turns_wanted>
+void step_all(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t lanes, TurnState& state,
+              gyro::LaneTurns* turns) {
+    const std::size_t width = hn::Lanes(D());
+    std::size_t lane = 0;
+    for (; lane + width < lanes; lane += 2 * width) step<2, turns_wanted>(tables, drive, lane, state, turns);
+    for (; lane < lanes; lane += width) step<1, turns_wanted>(tables, drive, lane, state, turns);
+}
+
+void step_lanes(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t lanes, TurnState& state,
+                gyro::LaneTurns* turns) {
+    if (turns != nullptr) {
+        step_all<true>(tables, drive, lanes, state, turns);
+    } else {
+        step_all<false>(tables, drive, lanes, state, turns);
+    }
+}
+
+}  // namespace ringlock::propagate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ringlock::propagate {
+
+HWY_EXPORT(step_lanes);
+
+void step_turns(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t lanes, TurnState& state,
+                gyro::LaneTurns* turns) {
+    if (turns != nullptr) turns->resize(drive.turns);
+    HWY_DYNAMIC_DISPATCH(step_lanes)(tables, drive, lanes, state, turns);
+}
+
+}  // namespace ringlock::propagate
+#endif

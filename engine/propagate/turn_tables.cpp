@@ -1,0 +1,272 @@
+#include "engine/propagate/turn_tables.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+
+#include "engine/core/error.hpp"
+#include "engine/propagate/half_turn.hpp"
+
+namespace ringlock::propagate {
+
+namespace {
+
+constexpr std::size_t variables = TurnTables::variables;
+using Point = std::array<double, variables>;  // in [-1, 1]
+using Terms = std::array<std::size_t, variables>;
+using Values = std::array<double, 3>;  // shift in fringes, Re z, Im z
+
+/// What exact_half_turns makes of points of the ranges.
+class Source {
+   public:
+    Source(const gyro::Device& device, double sign, int end, const std::array<Range, variables>& ranges)
+        : device_(device), sign_(sign), end_(end), ranges_(ranges) {}
+
+    std::vector<Values> at(const std::vector<Point>& points) const {
+        std::vector<HalfTurnProblem> problems;
+        for (const Point& point : points) {
+            gyro::HalfCycle half = device_.half_cycle(sign_, value(0, point));
+            half.rate_rad_s = value(1, point);
+            gyro::Coupling coupling = device_.coupling;
+            coupling.b_rad_s = value(2, point);
+            problems.push_back(end_ == 0 ? beginning(half, coupling) : ending(half, coupling));
+        }
+        std::vector<HalfTurn> turns(problems.size());
+        exact_half_turns(problems, turns);
+        std::vector<Values> values;
+        for (std::size_t i = 0; i < turns.size(); ++i) {
+            // Half of the half cycle's plain phase is taken out by the user; a harmonic makes the two halves unequal.
+            const gyro::HalfCycle& half = problems[i].half;
+            const double unequal = half.amplitude_rad * half.harmonic_ratio * std::cos(half.harmonic_phase_rad);
+            values.push_back({(turns[i].shift_rad + unequal) / units::two_pi, turns[i].z.real(), turns[i].z.imag()});
+        }
+        return values;
+    }
+
+   private:
+    double value(std::size_t variable, const Point& point) const {
+        const Range& range = ranges_[variable];
+        return 0.5 * ((range.highest + range.lowest) + point[variable] * (range.highest - range.lowest));
+    }
+
+    const gyro::Device& device_;
+    double sign_;
+    int end_;
+    const std::array<Range, variables>& ranges_;
+};
+
+double node(std::size_t i, std::size_t terms) {
+    return terms == 1 ? 0.0 : std::cos(units::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(terms));
+}
+
+/// Row i: the powers' coefficients of the i-th Lagrange polynomial of the Chebyshev nodes.
+std::vector<std::vector<double>> lagrange_powers(std::size_t terms) {
+    // Chebyshev coefficients first, then their recurrence in powers: both well conditioned for the few terms used.
+    std::vector<std::vector<double>> chebyshev(terms, std::vector<double>(terms, 0.0));  // [n][power]
+    chebyshev[0][0] = 1.0;
+    if (terms > 1) chebyshev[1][1] = 1.0;
+    for (std::size_t n = 2; n < terms; ++n) {
+        for (std::size_t k = 0; k < terms; ++k) {
+            chebyshev[n][k] = (k > 0 ? 2.0 * chebyshev[n - 1][k - 1] : 0.0) - chebyshev[n - 2][k];
+        }
+    }
+    std::vector<std::vector<double>> rows(terms, std::vector<double>(terms, 0.0));
+    for (std::size_t i = 0; i < terms; ++i) {
+        const double angle = units::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(terms);
+        for (std::size_t n = 0; n < terms; ++n) {
+            const double weight =
+                (n == 0 ? 1.0 : 2.0) / static_cast<double>(terms) * std::cos(static_cast<double>(n) * angle);
+            for (std::size_t k = 0; k < terms; ++k) rows[i][k] += weight * chebyshev[n][k];
+        }
+    }
+    return rows;
+}
+
+/// Polynomial of a part for one gyro: [coupling][rate][amplitude].
+struct Polynomial {
+    Terms terms{1, 1, 1};
+    std::vector<Values> coefficients;
+
+    Values at(const Point& point) const {
+        Values sum{};
+        std::size_t i = 0;
+        double third = 1.0;
+        for (std::size_t c = 0; c < terms[2]; ++c, third *= point[2]) {
+            double second = third;
+            for (std::size_t b = 0; b < terms[1]; ++b, second *= point[1]) {
+                double first = second;
+                for (std::size_t a = 0; a < terms[0]; ++a, first *= point[0], ++i) {
+                    for (std::size_t k = 0; k < 3; ++k) sum[k] += first * coefficients[i][k];
+                }
+            }
+        }
+        return sum;
+    }
+};
+
+Polynomial interpolate(const Source& source, const Terms& terms) {
+    std::vector<Point> points;
+    for (std::size_t c = 0; c < terms[2]; ++c) {
+        for (std::size_t b = 0; b < terms[1]; ++b) {
+            for (std::size_t a = 0; a < terms[0]; ++a) {
+                points.push_back({node(a, terms[0]), node(b, terms[1]), node(c, terms[2])});
+            }
+        }
+    }
+    Polynomial polynomial{terms, source.at(points)};
+    // One variable after the other, from values at nodes to coefficients of powers.
+    std::size_t stride = 1;
+    for (std::size_t v = 0; v < variables; ++v) {
+        const std::size_t n = terms[v];
+        const auto rows = lagrange_powers(n);
+        std::vector<Values> next(polynomial.coefficients.size(), Values{});
+        for (std::size_t i = 0; i < next.size(); ++i) {
+            const std::size_t at = i / stride % n;
+            for (std::size_t k = 0; k < n; ++k) {
+                for (std::size_t c = 0; c < 3; ++c) {
+                    next[i - at * stride + k * stride][c] += rows[at][k] * polynomial.coefficients[i][c];
+                }
+            }
+        }
+        polynomial.coefficients = std::move(next);
+        stride *= n;
+    }
+    return polynomial;
+}
+
+/// Largest error of a turn, two half turns, at the points [rad].
+double error_rad(const Source& source, const Polynomial& polynomial, const std::vector<Point>& points) {
+    const std::vector<Values> exact = source.at(points);
+    double worst = 0.0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const Values table = polynomial.at(points[i]);
+        // A half turn's phase depends on shift directly and on z through 2 arg(1 + z ...).
+        worst = std::max({worst, units::two_pi * std::abs(exact[i][0] - table[0]),
+                          2.0 * std::hypot(exact[i][1] - table[1], exact[i][2] - table[2])});
+    }
+    return 2.0 * worst;
+}
+
+/// Points between the nodes: spread over the ranges by the golden ratio, the corners among them.
+std::vector<Point> probes(const Terms& terms) {
+    std::vector<Point> points;
+    for (int i = 0; i < 8; ++i) {
+        Point inside{};
+        Point corner{};
+        for (std::size_t v = 0; v < variables; ++v) {
+            if (terms[v] == 1) continue;
+            const double golden = (static_cast<double>(i) + 0.5) * (v == 0 ? 0.618034 : v == 1 ? 0.754878 : 0.569840);
+            inside[v] = 2.0 * (golden - std::floor(golden)) - 1.0;
+            corner[v] = (i >> v & 1) != 0 ? 1.0 : -1.0;
+        }
+        points.push_back(inside);
+        points.push_back(corner);
+    }
+    return points;
+}
+
+/// Terms that one variable takes by itself, the others in the middle of their ranges.
+std::size_t terms_needed(const Source& source, std::size_t variable, double tolerance_rad) {
+    for (const std::size_t n : {3U, 4U, 5U, 6U, 8U, 10U, 12U, 16U, 20U}) {
+        Terms terms{1, 1, 1};
+        terms[variable] = n;
+        const Polynomial polynomial = interpolate(source, terms);
+        std::vector<Point> points;
+        for (int i = 0; i <= 4; ++i) {  // between the nodes and at the ends
+            Point point{};
+            point[variable] = -std::cos(units::pi * static_cast<double>(i) / 4.0 * 0.998 + 0.003);
+            points.push_back(point);
+        }
+        if (error_rad(source, polynomial, points) <= 0.5 * tolerance_rad) return n;
+    }
+    return TurnTables::most_nodes;
+}
+
+}  // namespace
+
+void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCycleRanges& wanted) {
+    ranges_[lane] = wanted;
+    const std::array<Range, variables> ranges{wanted.amplitude_rad, wanted.rate_rad_s, wanted.b_rad_s};
+    for (std::size_t v = 0; v < variables; ++v) {
+        const double width = ranges[v].highest - ranges[v].lowest;
+        centre_[v][lane] = 0.5 * (ranges[v].highest + ranges[v].lowest);
+        inverse_[v][lane] = width > 0.0 ? 2.0 / width : 0.0;
+    }
+    const bool alike = device.harmonic_ratio == 0.0 && device.coupling.turn_asymmetry == 0.0;
+    if (!alike && symmetric_) {  // the gyros before have only one end so far, which is both
+        for (std::size_t i = 0; i < 4; i += 2) parts_[i + 1] = parts_[i];
+        symmetric_ = false;
+    }
+    for (const double sign : {1.0, -1.0}) {
+        for (int end = 0; end < (symmetric_ ? 1 : 2); ++end) {
+            const Source source(device, sign, end, ranges);
+            Terms terms{1, 1, 1};
+            for (std::size_t v = 0; v < variables; ++v) {
+                if (inverse_[v][lane] > 0.0) terms[v] = terms_needed(source, v, tolerance_rad_);
+            }
+            Polynomial polynomial;
+            double error = 0.0;
+            for (;;) {
+                const std::size_t largest = *std::max_element(terms.begin(), terms.end());
+                polynomial = interpolate(source, terms);
+                error = error_rad(source, polynomial, probes(terms));
+                if (error <= tolerance_rad_) break;
+                if (largest >= most_nodes) {
+                    throw RunError(fmt::format(
+                        "turn map: {} nodes over amplitudes {:.6g} to {:.6g} rad and rates {:.6g} to {:.6g} rad/s "
+                        "leave an error of {:.3g} rad, above {:.3g}; raise propagation.turn_map_tolerance_rad or "
+                        "narrow the spread of amplitudes and rates",
+                        largest, ranges[0].lowest, ranges[0].highest, ranges[1].lowest, ranges[1].highest, error,
+                        tolerance_rad_));
+                }
+                for (std::size_t v = 0; v < variables; ++v) terms[v] += terms[v] > 1 ? 1 : 0;
+            }
+            error_rad_[lane] = std::max(error_rad_[lane], error);
+            put(parts_[index(sign, end)], lane, terms, polynomial.coefficients);
+        }
+    }
+}
+
+void TurnTables::put(Part& part, std::size_t lane, const std::array<std::size_t, variables>& terms,
+                     const std::vector<std::array<double, 3>>& coefficients) {
+    std::array<std::size_t, variables> grown{};
+    for (std::size_t v = 0; v < variables; ++v) grown[v] = std::max(part.terms[v], terms[v]);
+    const auto at = [](const std::array<std::size_t, variables>& n, std::size_t a, std::size_t b, std::size_t c) {
+        return (c * n[1] + b) * n[0] + a;
+    };
+    if (grown != part.terms || part.coefficients.empty()) {
+        std::vector<simd::Lanes> moved(3 * grown[0] * grown[1] * grown[2]);
+        for (std::size_t c = 0; c < part.terms[2] && !part.coefficients.empty(); ++c) {
+            for (std::size_t b = 0; b < part.terms[1]; ++b) {
+                for (std::size_t a = 0; a < part.terms[0]; ++a) {
+                    for (std::size_t k = 0; k < 3; ++k) {
+                        moved[3 * at(grown, a, b, c) + k] = part.coefficients[3 * at(part.terms, a, b, c) + k];
+                    }
+                }
+            }
+        }
+        part.terms = grown;
+        part.coefficients = std::move(moved);
+    }
+    for (std::size_t c = 0; c < grown[2]; ++c) {
+        for (std::size_t b = 0; b < grown[1]; ++b) {
+            for (std::size_t a = 0; a < grown[0]; ++a) {
+                const bool has = a < terms[0] && b < terms[1] && c < terms[2];
+                for (std::size_t k = 0; k < 3; ++k) {
+                    part.coefficients[3 * at(grown, a, b, c) + k][lane] =
+                        has ? coefficients[at(terms, a, b, c)][k] : 0.0;
+                }
+            }
+        }
+    }
+}
+
+std::size_t TurnTables::nodes() const {
+    std::size_t most = 1;
+    for (const Part& part : parts_) most = std::max(most, *std::max_element(part.terms.begin(), part.terms.end()));
+    return most;
+}
+
+}  // namespace ringlock::propagate

@@ -1,0 +1,77 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "engine/gyro/device.hpp"
+#include "engine/simd/lanes.hpp"
+
+namespace ringlock::propagate {
+
+/// Values that a quantity of the half cycles takes.
+struct Range {
+    double lowest = 0.0;
+    double highest = 0.0;
+
+    bool covers(double value) const { return value >= lowest && value <= highest; }
+};
+
+/// What may differ from half cycle to half cycle of one gyro.
+struct HalfCycleRanges {
+    Range amplitude_rad;
+    Range rate_rad_s;
+    Range b_rad_s;
+};
+
+/// The exact half turns of a block of gyros as polynomials in amplitude, rate and coupling.
+///
+/// Each gyro has its own polynomials over its own ranges, of as many terms as hold the error measured between the
+/// nodes; a quantity that does not vary takes one term. What a gyro's polynomials are depends on its device and ranges
+/// alone.
+class TurnTables {
+   public:
+    static constexpr std::size_t variables = 3;
+    static constexpr std::size_t most_nodes = 24;
+
+    /// Polynomials of the half turns at one end of half cycles of one sign.
+    struct Part {
+        /// Terms in each variable: the largest number of any gyro, others have zeros.
+        std::array<std::size_t, variables> terms{1, 1, 1};
+        /// [coupling][rate][amplitude][shift in fringes, Re z, Im z], powers of the variables scaled to [-1, 1].
+        std::vector<simd::Lanes> coefficients;
+    };
+
+    /// `tolerance_rad`: interpolation error of a turn.
+    explicit TurnTables(double tolerance_rad) : tolerance_rad_(tolerance_rad) {}
+
+    /// Makes the polynomials of one gyro. Throws RunError where the tolerance cannot be held.
+    void make(std::size_t lane, const gyro::Device& device, const HalfCycleRanges& ranges);
+
+    /// End 0: from the turn at which the half cycle begins to its middle. End 1: from its middle to the next turn.
+    const Part& part(double sign, int end) const { return parts_[index(sign, symmetric_ ? 0 : end)]; }
+    /// Both ends are alike for all gyros.
+    bool symmetric() const { return symmetric_; }
+    /// Middle and inverse half width of the ranges, 0 for what does not vary.
+    const std::array<simd::Lanes, variables>& centre() const { return centre_; }
+    const std::array<simd::Lanes, variables>& inverse_half_width() const { return inverse_; }
+    const HalfCycleRanges& ranges(std::size_t lane) const { return ranges_[lane]; }
+    /// Largest interpolation error of a turn of that gyro, measured between the nodes of all its tables so far [rad].
+    double measured_error_rad(std::size_t lane) const { return error_rad_[lane]; }
+    /// Largest number of terms in any variable.
+    std::size_t nodes() const;
+
+   private:
+    static std::size_t index(double sign, int end) { return (sign > 0 ? 0U : 2U) + static_cast<std::size_t>(end); }
+    void put(Part& part, std::size_t lane, const std::array<std::size_t, variables>& terms,
+             const std::vector<std::array<double, 3>>& coefficients);
+
+    double tolerance_rad_;
+    bool symmetric_ = true;
+    std::array<Part, 4> parts_;
+    std::array<simd::Lanes, variables> centre_;
+    std::array<simd::Lanes, variables> inverse_;
+    std::array<HalfCycleRanges, simd::lanes> ranges_{};
+    std::array<double, simd::lanes> error_rad_{};
+};
+
+}  // namespace ringlock::propagate
