@@ -55,11 +55,16 @@ double choose_fast_from_s(const gyro::HalfCycle& half) {
     return std::nan("");
 }
 
-/// First column (x, y) of the flow of x' = (i g/2) x - (b/2) y, y' = -(b/2) x - (i g/2) y from time 0 to `end_s`:
-/// the Moebius map w -> (x w + conj y)/(y w + conj x).
-std::array<Complex, 2> flow(const gyro::HalfCycle& half, double b_rad_s, double end_s) {
+/// First column of a 2x2 flow, the Moebius map w -> (x w + conj y)/(y w + conj x).
+struct Flow {
     Complex x = 1.0;
     Complex y = 0.0;
+    double turned_rad = 0.0;  ///< argument of x, followed from 0 on: strong coupling turns it by whole fringes
+};
+
+/// The flow of x' = (i g/2) x - (b/2) y, y' = -(b/2) x - (i g/2) y from time 0 to `end_s`.
+Flow flow(const gyro::HalfCycle& half, double b_rad_s, double end_s) {
+    auto [x, y, turned_rad] = Flow();
     const double acceleration = half.end_acceleration_rad_s2();
     double t = 0.0;
     while (t < end_s) {
@@ -91,9 +96,10 @@ std::array<Complex, 2> flow(const gyro::HalfCycle& half, double b_rad_s, double 
             x += xs[n];
             y += ys[n];
         }
+        turned_rad += std::arg(x * std::conj(xs[0]));  // some 2 rad a step, for |y| < |x|
         t = next;
     }
-    return {x, y};
+    return {x, y, turned_rad};
 }
 
 }  // namespace
@@ -135,7 +141,7 @@ HalfTurn exact_half_turn(const gyro::HalfCycle& half, double b_rad_s) {
                         half.amplitude_rad / units::pi, half.rate_rad_s));
     }
     const double middle = 0.5 * half.duration_s;
-    const auto [x, y] = flow(half, b_rad_s, start);
+    const auto [x, y, turned_rad] = flow(half, b_rad_s, start);
     const Complex k = slow_solution(half, b_rad_s, start);
     // z = (w + i K)/(1 - i conj(K) w) after w -> (x w + conj y)/(y w + conj x); the common factor 1/sqrt(1 - |K|^2)
     // is real and drops out.
@@ -152,8 +158,13 @@ HalfTurn exact_half_turn(const gyro::HalfCycle& half, double b_rad_s) {
         return since * stretch * slow_solution(half, b_rad_s, zero + since).real();
     };
     const double slowed = b_rad_s * boost::math::quadrature::gauss<double, 20>::integrate(slow_rate, 0.0, 1.0);
+    // The fringe from the argument that was followed, the rest from alpha itself: a sum over steps loses digits.
+    // |K y| < |x|, so that alpha lies within a quarter turn of x.
+    const double plain = half.plain_phase_rad(start);
+    const double followed = 2.0 * (turned_rad + std::arg(alpha * std::conj(x))) - plain;
+    const double rest = std::remainder(2.0 * std::arg(alpha) - plain, units::two_pi);
     HalfTurn turn;
-    turn.shift_rad = std::remainder(2.0 * std::arg(alpha) - half.plain_phase_rad(start), units::two_pi) - slowed;
+    turn.shift_rad = rest + units::two_pi * std::nearbyint((followed - rest) / units::two_pi) - slowed;
     turn.z = beta / alpha;
     return turn;
 }

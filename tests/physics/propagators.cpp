@@ -40,6 +40,25 @@ TEST(Propagators, TurnMapAgreesWithDirectIntegratorTo1e8RadATurn) {
     EXPECT_LT(worst_difference(60, 50000.0, 12), 1e-8);
 }
 
+TEST(Propagators, StrongCouplingKeepsItsWholeFringes) {
+    // From some 7000 deg/h on, half a turn is late by more than half a fringe.
+    for (const double threshold_deg_h : {6000.0, 8000.0, 20000.0, 50000.0}) {
+        for (const double rate_deg_h : {0.0, 15.0, -40000.0}) {
+            gyro::Setup setup = paper_device();
+            setup.lockin_threshold_deg_h = threshold_deg_h;
+            setup.input_rate_deg_h = rate_deg_h;
+            const gyro::Device device(setup);
+            const auto direct = make_propagator(Method::direct, device, 0.0, 1e-12);
+            const auto map = make_propagator(Method::turn_map, device);
+            for (const double sign : {1.0, -1.0}) {
+                const auto half = device.half_cycle(sign, device.dither_amplitude_rad);
+                EXPECT_NEAR(map->lockin_gain_rad(0.7, half, 0.0), direct->lockin_gain_rad(0.7, half, 0.0), 1e-8)
+                    << threshold_deg_h << " at " << rate_deg_h << " deg/h, sign " << sign;
+            }
+        }
+    }
+}
+
 TEST(LongPropagators, TurnMapAgreesWithDirectIntegratorOverTenThousandTurns) {
     EXPECT_LT(worst_difference(10000, 50000.0, 13), 1e-9);
 }
