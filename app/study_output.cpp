@@ -33,6 +33,11 @@ Json json_mean(const study::MeanFigure& figure) {
     return {{"mean", number(figure.mean)}, {"lo", number(figure.lo)}, {"hi", number(figure.hi)}};
 }
 
+bool has_closed_form(const study::ArmSummary& arm) {
+    return std::any_of(arm.sweep.begin(), arm.sweep.end(),
+                       [](const study::SweepPoint& point) { return point.closed_form_rate_deg_h.has_value(); });
+}
+
 Json json_arm(const study::ArmSummary& arm) {
     Json json{{"gyros", arm.gyros},
               {"arw_deg_rt_h", arm.noise_injected ? json_figure(arm.arw_deg_rt_h) : Json(nullptr)},
@@ -51,10 +56,21 @@ Json json_arm(const study::ArmSummary& arm) {
         json["locked_up_to_deg_h"] = number(study::locked_up_to_deg_h(arm));
         json["sweep"] = Json::array();
         for (const study::SweepPoint& point : arm.sweep) {
-            json["sweep"].push_back({{"input_rate_deg_h", point.input_rate_deg_h},
-                                     {"output_rate_deg_h", json_mean(point.output_rate_deg_h)},
-                                     {"locked", point.locked},
-                                     {"gyros", point.gyros}});
+            Json rate{{"input_rate_deg_h", point.input_rate_deg_h},
+                      {"output_rate_deg_h", json_mean(point.output_rate_deg_h)},
+                      {"locked", point.locked},
+                      {"gyros", point.gyros}};
+            if (point.closed_form_rate_deg_h) rate["closed_form_rate_deg_h"] = number(point.closed_form_rate_deg_h);
+            json["sweep"].push_back(std::move(rate));
+        }
+        if (has_closed_form(arm)) {
+            json["steps"] = Json::array();
+            for (const study::Step& step : arm.steps) {
+                json["steps"].push_back({{"order", step.order},
+                                         {"output_rate_deg_h", step.output_rate_deg_h},
+                                         {"first_input_rate_deg_h", step.first_deg_h},
+                                         {"last_input_rate_deg_h", step.last_deg_h}});
+            }
         }
     }
     return json;
@@ -99,6 +115,21 @@ report::Table arm_table(const study::Summary& summary) {
     return table;
 }
 
+/// Where the arm stands on the staircase.
+std::string steps_text(const study::ArmSummary& arm) {
+    if (arm.steps.empty()) return "";
+    report::Table table({{"step n", report::Align::right},
+                         {"output deg/h", report::Align::right},
+                         {"from input deg/h", report::Align::right},
+                         {"to", report::Align::right}});
+    for (const study::Step& step : arm.steps) {
+        table.add_row({fmt::format("{}", step.order), rate_cell(step.output_rate_deg_h),
+                       fmt::format("{:.3f}", step.first_deg_h), fmt::format("{:.3f}", step.last_deg_h)});
+    }
+    return fmt::format("\n{}: all gyros locked to n fringes a dither cycle (closed form)\n{}\n", arm.name,
+                       table.text());
+}
+
 std::string sweep_text(const study::Study& study, const study::Summary& summary) {
     std::string text;
     const auto& points = summary.arms.front().sweep;
@@ -106,12 +137,18 @@ std::string sweep_text(const study::Study& study, const study::Summary& summary)
     constexpr std::size_t most_rows = 21;
     const std::size_t step = (points.size() + most_rows - 2) / (most_rows - 1);
     std::vector<report::Column> columns{{"input deg/h", report::Align::right}};
-    for (const study::ArmSummary& arm : summary.arms) columns.push_back({arm.name, report::Align::right});
+    for (const study::ArmSummary& arm : summary.arms) {
+        columns.push_back({arm.name, report::Align::right});
+        if (has_closed_form(arm)) columns.push_back({"closed form", report::Align::right});
+    }
     report::Table table(columns);
     for (std::size_t i = 0; i < points.size(); i += step) {
         std::vector<std::string> row{fmt::format("{:.3f}", points[i].input_rate_deg_h)};
         for (const study::ArmSummary& arm : summary.arms) {
-            row.push_back(rate_cell(arm.sweep[i].output_rate_deg_h.mean));
+            const study::SweepPoint& point = arm.sweep[i];
+            row.push_back(rate_cell(point.output_rate_deg_h.mean));
+            if (!has_closed_form(arm)) continue;
+            row.push_back(point.closed_form_rate_deg_h ? rate_cell(*point.closed_form_rate_deg_h) : "-");
         }
         table.add_row(row);
     }
@@ -125,10 +162,72 @@ std::string sweep_text(const study::Study& study, const study::Summary& summary)
             text += fmt::format("{}: not locked at any rate of the sweep\n", arm.name);
         }
     }
+    for (const study::ArmSummary& arm : summary.arms) text += steps_text(arm);
     const auto& input = study.scenario.input;
     text += fmt::format("Rates are {:.4g} deg/h apart.\n", std::abs(input.sweep_stop_deg_h - input.rate_deg_h) /
                                                                static_cast<double>(input.sweep_points - 1));
     return text;
+}
+
+/// Whether a sweep is so wide that on the diagonal of output against input the errors would not be seen.
+bool diagonal_hides_errors(const study::Study& study, const study::Summary& summary) {
+    constexpr double visible = 0.1;
+    double largest_deg_h = 0.0;
+    for (const study::ArmSummary& arm : summary.arms) {
+        for (const study::SweepPoint& point : arm.sweep) {
+            const double error_deg_h = point.output_rate_deg_h.mean - point.input_rate_deg_h;
+            largest_deg_h = std::max(largest_deg_h, std::abs(error_deg_h));
+        }
+    }
+    const auto& input = study.scenario.input;
+    return largest_deg_h < visible * std::abs(input.sweep_stop_deg_h - input.rate_deg_h);
+}
+
+/// Leaves of a curve those points that lie apart by more than a marker.
+report::Curve thinned(report::Curve curve) {
+    if (curve.x.empty()) return curve;
+    const auto span = [](const std::vector<double>& v) {
+        const auto [lowest, highest] = std::minmax_element(v.begin(), v.end());
+        return std::max(*highest - *lowest, 1e-300);
+    };
+    constexpr double apart = 0.025;  // of the axes
+    const double x_span = span(curve.x);
+    const double y_span = span(curve.y);
+    std::size_t kept = 1;
+    for (std::size_t i = 1; i < curve.x.size(); ++i) {
+        const double x = (curve.x[i] - curve.x[kept - 1]) / x_span;
+        const double y = (curve.y[i] - curve.y[kept - 1]) / y_span;
+        if (std::hypot(x, y) < apart) continue;
+        curve.x[kept] = curve.x[i];
+        curve.y[kept++] = curve.y[i];
+    }
+    curve.x.resize(kept);
+    curve.y.resize(kept);
+    return curve;
+}
+
+report::Figure sweep_figure(const study::Study& study, const study::Summary& summary) {
+    using Style = report::Curve::Style;
+    report::Figure figure;
+    const bool errors = diagonal_hides_errors(study, summary);
+    figure.title = errors ? "Rate error against input rate" : "Output rate against input rate";
+    figure.x_label = "input rate [deg/h]";
+    figure.y_label = errors ? "mean output rate less input rate [deg/h]" : "mean output rate [deg/h]";
+    for (const study::ArmSummary& arm : summary.arms) {
+        const bool closed = has_closed_form(arm);
+        report::Curve simulated{arm.name, {}, {}, {}, {}, closed ? Style::points : Style::line};
+        report::Curve exact{arm.name + ", closed form", {}, {}, {}, {}, Style::dashed};
+        for (const study::SweepPoint& point : arm.sweep) {
+            const double from = errors ? point.input_rate_deg_h : 0.0;
+            simulated.x.push_back(point.input_rate_deg_h);
+            simulated.y.push_back(point.output_rate_deg_h.mean - from);
+            exact.x.push_back(point.input_rate_deg_h);
+            exact.y.push_back(point.closed_form_rate_deg_h.value_or(std::nan("")) - from);
+        }
+        figure.curves.push_back(closed ? thinned(std::move(simulated)) : std::move(simulated));
+        if (closed) figure.curves.push_back(std::move(exact));
+    }
+    return figure;
 }
 
 }  // namespace
@@ -172,21 +271,7 @@ std::string study_text(const study::Study& study, const study::Summary& summary,
 report::Figure study_figure(const study::Study& study, const study::Summary& summary) {
     report::Figure figure;
     using Style = report::Curve::Style;
-    if (!summary.arms.front().sweep.empty()) {
-        figure.title = "Output rate against input rate";
-        figure.x_label = "input rate [deg/h]";
-        figure.y_label = "mean output rate [deg/h]";
-        figure.log_x = figure.log_y = false;
-        for (const study::ArmSummary& arm : summary.arms) {
-            report::Curve curve{arm.name, {}, {}, {}, {}, Style::line};
-            for (const study::SweepPoint& point : arm.sweep) {
-                curve.x.push_back(point.input_rate_deg_h);
-                curve.y.push_back(point.output_rate_deg_h.mean);
-            }
-            figure.curves.push_back(std::move(curve));
-        }
-        return figure;
-    }
+    if (!summary.arms.front().sweep.empty()) return sweep_figure(study, summary);
     figure.title = fmt::format("Overlapping Allan deviation, {} gyros", study.gyros.size());
     figure.x_label = "averaging time tau [s]";
     figure.y_label = "Allan deviation [deg/h]";

@@ -13,7 +13,8 @@ std::string study_json(const study::Study& study, const study::Summary& summary,
 /// The arm comparison with theory beside it, for people.
 std::string study_text(const study::Study& study, const study::Summary& summary, const store::Provenance& provenance);
 
-/// Allan deviations of all arms; of a sweep, output rate against input rate.
+/// Allan deviations of all arms; of a sweep, output rate against input rate, or its error where the sweep is so wide
+/// that it would not be seen. Beside a closed form, drawn as a line, the simulation is shown as points.
 report::Figure study_figure(const study::Study& study, const study::Summary& summary);
 
 }  // namespace ringlock::app

@@ -26,6 +26,12 @@ inline constexpr std::array drawn_parameters = {
                         &gyro::Setup::dither_peak_rate_deg_s},
 };
 
+/// Mean rate in closed form: in arms that have one only. NaN where a gyro has none.
+inline constexpr Column<GyroStatistics, std::optional<double>> closed_form_column{
+    "rate_error_closed_form_deg_h", "deg/h",
+    "mean output rate over infinite time, computed from one cycle, less the input rate",
+    &GyroStatistics::rate_error_closed_form_deg_h};
+
 /// Noise coefficients; each has the datasets NAME, NAME_lo, NAME_hi.
 inline constexpr std::array coefficient_columns = {
     Column<noise::NoiseFit, noise::Coefficient>{"quantization_arcsec", "arcsec", "white angle noise Q",

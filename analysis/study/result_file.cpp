@@ -170,7 +170,9 @@ std::uint64_t expected_size_bytes(const Study& study) {
     const auto samples = study.scenario.output.angle_record ? static_cast<std::uint64_t>(study.schedule.samples) : 0;
     const std::uint64_t statistics =
         8 * (3 * coefficient_columns.size() + 1 + allan_columns.size() * study.factors.size());
-    return gyros * (8 * drawn_parameters.size() + arms * (8 * samples + statistics));
+    std::uint64_t bytes = gyros * (8 * drawn_parameters.size() + arms * (8 * samples + statistics));
+    for (const ArmStatistics& arm : study.arms) bytes += has_closed_form(study.scenario, arm.arm) ? 8 * gyros : 0;
+    return bytes;
 }
 
 ResultWriter::ResultWriter(const std::filesystem::path& path, const Study& study) : file_(refuse_to_lose(path, study)) {
@@ -214,6 +216,12 @@ void ResultWriter::finish(const Study& study, const Summary& summary, const stor
         group.write("rate_error_deg_h",
                     over_gyros(study.arms[i], [](const GyroStatistics& g) { return g.rate_error_deg_h; }),
                     {"deg/h", "mean output rate less the input rate"});
+        if (has_closed_form(study.scenario, study.arms[i].arm)) {
+            const auto& column = closed_form_column;
+            group.write(column.name,
+                        over_gyros(study.arms[i], [&](const GyroStatistics& g) { return or_nan(g.*column.field); }),
+                        {column.unit, column.description});
+        }
         write_noise(group, study.arms[i]);
         write_allan(group, study, study.arms[i], summary.arms[i]);
         write_figures(group, summary.arms[i]);
@@ -240,6 +248,11 @@ void read_arm(const store::Group& group, const Study& study, ArmStatistics& arm)
     const std::size_t taus = study.factors.size();
     const auto errors = read_column(group, "rate_error_deg_h", {gyros});
     for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].rate_error_deg_h = errors[g];
+    // Absent from results of earlier programs, too.
+    if (has_closed_form(study.scenario, arm.arm) && group.has_dataset(closed_form_column.name)) {
+        const auto values = read_column(group, closed_form_column.name, {gyros});
+        for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].*closed_form_column.field = or_nothing(values[g]);
+    }
     const store::Group noise = group.group("noise");
     for (const auto& column : coefficient_columns) {
         const std::string name = column.name;

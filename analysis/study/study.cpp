@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "engine/ensemble/closed_form.hpp"
 #include "engine/ensemble/draw.hpp"
 
 namespace ringlock::study {
@@ -16,6 +17,11 @@ Study::Study(const scenario::Scenario& what)
     for (const std::string& name : scenario.arms) {
         arms.push_back({scenario::parse_arm(name), std::vector<GyroStatistics>(total)});
     }
+}
+
+bool has_closed_form(const scenario::Scenario& scenario, const scenario::Arm& arm) {
+    const bool plain = !arm.ideal && !arm.noise_injected && arm.compensator == scenario::Compensator::none;
+    return plain && ensemble::drive_repeats(scenario);
 }
 
 GyroStatistics analyse_record(std::span<const double> angle_arcsec, double interval_s, double input_rate_deg_h,
@@ -33,15 +39,22 @@ Study run(const scenario::Scenario& scenario, int threads, const OnRecord& on_re
           const ensemble::Monitor& monitor) {
     Study study(scenario);
     std::vector<scenario::Arm> arms;
-    for (const ArmStatistics& arm : study.arms) arms.push_back(arm.arm);
+    std::vector<bool> closed_form;
+    for (const ArmStatistics& arm : study.arms) {
+        arms.push_back(arm.arm);
+        closed_form.push_back(has_closed_form(scenario, arm.arm));
+    }
 
     std::mutex mutex;  // sums of whole numbers and a maximum: their order does not matter
     const auto sink = [&](std::int64_t gyro, ensemble::GyroRecord&& record) {
         const auto slot = static_cast<std::size_t>(gyro);
         study.gyros[slot] = record.setup;
         for (std::size_t arm = 0; arm < arms.size(); ++arm) {
-            study.arms[arm].gyros[slot] = analyse_record(record.angle_arcsec[arm], study.schedule.sample_interval_s,
-                                                         record.setup.input_rate_deg_h, study.factors);
+            GyroStatistics& found = study.arms[arm].gyros[slot];
+            found = analyse_record(record.angle_arcsec[arm], study.schedule.sample_interval_s,
+                                   record.setup.input_rate_deg_h, study.factors);
+            if (closed_form[arm])
+                found.rate_error_closed_form_deg_h = ensemble::closed_form_rate_error_deg_h(record.setup);
         }
         if (on_record) on_record(gyro, record.angle_arcsec);
         const std::lock_guard lock(mutex);

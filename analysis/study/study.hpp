@@ -2,6 +2,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -22,6 +23,8 @@ struct GyroStatistics {
     std::vector<allan::Point> allan;  ///< at Study::factors
     noise::NoiseFit noise;
     double rate_error_deg_h = 0.0;  ///< mean output rate over the record less the input rate
+    /// The same over infinite time, without simulation: where has_closed_form() and the dither has fringes enough.
+    std::optional<double> rate_error_closed_form_deg_h;
 };
 
 struct ArmStatistics {
@@ -41,6 +44,10 @@ struct Study {
     std::int64_t turns_off_table = 0;
     double turn_map_error_rad = 0.0;  ///< largest error measured between the nodes of the turn maps
 };
+
+/// Whether the mean rate of the arm's gyros is known in closed form: a drive that repeats itself, and nothing
+/// corrected.
+bool has_closed_form(const scenario::Scenario& scenario, const scenario::Arm& arm);
 
 /// Allan deviations, noise coefficients and rate error of one record.
 ///

@@ -141,14 +141,56 @@ std::vector<SweepPoint> sweep(const Study& study, const ArmStatistics& arm) {
         point.gyros = study.scenario.ensemble.gyros;
         point.can_tell = std::abs(point.input_rate_deg_h) > fringe_rate_deg_h;
         std::vector<double> rates;
+        std::vector<double> closed_form;
         for (std::size_t i = first; i < first + members; ++i) {
+            if (const auto error = arm.gyros[i].rate_error_closed_form_deg_h) {
+                closed_form.push_back(point.input_rate_deg_h + *error);
+            }
             rates.push_back(point.input_rate_deg_h + arm.gyros[i].rate_error_deg_h);
             if (std::abs(rates.back()) < fringe_rate_deg_h) ++point.locked;
         }
         point.output_rate_deg_h = mean_figure(rates);
+        if (closed_form.size() == members) point.closed_form_rate_deg_h = mean_figure(closed_form).mean;
         points.push_back(point);
     }
     return points;
+}
+
+/// The step to which all gyros [first, last) of a rate are locked, by the closed form.
+std::optional<std::int64_t> step_of(const Study& study, const ArmStatistics& arm, std::size_t first, std::size_t last) {
+    // A locked rate is whole fringes a cycle to rounding; one that is free by so little does not occur.
+    constexpr double rounding_fringes = 1e-9;
+    std::optional<std::int64_t> step;
+    for (std::size_t i = first; i < last; ++i) {
+        const auto error = arm.gyros[i].rate_error_closed_form_deg_h;
+        if (!error) return std::nullopt;
+        const gyro::Setup& setup = study.gyros[i];
+        const double fringes = (setup.input_rate_deg_h + *error) / gyro::band_centre_deg_h(setup, 1);
+        const std::int64_t whole = std::llround(fringes);
+        if (std::abs(fringes - static_cast<double>(whole)) > rounding_fringes) return std::nullopt;
+        if (step && *step != whole) return std::nullopt;
+        step = whole;
+    }
+    return step;
+}
+
+std::vector<Step> steps(const Study& study, const ArmStatistics& arm) {
+    std::vector<Step> out;
+    if (study.scenario.input.sweep_points == 1) return out;
+    const auto members = static_cast<std::size_t>(study.scenario.ensemble.gyros);
+    std::optional<std::int64_t> before;
+    for (std::size_t first = 0; first < arm.gyros.size(); first += members) {
+        const auto order = step_of(study, arm, first, first + members);
+        const double rate = ensemble::input_rate_deg_h(study.scenario, static_cast<std::int64_t>(first));
+        if (order && order == before) {
+            out.back().last_deg_h = rate;
+        } else if (order) {
+            const double output = static_cast<double>(*order) * gyro::band_centre_deg_h(study.gyros[first], 1);
+            out.push_back({*order, output, rate, rate});
+        }
+        before = order;
+    }
+    return out;
 }
 
 }  // namespace
@@ -184,6 +226,7 @@ Summary summarise(const Study& study) {
         out.rate_error_deg_h = mean_figure(errors);
         out.allan = ensemble_allan(arm);
         out.sweep = sweep(study, arm);
+        out.steps = steps(study, arm);
         summary.arms.push_back(std::move(out));
     }
     return summary;

@@ -40,6 +40,16 @@ struct SweepPoint {
     std::int64_t locked = 0;  ///< gyros whose output moved by less than a fringe over the whole record
     bool can_tell = true;     ///< the input moves by more than a fringe, so that locked and free differ
     std::int64_t gyros = 0;
+    /// Mean output rate over infinite time and the gyros, without simulation; see has_closed_form().
+    std::optional<double> closed_form_rate_deg_h;
+};
+
+/// Rates of a sweep, next to each other, at which every gyro of the arm is locked to the same step of the staircase.
+struct Step {
+    std::int64_t order = 0;          ///< n: fringes a dither cycle
+    double output_rate_deg_h = 0.0;  ///< n K w_D/(2 pi)
+    double first_deg_h = 0.0;        ///< input rates, in the order of the sweep
+    double last_deg_h = 0.0;
 };
 
 struct ArmSummary {
@@ -51,6 +61,7 @@ struct ArmSummary {
     MeanFigure rate_error_deg_h;
     std::vector<EnsemblePoint> allan;
     std::vector<SweepPoint> sweep;  ///< empty without a sweep
+    std::vector<Step> steps;        ///< of the closed form, in the order of the sweep
 };
 
 struct Theory {

@@ -42,9 +42,11 @@ std::unique_ptr<propagate::Propagator> make_propagator(const scenario::Scenario&
     }
     const double amplitude = device.dither_amplitude_rad;
     const double margin = dither::Drive::amplitude_margin_rad(injected_rms_rad(scenario, kind));
-    return std::make_unique<propagate::TurnMap>(
-        device.coupling, device.half_cycle(1.0, amplitude), device.half_cycle(-1.0, amplitude),
-        propagate::TurnMap::Range{amplitude - margin, amplitude + margin}, scenario.propagation.turn_map_tolerance_rad);
+    const double slow = 100.0 * device.phase_per_arcsec;
+    const propagate::HalfCycleRanges ranges{{amplitude - margin, amplitude + margin},
+                                            {device.input_rate_rad_s - slow, device.input_rate_rad_s + slow},
+                                            {device.coupling.b_rad_s, device.coupling.b_rad_s}};
+    return std::make_unique<propagate::TurnMap>(device, ranges, scenario.propagation.turn_map_tolerance_rad);
 }
 
 }  // namespace
@@ -109,13 +111,12 @@ double Trajectory::lockin_error_rad() const { return state_->lockin_at_zero_rate
 
 void Trajectory::advance() {
     State& s = *state_;
-    const gyro::HalfCycle half = s.drive.after();
+    gyro::HalfCycle half = s.drive.after();
     double angle_arcsec = 0.0;
     for (const auto& process : s.processes) angle_arcsec += process->angle_arcsec(s.drive.time_s(), half.duration_s);
-    const double step = s.device.phase_per_arcsec * angle_arcsec;
-    if (s.propagator) s.lockin_rad += s.propagator->lockin_gain_rad(s.phase().remainder_rad, half, step);
+    half.rate_rad_s += s.device.phase_per_arcsec * angle_arcsec / half.duration_s;
+    if (s.propagator) s.lockin_rad += s.propagator->lockin_gain_rad(s.phase().remainder_rad, half);
     s.rotation.add(half.rate_rad_s * half.duration_s);
-    s.rotation.add(step);
     s.drive.advance();
 }
 

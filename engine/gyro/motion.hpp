@@ -10,13 +10,13 @@ namespace ringlock::gyro {
 
 /// Taylor series in time of the solution of the equation of motion
 ///
-///     psi' = g(t) + b sin(psi + e),   g(t) = rate + sign A w sin(w t),   w = pi / duration       (Gao & Deng 2007, eq.
-///     1)
+///     psi' = g(t) + b(t) sin(psi + e)                                                    (Gao & Deng 2007, eq. 1)
 ///
-/// around a point (t, psi). With S = sin(psi + e) and Q = cos(psi + e) the coefficients follow from
-/// S' = Q psi', Q' = -S psi':
+/// around a point (t, psi), g and b as HalfCycle and Coupling say. With S = sin(psi + e) and Q = cos(psi + e) the
+/// coefficients follow from S' = Q psi', Q' = -S psi':
 ///
-///     (n+1) psi_{n+1} = g_n + b S_n,   n S_n = sum_{j=1..n} j psi_j Q_{n-j},   n Q_n = -sum_{j=1..n} j psi_j S_{n-j}.
+///     (n+1) psi_{n+1} = g_n + sum_{j=0..n} b_j S_{n-j},
+///     n S_n = sum_{j=1..n} j psi_j Q_{n-j},   n Q_n = -sum_{j=1..n} j psi_j S_{n-j}.
 ///
 /// Coefficients are in powers of h/scale, which keeps them near one.
 template <std::size_t Order>
@@ -27,12 +27,19 @@ class PhaseSeries {
         : scale_s_(scale_s) {
         const double w = half.angular_frequency_rad_s();
         const double x = w * scale_s;
-        const double sin_wt = std::sin(w * t_s);
-        const double cos_wt = std::cos(w * t_s);
-        double power = half.sign * half.amplitude_rad * x;  // A w scale (w scale)^n / n!
+        std::array<double, 4> sine{};      // sin(w t) and its derivatives in w t
+        std::array<double, 4> harmonic{};  // sin(2 w t + f), likewise
+        cycle(sine, w * t_s);
+        cycle(harmonic, 2.0 * w * t_s + half.harmonic_phase_rad);
+        // In units of the scale: A w, times (w scale)^n/n! or (2 w scale)^n/n!; the swing of b likewise
+        double first = half.sign * half.amplitude_rad * x;
+        double second = half.harmonic_ratio * half.amplitude_rad * x;
         const double b = coupling.b_rad_s * scale_s;
+        double swing = half.sign * coupling.turn_asymmetry * b;
+        const bool swings = swing != 0.0;
         std::array<double, Order> s{};
         std::array<double, Order> q{};
+        std::array<double, Order> bs{};            // b_j
         std::array<double, Order + 1> weighted{};  // j psi_j
         s[0] = std::sin(psi_rad + coupling.phase_rad);
         q[0] = std::cos(psi_rad + coupling.phase_rad);
@@ -47,13 +54,19 @@ class PhaseSeries {
                 }
                 s[n] = sum_s / static_cast<double>(n);
                 q[n] = -sum_q / static_cast<double>(n);
-                power *= x / static_cast<double>(n);
+                first *= x / static_cast<double>(n);
+                second *= 2.0 * x / static_cast<double>(n);
+                swing *= x / static_cast<double>(n);
             }
-            set_sine_derivative(n, sin_wt, cos_wt);
-            double g = power * sine_;
-            if (n == 0) g += half.rate_rad_s * scale_s;
-            weighted[n + 1] = g + b * s[n];
-            psi_[n + 1] = weighted[n + 1] / static_cast<double>(n + 1);
+            double right = first * sine[n % 4] + second * harmonic[n % 4];
+            if (n == 0) right += half.rate_rad_s * scale_s;
+            right += b * s[n];
+            if (swings) {
+                bs[n] = swing * sine[(n + 1) % 4];
+                for (std::size_t j = 0; j <= n; ++j) right += bs[j] * s[n - j];
+            }
+            weighted[n + 1] = right;
+            psi_[n + 1] = right / static_cast<double>(n + 1);
         }
     }
 
@@ -93,25 +106,14 @@ class PhaseSeries {
     }
 
    private:
-    void set_sine_derivative(std::size_t n, double sin_wt, double cos_wt) {
-        switch (n % 4) {  // n-th derivative of sine
-            case 0:
-                sine_ = sin_wt;
-                break;
-            case 1:
-                sine_ = cos_wt;
-                break;
-            case 2:
-                sine_ = -sin_wt;
-                break;
-            default:
-                sine_ = -cos_wt;
-                break;
-        }
+    /// sin x and its first three derivatives, which then repeat.
+    static void cycle(std::array<double, 4>& to, double x) {
+        to = {std::sin(x), std::cos(x), 0.0, 0.0};
+        to[2] = -to[0];
+        to[3] = -to[1];
     }
 
     double scale_s_;
-    double sine_ = 0.0;
     std::array<double, Order + 1> psi_{};
 };
 

@@ -12,7 +12,7 @@ class DirectIntegrator final : public Propagator {
     /// `tolerance_rad`: error over a half cycle, shared out among its steps (two or three a fringe).
     DirectIntegrator(gyro::Coupling coupling, double tolerance_rad);
 
-    double lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half, double mid_step_rad) override;
+    double lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half) override;
 
     /// Steps taken so far.
     std::int64_t steps() const { return steps_; }

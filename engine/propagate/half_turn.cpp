@@ -33,6 +33,7 @@ struct Batch {
     // Results
     simd::Lanes alpha_re, alpha_im, z_re, z_im;
     simd::Lanes slowed_rad;
+    simd::Lanes turned_rad;  // argument of alpha, followed from 0 on: strong coupling turns it by whole fringes
 };
 
 }  // namespace
@@ -95,10 +96,12 @@ struct Problems {
 };
 
 /// First column (x, y) of the flow of x' = (i g/2) x - (b/2) y, y' = -(b/2) x - (i g/2) y from time 0 to `end`: the
-/// Moebius map w -> (x w + conj y)/(y w + conj x).
+/// Moebius map w -> (x w + conj y)/(y w + conj x). `turned`: argument of x, followed from step to step.
 template <class D, class V>
-HWY_INLINE void flow(D d, const Problems<D>& problems, V end, V longest, sm::Complex<V>& x, sm::Complex<V>& y) {
+HWY_INLINE void flow(D d, const Problems<D>& problems, V end, V longest, sm::Complex<V>& x, sm::Complex<V>& y,
+                     V& turned) {
     const V zero = hn::Zero(d);
+    turned = zero;
     x = {hn::Set(d, 1.0), zero};
     y = {zero, zero};
     V t = zero;
@@ -138,6 +141,8 @@ HWY_INLINE void flow(D d, const Problems<D>& problems, V end, V longest, sm::Com
             x = {x.re + xs[n].re, x.im + xs[n].im};
             y = {y.re + ys[n].re, y.im + ys[n].im};
         }
+        const sm::Complex<V> step = sm::mul(d, x, sm::Complex<V>{xs[0].re, hn::Neg(xs[0].im)});
+        turned = turned + sm::arg(d, step.re, step.im);  // some 2 rad, for |y| < |x|
         t = next;
     }
 }
@@ -194,7 +199,8 @@ void solve(Batch& batch, std::size_t lanes) {
         const V start = hn::Load(d, batch.fast_from_s.data() + lane);
         sm::Complex<V> x;
         sm::Complex<V> y;
-        flow(d, problems, start, hn::Load(d, batch.longest_step_s.data() + lane), x, y);
+        V turned;
+        flow(d, problems, start, hn::Load(d, batch.longest_step_s.data() + lane), x, y, turned);
         const sm::Complex<V> k = slow_solution(d, problems, start);
         // z = (w + i K)/(1 - i conj(K) w) after w -> (x w + conj y)/(y w + conj x); the common factor 1/sqrt(1 - |K|^2)
         // is real and drops out. alpha = x + i K y, beta = conj y + i K conj x.
@@ -204,6 +210,9 @@ void solve(Batch& batch, std::size_t lanes) {
             sm::mul_add(d, ik, sm::Complex<V>{x.re, hn::Neg(x.im)}, sm::Complex<V>{y.re, hn::Neg(y.im)});
         const V inverse = hn::Set(d, 1.0) / sm::norm(d, alpha);
         const sm::Complex<V> z = sm::mul(d, beta, sm::Complex<V>{alpha.re, hn::Neg(alpha.im)});
+        // |K y| < |x|: alpha lies within a quarter turn of x.
+        const sm::Complex<V> bend = sm::mul(d, alpha, sm::Complex<V>{x.re, hn::Neg(x.im)});
+        hn::Store(turned + sm::arg(d, bend.re, bend.im), d, batch.turned_rad.data() + lane);
         hn::Store(alpha.re, d, batch.alpha_re.data() + lane);
         hn::Store(alpha.im, d, batch.alpha_im.data() + lane);
         hn::Store(z.re * inverse, d, batch.z_re.data() + lane);
@@ -234,6 +243,7 @@ namespace {
 
 constexpr double least_adiabaticity = 100.0;
 constexpr double full_adiabaticity = 300.0;
+constexpr double least_beat = 4.0;   // g over b: the slow solution is a series in b/g, too
 constexpr double latest_sine = 0.9;  // the slow solution must hold from here to the middle
 
 double greatest_acceleration_rad_s2(const gyro::HalfCycle& half) {
@@ -243,8 +253,8 @@ double greatest_acceleration_rad_s2(const gyro::HalfCycle& half) {
 
 /// Time from which the motion is fast: g^2 >= adiabaticity * (greatest phase acceleration), up to the middle. NaN where
 /// there is none. It need not be exact: any time at which the motion is fast will do.
-double fast_from_s(const gyro::HalfCycle& half, double adiabaticity) {
-    const double fast = std::sqrt(adiabaticity * greatest_acceleration_rad_s2(half));
+double fast_from_s(const gyro::HalfCycle& half, double b_rad_s, double adiabaticity) {
+    const double fast = std::max(std::sqrt(adiabaticity * greatest_acceleration_rad_s2(half)), least_beat * b_rad_s);
     const double w = half.angular_frequency_rad_s();
     double late = std::asin(latest_sine) / w;
     for (int i = 0; i <= 8; ++i) {
@@ -259,10 +269,10 @@ double fast_from_s(const gyro::HalfCycle& half, double adiabaticity) {
     return late;
 }
 
-double choose_fast_from_s(const gyro::HalfCycle& half) {
+double choose_fast_from_s(const gyro::HalfCycle& half, double b_rad_s) {
     for (double adiabaticity = full_adiabaticity; adiabaticity >= least_adiabaticity; adiabaticity *= 0.9) {
-        const double t = fast_from_s(half, adiabaticity);
-        if (t == t) return t;
+        const double t = fast_from_s(half, b_rad_s, adiabaticity);
+        if (!std::isnan(t)) return t;
     }
     return std::nan("");
 }
@@ -313,7 +323,9 @@ HalfTurnProblem ending(const gyro::HalfCycle& half, const gyro::Coupling& coupli
     return problem;
 }
 
-bool has_fast_middle(const gyro::HalfCycle& half) { return choose_fast_from_s(half) == choose_fast_from_s(half); }
+bool has_fast_middle(const gyro::HalfCycle& half, double b_rad_s) {
+    return !std::isnan(choose_fast_from_s(half, b_rad_s));
+}
 
 void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfTurn> turns) {
     Batch batch;
@@ -321,12 +333,13 @@ void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfT
         const std::size_t count = std::min(simd::lanes, problems.size() - first);
         for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
             const HalfTurnProblem& problem = problems[first + std::min(lane, count - 1)];
-            const double start = choose_fast_from_s(problem.half);
-            if (!(start == start)) {
-                throw RunError(fmt::format(
-                    "turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s has no fast middle; "
-                    "use propagation.method = \"direct\"",
-                    problem.half.amplitude_rad / units::pi, problem.half.rate_rad_s));
+            const double start = choose_fast_from_s(problem.half, problem.b_rad_s);
+            if (std::isnan(start)) {
+                throw RunError(
+                    fmt::format("turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s and a coupling "
+                                "of {:.4g} rad/s has "
+                                "no fast middle; use propagation.method = \"direct\"",
+                                problem.half.amplitude_rad / units::pi, problem.half.rate_rad_s, problem.b_rad_s));
             }
             prepare(batch, lane, problem, start);
         }
@@ -335,7 +348,11 @@ void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfT
             HalfTurn& turn = turns[first + lane];
             const double plain = problems[first + lane].half.plain_phase_rad(batch.fast_from_s[lane]);
             const double angle = 2.0 * std::atan2(batch.alpha_im[lane], batch.alpha_re[lane]);
-            turn.shift_rad = std::remainder(angle - plain, units::two_pi) - batch.slowed_rad[lane];
+            // The fringe from the argument that was followed, the rest from alpha itself: a sum over steps loses
+            // digits.
+            const double rest = std::remainder(angle - plain, units::two_pi);
+            const double fringes = std::nearbyint((2.0 * batch.turned_rad[lane] - plain - rest) / units::two_pi);
+            turn.shift_rad = rest + units::two_pi * fringes - batch.slowed_rad[lane];
             turn.z = {batch.z_re[lane], batch.z_im[lane]};
         }
     }

@@ -39,7 +39,8 @@ void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfT
 /// One of them. `half.sign` must be +1.
 HalfTurn exact_half_turn(const gyro::HalfCycle& half, double b_rad_s);
 
-/// Whether exact_half_turn can be formed: enough fringes between the turn and the middle.
-bool has_fast_middle(const gyro::HalfCycle& half);
+/// Whether exact_half_turn can be formed: enough fringes between the turn and the middle, and coupling that is weak
+/// beside the rate there.
+bool has_fast_middle(const gyro::HalfCycle& half, double b_rad_s);
 
 }  // namespace ringlock::propagate

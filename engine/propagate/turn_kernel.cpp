@@ -46,8 +46,18 @@ HWY_INLINE HalfMap evaluate(D d, const TurnTables::Part& part, std::size_t lane,
     return {sum[0], sum[1], sum[2]};
 }
 
+/// Argument of v or q. Where no kick is strong, `strong` or not makes no difference to the result, but to the time.
+template <bool strong>
+HWY_INLINE V bend(D d, sm::Complex<V> a) {
+    if constexpr (strong) {
+        return sm::arg(d, a.re, a.im);
+    } else {
+        return sm::arg_right(d, a.re, a.im);
+    }
+}
+
 /// `group` vectors side by side: the turns of one hide the latency of the other's.
-template <std::size_t group, bool turns_wanted>
+template <std::size_t group, bool turns_wanted, bool strong>
 void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t first_lane, TurnState& state,
           gyro::LaneTurns* turns) {
     const D d;
@@ -101,11 +111,11 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
                 const sm::Complex<V> e = sm::mul(d, w, sm::Complex<V>{v.re, hn::Neg(v.im)});
                 hn::Store(e.re * inverse, d, turns->cosine[i].data() + lane);
                 hn::Store(hn::Neg(sign * e.im * inverse), d, turns->sine[i].data() + lane);
-                const V bend = sm::arg_right(d, v.re, v.im) * per_half_pi;
-                hn::Store(sm::fma(d, sign, bend, before_turn), d, turns->lockin_fringes[i].data() + lane);
+                const V second_half = bend<strong>(d, v) * per_half_pi;
+                hn::Store(sm::fma(d, sign, second_half, before_turn), d, turns->lockin_fringes[i].data() + lane);
             }
             const sm::Complex<V> q = sm::mul_add(d, z_after, w, v);
-            const V gain = sm::fma(d, sm::arg_right(d, q.re, q.im), per_half_pi, after.shift);
+            const V gain = sm::fma(d, bend<strong>(d, q), per_half_pi, after.shift);
             lockin[g] = sm::fma(d, sign, gain, before_turn);
             shift_before[g] = next.shift;
             re_before[g] = next.z_re;
@@ -123,21 +133,24 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
     }
 }
 
-template <bool turns_wanted>
+template <bool turns_wanted, bool strong>
 void step_all(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t lanes, TurnState& state,
               gyro::LaneTurns* turns) {
     const std::size_t width = hn::Lanes(D());
     std::size_t lane = 0;
-    for (; lane + width < lanes; lane += 2 * width) step<2, turns_wanted>(tables, drive, lane, state, turns);
-    for (; lane < lanes; lane += width) step<1, turns_wanted>(tables, drive, lane, state, turns);
+    for (; lane + width < lanes; lane += 2 * width) step<2, turns_wanted, strong>(tables, drive, lane, state, turns);
+    for (; lane < lanes; lane += width) step<1, turns_wanted, strong>(tables, drive, lane, state, turns);
 }
 
 void step_lanes(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t lanes, TurnState& state,
                 gyro::LaneTurns* turns) {
+    const bool strong = tables.strong();
     if (turns != nullptr) {
-        step_all<true>(tables, drive, lanes, state, turns);
+        strong ? step_all<true, true>(tables, drive, lanes, state, turns)
+               : step_all<true, false>(tables, drive, lanes, state, turns);
     } else {
-        step_all<false>(tables, drive, lanes, state, turns);
+        strong ? step_all<false, true>(tables, drive, lanes, state, turns)
+               : step_all<false, false>(tables, drive, lanes, state, turns);
     }
 }
 

@@ -184,6 +184,11 @@ std::size_t terms_needed(const Source& source, std::size_t variable, double tole
     return TurnTables::most_nodes;
 }
 
+/// Kicks from about which the phase may turn by more than an eighth of a fringe: |z| + |z|(1 + |z|) > sin(pi/4).
+bool is_strong(const Polynomial& polynomial) {
+    return std::hypot(polynomial.coefficients[0][1], polynomial.coefficients[0][2]) > 0.3;
+}
+
 }  // namespace
 
 void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCycleRanges& wanted) {
@@ -223,6 +228,7 @@ void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCy
                 }
                 for (std::size_t v = 0; v < variables; ++v) terms[v] += terms[v] > 1 ? 1 : 0;
             }
+            strong_ = strong_ || is_strong(polynomial);
             error_rad_[lane] = std::max(error_rad_[lane], error);
             put(parts_[index(sign, end)], lane, terms, polynomial.coefficients);
         }

@@ -51,6 +51,8 @@ class TurnTables {
     const Part& part(double sign, int end) const { return parts_[index(sign, symmetric_ ? 0 : end)]; }
     /// Both ends are alike for all gyros.
     bool symmetric() const { return symmetric_; }
+    /// Lock-in may turn some gyro's phase by more than an eighth of a fringe at a turn.
+    bool strong() const { return strong_; }
     /// Middle and inverse half width of the ranges, 0 for what does not vary.
     const std::array<simd::Lanes, variables>& centre() const { return centre_; }
     const std::array<simd::Lanes, variables>& inverse_half_width() const { return inverse_; }
@@ -67,6 +69,7 @@ class TurnTables {
 
     double tolerance_rad_;
     bool symmetric_ = true;
+    bool strong_ = false;
     std::array<Part, 4> parts_;
     std::array<simd::Lanes, variables> centre_;
     std::array<simd::Lanes, variables> inverse_;

@@ -46,7 +46,7 @@ Contender through(std::shared_ptr<propagate::Propagator> propagator, const gyro:
             const gyro::HalfCycle half = drive.after();
             Phase phase = input;
             phase.add(drive.turn_phase_rad() + lockin);
-            lockin += propagator->lockin_gain_rad(phase.remainder_rad, half, 0.0);
+            lockin += propagator->lockin_gain_rad(phase.remainder_rad, half);
             input.add(half.rate_rad_s * half.duration_s);
             drive.advance();
         }
@@ -61,8 +61,8 @@ double worst_error_rad(propagate::Propagator& propagator, const gyro::Device& de
     double worst = 0.0;
     for (int turn = 0; turn < 40; ++turn) {
         const double phase_rad = -3.0 + 0.15 * turn;
-        worst = std::max(worst, std::abs(propagator.lockin_gain_rad(phase_rad, drive.after(), 0.0) -
-                                         reference.lockin_gain_rad(phase_rad, drive.after(), 0.0)));
+        worst = std::max(worst, std::abs(propagator.lockin_gain_rad(phase_rad, drive.after()) -
+                                         reference.lockin_gain_rad(phase_rad, drive.after())));
         drive.advance();
     }
     return worst;
@@ -72,7 +72,7 @@ double worst_error_rad(propagate::Propagator& propagator, const gyro::Device& de
 class Odeint final : public propagate::Propagator {
    public:
     Odeint(gyro::Coupling coupling, double tolerance_rad) : coupling_(coupling), tolerance_rad_(tolerance_rad) {}
-    double lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half, double /*mid_step_rad*/) override {
+    double lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half) override {
         using Stepper = boost::numeric::odeint::runge_kutta_fehlberg78<double>;
         double deviation = 0.0;
         boost::numeric::odeint::integrate_adaptive(
@@ -110,9 +110,12 @@ int main() {
     const gyro::Device device(ensemble::nominal_setup(scenario));
     const double a = device.dither_amplitude_rad;
     const double margin = dither::Drive::amplitude_margin_rad(3.0);
-    const auto map =
-        std::make_shared<propagate::TurnMap>(device.coupling, device.half_cycle(1.0, a), device.half_cycle(-1.0, a),
-                                             propagate::TurnMap::Range{a - margin, a + margin}, 1e-8);
+    const auto map = std::make_shared<propagate::TurnMap>(
+        device,
+        propagate::HalfCycleRanges{{a - margin, a + margin},
+                                   {device.input_rate_rad_s, device.input_rate_rad_s},
+                                   {device.coupling.b_rad_s, device.coupling.b_rad_s}},
+        1e-8);
     scenario::Scenario ideal = scenario;
     ideal.readout.model = scenario::ReadoutModel::ideal;
 

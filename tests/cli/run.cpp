@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <map>
@@ -241,6 +242,41 @@ TEST_F(RunCommand, JsonIsOneObjectWithTheFieldsOfTheContract) {
         }
     }
     EXPECT_EQ(left(), (std::set<std::string>{"out.h5", "s.toml"}));
+}
+
+TEST_F(RunCommand, SweepsShowTheClosedFormWhereTheDriveRepeatsItself) {
+    const std::string sweep =
+        "[input]\nrate_deg_h = 0.0\nsweep_stop_deg_h = 60.0\nsweep_points = 3\n"
+        "[ensemble]\ngyros = 2\nduration_s = 20.0\ndither_amplitude_sd_relative = 0.0\n"
+        "[arms]\nnames = [\"uncompensated\", \"noise_injected\"]\n";
+    write("noisy.toml", sweep + "[effects.quantum_noise]\ndeg_rt_h = 1e-4\n");
+    write("still.toml", sweep + "[effects.quantum_noise]\ndeg_rt_h = 0.0\n");
+    const json noisy = json::parse(run({"run", "noisy.toml", "--json"}).out)["arms"]["uncompensated"];
+    EXPECT_FALSE(noisy.contains("steps"));
+    for (const json& rate : noisy["sweep"]) EXPECT_FALSE(rate.contains("closed_form_rate_deg_h"));
+    EXPECT_THAT(run({"analyze", "noisy.h5"}).out, testing::Not(HasSubstr("closed form")));
+
+    const Outcome r = run({"run", "still.toml", "--json", "--plot", "still.svg"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    const json out = json::parse(r.out);
+    const json& arms = out["arms"];
+    const double interval_s = out["sample_interval_s"];
+    const double fringe_deg_h = 0.5 / (std::floor(20.0 / interval_s) * interval_s);
+    ASSERT_EQ(arms["uncompensated"]["sweep"].size(), 3U);
+    for (const json& rate : arms["uncompensated"]["sweep"]) {
+        expect_numbers(rate, {"input_rate_deg_h", "closed_form_rate_deg_h"});
+        // A fringe over the record; the instrument's reading noise, 0.005 rad, is small against it.
+        EXPECT_NEAR(rate["closed_form_rate_deg_h"], rate["output_rate_deg_h"]["mean"], 1.01 * fringe_deg_h);
+    }
+    ASSERT_EQ(arms["uncompensated"]["steps"].size(), 1U) << "locked at 0 deg/h, free at 30 and 60";
+    const json& step = arms["uncompensated"]["steps"][0];
+    expect_numbers(step, {"order", "output_rate_deg_h", "first_input_rate_deg_h", "last_input_rate_deg_h"});
+    EXPECT_EQ(step["order"], 0);
+    EXPECT_FALSE(arms["noise_injected"].contains("steps"));
+    for (const json& rate : arms["noise_injected"]["sweep"]) EXPECT_FALSE(rate.contains("closed_form_rate_deg_h"));
+    EXPECT_EQ(json::parse(run({"analyze", "still.h5", "--json"}).out)["arms"], arms);
+    EXPECT_THAT(run({"analyze", "still.h5"}).out, AllOf(HasSubstr("closed form"), HasSubstr("step n")));
+    EXPECT_THAT(read("still.svg"), HasSubstr("uncompensated, closed form"));
 }
 
 TEST_F(RunCommand, TurnsOfSharedTrajectoriesCountOnce) {

@@ -39,17 +39,15 @@ TEST_P(Invariants, WithoutDitherTheMeanRateIsAdlers) {
         if (GetParam() == Method::direct) {
             propagator = std::make_unique<propagate::DirectIntegrator>(gyro::Coupling{b, 0.4}, 1e-12);
         } else {
-            const gyro::Device device(paper_device());
-            const double a = device.dither_amplitude_rad;
-            propagator = std::make_unique<propagate::TurnMap>(gyro::Coupling{b, 0.4}, device.half_cycle(1.0, a),
-                                                              device.half_cycle(-1.0, a),
-                                                              propagate::TurnMap::Range{a, a}, 1e-10);
+            gyro::Device device(paper_device());
+            device.coupling = {b, 0.4};
+            propagator = std::make_unique<propagate::TurnMap>(device, ranges(device, 0.0), 1e-10);
         }
         Phase phase(0.3);
         const int intervals = 40;
         double total = 0.0;
         for (int i = 0; i < intervals; ++i) {
-            const double gain = rate * half.duration_s + propagator->lockin_gain_rad(phase.remainder_rad, half, 0.0);
+            const double gain = rate * half.duration_s + propagator->lockin_gain_rad(phase.remainder_rad, half);
             phase.add(gain);
             total += gain;
         }
@@ -118,7 +116,7 @@ TEST_P(Invariants, AHalfCycleCarriesAConstantThatAWholeOneDoesNot) {
         for (int j = 0; j < n; ++j) {
             auto half = up;
             half.amplitude_rad += units::pi * j / n;
-            mean += propagator->lockin_gain_rad(units::two_pi * i / n, half, 0.0) / (n * n);
+            mean += propagator->lockin_gain_rad(units::two_pi * i / n, half) / (n * n);
         }
     }
     EXPECT_NEAR(mean, -2.0 * gyro::half_turn_delay_rad(paper_device()), 0.003 * std::abs(mean));
@@ -157,7 +155,7 @@ double distance_after(Method method, int turns) {
         for (std::size_t i = 0; i < 2; ++i) {
             Phase phase(start[i] + lockin[i]);
             phase.add(drive.turn_phase_rad());
-            lockin[i] += propagator->lockin_gain_rad(phase.remainder_rad, half, 0.0);
+            lockin[i] += propagator->lockin_gain_rad(phase.remainder_rad, half);
         }
         drive.advance();
     }
@@ -187,8 +185,8 @@ Apart propagators_apart(int turns) {
     for (int turn = 0; turn < turns; ++turn) {
         const auto half = drive.after();
         Phase phase = input + drive.turn_phase_rad();
-        a += map->lockin_gain_rad((phase + a).remainder_rad, half, 0.0);
-        b += direct->lockin_gain_rad((phase + b).remainder_rad, half, 0.0);
+        a += map->lockin_gain_rad((phase + a).remainder_rad, half);
+        b += direct->lockin_gain_rad((phase + b).remainder_rad, half);
         distances.push_back(std::abs(a - b));
         input.add(half.rate_rad_s * half.duration_s);
         drive.advance();

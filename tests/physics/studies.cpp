@@ -78,6 +78,33 @@ TEST(Scenarios, DeadBandEndsWhereItSays) {
     }
 }
 
+TEST(Scenarios, TheStaircaseIsTheOneOfTheClosedForm) {
+    scenario::Scenario scenario = from_file("staircase.toml");
+    EXPECT_EQ(scenario.ensemble.dither_amplitude_sd_relative, 0.0);
+    EXPECT_EQ(scenario.input.sweep_points, 1351);
+    // Each tenth rate: the same range, 1 deg/h apart, gives the figures of its answer to 1 deg/h.
+    scenario.input.sweep_points = 136;
+    const study::Study study = study::run(scenario, 2);
+    const study::Summary summary = study::summarise(study);
+    const study::ArmSummary& plain = arm(summary, "uncompensated");
+    // N cycles gain N rotation numbers within a fringe; the readings are 1e-3 fringes off the turns.
+    const double duration_s = study.schedule.sample_interval_s * static_cast<double>(study.schedule.samples - 1);
+    const double fringe_deg_h = scenario.gyro.scale_factor_arcsec / duration_s;
+    EXPECT_NEAR(fringe_deg_h, 0.0085, 5e-5);
+    for (const study::GyroStatistics& gyro : study.arms.at(1).gyros) {
+        ASSERT_TRUE(gyro.rate_error_closed_form_deg_h);
+        EXPECT_NEAR(gyro.rate_error_deg_h, *gyro.rate_error_closed_form_deg_h, 1.01 * fringe_deg_h);
+    }
+    ASSERT_EQ(plain.steps.size(), 3U);
+    const std::vector<std::pair<double, double>> steps = {{0.0, 2.0}, {61.0, 63.0}, {123.0, 127.0}};
+    for (std::size_t n = 0; n < steps.size(); ++n) {
+        EXPECT_EQ(plain.steps[n].order, static_cast<std::int64_t>(n));
+        EXPECT_NEAR(plain.steps[n].output_rate_deg_h, 62.341 * static_cast<double>(n), 1e-3);
+        EXPECT_NEAR(plain.steps[n].first_deg_h, steps[n].first, 1e-9);
+        EXPECT_NEAR(plain.steps[n].last_deg_h, steps[n].second, 1e-9);
+    }
+}
+
 TEST(Scenarios, TheDirectIntegratorGivesTheSameStudyAsTheTurnMap) {
     // Everything a scenario can ask for at once; 500 turns and two trajectories of two gyros.
     scenario::Scenario scenario;

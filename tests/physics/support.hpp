@@ -39,15 +39,19 @@ class Uniform {
     std::mt19937_64 engine_;
 };
 
+/// Half cycles of the device's own rate and coupling, and of amplitudes up to `margin_rad` from its own.
+inline propagate::HalfCycleRanges ranges(const gyro::Device& device, double margin_rad) {
+    const double a = device.dither_amplitude_rad;
+    const double b = device.coupling.b_rad_s;
+    return {{a - margin_rad, a + margin_rad}, {device.input_rate_rad_s, device.input_rate_rad_s}, {b, b}};
+}
+
 enum class Method { turn_map, direct };
 
 inline std::unique_ptr<propagate::Propagator> make_propagator(Method method, const gyro::Device& device,
                                                               double margin_rad = 0.0, double tolerance_rad = 1e-11) {
     if (method == Method::direct) return std::make_unique<propagate::DirectIntegrator>(device.coupling, tolerance_rad);
-    const double a = device.dither_amplitude_rad;
-    return std::make_unique<propagate::TurnMap>(device.coupling, device.half_cycle(1.0, a), device.half_cycle(-1.0, a),
-                                                propagate::TurnMap::Range{a - margin_rad, a + margin_rad},
-                                                tolerance_rad);
+    return std::make_unique<propagate::TurnMap>(device, ranges(device, margin_rad), tolerance_rad);
 }
 
 /// A map of the circle psi -> psi + shift + 2 arg(1 + z exp(-i psi)), which is what any stretch of the motion is.
@@ -86,9 +90,9 @@ inline CircleMap cycle_map(Method method, const gyro::Setup& setup) {
     return circle_map([&](double psi) {
         const auto up = device.half_cycle(1.0, device.dither_amplitude_rad);
         const auto down = device.half_cycle(-1.0, device.dither_amplitude_rad);
-        const double first = propagator->lockin_gain_rad(psi, up, 0.0);
+        const double first = propagator->lockin_gain_rad(psi, up);
         Phase top(psi + up.plain_phase_total_rad() + first);
-        const double second = propagator->lockin_gain_rad(top.remainder_rad, down, 0.0);
+        const double second = propagator->lockin_gain_rad(top.remainder_rad, down);
         return first + second + device.input_rate_rad_s * device.period_s();
     });
 }

@@ -278,7 +278,8 @@ void compare(const Entries& page, const Entries& file) {
 }
 
 TEST_F(ResultFile, HoldsWhatThePageSays) {
-    const scenario::Scenario scenario = small(true);
+    scenario::Scenario scenario = small(true);
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;  // the drive repeats itself: closed forms, too
     write(path_, scenario);
     const Entries file = walk(path_, Study(scenario));
     EXPECT_GT(file.size(), 80U);
@@ -290,6 +291,7 @@ TEST_F(ResultFile, HoldsNoAngleRecordWhereNoneIsWanted) {
     const scenario::Scenario scenario = small(false);
     write(path_, scenario);
     Entries expected = page(scenario.arms);
+    EXPECT_EQ(expected.erase("/arms/uncompensated/rate_error_closed_form_deg_h"), 1U) << "there is quantum noise";
     for (const std::string& arm : scenario.arms) EXPECT_EQ(expected.erase("/arms/" + arm + "/angle_arcsec"), 1U);
     compare(expected, walk(path_, Study(scenario)));
 }
@@ -384,6 +386,74 @@ TEST_F(ResultFile, GivesTheStudyBack) {
     EXPECT_EQ(read_provenance(path_).scenario_file, "small.toml");
     // The scenario in the file is a scenario.
     EXPECT_EQ(scenario::parse_string(file.dataset("scenario").read<std::string>().at(0), "resolved"), scenario);
+}
+
+TEST_F(ResultFile, GivesClosedFormsBackWhereTheDriveRepeatsItself) {
+    scenario::Scenario scenario = small(false);
+    scenario.arms = {"ideal", "uncompensated", "compensated", "noise_injected"};
+    scenario.input = {.rate_deg_h = 1.0, .sweep_stop_deg_h = 15.0, .sweep_points = 2};
+    const auto read = [&] {
+        fs::remove(path_);
+        write(path_, scenario);
+        return read_result(path_);
+    };
+    for (const ArmStatistics& arm : read().arms) {
+        for (const GyroStatistics& gyro : arm.gyros) EXPECT_FALSE(gyro.rate_error_closed_form_deg_h) << arm.arm.name;
+    }
+    EXPECT_FALSE(store::File::open(path_).has_dataset("arms/uncompensated/rate_error_closed_form_deg_h"));
+
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    const Study study = read();
+    const double fringe_deg_h = scenario.gyro.scale_factor_arcsec /
+                                (study.schedule.sample_interval_s * static_cast<double>(study.schedule.samples - 1));
+    for (const ArmStatistics& arm : study.arms) {
+        for (const GyroStatistics& gyro : arm.gyros) {
+            const auto& closed_form = gyro.rate_error_closed_form_deg_h;
+            ASSERT_EQ(closed_form.has_value(), arm.arm.name == "uncompensated") << arm.arm.name;
+            if (!closed_form) continue;
+            // The instrument's reading noise, 0.005 rad, is small against a fringe.
+            EXPECT_NEAR(*closed_form, gyro.rate_error_deg_h, 1.01 * fringe_deg_h);
+        }
+    }
+    const ArmSummary summary = summarise(study).arms.at(1);
+    ASSERT_EQ(summary.sweep.size(), 2U);
+    EXPECT_NEAR(summary.sweep[0].closed_form_rate_deg_h.value(), 0.0, 1e-9) << "locked";
+    EXPECT_NEAR(summary.sweep[1].closed_form_rate_deg_h.value(), 14.8, 0.2);
+    ASSERT_EQ(summary.steps.size(), 1U);
+    EXPECT_EQ(summary.steps[0].order, 0);
+    EXPECT_EQ(summary.steps[0].first_deg_h, 1.0);
+    EXPECT_EQ(summary.steps[0].last_deg_h, 1.0);
+
+    // Results of programs that knew no closed form are read as they are.
+    const hid_t file = H5Fopen(path_.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    ASSERT_GE(H5Ldelete(file, "arms/uncompensated/rate_error_closed_form_deg_h", H5P_DEFAULT), 0);
+    H5Fclose(file);
+    const ArmSummary older = summarise(read_result(path_)).arms.at(1);
+    EXPECT_FALSE(older.sweep.at(0).closed_form_rate_deg_h);
+    EXPECT_TRUE(older.steps.empty());
+}
+
+TEST(ClosedForm, IsThereWhereNoEffectAddsARateThatVaries) {
+    const auto repeats = [](const std::string& effect, const std::string& parameter, double value) {
+        scenario::Scenario scenario;
+        scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+        if (!effect.empty()) scenario.effects.at(effect).at(parameter) = value;
+        EXPECT_FALSE(has_closed_form(scenario, scenario::parse_arm("ideal")));
+        EXPECT_FALSE(has_closed_form(scenario, scenario::parse_arm("compensated")));
+        EXPECT_FALSE(has_closed_form(scenario, scenario::parse_arm("noise_injected")));
+        return has_closed_form(scenario, scenario::parse_arm("uncompensated"));
+    };
+    EXPECT_FALSE(has_closed_form(scenario::Scenario(), scenario::parse_arm("uncompensated"))) << "quantum noise";
+    EXPECT_TRUE(repeats("", "", 0.0));
+    EXPECT_TRUE(repeats("dither_asymmetry", "ratio", 0.01));
+    EXPECT_TRUE(repeats("detector_phase_offset", "phase_rad", 0.3));
+    EXPECT_TRUE(repeats("readout_ellipse", "gain", 0.03));
+    EXPECT_FALSE(repeats("quantum_noise", "deg_rt_h", 1e-6));
+    EXPECT_FALSE(repeats("bias_instability", "deg_h", 0.01));
+    EXPECT_FALSE(repeats("bias_ramp", "deg_h_per_h", 1.0));
+    EXPECT_FALSE(repeats("bias_step", "step_deg_h", 1.0));
+    EXPECT_FALSE(repeats("base_vibration", "rate_deg_h", 1.0));
+    EXPECT_FALSE(repeats("rate_random_walk", "deg_h_rt_h", 1.0));
 }
 
 // What is there already.
