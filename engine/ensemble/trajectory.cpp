@@ -23,10 +23,10 @@ gyro::Device make_device(const gyro::Setup& setup, Kind kind) {
     return device;
 }
 
-readout::Electronics make_electronics(const scenario::Scenario& scenario, const gyro::Setup& setup) {
+readout::Electronics make_electronics(const scenario::Scenario& scenario) {
     const auto& readout = scenario.readout;
     return {readout.model == scenario::ReadoutModel::ideal, readout.angle_output == scenario::AngleOutput::interpolated,
-            readout.clock_hz, readout.detector_noise_relative, setup.ellipse};
+            readout.clock_hz, readout.detector_noise_relative};
 }
 
 double injected_rms_rad(const scenario::Scenario& scenario, Kind kind) {
@@ -56,7 +56,7 @@ struct Trajectory::State {
         : device(make_device(setup, kind)),
           drive(device, injected_rms_rad(scenario, kind), who),
           propagator(make_propagator(scenario, device, kind)),
-          readout(make_electronics(scenario, setup), who),
+          readout(make_electronics(scenario), setup.ellipse, who),
           start(device.initial_phase_rad) {
         for (const effects::Effect* effect : effects::registry()) {
             const auto values = scenario.effects.find(std::string(effect->name()));

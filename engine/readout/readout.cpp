@@ -8,7 +8,8 @@ namespace {
 constexpr double quarter_rad = 0.5 * units::pi;
 }
 
-Readout::Readout(const Electronics& electronics, random::Identity who) : electronics_(electronics) {
+Readout::Readout(const Electronics& electronics, const gyro::Ellipse& ellipse, random::Identity who)
+    : electronics_(electronics), ellipse_(ellipse) {
     if (!electronics_.ideal && electronics_.detector_noise_relative > 0.0) {
         noise_.emplace(who, random::Purpose::detector_noise);
     }
@@ -28,7 +29,7 @@ ReadTurn Readout::read(const TurnPath& path, const Phase& phase, std::int64_t tu
     reading.sin = std::sin(psi);
     reading.cos = std::cos(psi);
     if (!electronics_.ideal) {
-        const gyro::Ellipse& e = electronics_.ellipse;
+        const gyro::Ellipse& e = ellipse_;
         reading.sin = (1.0 + e.gain) * reading.sin + e.offset_sin;
         reading.cos = std::cos(psi + e.orthogonality_rad) + e.offset_cos;
         if (noise_) {

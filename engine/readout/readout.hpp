@@ -4,20 +4,12 @@
 #include "engine/core/phase.hpp"
 #include "engine/gyro/device.hpp"
 #include "engine/random/stream.hpp"
+#include "engine/readout/lane_readout.hpp"
 #include "engine/readout/reading.hpp"
 #include "engine/readout/turn_path.hpp"
 
 /// From the true phase to what the electronics report.
 namespace ringlock::readout {
-
-/// Properties of the electronics.
-struct Electronics {
-    bool ideal = false;                    ///< exact phase, time and acceleration at every zero-rate point
-    bool interpolate = true;               ///< angle from count and quadrature; otherwise whole quarter fringes
-    double clock_hz = 0.0;                 ///< times are whole ticks; 0: continuous
-    double detector_noise_relative = 0.0;  ///< rms of each detector sample over the fringe amplitude
-    gyro::Ellipse ellipse;
-};
 
 /// A reading and, for scoring only, how far the phase read is from the true one.
 struct ReadTurn {
@@ -27,7 +19,7 @@ struct ReadTurn {
 
 class Readout {
    public:
-    Readout(const Electronics& electronics, random::Identity who);
+    Readout(const Electronics& electronics, const gyro::Ellipse& ellipse, random::Identity who);
 
     /// Reads the zero-rate point on `path`, that of turn number `turn`. `phase` is psi at the dither's turn, at
     /// `turn_time_s`; the phase at which the path was made must be its remainder. Turns may be left out: each has its
@@ -39,6 +31,7 @@ class Readout {
     double tick(double turn_time_s, double offset_s) const;
 
     Electronics electronics_;
+    gyro::Ellipse ellipse_;
     std::optional<random::NormalStream> noise_;
 };
 

@@ -1,0 +1,50 @@
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "engine/simd/lanes.hpp"
+
+namespace ringlock::readout {
+
+/// What the electronics report of consecutive zero-rate points of a block of gyros: one row a turn, one column a gyro.
+/// Even turns of a run are minima of the phase. Compensators see this and nothing else.
+struct LaneReadings {
+    std::int64_t first_turn = 0;
+    std::size_t turns = 0;
+    std::vector<simd::Lanes> sine;  ///< quadrature detectors
+    std::vector<simd::Lanes> cosine;
+    /// Unwrapped phase: the quadrature's on the branch nearest to the middle of the quarter fringe that the counter
+    /// names; fringes, less ...
+    std::vector<simd::Lanes> phase_fringes;
+    std::vector<simd::Lanes> phase_whole;  ///< ... these whole ones
+    /// Magnitude of the phase acceleration on either side; 0 where no two pulses were told apart.
+    std::vector<simd::Lanes> accel_before_rad_s2;
+    std::vector<simd::Lanes> accel_after_rad_s2;
+
+    void resize(std::size_t wanted) {
+        turns = wanted;
+        for (auto* column : {&sine, &cosine, &phase_fringes, &phase_whole, &accel_before_rad_s2, &accel_after_rad_s2}) {
+            column->resize(wanted);
+        }
+    }
+    bool minimum(std::size_t i) const { return (first_turn + static_cast<std::int64_t>(i)) % 2 == 0; }
+};
+
+/// The same turns as they are, for scoring.
+struct LaneAngles {
+    /// Angle output of the gyro with the dither stripped, in fringes of rotation: case, lock-in and reading error; less
+    /// the whole fringes below.
+    std::vector<simd::Lanes> angle_fringes;
+    std::vector<simd::Lanes> angle_whole;
+    /// Lock-in error at the zero-rate point, less the whole fringes below.
+    std::vector<simd::Lanes> lockin_fringes;
+    simd::Lanes lockin_whole;
+
+    void resize(std::size_t wanted) {
+        angle_fringes.resize(wanted);
+        angle_whole.resize(wanted);
+        lockin_fringes.resize(wanted);
+    }
+};
+
+}  // namespace ringlock::readout

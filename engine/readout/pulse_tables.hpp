@@ -1,0 +1,34 @@
+#pragma once
+#include <array>
+#include <span>
+
+#include "engine/gyro/device.hpp"
+#include "engine/simd/lanes.hpp"
+
+namespace ringlock::readout {
+
+/// When the comparators switch next to a turn: times of the two quarter-fringe pulses nearest to the zero-rate point on
+/// each side, as functions of the phase there.
+///
+/// With x the phase turned upright (psi + coupling phase at minima, its negative at maxima), d the phase from the extremum
+/// to the pulse and a the phase acceleration, t sqrt(a) = sqrt(2 d) R, and R is a smooth function of d for each of the
+/// four quarters that the pulse may begin: polynomials from the equation of motion, solved from the zero-rate point
+/// outwards. Amplitude noise and rates that vary enter through a.
+struct PulseTables {
+    static constexpr std::size_t terms = 10;
+    static constexpr std::size_t quarters = 4;
+
+    /// Polynomial in 4 d1/pi - 1, d1 the distance of the first pulse: [quarter][power].
+    using Times = std::array<std::array<simd::Lanes, terms>, quarters>;
+    /// [minimum, maximum][before, after][first, second pulse]
+    std::array<std::array<std::array<Times, 2>, 2>, 2> times;
+
+    /// Makes the tables of one gyro. `b_rad_s`: its coupling. Throws RunError where the phase does not pass two quarter
+    /// fringes on either side of a turn.
+    void make(std::size_t lane, const gyro::Device& device);
+
+    /// Polynomial of a table at the quarter and distance, for tests: t sqrt(a)/sqrt(2 d).
+    static double at(const Times& times, std::size_t lane, std::size_t quarter, double first_distance_rad);
+};
+
+}  // namespace ringlock::readout
