@@ -8,147 +8,95 @@
 #include "engine/core/error.hpp"
 #include "engine/simd/targets.hpp"
 // The above must come first.
-#include "engine/simd/math-inl.hpp"
+#include "engine/gyro/turn_series-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ringlock::readout::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 namespace sm = simd::HWY_NAMESPACE;
+namespace gm = gyro::HWY_NAMESPACE;
 
 using D = hn::CappedTag<double, simd::lanes>;
 using V = hn::Vec<D>;
 
-constexpr std::size_t order = 9;  // of the Taylor series from the dither's turn to the phase's
-constexpr int most_steps = 4000;
+using Side = gm::UprightSide<V>;
 
-/// A half cycle next to a turn, turned upright: x' = rate + A w (sin(w t) + ratio sin(2 w t + f)) + b(t) sin(x) with t
-/// from the dither's turn, in either direction.
-struct Side {
-    V amplitude, w, rate, b;
-};
+constexpr int most_steps = 8000;
 
-/// Phase x, cosine and sine of it, and the lock-in's share, as they go from the dither's turn to the phase's.
+/// How the phase x gets from the dither's turn to its own.
 struct Walk {
-    V time_s, cosine, sine;
-    V lockin_rad;  // gained since the dither's turn
-    V phase_rad;   // gained since the dither's turn
+    V time_s, sine, cosine;
+    V lockin_rad;  ///< the lock-in's share of phase_rad
+    V phase_rad;   ///< gained since the dither's turn
 };
 
-/// \return false where some lane does not get there
-HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, V ratio, V harmonic_phase_fringes,
-                                  V harmonic_sine, V harmonic_cosine, V asymmetry, Walk& walk, V& forward_side) {
+/// Goes to where the rate of x vanishes; false where some lane does not get there.
+HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, Walk& walk) {
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
-    const V first_rate = sm::fma(d, after.amplitude * after.w * ratio, harmonic_sine,
-                                 sm::fma(d, after.b * (one + asymmetry), walk.sine, after.rate));
+    // A minimum whose phase still falls at the dither's turn lies after it.
+    const V first_rate = sm::fma(d, after.amplitude * after.w * after.ratio, after.harmonic_sine,
+                                 sm::fma(d, after.b * (one + after.asymmetry), walk.sine, after.rate));
     const auto ahead = first_rate < zero;
-    const V amplitude = hn::IfThenElse(ahead, after.amplitude, before.amplitude);
-    const V w = hn::IfThenElse(ahead, after.w, before.w);
-    const V rate = hn::IfThenElse(ahead, after.rate, before.rate);
-    const V b = hn::IfThenElse(ahead, after.b, before.b);
-    forward_side = hn::IfThenElse(ahead, one, hn::Neg(one));
-    const V scale = one / hn::Sqrt(amplitude * w * w);
-    const V step_angle = w * scale;
-    V s1 = zero;
-    V c1 = one;
-    V s2 = harmonic_sine;
-    V c2 = harmonic_cosine;
+    Side side = after;
+    side.amplitude = hn::IfThenElse(ahead, after.amplitude, before.amplitude);
+    side.w = hn::IfThenElse(ahead, after.w, before.w);
+    side.rate = hn::IfThenElse(ahead, after.rate, before.rate);
+    side.b = hn::IfThenElse(ahead, after.b, before.b);
+    const V forward = hn::IfThenElse(ahead, one, hn::Neg(one));
+    const V scale = one / (side.w * hn::Sqrt(side.amplitude));
+    V sine_wt = zero;
+    V cosine_wt = one;
     hn::Mask<D> done = zero > zero;
+    gm::TurnSeries<D> series;
     for (int step = 0; step < most_steps; ++step) {
-        // Taylor coefficients in units of the scale.
-        V first = amplitude * step_angle;
-        V second = first * ratio;
-        const V beta = b * scale;
-        const V swing = beta * asymmetry;
-        const V couplings[3] = {sm::fma(d, swing, c1, beta), hn::Neg(swing * step_angle * s1),
-                                hn::Neg(swing * step_angle * step_angle * c1 * hn::Set(d, 0.5))};
-        V sines[order], cosines[order], weighted[order + 1], lockin[order + 1], drive[order];
-        for (std::size_t n = 0; n < order; ++n) {
-            const V sine = n % 4 == 0 ? s1 : n % 4 == 1 ? c1 : n % 4 == 2 ? hn::Neg(s1) : hn::Neg(c1);
-            const V doubled = n % 4 == 0 ? s2 : n % 4 == 1 ? c2 : n % 4 == 2 ? hn::Neg(s2) : hn::Neg(c2);
-            drive[n] = sm::fma(d, first, sine, second * doubled);
-            const V factor = step_angle * hn::Set(d, 1.0 / static_cast<double>(n + 1));
-            first = first * factor;
-            second = second * (factor + factor);
-        }
-        drive[0] = sm::fma(d, rate, scale, drive[0]);
-        sines[0] = walk.sine;
-        cosines[0] = walk.cosine;
-        weighted[0] = zero;
-        for (std::size_t n = 0; n < order; ++n) {
-            if (n > 0) {
-                V sum_s = zero;
-                V sum_c = zero;
-                for (std::size_t j = 1; j <= n; ++j) {
-                    sum_s = sm::fma(d, weighted[j], cosines[n - j], sum_s);
-                    sum_c = sm::fma(d, weighted[j], sines[n - j], sum_c);
-                }
-                const V inverse = hn::Set(d, 1.0 / static_cast<double>(n));
-                sines[n] = sum_s * inverse;
-                cosines[n] = hn::Neg(sum_c * inverse);
-            }
-            V pull = couplings[0] * sines[n];
-            for (std::size_t j = 1; j <= n && j < 3; ++j) pull = sm::fma(d, couplings[j], sines[n - j], pull);
-            lockin[n + 1] = pull;  // (n + 1) times the coefficient
-            weighted[n + 1] = drive[n] + pull;
-        }
-        // A step within which neither time nor phase goes far enough for the series to lose digits.
-        const V limit = hn::Min(hn::Set(d, 0.25), hn::Set(d, 0.25) / hn::Max(hn::Abs(weighted[1]), hn::Set(d, 1e-3)));
-        // Root of the rate: a parabola's extremum, then Newton where that is near enough for the series to hold.
-        V root = hn::Neg(weighted[1]) / weighted[2];
-        const auto near = forward_side * root <= limit;
+        series.expand(d, side, scale, sine_wt, cosine_wt, walk.sine, walk.cosine);
+        const V limit = gm::longest_step(d, series.rate[1]);
+        // A parabola's extremum, then Newton where that is near enough for the series to hold.
+        V root = hn::Neg(series.rate[1]) / series.rate[2];
+        const auto near = forward * root <= limit;
         for (int i = 0; i < 2; ++i) {
-            V value = weighted[order];
-            V slope = weighted[order] * hn::Set(d, static_cast<double>(order - 1));
-            for (std::size_t n = order - 1; n >= 1; --n) {
-                value = sm::fma(d, value, root, weighted[n]);
-                if (n >= 2) slope = sm::fma(d, slope, root, weighted[n] * hn::Set(d, static_cast<double>(n - 1)));
-            }
+            V value, slope;
+            series.rate_at(d, root, value, slope);
             root = root - value / slope;
         }
         // A step too far is taken back, but not beyond the dither's turn, where the other half cycle rules.
-        root = forward_side * hn::Max(forward_side * root, hn::Neg(forward_side * walk.time_s / scale));
-        V h = hn::IfThenElse(near, root, forward_side * limit);
+        root = forward * hn::Max(forward * root, hn::Neg(forward * walk.time_s / scale));
+        V h = hn::IfThenElse(near, root, forward * limit);
         h = hn::IfThenElse(done, zero, h);
-        V phase = weighted[order] * hn::Set(d, 1.0 / static_cast<double>(order));
-        V gained = lockin[order] * hn::Set(d, 1.0 / static_cast<double>(order));
-        for (std::size_t n = order - 1; n >= 1; --n) {
-            const V inverse = hn::Set(d, 1.0 / static_cast<double>(n));
-            phase = sm::fma(d, phase, h, weighted[n] * inverse);
-            gained = sm::fma(d, gained, h, lockin[n] * inverse);
-        }
-        phase = phase * h;
+        V phase, lockin;
+        series.gains(d, h, phase, lockin);
         walk.phase_rad = walk.phase_rad + phase;
-        walk.lockin_rad = sm::fma(d, gained, h, walk.lockin_rad);
+        walk.lockin_rad = walk.lockin_rad + lockin;
         walk.time_s = sm::fma(d, h, scale, walk.time_s);
-        V turn_s;
-        V turn_c;
-        sm::sincos(d, phase * hn::Set(d, 0.15915494309189535), turn_s, turn_c);
+        V turn_s, turn_c;
+        gm::sincos_small(d, phase, turn_s, turn_c);
         const V cosine = sm::fnma(d, walk.sine, turn_s, walk.cosine * turn_c);
         const V sine = sm::fma(d, walk.cosine, turn_s, walk.sine * turn_c);
         walk.cosine = hn::IfThenElse(done, walk.cosine, cosine);
         walk.sine = hn::IfThenElse(done, walk.sine, sine);
         done = hn::Or(done, near);
         if (hn::AllTrue(d, done)) return true;
-        const V fringes = w * walk.time_s * hn::Set(d, 0.15915494309189535);
+        const V fringes = side.w * walk.time_s * hn::Set(d, 0.15915494309189535);
         if (!hn::AllTrue(d, hn::Abs(fringes) < hn::Set(d, 0.25))) return false;
-        sm::sincos(d, fringes, s1, c1);
-        sm::sincos(d, fringes + fringes + harmonic_phase_fringes, s2, c2);
+        sm::sincos(d, fringes, sine_wt, cosine_wt);
     }
     return false;
 }
 
 /// Phase acceleration of a half cycle's drive at `time_s` from the turn, a magnitude [rad/s^2].
-HWY_INLINE V drive_acceleration(D d, const Side& side, V ratio, V harmonic_sine, V harmonic_cosine, V time_s) {
+HWY_INLINE V drive_acceleration(D d, const Side& side, V time_s) {
+    // cos y + 2 ratio cos(2 y + f) with y = w t, from y = 2 (y/2): |y| <= 3/4 before the middle of any quarter
     const V y = side.w * time_s;
     V s, c;
-    sm::sincos(d, y * hn::Set(d, 0.15915494309189535), s, c);
-    // cos y + 2 ratio cos(2 y + f)
-    const V c2 = sm::fnma(d, s + s, s, hn::Set(d, 1.0));
-    const V s2 = (s + s) * c;
-    const V harmonic = sm::fnma(d, s2, harmonic_sine, c2 * harmonic_cosine);
-    return side.amplitude * side.w * side.w * sm::fma(d, ratio + ratio, harmonic, c);
+    gm::sincos_small(d, y * hn::Set(d, 0.5), s, c);
+    const V sine = (s + s) * c;
+    const V cosine = sm::fnma(d, s + s, s, hn::Set(d, 1.0));
+    const V c2 = sm::fnma(d, sine + sine, sine, hn::Set(d, 1.0));
+    const V s2 = (sine + sine) * cosine;
+    const V harmonic = sm::fnma(d, s2, side.harmonic_sine, c2 * side.harmonic_cosine);
+    return side.amplitude * side.w * side.w * sm::fma(d, side.ratio + side.ratio, harmonic, cosine);
 }
 
 template <class Times>
@@ -195,7 +143,6 @@ bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& puls
         const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
         const V harmonic_sine = load(constants.harmonic_sine);
         const V harmonic_cosine = load(constants.harmonic_cosine);
-        const V harmonic_phase = load(constants.harmonic_phase_fringes);
         const V coupling_cosine = load(constants.coupling_cosine);
         const V coupling_sine = load(constants.coupling_sine);
         const V lockin_whole = load(turns.lockin_whole);
@@ -205,17 +152,22 @@ bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& puls
             const V sign = hn::Set(d, direction);
             const std::size_t after_side = direction > 0 ? 0 : 1;
             const std::size_t before_side = 1 - after_side;
-            const Side before{load(drive.amplitude_rad[i]), load(constants.angular_frequency_rad_s[before_side]),
-                              sign * load(drive.rate_rad_s[i]), load(drive.b_rad_s[i])};
-            const Side after{load(drive.amplitude_rad[i + 1]), load(constants.angular_frequency_rad_s[after_side]),
-                             sign * load(drive.rate_rad_s[i + 1]), load(drive.b_rad_s[i + 1])};
             const V ratio = sign * load(constants.harmonic_ratio);
-            Walk walk{zero, load(turns.cosine[i]), sign * load(turns.sine[i]), zero, zero};
-            V ahead;
-            if (!walk_to_zero_rate(d, before, after, ratio, harmonic_phase, harmonic_sine, harmonic_cosine,
-                                   sign * load(constants.turn_asymmetry), walk, ahead)) {
-                return false;
-            }
+            const V asymmetry = sign * load(constants.turn_asymmetry);
+            const auto side_of = [&](std::size_t half, std::size_t which) HWY_ATTR {
+                return Side{load(drive.amplitude_rad[half]),
+                            load(constants.angular_frequency_rad_s[which]),
+                            sign * load(drive.rate_rad_s[half]),
+                            load(drive.b_rad_s[half]),
+                            ratio,
+                            harmonic_sine,
+                            harmonic_cosine,
+                            asymmetry};
+            };
+            const Side before = side_of(i, before_side);
+            const Side after = side_of(i + 1, after_side);
+            Walk walk{zero, sign * load(turns.sine[i]), load(turns.cosine[i]), zero, zero};
+            if (!walk_to_zero_rate(d, before, after, walk)) return false;
             const V lockin = sm::fma(d, sign * walk.lockin_rad, per_rad, load(turns.lockin_fringes[i]));
             store(lockin, angles.lockin_fringes[i]);
             // psi at the zero-rate point, in fringes less whole ones that are added where the phase is reported.
@@ -256,10 +208,8 @@ bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& puls
             if (!accelerations) continue;
 
             if (electronics.ideal) {
-                store(drive_acceleration(d, before, ratio, harmonic_sine, harmonic_cosine, walk.time_s),
-                      readings.accel_before_rad_s2[i]);
-                store(drive_acceleration(d, after, ratio, harmonic_sine, harmonic_cosine, walk.time_s),
-                      readings.accel_after_rad_s2[i]);
+                store(drive_acceleration(d, before, walk.time_s), readings.accel_before_rad_s2[i]);
+                store(drive_acceleration(d, after, walk.time_s), readings.accel_after_rad_s2[i]);
                 continue;
             }
             // Comparators switch at whole quarter fringes of the true phase; how far these are from the extremum the
@@ -327,7 +277,6 @@ LaneReadout::LaneReadout(std::span<const gyro::Device> devices, std::span<const 
         constants_.harmonic_ratio[lane] = device.harmonic_ratio;
         constants_.harmonic_sine[lane] = std::sin(device.harmonic_phase_rad);
         constants_.harmonic_cosine[lane] = std::cos(device.harmonic_phase_rad);
-        constants_.harmonic_phase_fringes[lane] = device.harmonic_phase_rad / units::two_pi;
         constants_.turn_asymmetry[lane] = device.coupling.turn_asymmetry;
         constants_.coupling_cosine[lane] = std::cos(device.coupling.phase_rad);
         constants_.coupling_sine[lane] = std::sin(device.coupling.phase_rad);

@@ -44,7 +44,7 @@ class LaneReadout {
     struct Constants {
         simd::Lanes angular_frequency_rad_s[2];
         simd::Lanes duration_s[2];
-        simd::Lanes harmonic_ratio, harmonic_sine, harmonic_cosine, harmonic_phase_fringes;
+        simd::Lanes harmonic_ratio, harmonic_sine, harmonic_cosine;
         simd::Lanes turn_asymmetry;
         simd::Lanes coupling_cosine, coupling_sine;  ///< of the coupling phase
         simd::Lanes gain, offset_sin, offset_cos, orthogonality_cosine, orthogonality_sine;
