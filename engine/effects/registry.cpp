@@ -4,15 +4,18 @@
 #include "engine/effects/effect.hpp"
 
 /// Every effect, one line each, in the order of their names; NAME.cpp defines `const Effect& NAME()`.
-#define RINGLOCK_EFFECTS(X)  \
-    X(base_vibration)        \
-    X(bias_instability)      \
-    X(bias_ramp)             \
-    X(bias_step)             \
-    X(detector_phase_offset) \
-    X(dither_asymmetry)      \
-    X(quantum_noise)         \
-    X(rate_random_walk)      \
+#define RINGLOCK_EFFECTS(X)   \
+    X(base_vibration)         \
+    X(bias_instability)       \
+    X(bias_ramp)              \
+    X(bias_step)              \
+    X(detector_phase_offset)  \
+    X(dither_asymmetry)       \
+    X(dither_second_harmonic) \
+    X(lockin_second_harmonic) \
+    X(lockin_turn_asymmetry)  \
+    X(quantum_noise)          \
+    X(rate_random_walk)       \
     X(readout_ellipse)
 
 namespace ringlock::effects {
@@ -35,12 +38,9 @@ const Effect* find(std::string_view name) {
 }
 
 std::span<const std::string_view> planned() {
-    static constexpr std::array<std::string_view, 11> names = {"bias_temperature",       "case_motion",
-                                                               "count_quantization",     "dither_residue",
-                                                               "dither_second_harmonic", "lockin_second_harmonic",
-                                                               "lockin_temperature",     "lockin_turn_asymmetry",
-                                                               "missed_counts",          "resampling",
-                                                               "scale_factor_error"};
+    static constexpr std::array<std::string_view, 8> names = {
+        "bias_temperature",   "case_motion",   "count_quantization", "dither_residue",
+        "lockin_temperature", "missed_counts", "resampling",         "scale_factor_error"};
     return names;
 }
 

@@ -45,12 +45,21 @@ struct HalfCycle {
     }
 };
 
-/// The lock-in term b (1 + turn_asymmetry cos(dither angle's phase)) sin(psi + phase): the cosine is 1 at minima of the
-/// phase and -1 at maxima.
+/// The lock-in term
+///
+///     b (1 + turn_asymmetry cos(dither angle's phase)) (sin(psi + phase) + second_ratio sin(2 psi + second_phase)):
+///
+/// the cosine is 1 at minima of the phase and -1 at maxima.
 struct Coupling {
     double b_rad_s = 0.0;  ///< b = (2 pi / K) Omega_L
     double phase_rad = 0.0;
     double turn_asymmetry = 0.0;
+    double second_ratio = 0.0;  ///< second harmonic of the coupling over the first; makes the flow no Moebius map
+    double second_phase_rad = 0.0;
+
+    /// Phase of the second harmonic in the angle theta = psi + phase: sin(2 psi + second_phase) =
+    /// sin(2 theta + this).
+    double second_from_first_rad() const { return second_phase_rad - 2.0 * phase_rad; }
 };
 
 }  // namespace ringlock::gyro

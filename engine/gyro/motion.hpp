@@ -10,13 +10,15 @@ namespace ringlock::gyro {
 
 /// Taylor series in time of the solution of the equation of motion
 ///
-///     psi' = g(t) + b(t) sin(psi + e)                                                    (Gao & Deng 2007, eq. 1)
+///     psi' = g(t) + b(t) F(psi),      F = sin(psi + e)                                   (Gao & Deng 2007, eq. 1)
 ///
 /// around a point (t, psi), g and b as HalfCycle and Coupling say. With S = sin(psi + e) and Q = cos(psi + e) the
 /// coefficients follow from S' = Q psi', Q' = -S psi':
 ///
-///     (n+1) psi_{n+1} = g_n + sum_{j=0..n} b_j S_{n-j},
+///     (n+1) psi_{n+1} = g_n + sum_{j=0..n} b_j F_{n-j},
 ///     n S_n = sum_{j=1..n} j psi_j Q_{n-j},   n Q_n = -sum_{j=1..n} j psi_j S_{n-j}.
+///
+/// A second harmonic of the coupling adds products of S and Q to F: sin 2x = 2 S Q, cos 2x = 1 - 2 S^2.
 ///
 /// Coefficients are in powers of h/scale, which keeps them near one.
 template <std::size_t Order>
@@ -37,8 +39,12 @@ class PhaseSeries {
         const double b = coupling.b_rad_s * scale_s;
         double swing = half.sign * coupling.turn_asymmetry * b;
         const bool swings = swing != 0.0;
+        const bool doubles = coupling.second_ratio != 0.0;
+        const double second_sine = coupling.second_ratio * std::cos(coupling.second_from_first_rad());
+        const double second_cosine = coupling.second_ratio * std::sin(coupling.second_from_first_rad());
         std::array<double, Order> s{};
         std::array<double, Order> q{};
+        std::array<double, Order> f{};
         std::array<double, Order> bs{};            // b_j
         std::array<double, Order + 1> weighted{};  // j psi_j
         s[0] = std::sin(psi_rad + coupling.phase_rad);
@@ -60,10 +66,20 @@ class PhaseSeries {
             }
             double right = first * sine[n % 4] + second * harmonic[n % 4];
             if (n == 0) right += half.rate_rad_s * scale_s;
-            right += b * s[n];
+            f[n] = s[n];
+            if (doubles) {
+                double sq = 0.0;
+                double ss = 0.0;
+                for (std::size_t j = 0; j <= n; ++j) {
+                    sq += s[j] * q[n - j];
+                    ss += s[j] * s[n - j];
+                }
+                f[n] += second_sine * 2.0 * sq + second_cosine * ((n == 0 ? 1.0 : 0.0) - 2.0 * ss);
+            }
+            right += b * f[n];
             if (swings) {
                 bs[n] = swing * sine[(n + 1) % 4];
-                for (std::size_t j = 0; j <= n; ++j) right += bs[j] * s[n - j];
+                for (std::size_t j = 0; j <= n; ++j) right += bs[j] * f[n - j];
             }
             weighted[n + 1] = right;
             psi_[n + 1] = right / static_cast<double>(n + 1);

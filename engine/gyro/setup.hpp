@@ -23,6 +23,8 @@ struct Setup {
     double dither_harmonic_ratio = 0.0;   ///< second harmonic of the dither rate over the first
     double dither_harmonic_phase_rad = 0.0;
     double lockin_turn_asymmetry = 0.0;  ///< threshold (1 + it) times at minima of the phase, (1 - it) times at maxima
+    double lockin_second_ratio = 0.0;    ///< coupling on sin(2 psi + lockin_second_phase_rad) over that on sin(psi)
+    double lockin_second_phase_rad = 0.0;
     double input_rate_deg_h = 0.0;
     double initial_phase_rad = 0.0;  ///< optical phase at the first turn
     Ellipse ellipse;

@@ -5,12 +5,13 @@
 
 namespace ringlock::propagate {
 
-/// The reference: integrates through every fringe by Taylor series of order 20 with the step chosen so that the last
-/// two terms stay below the tolerance (Jorba & Zou 2005). Nothing about the dither is assumed but its equation.
+/// The reference for one half cycle of one gyro at a time: integrate() of direct_lanes.hpp in one lane. Nothing about
+/// the dither is assumed but its equation.
 class DirectIntegrator final : public Propagator {
    public:
-    /// `tolerance_rad`: error over a half cycle, shared out among its steps (two or three a fringe).
-    DirectIntegrator(gyro::Coupling coupling, double tolerance_rad);
+    /// `tolerance_rad`: error over a half cycle, shared out among its steps (about one a fringe).
+    DirectIntegrator(gyro::Coupling coupling, double tolerance_rad)
+        : coupling_(coupling), tolerance_rad_(tolerance_rad) {}
 
     double lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half) override;
 

@@ -97,6 +97,7 @@ LiftedMap exact_cycle(const gyro::Device& device) {
 }
 
 bool has_exact_cycle(const gyro::Device& device) {
+    if (device.coupling.second_ratio != 0.0) return false;
     const double amplitude = device.dither_amplitude_rad;
     const auto fast = [&](double sign) {
         const HalfTurnProblem problem = beginning(device.half_cycle(sign, amplitude), device.coupling);

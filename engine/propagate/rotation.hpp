@@ -51,7 +51,8 @@ LiftedMap exact_half_cycle(const gyro::HalfCycle& half, const gyro::Coupling& co
 /// rounding. Throws RunError where has_exact_cycle() is false.
 LiftedMap exact_cycle(const gyro::Device& device);
 
-/// Whether exact_cycle() can be formed: enough fringes in both half cycles, and a dither that reverses the input rate.
+/// Whether exact_cycle() can be formed: enough fringes in both half cycles, a dither that reverses the input rate, and
+/// a coupling without second harmonic.
 bool has_exact_cycle(const gyro::Device& device);
 
 /// Mean output rate less input rate [deg/h] of a gyro whose drive repeats itself, over infinite time. The mean over a

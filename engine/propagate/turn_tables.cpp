@@ -192,6 +192,11 @@ bool is_strong(const Polynomial& polynomial) {
 }  // namespace
 
 void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCycleRanges& wanted) {
+    if (device.coupling.second_ratio != 0.0) {
+        throw RunError(
+            fmt::format("turn map: a coupling with a second harmonic, {:.3g} of the first, is no Moebius map",
+                        device.coupling.second_ratio));
+    }
     ranges_[lane] = wanted;
     const std::array<Range, variables> ranges{wanted.amplitude_rad, wanted.rate_rad_s, wanted.b_rad_s};
     for (std::size_t v = 0; v < variables; ++v) {

@@ -44,7 +44,8 @@ class TurnTables {
     /// `tolerance_rad`: interpolation error of a turn.
     explicit TurnTables(double tolerance_rad) : tolerance_rad_(tolerance_rad) {}
 
-    /// Makes the polynomials of one gyro. Throws RunError where the tolerance cannot be held.
+    /// Makes the polynomials of one gyro. Throws RunError where the tolerance cannot be held, and where the coupling
+    /// has a second harmonic: such half turns are no Moebius maps.
     void make(std::size_t lane, const gyro::Device& device, const HalfCycleRanges& ranges);
 
     /// End 0: from the turn at which the half cycle begins to its middle. End 1: from its middle to the next turn.

@@ -90,5 +90,38 @@ TEST(DitherAsymmetry, AddsToWhatTheGyroHasDrawn) {
     EXPECT_DOUBLE_EQ(configured("dither_asymmetry", {{"ratio", 0.02}}, drawn).dither_asymmetry_ratio, 0.021);
 }
 
+TEST(SecondHarmonics, SetRatioAndPhase) {
+    const gyro::Setup dither = configured("dither_second_harmonic", {{"ratio", 0.02}, {"phase_rad", 0.5}});
+    EXPECT_EQ(dither.dither_harmonic_ratio, 0.02);
+    EXPECT_EQ(dither.dither_harmonic_phase_rad, 0.5);
+    const gyro::Setup lockin = configured("lockin_second_harmonic", {{"ratio", 0.1}, {"phase_rad", -0.5}});
+    EXPECT_EQ(lockin.lockin_second_ratio, 0.1);
+    EXPECT_EQ(lockin.lockin_second_phase_rad, -0.5);
+}
+
+TEST(SecondHarmonics, APhaseAloneDoesNothing) {
+    for (const std::string_view name : {"dither_second_harmonic", "lockin_second_harmonic"}) {
+        EXPECT_FALSE(find(name)->active({{"ratio", 0.0}, {"phase_rad", 1.0}})) << name;
+        EXPECT_TRUE(find(name)->active({{"ratio", 0.01}, {"phase_rad", 0.0}})) << name;
+    }
+}
+
+TEST(LockinTurnAsymmetry, SetsTheDifferenceBetweenTheTurns) {
+    EXPECT_EQ(configured("lockin_turn_asymmetry", {{"ratio", 0.1}}).lockin_turn_asymmetry, 0.1);
+}
+
+TEST(EffectRegistry, ConstantsOfTheGyroAreLeftAloneByDefaults) {
+    const gyro::Setup untouched;
+    for (const Effect* effect : registry()) {
+        gyro::Setup setup;
+        effect->configure(defaults_of(*effect), setup);
+        EXPECT_EQ(setup.dither_harmonic_ratio, untouched.dither_harmonic_ratio) << effect->name();
+        EXPECT_EQ(setup.lockin_second_ratio, untouched.lockin_second_ratio) << effect->name();
+        EXPECT_EQ(setup.lockin_turn_asymmetry, untouched.lockin_turn_asymmetry) << effect->name();
+        EXPECT_EQ(setup.coupling_phase_rad, untouched.coupling_phase_rad) << effect->name();
+        EXPECT_EQ(setup.dither_asymmetry_ratio, untouched.dither_asymmetry_ratio) << effect->name();
+    }
+}
+
 }  // namespace
 }  // namespace ringlock::effects

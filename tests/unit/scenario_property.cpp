@@ -108,7 +108,8 @@ TEST(ScenarioProperty, DamagedBytesAreParsedOrRefused) {
         }
         ASSERT_NO_THROW(parse_or_refuse(text, parsed)) << text;
     }
-    EXPECT_GT(parsed, mutants / 100) << "the mutants die in the TOML parser, before they reach this project's code";
+    // About one in a hundred stays valid.
+    EXPECT_GT(parsed, mutants / 200) << "the mutants die in the TOML parser, before they reach this project's code";
     EXPECT_LT(parsed, mutants);
 }
 
