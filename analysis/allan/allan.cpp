@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
 #include "analysis/allan/degrees_of_freedom.hpp"
+#include "analysis/allan/interval.hpp"
 #include "analysis/allan/noise_identification.hpp"
 #include "engine/core/error.hpp"
 
@@ -100,12 +100,7 @@ std::vector<std::int64_t> all_factors(std::int64_t largest) {
 
 std::vector<Point> deviation(Estimator estimator, std::span<const double> phase, double tau0_s,
                              std::span<const std::int64_t> factors, const Options& options) {
-    if (!(tau0_s > 0.0) || !std::isfinite(tau0_s)) {
-        throw InputError(fmt::format("sampling interval {} s: must be a positive number", tau0_s));
-    }
-    if (!(options.confidence > 0.0 && options.confidence < 1.0)) {
-        throw InputError(fmt::format("confidence {}: must lie between 0 and 1", options.confidence));
-    }
+    check_deviation_input(tau0_s, options.confidence);
     const auto points = static_cast<std::int64_t>(phase.size());
     const std::int64_t largest = largest_factor(estimator, points);
     const bool overlapping = estimator == Estimator::oadev;
@@ -130,9 +125,7 @@ std::vector<Point> deviation(Estimator estimator, std::span<const double> phase,
         p.dev = std::sqrt(sum / (2.0 * static_cast<double>(p.terms))) / p.tau_s;
         p.alpha = noise(m);
         p.edf = degrees_of_freedom(shape, p.alpha, m, points);
-        const boost::math::chi_squared chi2(p.edf);
-        p.lo = p.dev * std::sqrt(p.edf / boost::math::quantile(chi2, 0.5 * (1.0 + options.confidence)));
-        p.hi = p.dev * std::sqrt(p.edf / boost::math::quantile(chi2, 0.5 * (1.0 - options.confidence)));
+        set_interval(p, options.confidence);
         out.push_back(p);
     }
     return out;

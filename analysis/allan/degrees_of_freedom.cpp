@@ -88,7 +88,9 @@ double degrees_of_freedom(const EstimatorShape& shape, int alpha, std::int64_t m
     }
     const std::int64_t span = shape.modified ? m * (d + 1) : 1 + m * d;  // phase points under one term
     if (m < 1 || points < span) throw std::domain_error("degrees of freedom: no term fits the record");
-    const std::int64_t strides = shape.overlapping ? m : 1;
+    const std::int64_t bound = shape.starts_per_tau > 0 ? std::min(m, shape.starts_per_tau) : m;
+    const std::int64_t strides = shape.overlapping ? bound : 1;
+    if (m % strides != 0) throw std::domain_error("degrees of freedom: the stride is no whole number of samples");
     const std::int64_t term_count = 1 + (points - span) / (m / strides);
     const auto terms = static_cast<double>(term_count);
 

@@ -61,6 +61,24 @@ TEST(AllanDegreesOfFreedom, EqualExactCovarianceSums) {
     }
 }
 
+// A bounded number of starts in a tau: white noises by the same oracle, at the stride that follows.
+TEST(AllanDegreesOfFreedom, BoundedStartsEqualExactCovarianceSums) {
+    for (const int starts : {1, 4, 8}) {
+        const EstimatorShape shape{.starts_per_tau = starts};
+        for (const int m : {1, 2, 4, 8, 16, 64}) {
+            const int stride = m > starts ? m / starts : 1;
+            for (const int points : {2 * m + 1, 2 * m + 2, 3 * m + 2, 301}) {
+                for (const int alpha : {2, 0}) {
+                    const double oracle = exact(alpha, m, points, stride);
+                    EXPECT_NEAR(degrees_of_freedom(shape, alpha, m, points), oracle, 1e-9 * oracle)
+                        << alpha << ' ' << m << ' ' << points << ' ' << starts;
+                }
+            }
+        }
+    }
+    EXPECT_THROW(degrees_of_freedom({.starts_per_tau = 8}, 0, 12, 100), std::domain_error);
+}
+
 // Long averaging: blocks of lags instead of single ones.
 TEST(AllanDegreesOfFreedom, LongTausStayAccurate) {
     const EstimatorShape shape;

@@ -2,9 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
 #include "analysis/allan/allan.hpp"
+#include "analysis/allan/interval.hpp"
 #include "analysis/allan/noise_identification.hpp"
 #include "engine/core/error.hpp"
 #include "tests/unit/allan_support.hpp"
@@ -31,6 +33,24 @@ long double plain_definition(const std::vector<double>& phase, std::int64_t m, s
         sum += z * z;
     }
     return std::sqrt(sum / (2.0L * terms)) / (static_cast<long double>(m) * tau0);
+}
+
+// Many degrees of freedom are taken by an expansion, few by inversion: both are the chi-squared interval. 1e-12: what
+// is left out of the expansion, and the inversion's own rounding.
+TEST(AllanDeviation, IntervalsAreChiSquared) {
+    for (const double confidence : {0.5, 0.6827, 0.95, 0.999}) {
+        for (const double edf : {0.7, 1.0, 40.0, 9.9e4, 1e5, 3e6, 2e8}) {
+            allan::Point p;
+            p.dev = 2.0;
+            p.edf = edf;
+            allan::set_interval(p, confidence);
+            const boost::math::chi_squared chi2(edf);
+            const double lo = 2.0 * std::sqrt(edf / boost::math::quantile(chi2, 0.5 + 0.5 * confidence));
+            const double hi = 2.0 * std::sqrt(edf / boost::math::quantile(chi2, 0.5 - 0.5 * confidence));
+            EXPECT_NEAR(p.lo, lo, 1e-12 * lo) << edf;
+            EXPECT_NEAR(p.hi, hi, 1e-12 * hi) << edf;
+        }
+    }
 }
 
 // Published figures: W. Riley, "The calculation of time domain frequency stability", tables II and III; NIST SP1065
