@@ -192,9 +192,16 @@ std::size_t terms_needed(const Source& source, std::size_t variable, double tole
     return TurnTables::most_nodes;
 }
 
-/// Kicks from about which the phase may turn by more than an eighth of a fringe: |z| + |z|(1 + |z|) > sin(pi/4).
+/// The two halves of a turn bend the phase by an argument of up to asin |z| each: together by more than pi/4, where the
+/// two ways to the arctangent begin to differ, from |z| = sin(pi/8) = 0.3827 on, anywhere in the ranges.
 bool is_strong(const Polynomial& polynomial) {
-    return std::hypot(polynomial.coefficients[0][1], polynomial.coefficients[0][2]) > 0.3;
+    double re = 0.0;
+    double im = 0.0;
+    for (const Values& values : polynomial.coefficients) {
+        re += std::abs(values[1]);
+        im += std::abs(values[2]);
+    }
+    return std::hypot(re, im) > 0.38;
 }
 
 }  // namespace
