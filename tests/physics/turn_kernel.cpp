@@ -268,13 +268,13 @@ TEST(TurnKernel, LanesMatesAndInstructionSetsDoNotMatter) {
     std::mt19937_64 random(407);
     for (const bool vary : {false, true}) {
         // Up to 5000 deg/h: kicks on both sides of the one at which the arctangent of the right half plane is left.
-        for (const double threshold_deg_h : {300.0, 5000.0}) {
+        for (const double threshold_deg_h : vary ? std::vector<double>{5000.0} : std::vector<double>{300.0, 5000.0}) {
             const auto members = block(408, turns, vary, 200.0, threshold_deg_h);
             const auto reference = go(members, turns, {turns});
             for (const std::string& target : simd::available_targets()) {
                 simd::use_target(target);
                 for (const std::size_t gyros :
-                     vary ? std::vector<std::size_t>{3, 1} : std::vector<std::size_t>{16, 9, 1, 1}) {
+                     vary ? std::vector<std::size_t>{3} : std::vector<std::size_t>{16, 9, 1, 1}) {
                     std::vector<std::size_t> order(members.size());
                     std::iota(order.begin(), order.end(), std::size_t{0});
                     std::shuffle(order.begin(), order.end(), random);
