@@ -33,10 +33,10 @@ void fill(const LaneDither::Constants& constants, double noise_rms_rad, const si
         V rate = load(state.rate_rad_s);
         V b = load(state.b_rad_s);
         const V amplitude = load(constants.amplitude_rad);
-        store(load(state.amplitude_rad), drive.amplitude_rad[0]);
+        V swing = load(state.amplitude_rad);
+        store(swing, drive.amplitude_rad[0]);
         store(rate, drive.rate_rad_s[0]);
         store(b, drive.b_rad_s[0]);
-        V swing = amplitude;
         for (std::size_t i = 0; i < drive.turns; ++i) {
             const int direction = drive.direction(i);
             const std::size_t side = direction > 0 ? 0 : 1;
@@ -117,7 +117,7 @@ void LaneDither::next(std::size_t turns, std::span<const simd::Lanes> extra_angl
                       std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive) {
     drive.resize(turns);
     drive.first_turn = turn_;
-    if (noise_rms_rad_ > 0.0) {
+    if (noise_rms_rad_ > 0.0 && turns > 0) {
         deviates_.resize(turns);
         random::normals(who_, random::Purpose::noise_injection, static_cast<std::uint64_t>(turn_) + 1, turns, lanes_,
                         deviates_.front().data());

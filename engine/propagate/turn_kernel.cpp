@@ -64,10 +64,11 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
     const std::size_t width = hn::Lanes(d);
     const V one = hn::Set(d, 1.0);
     const V per_half_pi = hn::Set(d, 0.3183098861837907);  // 2 rad in fringes
-    V lockin[group], phase[group], shift_before[group], re_before[group], im_before[group];
+    V lockin[group], whole[group], phase[group], shift_before[group], re_before[group], im_before[group];
     for (std::size_t g = 0; g < group; ++g) {
         const std::size_t lane = first_lane + g * width;
         lockin[g] = hn::Load(d, state.lockin_fringes.data() + lane);
+        whole[g] = hn::Zero(d);
         phase[g] = hn::Load(d, state.coupling_phase_fringes.data() + lane);
         shift_before[g] = hn::Load(d, state.shift_fringes.data() + lane);
         re_before[g] = hn::Load(d, state.z_re.data() + lane);
@@ -112,11 +113,16 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
                 hn::Store(e.re * inverse, d, turns->cosine[i].data() + lane);
                 hn::Store(hn::Neg(sign * e.im * inverse), d, turns->sine[i].data() + lane);
                 const V second_half = bend<strong>(d, v) * per_half_pi;
-                hn::Store(sm::fma(d, sign, second_half, before_turn), d, turns->lockin_fringes[i].data() + lane);
+                const V at_turn = sm::fma(d, sign, second_half, before_turn);
+                hn::Store(whole[g] + at_turn, d, turns->lockin_fringes[i].data() + lane);
             }
             const sm::Complex<V> q = sm::mul_add(d, z_after, w, v);
             const V gain = sm::fma(d, bend<strong>(d, q), per_half_pi, after.shift);
-            lockin[g] = sm::fma(d, sign, gain, before_turn);
+            // Whole fringes go at every turn, or rounding would know where a piece began. They go from what was there
+            // before the turn, which is off the chain of operations that a turn must wait for.
+            const V carry = sm::nearest(d, before_turn);
+            whole[g] = whole[g] + carry;
+            lockin[g] = sm::fma(d, sign, gain, before_turn - carry);
             shift_before[g] = next.shift;
             re_before[g] = next.z_re;
             im_before[g] = next.z_im;
@@ -124,9 +130,8 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
     }
     for (std::size_t g = 0; g < group; ++g) {
         const std::size_t lane = first_lane + g * width;
-        const V whole = sm::nearest(d, lockin[g]);
-        hn::Store(lockin[g] - whole, d, state.lockin_fringes.data() + lane);
-        hn::Store(hn::Load(d, state.whole.data() + lane) + whole, d, state.whole.data() + lane);
+        hn::Store(lockin[g], d, state.lockin_fringes.data() + lane);
+        hn::Store(hn::Load(d, state.whole.data() + lane) + whole[g], d, state.whole.data() + lane);
         hn::Store(shift_before[g], d, state.shift_fringes.data() + lane);
         hn::Store(re_before[g], d, state.z_re.data() + lane);
         hn::Store(im_before[g], d, state.z_im.data() + lane);

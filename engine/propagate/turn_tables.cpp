@@ -61,24 +61,29 @@ double node(std::size_t i, std::size_t terms) {
     return terms == 1 ? 0.0 : std::cos(units::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(terms));
 }
 
-/// Row i: the powers' coefficients of the i-th Lagrange polynomial of the Chebyshev nodes.
-std::vector<std::vector<double>> lagrange_powers(std::size_t terms) {
-    // Chebyshev coefficients first, then their recurrence in powers: both well conditioned for the few terms used.
-    std::vector<std::vector<double>> chebyshev(terms, std::vector<double>(terms, 0.0));  // [n][power]
-    chebyshev[0][0] = 1.0;
-    if (terms > 1) chebyshev[1][1] = 1.0;
-    for (std::size_t n = 2; n < terms; ++n) {
-        for (std::size_t k = 0; k < terms; ++k) {
-            chebyshev[n][k] = (k > 0 ? 2.0 * chebyshev[n - 1][k - 1] : 0.0) - chebyshev[n - 2][k];
-        }
-    }
-    std::vector<std::vector<double>> rows(terms, std::vector<double>(terms, 0.0));
+/// Matrix of `terms` columns in each row.
+using Matrix = std::vector<std::vector<double>>;
+
+/// Row n: what values at the Chebyshev nodes count for in the coefficient of the n-th Chebyshev polynomial.
+Matrix chebyshev_weights(std::size_t terms) {
+    Matrix rows(terms, std::vector<double>(terms, 0.0));
     for (std::size_t i = 0; i < terms; ++i) {
         const double angle = units::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(terms);
         for (std::size_t n = 0; n < terms; ++n) {
-            const double weight =
-                (n == 0 ? 1.0 : 2.0) / static_cast<double>(terms) * std::cos(static_cast<double>(n) * angle);
-            for (std::size_t k = 0; k < terms; ++k) rows[i][k] += weight * chebyshev[n][k];
+            rows[n][i] = (n == 0 ? 1.0 : 2.0) / static_cast<double>(terms) * std::cos(static_cast<double>(n) * angle);
+        }
+    }
+    return rows;
+}
+
+/// Row k: what Chebyshev polynomials count for in the coefficient of the k-th power.
+Matrix chebyshev_powers(std::size_t terms) {
+    Matrix rows(terms, std::vector<double>(terms, 0.0));
+    rows[0][0] = 1.0;
+    if (terms > 1) rows[1][1] = 1.0;
+    for (std::size_t n = 2; n < terms; ++n) {
+        for (std::size_t k = 0; k < terms; ++k) {
+            rows[k][n] = (k > 0 ? 2.0 * rows[k - 1][n - 1] : 0.0) - rows[k][n - 2];
         }
     }
     return rows;
@@ -116,21 +121,24 @@ Polynomial interpolate(const Source& source, const Terms& terms) {
         }
     }
     Polynomial polynomial{terms, source.at(points)};
-    // One variable after the other, from values at nodes to coefficients of powers.
+    // One variable after the other, from values at nodes to Chebyshev coefficients to powers. The two steps must not
+    // be made one: rows of their product are as large as 2.4^terms, and a shift of many fringes would be summed up from
+    // parts as large. Chebyshev coefficients are small by then.
     std::size_t stride = 1;
     for (std::size_t v = 0; v < variables; ++v) {
         const std::size_t n = terms[v];
-        const auto rows = lagrange_powers(n);
-        std::vector<Values> next(polynomial.coefficients.size(), Values{});
-        for (std::size_t i = 0; i < next.size(); ++i) {
-            const std::size_t at = i / stride % n;
-            for (std::size_t k = 0; k < n; ++k) {
-                for (std::size_t c = 0; c < 3; ++c) {
-                    next[i - at * stride + k * stride][c] += rows[at][k] * polynomial.coefficients[i][c];
+        for (const Matrix& matrix : {chebyshev_weights(n), chebyshev_powers(n)}) {
+            std::vector<Values> next(polynomial.coefficients.size(), Values{});
+            for (std::size_t i = 0; i < next.size(); ++i) {
+                const std::size_t at = i / stride % n;
+                for (std::size_t k = 0; k < n; ++k) {
+                    for (std::size_t c = 0; c < 3; ++c) {
+                        next[i - at * stride + k * stride][c] += matrix[k][at] * polynomial.coefficients[i][c];
+                    }
                 }
             }
+            polynomial.coefficients = std::move(next);
         }
-        polynomial.coefficients = std::move(next);
         stride *= n;
     }
     return polynomial;
@@ -184,9 +192,16 @@ std::size_t terms_needed(const Source& source, std::size_t variable, double tole
     return TurnTables::most_nodes;
 }
 
-/// Kicks from about which the phase may turn by more than an eighth of a fringe: |z| + |z|(1 + |z|) > sin(pi/4).
+/// The two halves of a turn bend the phase by an argument of up to asin |z| each: together by more than pi/4, where the
+/// two ways to the arctangent begin to differ, from |z| = sin(pi/8) = 0.3827 on, anywhere in the ranges.
 bool is_strong(const Polynomial& polynomial) {
-    return std::hypot(polynomial.coefficients[0][1], polynomial.coefficients[0][2]) > 0.3;
+    double re = 0.0;
+    double im = 0.0;
+    for (const Values& values : polynomial.coefficients) {
+        re += std::abs(values[1]);
+        im += std::abs(values[2]);
+    }
+    return std::hypot(re, im) > 0.38;
 }
 
 }  // namespace

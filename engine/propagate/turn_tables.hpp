@@ -52,7 +52,7 @@ class TurnTables {
     const Part& part(double sign, int end) const { return parts_[index(sign, symmetric_ ? 0 : end)]; }
     /// Both ends are alike for all gyros.
     bool symmetric() const { return symmetric_; }
-    /// Lock-in may turn some gyro's phase by more than an eighth of a fringe at a turn.
+    /// Lock-in may turn some gyro's phase by more than a quarter fringe at a turn.
     bool strong() const { return strong_; }
     /// Middle and inverse half width of the ranges, 0 for what does not vary.
     const std::array<simd::Lanes, variables>& centre() const { return centre_; }

@@ -20,8 +20,8 @@ struct LaneIdentities {
 /// the instruction set and the steps asked for together.
 ///
 /// Philox 4x32-10 (Salmon, Moraes, Dror, Shaw, SC11) with the seed as key and the counter {step / 2, gyro, purpose};
-/// the 128 bits of a counter make two deviates by the method of Box and Muller (Ann. Math. Stat. 29, 610, 1958), with
-/// 52 bits for the radius (at most 8.49) and 52 for the angle.
+/// gyros are below 2^56; the 128 bits of a counter make two deviates by the method of Box and Muller (Ann. Math. Stat.
+/// 29, 610, 1958), with 52 bits for the radius (at most 8.49) and 52 for the angle.
 ///
 /// \param lanes  lanes to fill, 1...simd::lanes; rounded up to whole vectors, all of which are written
 /// \param out    steps rows of simd::lanes, aligned to simd::alignment

@@ -50,9 +50,10 @@ HWY_INLINE V fnma(D d, V a, V b, V c) {
 #endif
 }
 
-/// c + x (coefficients[0] + x (coefficients[1] + ...)) without the first: sum of coefficients[k] x^k.
+/// Sum of coefficients[k] x^k, two terms at least.
 template <class D, class V, std::size_t N>
 HWY_INLINE V polynomial(D d, V x, const double (&coefficients)[N]) {
+    static_assert(N >= 2);
     // Even and odd powers side by side halve the chain of dependent operations.
     const V x2 = x * x;
     V even = hn::Set(d, coefficients[N - 1 - (N - 1) % 2]);
@@ -113,6 +114,7 @@ HWY_INLINE V atan_small(D d, V t) {
 }
 
 /// Angle of the complex number re + i im [rad] where |im| <= tan(3 pi/8) re: the right half plane but for two slices.
+/// Error below 3e-16.
 template <class D, class V>
 HWY_INLINE V arg_right(D d, V re, V im) {
     const V size = hn::Abs(im);
@@ -125,7 +127,8 @@ HWY_INLINE V arg_right(D d, V re, V im) {
     return hn::CopySign(turned, im);
 }
 
-/// Angle of the complex number re + i im [rad], in [-pi, pi]; 0 for 0.
+/// Angle of the complex number re + i im [rad], in [-pi, pi]; 0 for 0. Error below 5e-16 where the larger part is
+/// between 2^-1000 and 2^1022.
 template <class D, class V>
 HWY_INLINE V arg(D d, V re, V im) {
     const V x = hn::Abs(re);

@@ -11,13 +11,14 @@ bad=0
 checks=0
 clean_tree() {
     rm -rf "$folder"
-    mkdir -p "$folder"/{engine/{core,gyro,random,ensemble,store},analysis/{allan,report},app,tests/unit}
+    mkdir -p "$folder"/{engine/{core,simd,gyro,random,ensemble,store},analysis/{allan,report},app,tests/unit}
     cd "$folder"
     echo '#pragma once' | tee engine/core/units.hpp engine/random/stream.hpp engine/store/file.hpp \
         analysis/allan/allan.hpp app/command.hpp >engine/gyro/device.hpp
     printf '#include "engine/gyro/device.hpp"\n#include <vector>\n#include "engine/core/units.hpp"\n' \
         >engine/gyro/device.cpp
     printf '#include "engine/gyro/device.hpp"\n' >engine/ensemble/run.cpp
+    printf '#include <vector>\n' >engine/simd/math-inl.hpp
     printf '#include "analysis/allan/allan.hpp"\n#include "engine/core/units.hpp"\n' >analysis/allan/allan.cpp
     printf '#include "analysis/allan/allan.hpp"\n#include "engine/store/file.hpp"\n' >analysis/report/plot.cpp
     printf '#include "app/command.hpp"\n' | tee tests/unit/command.cpp >app/main.cpp
@@ -43,7 +44,7 @@ include_fault() {
 }
 
 clean_tree
-expect 0 "12 files" includes.sh
+expect 0 "13 files" includes.sh
 # Nothing to read is not a success.
 rm -rf "$folder"/{engine,analysis,app,tests}
 expect 2 "no sources" includes.sh
