@@ -63,6 +63,7 @@ TEST(LongPropagators, TurnMapAgreesWithDirectIntegratorOverTenThousandTurns) {
 }
 
 TEST(Propagators, DirectIntegratorAgreesWithAnIndependentIntegrator) {
+    // Others, and one in extended precision, are in reference_integrators.cpp.
     Uniform uniform(21);
     for (int i = 0; i < 8; ++i) {
         gyro::Setup setup = paper_device();
