@@ -114,12 +114,13 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     for (const study::ArmStatistics& arm : plan.arms) arms.push_back(arm.arm);
     ensemble::Progress progress(gyros,
                                 {.quiet = arguments.quiet, .total_turns = ensemble::expected_turns(scenario, arms)});
-    const auto on_record = [&](std::int64_t gyro, const auto& angle_arcsec) {
-        writer.write_record(gyro, angle_arcsec);
-        progress.advance(1, 0);
-    };
-    const ensemble::Monitor monitor{interrupted, [&](std::int64_t turns) { progress.advance(0, turns); }};
-    const study::Study study = study::run(scenario, threads, on_record, monitor);
+    study::OnSamples on_samples;
+    if (scenario.output.angle_record) {
+        on_samples = [&](const study::SampledAngles& samples) { writer.write_samples(samples); };
+    }
+    const ensemble::Monitor monitor{interrupted,
+                                    [&](std::int64_t done, std::int64_t turns) { progress.advance(done, turns); }};
+    const study::Study study = study::run(scenario, threads, on_samples, monitor);
     progress.finish();
     check_interrupt();
 

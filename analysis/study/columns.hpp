@@ -62,7 +62,7 @@ inline constexpr std::array pooling_columns = {
 
 /// Allan deviations of the gyros.
 inline constexpr std::array allan_columns = {
-    Column<allan::Point>{"deviation_deg_h", "deg/h", "overlapping Allan deviation", &allan::Point::dev},
+    Column<allan::Point>{"deviation_deg_h", "deg/h", "overlapping Allan deviation, stride tau/8", &allan::Point::dev},
     Column<allan::Point>{"deviation_lo_deg_h", "deg/h", "lower end of its 68.27 % interval", &allan::Point::lo},
     Column<allan::Point>{"deviation_hi_deg_h", "deg/h", "upper end of its 68.27 % interval", &allan::Point::hi},
     Column<allan::Point>{"edf", "1", "equivalent degrees of freedom", &allan::Point::edf},

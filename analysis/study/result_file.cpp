@@ -33,6 +33,8 @@ const char* compensator_name(scenario::Compensator compensator) {
             return "published";
         case scenario::Compensator::corrected:
             return "corrected";
+        case scenario::Compensator::exact:
+            return "exact";
         case scenario::Compensator::none:
             break;
     }
@@ -78,9 +80,9 @@ void write_allan(store::Group& group, const Study& study, const ArmStatistics& a
     const std::size_t taus = study.factors.size();
     const store::Shape shape{arm.gyros.size(), taus};
     std::vector<double> tau;
-    for (const std::int64_t m : study.factors) tau.push_back(static_cast<double>(m) * study.schedule.sample_interval_s);
+    for (const std::int64_t m : study.factors) tau.push_back(static_cast<double>(m) * study.schedule.cycle_s);
     allan.write("tau_s", tau, {"s", "averaging times"});
-    allan.write("averaging_factor", study.factors, {"1", "averaging times in samples"});
+    allan.write("averaging_factor", study.factors, {"1", "averaging times in dither cycles"});
     for (const auto& column : allan_columns) {
         std::vector<double> values;
         for (const GyroStatistics& gyro : arm.gyros) {
@@ -195,16 +197,18 @@ ResultWriter::ResultWriter(const std::filesystem::path& path, const Study& study
     }
 }
 
-void ResultWriter::write_record(std::int64_t gyro, const std::vector<std::vector<double>>& angle_arcsec) {
-    for (std::size_t arm = 0; arm < records_.size(); ++arm) {
-        records_[arm].write_rows(static_cast<std::uint64_t>(gyro), 1, std::span<const double>(angle_arcsec[arm]));
-    }
+void ResultWriter::write_samples(const SampledAngles& samples) {
+    if (records_.empty()) return;
+    const std::uint64_t columns = samples.angle_arcsec.size() / samples.gyros;
+    records_[samples.arm].write_block(static_cast<std::uint64_t>(samples.first_gyro), samples.gyros,
+                                      static_cast<std::uint64_t>(samples.first_sample), columns,
+                                      std::span<const double>(samples.angle_arcsec));
 }
 
 void ResultWriter::finish(const Study& study, const Summary& summary, const store::Provenance& provenance) {
     store::File& root = file_.file();
     root.set_attribute("turns", study.turns);
-    root.set_attribute("turns_off_table", study.turns_off_table);
+    root.set_attribute("tables_remade", study.tables_remade);
     root.set_attribute("turn_map_error_rad", study.turn_map_error_rad);
     root.set_attribute("sample_interval_s", study.schedule.sample_interval_s);
     root.set_attribute("theory_arw_deg_rt_h", summary.theory.arw_deg_rt_h);
@@ -313,7 +317,7 @@ Study read_result(const std::filesystem::path& path) {
     if (text.size() != 1) throw InputError(fmt::format("{}: dataset /scenario must hold one text", path.string()));
     Study study(scenario::parse_string(text[0], path.string() + ":/scenario"));
     study.turns = file.int_attribute("turns");
-    study.turns_off_table = file.int_attribute("turns_off_table");
+    study.tables_remade = file.int_attribute("tables_remade");
     study.turn_map_error_rad = file.double_attribute("turn_map_error_rad");
     // What is not drawn is in the scenario.
     std::fill(study.gyros.begin(), study.gyros.end(), ensemble::nominal_setup(study.scenario));

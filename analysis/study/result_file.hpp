@@ -11,7 +11,7 @@
 /// The result file; results/FORMAT.md lists every dataset.
 namespace ringlock::study {
 
-inline constexpr std::int64_t result_format_version = 1;
+inline constexpr std::int64_t result_format_version = 2;
 
 /// Writes a result as the study goes on: angle records as gyros finish, the rest at the end. The file has its name only
 /// after finish().
@@ -21,8 +21,8 @@ class ResultWriter {
     /// a result of the same scenario and seed is replaced, anything else is kept.
     ResultWriter(const std::filesystem::path& path, const Study& study);
 
-    /// Writes the angle records of a gyro, [arm][sample] in arcsec. From any thread.
-    void write_record(std::int64_t gyro, const std::vector<std::vector<double>>& angle_arcsec);
+    /// Writes samples of the angle output, where the scenario stores them. From any thread.
+    void write_samples(const SampledAngles& samples);
     /// Writes everything else and gives the file its name.
     void finish(const Study& study, const Summary& summary, const store::Provenance& provenance);
 

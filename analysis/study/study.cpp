@@ -1,17 +1,23 @@
 #include "analysis/study/study.hpp"
 
 #include <algorithm>
+#include <array>
+#include <memory>
 #include <mutex>
 
+#include "analysis/allan/bounded_record.hpp"
+#include "analysis/allan/octave_deviation.hpp"
+#include "analysis/allan/octave_stream.hpp"
 #include "engine/ensemble/closed_form.hpp"
 #include "engine/ensemble/draw.hpp"
+#include "engine/ensemble/output_counts.hpp"
 
 namespace ringlock::study {
 
 Study::Study(const scenario::Scenario& what)
     : scenario(what),
       schedule(what),
-      factors(allan::octave_factors(allan::largest_factor(allan::Estimator::oadev, schedule.samples))) {
+      factors(allan::octave_factors(allan::largest_factor(allan::Estimator::oadev, schedule.cycles()))) {
     const auto total = static_cast<std::size_t>(ensemble::total_gyros(scenario));
     gyros.resize(total);
     for (const std::string& name : scenario.arms) {
@@ -24,45 +30,150 @@ bool has_closed_form(const scenario::Scenario& scenario, const scenario::Arm& ar
     return plain && ensemble::drive_repeats(scenario);
 }
 
-GyroStatistics analyse_record(std::span<const double> angle_arcsec, double interval_s, double input_rate_deg_h,
-                              std::span<const std::int64_t> factors) {
-    GyroStatistics result;
-    const std::vector<double> phase = allan::centred_phase(angle_arcsec, allan::Kind::phase, interval_s);
-    result.allan = allan::deviation(allan::Estimator::oadev, phase, interval_s, factors);
-    result.noise = noise::fit_noise(angle_arcsec, interval_s);
-    const double duration_s = interval_s * static_cast<double>(angle_arcsec.size() - 1);
-    result.rate_error_deg_h = (angle_arcsec.back() - angle_arcsec.front()) / duration_s - input_rate_deg_h;
-    return result;
-}
+namespace {
 
-Study run(const scenario::Scenario& scenario, int threads, const OnRecord& on_record,
+/// Samples gathered before they are handed on: enough for a write to be worth its while.
+constexpr std::size_t gathered_samples = 256;
+
+/// The statistics of one arm of one block while it is simulated.
+class ArmStream {
+   public:
+    ArmStream(const Study& study, std::size_t arm, std::int64_t first_gyro, std::size_t gyros,
+              const OnSamples& on_samples)
+        : study_(study),
+          gyros_(gyros),
+          on_samples_(on_samples),
+          record_(study.schedule.samples, fit_samples),
+          waiting_{arm, first_gyro, gyros, 0, {}} {}
+
+    void add(std::span<const simd::LaneCounts> counts) {
+        if (cycle_ == 0 && !counts.empty()) last_ = counts.front();
+        octaves_.add(counts, gyros_);
+        const std::int64_t every = study_.schedule.cycles_per_sample;
+        for (const simd::LaneCounts& row : counts) {
+            if (cycle_++ % every != 0) continue;
+            record_.add({&row, 1});
+            take_sample(row);
+        }
+    }
+
+    GyroStatistics finish(std::size_t lane, const gyro::Setup& setup) const {
+        const double arcsec_per_count = setup.scale_factor_arcsec / ensemble::counts_per_fringe;
+        GyroStatistics result;
+        result.allan = allan::deviation(octaves_, lane, arcsec_per_count, study_.schedule.cycle_s);
+        result.noise = noise::fit_noise(record_.phase(lane, arcsec_per_count),
+                                        study_.schedule.sample_interval_s * static_cast<double>(record_.interval()));
+        const double duration_s = study_.schedule.cycle_s * static_cast<double>(study_.schedule.cycles() - 1);
+        result.rate_error_deg_h =
+            static_cast<double>(turned_[lane]) * arcsec_per_count / duration_s - setup.input_rate_deg_h;
+        return result;
+    }
+
+    /// Hands on what waits.
+    void flush() {
+        if (waiting_rows_.empty()) return;
+        const std::size_t samples = waiting_rows_.size();
+        waiting_.angle_arcsec.resize(gyros_ * samples);
+        const double arcsec_per_count = study_.scenario.gyro.scale_factor_arcsec / ensemble::counts_per_fringe;
+        for (std::size_t lane = 0; lane < gyros_; ++lane) {
+            for (std::size_t i = 0; i < samples; ++i) {
+                waiting_.angle_arcsec[lane * samples + i] =
+                    static_cast<double>(waiting_rows_[i][lane]) * arcsec_per_count;
+            }
+        }
+        on_samples_(waiting_);
+        waiting_.first_sample += static_cast<std::int64_t>(samples);
+        waiting_rows_.clear();
+    }
+
+   private:
+    __extension__ using Wide = __int128;  // counts do not wrap round in it
+
+    void take_sample(const simd::LaneCounts& row) {
+        std::array<Wide, simd::lanes> angle{};
+        for (std::size_t lane = 0; lane < gyros_; ++lane) {
+            // The first sample is an angle by itself; from then on differences tell, which may wrap round.
+            if (sample_ == 0) {
+                origin_[lane] = row[lane];
+            } else {
+                turned_[lane] += static_cast<std::int64_t>(static_cast<std::uint64_t>(row[lane]) -
+                                                           static_cast<std::uint64_t>(last_[lane]));
+            }
+            angle[lane] = origin_[lane] + turned_[lane];
+        }
+        last_ = row;
+        ++sample_;
+        if (!on_samples_) return;
+        waiting_rows_.push_back(angle);
+        if (waiting_rows_.size() == gathered_samples) flush();
+    }
+
+    const Study& study_;
+    std::size_t gyros_;
+    const OnSamples& on_samples_;
+    allan::OctaveStream octaves_;
+    allan::BoundedRecord record_;
+    std::int64_t cycle_ = 0;
+    std::int64_t sample_ = 0;
+    simd::LaneCounts last_;
+    std::array<Wide, simd::lanes> origin_{};
+    std::array<Wide, simd::lanes> turned_{};
+    SampledAngles waiting_;
+    std::vector<std::array<Wide, simd::lanes>> waiting_rows_;
+};
+
+/// One block of gyros of a study.
+class BlockStatistics final : public ensemble::BlockSink {
+   public:
+    BlockStatistics(Study& study, std::mutex& mutex, std::int64_t first_gyro, std::size_t gyros,
+                    const OnSamples& on_samples)
+        : study_(study), mutex_(mutex), first_(static_cast<std::size_t>(first_gyro)), gyros_(gyros) {
+        for (std::size_t arm = 0; arm < study.arms.size(); ++arm) {
+            arms_.push_back(std::make_unique<ArmStream>(study, arm, first_gyro, gyros, on_samples));
+        }
+    }
+
+    void cycles(std::size_t arm, std::span<const simd::LaneCounts> counts) override { arms_[arm]->add(counts); }
+
+    void finish(const ensemble::BlockResult& result) override {
+        for (std::size_t arm = 0; arm < arms_.size(); ++arm) {
+            arms_[arm]->flush();
+            const bool closed_form = has_closed_form(study_.scenario, study_.arms[arm].arm);
+            for (std::size_t lane = 0; lane < gyros_; ++lane) {
+                GyroStatistics& found = study_.arms[arm].gyros[first_ + lane];
+                found = arms_[arm]->finish(lane, result.setups[lane]);
+                if (closed_form) {
+                    found.rate_error_closed_form_deg_h = ensemble::closed_form_rate_error_deg_h(result.setups[lane]);
+                }
+            }
+        }
+        for (std::size_t lane = 0; lane < gyros_; ++lane) study_.gyros[first_ + lane] = result.setups[lane];
+        const std::lock_guard lock(mutex_);  // sums of whole numbers and a maximum: their order does not matter
+        study_.turns += result.turns;
+        study_.tables_remade += result.tables_remade;
+        study_.turn_map_error_rad = std::max(study_.turn_map_error_rad, result.turn_map_error_rad);
+    }
+
+   private:
+    Study& study_;
+    std::mutex& mutex_;
+    std::size_t first_;
+    std::size_t gyros_;
+    std::vector<std::unique_ptr<ArmStream>> arms_;
+};
+
+}  // namespace
+
+Study run(const scenario::Scenario& scenario, int threads, const OnSamples& on_samples,
           const ensemble::Monitor& monitor) {
     Study study(scenario);
     std::vector<scenario::Arm> arms;
-    std::vector<bool> closed_form;
-    for (const ArmStatistics& arm : study.arms) {
-        arms.push_back(arm.arm);
-        closed_form.push_back(has_closed_form(scenario, arm.arm));
-    }
-
-    std::mutex mutex;  // sums of whole numbers and a maximum: their order does not matter
-    const auto sink = [&](std::int64_t gyro, ensemble::GyroRecord&& record) {
-        const auto slot = static_cast<std::size_t>(gyro);
-        study.gyros[slot] = record.setup;
-        for (std::size_t arm = 0; arm < arms.size(); ++arm) {
-            GyroStatistics& found = study.arms[arm].gyros[slot];
-            found = analyse_record(record.angle_arcsec[arm], study.schedule.sample_interval_s,
-                                   record.setup.input_rate_deg_h, study.factors);
-            if (closed_form[arm])
-                found.rate_error_closed_form_deg_h = ensemble::closed_form_rate_error_deg_h(record.setup);
-        }
-        if (on_record) on_record(gyro, record.angle_arcsec);
-        const std::lock_guard lock(mutex);
-        study.turns += record.turns;
-        study.turns_off_table += record.turns_off_table;
-        study.turn_map_error_rad = std::max(study.turn_map_error_rad, record.turn_map_error_rad);
+    for (const ArmStatistics& arm : study.arms) arms.push_back(arm.arm);
+    std::mutex mutex;
+    const auto make_sink = [&](std::int64_t first_gyro, std::size_t gyros) {
+        return std::make_unique<BlockStatistics>(study, mutex, first_gyro, gyros, on_samples);
     };
-    ensemble::run(scenario, arms, 0, ensemble::total_gyros(scenario), threads, sink, monitor);
+    ensemble::run(scenario, arms, 0, ensemble::total_gyros(scenario), threads, make_sink, monitor);
     return study;
 }
 

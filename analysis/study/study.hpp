@@ -37,11 +37,11 @@ struct Study {
 
     scenario::Scenario scenario;
     ensemble::Schedule schedule;
-    std::vector<std::int64_t> factors;  ///< averaging factors of the Allan deviations: octaves
+    std::vector<std::int64_t> factors;  ///< averaging factors of the Allan deviations in dither cycles: octaves
     std::vector<gyro::Setup> gyros;     ///< parameters as drawn
     std::vector<ArmStatistics> arms;
-    std::int64_t turns = 0;  ///< zero-rate points of distinct physical trajectories
-    std::int64_t turns_off_table = 0;
+    std::int64_t turns = 0;           ///< zero-rate points of distinct physical trajectories
+    std::int64_t tables_remade = 0;   ///< turn maps made anew because a drive left their ranges
     double turn_map_error_rad = 0.0;  ///< largest error measured between the nodes of the turn maps
 };
 
@@ -49,18 +49,24 @@ struct Study {
 /// corrected.
 bool has_closed_form(const scenario::Scenario& scenario, const scenario::Arm& arm);
 
-/// Allan deviations, noise coefficients and rate error of one record.
-///
-/// \param angle_arcsec  output angle, uniform
-/// \param interval_s    sampling interval
-GyroStatistics analyse_record(std::span<const double> angle_arcsec, double interval_s, double input_rate_deg_h,
-                              std::span<const std::int64_t> factors);
+/// Told of samples of the angle output of an arm: those of gyros first_gyro + i, i < gyros, from sample first_sample
+/// on, [gyro][sample] in arcsec. From any thread.
+struct SampledAngles {
+    std::size_t arm = 0;
+    std::int64_t first_gyro = 0;
+    std::size_t gyros = 0;
+    std::int64_t first_sample = 0;
+    std::vector<double> angle_arcsec;
+};
+using OnSamples = std::function<void(const SampledAngles& samples)>;
 
-/// Told when a gyro is done and analysed: its angle records, [arm][sample] in arcsec. From any thread.
-using OnRecord = std::function<void(std::int64_t gyro, const std::vector<std::vector<double>>& angle_arcsec)>;
-
-/// Runs the whole study. Throws RunError, Interrupted.
-Study run(const scenario::Scenario& scenario, int threads, const OnRecord& on_record = nullptr,
+/// Runs the whole study. Statistics are taken while it runs: Allan deviations from every cycle of the dither, noise
+/// coefficients from at most `fit_samples` of the samples; nothing grows with the simulated time but the number of
+/// octaves. Throws RunError, Interrupted.
+Study run(const scenario::Scenario& scenario, int threads, const OnSamples& on_samples = nullptr,
           const ensemble::Monitor& monitor = {});
+
+/// Most samples of a gyro that noise coefficients are fitted to: N is known to 1 % from as many.
+inline constexpr std::int64_t fit_samples = 8192;
 
 }  // namespace ringlock::study

@@ -1,39 +1,98 @@
 #include "engine/compensate/first_order.hpp"
 
-#include <algorithm>
 #include <cmath>
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/compensate/first_order.cpp"
 #include "engine/core/units.hpp"
+#include "engine/simd/targets.hpp"
+// The above must come first.
+#include "engine/simd/math-inl.hpp"
 
+HWY_BEFORE_NAMESPACE();
+namespace ringlock::compensate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+namespace sm = simd::HWY_NAMESPACE;
+
+using D = hn::CappedTag<double, simd::lanes>;
+using V = hn::Vec<D>;
+
+constexpr double memory_turns = 512.0;
+
+/// Mean of the positive values seen.
+struct Average {
+    V mean, count;
+
+    HWY_INLINE V update(D d, V value) {
+        const V zero = hn::Zero(d);
+        const auto seen = value > zero;
+        count = hn::IfThenElse(seen, hn::Min(count + hn::Set(d, 1.0), hn::Set(d, memory_turns)), count);
+        const V share = (value - mean) / hn::Max(count, hn::Set(d, 1.0));
+        mean = mean + hn::IfThenElseZero(seen, share);
+        return mean;
+    }
+};
+
+void observe_lanes(std::size_t lanes, const readout::LaneReadings& readings, FirstOrder::State& state,
+                   LaneErrors& errors) {
+    const D d;
+    const V zero = hn::Zero(d);
+    const V tiny = hn::Set(d, 1e-300);
+    for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+        const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
+        const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
+        Average average[4];
+        for (std::size_t k = 0; k < 4; ++k) average[k] = {load(state.mean_rad_s2[k]), load(state.count[k])};
+        V after_last = load(state.after_last_fringes);
+        V error = load(state.error_fringes);
+        const V scale = load(state.scale_fringes);
+        store(load(state.error_whole), errors.whole);
+        for (std::size_t i = 0; i < readings.turns; ++i) {
+            const V sine = load(readings.sine[i]);
+            const V cosine = load(readings.cosine[i]);
+            const bool minimum = readings.minimum(i);
+            // sin +- cos of the phase; the detectors' common scale drops out.
+            const V size2 = hn::Max(sm::fma(d, sine, sine, cosine * cosine), tiny);
+            const V projection = scale * (minimum ? sine + cosine : sine - cosine);
+            const auto half_kick = [&](Average& of, V acceleration) HWY_ATTR {
+                const V a = of.update(d, acceleration);
+                return hn::IfThenElseZero(a > zero, projection / hn::Sqrt(hn::Max(a, tiny) * size2));
+            };
+            Average* const sides = average + (minimum ? 0 : 2);
+            error = error + (after_last + half_kick(sides[0], load(readings.accel_before_rad_s2[i])));
+            after_last = half_kick(sides[1], load(readings.accel_after_rad_s2[i]));
+            store(error, errors.fringes[i]);
+        }
+        const V whole = sm::nearest(d, error);
+        store(error - whole, state.error_fringes);
+        store(load(state.error_whole) + whole, state.error_whole);
+        store(after_last, state.after_last_fringes);
+        for (std::size_t k = 0; k < 4; ++k) {
+            store(average[k].mean, state.mean_rad_s2[k]);
+            store(average[k].count, state.count[k]);
+        }
+    }
+}
+
+}  // namespace ringlock::compensate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace ringlock::compensate {
 
-namespace {
-constexpr std::int64_t memory_turns = 512;
-}
+HWY_EXPORT(observe_lanes);
 
-FirstOrder::FirstOrder(const Calibration& calibration, double factor)
-    : scale_(factor * calibration.b_rad_s * std::sqrt(units::pi)) {}
-
-double FirstOrder::Average::update(double value) {
-    if (value > 0.0) {
-        count_ = std::min(count_ + 1, memory_turns);
-        mean_ += (value - mean_) / static_cast<double>(count_);
+FirstOrder::FirstOrder(const Calibration& calibration, double factor) : lanes_(calibration.lanes) {
+    for (std::size_t lane = 0; lane < lanes_; ++lane) {
+        state_.scale_fringes[lane] = factor * calibration.b_rad_s[lane] * std::sqrt(units::pi) / units::two_pi;
     }
-    return mean_;
 }
 
-void FirstOrder::observe(const readout::Reading& reading) {
-    const double amplitude = std::hypot(reading.sin, reading.cos);
-    const bool minimum = reading.direction > 0;
-    // sin +- cos of the phase; the detectors' common scale drops out.
-    const double projection =
-        amplitude > 0.0 ? (reading.sin + (minimum ? reading.cos : -reading.cos)) / amplitude : 0.0;
-    const auto half_kick = [&](std::size_t side, double acceleration) {
-        const double a = acceleration_[side + (minimum ? 0 : 2)].update(acceleration);
-        return a > 0.0 ? scale_ / std::sqrt(a) * projection : 0.0;
-    };
-    error_rad_ += after_last_rad_ + half_kick(0, reading.accel_before_rad_s2);
-    after_last_rad_ = half_kick(1, reading.accel_after_rad_s2);
+void FirstOrder::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
+    errors.fringes.resize(readings.turns);
+    HWY_DYNAMIC_DISPATCH(observe_lanes)(lanes_, readings, state_, errors);
 }
 
 }  // namespace ringlock::compensate
+#endif

@@ -1,8 +1,5 @@
 #pragma once
-#include <array>
-#include <cstdint>
-
-#include "engine/compensate/compensator.hpp"
+#include "engine/compensate/lane_compensator.hpp"
 
 namespace ringlock::compensate {
 
@@ -14,41 +11,30 @@ namespace ringlock::compensate {
 /// f = 1/2 is right; the paper prints f = 1 (its equations 16 and 17), which contradicts its own (7).
 ///
 /// The acceleration that two pulses give is itself bent by the lock-in, in step with psi_0. It is therefore averaged
-/// over turns, for each side of minima and of maxima by itself.
-class FirstOrder : public Compensator {
+/// over turns, for each side of minima and of maxima by itself: all of the turns seen at first, then about the last
+/// 512.
+class FirstOrder final : public LaneCompensator {
    public:
+    static constexpr double corrected = 0.5;
+    static constexpr double published = 1.0;
+
     FirstOrder(const Calibration& calibration, double factor);
 
-    void observe(const readout::Reading& reading) override;
-    double error_rad() const override { return error_rad_; }
+    void observe(const readout::LaneReadings& readings, LaneErrors& errors) override;
 
-   private:
-    /// Mean of the positive values seen: of all of them at first, then of about the last `memory_turns`.
-    class Average {
-       public:
-        double update(double value);
-
-       private:
-        double mean_ = 0.0;
-        std::int64_t count_ = 0;
+    struct State {
+        simd::Lanes scale_fringes;  ///< f b sqrt(pi)
+        /// [before a minimum, after it, before a maximum, after it]
+        simd::Lanes mean_rad_s2[4];
+        simd::Lanes count[4];
+        simd::Lanes after_last_fringes;
+        simd::Lanes error_fringes;
+        simd::Lanes error_whole;
     };
 
-    double scale_;  // f b sqrt(pi)
-    std::array<Average, 4> acceleration_;
-    double after_last_rad_ = 0.0;
-    double error_rad_ = 0.0;
-};
-
-/// Corrected coefficients.
-class Corrected final : public FirstOrder {
-   public:
-    explicit Corrected(const Calibration& calibration) : FirstOrder(calibration, 0.5) {}
-};
-
-/// The coefficients as printed, twice too large.
-class Published final : public FirstOrder {
-   public:
-    explicit Published(const Calibration& calibration) : FirstOrder(calibration, 1.0) {}
+   private:
+    std::size_t lanes_;
+    State state_;
 };
 
 }  // namespace ringlock::compensate

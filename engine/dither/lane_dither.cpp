@@ -117,6 +117,8 @@ void LaneDither::next(std::size_t turns, std::span<const simd::Lanes> extra_angl
                       std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive) {
     drive.resize(turns);
     drive.first_turn = turn_;
+    drive.rates_vary = !extra_angle_arcsec.empty();
+    drive.thresholds_vary = !threshold_factor.empty();
     if (noise_rms_rad_ > 0.0 && turns > 0) {
         deviates_.resize(turns);
         random::normals(who_, random::Purpose::noise_injection, static_cast<std::uint64_t>(turn_) + 1, turns, lanes_,

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "engine/gyro/setup.hpp"
+#include "engine/random/normal_lanes.hpp"
 #include "engine/random/stream.hpp"
+#include "engine/simd/lanes.hpp"
 
 /// Effects beyond the base equation. One file each, one line in registry.cpp.
 namespace ringlock::effects {
@@ -33,6 +35,22 @@ class RateProcess {
     virtual double angle_arcsec(double start_s, double duration_s) = 0;
 };
 
+/// Consecutive intervals of time of a block of gyros: [interval][gyro].
+struct LaneIntervals {
+    std::size_t lanes = simd::lanes;  ///< gyros of the block
+    std::uint64_t first = 0;          ///< number of the first interval since the start of the run
+    std::span<const simd::Lanes> start_s;
+    std::span<const simd::Lanes> duration_s;
+};
+
+/// A rate process of a block of gyros.
+class LaneRateProcess {
+   public:
+    virtual ~LaneRateProcess() = default;
+    /// Adds the rotation [arcsec] of each interval to `angle_arcsec`. Called with consecutive intervals, once each.
+    virtual void add_angles(const LaneIntervals& intervals, std::span<simd::Lanes> angle_arcsec) = 0;
+};
+
 /// An effect: what it is called, what it needs, what it does to a gyro.
 class Effect {
    public:
@@ -49,6 +67,10 @@ class Effect {
     virtual std::unique_ptr<RateProcess> rate_process(const Values& /*values*/, const random::Identity& /*who*/) const {
         return nullptr;
     }
+    /// The same for the first `lanes` gyros of a block, with the same angles: one rate_process() a gyro, unless the
+    /// effect has something faster.
+    virtual std::unique_ptr<LaneRateProcess> lane_rate_process(const Values& values, const random::LaneIdentities& who,
+                                                               std::size_t lanes) const;
 };
 
 /// All effects this program can simulate, in the order of their names.

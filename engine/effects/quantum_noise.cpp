@@ -14,15 +14,39 @@ constexpr std::array parameters_of = {
 class Process final : public RateProcess {
    public:
     Process(double deg_rt_h, const random::Identity& who)
-        : arcsec_rt_s_(deg_rt_h / units::deg_rt_h_per_arcsec_rt_s), normal_(who, random::Purpose::quantum_noise) {}
+        : arcsec_rt_s_(deg_rt_h / units::deg_rt_h_per_arcsec_rt_s), who_(who) {}
 
     double angle_arcsec(double /*start_s*/, double duration_s) override {
-        return arcsec_rt_s_ * std::sqrt(duration_s) * normal_();
+        return arcsec_rt_s_ * std::sqrt(duration_s) * random::normal(who_, random::Purpose::quantum_noise, interval_++);
     }
 
    private:
     double arcsec_rt_s_;
-    random::NormalStream normal_;
+    random::Identity who_;
+    std::uint64_t interval_ = 0;
+};
+
+/// Every half cycle of every gyro of a study takes one: all gyros at once.
+class LaneProcess final : public LaneRateProcess {
+   public:
+    LaneProcess(double deg_rt_h, const random::LaneIdentities& who)
+        : arcsec_rt_s_(deg_rt_h / units::deg_rt_h_per_arcsec_rt_s), who_(who) {}
+
+    void add_angles(const LaneIntervals& intervals, std::span<simd::Lanes> angle_arcsec) override {
+        deviates_.resize(angle_arcsec.size());
+        random::normals(who_, random::Purpose::quantum_noise, intervals.first, deviates_.size(), intervals.lanes,
+                        deviates_.front().data());
+        for (std::size_t i = 0; i < angle_arcsec.size(); ++i) {
+            for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+                angle_arcsec[i][lane] += arcsec_rt_s_ * std::sqrt(intervals.duration_s[i][lane]) * deviates_[i][lane];
+            }
+        }
+    }
+
+   private:
+    double arcsec_rt_s_;
+    random::LaneIdentities who_;
+    std::vector<simd::Lanes> deviates_;
 };
 
 class QuantumNoise final : public Effect {
@@ -41,6 +65,10 @@ class QuantumNoise final : public Effect {
     bool active(const Values& values) const override { return values.at("deg_rt_h") != 0.0; }
     std::unique_ptr<RateProcess> rate_process(const Values& values, const random::Identity& who) const override {
         return std::make_unique<Process>(values.at("deg_rt_h"), who);
+    }
+    std::unique_ptr<LaneRateProcess> lane_rate_process(const Values& values, const random::LaneIdentities& who,
+                                                       std::size_t /*lanes*/) const override {
+        return std::make_unique<LaneProcess>(values.at("deg_rt_h"), who);
     }
 };
 

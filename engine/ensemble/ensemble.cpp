@@ -13,6 +13,9 @@
 #include <vector>
 
 #include "engine/core/error.hpp"
+#include "engine/ensemble/block.hpp"
+#include "engine/ensemble/draw.hpp"
+#include "engine/ensemble/trajectory_kind.hpp"
 
 namespace ringlock::ensemble {
 
@@ -43,30 +46,85 @@ class Failures {
     std::vector<std::pair<std::int64_t, std::string>> failures_;
 };
 
+/// Gyros of a block: full ones where that leaves work for every thread, to the end as well.
+std::int64_t block_size(std::int64_t gyros, int threads) {
+    constexpr std::int64_t blocks_per_thread = 2;
+    const std::int64_t full = simd::lanes;
+    const std::int64_t share = (gyros + blocks_per_thread * threads - 1) / (blocks_per_thread * threads);
+    // Half a block is one vector of AVX-512; a smaller one would run with empty lanes.
+    return share >= full ? full : std::min<std::int64_t>(gyros, std::max<std::int64_t>(share, full / 2));
+}
+
+/// Turns between two looks at the monitor: a dither second, or less where each takes milliseconds.
+std::size_t piece_turns(const scenario::Scenario& scenario) {
+    return scenario.propagation.method == scenario::PropagationMethod::direct ? 8 : 128;
+}
+
+void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first,
+              std::size_t gyros, BlockSink& sink, const Monitor& monitor) {
+    const Schedule schedule(scenario);
+    const std::size_t piece = piece_turns(scenario);
+    GyroBlock block(scenario, arms, first, gyros);
+    const std::int64_t counted = static_cast<std::int64_t>(gyros) * block.trajectories();
+    for (std::int64_t turn = 0; turn < schedule.turns();) {
+        if (monitor.cancelled && monitor.cancelled()) throw Interrupted();
+        const auto turns =
+            static_cast<std::size_t>(std::min(static_cast<std::int64_t>(piece), schedule.turns() - turn));
+        block.advance(turns);
+        for (std::size_t arm = 0; arm < arms.size(); ++arm) sink.cycles(arm, block.counts(arm));
+        turn += static_cast<std::int64_t>(turns);
+        if (monitor.on_progress) monitor.on_progress(0, static_cast<std::int64_t>(turns) * counted);
+    }
+    sink.finish({first, block.setups(), counted * schedule.turns(), block.tables_remade(), block.table_error_rad()});
+    if (monitor.on_progress) monitor.on_progress(static_cast<std::int64_t>(gyros), 0);
+}
+
 }  // namespace
 
+std::int64_t expected_turns(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms) {
+    std::int64_t trajectories = 0;
+    for (const TrajectoryKind kind : {TrajectoryKind::plain, TrajectoryKind::noise_injected}) {
+        const auto is = [&](const scenario::Arm& arm) { return kind_of(arm) == kind; };
+        trajectories += std::any_of(arms.begin(), arms.end(), is) ? 1 : 0;
+    }
+    return total_gyros(scenario) * trajectories * Schedule(scenario).turns();
+}
+
 void run(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first, std::int64_t last,
-         int threads, const Sink& sink, const Monitor& monitor) {
+         int threads, const SinkFactory& make_sink, const Monitor& monitor) {
+    if (first == last) return;
     // An arena alone gets no more workers than there are cores; asked for more threads, give more.
     const oneapi::tbb::global_control control(oneapi::tbb::global_control::max_allowed_parallelism,
                                               static_cast<std::size_t>(threads));
     oneapi::tbb::task_arena arena(threads);
     Failures failures;
+    const std::int64_t size = block_size(last - first, threads);
+    const auto simulate_block = [&](std::int64_t gyro, std::int64_t gyros) {
+        const auto sink = make_sink(gyro, static_cast<std::size_t>(gyros));
+        simulate(scenario, arms, gyro, static_cast<std::size_t>(gyros), *sink, monitor);
+    };
     arena.execute([&] {
         // Its own context: cancelling this loop must not cancel a loop of the caller around it.
         oneapi::tbb::task_group_context context(oneapi::tbb::task_group_context::isolated);
         oneapi::tbb::parallel_for(
-            oneapi::tbb::blocked_range<std::int64_t>(first, last, 1),
-            [&](const oneapi::tbb::blocked_range<std::int64_t>& block) {
-                for (std::int64_t gyro = block.begin(); gyro != block.end(); ++gyro) {
-                    GyroRecord record;
+            oneapi::tbb::blocked_range<std::int64_t>(0, (last - first + size - 1) / size, 1),
+            [&](const oneapi::tbb::blocked_range<std::int64_t>& blocks) {
+                for (std::int64_t block = blocks.begin(); block != blocks.end(); ++block) {
+                    const std::int64_t gyro = first + block * size;
+                    const std::int64_t gyros = std::min(size, last - gyro);
                     try {
-                        record = simulate_gyro(scenario, arms, gyro, monitor);
-                    } catch (const RunError& error) {
-                        failures.add(gyro, error.what());
-                        continue;
+                        simulate_block(gyro, gyros);
+                    } catch (const RunError& together) {
+                        // Which ones? Those of the block that can be simulated are so by themselves.
+                        for (std::int64_t one = gyro; one < gyro + gyros; ++one) {
+                            try {
+                                if (gyros == 1) throw together;
+                                simulate_block(one, 1);
+                            } catch (const RunError& error) {
+                                failures.add(one, error.what());
+                            }
+                        }
                     }
-                    sink(gyro, std::move(record));
                 }
             },
             oneapi::tbb::simple_partitioner(), context);

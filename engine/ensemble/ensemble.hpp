@@ -1,23 +1,57 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
+#include <vector>
 
-#include "engine/ensemble/gyro_run.hpp"
+#include "engine/gyro/setup.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/scenario.hpp"
+#include "engine/simd/lanes.hpp"
 
 namespace ringlock::ensemble {
 
-/// Called once for each gyro when it is done, from any thread, several at a time and in any order.
-using Sink = std::function<void(std::int64_t gyro, GyroRecord&& record)>;
+/// What a block of gyros was, beside its output.
+struct BlockResult {
+    std::int64_t first_gyro = 0;
+    std::vector<gyro::Setup> setups;  ///< of each gyro, as drawn
+    std::int64_t turns = 0;           ///< zero-rate points of the trajectories simulated, without that of `ideal`
+    std::int64_t tables_remade = 0;   ///< turn maps made anew because the drive left their ranges
+    double turn_map_error_rad = 0.0;  ///< largest interpolation error measured when the tables were made; 0: no tables
+};
 
-/// Simulates gyros [first, last) of the scenario on `threads` threads of oneTBB.
+/// Takes the output of one block of consecutive gyros while it is simulated. Memory for all of it is not held by the
+/// engine.
+class BlockSink {
+   public:
+    virtual ~BlockSink() = default;
+    /// Angle output of an arm at the next minima of the dither, one a cycle from the first turn on: [minimum][gyro] in
+    /// counts of 1/counts_per_fringe fringes that wrap round (output_counts.hpp).
+    virtual void cycles(std::size_t arm, std::span<const simd::LaneCounts> counts) = 0;
+    /// The block is done.
+    virtual void finish(const BlockResult& result) = 0;
+};
+
+/// Makes the sink of a block; called from the thread that simulates it.
+using SinkFactory = std::function<std::unique_ptr<BlockSink>(std::int64_t first_gyro, std::size_t gyros)>;
+
+/// What a simulation tells while it runs, and asks; both may be empty, and are called from any thread.
+struct Monitor {
+    std::function<bool()> cancelled;  ///< true stops the simulation with Interrupted
+    /// So many gyros and turns more are done; turns as BlockResult::turns counts them.
+    std::function<void(std::int64_t gyros, std::int64_t turns)> on_progress;
+};
+
+/// Turns that the whole ensemble will count.
+std::int64_t expected_turns(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms);
+
+/// Simulates gyros [first, last) of the scenario on `threads` threads of oneTBB, in blocks of at most simd::lanes.
 ///
-/// What a gyro does depends on its number, never on the thread: results are the same for any number of threads. Gyros
-/// that fail do not stop the others; their failures are reported together in one RunError at the end. Cancellation
-/// stops all and throws Interrupted.
+/// What a gyro does depends on its number, never on block or thread: results are the same for any number of threads.
+/// Gyros that fail do not stop the others; their failures are reported together in one RunError at the end.
+/// Cancellation stops all and throws Interrupted.
 void run(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first, std::int64_t last,
-         int threads, const Sink& sink, const Monitor& monitor);
+         int threads, const SinkFactory& make_sink, const Monitor& monitor);
 
 }  // namespace ringlock::ensemble

@@ -13,6 +13,8 @@ namespace ringlock::gyro {
 struct LaneDrive {
     std::int64_t first_turn = 0;
     std::size_t turns = 0;
+    bool rates_vary = false;  ///< from half cycle to half cycle
+    bool thresholds_vary = false;
     std::vector<simd::Lanes> plain_fringes;     ///< [turns] phase of drive and input at the turn, less whole fringes
     std::vector<simd::Lanes> amplitude_rad;     ///< [turns + 1] amplitude of the half cycle: half its swing
     std::vector<simd::Lanes> rate_rad_s;        ///< [turns + 1] phase rate of the input over the half cycle

@@ -49,7 +49,10 @@ struct TurnSeries {
         V second = first * side.ratio;
         V drive[order];
         for (std::size_t n = 0; n < order; ++n) {
-            const V sine = n % 4 == 0 ? sine_wt : n % 4 == 1 ? cosine_wt : n % 4 == 2 ? hn::Neg(sine_wt) : hn::Neg(cosine_wt);
+            const V sine = n % 4 == 0   ? sine_wt
+                           : n % 4 == 1 ? cosine_wt
+                           : n % 4 == 2 ? hn::Neg(sine_wt)
+                                        : hn::Neg(cosine_wt);
             const V doubled = n % 4 == 0 ? s2 : n % 4 == 1 ? c2 : n % 4 == 2 ? hn::Neg(s2) : hn::Neg(c2);
             drive[n] = sm::fma(d, first, sine, second * doubled);
             const V factor = angle * hn::Set(d, 1.0 / static_cast<double>(n + 1));

@@ -4,7 +4,7 @@
 #define HWY_TARGET_INCLUDE "engine/propagate/turn_kernel.cpp"
 #include "engine/simd/targets.hpp"
 // The above must come first.
-#include "engine/simd/math-inl.hpp"
+#include "engine/propagate/turn_tables-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ringlock::propagate::HWY_NAMESPACE {
@@ -14,37 +14,7 @@ namespace sm = simd::HWY_NAMESPACE;
 
 using D = hn::CappedTag<double, simd::lanes>;
 using V = hn::Vec<D>;
-
-/// One half of a half cycle.
-struct HalfMap {
-    V shift, z_re, z_im;
-};
-
-/// Polynomials of one part at the scaled variables.
-HWY_INLINE HalfMap evaluate(D d, const TurnTables::Part& part, std::size_t lane, V amplitude, V rate, V coupling) {
-    const auto [amplitudes, rates, couplings] = part.terms;
-    const simd::Lanes* row = part.coefficients.data() + 3 * amplitudes * rates * couplings;
-    // Terms that a gyro does not have are zeros: 0 x + c is c to the bit.
-    const V zero = hn::Zero(d);
-    V sum[3] = {zero, zero, zero};
-    for (std::size_t c = 0; c < couplings; ++c) {
-        V over_rate[3] = {zero, zero, zero};
-        for (std::size_t b = 0; b < rates; ++b) {
-            row -= 3;
-            V over_amplitude[3];
-            for (std::size_t k = 0; k < 3; ++k) over_amplitude[k] = hn::Load(d, row[k].data() + lane);
-            for (std::size_t a = 1; a < amplitudes; ++a) {
-                row -= 3;
-                for (std::size_t k = 0; k < 3; ++k) {
-                    over_amplitude[k] = sm::fma(d, over_amplitude[k], amplitude, hn::Load(d, row[k].data() + lane));
-                }
-            }
-            for (std::size_t k = 0; k < 3; ++k) over_rate[k] = sm::fma(d, over_rate[k], rate, over_amplitude[k]);
-        }
-        for (std::size_t k = 0; k < 3; ++k) sum[k] = sm::fma(d, sum[k], coupling, over_rate[k]);
-    }
-    return {sum[0], sum[1], sum[2]};
-}
+using HalfMap = HalfMapOf<V>;
 
 /// Argument of v or q. Where no kick is strong, `strong` or not makes no difference to the result, but to the time.
 template <bool strong>

@@ -52,7 +52,7 @@ HWY_INLINE hn::Vec<hn::Rebind<double, D>> one_to_two(D d, V high, V low) {
 }
 
 void fill_normals(const LaneIdentities& who, Purpose purpose, std::uint64_t first_step, std::size_t steps,
-                  std::size_t lanes, double* HWY_RESTRICT out) {
+                  std::size_t lanes, double* HWY_RESTRICT out, std::size_t pair_stride) {
     const hn::CappedTag<double, simd::lanes> d;
     const hn::Rebind<std::uint64_t, decltype(d)> bits;
     const std::size_t width = hn::Lanes(d);
@@ -64,7 +64,7 @@ void fill_normals(const LaneIdentities& who, Purpose purpose, std::uint64_t firs
         const auto last =
             hn::Or(hn::ShiftLeft<8>(hn::ShiftRight<32>(gyro)), hn::Set(bits, static_cast<std::uint64_t>(purpose)));
         const std::uint64_t end = first_step + steps;
-        for (std::uint64_t step = first_step & ~std::uint64_t{1}; step < end; step += 2) {
+        for (std::uint64_t step = first_step & ~std::uint64_t{1}; step < end; step += 2 * pair_stride) {
             const std::uint64_t pair = step >> 1;
             using Bits = hn::Vec<decltype(bits)>;
             const auto words =
@@ -90,8 +90,8 @@ namespace ringlock::random {
 HWY_EXPORT(fill_normals);
 
 void normals(const LaneIdentities& who, Purpose purpose, std::uint64_t first_step, std::size_t steps, std::size_t lanes,
-             double* out) {
-    HWY_DYNAMIC_DISPATCH(fill_normals)(who, purpose, first_step, steps, lanes, out);
+             double* out, std::size_t pair_stride) {
+    HWY_DYNAMIC_DISPATCH(fill_normals)(who, purpose, first_step, steps, lanes, out, pair_stride);
 }
 
 double normal(Identity who, Purpose purpose, std::uint64_t step) {

@@ -23,10 +23,12 @@ struct LaneIdentities {
 /// gyros are below 2^56; the 128 bits of a counter make two deviates by the method of Box and Muller (Ann. Math. Stat.
 /// 29, 610, 1958), with 52 bits for the radius (at most 8.49) and 52 for the angle.
 ///
+/// \param pair_stride  of the pairs of steps 2 k and 2 k + 1 only every so many, from first_step's on, are drawn; the
+///                     rows of the others are left as they are
 /// \param lanes  lanes to fill, 1...simd::lanes; rounded up to whole vectors, all of which are written
 /// \param out    steps rows of simd::lanes, aligned to simd::alignment
 void normals(const LaneIdentities& who, Purpose purpose, std::uint64_t first_step, std::size_t steps, std::size_t lanes,
-             double* out);
+             double* out, std::size_t pair_stride = 1);
 
 /// The deviate of one step of one gyro: what normals() gives.
 double normal(Identity who, Purpose purpose, std::uint64_t step);

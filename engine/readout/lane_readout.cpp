@@ -181,9 +181,9 @@ bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& puls
             V error = zero;  // phase read less phase, fringes
             if (!electronics.ideal) {
                 sine = sm::fma(d, sine, load(constants.gain), load(constants.offset_sin));
-                cosine = sm::fnma(d, true_sine, load(constants.orthogonality_sine),
-                                  sm::fma(d, true_cosine, load(constants.orthogonality_cosine),
-                                          load(constants.offset_cos)));
+                cosine =
+                    sm::fnma(d, true_sine, load(constants.orthogonality_sine),
+                             sm::fma(d, true_cosine, load(constants.orthogonality_cosine), load(constants.offset_cos)));
                 if (!noise.empty()) {
                     const V rms = hn::Set(d, electronics.detector_noise_relative);
                     sine = sm::fma(d, rms, load(noise[2 * i]), sine);
@@ -242,8 +242,10 @@ bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& puls
                 const auto& tables = pulses.times[after_side][which];
                 const V harmonic = sm::fma(d, ratio + ratio, harmonic_cosine, hn::Set(d, 1.0));
                 const V scale = which_sign / hn::Sqrt(side.amplitude * side.w * side.w * harmonic);
-                const V first_s = sm::fma(d, near_root * scale, pulse_factor(d, tables[0], lane, odd, upper, x), walk.time_s);
-                const V second_s = sm::fma(d, far_root * scale, pulse_factor(d, tables[1], lane, odd, upper, x), walk.time_s);
+                const V first_s =
+                    sm::fma(d, near_root * scale, pulse_factor(d, tables[0], lane, odd, upper, x), walk.time_s);
+                const V second_s =
+                    sm::fma(d, far_root * scale, pulse_factor(d, tables[1], lane, odd, upper, x), walk.time_s);
                 const V interval = ticked_interval(d, tick_fraction, first_s, second_s, electronics.clock_hz);
                 return acceleration_of_pulses(d, near - error_rad, far - error_rad, interval);
             };
@@ -297,7 +299,8 @@ void LaneReadout::read(const gyro::LaneDrive& drive, const gyro::LaneTurns& turn
     angles.resize(drive.turns);
     if (!HWY_DYNAMIC_DISPATCH(read_lanes)(constants_, pulses_, electronics_, with_accelerations_, lanes_, drive, turns,
                                           noise, stride, readings, angles)) {
-        throw RunError("readout: the phase does not reverse near a turn of the dither; the input rate is too high for it");
+        throw RunError(
+            "readout: the phase does not reverse near a turn of the dither; the input rate is too high for it");
     }
 }
 

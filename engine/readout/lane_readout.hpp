@@ -25,8 +25,8 @@ using DetectorNoise = std::span<const simd::Lanes>;
 /// Readout of a block of gyros.
 ///
 /// The dither turns at its own zero-rate point; the phase turns where input rate and lock-in are added, a little before
-/// or after. From the dither's turn the phase's is found by Taylor series of the equation of motion, in as many steps as
-/// it takes; pulses next to it come from PulseTables.
+/// or after. From the dither's turn the phase's is found by Taylor series of the equation of motion, in as many steps
+/// as it takes; pulses next to it come from PulseTables.
 class LaneReadout {
    public:
     /// \param devices     of each gyro, at most simd::lanes; with b = 0 where there is no lock-in

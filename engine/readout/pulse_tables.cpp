@@ -22,7 +22,8 @@ double standstill_s(const gyro::HalfCycle& half, const gyro::Coupling& coupling,
     double t = 0.0;
     for (int i = 0; i < 50; ++i) {
         const double cosine = half.sign * std::cos(w * (origin + t));
-        const double rate = half.drive_rate_rad_s(origin + t) + coupling.b_rad_s * (1.0 + coupling.turn_asymmetry * cosine) *
+        const double rate = half.drive_rate_rad_s(origin + t) + coupling.b_rad_s *
+                                                                    (1.0 + coupling.turn_asymmetry * cosine) *
                                                                     std::sin(psi_rad + coupling.phase_rad);
         // Close to the turn the drive's rate is nearly linear in time.
         const double slope = side * half.sign * half.end_acceleration_rad_s2(side > 0 ? 0 : 1);
@@ -53,7 +54,8 @@ std::array<double, 2> crossings_s(const gyro::HalfCycle& half, const gyro::Coupl
             // Newton from outside: the phase moves away ever faster.
             double at = h;
             for (int i = 0; i < 60; ++i) {
-                const double step = (gone + up * series.gain_rad(at) - distances_rad[found]) / (up * series.rate_rad_s(at));
+                const double step =
+                    (gone + up * series.gain_rad(at) - distances_rad[found]) / (up * series.rate_rad_s(at));
                 at -= step;
                 if (std::abs(step) <= 1e-15 * scale) break;
             }
@@ -63,7 +65,8 @@ std::array<double, 2> crossings_s(const gyro::HalfCycle& half, const gyro::Coupl
         gone = reached;
         t += h;
         if (std::abs(t) > 0.5 * half.duration_s) {
-            throw RunError("readout: fewer than two quarter-fringe pulses between a turn and the middle of its half cycle");
+            throw RunError(
+                "readout: fewer than two quarter-fringe pulses between a turn and the middle of its half cycle");
         }
     }
     return times;

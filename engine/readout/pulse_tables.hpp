@@ -10,10 +10,10 @@ namespace ringlock::readout {
 /// When the comparators switch next to a turn: times of the two quarter-fringe pulses nearest to the zero-rate point on
 /// each side, as functions of the phase there.
 ///
-/// With x the phase turned upright (psi + coupling phase at minima, its negative at maxima), d the phase from the extremum
-/// to the pulse and a the phase acceleration, t sqrt(a) = sqrt(2 d) R, and R is a smooth function of d for each of the
-/// four quarters that the pulse may begin: polynomials from the equation of motion, solved from the zero-rate point
-/// outwards. Amplitude noise and rates that vary enter through a.
+/// With x the phase turned upright (psi + coupling phase at minima, its negative at maxima), d the phase from the
+/// extremum to the pulse and a the phase acceleration, t sqrt(a) = sqrt(2 d) R, and R is a smooth function of d for
+/// each of the four quarters that the pulse may begin: polynomials from the equation of motion, solved from the
+/// zero-rate point outwards. Amplitude noise and rates that vary enter through a.
 struct PulseTables {
     static constexpr std::size_t terms = 10;
     static constexpr std::size_t quarters = 4;

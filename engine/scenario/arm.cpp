@@ -21,9 +21,10 @@ struct CompensatorName {
 constexpr std::array compensators = {
     CompensatorName{"compensated_published", Compensator::published},
     CompensatorName{"compensated", Compensator::corrected},
+    CompensatorName{"compensated_exact", Compensator::exact},
 };
-constexpr std::array<std::string_view, 4> planned_compensators = {"compensated_exact", "compensated_adaptive",
-                                                                  "compensated_extrapolated", "compensated_two_train"};
+constexpr std::array<std::string_view, 3> planned_compensators = {"compensated_adaptive", "compensated_extrapolated",
+                                                                  "compensated_two_train"};
 
 std::vector<Arm> all_arms() {
     std::vector<Arm> arms = {

@@ -10,6 +10,7 @@ enum class Compensator {
     none,
     published,  ///< equations of Gao and Deng 2007 as printed
     corrected,  ///< the same with corrected coefficients
+    exact,      ///< the turn map inverted
 };
 
 struct Arm {

@@ -95,18 +95,30 @@ Dataset::Selection Dataset::select_all() const {
 }
 
 Dataset::Selection Dataset::select(std::uint64_t first_row, std::uint64_t n_rows) const {
+    return select(first_row, n_rows, 0, shape_.size() == 2 ? shape_[1] : 1);
+}
+
+Dataset::Selection Dataset::select(std::uint64_t first_row, std::uint64_t n_rows, std::uint64_t first_column,
+                                   std::uint64_t n_columns) const {
     const std::uint64_t rows = shape_.empty() ? 0 : shape_[0];
+    const std::uint64_t columns = shape_.size() == 2 ? shape_[1] : 1;
     if (first_row > rows || n_rows > rows - first_row)
         detail::fail_input(file(), path(),
                            fmt::format("has {} rows, no block of {} from row {}", rows, n_rows, first_row));
+    if (first_column > columns || n_columns > columns - first_column)
+        detail::fail_input(
+            file(), path(),
+            fmt::format("has {} columns, no block of {} from column {}", columns, n_columns, first_column));
     Selection block;
-    std::vector<hsize_t> start(shape_.size(), 0);
-    std::vector<hsize_t> count(shape_.begin(), shape_.end());
-    start[0] = first_row;
-    count[0] = n_rows;
+    std::vector<hsize_t> start{first_row};
+    std::vector<hsize_t> count{n_rows};
+    if (shape_.size() == 2) {
+        start.push_back(first_column);
+        count.push_back(n_columns);
+    }
     block.file_space = Id(H5Dget_space(id().get()));
     block.memory_space = Id(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr));
-    block.size = n_rows * (count.size() == 2 ? count[1] : 1);
+    block.size = n_rows * n_columns;
     if (block.size == 0)
         H5Sselect_none(block.file_space.get());
     else
@@ -175,6 +187,13 @@ void Dataset::write_rows(std::uint64_t first_row, std::uint64_t n_rows, std::spa
 }
 
 template <Element T>
+void Dataset::write_block(std::uint64_t first_row, std::uint64_t n_rows, std::uint64_t first_column,
+                          std::uint64_t n_columns, std::span<const T> values) {
+    const Lock lock;
+    write_selection(select(first_row, n_rows, first_column, n_columns), values);
+}
+
+template <Element T>
 std::vector<T> Dataset::read() const try {
     const Lock lock;
     return read_selection<T>(select_all());
@@ -238,13 +257,15 @@ Dataset Group::write(const std::string& name, std::span<const T> values, const L
     return write(name, values, Shape{values.size()}, label);
 }
 
-#define RINGLOCK_INSTANTIATE(T)                                                                \
-    template void Dataset::write<T>(std::span<const T>);                                       \
-    template void Dataset::write_rows<T>(std::uint64_t, std::uint64_t, std::span<const T>);    \
-    template std::vector<T> Dataset::read<T>() const;                                          \
-    template std::vector<T> Dataset::read_rows<T>(std::uint64_t, std::uint64_t) const;         \
-    template Dataset Group::create_dataset<T>(const std::string&, const Shape&, const Label&); \
-    template Dataset Group::write<T>(const std::string&, std::span<const T>, const Label&);    \
+#define RINGLOCK_INSTANTIATE(T)                                                                       \
+    template void Dataset::write<T>(std::span<const T>);                                              \
+    template void Dataset::write_rows<T>(std::uint64_t, std::uint64_t, std::span<const T>);           \
+    template void Dataset::write_block<T>(std::uint64_t, std::uint64_t, std::uint64_t, std::uint64_t, \
+                                          std::span<const T>);                                        \
+    template std::vector<T> Dataset::read<T>() const;                                                 \
+    template std::vector<T> Dataset::read_rows<T>(std::uint64_t, std::uint64_t) const;                \
+    template Dataset Group::create_dataset<T>(const std::string&, const Shape&, const Label&);        \
+    template Dataset Group::write<T>(const std::string&, std::span<const T>, const Label&);           \
     template Dataset Group::write<T>(const std::string&, std::span<const T>, const Shape&, const Label&);
 RINGLOCK_INSTANTIATE(double)
 RINGLOCK_INSTANTIATE(std::int64_t)

@@ -102,6 +102,12 @@ class Dataset : public Node {
     template <Element T>
     void write_rows(std::uint64_t first_row, std::uint64_t n_rows, std::span<const T> values);
 
+    /// Columns [first_column, first_column + n_columns) of rows [first_row, first_row + n_rows) of a dataset of two
+    /// dimensions, rows one after the other.
+    template <Element T>
+    void write_block(std::uint64_t first_row, std::uint64_t n_rows, std::uint64_t first_column, std::uint64_t n_columns,
+                     std::span<const T> values);
+
     /// Reads numbers only into a type that holds all values of the stored one (any number into double).
     template <Element T>
     std::vector<T> read() const;
@@ -113,6 +119,8 @@ class Dataset : public Node {
     Dataset(Id id, std::string file, std::string path);
     struct Selection;
     Selection select(std::uint64_t first_row, std::uint64_t n_rows) const;
+    Selection select(std::uint64_t first_row, std::uint64_t n_rows, std::uint64_t first_column,
+                     std::uint64_t n_columns) const;
     Selection select_all() const;
     template <Element T>
     void write_selection(const Selection& selection, std::span<const T> values);

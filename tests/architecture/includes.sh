@@ -76,7 +76,7 @@ fi
 for file in "${sources[@]}"; do
     case "$file" in
         *.cpp | *.cpp.in) ;;
-        engine/simd/*-inl.hpp | engine/simd/targets.hpp) ;; # included anew for every instruction set
+        *-inl.hpp | engine/simd/targets.hpp) ;; # included anew for every instruction set
         *.hpp | *.hpp.in)
             grep -qx '#pragma once' "$file" || complain "$file: no #pragma once"
             ;;

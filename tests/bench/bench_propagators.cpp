@@ -9,14 +9,12 @@
 #include <vector>
 
 #include "analysis/report/table.hpp"
-#include "engine/compensate/first_order.hpp"
-#include "engine/dither/drive.hpp"
 #include "engine/ensemble/draw.hpp"
-#include "engine/ensemble/trajectory.hpp"
 #include "engine/propagate/direct.hpp"
 #include "engine/propagate/turn_map.hpp"
 #include "tests/bench/noisy_dither.hpp"
 #include "tests/bench/reference_cost.hpp"
+#include "tests/support/drive.hpp"
 
 namespace {
 
@@ -38,19 +36,6 @@ Contender through(std::shared_ptr<propagate::Propagator> propagator, const gyro:
     return [propagator, device](int turns) { return bench::go_through(*propagator, device, turns); };
 }
 
-Contender read_and_corrected(const scenario::Scenario& scenario) {
-    return [scenario](int turns) {
-        const gyro::Setup setup = ensemble::nominal_setup(scenario);
-        ensemble::Trajectory trajectory(scenario, setup, {1, 0}, ensemble::Trajectory::Kind::noise_injected);
-        compensate::Corrected compensator({gyro::Device(setup).coupling.b_rad_s});
-        for (int turn = 0; turn < turns; ++turn) {
-            compensator.observe(trajectory.read().reading);
-            trajectory.advance();
-        }
-        return compensator.error_rad();
-    };
-}
-
 }  // namespace
 
 int main() {
@@ -58,15 +43,13 @@ int main() {
     scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
     const gyro::Device device(ensemble::nominal_setup(scenario));
     const double a = device.dither_amplitude_rad;
-    const double margin = dither::Drive::amplitude_margin_rad(3.0);
+    const double margin = test::Drive::amplitude_margin_rad(3.0);
     const auto map = std::make_shared<propagate::TurnMap>(
         device,
         propagate::HalfCycleRanges{{a - margin, a + margin},
                                    {device.input_rate_rad_s, device.input_rate_rad_s},
                                    {device.coupling.b_rad_s, device.coupling.b_rad_s}},
         1e-8);
-    scenario::Scenario ideal = scenario;
-    ideal.readout.model = scenario::ReadoutModel::ideal;
 
     const std::vector<bench::SolvedHalfCycle> truth = bench::solved_half_cycles(device);
     std::vector<Entry> entries;
@@ -82,8 +65,6 @@ int main() {
                            through(std::move(reference.propagator), device), reference.worst_error_rad});
     }
     add_propagator("turn map, 1e-8 rad", 1000000, map);
-    entries.push_back({"turn map, ideal readout, corrected", 300000, read_and_corrected(ideal)});
-    entries.push_back({"turn map, instrument readout, corrected", 60000, read_and_corrected(scenario)});
 
     constexpr int rounds = 5;
     double sink = 0.0;

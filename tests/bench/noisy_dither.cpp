@@ -4,13 +4,13 @@
 #include <cmath>
 
 #include "engine/core/phase.hpp"
-#include "engine/dither/drive.hpp"
 #include "engine/propagate/direct.hpp"
+#include "tests/support/drive.hpp"
 
 namespace ringlock::bench {
 
 double go_through(propagate::Propagator& propagator, const gyro::Device& device, int turns) {
-    dither::Drive drive(device, turn_phase_rms_rad, {1, 0});
+    test::Drive drive(device, turn_phase_rms_rad, {1, 0});
     Phase input(device.initial_phase_rad);
     double lockin_rad = 0.0;
     for (int turn = 0; turn < turns; ++turn) {
@@ -26,7 +26,7 @@ double go_through(propagate::Propagator& propagator, const gyro::Device& device,
 
 std::vector<SolvedHalfCycle> solved_half_cycles(const gyro::Device& device) {
     propagate::DirectIntegrator direct(device.coupling, 1e-13);
-    dither::Drive drive(device, turn_phase_rms_rad, {2, 0});
+    test::Drive drive(device, turn_phase_rms_rad, {2, 0});
     std::vector<SolvedHalfCycle> solved;
     for (int turn = 0; turn < 40; ++turn) {
         const double phase_rad = -3.0 + 0.15 * turn;

@@ -75,8 +75,8 @@ TEST_F(RunCommand, BadScenariosAreRefusedWithPlaceKeyValueAndWhatIsAllowed) {
                             says("bad.toml:2:16", "output.angle_record", "true or false"));
     expect_scenario_refused("[arms]\nnames = [\"uncompensatd\"]\n",
                             says("bad.toml:2:10", "arms.names", "uncompensatd", "did you mean \"uncompensated\"?"));
-    expect_scenario_refused("[arms]\nnames = [\"compensated_exact\"]\n",
-                            says("bad.toml:2:10", "compensated_exact", "not there yet", "arms are: ideal"));
+    expect_scenario_refused("[arms]\nnames = [\"compensated_adaptive\"]\n",
+                            says("bad.toml:2:10", "compensated_adaptive", "not there yet", "arms are: ideal"));
     expect_scenario_refused("[arms]\nnames = []\n", says("bad.toml:2:9", "arms.names", "empty"));
     expect_scenario_refused("[arms]\nnames = [\"ideal\", \"ideal\"]\n", says("bad.toml:2:19", "stands twice"));
     expect_scenario_refused("[effects.missed_counts]\nprobability_per_turn = 0.1\n",

@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <vector>
 
-#include "engine/dither/drive.hpp"
 #include "engine/propagate/circle_map.hpp"
 #include "engine/propagate/half_turn.hpp"
 #include "tests/physics/support.hpp"
+#include "tests/support/drive.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -149,7 +149,7 @@ double distance_after(Method method, int turns) {
     const auto propagator = make_propagator(method, device, 20.0);
     std::array<double, 2> lockin{0.0, 0.0};
     const std::array<double, 2> start{0.0, 2.0};
-    dither::Drive drive(device, 3.0, {5, 0});
+    Drive drive(device, 3.0, {5, 0});
     for (int turn = 0; turn < turns; ++turn) {
         const auto half = drive.after();
         for (std::size_t i = 0; i < 2; ++i) {
@@ -177,7 +177,7 @@ Apart propagators_apart(int turns) {
     const gyro::Device device(setup);
     const auto map = make_propagator(Method::turn_map, device, 20.0);
     const auto direct = make_propagator(Method::direct, device, 0.0, 1e-12);
-    dither::Drive drive(device, 3.0, {6, 1});
+    Drive drive(device, 3.0, {6, 1});
     Phase input;
     double a = 0.0;
     double b = 0.0;

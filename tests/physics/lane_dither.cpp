@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <vector>
 
-#include "engine/dither/drive.hpp"
 #include "tests/physics/support.hpp"
+#include "tests/support/drive.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -95,7 +95,7 @@ TEST(LaneDither, WithoutNoiseIsTheDriveOfOneGyro) {
     const std::size_t turns = 1000;
     const Rows rows = go(all, 0.0, turns, {100});
     for (std::size_t lane = 0; lane < all.size(); ++lane) {
-        dither::Drive drive(all[lane], 0.0, {seed, 0});
+        Drive drive(all[lane], 0.0, {seed, 0});
         Phase rotation;
         for (std::size_t i = 0; i < turns; ++i, drive.advance()) {
             const gyro::HalfCycle half = drive.after();
@@ -124,7 +124,7 @@ TEST(LaneDither, SwingsBetweenNoisyTurns) {
     const Rows quiet = go(all, 0.0, turns, {64});
     const auto who = identities();
     const double margin = dither::LaneDither::amplitude_margin_rad(rms_rad);
-    EXPECT_EQ(margin, dither::Drive::amplitude_margin_rad(rms_rad));
+    EXPECT_EQ(margin, Drive::amplitude_margin_rad(rms_rad));
     double sum = 0.0;
     for (std::size_t lane = 0; lane < all.size(); ++lane) {
         const auto turn_noise_rad = [&](std::size_t turn) {

@@ -1,10 +1,9 @@
 // What injected noise does to the lock-in error: statistics over ensembles, with an ideal readout.
 #include <cstdio>
 
-#include "engine/ensemble/draw.hpp"
-#include "engine/ensemble/ensemble.hpp"
+#include "analysis/study/study.hpp"
+#include "engine/ensemble/block.hpp"
 #include "engine/ensemble/schedule.hpp"
-#include "engine/ensemble/trajectory.hpp"
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
@@ -26,21 +25,29 @@ Outcome injected(double rms_rad, double rate_deg_h, std::int64_t gyros, double d
     scenario.ensemble.duration_s = duration_s;
     scenario.ensemble.dither_amplitude_sd_relative = 0.0;
     scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
-    const std::vector<scenario::Arm> arms{scenario::parse_arm("noise_injected")};
+    scenario.arms = {"noise_injected"};
     const ensemble::Schedule schedule(scenario);
     std::vector<double> rate(static_cast<std::size_t>(gyros));
     std::vector<double> variance(rate.size());
-    ensemble::run(scenario, arms, 0, gyros, 2,
-                  [&](std::int64_t gyro, ensemble::GyroRecord&& record) {
-                      const auto& x = record.angle_arcsec[0];
-                      const auto n = static_cast<double>(x.size() - 1);
-                      const double mean = (x.back() - x.front()) / n;
-                      double sum = 0.0;
-                      for (std::size_t i = 1; i < x.size(); ++i) sum += std::pow(x[i] - x[i - 1] - mean, 2);
-                      rate[static_cast<std::size_t>(gyro)] = mean / schedule.sample_interval_s - rate_deg_h;
-                      variance[static_cast<std::size_t>(gyro)] = sum / (n - 1.0) / schedule.sample_interval_s;
-                  },
-                  {});
+    std::vector<std::vector<double>> angle(rate.size());  // one slot a gyro: blocks write beside each other
+    const auto on_samples = [&](const study::SampledAngles& block) {
+        const std::size_t samples = block.angle_arcsec.size() / block.gyros;
+        for (std::size_t g = 0; g < block.gyros; ++g) {
+            auto& all = angle[static_cast<std::size_t>(block.first_gyro) + g];
+            all.insert(all.end(), block.angle_arcsec.begin() + static_cast<std::ptrdiff_t>(g * samples),
+                       block.angle_arcsec.begin() + static_cast<std::ptrdiff_t>((g + 1) * samples));
+        }
+    };
+    study::run(scenario, 2, on_samples);
+    for (std::size_t g = 0; g < angle.size(); ++g) {
+        const auto& x = angle[g];
+        const auto n = static_cast<double>(x.size() - 1);
+        const double mean = (x.back() - x.front()) / n;
+        double sum = 0.0;
+        for (std::size_t i = 1; i < x.size(); ++i) sum += std::pow(x[i] - x[i - 1] - mean, 2);
+        rate[g] = mean / schedule.sample_interval_s - rate_deg_h;
+        variance[g] = sum / (n - 1.0) / schedule.sample_interval_s;
+    }
     Outcome outcome{0.0, 0.0, 0.0};
     const auto count = static_cast<double>(gyros);
     for (std::size_t i = 0; i < rate.size(); ++i) {
@@ -98,26 +105,25 @@ TEST(Randomisation, IncrementsOverSinglePeriodsReadTooLow) {
     scenario.readout.model = scenario::ReadoutModel::ideal;
     double single = 0.0;
     double many = 0.0;
-    const int block = 100;
-    const int periods = 40000;
-    for (std::uint64_t g = 0; g < 8; ++g) {
-        gyro::Setup setup = paper_device();
-        setup.input_rate_deg_h = 15.0;
-        ensemble::Trajectory trajectory(scenario, setup, {3, g}, ensemble::Trajectory::Kind::noise_injected);
-        double last = 0.0;
-        double last_block = 0.0;
-        for (int period = 0; period < periods; ++period) {
-            trajectory.read();
-            const double error = trajectory.lockin_error_rad();
-            if (period > 0) single += std::pow(error - last, 2);
-            if (period > 0 && period % block == 0) {
-                many += std::pow(error - last_block, 2);
-                last_block = error;
+    constexpr std::size_t block = 100;
+    constexpr int blocks = 400;
+    gyro::Setup setup = paper_device();
+    setup.input_rate_deg_h = 15.0;
+    const std::vector<scenario::Arm> arms{scenario::parse_arm("noise_injected")};
+    ensemble::GyroBlock gyros(scenario, arms, 0, std::vector<gyro::Setup>(8, setup));
+    std::vector<double> last(8);
+    std::vector<double> last_block(8);
+    for (int piece = 0; piece < blocks; ++piece) {
+        gyros.advance(2 * block);
+        for (std::size_t g = 0; g < last.size(); ++g) {
+            for (std::size_t period = 0; period < block; ++period) {
+                const double error = gyros.lockin_error_rad(0, 2 * period, g);
+                const bool first = piece == 0 && period == 0;
+                if (!first) single += std::pow(error - last[g], 2);
+                if (!first && period == 0) many += std::pow(error - last_block[g], 2);
+                if (period == 0) last_block[g] = error;
+                last[g] = error;
             }
-            if (period == 0) last_block = error;
-            last = error;
-            trajectory.advance();
-            trajectory.advance();
         }
     }
     EXPECT_NEAR(std::sqrt(single / many), std::sqrt(0.75), 0.03);

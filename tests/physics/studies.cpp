@@ -6,6 +6,7 @@
 
 #include "analysis/study/summary.hpp"
 #include "engine/scenario/parse.hpp"
+#include "tests/support/gyro_records.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -117,20 +118,20 @@ TEST(Scenarios, TheDirectIntegratorGivesTheSameStudyAsTheTurnMap) {
     scenario.effects["readout_ellipse"]["gain"] = 0.03;
     scenario.effects["bias_ramp"]["deg_h_per_h"] = 1000.0;
     scenario.effects["base_vibration"] = {{"frequency_hz", 7.0}, {"rate_deg_h", 50.0}, {"phase_rad", 1.0}};
-    const auto angles = [&](scenario::PropagationMethod method) {
+    const auto records = [&](scenario::PropagationMethod method) {
         scenario.propagation.method = method;
-        std::vector<std::vector<std::vector<double>>> all(2);
-        study::run(scenario, 2, [&](std::int64_t gyro, const auto& angle_arcsec) {
-            all[static_cast<std::size_t>(gyro)] = angle_arcsec;
-        });
+        auto all = std::make_unique<GyroRecords>(scenario, 2);
+        all->run(0, 2, 2);
         return all;
     };
-    const auto map = angles(scenario::PropagationMethod::turn_map);
-    const auto direct = angles(scenario::PropagationMethod::direct);
-    for (std::size_t g = 0; g < 2; ++g) {
-        for (std::size_t a = 0; a < map[g].size(); ++a) {
-            for (std::size_t i = 0; i < map[g][a].size(); ++i) {
-                EXPECT_NEAR(map[g][a][i], direct[g][a][i], 1e-8) << scenario.arms[a] << " sample " << i;
+    const auto map = records(scenario::PropagationMethod::turn_map);
+    const auto direct = records(scenario::PropagationMethod::direct);
+    for (const std::int64_t g : {0, 1}) {
+        for (std::size_t a = 0; a < scenario.arms.size(); ++a) {
+            ASSERT_EQ((*map)[g].counts[a].size(), (*direct)[g].counts[a].size());
+            for (std::size_t i = 0; i < (*map)[g].counts[a].size(); ++i) {
+                EXPECT_NEAR((*map)[g].angle_arcsec(a, i), (*direct)[g].angle_arcsec(a, i), 1e-8)
+                    << scenario.arms[a] << " cycle " << i;
             }
         }
     }

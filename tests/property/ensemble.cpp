@@ -4,25 +4,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/schedule.hpp"
 #include "engine/scenario/render.hpp"
+#include "engine/simd/target.hpp"
 #include "tests/property/random_scenario.hpp"
+#include "tests/support/gyro_records.hpp"
 
 namespace ringlock::ensemble {
 namespace {
 
 using scenario::Scenario;
+using test::GyroRecord;
 using test::parsed;
 using test::RandomScenarios;
+using test::simulate;
 
 constexpr int scenarios = 12;
-
-GyroRecord simulate(const Scenario& scenario, std::int64_t gyro) {
-    return simulate_gyro(scenario, parsed(scenario.arms), gyro, {});
-}
 
 bool same(const gyro::Setup& a, const gyro::Setup& b) {
     return a.scale_factor_arcsec == b.scale_factor_arcsec && a.lockin_threshold_deg_h == b.lockin_threshold_deg_h &&
@@ -41,8 +40,7 @@ TEST(EnsembleProperty, AGyroDoesNotKnowHowManyOthersThereAre) {
         const GyroRecord one = simulate(few, gyro);
         const GyroRecord other = simulate(many, gyro);
         EXPECT_TRUE(same(one.setup, other.setup)) << to_toml(few);
-        EXPECT_EQ(one.angle_arcsec, other.angle_arcsec) << to_toml(few);
-        EXPECT_EQ(one.turns, other.turns);
+        EXPECT_EQ(one.counts, other.counts) << to_toml(few);
     }
 }
 
@@ -60,7 +58,7 @@ TEST(EnsembleProperty, AnArmDoesNotKnowWhichOthersAreRun) {
         for (std::size_t arm = 0; arm < part.arms.size(); ++arm) {
             const auto at = std::find(scenario.arms.begin(), scenario.arms.end(), part.arms[arm]);
             ASSERT_NE(at, scenario.arms.end());
-            EXPECT_EQ(some.angle_arcsec[arm], all.angle_arcsec[static_cast<std::size_t>(at - scenario.arms.begin())])
+            EXPECT_EQ(some.counts[arm], all.counts[static_cast<std::size_t>(at - scenario.arms.begin())])
                 << part.arms[arm] << "\n"
                 << to_toml(part);
         }
@@ -71,23 +69,30 @@ TEST(EnsembleProperty, ARunIsItsGyrosInAnyPartsAndOnAnyThreads) {
     RandomScenarios random(3);
     for (int i = 0; i < scenarios / 2; ++i) {
         const Scenario scenario = random.next();
-        const auto arms = parsed(scenario.arms);
         const auto total = total_gyros(scenario);
-        std::vector<GyroRecord> records(static_cast<std::size_t>(total));
-        std::vector<int> seen(records.size());
-        std::mutex mutex;
-        const auto sink = [&](std::int64_t gyro, GyroRecord&& record) {
-            const std::lock_guard lock(mutex);
-            ++seen[static_cast<std::size_t>(gyro)];
-            records[static_cast<std::size_t>(gyro)] = std::move(record);
-        };
+        test::GyroRecords records(scenario, static_cast<std::size_t>(total));
         const std::int64_t cut = random.whole(0, total);
-        run(scenario, arms, 0, cut, 3, sink, {});
-        run(scenario, arms, cut, total, 1, sink, {});
-        for (std::size_t g = 0; g < records.size(); ++g) {
-            EXPECT_EQ(seen[g], 1) << g;
-            EXPECT_EQ(records[g].angle_arcsec, simulate(scenario, static_cast<std::int64_t>(g)).angle_arcsec) << g;
+        records.run(0, cut, 3);
+        records.run(cut, total, 1);
+        for (std::int64_t g = 0; g < total; ++g) {
+            EXPECT_EQ(records[g].seen, 1) << g;
+            EXPECT_EQ(records[g].counts, simulate(scenario, g).counts) << g;
         }
+    }
+}
+
+TEST(EnsembleProperty, InstructionSetsGiveTheSameBits) {
+    RandomScenarios random(8);
+    for (int i = 0; i < 4; ++i) {
+        Scenario scenario = random.next();
+        scenario.arms = scenario::arm_names();
+        scenario.noise_injection.turn_phase_rms_rad = 3.0;
+        const GyroRecord best = simulate(scenario, 1);
+        for (const std::string& target : simd::available_targets()) {
+            simd::use_target(target);
+            EXPECT_EQ(simulate(scenario, 1).counts, best.counts) << target << "\n" << to_toml(scenario);
+        }
+        simd::use_best_target();
     }
 }
 
@@ -102,7 +107,7 @@ TEST(EnsembleProperty, RatesOfASweepAreComparedInPairs) {
         const std::int64_t gyro = point * sweep.ensemble.gyros + member;
         single.input = {.rate_deg_h = input_rate_deg_h(sweep, gyro), .sweep_stop_deg_h = 0.0, .sweep_points = 1};
         EXPECT_TRUE(same(draw_setup(sweep, gyro), draw_setup(sweep, member)));
-        EXPECT_EQ(simulate(sweep, gyro).angle_arcsec, simulate(single, member).angle_arcsec) << to_toml(sweep);
+        EXPECT_EQ(simulate(sweep, gyro).counts, simulate(single, member).counts) << to_toml(sweep);
     }
 }
 
@@ -131,8 +136,8 @@ TEST(EnsembleProperty, WithoutLockInAllArmsAreTheIdealOne) {
         scenario.arms = scenario::arm_names();
         const GyroRecord record = simulate(scenario, 0);
         for (std::size_t arm = 1; arm < scenario.arms.size(); ++arm) {
-            for (std::size_t k = 0; k < record.angle_arcsec[0].size(); ++k) {
-                ASSERT_NEAR(record.angle_arcsec[arm][k], record.angle_arcsec[0][k], 1e-9)
+            for (std::size_t k = 0; k < record.counts[0].size(); ++k) {
+                ASSERT_NEAR(record.angle_arcsec(arm, k), record.angle_arcsec(0, k), 1e-9)
                     << scenario.arms[arm] << " sample " << k << "\n"
                     << to_toml(scenario);
             }
@@ -155,13 +160,8 @@ TEST(EnsembleProperty, AnglesScaleWithTheScaleFactor) {
         twice.effects["rate_random_walk"]["deg_h_rt_h"] *= 2.0;
         const GyroRecord one = simulate(scenario, 0);
         const GyroRecord two = simulate(twice, 0);
-        for (std::size_t arm = 0; arm < one.angle_arcsec.size(); ++arm) {
-            for (std::size_t k = 0; k < one.angle_arcsec[arm].size(); ++k) {
-                ASSERT_EQ(2.0 * one.angle_arcsec[arm][k], two.angle_arcsec[arm][k])
-                    << scenario.arms[arm] << " sample " << k << "\n"
-                    << to_toml(scenario);
-            }
-        }
+        // Counts are parts of fringes, which stand for twice the angle.
+        EXPECT_EQ(one.counts, two.counts) << to_toml(scenario);
     }
 }
 

@@ -5,7 +5,7 @@
 #include "engine/gyro/device.hpp"
 #include "engine/random/stream.hpp"
 
-namespace ringlock::dither {
+namespace ringlock::test {
 
 /// The dither of one gyro, turn after turn: a sinusoid with asymmetry, and optionally random noise on the dither angle
 /// at each turn. Noise is on the angle, not on the rate: the case swings between noisy turns and stays where it is.
@@ -48,4 +48,4 @@ class Drive {
     gyro::HalfCycle after_;
 };
 
-}  // namespace ringlock::dither
+}  // namespace ringlock::test

@@ -1,11 +1,11 @@
-#include "engine/readout/turn_path.hpp"
+#include "tests/support/turn_path.hpp"
 
 #include <cmath>
 
 #include "engine/core/error.hpp"
 #include "engine/gyro/motion.hpp"
 
-namespace ringlock::readout {
+namespace ringlock::test {
 
 namespace {
 
@@ -135,4 +135,4 @@ std::array<double, 2> TurnPath::crossing_times_s(int side, const std::array<doub
     throw RunError("readout: fewer than two quarter-fringe pulses between a turn and the middle of its half cycle");
 }
 
-}  // namespace ringlock::readout
+}  // namespace ringlock::test

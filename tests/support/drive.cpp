@@ -1,6 +1,6 @@
-#include "engine/dither/drive.hpp"
+#include "tests/support/drive.hpp"
 
-namespace ringlock::dither {
+namespace ringlock::test {
 
 Drive::Drive(const gyro::Device& device, double turn_phase_rms_rad, random::Identity who)
     : device_(device), rms_rad_(turn_phase_rms_rad) {
@@ -39,4 +39,4 @@ double Drive::amplitude_margin_rad(double turn_phase_rms_rad) {
     return 8.0 * turn_phase_rms_rad / std::sqrt(2.0);
 }
 
-}  // namespace ringlock::dither
+}  // namespace ringlock::test

@@ -3,7 +3,7 @@
 
 #include "engine/gyro/half_cycle.hpp"
 
-namespace ringlock::readout {
+namespace ringlock::test {
 
 /// The phase's path close to one turn, from the equation of motion.
 ///
@@ -49,4 +49,4 @@ class TurnPath {
     double zero_phase_rad_ = 0.0;
 };
 
-}  // namespace ringlock::readout
+}  // namespace ringlock::test

@@ -1,0 +1,258 @@
+#include "engine/compensate/exact.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/compensate/exact.cpp"
+#include "engine/core/error.hpp"
+#include "engine/core/units.hpp"
+#include "engine/simd/targets.hpp"
+// The above must come first.
+#include "engine/gyro/turn_series-inl.hpp"
+#include "engine/propagate/turn_tables-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace ringlock::compensate::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+namespace sm = simd::HWY_NAMESPACE;
+namespace gm = gyro::HWY_NAMESPACE;
+namespace pm = propagate::HWY_NAMESPACE;
+
+using D = hn::CappedTag<double, simd::lanes>;
+using V = hn::Vec<D>;
+
+constexpr int most_steps = 8000;
+
+/// What the phase gains from the zero-rate point, where its sine and cosine are given, to the dither's turn, and the
+/// lock-in's share of that. `sine` and `cosine` become those at the dither's turn. False where it is too far.
+HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V& sine, V& cosine, V& phase_rad,
+                                    V& lockin_rad) {
+    const V zero = hn::Zero(d);
+    const V one = hn::Set(d, 1.0);
+    const V scale = one / (side.w * hn::Sqrt(side.amplitude));
+    // rate + A w sin(w t) + b sin x = 0
+    const V y = hn::Neg(sm::fma(d, side.b, sine, side.rate)) / (side.amplitude * side.w);
+    static constexpr double of_asin[] = {1.0 / 6, 3.0 / 40, 15.0 / 336, 105.0 / 3456, 945.0 / 42240, 10395.0 / 599040};
+    const V y2 = y * y;
+    const V wt = sm::fma(d, y * y2, sm::polynomial(d, y2, of_asin), y);
+    V left = hn::Neg(wt / (side.w * scale));  // to go, in scales of time
+    V sine_wt = y;
+    V cosine_wt = hn::Sqrt(hn::Max(sm::fnma(d, y, y, one), zero));
+    V angle = wt;
+    phase_rad = zero;
+    lockin_rad = zero;
+    gm::TurnSeries<D> series;
+    for (int step = 0; step < most_steps; ++step) {
+        series.expand(d, side, scale, sine_wt, cosine_wt, sine, cosine);
+        const V limit = gm::longest_step(d, series.rate[1]);
+        const V h = hn::CopySign(hn::Min(hn::Abs(left), limit), left);
+        V phase, lockin;
+        series.gains(d, h, phase, lockin);
+        phase_rad = phase_rad + phase;
+        lockin_rad = lockin_rad + lockin;
+        V turn_s, turn_c;
+        gm::sincos_small(d, phase, turn_s, turn_c);
+        const V turned = sm::fnma(d, sine, turn_s, cosine * turn_c);
+        sine = sm::fma(d, cosine, turn_s, sine * turn_c);
+        cosine = turned;
+        left = left - h;
+        if (hn::AllTrue(d, left == zero)) return true;
+        angle = sm::fma(d, h * scale, side.w, angle);
+        sm::sincos(d, angle * hn::Set(d, 0.15915494309189535), sine_wt, cosine_wt);
+    }
+    return false;
+}
+
+bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const readout::LaneReadings& readings,
+                   bool begun, Exact::State& state, LaneErrors& errors) {
+    const D d;
+    const V zero = hn::Zero(d);
+    const V one = hn::Set(d, 1.0);
+    const V half = hn::Set(d, 0.5);
+    const V per_rad = hn::Set(d, 0.15915494309189535);
+    const V two_pi = hn::Set(d, 6.283185307179586);
+    for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+        const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
+        const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
+        const V mean_amplitude = load(state.amplitude_rad);
+        const V b = load(state.b_rad_s);
+        const V rate = load(state.rate_rad_s);
+        const V centre = load(tables.centre()[0]);
+        const V inverse = load(tables.inverse_half_width()[0]);
+        const V rate_x = hn::Max(hn::Min((rate - load(tables.centre()[1])) * load(tables.inverse_half_width()[1]), one),
+                                 hn::Neg(one));
+        V last_sine = load(state.sine);
+        V last_cosine = load(state.cosine);
+        V last_fringes = load(state.turn_fringes);
+        V last_whole = load(state.turn_whole);
+        V error = load(state.error_fringes);
+        V last_amplitude = load(state.last_amplitude_rad);
+        store(load(state.error_whole), errors.whole);
+        for (std::size_t i = 0; i < readings.turns; ++i) {
+            const bool minimum = readings.minimum(i);
+            const V sign = hn::Set(d, minimum ? 1.0 : -1.0);
+            const V raw_sine = load(readings.sine[i]);
+            const V raw_cosine = load(readings.cosine[i]);
+            const V size =
+                one / hn::Sqrt(hn::Max(sm::fma(d, raw_sine, raw_sine, raw_cosine * raw_cosine), hn::Set(d, 1e-300)));
+            V sine = sign * raw_sine * size;
+            V cosine = raw_cosine * size;
+            const std::size_t after = minimum ? 0 : 1;
+            const V w_after = hn::Set(d, 3.141592653589793) / load(state.duration_s[after]);
+            const V w_before = hn::Set(d, 3.141592653589793) / load(state.duration_s[1 - after]);
+
+            // The half cycle that ends here, turned upright by its own sign, which is that of the turn before.
+            const V swing = hn::Neg(sign) * ((load(readings.phase_whole[i]) - last_whole) +
+                                             (load(readings.phase_fringes[i]) - last_fringes));
+            const V plain_rotation = hn::Neg(sign) * rate * load(state.duration_s[1 - after]);
+            // First from zero-rate point to dither's turn by the amplitude that the swing shows but for the lock-in.
+            const V rough = half * sm::fma(d, swing, two_pi, hn::Neg(plain_rotation));
+            const bool has_before = begun || i > 0;
+            const V before_amplitude = has_before ? rough : mean_amplitude;
+            const V standstill = sm::fma(d, b, sine, sign * rate);
+            const auto ahead = standstill < zero;
+            const gm::UprightSide<V> side{hn::IfThenElse(ahead, mean_amplitude, before_amplitude),
+                                          hn::IfThenElse(ahead, w_after, w_before),
+                                          sign * rate,
+                                          b,
+                                          zero,
+                                          zero,
+                                          one,
+                                          zero};
+            V phase_rad, lockin_rad;
+            if (!walk_to_dither_turn(d, side, sine, cosine, phase_rad, lockin_rad)) return false;
+            const V turn_fringes = sm::fma(d, sign * phase_rad, per_rad, load(readings.phase_fringes[i]));
+            if (has_before) {
+                const auto scaled = [&](V amplitude) HWY_ATTR {
+                    return hn::Max(hn::Min((amplitude - centre) * inverse, one), hn::Neg(one));
+                };
+                const propagate::TurnTables::Part& part = tables.part(minimum ? -1.0 : 1.0, 0);
+                // To first order for the amplitude, then in full: exp(-i x_0) and exp(-i x_1).
+                const V moved =
+                    sm::fma(d, hn::Neg(sign) * (turn_fringes - load(readings.phase_fringes[i])), one, swing);
+                const pm::HalfMapOf<V> first = pm::evaluate(d, part, lane, scaled(rough), rate_x, zero);
+                const V bend = sm::fma(d, first.z_im, last_cosine - cosine,
+                                       hn::Neg(first.z_re * (last_sine - sine)));  // Im z (e_0 - e_1)
+                const V gain_rad = sm::fma(d, bend, hn::Set(d, 2.0), first.shift * (two_pi + two_pi));
+                const V amplitude = half * (sm::fma(d, moved, two_pi, hn::Neg(plain_rotation)) - gain_rad);
+                const pm::HalfMapOf<V> map = pm::evaluate(d, part, lane, scaled(amplitude), rate_x, zero);
+                const sm::Complex<V> z{map.z_re, map.z_im};
+                const sm::Complex<V> unit{one, zero};
+                const sm::Complex<V> e0{last_cosine, hn::Neg(last_sine)};
+                const sm::Complex<V> e1{hn::Neg(cosine), sine};
+                const sm::Complex<V> q = sm::mul(d, sm::mul_add(d, z, e0, unit), sm::mul_add(d, z, e1, unit));
+                const V gain =
+                    sm::fma(d, sm::arg(d, q.re, q.im), hn::Set(d, 0.3183098861837907), map.shift + map.shift);
+                error = sm::fnma(d, sign, gain, error);
+                last_amplitude = amplitude;
+            }
+            // From the dither's turn to the zero-rate point again: the lock-in's share the other way round.
+            store(sm::fnma(d, sign * lockin_rad, per_rad, error), errors.fringes[i]);
+            last_sine = sine;
+            last_cosine = cosine;
+            last_fringes = turn_fringes;
+            last_whole = load(readings.phase_whole[i]);
+        }
+        const V whole = sm::nearest(d, error);
+        store(error - whole, state.error_fringes);
+        store(load(state.error_whole) + whole, state.error_whole);
+        store(last_sine, state.sine);
+        store(last_cosine, state.cosine);
+        store(last_fringes, state.turn_fringes);
+        store(last_whole, state.turn_whole);
+        store(last_amplitude, state.last_amplitude_rad);
+    }
+    return true;
+}
+
+}  // namespace ringlock::compensate::HWY_NAMESPACE
+
+#if HWY_ONCE
+namespace ringlock::compensate {
+
+HWY_EXPORT(observe_lanes);
+
+namespace {
+
+constexpr double averaging_s = 16.0;   // of the input rate
+constexpr double least_margin = 0.02;  // of the amplitude
+
+}  // namespace
+
+Exact::Exact(const Calibration& calibration, double tolerance_rad) : calibration_(calibration), tables_(tolerance_rad) {
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+        const std::size_t which = std::min(lane, calibration.lanes - 1);
+        state_.amplitude_rad[lane] = calibration.dither_amplitude_rad[which];
+        state_.last_amplitude_rad[lane] = calibration.dither_amplitude_rad[which];
+        state_.b_rad_s[lane] = calibration.b_rad_s[which];
+        state_.duration_s[0][lane] = calibration.positive_duration_s[which];
+        state_.duration_s[1][lane] = calibration.negative_duration_s[which];
+    }
+}
+
+void Exact::make_tables(std::size_t lane) {
+    gyro::Device device{gyro::Setup{}};
+    device.coupling = {state_.b_rad_s[lane], 0.0, 0.0};
+    device.dither_amplitude_rad = state_.amplitude_rad[lane];
+    device.positive_duration_s = state_.duration_s[0][lane];
+    device.negative_duration_s = state_.duration_s[1][lane];
+    const double a = device.dither_amplitude_rad;
+    const double margin = std::max(least_margin * a, calibration_.amplitude_margin_rad);
+    // A rate averaged over one second is uncertain by some fringes a second.
+    const double width = 16.0 * units::two_pi + 0.01 * std::abs(state_.rate_rad_s[lane]);
+    const double rate = state_.rate_rad_s[lane];
+    const double b = state_.b_rad_s[lane];
+    tables_.make(lane, device, {{a - margin, a + margin}, {rate - width, rate + width}, {b, b}});
+}
+
+void Exact::estimate_rate(const readout::LaneReadings& readings) {
+    // Minima only: the dither drops out but for its noise.
+    const std::size_t first = readings.minimum(0) ? 0 : 1;
+    if (first >= readings.turns) return;
+    const std::size_t last = first + (readings.turns - 1 - first) / 2 * 2;
+    for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
+        const double period = state_.duration_s[0][lane] + state_.duration_s[1][lane];
+        double from = last_fringes_[lane];
+        double from_whole = last_whole_[lane];
+        double cycles = static_cast<double>((last - first) / 2 + 1);
+        if (!begun_) {
+            from = readings.phase_fringes[first][lane];
+            from_whole = readings.phase_whole[first][lane];
+            cycles -= 1.0;
+        }
+        last_fringes_[lane] = readings.phase_fringes[last][lane];
+        last_whole_[lane] = readings.phase_whole[last][lane];
+        if (cycles == 0.0) continue;
+        const double turned = (last_whole_[lane] - from_whole) + (last_fringes_[lane] - from);
+        const double seconds = cycles * period;
+        window_s_[lane] = std::min(window_s_[lane] + seconds, averaging_s);
+        const double rate = turned * units::two_pi / seconds;
+        state_.rate_rad_s[lane] += (rate - state_.rate_rad_s[lane]) * std::min(seconds / window_s_[lane], 1.0);
+    }
+}
+
+void Exact::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
+    errors.fringes.resize(readings.turns);
+    if (readings.turns == 0) return;
+    if (!begun_) {
+        estimate_rate(readings);
+        for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) make_tables(lane);
+    }
+    if (!HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, readings, begun_, state_, errors)) {
+        throw RunError(
+            "compensated_exact: the phase does not reverse near a turn of the dither; the input rate is too "
+            "high for it");
+    }
+    if (begun_) {
+        estimate_rate(readings);
+        for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
+            if (!tables_.ranges(lane).rate_rad_s.covers(state_.rate_rad_s[lane])) make_tables(lane);
+        }
+    }
+    begun_ = true;
+}
+
+}  // namespace ringlock::compensate
+#endif

@@ -1,0 +1,55 @@
+#pragma once
+#include <optional>
+
+#include "engine/compensate/lane_compensator.hpp"
+#include "engine/propagate/turn_tables.hpp"
+
+namespace ringlock::compensate {
+
+/// The turn map inverted: the exact lock-in error of a half cycle from the phases measured at its two turns.
+///
+/// With z and shift of the half turn (docs/turn-map.md), and the phases at the dither's turns at its beginning and end
+/// turned upright, x_0 = s psi_0 and x_1 = -s psi_1, a half cycle of sign s gains
+///
+///     s (2 shift + 2 arg[(1 + z exp(-i x_0)) (1 - z exp(-i x_1))])
+///
+/// beyond drive and input: no first order, no knowledge of what lies between. The amplitude, on which z depends,
+/// follows from the swing measured between the turns; the input rate from the mean of the output over some seconds.
+/// Phases are carried from the zero-rate point, where they are read, to the dither's turn by the Taylor series of the
+/// equation of motion.
+///
+/// The rate must be known roughly before the first correction: errors of the first piece of readings of a run are
+/// computed with the mean rate over that piece. Where the phase's turn lies after the dither's, the half cycle under
+/// way is taken to have the mean amplitude, as its swing is not known yet.
+class Exact final : public LaneCompensator {
+   public:
+    /// `tolerance_rad`: of the tables, for one turn. Throws RunError where a dither has too few fringes for a turn map.
+    Exact(const Calibration& calibration, double tolerance_rad);
+
+    void observe(const readout::LaneReadings& readings, LaneErrors& errors) override;
+
+    struct State {
+        simd::Lanes amplitude_rad, b_rad_s;
+        simd::Lanes duration_s[2];  ///< of half cycles of positive and negative sign
+        simd::Lanes rate_rad_s;     ///< as estimated
+        // Of the turn before: sine and cosine of its upright phase at the dither's turn, that phase, and the amplitude
+        // of the half cycle that ended there.
+        simd::Lanes sine, cosine, turn_fringes, turn_whole, last_amplitude_rad;
+        simd::Lanes error_fringes;  ///< at the dither's turn
+        simd::Lanes error_whole;
+    };
+
+   private:
+    void estimate_rate(const readout::LaneReadings& readings);
+    void make_tables(std::size_t lane);
+
+    Calibration calibration_;
+    propagate::TurnTables tables_;
+    State state_;
+    bool begun_ = false;
+    std::array<double, simd::lanes> window_s_{};      ///< time over which the rate was averaged so far
+    std::array<double, simd::lanes> last_fringes_{};  ///< phase at the last minimum seen
+    std::array<double, simd::lanes> last_whole_{};
+};
+
+}  // namespace ringlock::compensate

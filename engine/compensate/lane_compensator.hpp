@@ -1,0 +1,36 @@
+#pragma once
+#include <array>
+#include <vector>
+
+#include "engine/readout/lane_readings.hpp"
+#include "engine/simd/lanes.hpp"
+
+/// Lock-in compensators: they see readings and a calibration, never the truth.
+namespace ringlock::compensate {
+
+/// What an operator has measured about each gyro of a block beforehand.
+struct Calibration {
+    std::size_t lanes = simd::lanes;                         ///< gyros of the block
+    std::array<double, simd::lanes> b_rad_s{};               ///< (2 pi / K) Omega_L
+    std::array<double, simd::lanes> dither_amplitude_rad{};  ///< half the swing in optical phase
+    std::array<double, simd::lanes> positive_duration_s{};   ///< of half cycles of positive dither rate
+    std::array<double, simd::lanes> negative_duration_s{};
+    double amplitude_margin_rad = 0.0;  ///< half cycles' amplitudes stay within it of the mean
+};
+
+/// Lock-in errors at the turns of a piece, to be taken away from the phases read there.
+struct LaneErrors {
+    std::vector<simd::Lanes> fringes;  ///< [turns], less ...
+    simd::Lanes whole;                 ///< ... these whole fringes
+};
+
+/// Computes the lock-in error of a block of gyros from the readings at the zero-rate points, online.
+class LaneCompensator {
+   public:
+    virtual ~LaneCompensator() = default;
+    /// Takes the next readings, consecutive and without gaps, and gives the error accumulated up to each. An error
+    /// never depends on later readings, but that the first piece of a run may be taken as one.
+    virtual void observe(const readout::LaneReadings& readings, LaneErrors& errors) = 0;
+};
+
+}  // namespace ringlock::compensate

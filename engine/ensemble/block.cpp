@@ -1,0 +1,312 @@
+#include "engine/ensemble/block.hpp"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "engine/compensate/exact.hpp"
+#include "engine/compensate/first_order.hpp"
+#include "engine/dither/lane_dither.hpp"
+#include "engine/effects/effect.hpp"
+#include "engine/ensemble/draw.hpp"
+#include "engine/ensemble/output_counts.hpp"
+#include "engine/ensemble/trajectory_kind.hpp"
+#include "engine/propagate/lane_propagator.hpp"
+#include "engine/readout/lane_readout.hpp"
+
+namespace ringlock::ensemble {
+
+namespace {
+
+/// An arm that reads a trajectory, with its compensator if it has one.
+struct Listener {
+    std::size_t arm;
+    std::unique_ptr<compensate::LaneCompensator> compensator;
+    compensate::LaneErrors errors;
+    std::vector<simd::LaneCounts> counts;
+};
+
+readout::Electronics make_electronics(const scenario::Scenario& scenario) {
+    const auto& readout = scenario.readout;
+    return {readout.model == scenario::ReadoutModel::ideal, readout.angle_output == scenario::AngleOutput::interpolated,
+            readout.clock_hz, readout.detector_noise_relative};
+}
+
+double injected_rms_rad(const scenario::Scenario& scenario, TrajectoryKind kind) {
+    return kind == TrajectoryKind::noise_injected ? scenario.noise_injection.turn_phase_rms_rad : 0.0;
+}
+
+std::vector<gyro::Device> make_devices(const std::vector<gyro::Setup>& setups, TrajectoryKind kind) {
+    std::vector<gyro::Device> devices;
+    for (const gyro::Setup& setup : setups) {
+        devices.emplace_back(setup);
+        if (kind == TrajectoryKind::ideal) devices.back().coupling.b_rad_s = 0.0;
+    }
+    return devices;
+}
+
+std::vector<gyro::Ellipse> ellipses_of(const std::vector<gyro::Setup>& setups) {
+    std::vector<gyro::Ellipse> ellipses;
+    for (const gyro::Setup& setup : setups) ellipses.push_back(setup.ellipse);
+    return ellipses;
+}
+
+std::unique_ptr<propagate::LanePropagator> make_propagator(const scenario::Scenario& scenario,
+                                                           const std::vector<gyro::Device>& devices,
+                                                           TrajectoryKind kind) {
+    if (scenario.propagation.method == scenario::PropagationMethod::direct && kind != TrajectoryKind::ideal) {
+        return std::make_unique<propagate::DirectPropagator>(devices, scenario.propagation.direct_tolerance_rad);
+    }
+    // Without lock-in there is nothing to tabulate; the map is that of the plain phase.
+    const double margin = kind == TrajectoryKind::ideal
+                              ? 0.0
+                              : dither::LaneDither::amplitude_margin_rad(injected_rms_rad(scenario, kind));
+    return std::make_unique<propagate::TurnMapLanes>(devices, margin, scenario.propagation.turn_map_tolerance_rad);
+}
+
+std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Scenario& scenario,
+                                                              const std::vector<gyro::Device>& devices,
+                                                              const scenario::Arm& arm, TrajectoryKind kind) {
+    compensate::Calibration calibration;
+    calibration.lanes = devices.size();
+    calibration.amplitude_margin_rad = dither::LaneDither::amplitude_margin_rad(injected_rms_rad(scenario, kind));
+    for (std::size_t lane = 0; lane < devices.size(); ++lane) {
+        calibration.b_rad_s[lane] = devices[lane].coupling.b_rad_s;
+        calibration.dither_amplitude_rad[lane] = devices[lane].dither_amplitude_rad;
+        calibration.positive_duration_s[lane] = devices[lane].positive_duration_s;
+        calibration.negative_duration_s[lane] = devices[lane].negative_duration_s;
+    }
+    switch (arm.compensator) {
+        case scenario::Compensator::published:
+            return std::make_unique<compensate::FirstOrder>(calibration, compensate::FirstOrder::published);
+        case scenario::Compensator::corrected:
+            return std::make_unique<compensate::FirstOrder>(calibration, compensate::FirstOrder::corrected);
+        case scenario::Compensator::exact:
+            return std::make_unique<compensate::Exact>(calibration, scenario.propagation.turn_map_tolerance_rad);
+        case scenario::Compensator::none:
+            break;
+    }
+    return nullptr;
+}
+
+/// One physical trajectory of the block and the arms that read it.
+class Branch {
+   public:
+    Branch(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms,
+           const std::vector<gyro::Setup>& setups, const random::LaneIdentities& who, TrajectoryKind kind)
+        : kind_(kind), devices_(make_devices(setups, kind)), dither_(devices_, injected_rms_rad(scenario, kind), who) {
+        for (std::size_t i = 0; i < arms.size(); ++i) {
+            if (kind_of(arms[i]) != kind) continue;
+            listeners_.push_back({i, make_compensator(scenario, devices_, arms[i], kind), {}, {}});
+            compensated_ = compensated_ || listeners_.back().compensator != nullptr;
+        }
+        if (listeners_.empty()) return;
+        propagator_ = make_propagator(scenario, devices_, kind);
+        readout_.emplace(devices_, ellipses_of(setups), make_electronics(scenario), compensated_);
+    }
+
+    bool empty() const { return listeners_.empty(); }
+    bool compensated() const { return compensated_; }
+
+    void advance(std::size_t turns, std::span<const simd::Lanes> angle_arcsec, readout::DetectorNoise noise) {
+        dither_.next(turns, angle_arcsec, {}, drive_);
+        propagator_->step(drive_, turns_);
+        readout_->read(drive_, turns_, noise, compensated_ ? 1 : 2, readings_, angles_);
+        for (Listener& listener : listeners_) {
+            if (listener.compensator) listener.compensator->observe(readings_, listener.errors);
+            output_counts(angles_, listener.compensator ? &listener.errors : nullptr, turns, listener.counts);
+        }
+    }
+
+    TrajectoryKind kind() const { return kind_; }
+    const std::vector<gyro::Device>& devices() const { return devices_; }
+    const propagate::LanePropagator& propagator() const { return *propagator_; }
+    const readout::LaneReadings& readings() const { return readings_; }
+    const readout::LaneAngles& angles() const { return angles_; }
+    const Listener* listener(std::size_t arm) const {
+        for (const Listener& listener : listeners_) {
+            if (listener.arm == arm) return &listener;
+        }
+        return nullptr;
+    }
+
+   private:
+    TrajectoryKind kind_;
+    std::vector<gyro::Device> devices_;
+    dither::LaneDither dither_;
+    std::unique_ptr<propagate::LanePropagator> propagator_;
+    std::optional<readout::LaneReadout> readout_;
+    std::vector<Listener> listeners_;
+    bool compensated_ = false;
+    gyro::LaneDrive drive_;
+    gyro::LaneTurns turns_;
+    readout::LaneReadings readings_;
+    readout::LaneAngles angles_;
+};
+
+random::LaneIdentities identities(const scenario::Scenario& scenario, std::int64_t first_gyro, std::size_t gyros) {
+    random::LaneIdentities who;
+    who.seed = scenario.ensemble.seed;
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+        who.gyro[lane] = identity(scenario, first_gyro + static_cast<std::int64_t>(std::min(lane, gyros - 1))).gyro;
+    }
+    return who;
+}
+
+}  // namespace
+
+struct GyroBlock::State {
+    State(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
+          std::vector<gyro::Setup> drawn)
+        : setups(std::move(drawn)), who(identities(scenario, first_gyro, setups.size())) {
+        for (const TrajectoryKind kind :
+             {TrajectoryKind::ideal, TrajectoryKind::plain, TrajectoryKind::noise_injected}) {
+            Branch branch(scenario, arms, setups, who, kind);
+            if (branch.empty()) continue;
+            every_turn = every_turn || branch.compensated();
+            branches.push_back(std::move(branch));
+        }
+        noisy = scenario.readout.model == scenario::ReadoutModel::instrument &&
+                scenario.readout.detector_noise_relative > 0.0;
+        for (const effects::Effect* effect : effects::registry()) {
+            const auto values = scenario.effects.find(std::string(effect->name()));
+            if (values == scenario.effects.end() || !effect->active(values->second)) continue;
+            if (auto process = effect->lane_rate_process(values->second, who, setups.size())) {
+                processes.push_back(std::move(process));
+            }
+        }
+        for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+            const gyro::Device device(setups[std::min(lane, setups.size() - 1)]);
+            duration_s[0][lane] = device.positive_duration_s;
+            duration_s[1][lane] = device.negative_duration_s;
+        }
+    }
+
+    /// Angles that varying rates add over the half cycles that begin in the piece; none without such rates.
+    std::span<const simd::Lanes> varying_angles(std::size_t turns) {
+        if (processes.empty()) return {};
+        interval_start_s.resize(turns);
+        interval_s.resize(turns);
+        angle_arcsec.assign(turns, simd::Lanes{});
+        for (std::size_t i = 0; i < turns; ++i) {
+            const std::int64_t number = turn + static_cast<std::int64_t>(i);
+            const std::size_t side = number % 2 == 0 ? 0 : 1;
+            for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+                interval_start_s[i][lane] =
+                    static_cast<double>(number / 2) * (duration_s[0][lane] + duration_s[1][lane]) +
+                    (side == 0 ? 0.0 : duration_s[0][lane]);
+            }
+            interval_s[i] = duration_s[side];
+        }
+        const effects::LaneIntervals intervals{setups.size(), static_cast<std::uint64_t>(turn), interval_start_s,
+                                               interval_s};
+        for (const auto& process : processes) process->add_angles(intervals, angle_arcsec);
+        return angle_arcsec;
+    }
+
+    readout::DetectorNoise detector_noise(std::size_t turns) {
+        if (!noisy) return {};
+        noise.resize(2 * turns);
+        random::normals(who, random::Purpose::detector_noise, 2 * static_cast<std::uint64_t>(turn), 2 * turns,
+                        setups.size(), noise.front().data(), every_turn ? 1 : 2);
+        return noise;
+    }
+
+    const Branch& branch_of(std::size_t arm) const {
+        return *std::find_if(branches.begin(), branches.end(),
+                             [&](const Branch& branch) { return branch.listener(arm) != nullptr; });
+    }
+
+    std::vector<gyro::Setup> setups;
+    random::LaneIdentities who;
+    std::vector<Branch> branches;
+    std::vector<std::unique_ptr<effects::LaneRateProcess>> processes;
+    bool every_turn = false;  // some compensator wants the maxima, too
+    bool noisy = false;
+    std::array<simd::Lanes, 2> duration_s;
+    std::int64_t turn = 0;
+    std::vector<simd::Lanes> interval_start_s;
+    std::vector<simd::Lanes> interval_s;
+    std::vector<simd::Lanes> angle_arcsec;
+    std::vector<simd::Lanes> noise;
+};
+
+namespace {
+
+std::vector<gyro::Setup> drawn(const scenario::Scenario& scenario, std::int64_t first_gyro, std::size_t gyros) {
+    std::vector<gyro::Setup> setups;
+    for (std::size_t i = 0; i < gyros; ++i) {
+        setups.push_back(draw_setup(scenario, first_gyro + static_cast<std::int64_t>(i)));
+    }
+    return setups;
+}
+
+}  // namespace
+
+GyroBlock::GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
+                     std::size_t gyros)
+    : GyroBlock(scenario, arms, first_gyro, drawn(scenario, first_gyro, gyros)) {}
+GyroBlock::GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
+                     std::vector<gyro::Setup> setups)
+    : state_(std::make_unique<State>(scenario, arms, first_gyro, std::move(setups))) {}
+GyroBlock::GyroBlock(GyroBlock&&) noexcept = default;
+GyroBlock& GyroBlock::operator=(GyroBlock&&) noexcept = default;
+GyroBlock::~GyroBlock() = default;
+
+void GyroBlock::advance(std::size_t turns) {
+    State& s = *state_;
+    const auto angles = s.varying_angles(turns);
+    const auto noise = s.detector_noise(turns);
+    for (Branch& branch : s.branches) branch.advance(turns, angles, noise);
+    s.turn += static_cast<std::int64_t>(turns);
+}
+
+std::span<const simd::LaneCounts> GyroBlock::counts(std::size_t arm) const {
+    return state_->branch_of(arm).listener(arm)->counts;
+}
+
+const readout::LaneReadings& GyroBlock::readings(std::size_t arm) const { return state_->branch_of(arm).readings(); }
+
+const readout::LaneAngles& GyroBlock::angles(std::size_t arm) const { return state_->branch_of(arm).angles(); }
+
+double GyroBlock::found_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const {
+    const Listener& listener = *state_->branch_of(arm).listener(arm);
+    if (!listener.compensator) return 0.0;
+    return units::two_pi * (listener.errors.whole[lane] + listener.errors.fringes[turn][lane]);
+}
+
+double GyroBlock::lockin_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const {
+    const readout::LaneAngles& angles = state_->branch_of(arm).angles();
+    return units::two_pi * (angles.lockin_whole[lane] + angles.lockin_fringes[turn][lane]);
+}
+
+const std::vector<gyro::Setup>& GyroBlock::setups() const { return state_->setups; }
+
+int GyroBlock::trajectories() const {
+    return static_cast<int>(std::count_if(state_->branches.begin(), state_->branches.end(),
+                                          [](const Branch& branch) { return branch.kind() != TrajectoryKind::ideal; }));
+}
+
+double GyroBlock::table_error_rad() const {
+    double worst = 0.0;
+    for (const Branch& branch : state_->branches) {
+        if (branch.kind() == TrajectoryKind::ideal) continue;
+        for (std::size_t lane = 0; lane < state_->setups.size(); ++lane) {
+            worst = std::max(worst, branch.propagator().table_error_rad(lane));
+        }
+    }
+    return worst;
+}
+
+std::int64_t GyroBlock::tables_remade() const {
+    std::int64_t sum = 0;
+    for (const Branch& branch : state_->branches) {
+        if (branch.kind() == TrajectoryKind::ideal) continue;
+        for (std::size_t lane = 0; lane < state_->setups.size(); ++lane) sum += branch.propagator().tables_remade(lane);
+    }
+    return sum;
+}
+
+}  // namespace ringlock::ensemble

@@ -1,0 +1,58 @@
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "engine/ensemble/schedule.hpp"
+#include "engine/gyro/setup.hpp"
+#include "engine/readout/lane_readings.hpp"
+#include "engine/scenario/arm.hpp"
+#include "engine/scenario/scenario.hpp"
+#include "engine/simd/lanes.hpp"
+
+namespace ringlock::ensemble {
+
+/// Consecutive gyros of a study, at most simd::lanes, taken through all its arms at once, piece after piece. What a
+/// gyro does depends on the scenario and its own number, never on the block that it is in.
+///
+/// Rates that vary in time, noise included, are constant over each half cycle, at their mean; the stripping of the
+/// dither is exact and refers each angle to the nominal time of its turn.
+class GyroBlock {
+   public:
+    /// Throws RunError where a trajectory cannot be followed, as do the functions below.
+    GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
+              std::size_t gyros);
+    /// The same with parameters of the caller's in place of those that the study would draw.
+    GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
+              std::vector<gyro::Setup> setups);
+    GyroBlock(GyroBlock&&) noexcept;
+    GyroBlock& operator=(GyroBlock&&) noexcept;
+    ~GyroBlock();
+
+    /// Goes through the next `turns` turns, an even number but for the last piece.
+    void advance(std::size_t turns);
+
+    /// Output of an arm at the minima of the piece, [minimum][gyro] in counts of 1/counts_per_fringe fringes.
+    std::span<const simd::LaneCounts> counts(std::size_t arm) const;
+    /// Readings of the trajectory of an arm. Where no arm of it has a compensator those at maxima are missing.
+    const readout::LaneReadings& readings(std::size_t arm) const;
+    /// What is true of these turns.
+    const readout::LaneAngles& angles(std::size_t arm) const;
+    /// Lock-in error that an arm's compensator has found at turn i of the piece for a gyro [rad]; 0 without one.
+    double found_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const;
+    /// Lock-in error there [rad].
+    double lockin_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const;
+
+    const std::vector<gyro::Setup>& setups() const;
+    /// Physical trajectories that lock-in acts on.
+    int trajectories() const;
+    double table_error_rad() const;  ///< largest measured when the turn maps were tabulated; 0: no tables
+    std::int64_t tables_remade() const;
+
+   private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace ringlock::ensemble

@@ -1,0 +1,52 @@
+#include "engine/ensemble/output_counts.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/ensemble/output_counts.cpp"
+#include "engine/simd/targets.hpp"
+// The above must come first.
+#include "engine/simd/math-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace ringlock::ensemble::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+void count(const readout::LaneAngles& angles, const compensate::LaneErrors* errors, std::size_t turns,
+           std::vector<simd::LaneCounts>& counts) {
+    const hn::CappedTag<double, simd::lanes> d;
+    const hn::Rebind<std::int64_t, decltype(d)> di;
+    // Whole numbers below 2^51 stand in the low bits once this is added.
+    const auto magic = hn::Set(d, 0x1.8p52);
+    const auto bias = hn::BitCast(di, magic);
+    for (std::size_t lane = 0; lane < simd::lanes; lane += hn::Lanes(d)) {
+        const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
+        for (std::size_t i = 0; i < turns; i += 2) {
+            auto fringes = load(angles.angle_fringes[i]);
+            auto whole = load(angles.angle_whole[i]);
+            if (errors != nullptr) {
+                fringes = fringes - load(errors->fringes[i]);
+                whole = whole - load(errors->whole);
+            }
+            const auto fine = hn::BitCast(di, fringes * hn::Set(d, counts_per_fringe) + magic) - bias;
+            const auto coarse = hn::ShiftLeft<32>(hn::BitCast(di, whole + magic) - bias);
+            hn::Store(coarse + fine, di, counts[i / 2].data() + lane);
+        }
+    }
+}
+
+}  // namespace ringlock::ensemble::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ringlock::ensemble {
+
+HWY_EXPORT(count);
+
+void output_counts(const readout::LaneAngles& angles, const compensate::LaneErrors* errors, std::size_t turns,
+                   std::vector<simd::LaneCounts>& counts) {
+    counts.resize((turns + 1) / 2);
+    HWY_DYNAMIC_DISPATCH(count)(angles, errors, turns, counts);
+}
+
+}  // namespace ringlock::ensemble
+#endif

@@ -1,0 +1,94 @@
+#include "engine/propagate/lane_propagator.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ringlock::propagate {
+
+namespace {
+
+/// Slow rates and couplings wander: ranges this many times as wide as what a piece asks for need not be made anew soon.
+constexpr double spare = 3.0;
+/// Ranges grow with each remake up to this rate, beyond which they need more and more terms [deg/h].
+constexpr double widest_rate_deg_h = 200.0;
+constexpr double widest_coupling = 0.05;  // relative
+
+/// Smallest and largest value of each gyro over the half cycles that begin in a piece.
+void extremes(const std::vector<simd::Lanes>& rows, simd::Lanes& lowest, simd::Lanes& highest) {
+    lowest = rows[1];
+    highest = rows[1];
+    for (std::size_t i = 2; i < rows.size(); ++i) {
+        for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+            lowest[lane] = std::min(lowest[lane], rows[i][lane]);
+            highest[lane] = std::max(highest[lane], rows[i][lane]);
+        }
+    }
+}
+
+/// A range around what is asked for, wider than the last one.
+Range around(double lowest, double highest, const Range& last, double widest) {
+    const double asked = 0.5 * (highest - lowest);
+    const double grown = std::min(last.highest - last.lowest, widest);  // twice the old half width
+    const double half = std::max(spare * asked, grown) + 1e-9 * std::abs(highest);
+    const double centre = 0.5 * (highest + lowest);
+    return {centre - half, centre + half};
+}
+
+}  // namespace
+
+TurnMapLanes::TurnMapLanes(std::span<const gyro::Device> devices, double amplitude_margin_rad, double tolerance_rad)
+    : devices_(devices.begin(), devices.end()), amplitude_margin_rad_(amplitude_margin_rad), tables_(tolerance_rad) {
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+        const gyro::Device& device = devices_[std::min(lane, devices_.size() - 1)];
+        state_.coupling_phase_fringes[lane] = device.coupling.phase_rad / units::two_pi;
+    }
+}
+
+void TurnMapLanes::cover(const gyro::LaneDrive& drive) {
+    const bool noisy = amplitude_margin_rad_ > 0.0;
+    if (begun_ && !noisy && !drive.rates_vary && !drive.thresholds_vary) return;
+    simd::Lanes low_amplitude, high_amplitude, low_rate, high_rate, low_b, high_b;
+    extremes(drive.amplitude_rad, low_amplitude, high_amplitude);
+    if (!begun_ || drive.rates_vary) extremes(drive.rate_rad_s, low_rate, high_rate);
+    if (!begun_ || drive.thresholds_vary) extremes(drive.b_rad_s, low_b, high_b);
+    for (std::size_t lane = 0; lane < devices_.size(); ++lane) {
+        const gyro::Device& device = devices_[lane];
+        HalfCycleRanges ranges = tables_.ranges(lane);
+        const auto misses = [&](const Range& range, double low, double high) {
+            return !begun_ || !range.covers(low) || !range.covers(high);
+        };
+        bool changed = !begun_;
+        if (misses(ranges.amplitude_rad, low_amplitude[lane], high_amplitude[lane])) {
+            // Noise beyond eight sigma, or the first piece.
+            const double a = device.dither_amplitude_rad;
+            const double margin =
+                std::max({amplitude_margin_rad_, 1.1 * (high_amplitude[lane] - a), 1.1 * (a - low_amplitude[lane])});
+            ranges.amplitude_rad = noisy ? Range{a - margin, a + margin} : Range{a, a};
+            changed = true;
+        }
+        if ((!begun_ || drive.rates_vary) && misses(ranges.rate_rad_s, low_rate[lane], high_rate[lane])) {
+            ranges.rate_rad_s = drive.rates_vary ? around(low_rate[lane], high_rate[lane], ranges.rate_rad_s,
+                                                          widest_rate_deg_h * device.phase_per_arcsec)
+                                                 : Range{low_rate[lane], high_rate[lane]};
+            changed = true;
+        }
+        if ((!begun_ || drive.thresholds_vary) && misses(ranges.b_rad_s, low_b[lane], high_b[lane])) {
+            ranges.b_rad_s = drive.thresholds_vary ? around(low_b[lane], high_b[lane], ranges.b_rad_s,
+                                                            widest_coupling * device.coupling.b_rad_s)
+                                                   : Range{low_b[lane], high_b[lane]};
+            changed = true;
+        }
+        if (!changed) continue;
+        if (begun_) ++remade_[lane];
+        tables_.make(lane, device, ranges);
+    }
+    begun_ = true;
+}
+
+void TurnMapLanes::step(const gyro::LaneDrive& drive, gyro::LaneTurns& turns) {
+    if (drive.turns == 0) return;
+    cover(drive);
+    step_turns(tables_, drive, devices_.size(), state_, &turns);
+}
+
+}  // namespace ringlock::propagate

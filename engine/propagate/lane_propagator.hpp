@@ -1,0 +1,64 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/gyro/device.hpp"
+#include "engine/gyro/lane_drive.hpp"
+#include "engine/propagate/direct_lanes.hpp"
+#include "engine/propagate/turn_kernel.hpp"
+#include "engine/propagate/turn_tables.hpp"
+
+namespace ringlock::propagate {
+
+/// Takes a block of gyros through a run, piece after piece. What a gyro does depends on itself alone.
+class LanePropagator {
+   public:
+    virtual ~LanePropagator() = default;
+    /// Goes through the turns of `drive`, which follow those of the call before, and fills `turns`.
+    /// Throws RunError where a half cycle cannot be solved to the tolerance asked for.
+    virtual void step(const gyro::LaneDrive& drive, gyro::LaneTurns& turns) = 0;
+    /// Largest error of a turn of that gyro's tables, measured between their nodes [rad]; 0 where there are none.
+    virtual double table_error_rad(std::size_t lane) const = 0;
+    /// Times that a gyro's tables were made anew because the drive left their ranges.
+    virtual std::int64_t tables_remade(std::size_t lane) const = 0;
+};
+
+/// The production propagator: the exact turn map. Tables are made over the ranges that the first piece asks for, with
+/// room to spare, and anew where a later one leaves them.
+class TurnMapLanes final : public LanePropagator {
+   public:
+    /// `amplitude_margin_rad`: how far injected noise takes the amplitude of a half cycle from the device's.
+    /// `tolerance_rad`: interpolation error of a turn.
+    TurnMapLanes(std::span<const gyro::Device> devices, double amplitude_margin_rad, double tolerance_rad);
+
+    void step(const gyro::LaneDrive& drive, gyro::LaneTurns& turns) override;
+    double table_error_rad(std::size_t lane) const override { return tables_.measured_error_rad(lane); }
+    std::int64_t tables_remade(std::size_t lane) const override { return remade_[lane]; }
+
+   private:
+    void cover(const gyro::LaneDrive& drive);
+
+    std::vector<gyro::Device> devices_;
+    double amplitude_margin_rad_;
+    TurnTables tables_;
+    TurnState state_;
+    std::array<std::int64_t, simd::lanes> remade_{};
+    bool begun_ = false;
+};
+
+/// The reference: every fringe integrated.
+class DirectPropagator final : public LanePropagator {
+   public:
+    /// `tolerance_rad`: error of a half cycle.
+    DirectPropagator(std::span<const gyro::Device> devices, double tolerance_rad) : direct_(devices, tolerance_rad) {}
+
+    void step(const gyro::LaneDrive& drive, gyro::LaneTurns& turns) override { direct_.step(drive, &turns); }
+    double table_error_rad(std::size_t /*lane*/) const override { return 0.0; }
+    std::int64_t tables_remade(std::size_t /*lane*/) const override { return 0; }
+
+   private:
+    DirectLanes direct_;
+};
+
+}  // namespace ringlock::propagate
