@@ -11,12 +11,15 @@
 #include "analysis/report/table.hpp"
 #include "engine/compensate/first_order.hpp"
 #include "engine/dither/drive.hpp"
+#include "engine/dither/lane_dither.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/trajectory.hpp"
 #include "engine/propagate/direct.hpp"
+#include "engine/propagate/direct_lanes.hpp"
 #include "engine/propagate/turn_map.hpp"
 #include "tests/bench/noisy_dither.hpp"
 #include "tests/bench/reference_cost.hpp"
+#include "tests/support/series_integrator.hpp"
 
 namespace {
 
@@ -36,6 +39,23 @@ struct Entry {
 /// The same noisy dither for all propagators.
 Contender through(std::shared_ptr<propagate::Propagator> propagator, const gyro::Device& device) {
     return [propagator, device](int turns) { return bench::go_through(*propagator, device, turns); };
+}
+
+/// A block of gyros under the same noisy dither, each with its own noise; a turn of one gyro counts as one.
+Contender through_block(const gyro::Device& device) {
+    return [device](int turns) {
+        const std::vector<gyro::Device> devices(simd::lanes, device);
+        random::LaneIdentities who;
+        who.seed = 1;
+        for (std::size_t lane = 0; lane < simd::lanes; ++lane) who.gyro[lane] = lane;
+        dither::LaneDither dither(devices, 3.0, who);
+        propagate::DirectLanes direct(devices, 1e-8);
+        gyro::LaneDrive drive;
+        gyro::LaneTurns at_turns;
+        dither.next(static_cast<std::size_t>(turns) / simd::lanes, {}, {}, drive);
+        direct.step(drive, &at_turns);
+        return at_turns.lockin_fringes.back()[0];
+    };
 }
 
 Contender read_and_corrected(const scenario::Scenario& scenario) {
@@ -75,8 +95,11 @@ int main() {
         const double error = bench::worst_error_rad(*propagator, truth);
         entries.push_back({name, turns, through(std::move(propagator), device), error});
     };
-    add_propagator("direct integrator, 1e-8 rad", 60,
+    add_propagator("scalar Taylor series, 1e-8 rad", 60,
+                   std::make_shared<test::SeriesIntegrator>(device.coupling, 1e-8));
+    add_propagator("direct integrator, one gyro, 1e-8 rad", 120,
                    std::make_shared<propagate::DirectIntegrator>(device.coupling, 1e-8));
+    entries.push_back({"direct integrator, 16 gyros, 1e-8 rad", 960, through_block(device)});
     for (bench::Reference& reference : bench::references(device)) {
         entries.push_back({fmt::format("{}, {:.1e} a step", reference.name, reference.tolerance_rad), 20,
                            through(std::move(reference.propagator), device), reference.worst_error_rad});
@@ -102,7 +125,7 @@ int main() {
                          {"microseconds", report::Align::right},
                          {"turns per second", report::Align::right},
                          {"worst error [rad]", report::Align::right},
-                         {"over the direct integrator", report::Align::right}});
+                         {"over the first", report::Align::right}});
     for (const Entry& entry : entries) {
         table.add_row({entry.name, fmt::format("{:.4g}", median(entry) * 1e6),
                        fmt::format("{:.3g}", 1.0 / median(entry)),
