@@ -15,7 +15,7 @@ inline constexpr double turn_phase_rms_rad = 3.0;
 double go_through(propagate::Propagator& propagator, const gyro::Device& device, int turns);
 
 /// A half cycle of the noise-injected dither and what the lock-in adds in it, by the direct integrator at 1e-13 rad.
-/// tests/physics/reference_integrators.cpp holds that to 2e-12 rad.
+/// tests/physics/reference_integrators.cpp holds that to 1e-12 rad.
 struct SolvedHalfCycle {
     gyro::HalfCycle half;
     double phase_rad;

@@ -7,8 +7,9 @@ namespace ringlock::test {
 
 /// The equation of motion for x, the deviation from the plain phase:
 ///
-///     x' = b(t) sin(phase + plain phase(t) + x + coupling phase).
+///     x' = b(t) F(phase + plain phase(t) + x),
 ///
+/// b(t), F and the plain phase as gyro::Coupling and gyro::HalfCycle say, written out here once more.
 /// The plain phase is known in closed form and is 1e5 times larger; integrated, it would cost digits.
 class Deviation {
    public:
@@ -16,7 +17,7 @@ class Deviation {
     Deviation(const gyro::Coupling& coupling, const gyro::HalfCycle& half, double phase_rad)
         : coupling_(coupling),
           half_(half),
-          start_rad_(phase_rad + coupling.phase_rad),
+          start_rad_(phase_rad),
           angular_frequency_rad_s_(half.angular_frequency_rad_s()) {}
 
     /// x' [rad/s].
@@ -31,12 +32,19 @@ class Deviation {
                          std::sin(angle);
         }
         if (coupling_.turn_asymmetry != 0.0) b_rad_s *= 1.0 + coupling_.turn_asymmetry * half_.sign * std::cos(angle);
-        return b_rad_s * std::sin(start_rad_ + plain_rad + x_rad);
+        const double psi_rad = start_rad_ + plain_rad + x_rad;
+        double f = std::sin(psi_rad + coupling_.phase_rad);
+        if (coupling_.second_ratio != 0.0) {
+            f += coupling_.second_ratio * std::sin(2.0 * psi_rad + coupling_.second_phase_rad);
+        }
+        return b_rad_s * f;
     }
     /// A bound of the phase rate [rad/s].
     double fastest_rad_s() const {
         return half_.amplitude_rad * angular_frequency_rad_s_ * (1.0 + std::abs(half_.harmonic_ratio)) +
-               std::abs(half_.rate_rad_s) + coupling_.b_rad_s * (1.0 + std::abs(coupling_.turn_asymmetry));
+               std::abs(half_.rate_rad_s) +
+               coupling_.b_rad_s * (1.0 + std::abs(coupling_.turn_asymmetry)) *
+                   (1.0 + std::abs(coupling_.second_ratio));
     }
 
    private:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <boost/math/constants/constants.hpp>
+#include <stdexcept>
 
 namespace ringlock::test {
 
@@ -47,6 +48,8 @@ std::size_t length(const std::array<Quad, drive_terms>& series) {
 
 ExtendedHalfCycle::ExtendedHalfCycle(gyro::Coupling coupling, const gyro::HalfCycle& half, double stride_rad)
     : coupling_(coupling) {
+    if (coupling.second_ratio != 0.0)
+        throw std::invalid_argument("extended precision: second harmonic of the coupling");
     const Quad b = coupling.b_rad_s;
     const Quad end_s = half.duration_s;
     const Quad w = pi() / end_s;

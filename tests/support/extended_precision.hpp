@@ -20,6 +20,7 @@ using Quad = boost::multiprecision::number<boost::multiprecision::cpp_bin_float_
 class ExtendedHalfCycle {
    public:
     /// `stride_rad`: phase that a step may run through; 5 leaves less than 1e-31 out of a step.
+    /// Throws std::invalid_argument for a second harmonic of the coupling, with which nothing is linear.
     ExtendedHalfCycle(gyro::Coupling coupling, const gyro::HalfCycle& half, double stride_rad = 5.0);
 
     /// What Propagator::lockin_gain_rad computes in double precision [rad].

@@ -1,5 +1,4 @@
 #pragma once
-#include <gtest/gtest.h>
 #include <stdlib.h>
 
 #include <filesystem>
@@ -13,7 +12,7 @@ namespace ringlock::test {
 class TemporaryDirectory {
    public:
     TemporaryDirectory() {
-        std::string name = testing::TempDir() + "ringlock-XXXXXX";
+        std::string name = (std::filesystem::temp_directory_path() / "ringlock-XXXXXX").string();
         if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("mkdtemp " + name);
         path_ = name;
     }
