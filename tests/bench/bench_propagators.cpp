@@ -21,6 +21,8 @@
 #include "engine/ensemble/trajectory.hpp"
 #include "engine/propagate/direct.hpp"
 #include "engine/propagate/direct_lanes.hpp"
+#include "engine/propagate/phase_kernel.hpp"
+#include "engine/propagate/turn_kernel.hpp"
 #include "engine/propagate/turn_map.hpp"
 #include "tests/support/series_integrator.hpp"
 
@@ -58,20 +60,50 @@ Contender through(std::shared_ptr<propagate::Propagator> propagator, const gyro:
 }
 
 /// A block of gyros under the same noisy dither, each with its own noise; a turn of one gyro counts as one.
-Contender through_block(const gyro::Device& device) {
-    return [device](int turns) {
-        const std::vector<gyro::Device> devices(simd::lanes, device);
-        random::LaneIdentities who;
-        who.seed = 1;
-        for (std::size_t lane = 0; lane < simd::lanes; ++lane) who.gyro[lane] = lane;
-        dither::LaneDither dither(devices, 3.0, who);
-        propagate::DirectLanes direct(devices, 1e-8);
+using Step = std::function<void(const gyro::LaneDrive&, gyro::LaneTurns*)>;
+Contender through_block(const gyro::Device& device, const Step& step) {
+    const std::vector<gyro::Device> devices(simd::lanes, device);
+    random::LaneIdentities who;
+    who.seed = 1;
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) who.gyro[lane] = lane;
+    auto dither = std::make_shared<dither::LaneDither>(devices, 3.0, who);
+    return [step, dither](int turns) {
         gyro::LaneDrive drive;
         gyro::LaneTurns at_turns;
-        dither.next(static_cast<std::size_t>(turns) / simd::lanes, {}, {}, drive);
-        direct.step(drive, &at_turns);
+        constexpr int piece = 512;
+        for (int left = turns / static_cast<int>(simd::lanes); left > 0; left -= piece) {
+            dither->next(static_cast<std::size_t>(std::min(left, piece)), {}, {}, drive);
+            step(drive, &at_turns);
+        }
         return at_turns.lockin_fringes.back()[0];
     };
+}
+
+propagate::HalfCycleRanges ranges_of(const gyro::Device& device) {
+    const double a = device.dither_amplitude_rad;
+    const double margin = dither::LaneDither::amplitude_margin_rad(3.0);
+    return {{a - margin, a + margin},
+            {device.input_rate_rad_s, device.input_rate_rad_s},
+            {device.coupling.b_rad_s, device.coupling.b_rad_s}};
+}
+
+Contender integrated(const gyro::Device& device) {
+    const std::vector<gyro::Device> devices(simd::lanes, device);
+    auto direct = std::make_shared<propagate::DirectLanes>(devices, 1e-8);
+    return through_block(
+        device, [direct](const gyro::LaneDrive& drive, gyro::LaneTurns* turns) { direct->step(drive, turns); });
+}
+
+/// By the kernel of `Tables` and `State`.
+template <class Tables, class State>
+Contender mapped(const gyro::Device& device,
+                 void (*kernel)(const Tables&, const gyro::LaneDrive&, std::size_t, State&, gyro::LaneTurns*)) {
+    auto tables = std::make_shared<Tables>(1e-8);
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) tables->make(lane, device, ranges_of(device));
+    auto state = std::make_shared<State>();
+    return through_block(device, [tables, state, kernel](const gyro::LaneDrive& drive, gyro::LaneTurns* turns) {
+        kernel(*tables, drive, simd::lanes, *state, turns);
+    });
 }
 
 /// Worst error of some half cycles of the noisy dither against the direct integrator at a tolerance of 1e-13 rad.
@@ -149,10 +181,14 @@ int main() {
                    std::make_shared<test::SeriesIntegrator>(device.coupling, 1e-8));
     add_propagator("direct integrator, one gyro, 1e-8 rad", 120,
                    std::make_shared<propagate::DirectIntegrator>(device.coupling, 1e-8));
-    entries.push_back({"direct integrator, 16 gyros, 1e-8 rad", 960, through_block(device)});
+    entries.push_back({"direct integrator, 16 gyros, 1e-8 rad", 960, integrated(device)});
     add_propagator("Boost.odeint Fehlberg 7(8), 1e-8 a step", 60, std::make_shared<Odeint>(device.coupling, 1e-8));
     add_propagator("Boost.odeint Fehlberg 7(8), 1e-11 a step", 60, std::make_shared<Odeint>(device.coupling, 1e-11));
     add_propagator("turn map, 1e-8 rad", 1000000, map);
+    entries.push_back({"turn map, 16 gyros, 1e-8 rad", 4000000, mapped(device, propagate::step_turns)});
+    gyro::Device harmonic = device;
+    harmonic.coupling.second_ratio = 0.1;
+    entries.push_back({"same, second harmonic of 0.1", 1000000, mapped(harmonic, propagate::step_phases)});
     entries.push_back({"turn map, ideal readout, corrected", 300000, read_and_corrected(ideal)});
     entries.push_back({"turn map, instrument readout, corrected", 60000, read_and_corrected(scenario)});
 
