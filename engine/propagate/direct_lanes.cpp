@@ -133,24 +133,35 @@ void integrate_vectors(Batch& batch, std::size_t first_lane) {
         for (std::size_t n = 0; n < order; ++n) {
             const V inverse = hn::Set(d, 1.0 / static_cast<double>(std::max<std::size_t>(n, 1)));
             if (n > 0) {
-                V sum_s[group], sum_q[group], sum_s2[group], sum_q2[group];
-                for (std::size_t g = 0; g < group; ++g) sum_s[g] = sum_q[g] = sum_s2[g] = sum_q2[g] = zero;
-                for (std::size_t j = 1; j <= n; ++j) {
+                // Even and odd terms side by side halve the chain of dependent operations.
+                V sum_s[2][group], sum_q[2][group], sum_s2[2][group], sum_q2[2][group];
+                for (std::size_t p = 0; p < 2; ++p) {
+                    for (std::size_t g = 0; g < group; ++g) sum_s[p][g] = sum_q[p][g] = zero;
+                    for (std::size_t g = 0; g < group; ++g) sum_s2[p][g] = sum_q2[p][g] = zero;
+                }
+                const auto add = [&](std::size_t p, std::size_t j) HWY_ATTR {
                     for (std::size_t g = 0; g < group; ++g) {
-                        sum_s[g] = sm::fma(d, weighted[j][g], q[n - j][g], sum_s[g]);
-                        sum_q[g] = sm::fnma(d, weighted[j][g], s[n - j][g], sum_q[g]);
+                        const V factor = weighted[j][g];
+                        sum_s[p][g] = sm::fma(d, factor, q[n - j][g], sum_s[p][g]);
+                        sum_q[p][g] = sm::fnma(d, factor, s[n - j][g], sum_q[p][g]);
                         if constexpr (second) {
-                            sum_s2[g] = sm::fma(d, weighted[j][g], q2[n - j][g], sum_s2[g]);
-                            sum_q2[g] = sm::fnma(d, weighted[j][g], s2[n - j][g], sum_q2[g]);
+                            sum_s2[p][g] = sm::fma(d, factor, q2[n - j][g], sum_s2[p][g]);
+                            sum_q2[p][g] = sm::fnma(d, factor, s2[n - j][g], sum_q2[p][g]);
                         }
                     }
+                };
+                std::size_t j = 1;
+                for (; j < n; j += 2) {
+                    add(0, j);
+                    add(1, j + 1);
                 }
+                if (j == n) add(0, j);
                 for (std::size_t g = 0; g < group; ++g) {
-                    s[n][g] = sum_s[g] * inverse;
-                    q[n][g] = sum_q[g] * inverse;
+                    s[n][g] = (sum_s[0][g] + sum_s[1][g]) * inverse;
+                    q[n][g] = (sum_q[0][g] + sum_q[1][g]) * inverse;
                     if constexpr (second) {
-                        s2[n][g] = sum_s2[g] * (inverse + inverse);
-                        q2[n][g] = sum_q2[g] * (inverse + inverse);
+                        s2[n][g] = (sum_s2[0][g] + sum_s2[1][g]) * (inverse + inverse);
+                        q2[n][g] = (sum_q2[0][g] + sum_q2[1][g]) * (inverse + inverse);
                     }
                     const V factor = x[g] * inverse;
                     first_term[g] = first_term[g] * factor;
