@@ -45,7 +45,7 @@ HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V& sine
     lockin_rad = zero;
     gm::TurnSeries<D> series;
     for (int step = 0; step < most_steps; ++step) {
-        series.expand(d, side, scale, sine_wt, cosine_wt, sine, cosine);
+        series.template expand<false>(d, side, scale, sine_wt, cosine_wt, sine, cosine);
         const V limit = gm::longest_step(d, series.rate[1]);
         const V h = hn::CopySign(hn::Min(hn::Abs(left), limit), left);
         V phase, lockin;
@@ -120,7 +120,10 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                                           zero,
                                           zero,
                                           one,
-                                          zero};
+                                          zero,
+                                          zero,
+                                          zero,
+                                          one};
             V phase_rad, lockin_rad;
             if (!walk_to_dither_turn(d, side, sine, cosine, phase_rad, lockin_rad)) return false;
             const V turn_fringes = sm::fma(d, sign * phase_rad, per_rad, load(readings.phase_fringes[i]));

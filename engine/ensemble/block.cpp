@@ -42,7 +42,7 @@ std::vector<gyro::Device> make_devices(const std::vector<gyro::Setup>& setups, T
     std::vector<gyro::Device> devices;
     for (const gyro::Setup& setup : setups) {
         devices.emplace_back(setup);
-        if (kind == TrajectoryKind::ideal) devices.back().coupling.b_rad_s = 0.0;
+        if (kind == TrajectoryKind::ideal) devices.back().coupling = {0.0, setup.coupling_phase_rad};
     }
     return devices;
 }
@@ -63,7 +63,7 @@ std::unique_ptr<propagate::LanePropagator> make_propagator(const scenario::Scena
     const double margin = kind == TrajectoryKind::ideal
                               ? 0.0
                               : dither::LaneDither::amplitude_margin_rad(injected_rms_rad(scenario, kind));
-    return std::make_unique<propagate::TurnMapLanes>(devices, margin, scenario.propagation.turn_map_tolerance_rad);
+    return propagate::make_turn_map(devices, margin, scenario.propagation.turn_map_tolerance_rad);
 }
 
 std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Scenario& scenario,

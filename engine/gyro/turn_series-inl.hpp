@@ -16,14 +16,16 @@ namespace sm = simd::HWY_NAMESPACE;
 
 /// A half cycle next to a turn, turned upright (x = psi + coupling phase at minima, its negative at maxima):
 ///
-///     x' = rate + A w (sin(w t) + ratio sin(2 w t + f)) + b (1 + asymmetry cos(w t)) sin(x),
+///     x' = rate + A w (sin(w t) + ratio sin(2 w t + f)) + b (1 + asymmetry cos(w t)) (sin(x) + second sin(2 x + h)),
 ///
-/// t from the dither's turn, in either direction.
+/// t from the dither's turn, in either direction. Code that is compiled for couplings of one harmonic takes `second` to
+/// be zero.
 template <class V>
 struct UprightSide {
     V amplitude, w, rate, b;
     V ratio, harmonic_sine, harmonic_cosine;  ///< of f
     V asymmetry;
+    V second, second_sine, second_cosine;  ///< of h
 };
 
 /// Taylor series of x and of the lock-in's share of it, around a point of the path. The unit of time is 1/(w sqrt(A)),
@@ -35,7 +37,8 @@ struct TurnSeries {
     V rate[order + 1];    ///< n times the n-th coefficient of x
     V lockin[order + 1];  ///< n times that of the lock-in's share
 
-    /// Around time `time` (in units of the scale, by the sine and cosine of w t) and phase x (by sine and cosine).
+    /// Around the time and the phase x whose sines and cosines of w t and x are given.
+    template <bool with_second>
     HWY_INLINE void expand(D d, const UprightSide<V>& side, V scale, V sine_wt, V cosine_wt, V sine_x, V cosine_x) {
         scale_s = scale;
         const V zero = hn::Zero(d);
@@ -70,7 +73,28 @@ struct TurnSeries {
         cosines[0] = cosine_x;
         rate[0] = zero;
         lockin[0] = zero;
+        V second_sines[with_second ? order : 1];  // of 2 x + h
+        V second_cosines[with_second ? order : 1];
+        if constexpr (with_second) {
+            const V s2x = (sine_x + sine_x) * cosine_x;
+            const V c2x = sm::fnma(d, sine_x + sine_x, sine_x, hn::Set(d, 1.0));
+            second_sines[0] = sm::fma(d, s2x, side.second_cosine, c2x * side.second_sine);
+            second_cosines[0] = sm::fnma(d, s2x, side.second_sine, c2x * side.second_cosine);
+        }
         for (std::size_t n = 0; n < order; ++n) {
+            if constexpr (with_second) {
+                if (n > 0) {
+                    V sum_s = rate[1] * second_cosines[n - 1];
+                    V sum_c = rate[1] * second_sines[n - 1];
+                    for (std::size_t j = 2; j <= n; ++j) {
+                        sum_s = sm::fma(d, rate[j], second_cosines[n - j], sum_s);
+                        sum_c = sm::fma(d, rate[j], second_sines[n - j], sum_c);
+                    }
+                    const V twice = hn::Set(d, 2.0 / static_cast<double>(n));
+                    second_sines[n] = sum_s * twice;
+                    second_cosines[n] = hn::Neg(sum_c * twice);
+                }
+            }
             if (n > 0) {
                 V sum_s = rate[1] * cosines[n - 1];
                 V sum_c = rate[1] * sines[n - 1];
@@ -82,8 +106,12 @@ struct TurnSeries {
                 sines[n] = sum_s * inverse;
                 cosines[n] = hn::Neg(sum_c * inverse);
             }
-            V pull = couplings[0] * sines[n];
-            for (std::size_t j = 1; j <= n && j < 3; ++j) pull = sm::fma(d, couplings[j], sines[n - j], pull);
+            const auto pulls = [&](std::size_t k) HWY_ATTR {
+                if constexpr (with_second) return sm::fma(d, side.second, second_sines[k], sines[k]);
+                return sines[k];
+            };
+            V pull = couplings[0] * pulls(n);
+            for (std::size_t j = 1; j <= n && j < 3; ++j) pull = sm::fma(d, couplings[j], pulls(n - j), pull);
             lockin[n + 1] = pull;
             rate[n + 1] = drive[n] + pull;
         }

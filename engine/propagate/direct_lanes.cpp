@@ -46,10 +46,16 @@ namespace sm = simd::HWY_NAMESPACE;
 using D = hn::CappedTag<double, simd::lanes>;
 using V = hn::Vec<D>;
 
-/// Taylor order. At it a step takes some nine tenths of a fringe, and work per fringe is least (at 1e-11 rad; work per
-/// step goes with the square of the order). A power of two, for the root that gives the step.
-constexpr std::size_t order = 32;
-constexpr int square_roots = 5;
+/// Taylor order. Work per step goes with its square, and the length of a step is that of convergence (the solution has
+/// poles at ln(2 g/b)/g in imaginary time) times the order-th root of the tolerance: between 1e-8 and 1e-11 rad, 20 to
+/// 24 cost least.
+constexpr std::size_t order = 24;
+
+/// About the order-th root of what is near one, by square roots, which are exact on every machine: power 1/32 + 1/128.
+HWY_INLINE V root(V x) {
+    for (int i = 0; i < 5; ++i) x = hn::Sqrt(x);
+    return x * hn::Sqrt(hn::Sqrt(x));
+}
 
 /// `group` vectors side by side: the sums of one hide the latency of the other's.
 template <std::size_t group, bool second, bool swing>
@@ -78,8 +84,9 @@ void integrate_vectors(Batch& batch, std::size_t first_lane) {
 
         // Series in powers of (time - t)/scale: theta' = plain + coupling, S = sin theta, Q = cos theta.
         V s[order][group], q[order][group];
-        V weighted[order + 1][group];  // n theta_n
-        V lockin[order + 1][group];    // of the phase that the lock-in adds
+        V weighted[order + 1][group];                                    // n theta_n
+        V lockin[order + 1][group];                                      // of the phase that the lock-in adds
+        V s2[second ? order : 1][group], q2[second ? order : 1][group];  // sine and cosine of 2 theta
         V f[swing ? order : 1][group], bs[swing ? order : 1][group];
         V cycle[4][group], doubled[4][group];  // sin(w t) and sin(2 w t + f) with their derivatives
         V x[group], first_term[group], second_term[group], swing_term[group], b[group];
@@ -101,6 +108,10 @@ void integrate_vectors(Batch& batch, std::size_t first_lane) {
             const V plain = sm::fma(d, rate, t[g], amplitude * swings);
             const V theta = sm::fma(d, plain + gain[g], per_two_pi, load(batch.start_fringes, g));
             sm::sincos(d, theta, s[0][g], q[0][g]);
+            if constexpr (second) {
+                s2[0][g] = two * s[0][g] * q[0][g];
+                q2[0][g] = sm::fnma(d, two * s[0][g], s[0][g], one);
+            }
             if (first) {
                 store(s[0][g], batch.sine, g);
                 store(q[0][g], batch.cosine, g);
@@ -122,17 +133,36 @@ void integrate_vectors(Batch& batch, std::size_t first_lane) {
         for (std::size_t n = 0; n < order; ++n) {
             const V inverse = hn::Set(d, 1.0 / static_cast<double>(std::max<std::size_t>(n, 1)));
             if (n > 0) {
-                V sum_s[group], sum_q[group];
-                for (std::size_t g = 0; g < group; ++g) sum_s[g] = sum_q[g] = zero;
-                for (std::size_t j = 1; j <= n; ++j) {
-                    for (std::size_t g = 0; g < group; ++g) {
-                        sum_s[g] = sm::fma(d, weighted[j][g], q[n - j][g], sum_s[g]);
-                        sum_q[g] = sm::fnma(d, weighted[j][g], s[n - j][g], sum_q[g]);
-                    }
+                // Even and odd terms side by side halve the chain of dependent operations.
+                V sum_s[2][group], sum_q[2][group], sum_s2[2][group], sum_q2[2][group];
+                for (std::size_t p = 0; p < 2; ++p) {
+                    for (std::size_t g = 0; g < group; ++g) sum_s[p][g] = sum_q[p][g] = zero;
+                    for (std::size_t g = 0; g < group; ++g) sum_s2[p][g] = sum_q2[p][g] = zero;
                 }
+                const auto add = [&](std::size_t p, std::size_t j) HWY_ATTR {
+                    for (std::size_t g = 0; g < group; ++g) {
+                        const V factor = weighted[j][g];
+                        sum_s[p][g] = sm::fma(d, factor, q[n - j][g], sum_s[p][g]);
+                        sum_q[p][g] = sm::fnma(d, factor, s[n - j][g], sum_q[p][g]);
+                        if constexpr (second) {
+                            sum_s2[p][g] = sm::fma(d, factor, q2[n - j][g], sum_s2[p][g]);
+                            sum_q2[p][g] = sm::fnma(d, factor, s2[n - j][g], sum_q2[p][g]);
+                        }
+                    }
+                };
+                std::size_t j = 1;
+                for (; j < n; j += 2) {
+                    add(0, j);
+                    add(1, j + 1);
+                }
+                if (j == n) add(0, j);
                 for (std::size_t g = 0; g < group; ++g) {
-                    s[n][g] = sum_s[g] * inverse;
-                    q[n][g] = sum_q[g] * inverse;
+                    s[n][g] = (sum_s[0][g] + sum_s[1][g]) * inverse;
+                    q[n][g] = (sum_q[0][g] + sum_q[1][g]) * inverse;
+                    if constexpr (second) {
+                        s2[n][g] = (sum_s2[0][g] + sum_s2[1][g]) * (inverse + inverse);
+                        q2[n][g] = (sum_q2[0][g] + sum_q2[1][g]) * (inverse + inverse);
+                    }
                     const V factor = x[g] * inverse;
                     first_term[g] = first_term[g] * factor;
                     second_term[g] = second_term[g] * (factor + factor);
@@ -144,14 +174,8 @@ void integrate_vectors(Batch& batch, std::size_t first_lane) {
                 if (n == 0) right = sm::fma(d, load(batch.rate_rad_s, g), scale[g], right);
                 V coupled = s[n][g];
                 if constexpr (second) {
-                    V sq = zero;
-                    V ss = zero;
-                    for (std::size_t j = 0; j <= n; ++j) {
-                        sq = sm::fma(d, s[j][g], q[n - j][g], sq);
-                        ss = sm::fma(d, s[j][g], s[n - j][g], ss);
-                    }
-                    coupled = sm::fma(d, load(batch.second_sine, g), sq + sq, coupled);
-                    coupled = sm::fma(d, load(batch.second_cosine, g), (n == 0 ? one : zero) - (ss + ss), coupled);
+                    coupled = sm::fma(d, load(batch.second_sine, g), s2[n][g], coupled);
+                    coupled = sm::fma(d, load(batch.second_cosine, g), q2[n][g], coupled);
                 }
                 V added = b[g] * coupled;
                 if constexpr (swing) {
@@ -167,8 +191,7 @@ void integrate_vectors(Batch& batch, std::size_t first_lane) {
             const auto active = t[g] < end[g];
             // The last term below the tolerance, and the one before it as good as.
             const V last = hn::Max(hn::Abs(lockin[order][g]), hn::Abs(lockin[order - 1][g]));
-            V step = load(batch.step_tolerance_rad, g) / (last + hn::Set(d, 1e-300));
-            for (int i = 0; i < square_roots; ++i) step = hn::Sqrt(step);
+            V step = root(load(batch.step_tolerance_rad, g) / (last + hn::Set(d, 1e-300)));
             step = hn::Min(step, two);  // both terms may be small by chance
             const V wanted = step * scale[g];
             const auto too_short = hn::AndNot(wanted > load(batch.shortest_s, g), active);

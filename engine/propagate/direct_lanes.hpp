@@ -27,7 +27,7 @@ struct StretchResult {
     std::int64_t steps = 0;
 };
 
-/// Integrates stretches by Taylor series of order 32 with steps chosen from the last two coefficients (Jorba & Zou
+/// Integrates stretches by Taylor series of order 24 with steps chosen from the last two coefficients (Jorba & Zou
 /// 2005, Experimental Mathematics 14). The variable is the phase that the lock-in adds, which stays small: nothing is
 /// lost over thousands of fringes.
 ///

@@ -269,14 +269,6 @@ double fast_from_s(const gyro::HalfCycle& half, double b_rad_s, double adiabatic
     return late;
 }
 
-double choose_fast_from_s(const gyro::HalfCycle& half, double b_rad_s) {
-    for (double adiabaticity = full_adiabaticity; adiabaticity >= least_adiabaticity; adiabaticity *= 0.9) {
-        const double t = fast_from_s(half, b_rad_s, adiabaticity);
-        if (!std::isnan(t)) return t;
-    }
-    return std::nan("");
-}
-
 /// Fills one lane. K goes as 1/(t - zero), and the substitution t - zero = (start - zero) stretch^u takes that out of
 /// the quadrature.
 void prepare(Batch& batch, std::size_t lane, const HalfTurnProblem& problem, double start_s) {
@@ -323,8 +315,16 @@ HalfTurnProblem ending(const gyro::HalfCycle& half, const gyro::Coupling& coupli
     return problem;
 }
 
+double fast_motion_from_s(const gyro::HalfCycle& half, double b_rad_s) {
+    for (double adiabaticity = full_adiabaticity; adiabaticity >= least_adiabaticity; adiabaticity *= 0.9) {
+        const double t = fast_from_s(half, b_rad_s, adiabaticity);
+        if (!std::isnan(t)) return t;
+    }
+    return std::nan("");
+}
+
 bool has_fast_middle(const gyro::HalfCycle& half, double b_rad_s) {
-    return !std::isnan(choose_fast_from_s(half, b_rad_s));
+    return !std::isnan(fast_motion_from_s(half, b_rad_s));
 }
 
 void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfTurn> turns) {
@@ -333,7 +333,7 @@ void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfT
         const std::size_t count = std::min(simd::lanes, problems.size() - first);
         for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
             const HalfTurnProblem& problem = problems[first + std::min(lane, count - 1)];
-            const double start = choose_fast_from_s(problem.half, problem.b_rad_s);
+            const double start = fast_motion_from_s(problem.half, problem.b_rad_s);
             if (std::isnan(start)) {
                 throw RunError(
                     fmt::format("turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s and a coupling "

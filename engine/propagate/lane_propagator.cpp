@@ -36,7 +36,9 @@ Range around(double lowest, double highest, const Range& last, double widest) {
 
 }  // namespace
 
-TurnMapLanes::TurnMapLanes(std::span<const gyro::Device> devices, double amplitude_margin_rad, double tolerance_rad)
+template <class Turns>
+TurnMapLanes<Turns>::TurnMapLanes(std::span<const gyro::Device> devices, double amplitude_margin_rad,
+                                  double tolerance_rad)
     : devices_(devices.begin(), devices.end()), amplitude_margin_rad_(amplitude_margin_rad), tables_(tolerance_rad) {
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
         const gyro::Device& device = devices_[std::min(lane, devices_.size() - 1)];
@@ -44,7 +46,8 @@ TurnMapLanes::TurnMapLanes(std::span<const gyro::Device> devices, double amplitu
     }
 }
 
-void TurnMapLanes::cover(const gyro::LaneDrive& drive) {
+template <class Turns>
+void TurnMapLanes<Turns>::cover(const gyro::LaneDrive& drive) {
     const bool noisy = amplitude_margin_rad_ > 0.0;
     if (begun_ && !noisy && !drive.rates_vary && !drive.thresholds_vary) return;
     simd::Lanes low_amplitude, high_amplitude, low_rate, high_rate, low_b, high_b;
@@ -85,10 +88,22 @@ void TurnMapLanes::cover(const gyro::LaneDrive& drive) {
     begun_ = true;
 }
 
-void TurnMapLanes::step(const gyro::LaneDrive& drive, gyro::LaneTurns& turns) {
+template <class Turns>
+void TurnMapLanes<Turns>::step(const gyro::LaneDrive& drive, gyro::LaneTurns& turns) {
     if (drive.turns == 0) return;
     cover(drive);
-    step_turns(tables_, drive, devices_.size(), state_, &turns);
+    Turns::step(tables_, drive, devices_.size(), state_, &turns);
+}
+
+template class TurnMapLanes<MoebiusTurns>;
+template class TurnMapLanes<TabulatedTurns>;
+
+std::unique_ptr<LanePropagator> make_turn_map(std::span<const gyro::Device> devices, double amplitude_margin_rad,
+                                              double tolerance_rad) {
+    const bool moebius = std::all_of(devices.begin(), devices.end(),
+                                     [](const gyro::Device& device) { return device.coupling.second_ratio == 0.0; });
+    if (moebius) return std::make_unique<TurnMapLanes<MoebiusTurns>>(devices, amplitude_margin_rad, tolerance_rad);
+    return std::make_unique<TurnMapLanes<TabulatedTurns>>(devices, amplitude_margin_rad, tolerance_rad);
 }
 
 }  // namespace ringlock::propagate

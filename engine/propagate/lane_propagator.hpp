@@ -1,11 +1,14 @@
 #pragma once
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "engine/gyro/device.hpp"
 #include "engine/gyro/lane_drive.hpp"
 #include "engine/propagate/direct_lanes.hpp"
+#include "engine/propagate/phase_kernel.hpp"
+#include "engine/propagate/phase_tables.hpp"
 #include "engine/propagate/turn_kernel.hpp"
 #include "engine/propagate/turn_tables.hpp"
 
@@ -24,8 +27,21 @@ class LanePropagator {
     virtual std::int64_t tables_remade(std::size_t lane) const = 0;
 };
 
-/// The production propagator: the exact turn map. Tables are made over the ranges that the first piece asks for, with
-/// room to spare, and anew where a later one leaves them.
+/// How half cycles of a coupling are tabulated and gone through.
+struct MoebiusTurns {
+    using Tables = TurnTables;
+    using State = TurnState;
+    static constexpr auto step = step_turns;
+};
+struct TabulatedTurns {
+    using Tables = PhaseTables;
+    using State = PhaseState;
+    static constexpr auto step = step_phases;
+};
+
+/// The production propagator: the turn map. Tables are made over the ranges that the first piece asks for, with room to
+/// spare, and anew where a later one leaves them.
+template <class Turns>
 class TurnMapLanes final : public LanePropagator {
    public:
     /// `amplitude_margin_rad`: how far injected noise takes the amplitude of a half cycle from the device's.
@@ -41,11 +57,15 @@ class TurnMapLanes final : public LanePropagator {
 
     std::vector<gyro::Device> devices_;
     double amplitude_margin_rad_;
-    TurnTables tables_;
-    TurnState state_;
+    typename Turns::Tables tables_;
+    typename Turns::State state_;
     std::array<std::int64_t, simd::lanes> remade_{};
     bool begun_ = false;
 };
+
+/// The exact Moebius map, or, where the coupling of one of the gyros has a second harmonic, the tabulated one.
+std::unique_ptr<LanePropagator> make_turn_map(std::span<const gyro::Device> devices, double amplitude_margin_rad,
+                                              double tolerance_rad);
 
 /// The reference: every fringe integrated.
 class DirectPropagator final : public LanePropagator {

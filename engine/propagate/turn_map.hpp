@@ -1,12 +1,14 @@
 #pragma once
 #include <cstdint>
 
+#include "engine/propagate/phase_tables.hpp"
 #include "engine/propagate/propagator.hpp"
 #include "engine/propagate/turn_tables.hpp"
 
 namespace ringlock::propagate {
 
-/// The production propagator for one half cycle of one gyro at a time: tables and kernel are those of a run.
+/// The production propagator for one half cycle of one gyro at a time: tables and kernel are those of a run, Moebius
+/// maps or, where the coupling has a second harmonic, series in the phase.
 class TurnMap final : public Propagator {
    public:
     /// Half cycles outside `ranges` are solved exactly one by one, slowly, never extrapolated.
@@ -17,13 +19,18 @@ class TurnMap final : public Propagator {
 
     /// Half cycles solved outside the tables so far.
     std::int64_t outside() const { return outside_; }
-    double measured_error_rad() const { return tables_.measured_error_rad(0); }
-    std::size_t nodes() const { return tables_.nodes(); }
+    double measured_error_rad() const {
+        return is_moebius() ? tables_.measured_error_rad(0) : phase_tables_.measured_error_rad(0);
+    }
+    std::size_t nodes() const { return is_moebius() ? tables_.nodes() : phase_tables_.nodes(); }
 
    private:
+    bool is_moebius() const { return device_.coupling.second_ratio == 0.0; }
+
     gyro::Device device_;
     double tolerance_rad_;
     TurnTables tables_;
+    PhaseTables phase_tables_;
     std::int64_t outside_ = 0;
 };
 

@@ -7,6 +7,7 @@
 #include <initializer_list>
 
 #include "engine/core/error.hpp"
+#include "engine/propagate/chebyshev.hpp"
 #include "engine/propagate/half_turn.hpp"
 
 namespace ringlock::propagate {
@@ -14,8 +15,6 @@ namespace ringlock::propagate {
 namespace {
 
 constexpr std::size_t variables = TurnTables::variables;
-using Point = std::array<double, variables>;  // in [-1, 1]
-using Terms = std::array<std::size_t, variables>;
 using Values = std::array<double, 3>;  // shift in fringes, Re z, Im z
 
 /// What exact_half_turns makes of points of the ranges.
@@ -57,38 +56,6 @@ class Source {
     const std::array<Range, variables>& ranges_;
 };
 
-double node(std::size_t i, std::size_t terms) {
-    return terms == 1 ? 0.0 : std::cos(units::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(terms));
-}
-
-/// Matrix of `terms` columns in each row.
-using Matrix = std::vector<std::vector<double>>;
-
-/// Row n: what values at the Chebyshev nodes count for in the coefficient of the n-th Chebyshev polynomial.
-Matrix chebyshev_weights(std::size_t terms) {
-    Matrix rows(terms, std::vector<double>(terms, 0.0));
-    for (std::size_t i = 0; i < terms; ++i) {
-        const double angle = units::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(terms);
-        for (std::size_t n = 0; n < terms; ++n) {
-            rows[n][i] = (n == 0 ? 1.0 : 2.0) / static_cast<double>(terms) * std::cos(static_cast<double>(n) * angle);
-        }
-    }
-    return rows;
-}
-
-/// Row k: what Chebyshev polynomials count for in the coefficient of the k-th power.
-Matrix chebyshev_powers(std::size_t terms) {
-    Matrix rows(terms, std::vector<double>(terms, 0.0));
-    rows[0][0] = 1.0;
-    if (terms > 1) rows[1][1] = 1.0;
-    for (std::size_t n = 2; n < terms; ++n) {
-        for (std::size_t k = 0; k < terms; ++k) {
-            rows[k][n] = (k > 0 ? 2.0 * rows[k - 1][n - 1] : 0.0) - rows[k][n - 2];
-        }
-    }
-    return rows;
-}
-
 /// Polynomial of a part for one gyro: [coupling][rate][amplitude].
 struct Polynomial {
     Terms terms{1, 1, 1};
@@ -112,35 +79,8 @@ struct Polynomial {
 };
 
 Polynomial interpolate(const Source& source, const Terms& terms) {
-    std::vector<Point> points;
-    for (std::size_t c = 0; c < terms[2]; ++c) {
-        for (std::size_t b = 0; b < terms[1]; ++b) {
-            for (std::size_t a = 0; a < terms[0]; ++a) {
-                points.push_back({node(a, terms[0]), node(b, terms[1]), node(c, terms[2])});
-            }
-        }
-    }
-    Polynomial polynomial{terms, source.at(points)};
-    // One variable after the other, from values at nodes to Chebyshev coefficients to powers. The two steps must not
-    // be made one: rows of their product are as large as 2.4^terms, and a shift of many fringes would be summed up from
-    // parts as large. Chebyshev coefficients are small by then.
-    std::size_t stride = 1;
-    for (std::size_t v = 0; v < variables; ++v) {
-        const std::size_t n = terms[v];
-        for (const Matrix& matrix : {chebyshev_weights(n), chebyshev_powers(n)}) {
-            std::vector<Values> next(polynomial.coefficients.size(), Values{});
-            for (std::size_t i = 0; i < next.size(); ++i) {
-                const std::size_t at = i / stride % n;
-                for (std::size_t k = 0; k < n; ++k) {
-                    for (std::size_t c = 0; c < 3; ++c) {
-                        next[i - at * stride + k * stride][c] += matrix[k][at] * polynomial.coefficients[i][c];
-                    }
-                }
-            }
-            polynomial.coefficients = std::move(next);
-        }
-        stride *= n;
-    }
+    Polynomial polynomial{terms, source.at(chebyshev_nodes(terms))};
+    nodes_to_powers(terms, 3, {polynomial.coefficients.data()->data(), 3 * polynomial.coefficients.size()});
     return polynomial;
 }
 
@@ -155,24 +95,6 @@ double error_rad(const Source& source, const Polynomial& polynomial, const std::
                           2.0 * std::hypot(exact[i][1] - table[1], exact[i][2] - table[2])});
     }
     return 2.0 * worst;
-}
-
-/// Points between the nodes: spread over the ranges by the golden ratio, the corners among them.
-std::vector<Point> probes(const Terms& terms) {
-    std::vector<Point> points;
-    for (int i = 0; i < 8; ++i) {
-        Point inside{};
-        Point corner{};
-        for (std::size_t v = 0; v < variables; ++v) {
-            if (terms[v] == 1) continue;
-            const double golden = (static_cast<double>(i) + 0.5) * (v == 0 ? 0.618034 : v == 1 ? 0.754878 : 0.569840);
-            inside[v] = 2.0 * (golden - std::floor(golden)) - 1.0;
-            corner[v] = (i >> v & 1) != 0 ? 1.0 : -1.0;
-        }
-        points.push_back(inside);
-        points.push_back(corner);
-    }
-    return points;
 }
 
 /// Terms that one variable takes by itself, the others in the middle of their ranges.
@@ -236,7 +158,7 @@ void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCy
             for (;;) {
                 const std::size_t largest = *std::max_element(terms.begin(), terms.end());
                 polynomial = interpolate(source, terms);
-                error = error_rad(source, polynomial, probes(terms));
+                error = error_rad(source, polynomial, points_between_nodes(terms));
                 if (error <= tolerance_rad_) break;
                 if (largest >= most_nodes) {
                     throw RunError(fmt::format(

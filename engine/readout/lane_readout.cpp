@@ -32,12 +32,20 @@ struct Walk {
 };
 
 /// Goes to where the rate of x vanishes; false where some lane does not get there.
+template <bool with_second>
 HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, Walk& walk) {
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
     // A minimum whose phase still falls at the dither's turn lies after it.
+    V pull = walk.sine;
+    if constexpr (with_second) {
+        const V doubled_sine = (walk.sine + walk.sine) * walk.cosine;
+        const V doubled_cosine = sm::fnma(d, walk.sine + walk.sine, walk.sine, one);
+        pull = sm::fma(d, after.second,
+                       sm::fma(d, doubled_sine, after.second_cosine, doubled_cosine * after.second_sine), pull);
+    }
     const V first_rate = sm::fma(d, after.amplitude * after.w * after.ratio, after.harmonic_sine,
-                                 sm::fma(d, after.b * (one + after.asymmetry), walk.sine, after.rate));
+                                 sm::fma(d, after.b * (one + after.asymmetry), pull, after.rate));
     const auto ahead = first_rate < zero;
     Side side = after;
     side.amplitude = hn::IfThenElse(ahead, after.amplitude, before.amplitude);
@@ -51,7 +59,7 @@ HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, Wa
     hn::Mask<D> done = zero > zero;
     gm::TurnSeries<D> series;
     for (int step = 0; step < most_steps; ++step) {
-        series.expand(d, side, scale, sine_wt, cosine_wt, walk.sine, walk.cosine);
+        series.template expand<with_second>(d, side, scale, sine_wt, cosine_wt, walk.sine, walk.cosine);
         const V limit = gm::longest_step(d, series.rate[1]);
         // A parabola's extremum, then Newton where that is near enough for the series to hold.
         V root = hn::Neg(series.rate[1]) / series.rate[2];
@@ -131,9 +139,10 @@ HWY_INLINE V acceleration_of_pulses(D d, V near_rad, V far_rad, V interval_s) {
     return hn::IfThenElseZero(interval_s > zero, root * root);
 }
 
-bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& pulses, const Electronics& electronics,
-                bool accelerations, std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
-                DetectorNoise noise, std::size_t stride, LaneReadings& readings, LaneAngles& angles) {
+template <bool with_second>
+bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses, const Electronics& electronics,
+              bool accelerations, std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
+              DetectorNoise noise, std::size_t stride, LaneReadings& readings, LaneAngles& angles) {
     const D d;
     const V zero = hn::Zero(d);
     const V per_rad = hn::Set(d, 0.15915494309189535);
@@ -154,6 +163,9 @@ bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& puls
             const std::size_t before_side = 1 - after_side;
             const V ratio = sign * load(constants.harmonic_ratio);
             const V asymmetry = sign * load(constants.turn_asymmetry);
+            const V second_sine = sign * load(constants.second_sine);
+            const V second_cosine = load(constants.second_cosine);
+            const V second = load(constants.second_ratio);
             const auto side_of = [&](std::size_t half, std::size_t which) HWY_ATTR {
                 return Side{load(drive.amplitude_rad[half]),
                             load(constants.angular_frequency_rad_s[which]),
@@ -162,12 +174,15 @@ bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& puls
                             ratio,
                             harmonic_sine,
                             harmonic_cosine,
-                            asymmetry};
+                            asymmetry,
+                            second,
+                            second_sine,
+                            second_cosine};
             };
             const Side before = side_of(i, before_side);
             const Side after = side_of(i + 1, after_side);
             Walk walk{zero, sign * load(turns.sine[i]), load(turns.cosine[i]), zero, zero};
-            if (!walk_to_zero_rate(d, before, after, walk)) return false;
+            if (!walk_to_zero_rate<with_second>(d, before, after, walk)) return false;
             const V lockin = sm::fma(d, sign * walk.lockin_rad, per_rad, load(turns.lockin_fringes[i]));
             store(lockin, angles.lockin_fringes[i]);
             // psi at the zero-rate point, in fringes less whole ones that are added where the phase is reported.
@@ -256,6 +271,14 @@ bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& puls
     return true;
 }
 
+bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& pulses, const Electronics& electronics,
+                bool accelerations, bool with_second, std::size_t lanes, const gyro::LaneDrive& drive,
+                const gyro::LaneTurns& turns, DetectorNoise noise, std::size_t stride, LaneReadings& readings,
+                LaneAngles& angles) {
+    const auto read = with_second ? read_all<true> : read_all<false>;
+    return read(constants, pulses, electronics, accelerations, lanes, drive, turns, noise, stride, readings, angles);
+}
+
 }  // namespace ringlock::readout::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -288,6 +311,10 @@ LaneReadout::LaneReadout(std::span<const gyro::Device> devices, std::span<const 
         constants_.orthogonality_cosine[lane] = std::cos(ellipse.orthogonality_rad);
         constants_.orthogonality_sine[lane] = std::sin(ellipse.orthogonality_rad);
         constants_.swing_whole[lane] = std::nearbyint(2.0 * device.dither_amplitude_rad / units::two_pi);
+        constants_.second_ratio[lane] = device.coupling.second_ratio;
+        constants_.second_sine[lane] = std::sin(device.coupling.second_from_first_rad());
+        constants_.second_cosine[lane] = std::cos(device.coupling.second_from_first_rad());
+        with_second_ = with_second_ || device.coupling.second_ratio != 0.0;
         if (with_pulses && !electronics.ideal) pulses_.make(lane, device);
     }
 }
@@ -297,8 +324,8 @@ void LaneReadout::read(const gyro::LaneDrive& drive, const gyro::LaneTurns& turn
     readings.first_turn = drive.first_turn;
     readings.resize(drive.turns);
     angles.resize(drive.turns);
-    if (!HWY_DYNAMIC_DISPATCH(read_lanes)(constants_, pulses_, electronics_, with_accelerations_, lanes_, drive, turns,
-                                          noise, stride, readings, angles)) {
+    if (!HWY_DYNAMIC_DISPATCH(read_lanes)(constants_, pulses_, electronics_, with_accelerations_, with_second_, lanes_,
+                                          drive, turns, noise, stride, readings, angles)) {
         throw RunError(
             "readout: the phase does not reverse near a turn of the dither; the input rate is too high for it");
     }

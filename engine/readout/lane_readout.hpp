@@ -46,7 +46,8 @@ class LaneReadout {
         simd::Lanes duration_s[2];
         simd::Lanes harmonic_ratio, harmonic_sine, harmonic_cosine;
         simd::Lanes turn_asymmetry;
-        simd::Lanes coupling_cosine, coupling_sine;  ///< of the coupling phase
+        simd::Lanes second_ratio, second_sine, second_cosine;  ///< second harmonic of the coupling, in psi + its phase
+        simd::Lanes coupling_cosine, coupling_sine;            ///< of the coupling phase
         simd::Lanes gain, offset_sin, offset_cos, orthogonality_cosine, orthogonality_sine;
         simd::Lanes swing_whole;  ///< whole fringes between minima and maxima that the drive's phases leave out
     };
@@ -55,6 +56,7 @@ class LaneReadout {
     std::size_t lanes_;
     Electronics electronics_;
     bool with_accelerations_;
+    bool with_second_ = false;
     Constants constants_;
     PulseTables pulses_;
 };

@@ -22,9 +22,10 @@ double standstill_s(const gyro::HalfCycle& half, const gyro::Coupling& coupling,
     double t = 0.0;
     for (int i = 0; i < 50; ++i) {
         const double cosine = half.sign * std::cos(w * (origin + t));
-        const double rate = half.drive_rate_rad_s(origin + t) + coupling.b_rad_s *
-                                                                    (1.0 + coupling.turn_asymmetry * cosine) *
-                                                                    std::sin(psi_rad + coupling.phase_rad);
+        const double rate = half.drive_rate_rad_s(origin + t) +
+                            coupling.b_rad_s * (1.0 + coupling.turn_asymmetry * cosine) *
+                                (std::sin(psi_rad + coupling.phase_rad) +
+                                 coupling.second_ratio * std::sin(2.0 * psi_rad + coupling.second_phase_rad));
         // Close to the turn the drive's rate is nearly linear in time.
         const double slope = side * half.sign * half.end_acceleration_rad_s2(side > 0 ? 0 : 1);
         const double step = -rate / slope;

@@ -243,8 +243,8 @@ void ensemble_run(std::int64_t gyros, int threads) {
     scenario.ensemble.gyros = gyros;
     scenario.ensemble.duration_s = 120.0;
     const auto arms = arms_of({"noise_injected", "noise_injected+compensated"});
-    ensemble::run(
-        scenario, arms, 0, gyros, threads, [](std::int64_t, std::size_t) { return std::make_unique<Nothing>(); }, {});
+    ensemble::run(scenario, arms, 0, gyros, threads,
+                  [](std::int64_t, std::size_t) { return std::make_unique<Nothing>(); }, {});
 }
 
 /// Peak memory [MB] of `ringlock run` over a study of so many hours.
@@ -387,17 +387,17 @@ int main(int argc, char** argv) {
     rows.push_back({"the same of ringlock's own vectorised direct integrator", "reported",
                     fmt::format("{:.0f}", integrated.per_turn_s() / map.per_turn_s()), "-"});
     rows.push_back({"turns a second and core, noise-injected, no readout", avx512 ? ">= 1e8 (AVX-512)" : "reported",
-                    fmt::format("{:.3g}", 1.0 / map.per_turn_s()),
-                    avx512 ? verdict(map.per_turn_s() <= 1e-8) : "-"});
+                    fmt::format("{:.3g}", 1.0 / map.per_turn_s()), avx512 ? verdict(map.per_turn_s() <= 1e-8) : "-"});
     rows.push_back({"time of such a turn over one normal deviate and one sine-cosine pair", "<= 3",
                     fmt::format("{:.2f}", map.per_turn_s() / kernel.per_turn_s()),
                     verdict(map.per_turn_s() <= 3.0 * kernel.per_turn_s())});
-    rows.push_back({"turns a second and core with ideal readout, corrected and exact compensator, Allan deviations of "
-                    "three arms",
-                    avx512 ? ">= 3e7" : "reported", fmt::format("{:.3g}", 1.0 / with_ideal.per_turn_s()),
-                    avx512 ? verdict(with_ideal.per_turn_s() <= 1.0 / 3e7) : "-"});
-    rows.push_back({"the same with instrument readout: detector noise, pulses on a clock", avx512 ? ">= 3e7" : "reported",
-                    fmt::format("{:.3g}", 1.0 / with_instrument.per_turn_s()),
+    rows.push_back(
+        {"turns a second and core with ideal readout, corrected and exact compensator, Allan deviations of "
+         "three arms",
+         avx512 ? ">= 3e7" : "reported", fmt::format("{:.3g}", 1.0 / with_ideal.per_turn_s()),
+         avx512 ? verdict(with_ideal.per_turn_s() <= 1.0 / 3e7) : "-"});
+    rows.push_back({"the same with instrument readout: detector noise, pulses on a clock",
+                    avx512 ? ">= 3e7" : "reported", fmt::format("{:.3g}", 1.0 / with_instrument.per_turn_s()),
                     avx512 ? verdict(with_instrument.per_turn_s() <= 1.0 / 3e7) : "-"});
     rows.push_back({"the same with instrument readout, no compensator", "reported",
                     fmt::format("{:.3g}", 1.0 / with_plain.per_turn_s()), "-"});
@@ -438,9 +438,10 @@ int main(int argc, char** argv) {
         line(fmt::format("{}, {:.1e} a step", reference.name, reference.tolerance_rad), reference.seconds_per_turn,
              fmt::format("{:.1e}", reference.worst_error_rad));
     }
-    fmt::print("\nMachine: {}; instruction set {}; {}; tables to {:.0e} rad a turn. Times are medians of rounds in which "
-               "the contenders take turns, a gyro at a time on one thread.\n",
-               processor(), simd::active_target(), "GCC " __VERSION__, table_tolerance_rad);
+    fmt::print(
+        "\nMachine: {}; instruction set {}; {}; tables to {:.0e} rad a turn. Times are medians of rounds in which "
+        "the contenders take turns, a gyro at a time on one thread.\n",
+        processor(), simd::active_target(), "GCC " __VERSION__, table_tolerance_rad);
     fmt::print(stderr, "(checksum {:.6g})\n", sink);
     return 0;
 }

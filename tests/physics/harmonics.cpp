@@ -17,10 +17,11 @@ gyro::Setup with(std::string_view effect, const effects::Values& values, gyro::S
 }
 
 /// Worst difference [rad] between turn map and direct integrator over random half cycles.
-double worst_difference(std::string_view effect, double most, bool has_phase, std::uint64_t seed) {
+double worst_difference(std::string_view effect, double most, bool has_phase, std::uint64_t seed,
+                        int half_cycles = 40) {
     Uniform uniform(seed);
     double worst = 0.0;
-    for (int i = 0; i < 40; ++i) {
+    for (int i = 0; i < half_cycles; ++i) {
         effects::Values values{{"ratio", uniform(-most, most)}};
         if (has_phase) values["phase_rad"] = uniform(-3.0, 3.0);
         gyro::Setup setup = with(effect, values);
@@ -76,6 +77,19 @@ TEST(LockinSecondHarmonic, ItsKickIsTheFirstsOverTheRootOfTwo) {
     EXPECT_NEAR(std::abs(kick) / (ratio * std::abs(first)), std::sqrt(0.5), 0.01);
     // Both are half a kick, sin(psi_0 + pi/4) and sin(2 psi_0 + pi/4).
     EXPECT_NEAR(std::arg(kick / first), 0.0, 0.05);
+}
+
+TEST(LockinSecondHarmonic, TheTurnMapTakesIt) {
+    EXPECT_LT(worst_difference("lockin_second_harmonic", 0.2, true, 43, 10), 1e-9);
+}
+
+TEST(LockinSecondHarmonic, OutsideItsTableTheTurnMapIntegratesAndCounts) {
+    const gyro::Device device(with("lockin_second_harmonic", {{"ratio", 0.1}, {"phase_rad", 0.2}}));
+    propagate::TurnMap map(device, ranges(device, 5.0), 1e-10);
+    propagate::DirectIntegrator direct(device.coupling, 1e-12);
+    const auto half = device.half_cycle(1.0, 1.2 * device.dither_amplitude_rad);
+    EXPECT_NEAR(map.lockin_gain_rad(1.0, half), direct.lockin_gain_rad(1.0, half), 1e-9);
+    EXPECT_EQ(map.outside(), 1);
 }
 
 TEST(LockinSecondHarmonic, ItsPhaseIsThatOfTwicePsiWhateverTheCouplingPhase) {

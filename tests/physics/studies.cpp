@@ -118,6 +118,9 @@ TEST(Scenarios, TheDirectIntegratorGivesTheSameStudyAsTheTurnMap) {
     scenario.effects["readout_ellipse"]["gain"] = 0.03;
     scenario.effects["bias_ramp"]["deg_h_per_h"] = 1000.0;
     scenario.effects["base_vibration"] = {{"frequency_hz", 7.0}, {"rate_deg_h", 50.0}, {"phase_rad", 1.0}};
+    scenario.effects["dither_second_harmonic"] = {{"ratio", 0.01}, {"phase_rad", 0.5}};
+    scenario.effects["lockin_second_harmonic"] = {{"ratio", 0.1}, {"phase_rad", -0.7}};
+    scenario.effects["lockin_turn_asymmetry"]["ratio"] = 0.1;
     const auto records = [&](scenario::PropagationMethod method) {
         scenario.propagation.method = method;
         auto all = std::make_unique<GyroRecords>(scenario, 2);

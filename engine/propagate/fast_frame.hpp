@@ -1,0 +1,28 @@
+#pragma once
+#include <array>
+#include <complex>
+
+#include "engine/gyro/half_cycle.hpp"
+
+namespace ringlock::propagate {
+
+/// The frame in which fast motion is plain rotation, whatever harmonics the coupling has:
+///
+///     phi = theta + 2 Re sum_k p_k exp(i k theta),      theta = psi + coupling phase,
+///
+/// turns at a rate that does not depend on phi. An asymptotic series in the coupling over the rate and in the change of
+/// the rate within a fringe; derived in docs/turn-map.md. Without second harmonic it is that of half_turn.hpp.
+class FastFrame {
+   public:
+    /// Of a half cycle at `t_s` from its first turn, where motion must be fast (fast_motion_from_s()).
+    FastFrame(const gyro::HalfCycle& half, const gyro::Coupling& coupling, double t_s);
+
+    /// phi - theta [rad].
+    double correction_rad(double theta_rad) const;
+
+   private:
+    static constexpr std::size_t harmonics = 12;
+    std::array<std::complex<double>, harmonics + 1> p_{};
+};
+
+}  // namespace ringlock::propagate
