@@ -23,7 +23,7 @@ namespace pm = propagate::HWY_NAMESPACE;
 using D = hn::CappedTag<double, simd::lanes>;
 using V = hn::Vec<D>;
 
-constexpr int most_steps = 8000;
+constexpr int most_steps = 20000;
 
 /// What the phase gains from the zero-rate point, where its sine and cosine are given, to the dither's turn, and the
 /// lock-in's share of that. `sine` and `cosine` become those at the dither's turn. False where it is too far.
@@ -31,21 +31,20 @@ HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V& sine
                                     V& lockin_rad) {
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
-    const V scale = one / (side.w * hn::Sqrt(side.amplitude));
+    const gm::UprightExtras<V> none{zero, zero, zero, zero, zero, zero, zero};
     // rate + A w sin(w t) + b sin x = 0
     const V y = hn::Neg(sm::fma(d, side.b, sine, side.rate)) / (side.amplitude * side.w);
     static constexpr double of_asin[] = {1.0 / 6, 3.0 / 40, 15.0 / 336, 105.0 / 3456, 945.0 / 42240, 10395.0 / 599040};
     const V y2 = y * y;
-    const V wt = sm::fma(d, y * y2, sm::polynomial(d, y2, of_asin), y);
-    V left = hn::Neg(wt / (side.w * scale));  // to go, in scales of time
+    V angle = sm::fma(d, y * y2, sm::polynomial(d, y2, of_asin), y);
+    V left = hn::Neg(angle / side.angle);  // to go, in scales of time
     V sine_wt = y;
     V cosine_wt = hn::Sqrt(hn::Max(sm::fnma(d, y, y, one), zero));
-    V angle = wt;
     phase_rad = zero;
     lockin_rad = zero;
-    gm::TurnSeries<D> series;
+    gm::TurnSeries<D, false> series;
     for (int step = 0; step < most_steps; ++step) {
-        series.template expand<false>(d, side, scale, sine_wt, cosine_wt, sine, cosine);
+        series.expand(d, side, none, sine_wt, cosine_wt, sine, cosine);
         const V limit = gm::longest_step(d, series.rate[1]);
         const V h = hn::CopySign(hn::Min(hn::Abs(left), limit), left);
         V phase, lockin;
@@ -59,7 +58,7 @@ HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V& sine
         cosine = turned;
         left = left - h;
         if (hn::AllTrue(d, left == zero)) return true;
-        angle = sm::fma(d, h * scale, side.w, angle);
+        angle = sm::fma(d, h, side.angle, angle);
         sm::sincos(d, angle * hn::Set(d, 0.15915494309189535), sine_wt, cosine_wt);
     }
     return false;
@@ -73,11 +72,13 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
     const V half = hn::Set(d, 0.5);
     const V per_rad = hn::Set(d, 0.15915494309189535);
     const V two_pi = hn::Set(d, 6.283185307179586);
+    const bool strong = tables.strong();
     for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
         const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
         const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
         const V mean_amplitude = load(state.amplitude_rad);
         const V b = load(state.b_rad_s);
+        const V scale_angle = load(state.scale_angle);
         const V rate = load(state.rate_rad_s);
         const V centre = load(tables.centre()[0]);
         const V inverse = load(tables.inverse_half_width()[0]);
@@ -100,8 +101,8 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
             V sine = sign * raw_sine * size;
             V cosine = raw_cosine * size;
             const std::size_t after = minimum ? 0 : 1;
-            const V w_after = hn::Set(d, 3.141592653589793) / load(state.duration_s[after]);
-            const V w_before = hn::Set(d, 3.141592653589793) / load(state.duration_s[1 - after]);
+            const V w_after = load(state.angular_frequency_rad_s[after]);
+            const V w_before = load(state.angular_frequency_rad_s[1 - after]);
 
             // The half cycle that ends here, turned upright by its own sign, which is that of the turn before.
             const V swing = hn::Neg(sign) * ((load(readings.phase_whole[i]) - last_whole) +
@@ -113,17 +114,13 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
             const V before_amplitude = has_before ? rough : mean_amplitude;
             const V standstill = sm::fma(d, b, sine, sign * rate);
             const auto ahead = standstill < zero;
-            const gm::UprightSide<V> side{hn::IfThenElse(ahead, mean_amplitude, before_amplitude),
-                                          hn::IfThenElse(ahead, w_after, w_before),
-                                          sign * rate,
-                                          b,
-                                          zero,
-                                          zero,
-                                          one,
-                                          zero,
-                                          zero,
-                                          zero,
-                                          one};
+            const gm::UprightSide<V> side{
+                hn::IfThenElse(ahead, mean_amplitude, before_amplitude),
+                hn::IfThenElse(ahead, w_after, w_before),
+                sign * rate,
+                b,
+                hn::IfThenElse(ahead, load(state.scale_s[after]), load(state.scale_s[1 - after])),
+                scale_angle};
             V phase_rad, lockin_rad;
             if (!walk_to_dither_turn(d, side, sine, cosine, phase_rad, lockin_rad)) return false;
             const V turn_fringes = sm::fma(d, sign * phase_rad, per_rad, load(readings.phase_fringes[i]));
@@ -135,7 +132,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 // To first order for the amplitude, then in full: exp(-i x_0) and exp(-i x_1).
                 const V moved =
                     sm::fma(d, hn::Neg(sign) * (turn_fringes - load(readings.phase_fringes[i])), one, swing);
-                const pm::HalfMapOf<V> first = pm::evaluate(d, part, lane, scaled(rough), rate_x, zero);
+                const pm::HalfMapOf<V> first = pm::middle(d, part, lane);
                 const V bend = sm::fma(d, first.z_im, last_cosine - cosine,
                                        hn::Neg(first.z_re * (last_sine - sine)));  // Im z (e_0 - e_1)
                 const V gain_rad = sm::fma(d, bend, hn::Set(d, 2.0), first.shift * (two_pi + two_pi));
@@ -146,8 +143,8 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 const sm::Complex<V> e0{last_cosine, hn::Neg(last_sine)};
                 const sm::Complex<V> e1{hn::Neg(cosine), sine};
                 const sm::Complex<V> q = sm::mul(d, sm::mul_add(d, z, e0, unit), sm::mul_add(d, z, e1, unit));
-                const V gain =
-                    sm::fma(d, sm::arg(d, q.re, q.im), hn::Set(d, 0.3183098861837907), map.shift + map.shift);
+                const V gain = sm::fma(d, strong ? sm::arg(d, q.re, q.im) : sm::arg_right(d, q.re, q.im),
+                                       hn::Set(d, 0.3183098861837907), map.shift + map.shift);
                 error = sm::fnma(d, sign, gain, error);
                 last_amplitude = amplitude;
             }
@@ -179,8 +176,8 @@ HWY_EXPORT(observe_lanes);
 
 namespace {
 
-constexpr double averaging_s = 16.0;   // of the input rate
-constexpr double least_margin = 0.02;  // of the amplitude
+constexpr double averaging_s = 16.0;    // of the input rate
+constexpr double least_margin = 0.001;  // of the amplitude
 
 }  // namespace
 
@@ -192,6 +189,13 @@ Exact::Exact(const Calibration& calibration, double tolerance_rad) : calibration
         state_.b_rad_s[lane] = calibration.b_rad_s[which];
         state_.duration_s[0][lane] = calibration.positive_duration_s[which];
         state_.duration_s[1][lane] = calibration.negative_duration_s[which];
+        const double root = std::sqrt(state_.amplitude_rad[lane]);
+        state_.scale_angle[lane] = 1.0 / root;
+        for (const std::size_t side : {0U, 1U}) {
+            const double w = units::pi / state_.duration_s[side][lane];
+            state_.angular_frequency_rad_s[side][lane] = w;
+            state_.scale_s[side][lane] = 1.0 / (w * root);
+        }
     }
 }
 

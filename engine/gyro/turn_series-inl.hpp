@@ -18,102 +18,93 @@ namespace sm = simd::HWY_NAMESPACE;
 ///
 ///     x' = rate + A w (sin(w t) + ratio sin(2 w t + f)) + b (1 + asymmetry cos(w t)) (sin(x) + second sin(2 x + h)),
 ///
-/// t from the dither's turn, in either direction. Code that is compiled for couplings of one harmonic takes `second` to
-/// be zero.
+/// t from the dither's turn, in either direction. `scale_s` is the unit of time of the series, near 1/(w sqrt(A)), in
+/// which the drive's acceleration is about one, and `angle` is w times it.
 template <class V>
 struct UprightSide {
     V amplitude, w, rate, b;
+    V scale_s, angle;
+};
+
+/// What only some devices have: zeros where code is compiled without.
+template <class V>
+struct UprightExtras {
     V ratio, harmonic_sine, harmonic_cosine;  ///< of f
     V asymmetry;
     V second, second_sine, second_cosine;  ///< of h
 };
 
-/// Taylor series of x and of the lock-in's share of it, around a point of the path. The unit of time is 1/(w sqrt(A)),
-/// in which the drive's acceleration is one. With |x'| < 1/4 and steps up to 1/4 what is left out is below 1e-11 rad.
-template <class D, class V = hn::Vec<D>>
+/// Taylor series of x and of the lock-in's share of it, around a point of the path. Within longest_step() what is left
+/// out is below 1e-10 rad, at slow input rates below 1e-12.
+///
+/// Compiled without `extras` it gives, where these are zero, the same bits in half the time.
+template <class D, bool extras, class V = hn::Vec<D>>
 struct TurnSeries {
-    static constexpr std::size_t order = 9;
-    V scale_s;
+    static constexpr std::size_t order = 7;
     V rate[order + 1];    ///< n times the n-th coefficient of x
     V lockin[order + 1];  ///< n times that of the lock-in's share
 
     /// Around the time and the phase x whose sines and cosines of w t and x are given.
-    template <bool with_second>
-    HWY_INLINE void expand(D d, const UprightSide<V>& side, V scale, V sine_wt, V cosine_wt, V sine_x, V cosine_x) {
-        scale_s = scale;
-        const V zero = hn::Zero(d);
-        const V angle = side.w * scale;
-        // sin(2 w t + f) and its cosine
-        const V doubled_sine = (sine_wt + sine_wt) * cosine_wt;
-        const V doubled_cosine = sm::fnma(d, sine_wt + sine_wt, sine_wt, hn::Set(d, 1.0));
-        const V s2 = sm::fma(d, doubled_sine, side.harmonic_cosine, doubled_cosine * side.harmonic_sine);
-        const V c2 = sm::fnma(d, doubled_sine, side.harmonic_sine, doubled_cosine * side.harmonic_cosine);
-        V first = side.amplitude * angle;
-        V second = first * side.ratio;
+    HWY_INLINE void expand(D d, const UprightSide<V>& side, const UprightExtras<V>& extra, V sine_wt, V cosine_wt,
+                           V sine_x, V cosine_x) {
         V drive[order];
+        V first = side.amplitude * side.angle;
+        RINGLOCK_UNROLL
         for (std::size_t n = 0; n < order; ++n) {
-            const V sine = n % 4 == 0   ? sine_wt
-                           : n % 4 == 1 ? cosine_wt
-                           : n % 4 == 2 ? hn::Neg(sine_wt)
-                                        : hn::Neg(cosine_wt);
-            const V doubled = n % 4 == 0 ? s2 : n % 4 == 1 ? c2 : n % 4 == 2 ? hn::Neg(s2) : hn::Neg(c2);
-            drive[n] = sm::fma(d, first, sine, second * doubled);
-            const V factor = angle * hn::Set(d, 1.0 / static_cast<double>(n + 1));
-            first = first * factor;
-            second = second * (factor + factor);
+            drive[n] = first * (n % 2 == 0 ? sine_wt : cosine_wt);
+            const double sign = n % 2 == 1 ? -1.0 : 1.0;  // sin, cos, -sin, -cos
+            if (n + 1 < order) first = first * (side.angle * hn::Set(d, sign / static_cast<double>(n + 1)));
         }
-        drive[0] = sm::fma(d, side.rate, scale, drive[0]);
-        const V beta = side.b * scale;
-        const V swing = beta * side.asymmetry;
-        const V couplings[3] = {sm::fma(d, swing, cosine_wt, beta), hn::Neg(swing * angle * sine_wt),
-                                hn::Neg(swing * angle * angle * cosine_wt * hn::Set(d, 0.5))};
+        V doubled_sines[extras ? order : 1];  // of 2 x + h
+        V doubled_cosines[extras ? order : 1];
+        V couplings[3] = {side.b * side.scale_s, hn::Zero(d), hn::Zero(d)};
+        if constexpr (extras) {
+            // sin(2 w t + f) and its cosine
+            const V one = hn::Set(d, 1.0);
+            const V s2wt = (sine_wt + sine_wt) * cosine_wt;
+            const V c2wt = sm::fnma(d, sine_wt + sine_wt, sine_wt, one);
+            const V s2 = sm::fma(d, s2wt, extra.harmonic_cosine, c2wt * extra.harmonic_sine);
+            const V c2 = sm::fnma(d, s2wt, extra.harmonic_sine, c2wt * extra.harmonic_cosine);
+            V second = side.amplitude * side.angle * extra.ratio;
+            RINGLOCK_UNROLL
+            for (std::size_t n = 0; n < order; ++n) {
+                drive[n] = drive[n] + second * (n % 2 == 0 ? s2 : c2);
+                const double sign = n % 2 == 1 ? -2.0 : 2.0;
+                second = second * (side.angle * hn::Set(d, sign / static_cast<double>(n + 1)));
+            }
+            const V swing = couplings[0] * extra.asymmetry;
+            couplings[0] = sm::fma(d, swing, cosine_wt, couplings[0]);
+            couplings[1] = hn::Neg(swing * side.angle * sine_wt);
+            couplings[2] = hn::Neg(swing * side.angle * side.angle * cosine_wt * hn::Set(d, 0.5));
+            const V s2x = (sine_x + sine_x) * cosine_x;
+            const V c2x = sm::fnma(d, sine_x + sine_x, sine_x, one);
+            doubled_sines[0] = sm::fma(d, s2x, extra.second_cosine, c2x * extra.second_sine);
+            doubled_cosines[0] = sm::fnma(d, s2x, extra.second_sine, c2x * extra.second_cosine);
+        }
+        drive[0] = sm::fma(d, side.rate, side.scale_s, drive[0]);
         V sines[order];
         V cosines[order];
         sines[0] = sine_x;
         cosines[0] = cosine_x;
-        rate[0] = zero;
-        lockin[0] = zero;
-        V second_sines[with_second ? order : 1];  // of 2 x + h
-        V second_cosines[with_second ? order : 1];
-        if constexpr (with_second) {
-            const V s2x = (sine_x + sine_x) * cosine_x;
-            const V c2x = sm::fnma(d, sine_x + sine_x, sine_x, hn::Set(d, 1.0));
-            second_sines[0] = sm::fma(d, s2x, side.second_cosine, c2x * side.second_sine);
-            second_cosines[0] = sm::fnma(d, s2x, side.second_sine, c2x * side.second_cosine);
-        }
+        RINGLOCK_UNROLL
         for (std::size_t n = 0; n < order; ++n) {
-            if constexpr (with_second) {
-                if (n > 0) {
-                    V sum_s = rate[1] * second_cosines[n - 1];
-                    V sum_c = rate[1] * second_sines[n - 1];
-                    for (std::size_t j = 2; j <= n; ++j) {
-                        sum_s = sm::fma(d, rate[j], second_cosines[n - j], sum_s);
-                        sum_c = sm::fma(d, rate[j], second_sines[n - j], sum_c);
-                    }
-                    const V twice = hn::Set(d, 2.0 / static_cast<double>(n));
-                    second_sines[n] = sum_s * twice;
-                    second_cosines[n] = hn::Neg(sum_c * twice);
-                }
-            }
             if (n > 0) {
-                V sum_s = rate[1] * cosines[n - 1];
-                V sum_c = rate[1] * sines[n - 1];
-                for (std::size_t j = 2; j <= n; ++j) {
-                    sum_s = sm::fma(d, rate[j], cosines[n - j], sum_s);
-                    sum_c = sm::fma(d, rate[j], sines[n - j], sum_c);
-                }
-                const V inverse = hn::Set(d, 1.0 / static_cast<double>(n));
-                sines[n] = sum_s * inverse;
-                cosines[n] = hn::Neg(sum_c * inverse);
+                next(d, n, 1.0, sines, cosines);
+                if constexpr (extras) next(d, n, 2.0, doubled_sines, doubled_cosines);
             }
             const auto pulls = [&](std::size_t k) HWY_ATTR {
-                if constexpr (with_second) return sm::fma(d, side.second, second_sines[k], sines[k]);
+                if constexpr (extras) return sm::fma(d, extra.second, doubled_sines[k], sines[k]);
                 return sines[k];
             };
-            V pull = couplings[0] * pulls(n);
-            for (std::size_t j = 1; j <= n && j < 3; ++j) pull = sm::fma(d, couplings[j], pulls(n - j), pull);
-            lockin[n + 1] = pull;
-            rate[n + 1] = drive[n] + pull;
+            if constexpr (extras) {
+                V pull = couplings[0] * pulls(n);
+                for (std::size_t j = 1; j <= n && j < 3; ++j) pull = sm::fma(d, couplings[j], pulls(n - j), pull);
+                lockin[n + 1] = pull;
+                rate[n + 1] = drive[n] + pull;
+            } else {
+                lockin[n + 1] = couplings[0] * pulls(n);
+                rate[n + 1] = drive[n] + lockin[n + 1];
+            }
         }
     }
 
@@ -121,17 +112,25 @@ struct TurnSeries {
     HWY_INLINE void rate_at(D d, V h, V& value, V& slope) const {
         value = rate[order];
         slope = rate[order] * hn::Set(d, static_cast<double>(order - 1));
+        RINGLOCK_UNROLL
         for (std::size_t n = order - 1; n >= 2; --n) {
             value = sm::fma(d, value, h, rate[n]);
             slope = sm::fma(d, slope, h, rate[n] * hn::Set(d, static_cast<double>(n - 1)));
         }
         value = sm::fma(d, value, h, rate[1]);
     }
+    HWY_INLINE V rate_at(D d, V h) const {
+        V value = rate[order];
+        RINGLOCK_UNROLL
+        for (std::size_t n = order - 1; n >= 1; --n) value = sm::fma(d, value, h, rate[n]);
+        return value;
+    }
 
     /// What x and the lock-in's share of it gain in `h` scales of time [rad].
     HWY_INLINE void gains(D d, V h, V& phase, V& lockin_share) const {
         phase = rate[order] * hn::Set(d, 1.0 / static_cast<double>(order));
         lockin_share = lockin[order] * hn::Set(d, 1.0 / static_cast<double>(order));
+        RINGLOCK_UNROLL
         for (std::size_t n = order - 1; n >= 1; --n) {
             const V inverse = hn::Set(d, 1.0 / static_cast<double>(n));
             phase = sm::fma(d, phase, h, rate[n] * inverse);
@@ -140,13 +139,34 @@ struct TurnSeries {
         phase = phase * h;
         lockin_share = lockin_share * h;
     }
+
+   private:
+    /// n-th Taylor coefficients of sine and cosine of `times` x + a constant: S' = times Q x', Q' = - times S x'.
+    HWY_INLINE void next(D d, std::size_t n, double times, V* sines, V* cosines) const {
+        // What is known longest comes first: the chain from term to term is what takes the time.
+        V sum_s = n > 2 ? rate[2] * cosines[n - 2] : hn::Zero(d);
+        V sum_c = n > 2 ? rate[2] * sines[n - 2] : hn::Zero(d);
+        RINGLOCK_UNROLL
+        for (std::size_t j = 3; j < n; ++j) {
+            sum_s = sm::fma(d, rate[j], cosines[n - j], sum_s);
+            sum_c = sm::fma(d, rate[j], sines[n - j], sum_c);
+        }
+        sum_s = sm::fma(d, rate[1], cosines[n - 1], sum_s);
+        sum_c = sm::fma(d, rate[1], sines[n - 1], sum_c);
+        if (n > 1) {
+            sum_s = sm::fma(d, rate[n], cosines[0], sum_s);
+            sum_c = sm::fma(d, rate[n], sines[0], sum_c);
+        }
+        sines[n] = sum_s * hn::Set(d, times / static_cast<double>(n));
+        cosines[n] = sum_c * hn::Set(d, -times / static_cast<double>(n));
+    }
 };
 
-/// Sine and cosine of small angles [rad], |angle| <= 3/8: Taylor series to the thirteenth order, error below 1e-17.
+/// Sine and cosine of small angles [rad], |angle| <= 1/4: Taylor series, error below 1e-16.
 template <class D, class V>
 HWY_INLINE void sincos_small(D d, V angle, V& sine, V& cosine) {
-    static constexpr double of_sine[] = {-1.0 / 6, 1.0 / 120, -1.0 / 5040, 1.0 / 362880, -1.0 / 39916800};
-    static constexpr double of_cosine[] = {-0.5, 1.0 / 24, -1.0 / 720, 1.0 / 40320, -1.0 / 3628800, 1.0 / 479001600};
+    static constexpr double of_sine[] = {-1.0 / 6, 1.0 / 120, -1.0 / 5040, 1.0 / 362880};
+    static constexpr double of_cosine[] = {-0.5, 1.0 / 24, -1.0 / 720, 1.0 / 40320, -1.0 / 3628800};
     const V x2 = angle * angle;
     sine = sm::fma(d, angle * x2, sm::polynomial(d, x2, of_sine), angle);
     cosine = sm::fma(d, x2, sm::polynomial(d, x2, of_cosine), hn::Set(d, 1.0));
@@ -155,7 +175,7 @@ HWY_INLINE void sincos_small(D d, V angle, V& sine, V& cosine) {
 /// Largest step of a series, in its scale: neither time nor phase may go far.
 template <class D, class V>
 HWY_INLINE V longest_step(D d, V rate) {
-    return hn::Set(d, 0.25) / hn::Max(hn::Abs(rate), hn::Set(d, 1.0));
+    return hn::Set(d, 0.125) / hn::Max(hn::Abs(rate), hn::Set(d, 1.0));
 }
 
 }  // namespace ringlock::gyro::HWY_NAMESPACE

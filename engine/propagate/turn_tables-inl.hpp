@@ -21,6 +21,13 @@ struct HalfMapOf {
     V shift, z_re, z_im;
 };
 
+/// The half turn in the middle of the ranges.
+template <class D>
+HWY_INLINE HalfMapOf<hn::Vec<D>> middle(D d, const TurnTables::Part& part, std::size_t lane) {
+    const simd::Lanes* row = part.coefficients.data();
+    return {hn::Load(d, row[0].data() + lane), hn::Load(d, row[1].data() + lane), hn::Load(d, row[2].data() + lane)};
+}
+
 /// Polynomials of one part at the scaled variables.
 template <class D, class V>
 HWY_INLINE HalfMapOf<V> evaluate(D d, const TurnTables::Part& part, std::size_t lane, V amplitude, V rate, V coupling) {

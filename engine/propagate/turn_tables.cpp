@@ -99,7 +99,7 @@ double error_rad(const Source& source, const Polynomial& polynomial, const std::
 
 /// Terms that one variable takes by itself, the others in the middle of their ranges.
 std::size_t terms_needed(const Source& source, std::size_t variable, double tolerance_rad) {
-    for (const std::size_t n : {3U, 4U, 5U, 6U, 8U, 10U, 12U, 16U, 20U}) {
+    for (const std::size_t n : {2U, 3U, 4U, 5U, 6U, 8U, 10U, 12U, 16U, 20U}) {
         Terms terms{1, 1, 1};
         terms[variable] = n;
         const Polynomial polynomial = interpolate(source, terms);

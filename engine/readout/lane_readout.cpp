@@ -21,8 +21,9 @@ using D = hn::CappedTag<double, simd::lanes>;
 using V = hn::Vec<D>;
 
 using Side = gm::UprightSide<V>;
+using Extras = gm::UprightExtras<V>;
 
-constexpr int most_steps = 8000;
+constexpr int most_steps = 20000;
 
 /// How the phase x gets from the dither's turn to its own.
 struct Walk {
@@ -32,52 +33,52 @@ struct Walk {
 };
 
 /// Goes to where the rate of x vanishes; false where some lane does not get there.
-template <bool with_second>
-HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, Walk& walk) {
+template <bool extras>
+HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, const Extras& extra, Walk& walk) {
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
     // A minimum whose phase still falls at the dither's turn lies after it.
-    V pull = walk.sine;
-    if constexpr (with_second) {
+    V first_rate = sm::fma(d, after.b, walk.sine, after.rate);
+    if constexpr (extras) {
         const V doubled_sine = (walk.sine + walk.sine) * walk.cosine;
         const V doubled_cosine = sm::fnma(d, walk.sine + walk.sine, walk.sine, one);
-        pull = sm::fma(d, after.second,
-                       sm::fma(d, doubled_sine, after.second_cosine, doubled_cosine * after.second_sine), pull);
+        const V pull =
+            sm::fma(d, extra.second, sm::fma(d, doubled_sine, extra.second_cosine, doubled_cosine * extra.second_sine),
+                    walk.sine);
+        first_rate = sm::fma(d, after.amplitude * after.w * extra.ratio, extra.harmonic_sine,
+                             sm::fma(d, after.b * (one + extra.asymmetry), pull, after.rate));
     }
-    const V first_rate = sm::fma(d, after.amplitude * after.w * after.ratio, after.harmonic_sine,
-                                 sm::fma(d, after.b * (one + after.asymmetry), pull, after.rate));
     const auto ahead = first_rate < zero;
-    Side side = after;
-    side.amplitude = hn::IfThenElse(ahead, after.amplitude, before.amplitude);
-    side.w = hn::IfThenElse(ahead, after.w, before.w);
-    side.rate = hn::IfThenElse(ahead, after.rate, before.rate);
-    side.b = hn::IfThenElse(ahead, after.b, before.b);
+    const Side side{
+        hn::IfThenElse(ahead, after.amplitude, before.amplitude), hn::IfThenElse(ahead, after.w, before.w),
+        hn::IfThenElse(ahead, after.rate, before.rate),           hn::IfThenElse(ahead, after.b, before.b),
+        hn::IfThenElse(ahead, after.scale_s, before.scale_s),     hn::IfThenElse(ahead, after.angle, before.angle)};
     const V forward = hn::IfThenElse(ahead, one, hn::Neg(one));
-    const V scale = one / (side.w * hn::Sqrt(side.amplitude));
     V sine_wt = zero;
     V cosine_wt = one;
+    V time = zero;  // in scales
     hn::Mask<D> done = zero > zero;
-    gm::TurnSeries<D> series;
+    gm::TurnSeries<D, extras> series;
     for (int step = 0; step < most_steps; ++step) {
-        series.template expand<with_second>(d, side, scale, sine_wt, cosine_wt, walk.sine, walk.cosine);
+        series.expand(d, side, extra, sine_wt, cosine_wt, walk.sine, walk.cosine);
         const V limit = gm::longest_step(d, series.rate[1]);
-        // A parabola's extremum, then Newton where that is near enough for the series to hold.
+        // A parabola's extremum, then Newton, and again with the same slope, where that is near enough for the series.
         V root = hn::Neg(series.rate[1]) / series.rate[2];
         const auto near = forward * root <= limit;
-        for (int i = 0; i < 2; ++i) {
-            V value, slope;
-            series.rate_at(d, root, value, slope);
-            root = root - value / slope;
-        }
+        V value, slope;
+        series.rate_at(d, root, value, slope);
+        const V inverse = one / slope;
+        root = sm::fnma(d, value, inverse, root);
+        root = sm::fnma(d, series.rate_at(d, root), inverse, root);
         // A step too far is taken back, but not beyond the dither's turn, where the other half cycle rules.
-        root = forward * hn::Max(forward * root, hn::Neg(forward * walk.time_s / scale));
+        root = forward * hn::Max(forward * root, hn::Neg(forward * time));
         V h = hn::IfThenElse(near, root, forward * limit);
         h = hn::IfThenElse(done, zero, h);
         V phase, lockin;
         series.gains(d, h, phase, lockin);
         walk.phase_rad = walk.phase_rad + phase;
         walk.lockin_rad = walk.lockin_rad + lockin;
-        walk.time_s = sm::fma(d, h, scale, walk.time_s);
+        time = time + h;
         V turn_s, turn_c;
         gm::sincos_small(d, phase, turn_s, turn_c);
         const V cosine = sm::fnma(d, walk.sine, turn_s, walk.cosine * turn_c);
@@ -85,8 +86,11 @@ HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, Wa
         walk.cosine = hn::IfThenElse(done, walk.cosine, cosine);
         walk.sine = hn::IfThenElse(done, walk.sine, sine);
         done = hn::Or(done, near);
-        if (hn::AllTrue(d, done)) return true;
-        const V fringes = side.w * walk.time_s * hn::Set(d, 0.15915494309189535);
+        if (hn::AllTrue(d, done)) {
+            walk.time_s = time * side.scale_s;
+            return true;
+        }
+        const V fringes = side.angle * time * hn::Set(d, 0.15915494309189535);
         if (!hn::AllTrue(d, hn::Abs(fringes) < hn::Set(d, 0.25))) return false;
         sm::sincos(d, fringes, sine_wt, cosine_wt);
     }
@@ -94,17 +98,25 @@ HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, Wa
 }
 
 /// Phase acceleration of a half cycle's drive at `time_s` from the turn, a magnitude [rad/s^2].
-HWY_INLINE V drive_acceleration(D d, const Side& side, V time_s) {
-    // cos y + 2 ratio cos(2 y + f) with y = w t, from y = 2 (y/2): |y| <= 3/4 before the middle of any quarter
+template <bool extras>
+HWY_INLINE V drive_acceleration(D d, const Side& side, const Extras& extra, V time_s) {
+    // cos y + 2 ratio cos(2 y + f) with y = w t <= 3/4, where a rate can still be turned round
     const V y = side.w * time_s;
     V s, c;
-    gm::sincos_small(d, y * hn::Set(d, 0.5), s, c);
-    const V sine = (s + s) * c;
-    const V cosine = sm::fnma(d, s + s, s, hn::Set(d, 1.0));
-    const V c2 = sm::fnma(d, sine + sine, sine, hn::Set(d, 1.0));
-    const V s2 = (sine + sine) * cosine;
-    const V harmonic = sm::fnma(d, s2, side.harmonic_sine, c2 * side.harmonic_cosine);
-    return side.amplitude * side.w * side.w * sm::fma(d, side.ratio + side.ratio, harmonic, cosine);
+    gm::sincos_small(d, y * hn::Set(d, 0.25), s, c);
+    V sine = (s + s) * c;
+    V cosine = sm::fnma(d, s + s, s, hn::Set(d, 1.0));
+    c = cosine;
+    s = sine;
+    sine = (s + s) * c;
+    cosine = sm::fnma(d, s + s, s, hn::Set(d, 1.0));
+    if constexpr (extras) {
+        const V c2 = sm::fnma(d, sine + sine, sine, hn::Set(d, 1.0));
+        const V s2 = (sine + sine) * cosine;
+        const V harmonic = sm::fnma(d, s2, extra.harmonic_sine, c2 * extra.harmonic_cosine);
+        cosine = sm::fma(d, extra.ratio + extra.ratio, harmonic, cosine);
+    }
+    return side.amplitude * side.w * side.w * cosine;
 }
 
 template <class Times>
@@ -139,7 +151,7 @@ HWY_INLINE V acceleration_of_pulses(D d, V near_rad, V far_rad, V interval_s) {
     return hn::IfThenElseZero(interval_s > zero, root * root);
 }
 
-template <bool with_second>
+template <bool extras>
 bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses, const Electronics& electronics,
               bool accelerations, std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
               DetectorNoise noise, std::size_t stride, LaneReadings& readings, LaneAngles& angles) {
@@ -150,8 +162,6 @@ bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses
     for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
         const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
         const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
-        const V harmonic_sine = load(constants.harmonic_sine);
-        const V harmonic_cosine = load(constants.harmonic_cosine);
         const V coupling_cosine = load(constants.coupling_cosine);
         const V coupling_sine = load(constants.coupling_sine);
         const V lockin_whole = load(turns.lockin_whole);
@@ -161,28 +171,22 @@ bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses
             const V sign = hn::Set(d, direction);
             const std::size_t after_side = direction > 0 ? 0 : 1;
             const std::size_t before_side = 1 - after_side;
-            const V ratio = sign * load(constants.harmonic_ratio);
-            const V asymmetry = sign * load(constants.turn_asymmetry);
-            const V second_sine = sign * load(constants.second_sine);
-            const V second_cosine = load(constants.second_cosine);
-            const V second = load(constants.second_ratio);
             const auto side_of = [&](std::size_t half, std::size_t which) HWY_ATTR {
-                return Side{load(drive.amplitude_rad[half]),
-                            load(constants.angular_frequency_rad_s[which]),
-                            sign * load(drive.rate_rad_s[half]),
-                            load(drive.b_rad_s[half]),
-                            ratio,
-                            harmonic_sine,
-                            harmonic_cosine,
-                            asymmetry,
-                            second,
-                            second_sine,
-                            second_cosine};
+                return Side{load(drive.amplitude_rad[half]),     load(constants.angular_frequency_rad_s[which]),
+                            sign * load(drive.rate_rad_s[half]), load(drive.b_rad_s[half]),
+                            load(constants.scale_s[which]),      load(constants.scale_angle)};
             };
             const Side before = side_of(i, before_side);
             const Side after = side_of(i + 1, after_side);
+            Extras extra{zero, zero, zero, zero, zero, zero, zero};
+            if constexpr (extras) {
+                extra = {sign * load(constants.harmonic_ratio), load(constants.harmonic_sine),
+                         load(constants.harmonic_cosine),       sign * load(constants.turn_asymmetry),
+                         load(constants.second_ratio),          sign * load(constants.second_sine),
+                         load(constants.second_cosine)};
+            }
             Walk walk{zero, sign * load(turns.sine[i]), load(turns.cosine[i]), zero, zero};
-            if (!walk_to_zero_rate<with_second>(d, before, after, walk)) return false;
+            if (!walk_to_zero_rate<extras>(d, before, after, extra, walk)) return false;
             const V lockin = sm::fma(d, sign * walk.lockin_rad, per_rad, load(turns.lockin_fringes[i]));
             store(lockin, angles.lockin_fringes[i]);
             // psi at the zero-rate point, in fringes less whole ones that are added where the phase is reported.
@@ -223,8 +227,8 @@ bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses
             if (!accelerations) continue;
 
             if (electronics.ideal) {
-                store(drive_acceleration(d, before, walk.time_s), readings.accel_before_rad_s2[i]);
-                store(drive_acceleration(d, after, walk.time_s), readings.accel_after_rad_s2[i]);
+                store(drive_acceleration<extras>(d, before, extra, walk.time_s), readings.accel_before_rad_s2[i]);
+                store(drive_acceleration<extras>(d, after, extra, walk.time_s), readings.accel_after_rad_s2[i]);
                 continue;
             }
             // Comparators switch at whole quarter fringes of the true phase; how far these are from the extremum the
@@ -255,8 +259,12 @@ bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses
             }
             const auto side_acceleration = [&](const Side& side, std::size_t which, V which_sign) HWY_ATTR {
                 const auto& tables = pulses.times[after_side][which];
-                const V harmonic = sm::fma(d, ratio + ratio, harmonic_cosine, hn::Set(d, 1.0));
-                const V scale = which_sign / hn::Sqrt(side.amplitude * side.w * side.w * harmonic);
+                V acceleration = side.amplitude * side.w * side.w;
+                if constexpr (extras) {
+                    acceleration =
+                        acceleration * sm::fma(d, extra.ratio + extra.ratio, extra.harmonic_cosine, hn::Set(d, 1.0));
+                }
+                const V scale = which_sign / hn::Sqrt(acceleration);
                 const V first_s =
                     sm::fma(d, near_root * scale, pulse_factor(d, tables[0], lane, odd, upper, x), walk.time_s);
                 const V second_s =
@@ -272,10 +280,10 @@ bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses
 }
 
 bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& pulses, const Electronics& electronics,
-                bool accelerations, bool with_second, std::size_t lanes, const gyro::LaneDrive& drive,
+                bool accelerations, bool extras, std::size_t lanes, const gyro::LaneDrive& drive,
                 const gyro::LaneTurns& turns, DetectorNoise noise, std::size_t stride, LaneReadings& readings,
                 LaneAngles& angles) {
-    const auto read = with_second ? read_all<true> : read_all<false>;
+    const auto read = extras ? read_all<true> : read_all<false>;
     return read(constants, pulses, electronics, accelerations, lanes, drive, turns, noise, stride, readings, angles);
 }
 
@@ -314,7 +322,13 @@ LaneReadout::LaneReadout(std::span<const gyro::Device> devices, std::span<const 
         constants_.second_ratio[lane] = device.coupling.second_ratio;
         constants_.second_sine[lane] = std::sin(device.coupling.second_from_first_rad());
         constants_.second_cosine[lane] = std::cos(device.coupling.second_from_first_rad());
-        with_second_ = with_second_ || device.coupling.second_ratio != 0.0;
+        extras_ = extras_ || device.coupling.second_ratio != 0.0 || device.coupling.turn_asymmetry != 0.0 ||
+                  device.harmonic_ratio != 0.0;
+        const double root = std::sqrt(device.dither_amplitude_rad);
+        constants_.scale_angle[lane] = 1.0 / root;
+        for (const std::size_t side : {0U, 1U}) {
+            constants_.scale_s[side][lane] = 1.0 / (constants_.angular_frequency_rad_s[side][lane] * root);
+        }
         if (with_pulses && !electronics.ideal) pulses_.make(lane, device);
     }
 }
@@ -324,7 +338,7 @@ void LaneReadout::read(const gyro::LaneDrive& drive, const gyro::LaneTurns& turn
     readings.first_turn = drive.first_turn;
     readings.resize(drive.turns);
     angles.resize(drive.turns);
-    if (!HWY_DYNAMIC_DISPATCH(read_lanes)(constants_, pulses_, electronics_, with_accelerations_, with_second_, lanes_,
+    if (!HWY_DYNAMIC_DISPATCH(read_lanes)(constants_, pulses_, electronics_, with_accelerations_, extras_, lanes_,
                                           drive, turns, noise, stride, readings, angles)) {
         throw RunError(
             "readout: the phase does not reverse near a turn of the dither; the input rate is too high for it");

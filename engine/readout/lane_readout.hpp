@@ -44,6 +44,8 @@ class LaneReadout {
     struct Constants {
         simd::Lanes angular_frequency_rad_s[2];
         simd::Lanes duration_s[2];
+        simd::Lanes scale_s[2];   ///< unit of time of the path near a turn
+        simd::Lanes scale_angle;  ///< angular frequency times that
         simd::Lanes harmonic_ratio, harmonic_sine, harmonic_cosine;
         simd::Lanes turn_asymmetry;
         simd::Lanes second_ratio, second_sine, second_cosine;  ///< second harmonic of the coupling, in psi + its phase
@@ -56,7 +58,7 @@ class LaneReadout {
     std::size_t lanes_;
     Electronics electronics_;
     bool with_accelerations_;
-    bool with_second_ = false;
+    bool extras_ = false;  // some gyro has a second harmonic, or unequal turns
     Constants constants_;
     PulseTables pulses_;
 };

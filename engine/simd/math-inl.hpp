@@ -15,6 +15,11 @@
 #include <cmath>
 #include <cstdint>
 
+// Series in registers, not in arrays: the compiler does not unroll long loops by itself.
+#ifndef RINGLOCK_UNROLL
+#define RINGLOCK_UNROLL _Pragma("GCC unroll 16")
+#endif
+
 HWY_BEFORE_NAMESPACE();
 namespace ringlock::simd::HWY_NAMESPACE {
 
@@ -58,7 +63,9 @@ HWY_INLINE V polynomial(D d, V x, const double (&coefficients)[N]) {
     const V x2 = x * x;
     V even = hn::Set(d, coefficients[N - 1 - (N - 1) % 2]);
     V odd = hn::Set(d, coefficients[N - 1 - N % 2]);
+    RINGLOCK_UNROLL
     for (std::size_t k = N - 1 - (N - 1) % 2; k >= 2; k -= 2) even = fma(d, even, x2, hn::Set(d, coefficients[k - 2]));
+    RINGLOCK_UNROLL
     for (std::size_t k = N - 1 - N % 2; k >= 3; k -= 2) odd = fma(d, odd, x2, hn::Set(d, coefficients[k - 2]));
     return fma(d, odd, x, even);
 }

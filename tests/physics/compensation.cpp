@@ -5,6 +5,7 @@
 
 #include "engine/compensate/exact.hpp"
 #include "engine/compensate/first_order.hpp"
+#include "engine/dither/lane_dither.hpp"
 #include "engine/ensemble/block.hpp"
 #include "tests/physics/support.hpp"
 
@@ -20,9 +21,10 @@ struct Spread {
 
 using Make = std::function<std::unique_ptr<compensate::LaneCompensator>(const compensate::Calibration&)>;
 
-compensate::Calibration calibration_of(const std::vector<gyro::Setup>& setups) {
+compensate::Calibration calibration_of(const std::vector<gyro::Setup>& setups, double noise_rms_rad) {
     compensate::Calibration calibration;
     calibration.lanes = setups.size();
+    calibration.amplitude_margin_rad = dither::LaneDither::amplitude_margin_rad(noise_rms_rad);
     for (std::size_t g = 0; g < setups.size(); ++g) {
         const gyro::Device device(setups[g]);
         calibration.b_rad_s[g] = device.coupling.b_rad_s;
@@ -47,7 +49,7 @@ Spread spread(const scenario::Scenario& scenario, std::size_t gyros, int blocks,
     // An arm with a compensator is read at every turn; the one under test is beside it.
     const std::vector<scenario::Arm> arms{scenario::parse_arm("noise_injected+compensated")};
     ensemble::GyroBlock gyro_block(scenario, arms, 0, setups);
-    const auto compensator = make(calibration_of(setups));
+    const auto compensator = make(calibration_of(setups, scenario.noise_injection.turn_phase_rms_rad));
     compensate::LaneErrors found;
     std::vector<std::vector<double>> raw(gyros);
     std::vector<std::vector<double>> left(gyros);
