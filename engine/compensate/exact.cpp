@@ -168,6 +168,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
 }
 
 }  // namespace ringlock::compensate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace ringlock::compensate {
