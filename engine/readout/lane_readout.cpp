@@ -55,7 +55,8 @@ HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, Wa
         const V limit = gm::longest_step(d, series.rate[1]);
         // A parabola's extremum, then Newton where that is near enough for the series to hold.
         V root = hn::Neg(series.rate[1]) / series.rate[2];
-        const auto near = forward * root <= limit;
+        // A fast input beside a strong coupling can bend the parabola away from zero: then on, too.
+        const auto near = hn::And(series.rate[2] > zero, forward * root <= limit);
         for (int i = 0; i < 2; ++i) {
             V value, slope;
             series.rate_at(d, root, value, slope);
