@@ -225,8 +225,8 @@ bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& puls
             const auto upper = index > hn::Set(d, 1.5);
             const V in_pair = index - hn::IfThenElseZero(upper, hn::Set(d, 2.0));
             const auto odd = in_pair > hn::Set(d, 0.5);
-            const V x = sm::fma(d, first_quarters, hn::Set(d, 2.0), hn::Set(d, -1.0));
             const V near_root = hn::Sqrt(near + near);
+            const V x = sm::fma(d, near_root, hn::Set(d, 1.1283791670955126), hn::Set(d, -1.0));  // 2/sqrt(pi)
             const V far_root = hn::Sqrt(far + far);
             const V error_rad = sign * error * hn::Set(d, 6.283185307179586);
             V tick_fraction = zero;

@@ -108,7 +108,7 @@ void PulseTables::make(std::size_t lane, const gyro::Device& device) {
                 std::array<std::array<double, terms>, 2> values{};
                 for (std::size_t i = 0; i < terms; ++i) {
                     const double node = std::cos(units::pi * (static_cast<double>(i) + 0.5) / terms);
-                    const double first = 0.5 * quarter_rad * (1.0 + node);
+                    const double first = quarter_rad * 0.25 * (1.0 + node) * (1.0 + node);
                     const std::array<double, 2> distances{first, first + quarter_rad};
                     // The extremum lies before the end of its quarter in the direction in which the phase leaves it.
                     const double psi = direction * (static_cast<double>(quarter + 1) * quarter_rad - first);
@@ -128,7 +128,7 @@ void PulseTables::make(std::size_t lane, const gyro::Device& device) {
 }
 
 double PulseTables::at(const Times& times, std::size_t lane, std::size_t quarter, double first_distance_rad) {
-    const double x = 4.0 * first_distance_rad / units::pi - 1.0;
+    const double x = 2.0 * std::sqrt(first_distance_rad / quarter_rad) - 1.0;
     double sum = 0.0;
     for (std::size_t k = terms; k-- > 0;) sum = sum * x + times[quarter][k][lane];
     return sum;
