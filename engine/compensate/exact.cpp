@@ -120,6 +120,9 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                                           zero,
                                           zero,
                                           one,
+                                          zero,
+                                          false,
+                                          zero,
                                           zero};
             V phase_rad, lockin_rad;
             if (!walk_to_dither_turn(d, side, sine, cosine, phase_rad, lockin_rad)) return false;

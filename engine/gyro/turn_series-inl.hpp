@@ -16,18 +16,32 @@ namespace sm = simd::HWY_NAMESPACE;
 
 /// A half cycle next to a turn, turned upright (x = psi + coupling phase at minima, its negative at maxima):
 ///
-///     x' = rate + A w (sin(w t) + ratio sin(2 w t + f)) + b (1 + asymmetry cos(w t)) sin(x),
+///     x' = rate + A w (sin(w t) + ratio sin(2 w t + f)) + b (1 + asymmetry cos(w t)) F(x),
+///     F = sin(x) + p sin(2 x) + q cos(2 x),
 ///
-/// t from the dither's turn, in either direction.
+/// t from the dither's turn, in either direction. p = r cos(h) and q = +-r sin(h) (negative at maxima) make a second
+/// harmonic r sin(2 (psi + coupling phase) + h) of the coupling.
 template <class V>
 struct UprightSide {
     V amplitude, w, rate, b;
     V ratio, harmonic_sine, harmonic_cosine;  ///< of f
     V asymmetry;
+    bool second = false;  ///< p and q are not all zero
+    V second_sine, second_cosine;
+
+    /// F(x) from sine and cosine of x.
+    template <class D>
+    HWY_INLINE V coupling(D d, V sine_x, V cosine_x) const {
+        if (!second) return sine_x;
+        const V doubled = sine_x + sine_x;
+        return sine_x + sm::fma(d, second_sine, doubled * cosine_x,
+                                second_cosine * sm::fnma(d, doubled, sine_x, hn::Set(d, 1.0)));
+    }
 };
 
 /// Taylor series of x and of the lock-in's share of it, around a point of the path. The unit of time is 1/(w sqrt(A)),
-/// in which the drive's acceleration is one. With |x'| < 1/4 and steps up to 1/4 what is left out is below 1e-11 rad.
+/// in which the drive's acceleration is one. With steps as long as longest_step() allows what is left out is below
+/// 1e-10 rad at the paper's device, and grows with b.
 template <class D, class V = hn::Vec<D>>
 struct TurnSeries {
     static constexpr std::size_t order = 9;
@@ -66,6 +80,7 @@ struct TurnSeries {
                                 hn::Neg(swing * angle * angle * cosine_wt * hn::Set(d, 0.5))};
         V sines[order];
         V cosines[order];
+        V forces[order];  // of F
         sines[0] = sine_x;
         cosines[0] = cosine_x;
         rate[0] = zero;
@@ -82,8 +97,20 @@ struct TurnSeries {
                 sines[n] = sum_s * inverse;
                 cosines[n] = hn::Neg(sum_c * inverse);
             }
-            V pull = couplings[0] * sines[n];
-            for (std::size_t j = 1; j <= n && j < 3; ++j) pull = sm::fma(d, couplings[j], sines[n - j], pull);
+            if (side.second) {
+                V ss = sines[0] * sines[n];
+                V sc = sines[0] * cosines[n];
+                for (std::size_t j = 1; j <= n; ++j) {
+                    ss = sm::fma(d, sines[j], sines[n - j], ss);
+                    sc = sm::fma(d, sines[j], cosines[n - j], sc);
+                }
+                const V doubled_c = hn::Set(d, n == 0 ? 1.0 : 0.0) - (ss + ss);
+                forces[n] = sines[n] + sm::fma(d, side.second_sine, sc + sc, side.second_cosine * doubled_c);
+            } else {
+                forces[n] = sines[n];
+            }
+            V pull = couplings[0] * forces[n];
+            for (std::size_t j = 1; j <= n && j < 3; ++j) pull = sm::fma(d, couplings[j], forces[n - j], pull);
             lockin[n + 1] = pull;
             rate[n + 1] = drive[n] + pull;
         }

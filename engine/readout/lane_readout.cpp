@@ -36,8 +36,9 @@ HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, Wa
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
     // A minimum whose phase still falls at the dither's turn lies after it.
-    const V first_rate = sm::fma(d, after.amplitude * after.w * after.ratio, after.harmonic_sine,
-                                 sm::fma(d, after.b * (one + after.asymmetry), walk.sine, after.rate));
+    const V first_rate =
+        sm::fma(d, after.amplitude * after.w * after.ratio, after.harmonic_sine,
+                sm::fma(d, after.b * (one + after.asymmetry), after.coupling(d, walk.sine, walk.cosine), after.rate));
     const auto ahead = first_rate < zero;
     Side side = after;
     side.amplitude = hn::IfThenElse(ahead, after.amplitude, before.amplitude);
@@ -163,7 +164,10 @@ bool read_lanes(const LaneReadout::Constants& constants, const PulseTables& puls
                             ratio,
                             harmonic_sine,
                             harmonic_cosine,
-                            asymmetry};
+                            asymmetry,
+                            constants.second,
+                            load(constants.second_sine),
+                            sign * load(constants.second_cosine)};
             };
             const Side before = side_of(i, before_side);
             const Side after = side_of(i + 1, after_side);
@@ -281,6 +285,10 @@ LaneReadout::LaneReadout(std::span<const gyro::Device> devices, std::span<const 
         constants_.harmonic_sine[lane] = std::sin(device.harmonic_phase_rad);
         constants_.harmonic_cosine[lane] = std::cos(device.harmonic_phase_rad);
         constants_.turn_asymmetry[lane] = device.coupling.turn_asymmetry;
+        const double second_rad = device.coupling.second_from_first_rad();
+        constants_.second = constants_.second || device.coupling.second_ratio != 0.0;
+        constants_.second_sine[lane] = device.coupling.second_ratio * std::cos(second_rad);
+        constants_.second_cosine[lane] = device.coupling.second_ratio * std::sin(second_rad);
         constants_.coupling_cosine[lane] = std::cos(device.coupling.phase_rad);
         constants_.coupling_sine[lane] = std::sin(device.coupling.phase_rad);
         constants_.gain[lane] = 1.0 + ellipse.gain;

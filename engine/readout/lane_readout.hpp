@@ -46,6 +46,8 @@ class LaneReadout {
         simd::Lanes duration_s[2];
         simd::Lanes harmonic_ratio, harmonic_sine, harmonic_cosine;
         simd::Lanes turn_asymmetry;
+        bool second = false;  ///< some coupling has a second harmonic: ratio times cosine and sine of its phase
+        simd::Lanes second_sine, second_cosine;
         simd::Lanes coupling_cosine, coupling_sine;  ///< of the coupling phase
         simd::Lanes gain, offset_sin, offset_cos, orthogonality_cosine, orthogonality_sine;
         simd::Lanes swing_whole;  ///< whole fringes between minima and maxima that the drive's phases leave out

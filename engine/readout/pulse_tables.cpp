@@ -19,12 +19,14 @@ using Series = gyro::PhaseSeries<20>;
 double standstill_s(const gyro::HalfCycle& half, const gyro::Coupling& coupling, int side, double psi_rad) {
     const double origin = side > 0 ? 0.0 : half.duration_s;
     const double w = half.angular_frequency_rad_s();
+    const double theta = psi_rad + coupling.phase_rad;
+    const double pull =
+        std::sin(theta) + coupling.second_ratio * std::sin(2.0 * theta + coupling.second_from_first_rad());
     double t = 0.0;
     for (int i = 0; i < 50; ++i) {
         const double cosine = half.sign * std::cos(w * (origin + t));
-        const double rate = half.drive_rate_rad_s(origin + t) + coupling.b_rad_s *
-                                                                    (1.0 + coupling.turn_asymmetry * cosine) *
-                                                                    std::sin(psi_rad + coupling.phase_rad);
+        const double rate =
+            half.drive_rate_rad_s(origin + t) + coupling.b_rad_s * (1.0 + coupling.turn_asymmetry * cosine) * pull;
         // Close to the turn the drive's rate is nearly linear in time.
         const double slope = side * half.sign * half.end_acceleration_rad_s2(side > 0 ? 0 : 1);
         const double step = -rate / slope;
