@@ -27,8 +27,8 @@ constexpr int most_steps = 20000;
 
 /// What the phase gains from the zero-rate point, where its sine and cosine are given, to the dither's turn, and the
 /// lock-in's share of that. `sine` and `cosine` become those at the dither's turn. False where it is too far.
-HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V& sine, V& cosine, V& phase_rad,
-                                    V& lockin_rad) {
+HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V inverse_angle, V& sine, V& cosine,
+                                    V& phase_rad, V& lockin_rad) {
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
     const gm::UprightExtras<V> none{zero, zero, zero, zero, zero, zero, zero};
@@ -37,7 +37,7 @@ HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V& sine
     static constexpr double of_asin[] = {1.0 / 6, 3.0 / 40, 15.0 / 336, 105.0 / 3456, 945.0 / 42240, 10395.0 / 599040};
     const V y2 = y * y;
     V angle = sm::fma(d, y * y2, sm::polynomial(d, y2, of_asin), y);
-    V left = hn::Neg(angle / side.angle);  // to go, in scales of time
+    V left = hn::Neg(angle * inverse_angle);  // to go, in scales of time
     V sine_wt = y;
     V cosine_wt = hn::Sqrt(hn::Max(sm::fnma(d, y, y, one), zero));
     phase_rad = zero;
@@ -45,8 +45,10 @@ HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V& sine
     gm::TurnSeries<D, false> series;
     for (int step = 0; step < most_steps; ++step) {
         series.expand(d, side, none, sine_wt, cosine_wt, sine, cosine);
-        const V limit = gm::longest_step(d, series.rate[1]);
-        const V h = hn::CopySign(hn::Min(hn::Abs(left), limit), left);
+        V h = left;
+        if (!hn::AllTrue(d, gm::within_step(d, hn::Abs(left), series.rate[1]))) {
+            h = hn::CopySign(hn::Min(hn::Abs(left), gm::longest_step(d, series.rate[1])), left);
+        }
         V phase, lockin;
         series.gains(d, h, phase, lockin);
         phase_rad = phase_rad + phase;
@@ -79,6 +81,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
         const V mean_amplitude = load(state.amplitude_rad);
         const V b = load(state.b_rad_s);
         const V scale_angle = load(state.scale_angle);
+        const V inverse_angle = one / scale_angle;
         const V rate = load(state.rate_rad_s);
         const V centre = load(tables.centre()[0]);
         const V inverse = load(tables.inverse_half_width()[0]);
@@ -122,7 +125,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 hn::IfThenElse(ahead, load(state.scale_s[after]), load(state.scale_s[1 - after])),
                 scale_angle};
             V phase_rad, lockin_rad;
-            if (!walk_to_dither_turn(d, side, sine, cosine, phase_rad, lockin_rad)) return false;
+            if (!walk_to_dither_turn(d, side, inverse_angle, sine, cosine, phase_rad, lockin_rad)) return false;
             const V turn_fringes = sm::fma(d, sign * phase_rad, per_rad, load(readings.phase_fringes[i]));
             if (has_before) {
                 const auto scaled = [&](V amplitude) HWY_ATTR {
@@ -168,6 +171,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
 }
 
 }  // namespace ringlock::compensate::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace ringlock::compensate {
@@ -176,7 +180,7 @@ HWY_EXPORT(observe_lanes);
 
 namespace {
 
-constexpr double averaging_s = 16.0;    // of the input rate
+constexpr double baseline_s = 32.0;     // the input rate is averaged over one to two of them
 constexpr double least_margin = 0.001;  // of the amplitude
 
 }  // namespace
@@ -214,29 +218,37 @@ void Exact::make_tables(std::size_t lane) {
     tables_.make(lane, device, {{a - margin, a + margin}, {rate - width, rate + width}, {b, b}});
 }
 
-void Exact::estimate_rate(const readout::LaneReadings& readings) {
-    // Minima only: the dither drops out but for its noise.
+void Exact::estimate_rate(const readout::LaneReadings& readings, const LaneErrors* errors) {
+    // Minima only: the dither drops out but for its noise, which a long baseline makes small; the lock-in's share is
+    // taken away as far as it is known.
     const std::size_t first = readings.minimum(0) ? 0 : 1;
     if (first >= readings.turns) return;
     const std::size_t last = first + (readings.turns - 1 - first) / 2 * 2;
-    for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
-        const double period = state_.duration_s[0][lane] + state_.duration_s[1][lane];
-        double from = last_fringes_[lane];
-        double from_whole = last_whole_[lane];
-        double cycles = static_cast<double>((last - first) / 2 + 1);
-        if (!begun_) {
-            from = readings.phase_fringes[first][lane];
-            from_whole = readings.phase_whole[first][lane];
-            cycles -= 1.0;
+    const auto mark_at = [&](std::size_t turn, std::size_t lane) {
+        Mark mark{readings.first_turn + static_cast<std::int64_t>(turn), readings.phase_fringes[turn][lane],
+                  readings.phase_whole[turn][lane]};
+        if (errors != nullptr) {
+            mark.fringes -= errors->fringes[turn][lane];
+            mark.whole -= errors->whole[lane];
         }
-        last_fringes_[lane] = readings.phase_fringes[last][lane];
-        last_whole_[lane] = readings.phase_whole[last][lane];
-        if (cycles == 0.0) continue;
-        const double turned = (last_whole_[lane] - from_whole) + (last_fringes_[lane] - from);
-        const double seconds = cycles * period;
-        window_s_[lane] = std::min(window_s_[lane] + seconds, averaging_s);
-        const double rate = turned * units::two_pi / seconds;
-        state_.rate_rad_s[lane] += (rate - state_.rate_rad_s[lane]) * std::min(seconds / window_s_[lane], 1.0);
+        return mark;
+    };
+    for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
+        auto& [older, newer] = marks_[lane];
+        if (!begun_) older = newer = mark_at(first, lane);
+        const Mark now = mark_at(last, lane);
+        const double period = state_.duration_s[0][lane] + state_.duration_s[1][lane];
+        const auto seconds_since = [&](const Mark& mark) {
+            return 0.5 * static_cast<double>(now.turn - mark.turn) * period;
+        };
+        if (now.turn > older.turn) {
+            state_.rate_rad_s[lane] =
+                ((now.whole - older.whole) + (now.fringes - older.fringes)) * units::two_pi / seconds_since(older);
+        }
+        if (seconds_since(newer) >= baseline_s) {
+            older = newer;
+            newer = now;
+        }
     }
 }
 
@@ -244,7 +256,7 @@ void Exact::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
     errors.fringes.resize(readings.turns);
     if (readings.turns == 0) return;
     if (!begun_) {
-        estimate_rate(readings);
+        estimate_rate(readings, nullptr);
         for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) make_tables(lane);
     }
     if (!HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, readings, begun_, state_, errors)) {
@@ -253,7 +265,7 @@ void Exact::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
             "high for it");
     }
     if (begun_) {
-        estimate_rate(readings);
+        estimate_rate(readings, &errors);
         for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
             if (!tables_.ranges(lane).rate_rad_s.covers(state_.rate_rad_s[lane])) make_tables(lane);
         }

@@ -14,9 +14,9 @@ namespace ringlock::compensate {
 ///     s (2 shift + 2 arg[(1 + z exp(-i x_0)) (1 - z exp(-i x_1))])
 ///
 /// beyond drive and input: no first order, no knowledge of what lies between. The amplitude, on which z depends,
-/// follows from the swing measured between the turns; the input rate from the mean of the output over some seconds.
-/// Phases are carried from the zero-rate point, where they are read, to the dither's turn by the Taylor series of the
-/// equation of motion.
+/// follows from the swing measured between the turns; the input rate from the corrected output over half a minute to a
+/// minute. Phases are carried from the zero-rate point, where they are read, to the dither's turn by the Taylor series
+/// of the equation of motion.
 ///
 /// The rate must be known roughly before the first correction: errors of the first piece of readings of a run are
 /// computed with the mean rate over that piece. Where the phase's turn lies after the dither's, the half cycle under
@@ -42,16 +42,21 @@ class Exact final : public LaneCompensator {
     };
 
    private:
-    void estimate_rate(const readout::LaneReadings& readings);
+    /// A minimum that the mean rate is counted from.
+    struct Mark {
+        std::int64_t turn = 0;
+        double fringes = 0.0;
+        double whole = 0.0;
+    };
+
+    void estimate_rate(const readout::LaneReadings& readings, const LaneErrors* errors);
     void make_tables(std::size_t lane);
 
     Calibration calibration_;
     propagate::TurnTables tables_;
     State state_;
     bool begun_ = false;
-    std::array<double, simd::lanes> window_s_{};      ///< time over which the rate was averaged so far
-    std::array<double, simd::lanes> last_fringes_{};  ///< phase at the last minimum seen
-    std::array<double, simd::lanes> last_whole_{};
+    std::array<std::array<Mark, 2>, simd::lanes> marks_{};  ///< one to two baselines ago, and less than one
 };
 
 }  // namespace ringlock::compensate

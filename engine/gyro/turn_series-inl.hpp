@@ -178,6 +178,12 @@ HWY_INLINE V longest_step(D d, V rate) {
     return hn::Set(d, 0.125) / hn::Max(hn::Abs(rate), hn::Set(d, 1.0));
 }
 
+/// Whether a step is no longer than that.
+template <class D, class V>
+HWY_INLINE auto within_step(D d, V step, V rate) {
+    return step * hn::Max(hn::Abs(rate), hn::Set(d, 1.0)) <= hn::Set(d, 0.125);
+}
+
 }  // namespace ringlock::gyro::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

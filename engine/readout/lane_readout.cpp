@@ -61,10 +61,10 @@ HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, co
     gm::TurnSeries<D, extras> series;
     for (int step = 0; step < most_steps; ++step) {
         series.expand(d, side, extra, sine_wt, cosine_wt, walk.sine, walk.cosine);
-        const V limit = gm::longest_step(d, series.rate[1]);
         // A parabola's extremum, then Newton, and again with the same slope, where that is near enough for the series.
         V root = hn::Neg(series.rate[1]) / series.rate[2];
-        const auto near = forward * root <= limit;
+        // A fast input beside a strong coupling can bend the parabola away from zero: then on, too.
+        const auto near = hn::And(series.rate[2] > zero, gm::within_step(d, forward * root, series.rate[1]));
         V value, slope;
         series.rate_at(d, root, value, slope);
         const V inverse = one / slope;
@@ -72,7 +72,8 @@ HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, co
         root = sm::fnma(d, series.rate_at(d, root), inverse, root);
         // A step too far is taken back, but not beyond the dither's turn, where the other half cycle rules.
         root = forward * hn::Max(forward * root, hn::Neg(forward * time));
-        V h = hn::IfThenElse(near, root, forward * limit);
+        V h = root;
+        if (!hn::AllTrue(d, near)) h = hn::IfThenElse(near, root, forward * gm::longest_step(d, series.rate[1]));
         h = hn::IfThenElse(done, zero, h);
         V phase, lockin;
         series.gains(d, h, phase, lockin);
@@ -143,12 +144,11 @@ HWY_INLINE V ticked_interval(D d, V tick_fraction, V first_s, V second_s, double
     return hn::Abs(second - first) * hn::Set(d, 1.0 / clock_hz);
 }
 
-/// Acceleration from two pulses: distance = a (t - t0)^2 / 2 at both, two equations for a and t0.
-HWY_INLINE V acceleration_of_pulses(D d, V near_rad, V far_rad, V interval_s) {
-    const V zero = hn::Zero(d);
-    const V root = (hn::Sqrt(hn::Max(far_rad + far_rad, zero)) - hn::Sqrt(hn::Max(near_rad + near_rad, zero))) /
-                   hn::Max(interval_s, hn::Set(d, 1e-300));
-    return hn::IfThenElseZero(interval_s > zero, root * root);
+/// Acceleration from two pulses: distance = a (t - t0)^2 / 2 at both, two equations for a and t0. `roots` is the
+/// difference of the roots of twice the distances.
+HWY_INLINE V acceleration_of_pulses(D d, V roots, V interval_s) {
+    const V root = roots / hn::Max(interval_s, hn::Set(d, 1e-300));
+    return hn::IfThenElseZero(interval_s > hn::Zero(d), root * root);
 }
 
 template <bool extras>
@@ -243,10 +243,13 @@ bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses
             const auto upper = index > hn::Set(d, 1.5);
             const V in_pair = index - hn::IfThenElseZero(upper, hn::Set(d, 2.0));
             const auto odd = in_pair > hn::Set(d, 0.5);
-            const V x = sm::fma(d, first_quarters, hn::Set(d, 2.0), hn::Set(d, -1.0));
             const V near_root = hn::Sqrt(near + near);
+            const V x = sm::fma(d, near_root, hn::Set(d, 1.1283791670955126), hn::Set(d, -1.0));  // 2/sqrt(pi)
             const V far_root = hn::Sqrt(far + far);
             const V error_rad = sign * error * hn::Set(d, 6.283185307179586);
+            const V twice_near = (near - error_rad) + (near - error_rad);
+            const V twice_far = (far - error_rad) + (far - error_rad);
+            const V measured_roots = hn::Sqrt(hn::Max(twice_far, zero)) - hn::Sqrt(hn::Max(twice_near, zero));
             V tick_fraction = zero;
             if (electronics.clock_hz > 0.0) {
                 const std::int64_t turn = drive.first_turn + static_cast<std::int64_t>(i);
@@ -270,7 +273,7 @@ bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses
                 const V second_s =
                     sm::fma(d, far_root * scale, pulse_factor(d, tables[1], lane, odd, upper, x), walk.time_s);
                 const V interval = ticked_interval(d, tick_fraction, first_s, second_s, electronics.clock_hz);
-                return acceleration_of_pulses(d, near - error_rad, far - error_rad, interval);
+                return acceleration_of_pulses(d, measured_roots, interval);
             };
             store(side_acceleration(before, 0, hn::Set(d, -1.0)), readings.accel_before_rad_s2[i]);
             store(side_acceleration(after, 1, hn::Set(d, 1.0)), readings.accel_after_rad_s2[i]);

@@ -19,13 +19,14 @@ using Series = gyro::PhaseSeries<20>;
 double standstill_s(const gyro::HalfCycle& half, const gyro::Coupling& coupling, int side, double psi_rad) {
     const double origin = side > 0 ? 0.0 : half.duration_s;
     const double w = half.angular_frequency_rad_s();
+    const double theta = psi_rad + coupling.phase_rad;
+    const double pull =
+        std::sin(theta) + coupling.second_ratio * std::sin(2.0 * theta + coupling.second_from_first_rad());
     double t = 0.0;
     for (int i = 0; i < 50; ++i) {
         const double cosine = half.sign * std::cos(w * (origin + t));
-        const double rate = half.drive_rate_rad_s(origin + t) +
-                            coupling.b_rad_s * (1.0 + coupling.turn_asymmetry * cosine) *
-                                (std::sin(psi_rad + coupling.phase_rad) +
-                                 coupling.second_ratio * std::sin(2.0 * psi_rad + coupling.second_phase_rad));
+        const double rate =
+            half.drive_rate_rad_s(origin + t) + coupling.b_rad_s * (1.0 + coupling.turn_asymmetry * cosine) * pull;
         // Close to the turn the drive's rate is nearly linear in time.
         const double slope = side * half.sign * half.end_acceleration_rad_s2(side > 0 ? 0 : 1);
         const double step = -rate / slope;
@@ -109,7 +110,7 @@ void PulseTables::make(std::size_t lane, const gyro::Device& device) {
                 std::array<std::array<double, terms>, 2> values{};
                 for (std::size_t i = 0; i < terms; ++i) {
                     const double node = std::cos(units::pi * (static_cast<double>(i) + 0.5) / terms);
-                    const double first = 0.5 * quarter_rad * (1.0 + node);
+                    const double first = quarter_rad * 0.25 * (1.0 + node) * (1.0 + node);
                     const std::array<double, 2> distances{first, first + quarter_rad};
                     // The extremum lies before the end of its quarter in the direction in which the phase leaves it.
                     const double psi = direction * (static_cast<double>(quarter + 1) * quarter_rad - first);
@@ -129,7 +130,7 @@ void PulseTables::make(std::size_t lane, const gyro::Device& device) {
 }
 
 double PulseTables::at(const Times& times, std::size_t lane, std::size_t quarter, double first_distance_rad) {
-    const double x = 4.0 * first_distance_rad / units::pi - 1.0;
+    const double x = 2.0 * std::sqrt(first_distance_rad / quarter_rad) - 1.0;
     double sum = 0.0;
     for (std::size_t k = terms; k-- > 0;) sum = sum * x + times[quarter][k][lane];
     return sum;

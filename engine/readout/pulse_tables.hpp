@@ -11,14 +11,19 @@ namespace ringlock::readout {
 /// each side, as functions of the phase there.
 ///
 /// With x the phase turned upright (psi + coupling phase at minima, its negative at maxima), d the phase from the
-/// extremum to the pulse and a the phase acceleration, t sqrt(a) = sqrt(2 d) R, and R is a smooth function of d for
-/// each of the four quarters that the pulse may begin: polynomials from the equation of motion, solved from the
-/// zero-rate point outwards. Amplitude noise and rates that vary enter through a.
+/// extremum to the pulse and a the phase acceleration, t sqrt(a) = sqrt(2 d) R, and R is a smooth function of sqrt(d),
+/// for the lock-in bends the path by the third power of t, for each of the four quarters that the pulse may begin:
+/// polynomials from the equation of motion, solved from the zero-rate point outwards. Amplitude noise and rates that
+/// vary enter through a.
+///
+/// The half cycle of that side is taken to rule from the zero-rate point on, even where the dither turns only between
+/// that point and the pulses. Where accelerations differ between the sides by a share q, both pulses of one side are
+/// misplaced by up to q times the time between the two turns; the interval between them is not, to first order.
 struct PulseTables {
     static constexpr std::size_t terms = 10;
     static constexpr std::size_t quarters = 4;
 
-    /// Polynomial in 4 d1/pi - 1, d1 the distance of the first pulse: [quarter][power].
+    /// Polynomial in 2 sqrt(d1/(pi/2)) - 1, d1 the distance of the first pulse: [quarter][power].
     using Times = std::array<std::array<simd::Lanes, terms>, quarters>;
     /// [minimum, maximum][before, after][first, second pulse]
     std::array<std::array<std::array<Times, 2>, 2>, 2> times;

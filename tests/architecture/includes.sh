@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The arrows between the rooms: `includes.sh ROOT` fails where an #include points against them.
-# Also: a source stands beside its header, headers have #pragma once, and every include of ours is a path from ROOT.
+# Also: a source stands beside its header, headers have #pragma once, every include of ours is a path from ROOT, and
+# namespaces of instruction sets end.
 set -euo pipefail
 cd "${1:?usage: includes.sh ROOT}"
 
@@ -82,6 +83,10 @@ for file in "${sources[@]}"; do
             ;;
         *) complain "$file: sources are called .cpp and .hpp" ;;
     esac
+    # A missing end leaves the rest of the source, plain functions included, to the last instruction set named.
+    if [[ $(grep -cx 'HWY_BEFORE_NAMESPACE();' "$file" || true) != $(grep -cx 'HWY_AFTER_NAMESPACE();' "$file" || true) ]]; then
+        complain "$file: HWY_BEFORE_NAMESPACE without HWY_AFTER_NAMESPACE, or the other way round"
+    fi
     room_of "$file"
     from="$room"
     if [[ -z ${may[$from]+placed} ]]; then

@@ -62,6 +62,7 @@ include_fault "not a path from the top" engine/gyro/device.cpp '#include "device
 include_fault "not a path from the top" engine/gyro/device.cpp '#include "engine/gyro/../core/units.hpp"'
 include_fault "does not exist" engine/gyro/device.cpp '#include "engine/core/unit.hpp"'
 include_fault "no #pragma once" engine/gyro/naked.hpp '// nothing'
+include_fault "without HWY_AFTER_NAMESPACE" engine/gyro/device.cpp 'HWY_BEFORE_NAMESPACE();'
 include_fault "sources are called" engine/gyro/device.h '#pragma once'
 include_fault "room 'engine/attic' has no line" engine/attic/old.cpp '// nothing'
 include_fault "room 'engine' has no line" engine/loose.cpp '// nothing'

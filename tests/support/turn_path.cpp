@@ -47,7 +47,11 @@ TurnPath::TurnPath(const gyro::HalfCycle& before, const gyro::HalfCycle& after, 
       scale_s_(std::sqrt(1.0 / after.end_acceleration_rad_s2())),
       zero_phase_rad_(phase_rad) {
     // A minimum (the half cycle after it is positive) whose phase still falls at the dither's turn lies after it.
-    const double rate = after_.rate_rad_s + coupling_.b_rad_s * std::sin(phase_rad + coupling_.phase_rad);
+    const double theta = phase_rad + coupling_.phase_rad;
+    const double rate =
+        after_.drive_rate_rad_s(0.0) +
+        coupling_.b_rad_s * (1.0 + coupling_.turn_asymmetry * after_.sign) *
+            (std::sin(theta) + coupling_.second_ratio * std::sin(2.0 * theta + coupling_.second_from_first_rad()));
     if (rate == 0.0) return;
     const int side = rate * after_.sign < 0.0 ? 1 : -1;
     // Fringes between the dither's turn and the phase's: a fast input needs long steps.
@@ -96,14 +100,20 @@ TurnPath::Place TurnPath::place(double time_s, int side) const {
 
 double TurnPath::plain_gain_rad() const {
     if (zero_time_s_ >= 0.0) return after_.plain_phase_rad(zero_time_s_);
-    // Backwards in time from the end of `before`: the cosine is symmetric about the turn.
-    const gyro::HalfCycle mirrored{-before_.sign, before_.amplitude_rad, before_.duration_s, -before_.rate_rad_s};
+    // Backwards in time from the end of `before`: its rates change their signs.
+    const gyro::HalfCycle mirrored{-before_.sign,       before_.amplitude_rad,  before_.duration_s,
+                                   -before_.rate_rad_s, before_.harmonic_ratio, -before_.harmonic_phase_rad};
     return mirrored.plain_phase_rad(-zero_time_s_);
 }
 
 double TurnPath::acceleration_rad_s2(int side) const {
     const gyro::HalfCycle& half = side > 0 ? after_ : before_;
-    return half.end_acceleration_rad_s2() * std::cos(half.angular_frequency_rad_s() * zero_time_s_);
+    const double w = half.angular_frequency_rad_s();
+    const double wt = w * zero_time_s_;
+    // The half cycle before ends here, half a turn of w t later.
+    const double first = (side > 0 ? half.sign : -half.sign) * std::cos(wt);
+    return half.amplitude_rad * w * w *
+           std::abs(first + 2.0 * half.harmonic_ratio * std::cos(2.0 * wt + half.harmonic_phase_rad));
 }
 
 std::array<double, 2> TurnPath::crossing_times_s(int side, const std::array<double, 2>& distance_rad) const {

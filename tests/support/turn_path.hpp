@@ -5,7 +5,8 @@
 
 namespace ringlock::test {
 
-/// The phase's path close to one turn, from the equation of motion.
+/// The phase's path close to one turn, from the equation of motion, with second harmonics of dither and coupling and a
+/// threshold that differs between the turns.
 ///
 /// The dither turns at its own zero-rate point; the phase turns where input rate and lock-in are added, a little before
 /// or after. Times are relative to the dither's turn.
