@@ -65,8 +65,9 @@ HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V& sine
     return false;
 }
 
+/// Rows [first_row, last_row) of the readings; errors are told less errors.whole.
 bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const readout::LaneReadings& readings,
-                   bool begun, Exact::State& state, LaneErrors& errors) {
+                   std::size_t first_row, std::size_t last_row, bool begun, Exact::State& state, LaneErrors& errors) {
     const D d;
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
@@ -89,8 +90,9 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
         V last_whole = load(state.turn_whole);
         V error = load(state.error_fringes);
         V last_amplitude = load(state.last_amplitude_rad);
-        store(load(state.error_whole), errors.whole);
-        for (std::size_t i = 0; i < readings.turns; ++i) {
+        V error_whole = load(state.error_whole);
+        const V told_whole = load(errors.whole);
+        for (std::size_t i = first_row; i < last_row; ++i) {
             const bool minimum = readings.minimum(i);
             const V sign = hn::Set(d, minimum ? 1.0 : -1.0);
             const V raw_sine = load(readings.sine[i]);
@@ -148,19 +150,22 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 const sm::Complex<V> q = sm::mul(d, sm::mul_add(d, z, e0, unit), sm::mul_add(d, z, e1, unit));
                 const V gain =
                     sm::fma(d, sm::arg(d, q.re, q.im), hn::Set(d, 0.3183098861837907), map.shift + map.shift);
+                // Whole fringes are put apart at every turn: bits must not depend on where a piece ends.
                 error = sm::fnma(d, sign, gain, error);
+                const V carry = sm::nearest(d, error);
+                error = error - carry;
+                error_whole = error_whole + carry;
                 last_amplitude = amplitude;
             }
             // From the dither's turn to the zero-rate point again: the lock-in's share the other way round.
-            store(sm::fnma(d, sign * lockin_rad, per_rad, error), errors.fringes[i]);
+            store(sm::fnma(d, sign * lockin_rad, per_rad, error) + (error_whole - told_whole), errors.fringes[i]);
             last_sine = sine;
             last_cosine = cosine;
             last_fringes = turn_fringes;
             last_whole = load(readings.phase_whole[i]);
         }
-        const V whole = sm::nearest(d, error);
-        store(error - whole, state.error_fringes);
-        store(load(state.error_whole) + whole, state.error_whole);
+        store(error, state.error_fringes);
+        store(error_whole, state.error_whole);
         store(last_sine, state.sine);
         store(last_cosine, state.cosine);
         store(last_fringes, state.turn_fringes);
@@ -182,6 +187,8 @@ namespace {
 
 constexpr double averaging_s = 16.0;   // of the input rate
 constexpr double least_margin = 0.02;  // of the amplitude
+// The rate is estimated at turns that do not depend on the size of later pieces; sooner after a short first one.
+constexpr std::int64_t most_turns_between_estimates = 128;
 
 }  // namespace
 
@@ -211,51 +218,69 @@ void Exact::make_tables(std::size_t lane) {
     tables_.make(lane, device, {{a - margin, a + margin}, {rate - width, rate + width}, {b, b}});
 }
 
-void Exact::estimate_rate(const readout::LaneReadings& readings) {
+void Exact::see_minima(const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row) {
     // Minima only: the dither drops out but for its noise.
-    const std::size_t first = readings.minimum(0) ? 0 : 1;
-    if (first >= readings.turns) return;
-    const std::size_t last = first + (readings.turns - 1 - first) / 2 * 2;
+    const std::size_t first = first_row + (readings.minimum(first_row) ? 0 : 1);
+    if (first >= last_row) return;
+    const std::size_t last = first + (last_row - 1 - first) / 2 * 2;
+    const auto point = [&](std::size_t row) {
+        return Minimum{readings.first_turn + static_cast<std::int64_t>(row), readings.phase_fringes[row],
+                       readings.phase_whole[row]};
+    };
+    if (estimated_.turn < 0) estimated_ = point(first);
+    latest_ = point(last);
+}
+
+void Exact::estimate_rate() {
+    const double cycles = 0.5 * static_cast<double>(latest_.turn - estimated_.turn);
+    if (cycles == 0.0) return;
     for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
-        const double period = state_.duration_s[0][lane] + state_.duration_s[1][lane];
-        double from = last_fringes_[lane];
-        double from_whole = last_whole_[lane];
-        double cycles = static_cast<double>((last - first) / 2 + 1);
-        if (!begun_) {
-            from = readings.phase_fringes[first][lane];
-            from_whole = readings.phase_whole[first][lane];
-            cycles -= 1.0;
-        }
-        last_fringes_[lane] = readings.phase_fringes[last][lane];
-        last_whole_[lane] = readings.phase_whole[last][lane];
-        if (cycles == 0.0) continue;
-        const double turned = (last_whole_[lane] - from_whole) + (last_fringes_[lane] - from);
-        const double seconds = cycles * period;
+        const double turned =
+            (latest_.whole[lane] - estimated_.whole[lane]) + (latest_.fringes[lane] - estimated_.fringes[lane]);
+        const double seconds = cycles * (state_.duration_s[0][lane] + state_.duration_s[1][lane]);
         window_s_[lane] = std::min(window_s_[lane] + seconds, averaging_s);
         const double rate = turned * units::two_pi / seconds;
         state_.rate_rad_s[lane] += (rate - state_.rate_rad_s[lane]) * std::min(seconds / window_s_[lane], 1.0);
     }
+    estimated_ = latest_;
 }
 
 void Exact::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
     errors.fringes.resize(readings.turns);
+    errors.whole = state_.error_whole;
     if (readings.turns == 0) return;
-    if (!begun_) {
-        estimate_rate(readings);
-        for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) make_tables(lane);
-    }
-    if (!HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, readings, begun_, state_, errors)) {
+    const auto solve = [&](std::size_t first, std::size_t last) {
+        if (HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, readings, first, last, begun_, state_,
+                                                errors)) {
+            return;
+        }
         throw RunError(
-            "compensated_exact: the phase does not reverse near a turn of the dither; the input rate is too "
-            "high for it");
+            "compensated_exact: the phase does not reverse near a turn of the dither; the input rate is too high for "
+            "it");
+    };
+    if (!begun_) {
+        see_minima(readings, 0, readings.turns);
+        estimate_rate();
+        for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) make_tables(lane);
+        solve(0, readings.turns);
+        begun_ = true;
+        turns_ = static_cast<std::int64_t>(readings.turns);
+        next_estimate_ = turns_ + std::clamp<std::int64_t>(turns_, 2, most_turns_between_estimates);
+        return;
     }
-    if (begun_) {
-        estimate_rate(readings);
+    for (std::size_t row = 0; row < readings.turns;) {
+        const std::size_t rows = std::min(readings.turns - row, static_cast<std::size_t>(next_estimate_ - turns_));
+        solve(row, row + rows);
+        see_minima(readings, row, row + rows);
+        row += rows;
+        turns_ += static_cast<std::int64_t>(rows);
+        if (turns_ < next_estimate_) continue;
+        next_estimate_ = turns_ + std::clamp<std::int64_t>(turns_, 2, most_turns_between_estimates);
+        estimate_rate();
         for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
             if (!tables_.ranges(lane).rate_rad_s.covers(state_.rate_rad_s[lane])) make_tables(lane);
         }
     }
-    begun_ = true;
 }
 
 }  // namespace ringlock::compensate
