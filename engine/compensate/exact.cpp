@@ -66,8 +66,9 @@ HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V inver
     return false;
 }
 
+/// Rows [first_row, last_row) of the readings; errors are told less errors.whole.
 bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const readout::LaneReadings& readings,
-                   bool begun, Exact::State& state, LaneErrors& errors) {
+                   std::size_t first_row, std::size_t last_row, bool begun, Exact::State& state, LaneErrors& errors) {
     const D d;
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
@@ -93,8 +94,9 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
         V last_whole = load(state.turn_whole);
         V error = load(state.error_fringes);
         V last_amplitude = load(state.last_amplitude_rad);
-        store(load(state.error_whole), errors.whole);
-        for (std::size_t i = 0; i < readings.turns; ++i) {
+        V error_whole = load(state.error_whole);
+        const V told_whole = load(errors.whole);
+        for (std::size_t i = first_row; i < last_row; ++i) {
             const bool minimum = readings.minimum(i);
             const V sign = hn::Set(d, minimum ? 1.0 : -1.0);
             const V raw_sine = load(readings.sine[i]);
@@ -148,19 +150,22 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 const sm::Complex<V> q = sm::mul(d, sm::mul_add(d, z, e0, unit), sm::mul_add(d, z, e1, unit));
                 const V gain = sm::fma(d, strong ? sm::arg(d, q.re, q.im) : sm::arg_right(d, q.re, q.im),
                                        hn::Set(d, 0.3183098861837907), map.shift + map.shift);
+                // Whole fringes are put apart at every turn: bits must not depend on where a piece ends.
                 error = sm::fnma(d, sign, gain, error);
+                const V carry = sm::nearest(d, error);
+                error = error - carry;
+                error_whole = error_whole + carry;
                 last_amplitude = amplitude;
             }
             // From the dither's turn to the zero-rate point again: the lock-in's share the other way round.
-            store(sm::fnma(d, sign * lockin_rad, per_rad, error), errors.fringes[i]);
+            store(sm::fnma(d, sign * lockin_rad, per_rad, error) + (error_whole - told_whole), errors.fringes[i]);
             last_sine = sine;
             last_cosine = cosine;
             last_fringes = turn_fringes;
             last_whole = load(readings.phase_whole[i]);
         }
-        const V whole = sm::nearest(d, error);
-        store(error - whole, state.error_fringes);
-        store(load(state.error_whole) + whole, state.error_whole);
+        store(error, state.error_fringes);
+        store(error_whole, state.error_whole);
         store(last_sine, state.sine);
         store(last_cosine, state.cosine);
         store(last_fringes, state.turn_fringes);
@@ -180,8 +185,10 @@ HWY_EXPORT(observe_lanes);
 
 namespace {
 
-constexpr double baseline_s = 32.0;     // the input rate is averaged over one to two of them
+constexpr double baseline_s = 16.0;     // the input rate is averaged over one to two of them
 constexpr double least_margin = 0.001;  // of the amplitude
+// The rate is estimated at turns that do not depend on the size of later pieces; sooner after a short first one.
+constexpr std::int64_t most_turns_between_estimates = 128;
 
 }  // namespace
 
@@ -218,59 +225,79 @@ void Exact::make_tables(std::size_t lane) {
     tables_.make(lane, device, {{a - margin, a + margin}, {rate - width, rate + width}, {b, b}});
 }
 
-void Exact::estimate_rate(const readout::LaneReadings& readings, const LaneErrors* errors) {
-    // Minima only: the dither drops out but for its noise, which a long baseline makes small; the lock-in's share is
+void Exact::see_minima(const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row,
+                       const LaneErrors* errors) {
+    // Minima only: the dither drops out but for its noise, which a long baseline makes small. The lock-in's share is
     // taken away as far as it is known.
-    const std::size_t first = readings.minimum(0) ? 0 : 1;
-    if (first >= readings.turns) return;
-    const std::size_t last = first + (readings.turns - 1 - first) / 2 * 2;
-    const auto mark_at = [&](std::size_t turn, std::size_t lane) {
-        Mark mark{readings.first_turn + static_cast<std::int64_t>(turn), readings.phase_fringes[turn][lane],
-                  readings.phase_whole[turn][lane]};
-        if (errors != nullptr) {
-            mark.fringes -= errors->fringes[turn][lane];
-            mark.whole -= errors->whole[lane];
+    const std::size_t first = first_row + (readings.minimum(first_row) ? 0 : 1);
+    if (first >= last_row) return;
+    const std::size_t last = first + (last_row - 1 - first) / 2 * 2;
+    const auto point = [&](std::size_t row) {
+        Minimum minimum{readings.first_turn + static_cast<std::int64_t>(row), readings.phase_fringes[row],
+                        readings.phase_whole[row]};
+        for (std::size_t lane = 0; errors != nullptr && lane < calibration_.lanes; ++lane) {
+            minimum.fringes[lane] -= errors->fringes[row][lane];
+            minimum.whole[lane] -= errors->whole[lane];
         }
-        return mark;
+        return minimum;
     };
+    if (older_.turn < 0) older_ = newer_ = point(first);
+    latest_ = point(last);
+}
+
+void Exact::estimate_rate() {
+    const double cycles = 0.5 * static_cast<double>(latest_.turn - older_.turn);
+    if (cycles == 0.0) return;
+    double period_s = 0.0;
     for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
-        auto& [older, newer] = marks_[lane];
-        if (!begun_) older = newer = mark_at(first, lane);
-        const Mark now = mark_at(last, lane);
-        const double period = state_.duration_s[0][lane] + state_.duration_s[1][lane];
-        const auto seconds_since = [&](const Mark& mark) {
-            return 0.5 * static_cast<double>(now.turn - mark.turn) * period;
-        };
-        if (now.turn > older.turn) {
-            state_.rate_rad_s[lane] =
-                ((now.whole - older.whole) + (now.fringes - older.fringes)) * units::two_pi / seconds_since(older);
-        }
-        if (seconds_since(newer) >= baseline_s) {
-            older = newer;
-            newer = now;
-        }
+        const double turned =
+            (latest_.whole[lane] - older_.whole[lane]) + (latest_.fringes[lane] - older_.fringes[lane]);
+        period_s = state_.duration_s[0][lane] + state_.duration_s[1][lane];
+        state_.rate_rad_s[lane] = turned * units::two_pi / (cycles * period_s);
+    }
+    // All gyros of a study are dithered at one frequency.
+    if (0.5 * static_cast<double>(latest_.turn - newer_.turn) * period_s >= baseline_s) {
+        older_ = newer_;
+        newer_ = latest_;
     }
 }
 
 void Exact::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
     errors.fringes.resize(readings.turns);
+    errors.whole = state_.error_whole;
     if (readings.turns == 0) return;
-    if (!begun_) {
-        estimate_rate(readings, nullptr);
-        for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) make_tables(lane);
-    }
-    if (!HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, readings, begun_, state_, errors)) {
+    const auto solve = [&](std::size_t first, std::size_t last) {
+        if (HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, readings, first, last, begun_, state_,
+                                                errors)) {
+            return;
+        }
         throw RunError(
-            "compensated_exact: the phase does not reverse near a turn of the dither; the input rate is too "
-            "high for it");
+            "compensated_exact: the phase does not reverse near a turn of the dither; the input rate is too high for "
+            "it");
+    };
+    if (!begun_) {
+        see_minima(readings, 0, readings.turns, nullptr);
+        estimate_rate();
+        for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) make_tables(lane);
+        solve(0, readings.turns);
+        begun_ = true;
+        turns_ = static_cast<std::int64_t>(readings.turns);
+        next_estimate_ = turns_ + std::clamp<std::int64_t>(turns_, 2, most_turns_between_estimates);
+        return;
     }
-    if (begun_) {
-        estimate_rate(readings, &errors);
+    for (std::size_t row = 0; row < readings.turns;) {
+        const std::size_t rows = std::min(readings.turns - row, static_cast<std::size_t>(next_estimate_ - turns_));
+        solve(row, row + rows);
+        see_minima(readings, row, row + rows, &errors);
+        row += rows;
+        turns_ += static_cast<std::int64_t>(rows);
+        if (turns_ < next_estimate_) continue;
+        next_estimate_ = turns_ + std::clamp<std::int64_t>(turns_, 2, most_turns_between_estimates);
+        estimate_rate();
         for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
             if (!tables_.ranges(lane).rate_rad_s.covers(state_.rate_rad_s[lane])) make_tables(lane);
         }
     }
-    begun_ = true;
 }
 
 }  // namespace ringlock::compensate

@@ -9,6 +9,11 @@ namespace {
 
 /// Slow rates and couplings wander: ranges this many times as wide as what a piece asks for need not be made anew soon.
 constexpr double spare = 3.0;
+/// Half widths up to which there is such room [deg/h; relative]; far beyond, terms would run out.
+constexpr double most_spare_rate_deg_h = 5000.0;
+constexpr double most_spare_coupling = 0.5;
+/// What a piece asks for no table may do without, with a little room for the next piece.
+constexpr double least_spare = 1.05;
 /// Ranges grow with each remake up to this rate, beyond which they need more and more terms [deg/h].
 constexpr double widest_rate_deg_h = 200.0;
 constexpr double widest_coupling = 0.05;  // relative
@@ -25,11 +30,12 @@ void extremes(const std::vector<simd::Lanes>& rows, simd::Lanes& lowest, simd::L
     }
 }
 
-/// A range around what is asked for, wider than the last one.
-Range around(double lowest, double highest, const Range& last, double widest) {
+/// A range around what is asked for, wider than the last one up to `widest`, with room to spare up to `most_spare`.
+Range around(double lowest, double highest, const Range& last, double widest, double most_spare) {
     const double asked = 0.5 * (highest - lowest);
     const double grown = std::min(last.highest - last.lowest, widest);  // twice the old half width
-    const double half = std::max(spare * asked, grown) + 1e-9 * std::abs(highest);
+    const double half =
+        std::max({least_spare * asked, std::min(spare * asked, most_spare), grown}) + 1e-9 * std::abs(highest);
     const double centre = 0.5 * (highest + lowest);
     return {centre - half, centre + half};
 }
@@ -71,13 +77,15 @@ void TurnMapLanes<Turns>::cover(const gyro::LaneDrive& drive) {
         }
         if ((!begun_ || drive.rates_vary) && misses(ranges.rate_rad_s, low_rate[lane], high_rate[lane])) {
             ranges.rate_rad_s = drive.rates_vary ? around(low_rate[lane], high_rate[lane], ranges.rate_rad_s,
-                                                          widest_rate_deg_h * device.phase_per_arcsec)
+                                                          widest_rate_deg_h * device.phase_per_arcsec,
+                                                          most_spare_rate_deg_h * device.phase_per_arcsec)
                                                  : Range{low_rate[lane], high_rate[lane]};
             changed = true;
         }
         if ((!begun_ || drive.thresholds_vary) && misses(ranges.b_rad_s, low_b[lane], high_b[lane])) {
             ranges.b_rad_s = drive.thresholds_vary ? around(low_b[lane], high_b[lane], ranges.b_rad_s,
-                                                            widest_coupling * device.coupling.b_rad_s)
+                                                            widest_coupling * device.coupling.b_rad_s,
+                                                            most_spare_coupling * device.coupling.b_rad_s)
                                                    : Range{low_b[lane], high_b[lane]};
             changed = true;
         }
