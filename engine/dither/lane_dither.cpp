@@ -57,8 +57,10 @@ void fill(const LaneDither::Constants& constants, double noise_rms_rad, const si
                 added_whole = added_whole + nearest;
             }
             if (!threshold_factor.empty()) b = load(threshold_factor[i]) * load(constants.b_rad_s);
-            store(rate, drive.rate_rad_s[i + 1]);
-            store(b, drive.b_rad_s[i + 1]);
+            if (!drive.constants_filled) {
+                store(rate, drive.rate_rad_s[i + 1]);
+                store(b, drive.b_rad_s[i + 1]);
+            }
             rotation = rotation + added;
             const V carry = sm::nearest(d, rotation);
             rotation = rotation - carry;
@@ -117,6 +119,9 @@ void LaneDither::next(std::size_t turns, std::span<const simd::Lanes> extra_angl
                       std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive) {
     drive.resize(turns);
     drive.first_turn = turn_;
+    const bool vary = !extra_angle_arcsec.empty() || !threshold_factor.empty();
+    drive.constants_filled = drive.constants_filled && !vary && filled_ == &drive;
+    filled_ = vary ? nullptr : &drive;
     drive.rates_vary = !extra_angle_arcsec.empty();
     drive.thresholds_vary = !threshold_factor.empty();
     if (noise_rms_rad_ > 0.0 && turns > 0) {
@@ -127,6 +132,7 @@ void LaneDither::next(std::size_t turns, std::span<const simd::Lanes> extra_angl
     HWY_DYNAMIC_DISPATCH(fill)
     (constants_, noise_rms_rad_, noise_rms_rad_ > 0.0 ? deviates_.data() : nullptr, extra_angle_arcsec,
      threshold_factor, lanes_, state_, drive);
+    drive.constants_filled = !vary;
     turn_ += static_cast<std::int64_t>(turns);
 }
 

@@ -52,6 +52,7 @@ class LaneDither {
     State state_;
     std::int64_t turn_ = 0;
     std::vector<simd::Lanes> deviates_;
+    const gyro::LaneDrive* filled_ = nullptr;  // has this dither's rates and couplings, if they are constant
 };
 
 }  // namespace ringlock::dither

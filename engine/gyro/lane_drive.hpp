@@ -15,14 +15,16 @@ struct LaneDrive {
     std::size_t turns = 0;
     bool rates_vary = false;  ///< from half cycle to half cycle
     bool thresholds_vary = false;
-    std::vector<simd::Lanes> plain_fringes;     ///< [turns] phase of drive and input at the turn, less whole fringes
-    std::vector<simd::Lanes> amplitude_rad;     ///< [turns + 1] amplitude of the half cycle: half its swing
-    std::vector<simd::Lanes> rate_rad_s;        ///< [turns + 1] phase rate of the input over the half cycle
-    std::vector<simd::Lanes> b_rad_s;           ///< [turns + 1] coupling over the half cycle
+    bool constants_filled = false;           ///< rows of rates and couplings that do not vary stand from a piece before
+    std::vector<simd::Lanes> plain_fringes;  ///< [turns] phase of drive and input at the turn, less whole fringes
+    std::vector<simd::Lanes> amplitude_rad;  ///< [turns + 1] amplitude of the half cycle: half its swing
+    std::vector<simd::Lanes> rate_rad_s;     ///< [turns + 1] phase rate of the input over the half cycle
+    std::vector<simd::Lanes> b_rad_s;        ///< [turns + 1] coupling over the half cycle
     std::vector<simd::Lanes> rotation_fringes;  ///< [turns] rotation of the case since turn 0 of the run, less ...
     std::vector<simd::Lanes> rotation_whole;    ///< [turns] ... these whole fringes
 
     void resize(std::size_t wanted) {
+        constants_filled = constants_filled && wanted == turns;
         turns = wanted;
         plain_fringes.resize(wanted);
         amplitude_rad.resize(wanted + 1);

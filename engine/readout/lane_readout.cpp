@@ -120,19 +120,40 @@ HWY_INLINE V drive_acceleration(D d, const Side& side, const Extras& extra, V ti
     return side.amplitude * side.w * side.w * cosine;
 }
 
-template <class Times>
-HWY_INLINE V pulse_factor(D d, const Times& times, std::size_t lane, hn::Mask<D> odd, hn::Mask<D> upper, V x) {
-    V sum = hn::Zero(d);
-    for (std::size_t k = PulseTables::terms; k-- > 0;) {
-        const V q0 = hn::Load(d, times[0][k].data() + lane);
-        const V q1 = hn::Load(d, times[1][k].data() + lane);
-        const V q2 = hn::Load(d, times[2][k].data() + lane);
-        const V q3 = hn::Load(d, times[3][k].data() + lane);
-        const V low = hn::IfThenElse(odd, q1, q0);
-        const V high = hn::IfThenElse(odd, q3, q2);
-        sum = sm::fma(d, sum, x, hn::IfThenElse(upper, high, low));
+/// Times of the two pulses on both sides over the roots of twice their distances, [before, after][first, second].
+struct PulseFactors {
+    V values[2][2];
+};
+
+template <class Sides>
+HWY_INLINE PulseFactors pulse_factors(D d, const Sides& sides, std::size_t used, std::size_t lane, hn::Mask<D> odd,
+                                      hn::Mask<D> upper, V x) {
+    const V zero = hn::Zero(d);
+    PulseFactors sums{{{zero, zero}, {zero, zero}}};
+    for (std::size_t k = used; k-- > 0;) {
+        for (std::size_t side = 0; side < 2; ++side) {
+            for (std::size_t pulse = 0; pulse < 2; ++pulse) {
+                const PulseTables::Times& times = sides[side][pulse];
+                const V low =
+                    hn::IfThenElse(odd, hn::Load(d, times[1][k].data() + lane), hn::Load(d, times[0][k].data() + lane));
+                const V high =
+                    hn::IfThenElse(odd, hn::Load(d, times[3][k].data() + lane), hn::Load(d, times[2][k].data() + lane));
+                V& sum = sums.values[side][pulse];
+                sum = sm::fma(d, sum, x, hn::IfThenElse(upper, high, low));
+            }
+        }
     }
-    return sum;
+    return sums;
+}
+
+/// Root of a half cycle's acceleration at the turn, inverse.
+template <bool extras>
+HWY_INLINE V inverse_root_acceleration(D d, const Side& side, const Extras& extra) {
+    V acceleration = side.amplitude * side.w * side.w;
+    if constexpr (extras) {
+        acceleration = acceleration * sm::fma(d, extra.ratio + extra.ratio, extra.harmonic_cosine, hn::Set(d, 1.0));
+    }
+    return hn::Set(d, 1.0) / hn::Sqrt(acceleration);
 }
 
 /// Times of the second pulse less that of the first in whole ticks, as the clock sees them [s].
@@ -166,6 +187,7 @@ bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses
         const V coupling_sine = load(constants.coupling_sine);
         const V lockin_whole = load(turns.lockin_whole);
         store(lockin_whole, angles.lockin_whole);
+        V last_scale = zero;
         for (std::size_t i = 0; i < drive.turns; i += stride) {
             const int direction = drive.direction(i);
             const V sign = hn::Set(d, direction);
@@ -260,23 +282,20 @@ bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses
                 const V ticks = time * clock;
                 tick_fraction = ticks - hn::Floor(ticks);
             }
-            const auto side_acceleration = [&](const Side& side, std::size_t which, V which_sign) HWY_ATTR {
-                const auto& tables = pulses.times[after_side][which];
-                V acceleration = side.amplitude * side.w * side.w;
-                if constexpr (extras) {
-                    acceleration =
-                        acceleration * sm::fma(d, extra.ratio + extra.ratio, extra.harmonic_cosine, hn::Set(d, 1.0));
-                }
-                const V scale = which_sign / hn::Sqrt(acceleration);
-                const V first_s =
-                    sm::fma(d, near_root * scale, pulse_factor(d, tables[0], lane, odd, upper, x), walk.time_s);
-                const V second_s =
-                    sm::fma(d, far_root * scale, pulse_factor(d, tables[1], lane, odd, upper, x), walk.time_s);
+            const PulseFactors factors = pulse_factors(d, pulses.times[after_side], pulses.used, lane, odd, upper, x);
+            const auto side_acceleration = [&](std::size_t which, V scale) HWY_ATTR {
+                const V first_s = sm::fma(d, near_root * scale, factors.values[which][0], walk.time_s);
+                const V second_s = sm::fma(d, far_root * scale, factors.values[which][1], walk.time_s);
                 const V interval = ticked_interval(d, tick_fraction, first_s, second_s, electronics.clock_hz);
                 return acceleration_of_pulses(d, measured_roots, interval);
             };
-            store(side_acceleration(before, 0, hn::Set(d, -1.0)), readings.accel_before_rad_s2[i]);
-            store(side_acceleration(after, 1, hn::Set(d, 1.0)), readings.accel_after_rad_s2[i]);
+            // The half cycle after this turn is the one before the next, unless its two ends differ.
+            const V scale_before =
+                extras || i == 0 || stride != 1 ? inverse_root_acceleration<extras>(d, before, extra) : last_scale;
+            const V scale_after = inverse_root_acceleration<extras>(d, after, extra);
+            last_scale = scale_after;
+            store(side_acceleration(0, hn::Neg(scale_before)), readings.accel_before_rad_s2[i]);
+            store(side_acceleration(1, scale_after), readings.accel_after_rad_s2[i]);
         }
     }
     return true;

@@ -12,6 +12,8 @@ namespace {
 
 constexpr double quarter_rad = 0.5 * units::pi;
 constexpr double tolerance_rad = 1e-12;
+constexpr double negligible_s = 2e-12;  // in the time of a pulse
+constexpr double longest_root = 2.507;  // of twice the distance of any pulse, sqrt(2 pi)
 using Series = gyro::PhaseSeries<20>;
 
 /// Time, from the turn at which `half` begins (side +1) or ends (-1), at which the phase would stand still with the
@@ -74,22 +76,31 @@ std::array<double, 2> crossings_s(const gyro::HalfCycle& half, const gyro::Coupl
     return times;
 }
 
-/// Polynomial through values at Chebyshev nodes.
-std::array<double, PulseTables::terms> powers(const std::array<double, PulseTables::terms>& values) {
+/// Polynomial through values at Chebyshev nodes, without the last terms that together make less than `negligible`.
+std::array<double, PulseTables::terms> powers(const std::array<double, PulseTables::terms>& values, double negligible,
+                                              std::size_t& used) {
     constexpr std::size_t n = PulseTables::terms;
+    std::array<double, n> weights{};
+    for (std::size_t k = 0; k < n; ++k) {
+        for (std::size_t i = 0; i < n; ++i) {
+            weights[k] += values[i] * std::cos(static_cast<double>(k) * units::pi * (static_cast<double>(i) + 0.5) / n);
+        }
+        weights[k] *= (k == 0 ? 1.0 : 2.0) / n;
+    }
+    std::size_t kept = n;
+    for (double left_out = 0.0; kept > 1; --kept) {
+        left_out += std::abs(weights[kept - 1]);
+        if (left_out > negligible) break;
+    }
+    used = std::max(used, kept);
     std::array<double, n> sum{};
     std::array<double, n> before{};
     std::array<double, n> now{};
     before[0] = 1.0;
     now[1] = 1.0;
-    for (std::size_t k = 0; k < n; ++k) {
-        double weight = 0.0;
-        for (std::size_t i = 0; i < n; ++i) {
-            weight += values[i] * std::cos(static_cast<double>(k) * units::pi * (static_cast<double>(i) + 0.5) / n);
-        }
-        weight *= (k == 0 ? 1.0 : 2.0) / n;
+    for (std::size_t k = 0; k < kept; ++k) {
         const auto& chebyshev = k == 0 ? before : now;
-        for (std::size_t p = 0; p < n; ++p) sum[p] += weight * chebyshev[p];
+        for (std::size_t p = 0; p < n; ++p) sum[p] += weights[k] * chebyshev[p];
         if (k == 0) continue;
         std::array<double, n> next{};
         for (std::size_t p = 0; p < n; ++p) next[p] = (p > 0 ? 2.0 * now[p - 1] : 0.0) - before[p];
@@ -120,7 +131,7 @@ void PulseTables::make(std::size_t lane, const gyro::Device& device) {
                     }
                 }
                 for (std::size_t pulse = 0; pulse < 2; ++pulse) {
-                    const auto coefficients = powers(values[pulse]);
+                    const auto coefficients = powers(values[pulse], negligible_s * root / longest_root, used);
                     auto& row = times[direction > 0 ? 0 : 1][side < 0 ? 0 : 1][pulse][quarter];
                     for (std::size_t k = 0; k < terms; ++k) row[k][lane] = coefficients[k];
                 }

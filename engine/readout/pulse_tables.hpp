@@ -27,6 +27,7 @@ struct PulseTables {
     using Times = std::array<std::array<simd::Lanes, terms>, quarters>;
     /// [minimum, maximum][before, after][first, second pulse]
     std::array<std::array<std::array<Times, 2>, 2>, 2> times;
+    std::size_t used = 1;  ///< terms that some gyro needs: what others do without is zero
 
     /// Makes the tables of one gyro. `b_rad_s`: its coupling. Throws RunError where the phase does not pass two quarter
     /// fringes on either side of a turn.
