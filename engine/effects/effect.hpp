@@ -63,6 +63,8 @@ class Effect {
     virtual bool active(const Values& values) const = 0;
     /// Changes constants of the gyro. The default does nothing.
     virtual void configure(const Values& /*values*/, gyro::Setup& /*setup*/) const {}
+    /// What the lock-in threshold is multiplied by when the temperature has changed by so much since the start.
+    virtual double threshold_factor(const Values& /*values*/, double /*temperature_change_k*/) const { return 1.0; }
     /// A rate process for one gyro, or null where the effect has none.
     virtual std::unique_ptr<RateProcess> rate_process(const Values& /*values*/, const random::Identity& /*who*/) const {
         return nullptr;

@@ -13,6 +13,7 @@
     X(dither_asymmetry)       \
     X(dither_second_harmonic) \
     X(lockin_second_harmonic) \
+    X(lockin_temperature)     \
     X(lockin_turn_asymmetry)  \
     X(quantum_noise)          \
     X(rate_random_walk)       \
@@ -38,9 +39,9 @@ const Effect* find(std::string_view name) {
 }
 
 std::span<const std::string_view> planned() {
-    static constexpr std::array<std::string_view, 8> names = {
-        "bias_temperature",   "case_motion",   "count_quantization", "dither_residue",
-        "lockin_temperature", "missed_counts", "resampling",         "scale_factor_error"};
+    static constexpr std::array<std::string_view, 7> names = {
+        "bias_temperature", "case_motion", "count_quantization", "dither_residue",
+        "missed_counts",    "resampling",  "scale_factor_error"};
     return names;
 }
 

@@ -110,8 +110,9 @@ class Branch {
     bool empty() const { return listeners_.empty(); }
     bool compensated() const { return compensated_; }
 
-    void advance(std::size_t turns, std::span<const simd::Lanes> angle_arcsec, readout::DetectorNoise noise) {
-        dither_.next(turns, angle_arcsec, {}, drive_);
+    void advance(std::size_t turns, std::span<const simd::Lanes> angle_arcsec,
+                 std::span<const simd::Lanes> threshold_factor, readout::DetectorNoise noise) {
+        dither_.next(turns, angle_arcsec, threshold_factor, drive_);
         propagator_->step(drive_, turns_);
         readout_->read(drive_, turns_, noise, compensated_ ? 1 : 2, readings_, angles_);
         for (Listener& listener : listeners_) {
@@ -170,9 +171,15 @@ struct GyroBlock::State {
         }
         noisy = scenario.readout.model == scenario::ReadoutModel::instrument &&
                 scenario.readout.detector_noise_relative > 0.0;
+        environment = scenario.environment;
+        const bool follows_temperature =
+            environment.temperature_ramp_k_per_h != 0.0 || environment.temperature_swing_k != 0.0;
         for (const effects::Effect* effect : effects::registry()) {
             const auto values = scenario.effects.find(std::string(effect->name()));
             if (values == scenario.effects.end() || !effect->active(values->second)) continue;
+            if (follows_temperature && effect->threshold_factor(values->second, 1.0) != 1.0) {
+                threshold_effects.emplace_back(effect, values->second);
+            }
             if (auto process = effect->lane_rate_process(values->second, who, setups.size())) {
                 processes.push_back(std::move(process));
             }
@@ -206,6 +213,26 @@ struct GyroBlock::State {
         return angle_arcsec;
     }
 
+    /// What the threshold is multiplied by over the half cycles that begin in the piece; none where it stays.
+    std::span<const simd::Lanes> threshold_factors(std::size_t turns) {
+        if (threshold_effects.empty()) return {};
+        factors.resize(turns);
+        for (std::size_t i = 0; i < turns; ++i) {
+            const std::int64_t number = turn + static_cast<std::int64_t>(i);
+            for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+                const double period_s = duration_s[0][lane] + duration_s[1][lane];
+                const double middle_s = (0.5 * static_cast<double>(number) + 0.25) * period_s;
+                const double change_k = scenario::temperature_change_k(environment, middle_s);
+                double factor = 1.0;
+                for (const auto& [effect, values] : threshold_effects) {
+                    factor *= effect->threshold_factor(values, change_k);
+                }
+                factors[i][lane] = factor;
+            }
+        }
+        return factors;
+    }
+
     readout::DetectorNoise detector_noise(std::size_t turns) {
         if (!noisy) return {};
         noise.resize(2 * turns);
@@ -223,6 +250,9 @@ struct GyroBlock::State {
     random::LaneIdentities who;
     std::vector<Branch> branches;
     std::vector<std::unique_ptr<effects::LaneRateProcess>> processes;
+    scenario::Environment environment;
+    std::vector<std::pair<const effects::Effect*, effects::Values>> threshold_effects;
+    std::vector<simd::Lanes> factors;
     bool every_turn = false;  // some compensator wants the maxima, too
     bool noisy = false;
     std::array<simd::Lanes, 2> duration_s;
@@ -258,8 +288,9 @@ GyroBlock::~GyroBlock() = default;
 void GyroBlock::advance(std::size_t turns) {
     State& s = *state_;
     const auto angles = s.varying_angles(turns);
+    const auto factors = s.threshold_factors(turns);
     const auto noise = s.detector_noise(turns);
-    for (Branch& branch : s.branches) branch.advance(turns, angles, noise);
+    for (Branch& branch : s.branches) branch.advance(turns, angles, factors, noise);
     s.turn += static_cast<std::int64_t>(turns);
 }
 

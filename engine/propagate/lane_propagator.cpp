@@ -18,18 +18,6 @@ constexpr double least_spare = 1.05;
 constexpr double widest_rate_deg_h = 200.0;
 constexpr double widest_coupling = 0.05;  // relative
 
-/// Smallest and largest value of each gyro over the half cycles that begin in a piece.
-void extremes(const std::vector<simd::Lanes>& rows, simd::Lanes& lowest, simd::Lanes& highest) {
-    lowest = rows[1];
-    highest = rows[1];
-    for (std::size_t i = 2; i < rows.size(); ++i) {
-        for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
-            lowest[lane] = std::min(lowest[lane], rows[i][lane]);
-            highest[lane] = std::max(highest[lane], rows[i][lane]);
-        }
-    }
-}
-
 /// A range around what is asked for, wider than the last one up to `widest`, with room to spare up to `most_spare`.
 Range around(double lowest, double highest, const Range& last, double widest, double most_spare) {
     const double asked = 0.5 * (highest - lowest);

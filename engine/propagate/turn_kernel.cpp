@@ -129,6 +129,21 @@ void step_lanes(const TurnTables& tables, const gyro::LaneDrive& drive, std::siz
     }
 }
 
+void find_extremes(const std::vector<simd::Lanes>& rows, simd::Lanes& lowest, simd::Lanes& highest) {
+    const D d;
+    for (std::size_t lane = 0; lane < simd::lanes; lane += hn::Lanes(d)) {
+        V low = hn::Load(d, rows[1].data() + lane);
+        V high = low;
+        for (std::size_t i = 2; i < rows.size(); ++i) {
+            const V value = hn::Load(d, rows[i].data() + lane);
+            low = hn::Min(low, value);
+            high = hn::Max(high, value);
+        }
+        hn::Store(low, d, lowest.data() + lane);
+        hn::Store(high, d, highest.data() + lane);
+    }
+}
+
 }  // namespace ringlock::propagate::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -136,6 +151,11 @@ HWY_AFTER_NAMESPACE();
 namespace ringlock::propagate {
 
 HWY_EXPORT(step_lanes);
+HWY_EXPORT(find_extremes);
+
+void extremes(const std::vector<simd::Lanes>& rows, simd::Lanes& lowest, simd::Lanes& highest) {
+    HWY_DYNAMIC_DISPATCH(find_extremes)(rows, lowest, highest);
+}
 
 void step_turns(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t lanes, TurnState& state,
                 gyro::LaneTurns* turns) {

@@ -22,4 +22,7 @@ struct TurnState {
 void step_turns(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t lanes, TurnState& state,
                 gyro::LaneTurns* turns);
 
+/// Smallest and largest value of each gyro over the half cycles that begin in a piece: of rows[1] and all after it.
+void extremes(const std::vector<simd::Lanes>& rows, simd::Lanes& lowest, simd::Lanes& highest);
+
 }  // namespace ringlock::propagate

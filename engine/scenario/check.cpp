@@ -103,6 +103,20 @@ Finding noise_leaves_the_dither(const Scenario& s) {
                     s.noise_injection.turn_phase_rms_rad, most, sigmas)};
 }
 
+Finding temperature_leaves_a_threshold(const Scenario& s) {
+    constexpr double most = 0.9;
+    const double change_k = std::abs(s.environment.temperature_ramp_k_per_h) * s.ensemble.duration_s / 3600.0 +
+                            s.environment.temperature_swing_k;
+    const double relative = s.effects.at("lockin_temperature").at("relative_per_k");
+    if (std::abs(relative) * change_k <= most) return {};
+    return Complaint{
+        {"effects.lockin_temperature.relative_per_k", "environment.temperature_ramp_k_per_h",
+         "environment.temperature_swing_k", "ensemble.duration_s"},
+        fmt::format("the temperature changes by up to {:g} K, the threshold by {:g} of itself; it must not "
+                    "change by more than {:g}",
+                    change_k, std::abs(relative) * change_k, most)};
+}
+
 Finding sample_holds_a_cycle(const Scenario& s) {
     const double cycle = 1.0 / s.dither.frequency_hz;
     if (s.output.sample_interval_s >= cycle) return {};
@@ -137,6 +151,8 @@ constexpr std::array all_rules = {
     Rule{"Injected noise leaves at least half of each half cycle's swing within six standard deviations (checked where "
          "an arm injects noise).",
          noise_leaves_the_dither},
+    Rule{"The temperature changes the lock-in threshold by no more than 0.9 of itself over the run.",
+         temperature_leaves_a_threshold},
     Rule{"A sample of the output is at least one dither cycle long.", sample_holds_a_cycle},
     Rule{"A run holds at least three samples.", run_holds_samples},
 };

@@ -1,5 +1,7 @@
 #include "engine/scenario/scenario.hpp"
 
+#include <cmath>
+
 #include "engine/effects/effect.hpp"
 
 namespace ringlock::scenario {
@@ -11,6 +13,11 @@ EffectSettings default_effect_settings() {
         for (const effects::Parameter& p : effect->parameters()) values.emplace(p.name, p.default_value);
     }
     return settings;
+}
+
+double temperature_change_k(const Environment& environment, double time_s) {
+    const double phase = 2.0 * std::numbers::pi * std::fmod(time_s / environment.temperature_period_s, 1.0);
+    return environment.temperature_ramp_k_per_h * time_s / 3600.0 + environment.temperature_swing_k * std::sin(phase);
 }
 
 double input_rate_deg_h(const InputRate& input, std::int64_t point) {

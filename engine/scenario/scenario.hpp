@@ -48,6 +48,17 @@ struct InputRate {
     bool operator==(const InputRate&) const = default;
 };
 
+/// Temperature of the gyros against that at the start: ramp t + swing sin(2 pi t / period).
+struct Environment {
+    double temperature_ramp_k_per_h = 0.0;
+    double temperature_swing_k = 0.0;
+    double temperature_period_s = 86400.0;
+    bool operator==(const Environment&) const = default;
+};
+
+/// Temperature less that at the start [K].
+double temperature_change_k(const Environment& environment, double time_s);
+
 /// How many gyros, for how long, and how they differ.
 struct Ensemble {
     std::int64_t gyros = 64;
@@ -93,6 +104,7 @@ struct Scenario {
     NoiseInjection noise_injection;
     Readout readout;
     InputRate input;
+    Environment environment;
     EffectSettings effects = default_effect_settings();
     Ensemble ensemble;
     /// Names that parse_arm() of arm.hpp understands.

@@ -128,6 +128,17 @@ std::vector<Section> base_sections() {
              key(RINGLOCK_KEY(input, sweep_points), between<std::int64_t>(1, 100'000, "1 is no sweep"),
                  "Evenly spaced rates of the sweep, both ends included; each gets ensemble.gyros gyros."),
          }},
+        {"environment",
+         "Temperature of the gyros against that at the start, for effects that follow it: ramp t + swing sin(2 pi t / "
+         "period).",
+         {
+             key(RINGLOCK_KEY(environment, temperature_ramp_k_per_h), between(-1000.0, 1000.0, "a gyro warming up"),
+                 "Steady change of the temperature."),
+             key(RINGLOCK_KEY(environment, temperature_swing_k), between(0.0, 100.0, "a day in the desert"),
+                 "Amplitude of the periodic change."),
+             key(RINGLOCK_KEY(environment, temperature_period_s), between(1.0, 1e9, "slower than the dither"),
+                 "Period of that; the default is a day."),
+         }},
         {"ensemble",
          "How many gyros, for how long, and how they differ.",
          {

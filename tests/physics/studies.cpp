@@ -1,6 +1,7 @@
 // Whole studies: what the scenarios say in their first lines, and what may not be claimed.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <string>
 
@@ -121,6 +122,8 @@ TEST(Scenarios, TheDirectIntegratorGivesTheSameStudyAsTheTurnMap) {
     scenario.effects["dither_second_harmonic"] = {{"ratio", 0.01}, {"phase_rad", 0.5}};
     scenario.effects["lockin_second_harmonic"] = {{"ratio", 0.1}, {"phase_rad", -0.7}};
     scenario.effects["lockin_turn_asymmetry"]["ratio"] = 0.1;
+    scenario.effects["lockin_temperature"]["relative_per_k"] = 0.02;
+    scenario.environment = {.temperature_ramp_k_per_h = 900.0, .temperature_swing_k = 3.0, .temperature_period_s = 2.0};
     const auto records = [&](scenario::PropagationMethod method) {
         scenario.propagation.method = method;
         auto all = std::make_unique<GyroRecords>(scenario, 2);
@@ -138,6 +141,20 @@ TEST(Scenarios, TheDirectIntegratorGivesTheSameStudyAsTheTurnMap) {
             }
         }
     }
+}
+
+TEST(Scenarios, ADriftingThresholdShowsInTheRandomWalk) {
+    // The random walk goes with the threshold: 20 % more after 10 K, so that its square over the run has the mean of
+    // (1 + 0.2 x)^2 over x from 0 to 1. 16 gyros of 600 samples each: 0.7 % of the random walk.
+    scenario::Scenario scenario;
+    scenario.arms = {"noise_injected"};
+    scenario.noise_injection.turn_phase_rms_rad = 4.0;
+    scenario.ensemble.gyros = 16;
+    const double still = *run(scenario).arms[0].arw_deg_rt_h.median;
+    scenario.environment.temperature_ramp_k_per_h = 60.0;
+    scenario.effects["lockin_temperature"]["relative_per_k"] = 0.02;
+    const double drifting = *run(scenario).arms[0].arw_deg_rt_h.median;
+    EXPECT_NEAR(drifting / still, std::sqrt((std::pow(1.2, 3) - 1.0) / 0.6), 0.03);
 }
 
 TEST(Claims, NoBiasInstabilityWithoutFlickerHoweverWellTheTurnsAreRandomised) {

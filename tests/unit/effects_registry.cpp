@@ -106,6 +106,18 @@ TEST(SecondHarmonics, APhaseAloneDoesNothing) {
     }
 }
 
+TEST(Effects, TheThresholdFollowsTheTemperature) {
+    const Effect& effect = *find("lockin_temperature");
+    EXPECT_DOUBLE_EQ(effect.threshold_factor({{"relative_per_k", 0.02}}, 10.0), 1.2);
+    EXPECT_DOUBLE_EQ(effect.threshold_factor({{"relative_per_k", -0.02}}, 10.0), 0.8);
+    EXPECT_EQ(effect.threshold_factor({{"relative_per_k", 0.02}}, 0.0), 1.0);
+    for (const Effect* other : registry()) {
+        if (other != &effect) {
+            EXPECT_EQ(other->threshold_factor(defaults_of(*other), 10.0), 1.0) << other->name();
+        }
+    }
+}
+
 TEST(LockinTurnAsymmetry, SetsTheDifferenceBetweenTheTurns) {
     EXPECT_EQ(configured("lockin_turn_asymmetry", {{"ratio", 0.1}}).lockin_turn_asymmetry, 0.1);
 }

@@ -61,6 +61,21 @@ TEST(ScenarioRules, ASweepIsNotTooLarge) {
                 AllOf(HasSubstr("s.toml:5:9: key \"ensemble.gyros\" = 1001: "), HasSubstr("100000000 gyros")));
 }
 
+TEST(ScenarioRules, TemperatureLeavesAThreshold) {
+    EXPECT_THAT(
+        complaint("[effects.lockin_temperature]\nrelative_per_k = 0.1\n[environment]\ntemperature_swing_k = 20"),
+        AllOf(HasSubstr("effects.lockin_temperature.relative_per_k"), HasSubstr("20 K"), HasSubstr("0.9")));
+    EXPECT_EQ(complaint("[effects.lockin_temperature]\nrelative_per_k = 0.1\n[environment]\ntemperature_swing_k = 5"),
+              "");
+}
+
+TEST(Environment, TemperatureIsARampAndAWave) {
+    const Environment environment{
+        .temperature_ramp_k_per_h = 6.0, .temperature_swing_k = 2.0, .temperature_period_s = 400.0};
+    EXPECT_EQ(temperature_change_k(environment, 0.0), 0.0);
+    EXPECT_NEAR(temperature_change_k(environment, 700.0), 7.0 / 6.0 - 2.0, 1e-12);
+}
+
 TEST(ScenarioRules, TheTurnMapNeedsFringes) {
     // 2 Omega_D / (K w_D) is 2005 at the default: 100 are left at a twentieth of the dither's peak rate.
     const std::string weak = "[dither]\npeak_rate_deg_s = 5.4\n[gyro]\nlockin_threshold_deg_h = 100\n";
