@@ -28,6 +28,7 @@
 #include "engine/ensemble/progress.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/render.hpp"
+#include "engine/simd/target.hpp"
 
 namespace ringlock::app {
 
@@ -125,6 +126,8 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     check_interrupt();
 
     provenance.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    provenance.turns_per_s = static_cast<double>(study.turns) / provenance.wall_s;
+    provenance.instruction_set = simd::active_target();
     const study::Summary summary = study::summarise(study);
     writer.finish(study, summary, provenance);
     if (!arguments.plot.empty()) report::write_svg(arguments.plot, study_figure(study, summary));

@@ -48,6 +48,8 @@ void each_member(P& p, Visit visit) {
     visit("date_utc", p.date_utc);
     visit("threads", p.threads);
     visit("wall_s", p.wall_s);
+    visit("turns_per_s", p.turns_per_s);
+    visit("instruction_set", p.instruction_set);
 }
 
 }  // namespace

@@ -18,7 +18,9 @@ struct Provenance {
     std::string host;
     std::string date_utc;  ///< start of the run, ISO 8601, e.g. 2024-02-29T12:00:00Z
     std::int64_t threads = 0;
-    double wall_s = 0.0;  ///< duration of the run, known at its end
+    double wall_s = 0.0;          ///< duration of the run, known at its end
+    double turns_per_s = 0.0;     ///< turns that the result counts over that
+    std::string instruction_set;  ///< of the vector code
 };
 
 /// Provenance of a run that starts now. `arguments` begin with the program's name.

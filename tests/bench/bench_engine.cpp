@@ -27,15 +27,20 @@
 
 #include "analysis/allan/octave_stream.hpp"
 #include "analysis/report/table.hpp"
+#include "engine/compensate/exact.hpp"
+#include "engine/compensate/first_order.hpp"
 #include "engine/core/error.hpp"
 #include "engine/dither/lane_dither.hpp"
 #include "engine/ensemble/block.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/ensemble.hpp"
+#include "engine/ensemble/output_counts.hpp"
 #include "engine/propagate/direct.hpp"
 #include "engine/propagate/direct_lanes.hpp"
+#include "engine/propagate/lane_propagator.hpp"
 #include "engine/propagate/turn_kernel.hpp"
 #include "engine/propagate/turn_map.hpp"
+#include "engine/readout/lane_readout.hpp"
 #include "engine/simd/target.hpp"
 #include "tests/bench/noisy_dither.hpp"
 #include "tests/bench/random_and_sincos.hpp"
@@ -276,6 +281,70 @@ double peak_memory_mb(double hours) {
     return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
+/// Median time of each stage of a turn with instrument readout and both compensators [s a turn].
+std::vector<std::pair<std::string, double>> stages() {
+    scenario::Scenario scenario = paper();
+    scenario.ensemble.gyros = simd::lanes;
+    random::LaneIdentities who;
+    std::vector<gyro::Device> devices;
+    compensate::Calibration calibration;
+    calibration.amplitude_margin_rad = dither::LaneDither::amplitude_margin_rad(bench::turn_phase_rms_rad);
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+        const gyro::Device& device =
+            devices.emplace_back(ensemble::draw_setup(scenario, static_cast<std::int64_t>(lane)));
+        who.gyro[lane] = lane;
+        calibration.b_rad_s[lane] = device.coupling.b_rad_s;
+        calibration.dither_amplitude_rad[lane] = device.dither_amplitude_rad;
+        calibration.positive_duration_s[lane] = device.positive_duration_s;
+        calibration.negative_duration_s[lane] = device.negative_duration_s;
+    }
+    const auto map = propagate::make_turn_map(devices, calibration.amplitude_margin_rad, table_tolerance_rad);
+    const std::vector<gyro::Ellipse> ellipses(simd::lanes);
+    const readout::LaneReadout readout(devices, ellipses, {false, true, 100e6, 0.005}, true);
+    dither::LaneDither dither(devices, bench::turn_phase_rms_rad, who);
+    compensate::FirstOrder corrected(calibration, compensate::FirstOrder::corrected);
+    compensate::Exact exact(calibration, table_tolerance_rad);
+    gyro::LaneDrive drive;
+    gyro::LaneTurns turns;
+    readout::LaneReadings readings;
+    readout::LaneAngles angles;
+    std::vector<simd::Lanes> noise(2 * piece);
+    compensate::LaneErrors errors[2];
+    std::vector<simd::LaneCounts> counts[3];
+    allan::OctaveStream streams[3];
+    const std::vector<std::pair<std::string, std::function<void()>>> work = {
+        {"drive: one deviate, amplitude, phase", [&] { dither.next(piece, {}, {}, drive); }},
+        {"turn map, with the phase at the turn", [&] { map->step(drive, turns); }},
+        {"two deviates of detector noise",
+         [&] {
+             random::normals(who, random::Purpose::detector_noise, 2 * static_cast<std::uint64_t>(drive.first_turn),
+                             2 * piece, simd::lanes, noise.front().data());
+         }},
+        {"readout: zero-rate point, quadrature, four pulses",
+         [&] { readout.read(drive, turns, noise, 1, readings, angles); }},
+        {"corrected compensator", [&] { corrected.observe(readings, errors[0]); }},
+        {"exact compensator", [&] { exact.observe(readings, errors[1]); }},
+        {"output counts of three arms",
+         [&] {
+             for (int arm = 0; arm < 3; ++arm) {
+                 ensemble::output_counts(angles, arm == 0 ? nullptr : &errors[arm - 1], piece, counts[arm]);
+             }
+         }},
+        {"Allan sums of three arms", [&] {
+             for (int arm = 0; arm < 3; ++arm) streams[arm].add(counts[arm], simd::lanes);
+         }}};
+    std::vector<std::vector<double>> seconds(work.size());
+    for (int round = 0; round < 3000; ++round) {
+        for (std::size_t i = 0; i < work.size(); ++i) seconds[i].push_back(seconds_of(work[i].second));
+    }
+    std::vector<std::pair<std::string, double>> medians;
+    for (std::size_t i = 0; i < work.size(); ++i) {
+        std::sort(seconds[i].begin(), seconds[i].end());
+        medians.emplace_back(work[i].first, seconds[i][seconds[i].size() / 2] / (1.0 * piece * simd::lanes));
+    }
+    return medians;
+}
+
 struct Row {
     std::string figure;
     std::string wanted;
@@ -336,6 +405,8 @@ int main(int argc, char** argv) {
     Contender with_plain{"with instrument readout and Allan", turns, [&] { plain.advance(pieces); }};
     Contender integrated{"vectorised direct integrator, 1e-8 rad", 16.0 * simd::lanes, [&] { direct.advance(16); }};
     race({&kernel, &map, &with_ideal, &with_instrument, &with_plain, &integrated}, 9);
+
+    const auto profile = stages();
 
     const gyro::Device device(ensemble::nominal_setup(paper()));
     const std::vector<bench::ReferenceCost> references = bench::reference_costs(device);
@@ -437,6 +508,15 @@ int main(int argc, char** argv) {
     for (const bench::ReferenceCost& reference : references) {
         line(fmt::format("{}, {:.1e} a step", reference.name, reference.tolerance_rad), reference.seconds_per_turn,
              fmt::format("{:.1e}", reference.worst_error_rad));
+    }
+    fmt::print("\n");
+    if (markdown) fmt::print("| stage of a turn with instrument readout | nanoseconds |\n|---|---|\n");
+    for (const auto& [stage, seconds] : profile) {
+        if (markdown) {
+            fmt::print("| {} | {:.2f} |\n", stage, seconds * 1e9);
+        } else {
+            fmt::print("{:<60} {:>12.2f} ns\n", stage, seconds * 1e9);
+        }
     }
     fmt::print(
         "\nMachine: {}; instruction set {}; {}; tables to {:.0e} rad a turn. Times are medians of rounds in which "

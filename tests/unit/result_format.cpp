@@ -109,8 +109,12 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 
 /// Unit that a name ends in.
 std::string unit_of_name(const std::string& name) {
-    static const std::vector<std::pair<std::string, std::string>> units = {
-        {"deg_h_rt_h", "deg/h/sqrt(h)"}, {"deg_rt_h", "deg/sqrt(h)"}, {"deg_h", "deg/h"}, {"_rad", "rad"}, {"_s", "s"}};
+    static const std::vector<std::pair<std::string, std::string>> units = {{"_per_s", "1/s"},
+                                                                           {"deg_h_rt_h", "deg/h/sqrt(h)"},
+                                                                           {"deg_rt_h", "deg/sqrt(h)"},
+                                                                           {"deg_h", "deg/h"},
+                                                                           {"_rad", "rad"},
+                                                                           {"_s", "s"}};
     for (const auto& [part, unit] : units) {
         if (name.find(part + "_") != std::string::npos || name.ends_with(part)) return unit;
     }
