@@ -172,6 +172,23 @@ HWY_INLINE V acceleration_of_pulses(D d, V roots, V interval_s) {
     return hn::IfThenElseZero(interval_s > hn::Zero(d), root * root);
 }
 
+/// The half cycles on either side of a turn.
+struct Sides {
+    V sign;
+    Side before, after;
+    Extras extra;
+    std::size_t after_side;  ///< 0: the half cycle after the turn is of positive sign
+};
+
+/// What is known of a turn so far.
+struct Found {
+    Walk walk;
+    V quarters;  ///< phase at the zero-rate point in quarter fringes
+    V error;     ///< phase read less phase, fringes
+};
+
+constexpr std::size_t turns_together = 16;
+
 template <bool extras>
 bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses, const Electronics& electronics,
               bool accelerations, std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
@@ -187,19 +204,15 @@ bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses
         const V coupling_sine = load(constants.coupling_sine);
         const V lockin_whole = load(turns.lockin_whole);
         store(lockin_whole, angles.lockin_whole);
-        V last_scale = zero;
-        for (std::size_t i = 0; i < drive.turns; i += stride) {
+        const auto sides_of = [&](std::size_t i) HWY_ATTR {
             const int direction = drive.direction(i);
             const V sign = hn::Set(d, direction);
             const std::size_t after_side = direction > 0 ? 0 : 1;
-            const std::size_t before_side = 1 - after_side;
             const auto side_of = [&](std::size_t half, std::size_t which) HWY_ATTR {
                 return Side{load(drive.amplitude_rad[half]),     load(constants.angular_frequency_rad_s[which]),
                             sign * load(drive.rate_rad_s[half]), load(drive.b_rad_s[half]),
                             load(constants.scale_s[which]),      load(constants.scale_angle)};
             };
-            const Side before = side_of(i, before_side);
-            const Side after = side_of(i + 1, after_side);
             Extras extra{zero, zero, zero, zero, zero, zero, zero};
             if constexpr (extras) {
                 extra = {sign * load(constants.harmonic_ratio), load(constants.harmonic_sine),
@@ -207,95 +220,120 @@ bool read_all(const LaneReadout::Constants& constants, const PulseTables& pulses
                          load(constants.second_ratio),          sign * load(constants.second_sine),
                          load(constants.second_cosine)};
             }
-            Walk walk{zero, sign * load(turns.sine[i]), load(turns.cosine[i]), zero, zero};
-            if (!walk_to_zero_rate<extras>(d, before, after, extra, walk)) return false;
-            const V lockin = sm::fma(d, sign * walk.lockin_rad, per_rad, load(turns.lockin_fringes[i]));
-            store(lockin, angles.lockin_fringes[i]);
-            // psi at the zero-rate point, in fringes less whole ones that are added where the phase is reported.
-            const V phase = sm::fma(d, sign * walk.phase_rad, per_rad,
-                                    load(drive.plain_fringes[i]) + load(turns.lockin_fringes[i]));
-            const V true_sine = sm::fnma(d, walk.cosine, coupling_sine, sign * walk.sine * coupling_cosine);
-            const V true_cosine = sm::fma(d, sign * walk.sine, coupling_sine, walk.cosine * coupling_cosine);
+            return Sides{sign, side_of(i, 1 - after_side), side_of(i + 1, after_side), extra, after_side};
+        };
+        V last_scale = zero;
+        // A few turns at a time, step by step: what one turn does waits for itself, turns do not wait for each other,
+        // and short steps let the processor work at several of them.
+        Found found[turns_together];
+        for (std::size_t first = 0; first < drive.turns; first += turns_together * stride) {
+            const std::size_t end = std::min(drive.turns, first + turns_together * stride);
+            for (std::size_t i = first; i < end; i += stride) {
+                const Sides sides = sides_of(i);
+                Walk& walk = found[(i - first) / stride].walk;
+                walk = {zero, sides.sign * load(turns.sine[i]), load(turns.cosine[i]), zero, zero};
+                if (!walk_to_zero_rate<extras>(d, sides.before, sides.after, sides.extra, walk)) return false;
+            }
+            for (std::size_t i = first; i < end; i += stride) {
+                const int direction = drive.direction(i);
+                const V sign = hn::Set(d, direction);
+                const Walk& walk = found[(i - first) / stride].walk;
+                const V lockin = sm::fma(d, sign * walk.lockin_rad, per_rad, load(turns.lockin_fringes[i]));
+                store(lockin, angles.lockin_fringes[i]);
+                // psi at the zero-rate point, in fringes less whole ones that are added where the phase is reported.
+                const V phase = sm::fma(d, sign * walk.phase_rad, per_rad,
+                                        load(drive.plain_fringes[i]) + load(turns.lockin_fringes[i]));
+                const V true_sine = sm::fnma(d, walk.cosine, coupling_sine, sign * walk.sine * coupling_cosine);
+                const V true_cosine = sm::fma(d, sign * walk.sine, coupling_sine, walk.cosine * coupling_cosine);
 
-            V sine = true_sine;
-            V cosine = true_cosine;
-            V error = zero;  // phase read less phase, fringes
-            if (!electronics.ideal) {
-                sine = sm::fma(d, sine, load(constants.gain), load(constants.offset_sin));
-                cosine =
-                    sm::fnma(d, true_sine, load(constants.orthogonality_sine),
-                             sm::fma(d, true_cosine, load(constants.orthogonality_cosine), load(constants.offset_cos)));
-                if (!noise.empty()) {
-                    const V rms = hn::Set(d, electronics.detector_noise_relative);
-                    sine = sm::fma(d, rms, load(noise[2 * i]), sine);
-                    cosine = sm::fma(d, rms, load(noise[2 * i + 1]), cosine);
+                V sine = true_sine;
+                V cosine = true_cosine;
+                V error = zero;  // phase read less phase, fringes
+                if (!electronics.ideal) {
+                    sine = sm::fma(d, sine, load(constants.gain), load(constants.offset_sin));
+                    cosine = sm::fnma(
+                        d, true_sine, load(constants.orthogonality_sine),
+                        sm::fma(d, true_cosine, load(constants.orthogonality_cosine), load(constants.offset_cos)));
+                    if (!noise.empty()) {
+                        const V rms = hn::Set(d, electronics.detector_noise_relative);
+                        sine = sm::fma(d, rms, load(noise[2 * i]), sine);
+                        cosine = sm::fma(d, rms, load(noise[2 * i + 1]), cosine);
+                    }
+                    error = sm::arg(d, sm::fma(d, cosine, true_cosine, sine * true_sine),
+                                    sm::fnma(d, cosine, true_sine, sine * true_cosine)) *
+                            per_rad;
                 }
-                error = sm::arg(d, sm::fma(d, cosine, true_cosine, sine * true_sine),
-                                sm::fnma(d, cosine, true_sine, sine * true_cosine)) *
-                        per_rad;
+                // The counter names the quarter fringe; the quadrature's phase is taken on the branch nearest its
+                // middle.
+                const V quarters = phase * hn::Set(d, 4.0);
+                const V in_quarter = (quarters - hn::Floor(quarters) - hn::Set(d, 0.5)) * quarter;
+                error = sm::fraction(d, in_quarter + error) - in_quarter;
+                store(sine, readings.sine[i]);
+                store(cosine, readings.cosine[i]);
+                store(phase + error, readings.phase_fringes[i]);
+                const V swing = direction > 0 ? zero : load(constants.swing_whole);
+                store(load(drive.rotation_whole[i]) + lockin_whole + swing, readings.phase_whole[i]);
+                const V output_error = electronics.interpolate ? error : hn::Neg(in_quarter);
+                store(load(drive.rotation_fringes[i]) + lockin + output_error, angles.angle_fringes[i]);
+                store(load(drive.rotation_whole[i]) + lockin_whole, angles.angle_whole[i]);
+                found[(i - first) / stride].quarters = quarters;
+                found[(i - first) / stride].error = error;
             }
-            // The counter names the quarter fringe; the quadrature's phase is taken on the branch nearest its middle.
-            const V quarters = phase * hn::Set(d, 4.0);
-            const V in_quarter = (quarters - hn::Floor(quarters) - hn::Set(d, 0.5)) * quarter;
-            error = sm::fraction(d, in_quarter + error) - in_quarter;
-            store(sine, readings.sine[i]);
-            store(cosine, readings.cosine[i]);
-            store(phase + error, readings.phase_fringes[i]);
-            const V swing = direction > 0 ? zero : load(constants.swing_whole);
-            store(load(drive.rotation_whole[i]) + lockin_whole + swing, readings.phase_whole[i]);
-            const V output_error = electronics.interpolate ? error : hn::Neg(in_quarter);
-            store(load(drive.rotation_fringes[i]) + lockin + output_error, angles.angle_fringes[i]);
-            store(load(drive.rotation_whole[i]) + lockin_whole, angles.angle_whole[i]);
             if (!accelerations) continue;
-
-            if (electronics.ideal) {
-                store(drive_acceleration<extras>(d, before, extra, walk.time_s), readings.accel_before_rad_s2[i]);
-                store(drive_acceleration<extras>(d, after, extra, walk.time_s), readings.accel_after_rad_s2[i]);
-                continue;
+            for (std::size_t i = first; i < end; i += stride) {
+                const auto& [sign, before, after, extra, after_side] = sides_of(i);
+                const auto& [walk, quarters, error] = found[(i - first) / stride];
+                if (electronics.ideal) {
+                    store(drive_acceleration<extras>(d, before, extra, walk.time_s), readings.accel_before_rad_s2[i]);
+                    store(drive_acceleration<extras>(d, after, extra, walk.time_s), readings.accel_after_rad_s2[i]);
+                    continue;
+                }
+                // Comparators switch at whole quarter fringes of the true phase; how far these are from the extremum
+                // the electronics know only through the phase they measured.
+                const V upright = sign * quarters;
+                const V floor = hn::Floor(upright);
+                const V first_quarters = floor + hn::Set(d, 1.0) - upright;  // (0, 1]
+                const V quarter_rad = hn::Set(d, 1.5707963267948966);
+                const V near = first_quarters * quarter_rad;
+                const V far = near + quarter_rad;
+                const V index = floor - hn::Set(d, 4.0) * hn::Floor(floor * quarter);  // 0...3
+                const auto upper = index > hn::Set(d, 1.5);
+                const V in_pair = index - hn::IfThenElseZero(upper, hn::Set(d, 2.0));
+                const auto odd = in_pair > hn::Set(d, 0.5);
+                const V near_root = hn::Sqrt(near + near);
+                const V x = sm::fma(d, near_root, hn::Set(d, 1.1283791670955126), hn::Set(d, -1.0));  // 2/sqrt(pi)
+                const V far_root = hn::Sqrt(far + far);
+                const V error_rad = sign * error * hn::Set(d, 6.283185307179586);
+                const V twice_near = (near - error_rad) + (near - error_rad);
+                const V twice_far = (far - error_rad) + (far - error_rad);
+                const V measured_roots = hn::Sqrt(hn::Max(twice_far, zero)) - hn::Sqrt(hn::Max(twice_near, zero));
+                V tick_fraction = zero;
+                if (electronics.clock_hz > 0.0) {
+                    const std::int64_t turn = drive.first_turn + static_cast<std::int64_t>(i);
+                    const V clock = hn::Set(d, electronics.clock_hz);
+                    const V cycles = hn::Set(d, static_cast<double>(turn / 2));
+                    V time = cycles * (load(constants.duration_s[0]) + load(constants.duration_s[1]));
+                    if (turn % 2 != 0) time = time + load(constants.duration_s[0]);
+                    const V ticks = time * clock;
+                    tick_fraction = ticks - hn::Floor(ticks);
+                }
+                const PulseFactors factors =
+                    pulse_factors(d, pulses.times[after_side], pulses.used, lane, odd, upper, x);
+                const V turned_s = walk.time_s;
+                const auto side_acceleration = [&](std::size_t which, V scale) HWY_ATTR {
+                    const V first_s = sm::fma(d, near_root * scale, factors.values[which][0], turned_s);
+                    const V second_s = sm::fma(d, far_root * scale, factors.values[which][1], turned_s);
+                    const V interval = ticked_interval(d, tick_fraction, first_s, second_s, electronics.clock_hz);
+                    return acceleration_of_pulses(d, measured_roots, interval);
+                };
+                // The half cycle after this turn is the one before the next, unless its two ends differ.
+                const V scale_before =
+                    extras || i == 0 || stride != 1 ? inverse_root_acceleration<extras>(d, before, extra) : last_scale;
+                const V scale_after = inverse_root_acceleration<extras>(d, after, extra);
+                last_scale = scale_after;
+                store(side_acceleration(0, hn::Neg(scale_before)), readings.accel_before_rad_s2[i]);
+                store(side_acceleration(1, scale_after), readings.accel_after_rad_s2[i]);
             }
-            // Comparators switch at whole quarter fringes of the true phase; how far these are from the extremum the
-            // electronics know only through the phase they measured.
-            const V upright = sign * quarters;
-            const V floor = hn::Floor(upright);
-            const V first_quarters = floor + hn::Set(d, 1.0) - upright;  // (0, 1]
-            const V quarter_rad = hn::Set(d, 1.5707963267948966);
-            const V near = first_quarters * quarter_rad;
-            const V far = near + quarter_rad;
-            const V index = floor - hn::Set(d, 4.0) * hn::Floor(floor * quarter);  // 0...3
-            const auto upper = index > hn::Set(d, 1.5);
-            const V in_pair = index - hn::IfThenElseZero(upper, hn::Set(d, 2.0));
-            const auto odd = in_pair > hn::Set(d, 0.5);
-            const V near_root = hn::Sqrt(near + near);
-            const V x = sm::fma(d, near_root, hn::Set(d, 1.1283791670955126), hn::Set(d, -1.0));  // 2/sqrt(pi)
-            const V far_root = hn::Sqrt(far + far);
-            const V error_rad = sign * error * hn::Set(d, 6.283185307179586);
-            const V twice_near = (near - error_rad) + (near - error_rad);
-            const V twice_far = (far - error_rad) + (far - error_rad);
-            const V measured_roots = hn::Sqrt(hn::Max(twice_far, zero)) - hn::Sqrt(hn::Max(twice_near, zero));
-            V tick_fraction = zero;
-            if (electronics.clock_hz > 0.0) {
-                const std::int64_t turn = drive.first_turn + static_cast<std::int64_t>(i);
-                const V clock = hn::Set(d, electronics.clock_hz);
-                const V cycles = hn::Set(d, static_cast<double>(turn / 2));
-                V time = cycles * (load(constants.duration_s[0]) + load(constants.duration_s[1]));
-                if (turn % 2 != 0) time = time + load(constants.duration_s[0]);
-                const V ticks = time * clock;
-                tick_fraction = ticks - hn::Floor(ticks);
-            }
-            const PulseFactors factors = pulse_factors(d, pulses.times[after_side], pulses.used, lane, odd, upper, x);
-            const auto side_acceleration = [&](std::size_t which, V scale) HWY_ATTR {
-                const V first_s = sm::fma(d, near_root * scale, factors.values[which][0], walk.time_s);
-                const V second_s = sm::fma(d, far_root * scale, factors.values[which][1], walk.time_s);
-                const V interval = ticked_interval(d, tick_fraction, first_s, second_s, electronics.clock_hz);
-                return acceleration_of_pulses(d, measured_roots, interval);
-            };
-            // The half cycle after this turn is the one before the next, unless its two ends differ.
-            const V scale_before =
-                extras || i == 0 || stride != 1 ? inverse_root_acceleration<extras>(d, before, extra) : last_scale;
-            const V scale_after = inverse_root_acceleration<extras>(d, after, extra);
-            last_scale = scale_after;
-            store(side_acceleration(0, hn::Neg(scale_before)), readings.accel_before_rad_s2[i]);
-            store(side_acceleration(1, scale_after), readings.accel_after_rad_s2[i]);
         }
     }
     return true;
