@@ -91,7 +91,6 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
         V last_sine = load(state.sine);
         V last_cosine = load(state.cosine);
         V last_fringes = load(state.turn_fringes);
-        V last_read = load(state.read_fringes);
         V last_whole = load(state.turn_whole);
         V error = load(state.error_fringes);
         V last_amplitude = load(state.last_amplitude_rad);
@@ -112,10 +111,9 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
 
             // The half cycle that ends here, turned upright by its own sign, which is that of the turn before.
             const V swing = hn::Neg(sign) * ((load(readings.phase_whole[i]) - last_whole) +
-                                             (load(readings.phase_fringes[i]) - last_read));
+                                             (load(readings.phase_fringes[i]) - last_fringes));
             const V plain_rotation = hn::Neg(sign) * rate * load(state.duration_s[1 - after]);
-            // First from zero-rate point to dither's turn by the amplitude that the swing between readings shows but
-            // for the lock-in: it waits for no turn before.
+            // First from zero-rate point to dither's turn by the amplitude that the swing shows but for the lock-in.
             const V rough = half * sm::fma(d, swing, two_pi, hn::Neg(plain_rotation));
             const bool has_before = begun || i > 0;
             const V before_amplitude = has_before ? rough : mean_amplitude;
@@ -138,7 +136,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 const propagate::TurnTables::Part& part = tables.part(minimum ? -1.0 : 1.0, 0);
                 // To first order for the amplitude, then in full: exp(-i x_0) and exp(-i x_1).
                 const V moved =
-                    hn::Neg(sign) * ((load(readings.phase_whole[i]) - last_whole) + (turn_fringes - last_fringes));
+                    sm::fma(d, hn::Neg(sign) * (turn_fringes - load(readings.phase_fringes[i])), one, swing);
                 const pm::HalfMapOf<V> first = pm::middle(d, part, lane);
                 const V bend = sm::fma(d, first.z_im, last_cosine - cosine,
                                        hn::Neg(first.z_re * (last_sine - sine)));  // Im z (e_0 - e_1)
@@ -164,7 +162,6 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
             last_sine = sine;
             last_cosine = cosine;
             last_fringes = turn_fringes;
-            last_read = load(readings.phase_fringes[i]);
             last_whole = load(readings.phase_whole[i]);
         }
         store(error, state.error_fringes);
@@ -172,7 +169,6 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
         store(last_sine, state.sine);
         store(last_cosine, state.cosine);
         store(last_fringes, state.turn_fringes);
-        store(last_read, state.read_fringes);
         store(last_whole, state.turn_whole);
         store(last_amplitude, state.last_amplitude_rad);
     }

@@ -41,7 +41,6 @@ class Exact final : public LaneCompensator {
         // Of the turn before: sine and cosine of its upright phase at the dither's turn, that phase, and the amplitude
         // of the half cycle that ended there.
         simd::Lanes sine, cosine, turn_fringes, turn_whole, last_amplitude_rad;
-        simd::Lanes read_fringes;   ///< phase read there
         simd::Lanes error_fringes;  ///< at the dither's turn
         simd::Lanes error_whole;
     };
