@@ -13,7 +13,7 @@ namespace ringlock::study {
 
 inline constexpr std::int64_t result_format_version = 2;
 
-/// Writes a result as the study goes on: angle records as gyros finish, the rest at the end. The file has its name only
+/// Writes a result as the study goes on: samples as they come, the rest at the end. The file has its name only
 /// after finish().
 class ResultWriter {
    public:

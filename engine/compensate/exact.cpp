@@ -93,7 +93,6 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
         V last_fringes = load(state.turn_fringes);
         V last_whole = load(state.turn_whole);
         V error = load(state.error_fringes);
-        V last_amplitude = load(state.last_amplitude_rad);
         V error_whole = load(state.error_whole);
         const V told_whole = load(errors.whole);
         for (std::size_t i = first_row; i < last_row; ++i) {
@@ -155,7 +154,6 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 const V carry = sm::nearest(d, error);
                 error = error - carry;
                 error_whole = error_whole + carry;
-                last_amplitude = amplitude;
             }
             // From the dither's turn to the zero-rate point again: the lock-in's share the other way round.
             store(sm::fnma(d, sign * lockin_rad, per_rad, error) + (error_whole - told_whole), errors.fringes[i]);
@@ -170,7 +168,6 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
         store(last_cosine, state.cosine);
         store(last_fringes, state.turn_fringes);
         store(last_whole, state.turn_whole);
-        store(last_amplitude, state.last_amplitude_rad);
     }
     return true;
 }
@@ -196,7 +193,6 @@ Exact::Exact(const Calibration& calibration, double tolerance_rad) : calibration
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
         const std::size_t which = std::min(lane, calibration.lanes - 1);
         state_.amplitude_rad[lane] = calibration.dither_amplitude_rad[which];
-        state_.last_amplitude_rad[lane] = calibration.dither_amplitude_rad[which];
         state_.b_rad_s[lane] = calibration.b_rad_s[which];
         state_.duration_s[0][lane] = calibration.positive_duration_s[which];
         state_.duration_s[1][lane] = calibration.negative_duration_s[which];

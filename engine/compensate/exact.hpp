@@ -38,9 +38,8 @@ class Exact final : public LaneCompensator {
         simd::Lanes angular_frequency_rad_s[2];
         simd::Lanes scale_s[2], scale_angle;  ///< unit of time of the path near a turn, and its angle of the dither
         simd::Lanes rate_rad_s;               ///< as estimated
-        // Of the turn before: sine and cosine of its upright phase at the dither's turn, that phase, and the amplitude
-        // of the half cycle that ended there.
-        simd::Lanes sine, cosine, turn_fringes, turn_whole, last_amplitude_rad;
+        // Of the turn before: sine and cosine of its upright phase at the dither's turn, and that phase.
+        simd::Lanes sine, cosine, turn_fringes, turn_whole;
         simd::Lanes error_fringes;  ///< at the dither's turn
         simd::Lanes error_whole;
     };

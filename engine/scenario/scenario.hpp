@@ -76,7 +76,7 @@ enum class PropagationMethod { turn_map, direct };
 /// How the equation of motion is solved.
 struct Propagation {
     PropagationMethod method = PropagationMethod::turn_map;
-    double direct_tolerance_rad = 1e-10;    ///< local error per step of the direct integrator
+    double direct_tolerance_rad = 1e-10;    ///< error of a half cycle by the direct integrator
     double turn_map_tolerance_rad = 1e-10;  ///< interpolation error per turn of the turn map
     bool operator==(const Propagation&) const = default;
 };

@@ -168,7 +168,7 @@ std::vector<Section> base_sections() {
                  "fringe, the reference."),
              key(RINGLOCK_KEY(propagation, direct_tolerance_rad),
                  between(1e-14, 1e-3, "double precision ends below it"),
-                 "Error per step that the direct integrator allows."),
+                 "Error of a half cycle that the direct integrator allows."),
              key(RINGLOCK_KEY(propagation, turn_map_tolerance_rad),
                  between(1e-14, 1e-3, "double precision ends below it"),
                  "Interpolation error per turn that the turn map allows."),
