@@ -64,17 +64,18 @@ double seconds_of(const std::function<void()>& work) {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+double median_of(std::vector<double> values) {
+    std::sort(values.begin(), values.end());
+    return values[values.size() / 2];
+}
+
 /// Something to be timed, in rounds with the others.
 struct Contender {
     std::string name;
     double turns;  ///< of one round, all gyros together
     std::function<void()> run;
     std::vector<double> seconds = {};
-    double per_turn_s() const {
-        std::vector<double> sorted = seconds;
-        std::sort(sorted.begin(), sorted.end());
-        return sorted[sorted.size() / 2] / turns;
-    }
+    double per_turn_s() const { return median_of(seconds) / turns; }
 };
 
 /// Contenders take turns, so that a machine that slows down slows all.
@@ -224,7 +225,7 @@ void multiply_adds(int threads) {
     const auto work = [] {
         double x[16];
         std::iota(std::begin(x), std::end(x), 0.5);
-        for (int i = 0; i < 30'000'000; ++i) {
+        for (int i = 0; i < 10'000'000; ++i) {
             for (double& value : x) value = value * 0.999999 + 1e-7;
         }
         return std::accumulate(std::begin(x), std::end(x), 0.0);
@@ -246,7 +247,7 @@ void ensemble_run(std::int64_t gyros, int threads) {
     };
     scenario::Scenario scenario = paper();
     scenario.ensemble.gyros = gyros;
-    scenario.ensemble.duration_s = 120.0;
+    scenario.ensemble.duration_s = 60.0;
     const auto arms = arms_of({"noise_injected", "noise_injected+compensated"});
     ensemble::run(scenario, arms, 0, gyros, threads,
                   [](std::int64_t, std::size_t) { return std::make_unique<Nothing>(); }, {});
@@ -416,14 +417,20 @@ int main(int argc, char** argv) {
     race({&map}, 3);  // again beside the references
     const double ratio = best.seconds_per_turn / map.per_turn_s();
 
-    constexpr std::int64_t gyros = 128;
+    constexpr std::int64_t gyros = 256;
     Contender one{"one thread", 1.0, [&] { ensemble_run(gyros, 1); }};
     Contender two{"two threads", 1.0, [&] { ensemble_run(gyros, 2); }};
     Contender one_loop{"one thread of multiply-adds", 1.0, [&] { multiply_adds(1); }};
     Contender two_loops{"two threads of multiply-adds", 1.0, [&] { multiply_adds(2); }};
-    race({&one, &two, &one_loop, &two_loops}, 5);
+    race({&one, &one_loop, &two, &two_loops}, 25);
     const double gain = one.per_turn_s() / two.per_turn_s();
     const double loop_gain = 2.0 * one_loop.per_turn_s() / two_loops.per_turn_s();
+    // Round by round: a neighbour that takes a processor away for some seconds takes it from study and loop alike.
+    std::vector<double> shares;
+    for (std::size_t i = 0; i < one.seconds.size(); ++i) {
+        shares.push_back(one.seconds[i] / two.seconds[i] / (2.0 * one_loop.seconds[i] / two_loops.seconds[i]));
+    }
+    const double share = median_of(shares);
 
     const double memory_one = peak_memory_mb(1.0);
     const double memory_ten = peak_memory_mb(10.0);
@@ -473,8 +480,7 @@ int main(int argc, char** argv) {
     rows.push_back({"the same with instrument readout, no compensator", "reported",
                     fmt::format("{:.3g}", 1.0 / with_plain.per_turn_s()), "-"});
     rows.push_back({"two threads over one, of what independent multiply-adds gain", ">= 0.95",
-                    fmt::format("{:.3f} ({:.2f} of {:.2f})", gain / loop_gain, gain, loop_gain),
-                    verdict(gain >= 0.95 * loop_gain)});
+                    fmt::format("{:.3f} ({:.2f} of {:.2f})", share, gain, loop_gain), verdict(share >= 0.95)});
     rows.push_back({"peak memory of a study, 10 h over 1 h", "within 5 %",
                     fmt::format("{:.3f} ({:.1f} and {:.1f} MB)", memory_ten / memory_one, memory_ten, memory_one),
                     verdict(std::abs(memory_ten / memory_one - 1.0) <= 0.05)});
