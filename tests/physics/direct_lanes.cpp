@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "engine/dither/lane_dither.hpp"
 #include "engine/propagate/turn_kernel.hpp"
 #include "engine/simd/target.hpp"
+#include "tests/physics/noisy_block.hpp"
 #include "tests/physics/support.hpp"
 #include "tests/support/series_integrator.hpp"
 
@@ -113,38 +113,16 @@ TEST(DirectLanes, AResultDoesNotDependOnTheInstructionSet) {
     simd::use_best_target();
 }
 
-/// Some gyros of unequal couplings and rates.
-std::vector<gyro::Device> block(std::size_t gyros) {
-    std::vector<gyro::Device> devices;
-    for (std::size_t i = 0; i < gyros; ++i) {
-        gyro::Setup setup = paper_device();
-        const auto x = static_cast<double>(i);
-        setup.lockin_threshold_deg_h *= 1.0 + 0.1 * x;
-        setup.input_rate_deg_h = 20.0 * x - 10.0;
-        setup.coupling_phase_rad = 0.4 * x;
-        setup.initial_phase_rad = 0.7 * x;
-        setup.dither_asymmetry_ratio = 0.01 * x;
-        devices.emplace_back(setup);
-    }
-    return devices;
-}
-
-dither::LaneDither noisy_dither(const std::vector<gyro::Device>& devices) {
-    random::LaneIdentities who;
-    who.seed = 35;
-    for (std::size_t lane = 0; lane < simd::lanes; ++lane) who.gyro[lane] = lane;
-    return {devices, 3.0, who};
-}
-
 TEST(DirectLanes, GoThroughTheTurnsOfADriveAsTheTurnMapDoes) {
-    const auto devices = block(5);
+    const auto devices =
+        unequal_devices(5, [](gyro::Setup& setup, double x) { setup.dither_asymmetry_ratio = 0.01 * x; });
     auto dither = noisy_dither(devices);
     propagate::DirectLanes direct(devices, 1e-12);
     propagate::TurnTables tables(1e-11);
     propagate::TurnState state;
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
         const gyro::Device& device = devices[std::min(lane, devices.size() - 1)];
-        tables.make(lane, device, ranges(device, dither::LaneDither::amplitude_margin_rad(3.0)));
+        tables.make(lane, device, noisy_ranges(device));
         state.coupling_phase_fringes[lane] = device.coupling.phase_rad / units::two_pi;
     }
     gyro::LaneDrive drive;

@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "engine/core/error.hpp"
-#include "engine/dither/lane_dither.hpp"
 #include "engine/propagate/direct_lanes.hpp"
 #include "engine/propagate/phase_kernel.hpp"
 #include "engine/propagate/turn_kernel.hpp"
 #include "engine/simd/target.hpp"
+#include "tests/physics/noisy_block.hpp"
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
@@ -141,30 +141,16 @@ TEST(PhaseTables, RefuseWhatTheyCannotHold) {
     EXPECT_THROW(moebius.make(0, device, ranges(device, 0.0)), RunError);
 }
 
-/// Some gyros of unequal devices.
+/// Unequal gyros with second harmonics of the coupling of `ratio` times their number.
 std::vector<gyro::Device> block(std::size_t gyros, double ratio) {
-    std::vector<gyro::Device> devices;
-    for (std::size_t i = 0; i < gyros; ++i) {
-        const auto x = static_cast<double>(i);
-        gyro::Setup setup = device_with(ratio * x, 0.3 * x);
-        setup.lockin_threshold_deg_h *= 1.0 + 0.1 * x;
-        setup.input_rate_deg_h = 20.0 * x - 10.0;
-        setup.coupling_phase_rad = 0.4 * x;
-        setup.initial_phase_rad = 0.7 * x;
-        devices.emplace_back(setup);
-    }
-    return devices;
-}
-
-dither::LaneDither noisy_dither(const std::vector<gyro::Device>& devices) {
-    random::LaneIdentities who;
-    who.seed = 35;
-    for (std::size_t lane = 0; lane < simd::lanes; ++lane) who.gyro[lane] = lane;
-    return {devices, 3.0, who};
+    return unequal_devices(gyros, [&](gyro::Setup& setup, double x) {
+        setup.lockin_second_ratio = ratio * x;
+        setup.lockin_second_phase_rad = 0.3 * x;
+    });
 }
 
 void make(PhaseTables& tables, PhaseState& state, std::size_t lane, const gyro::Device& device) {
-    tables.make(lane, device, ranges(device, dither::LaneDither::amplitude_margin_rad(3.0)));
+    tables.make(lane, device, noisy_ranges(device));
     state.coupling_phase_fringes[lane] = device.coupling.phase_rad / units::two_pi;
 }
 
@@ -204,7 +190,7 @@ TEST(PhaseTables, AgreeWithTheMoebiusMapWithoutSecondHarmonic) {
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
         const gyro::Device& device = devices[std::min(lane, devices.size() - 1)];
         if (lane < devices.size()) make(tables, state, lane, device);
-        moebius.make(lane, device, ranges(device, dither::LaneDither::amplitude_margin_rad(3.0)));
+        moebius.make(lane, device, noisy_ranges(device));
         moebius_state.coupling_phase_fringes[lane] = device.coupling.phase_rad / units::two_pi;
     }
     gyro::LaneDrive drive;

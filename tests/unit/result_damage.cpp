@@ -1,0 +1,171 @@
+// Files that are no result, another one or a damaged one: in the way of a result, and given to be read.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <hdf5.h>
+
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "analysis/study/result_file.hpp"
+#include "engine/core/error.hpp"
+#include "tests/unit/result_support.hpp"
+
+namespace ringlock::study {
+namespace {
+
+using test::bytes;
+using test::ResultFile;
+using test::small;
+using test::write;
+using testing::AllOf;
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+// What is there already.
+
+TEST_F(ResultFile, ReplacesAResultOfTheSameScenarioOnly) {
+    write(path_, small(false));
+    EXPECT_NO_THROW(write(path_, small(false)));
+    const std::string before = bytes(path_);
+    EXPECT_THROW(ResultWriter(path_, Study(small(false, 6))), InputError) << "another seed";
+    EXPECT_THROW(ResultWriter(path_, Study(small(true))), InputError) << "another scenario";
+    EXPECT_EQ(bytes(path_), before);
+    EXPECT_EQ(left(), std::set<std::string>{"out.h5"});
+}
+
+TEST_F(ResultFile, KeepsFilesThatAreNoResult) {
+    for (const std::string& content : {std::string("not HDF5\n"), std::string()}) {
+        std::ofstream(path_, std::ios::binary) << content;
+        EXPECT_THROW(ResultWriter(path_, Study(small(false))), InputError);
+        EXPECT_EQ(bytes(path_), content);
+    }
+    store::File::create(path_).set_attribute("format", "rlg-record");
+    const std::string before = bytes(path_);
+    EXPECT_THROW(ResultWriter(path_, Study(small(false))), InputError);
+    EXPECT_EQ(bytes(path_), before);
+    EXPECT_EQ(left(), std::set<std::string>{"out.h5"});
+}
+
+TEST_F(ResultFile, LeavesNothingWithoutFinish) {
+    { ResultWriter writer(path_, Study(small(true))); }
+    EXPECT_EQ(left(), std::set<std::string>{});
+    EXPECT_THROW(ResultWriter(directory_ / "missing" / "out.h5", Study(small(true))), InputError);
+    EXPECT_THROW(ResultWriter(directory_ / std::string(300, 'x'), Study(small(true))), InputError);
+    EXPECT_EQ(left(), std::set<std::string>{});
+}
+
+// Damage.
+
+class DamagedResult : public ResultFile {
+   protected:
+    void SetUp() override {
+        ResultFile::SetUp();
+        write(path_, small(true));
+    }
+    /// Opens the file for a change by hand.
+    template <class Change>
+    void change(Change how) {
+        const hid_t file = H5Fopen(path_.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+        ASSERT_GE(file, 0);
+        how(file);
+        ASSERT_GE(H5Fclose(file), 0);
+    }
+    void remove(const char* name) {
+        change([&](hid_t file) { ASSERT_GE(H5Ldelete(file, name, H5P_DEFAULT), 0) << name; });
+    }
+    void reshape(const char* name, const std::vector<hsize_t>& extent) {
+        remove(name);
+        change([&](hid_t file) {
+            const hid_t space = H5Screate_simple(static_cast<int>(extent.size()), extent.data(), nullptr);
+            H5Dclose(H5Dcreate2(file, name, H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+            H5Sclose(space);
+        });
+    }
+    void set_version(std::int64_t version) {
+        change([&](hid_t file) {
+            const hid_t attribute = H5Aopen(file, "format_version", H5P_DEFAULT);
+            H5Awrite(attribute, H5T_NATIVE_INT64, &version);
+            H5Aclose(attribute);
+        });
+    }
+};
+
+TEST_F(DamagedResult, MissingObjectsAreNamed) {
+    ASSERT_EQ(complaint_of(path_), "(accepted)");
+    for (const char* name : {"arms/uncompensated/allan/edf", "arms/uncompensated/noise/arw_deg_rt_h_lo",
+                             "arms/noise_injected+compensated/rate_error_deg_h", "arms/uncompensated/noise",
+                             "gyros/initial_phase_rad", "arms", "scenario"}) {
+        fs::remove(path_);
+        write(path_, small(true));
+        remove(name);
+        EXPECT_THAT(complaint_of(path_), AllOf(HasSubstr(path_.string()), HasSubstr(name), HasSubstr("missing")));
+    }
+    // Angle records are not read for the statistics.
+    fs::remove(path_);
+    write(path_, small(true));
+    remove("arms/uncompensated/angle_arcsec");
+    EXPECT_EQ(complaint_of(path_), "(accepted)");
+}
+
+TEST_F(DamagedResult, WrongShapesAreNamedWithBoth) {
+    const std::size_t taus = Study(small(true)).factors.size();
+    reshape("arms/uncompensated/rate_error_deg_h", {4});
+    EXPECT_THAT(complaint_of(path_), AllOf(HasSubstr(path_.string()), HasSubstr("/arms/uncompensated/rate_error_deg_h"),
+                                           HasSubstr("[4]"), HasSubstr("[3]")));
+    reshape("arms/uncompensated/rate_error_deg_h", {3});
+    ASSERT_EQ(complaint_of(path_), "(accepted)");
+    // As many numbers, but the other way round.
+    reshape("arms/uncompensated/allan/edf", {taus, 3});
+    EXPECT_THAT(complaint_of(path_),
+                AllOf(HasSubstr("/arms/uncompensated/allan/edf"), HasSubstr("the result is damaged")));
+}
+
+TEST_F(DamagedResult, WrongKindsAreNamed) {
+    remove("gyros/initial_phase_rad");
+    change([](hid_t file) {
+        H5Gclose(H5Gcreate2(file, "gyros/initial_phase_rad", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+    });
+    EXPECT_THAT(complaint_of(path_), AllOf(HasSubstr("/gyros/initial_phase_rad"), HasSubstr("must be a dataset")));
+    reshape("scenario", {1});
+    EXPECT_THAT(complaint_of(path_), AllOf(HasSubstr(path_.string()), HasSubstr("/scenario")));
+}
+
+TEST_F(DamagedResult, OtherVersionsAndFormatsAreRefused) {
+    set_version(1);
+    EXPECT_THAT(complaint_of(path_),
+                AllOf(HasSubstr(path_.string()), HasSubstr("format_version is 1"), HasSubstr("reads 2")));
+    set_version(2);
+    change([](hid_t file) { H5Adelete(file, "turns"); });
+    EXPECT_THAT(complaint_of(path_), AllOf(HasSubstr(path_.string()), HasSubstr("turns"), HasSubstr("missing")));
+    change([](hid_t file) { H5Adelete(file, "format"); });
+    EXPECT_THAT(complaint_of(path_), AllOf(HasSubstr(path_.string()), HasSubstr("not a ringlock result")));
+}
+
+TEST_F(DamagedResult, TruncatedFilesAreRefusedAtAnyLength) {
+    const std::string whole = bytes(path_);
+    for (const double part : {0.0, 0.0001, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.9999}) {
+        const auto length = static_cast<std::size_t>(part * static_cast<double>(whole.size()));
+        std::ofstream(path_, std::ios::binary) << whole.substr(0, length);
+        EXPECT_THAT(complaint_of(path_), HasSubstr(path_.string())) << length << " of " << whole.size() << " bytes";
+    }
+}
+
+// Bytes that went bad: either the damage is noticed, or it hit a number; never anything but InputError.
+TEST_F(DamagedResult, OverwrittenBytesNeverCrash) {
+    const std::string whole = bytes(path_);
+    for (std::size_t i = 0; i < 60; ++i) {
+        std::string bad = whole;
+        const std::size_t at = i * (whole.size() / 60);
+        for (std::size_t k = at; k < std::min(at + 64, bad.size()); ++k) bad[k] = static_cast<char>(0xA5 ^ bad[k]);
+        std::ofstream(path_, std::ios::binary) << bad;
+        try {
+            (void)read_result(path_);
+        } catch (const InputError& error) {
+            EXPECT_THAT(error.what(), HasSubstr(path_.string()));
+        }
+    }
+}
+
+}  // namespace
+}  // namespace ringlock::study
