@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "engine/ensemble/output_counts.hpp"
 #include "engine/ensemble/trajectory_kind.hpp"
 #include "engine/propagate/lane_propagator.hpp"
+#include "engine/readout/fraction_recovery.hpp"
 #include "engine/readout/lane_readout.hpp"
 
 namespace ringlock::ensemble {
@@ -30,8 +32,16 @@ struct Listener {
 
 readout::Electronics make_electronics(const scenario::Scenario& scenario) {
     const auto& readout = scenario.readout;
-    return {readout.model == scenario::ReadoutModel::ideal, readout.angle_output == scenario::AngleOutput::interpolated,
-            readout.clock_hz, readout.detector_noise_relative};
+    readout::Electronics electronics{readout.model == scenario::ReadoutModel::ideal,
+                                     readout.angle_output == scenario::AngleOutput::interpolated, readout.clock_hz,
+                                     readout.detector_noise_relative};
+    if (readout.model == scenario::ReadoutModel::instrument) {
+        electronics.comparator_noise_relative = readout.comparator_noise_relative;
+        electronics.comparator_hysteresis_relative = readout.comparator_hysteresis_relative;
+        electronics.detector_bandwidth_hz = readout.detector_bandwidth_hz;
+        electronics.adc_bits = static_cast<int>(readout.adc_bits);
+    }
+    return electronics;
 }
 
 double injected_rms_rad(const scenario::Scenario& scenario, TrajectoryKind kind) {
@@ -104,17 +114,28 @@ class Branch {
         }
         if (listeners_.empty()) return;
         propagator_ = make_propagator(scenario, devices_, kind);
-        readout_.emplace(devices_, ellipses_of(setups), make_electronics(scenario), compensated_);
+        const readout::Electronics electronics = make_electronics(scenario);
+        const bool instrument = scenario.readout.model == scenario::ReadoutModel::instrument;
+        every_turn_ = compensated_ || instrument;
+        readout_.emplace(devices_, ellipses_of(setups), electronics,
+                         instrument     ? readout::Wanted::pulses
+                         : compensated_ ? readout::Wanted::accelerations
+                                        : readout::Wanted::phase);
+        if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
+            // Amplitudes are half the difference of two turns' noise.
+            recovery_.emplace(devices_, electronics, injected_rms_rad(scenario, kind) / std::numbers::sqrt2);
+        }
     }
 
     bool empty() const { return listeners_.empty(); }
-    bool compensated() const { return compensated_; }
+    bool every_turn() const { return every_turn_; }
 
     void advance(std::size_t turns, std::span<const simd::Lanes> angle_arcsec,
-                 std::span<const simd::Lanes> threshold_factor, readout::DetectorNoise noise) {
+                 std::span<const simd::Lanes> threshold_factor, const readout::ElectronicNoise& noise) {
         dither_.next(turns, angle_arcsec, threshold_factor, drive_);
         propagator_->step(drive_, turns_);
-        readout_->read(drive_, turns_, noise, compensated_ ? 1 : 2, readings_, angles_);
+        readout_->read(drive_, turns_, noise, every_turn_ ? 1 : 2, readings_, angles_);
+        if (recovery_) recovery_->recover(readings_, angles_);
         for (Listener& listener : listeners_) {
             if (listener.compensator) listener.compensator->observe(readings_, listener.errors);
             output_counts(angles_, listener.compensator ? &listener.errors : nullptr, turns, listener.counts);
@@ -140,7 +161,9 @@ class Branch {
     std::unique_ptr<propagate::LanePropagator> propagator_;
     std::optional<readout::LaneReadout> readout_;
     std::vector<Listener> listeners_;
+    std::optional<readout::FractionRecovery> recovery_;
     bool compensated_ = false;
+    bool every_turn_ = false;
     gyro::LaneDrive drive_;
     gyro::LaneTurns turns_;
     readout::LaneReadings readings_;
@@ -166,11 +189,13 @@ struct GyroBlock::State {
              {TrajectoryKind::ideal, TrajectoryKind::plain, TrajectoryKind::noise_injected}) {
             Branch branch(scenario, arms, setups, who, kind);
             if (branch.empty()) continue;
-            every_turn = every_turn || branch.compensated();
+            every_turn = every_turn || branch.every_turn();
             branches.push_back(std::move(branch));
         }
-        noisy = scenario.readout.model == scenario::ReadoutModel::instrument &&
-                scenario.readout.detector_noise_relative > 0.0;
+        noisy_detectors =
+            scenario.readout.model != scenario::ReadoutModel::ideal && scenario.readout.detector_noise_relative > 0.0;
+        noisy_comparators = scenario.readout.model == scenario::ReadoutModel::instrument &&
+                            scenario.readout.comparator_noise_relative > 0.0;
         environment = scenario.environment;
         const bool follows_temperature =
             environment.temperature_ramp_k_per_h != 0.0 || environment.temperature_swing_k != 0.0;
@@ -233,11 +258,21 @@ struct GyroBlock::State {
         return factors;
     }
 
-    readout::DetectorNoise detector_noise(std::size_t turns) {
-        if (!noisy) return {};
-        noise.resize(2 * turns);
-        random::normals(who, random::Purpose::detector_noise, 2 * static_cast<std::uint64_t>(turn), 2 * turns,
-                        setups.size(), noise.front().data(), every_turn ? 1 : 2);
+    readout::ElectronicNoise electronic_noise(std::size_t turns) {
+        readout::ElectronicNoise noise;
+        if (noisy_detectors) {
+            detectors.resize(2 * turns);
+            random::normals(who, random::Purpose::detector_noise, 2 * static_cast<std::uint64_t>(turn), 2 * turns,
+                            setups.size(), detectors.front().data(), every_turn ? 1 : 2);
+            noise.detectors = detectors;
+        }
+        if (noisy_comparators) {
+            constexpr std::size_t pulses = 2 * readout::kept_pulses;
+            comparators.resize(pulses * turns);
+            random::normals(who, random::Purpose::comparator_noise, pulses * static_cast<std::uint64_t>(turn),
+                            pulses * turns, setups.size(), comparators.front().data());
+            noise.comparators = comparators;
+        }
         return noise;
     }
 
@@ -254,13 +289,15 @@ struct GyroBlock::State {
     std::vector<std::pair<const effects::Effect*, effects::Values>> threshold_effects;
     std::vector<simd::Lanes> factors;
     bool every_turn = false;  // some compensator wants the maxima, too
-    bool noisy = false;
+    bool noisy_detectors = false;
+    bool noisy_comparators = false;
     std::array<simd::Lanes, 2> duration_s;
     std::int64_t turn = 0;
     std::vector<simd::Lanes> interval_start_s;
     std::vector<simd::Lanes> interval_s;
     std::vector<simd::Lanes> angle_arcsec;
-    std::vector<simd::Lanes> noise;
+    std::vector<simd::Lanes> detectors;
+    std::vector<simd::Lanes> comparators;
 };
 
 namespace {
@@ -289,7 +326,7 @@ void GyroBlock::advance(std::size_t turns) {
     State& s = *state_;
     const auto angles = s.varying_angles(turns);
     const auto factors = s.threshold_factors(turns);
-    const auto noise = s.detector_noise(turns);
+    const auto noise = s.electronic_noise(turns);
     for (Branch& branch : s.branches) branch.advance(turns, angles, factors, noise);
     s.turn += static_cast<std::int64_t>(turns);
 }

@@ -22,6 +22,7 @@ enum class Purpose : std::uint64_t {
     rate_random_walk = 8,
     bias_instability = 9,
     bootstrap = 10,
+    comparator_noise = 11,
 };
 
 /// Who draws: the study's seed and the gyro's number.

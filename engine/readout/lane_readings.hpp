@@ -2,9 +2,28 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/readout/electronics.hpp"
 #include "engine/simd/lanes.hpp"
 
 namespace ringlock::readout {
+
+/// Times of the comparators' pulses next to consecutive turns, as the counter's clock sees them.
+struct LanePulses {
+    /// From the instant at which the detectors were sampled, in the direction of time [s]; 0 where that pulse was not
+    /// told apart from its neighbour beyond the turn. [before, after][nearest first][turn]
+    std::vector<simd::Lanes> time_s[2][kept_pulses];
+    /// Number of the quarter fringe of the nearest pulses, counted upright: the phase itself at minima, its negative at
+    /// maxima; in quarter fringes, on the branch of phase_fringes. [turn]
+    std::vector<simd::Lanes> first_quarter;
+
+    void resize(std::size_t wanted) {
+        for (auto& side : time_s) {
+            for (auto& column : side) column.resize(wanted);
+        }
+        first_quarter.resize(wanted);
+    }
+    bool empty() const { return first_quarter.empty(); }
+};
 
 /// What the electronics report of consecutive zero-rate points of a block of gyros: one row a turn, one column a gyro.
 /// Even turns of a run are minima of the phase. Compensators see this and nothing else.
@@ -20,6 +39,7 @@ struct LaneReadings {
     /// Magnitude of the phase acceleration on either side; 0 where no two pulses were told apart.
     std::vector<simd::Lanes> accel_before_rad_s2;
     std::vector<simd::Lanes> accel_after_rad_s2;
+    LanePulses pulses;  ///< empty where nobody asked for them
 
     void resize(std::size_t wanted) {
         turns = wanted;

@@ -5,22 +5,20 @@
 #include "engine/gyro/device.hpp"
 #include "engine/gyro/lane_drive.hpp"
 #include "engine/random/normal_lanes.hpp"
+#include "engine/readout/electronics.hpp"
 #include "engine/readout/lane_readings.hpp"
 #include "engine/readout/pulse_tables.hpp"
+#include "engine/readout/readout_constants.hpp"
 
 /// From the true phase to what the electronics report.
 namespace ringlock::readout {
 
-/// Properties of the electronics.
-struct Electronics {
-    bool ideal = false;                    ///< exact phase and acceleration at every zero-rate point
-    bool interpolate = true;               ///< angle from count and quadrature; otherwise whole quarter fringes
-    double clock_hz = 0.0;                 ///< pulses are timed in whole ticks; 0: continuous
-    double detector_noise_relative = 0.0;  ///< rms of each detector sample over the fringe amplitude
+/// What readings hold beside the phase.
+enum class Wanted {
+    phase,
+    accelerations,  ///< from two pulses on either side unless the electronics are ideal
+    pulses,         ///< these, too, and the detectors sampled where the pulses tell; every property of the electronics
 };
-
-/// The same noise for all trajectories of a block: deviates of both detectors at each turn, [2 turn + detector][gyro].
-using DetectorNoise = std::span<const simd::Lanes>;
 
 /// Readout of a block of gyros.
 ///
@@ -31,35 +29,20 @@ class LaneReadout {
    public:
     /// \param devices     of each gyro, at most simd::lanes; with b = 0 where there is no lock-in
     /// \param ellipses    errors of each gyro's detectors; not used by ideal electronics
-    /// \param with_pulses accelerations are wanted, from pulses unless the electronics are ideal
+    /// \param wanted      what the readings must hold
     LaneReadout(std::span<const gyro::Device> devices, std::span<const gyro::Ellipse> ellipses,
-                const Electronics& electronics, bool with_pulses);
+                const Electronics& electronics, Wanted wanted);
 
-    /// Reads every `stride`-th turn of the piece, from the first; rows of turns in between are left as they are.
-    /// `noise` is empty where the electronics have none. Throws RunError where the phase does not reverse near a turn.
-    void read(const gyro::LaneDrive& drive, const gyro::LaneTurns& turns, DetectorNoise noise, std::size_t stride,
-              LaneReadings& readings, LaneAngles& angles) const;
-
-    /// What the kernel needs, one value for each gyro; index 0 of a pair: half cycles of positive sign.
-    struct Constants {
-        simd::Lanes angular_frequency_rad_s[2];
-        simd::Lanes duration_s[2];
-        simd::Lanes scale_s[2];   ///< unit of time of the path near a turn
-        simd::Lanes scale_angle;  ///< angular frequency times that
-        simd::Lanes harmonic_ratio, harmonic_sine, harmonic_cosine;
-        simd::Lanes turn_asymmetry;
-        simd::Lanes second_ratio, second_sine, second_cosine;  ///< second harmonic of the coupling, in psi + its phase
-        simd::Lanes coupling_cosine, coupling_sine;            ///< of the coupling phase
-        simd::Lanes gain, offset_sin, offset_cos, orthogonality_cosine, orthogonality_sine;
-        simd::Lanes swing_whole;  ///< whole fringes between minima and maxima that the drive's phases leave out
-    };
+    /// Reads every `stride`-th turn of the piece, from the first; rows of turns in between are left as they are. With
+    /// pulses, every turn is read. Throws RunError where the phase does not reverse near a turn.
+    void read(const gyro::LaneDrive& drive, const gyro::LaneTurns& turns, const ElectronicNoise& noise,
+              std::size_t stride, LaneReadings& readings, LaneAngles& angles) const;
 
    private:
     std::size_t lanes_;
     Electronics electronics_;
-    bool with_accelerations_;
-    bool extras_ = false;  // some gyro has a second harmonic, or unequal turns
-    Constants constants_;
+    Wanted wanted_;
+    ReadoutConstants constants_;
     PulseTables pulses_;
 };
 

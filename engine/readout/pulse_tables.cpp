@@ -1,5 +1,7 @@
 #include "engine/readout/pulse_tables.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -13,7 +15,7 @@ namespace {
 constexpr double quarter_rad = 0.5 * units::pi;
 constexpr double tolerance_rad = 1e-12;
 constexpr double negligible_s = 2e-12;  // in the time of a pulse
-constexpr double longest_root = 2.507;  // of twice the distance of any pulse, sqrt(2 pi)
+constexpr double longest_root = 3.545;  // of twice the distance of any pulse, sqrt(4 pi)
 using Series = gyro::PhaseSeries<20>;
 
 /// Time, from the turn at which `half` begins (side +1) or ends (-1), at which the phase would stand still with the
@@ -38,23 +40,25 @@ double standstill_s(const gyro::HalfCycle& half, const gyro::Coupling& coupling,
     return t;
 }
 
-/// Times from the standstill to two distances beyond it.
-std::array<double, 2> crossings_s(const gyro::HalfCycle& half, const gyro::Coupling& coupling, int side, double psi_rad,
-                                  const std::array<double, 2>& distances_rad) {
+using PerPulse = std::array<double, kept_pulses>;
+
+/// Times from the standstill to the first `pulses` distances beyond it.
+PerPulse crossings_s(const gyro::HalfCycle& half, const gyro::Coupling& coupling, int side, double psi_rad,
+                     const PerPulse& distances_rad, std::size_t pulses) {
     const double origin = side > 0 ? 0.0 : half.duration_s;
     const double start = standstill_s(half, coupling, side, psi_rad);
     const double up = side * half.sign;  // the phase rises on both sides of a minimum
     const double scale = 1.0 / std::sqrt(half.end_acceleration_rad_s2(side > 0 ? 0 : 1));
-    std::array<double, 2> times{};
+    PerPulse times{};
     std::size_t found = 0;
     double t = start;
     double psi = psi_rad;
     double gone = 0.0;
-    while (found < 2) {
+    while (found < pulses) {
         const Series series(half, coupling, origin + t, psi, scale);
         const double h = side * std::min(series.step_s(tolerance_rad), scale);
         const double reached = gone + up * series.gain_rad(h);
-        while (found < 2 && reached >= distances_rad[found]) {
+        while (found < pulses && reached >= distances_rad[found]) {
             // Newton from outside: the phase moves away ever faster.
             double at = h;
             for (int i = 0; i < 60; ++i) {
@@ -69,8 +73,9 @@ std::array<double, 2> crossings_s(const gyro::HalfCycle& half, const gyro::Coupl
         gone = reached;
         t += h;
         if (std::abs(t) > 0.5 * half.duration_s) {
-            throw RunError(
-                "readout: fewer than two quarter-fringe pulses between a turn and the middle of its half cycle");
+            throw RunError(fmt::format(
+                "readout: fewer than {} quarter-fringe pulses between a turn and the middle of its half cycle",
+                pulses));
         }
     }
     return times;
@@ -112,25 +117,33 @@ std::array<double, PulseTables::terms> powers(const std::array<double, PulseTabl
 
 }  // namespace
 
-void PulseTables::make(std::size_t lane, const gyro::Device& device) {
+void PulseTables::make(std::size_t lane, const gyro::Device& device, std::size_t pulses) {
+    for (const std::size_t which : {0U, 1U}) {
+        const gyro::HalfCycle half = device.half_cycle(which == 0 ? 1.0 : -1.0, device.dither_amplitude_rad);
+        const double b = device.coupling.b_rad_s;
+        inverse_bend[which][lane] = b != 0.0 ? std::sqrt(half.end_acceleration_rad_s2()) / b : 0.0;
+    }
     for (const int direction : {1, -1}) {
         for (const int side : {-1, 1}) {
             const gyro::HalfCycle half = device.half_cycle(side * direction, device.dither_amplitude_rad);
             const double root = std::sqrt(half.end_acceleration_rad_s2(side > 0 ? 0 : 1));
             for (std::size_t quarter = 0; quarter < quarters; ++quarter) {
-                std::array<std::array<double, terms>, 2> values{};
+                std::array<std::array<double, terms>, kept_pulses> values{};
                 for (std::size_t i = 0; i < terms; ++i) {
                     const double node = std::cos(units::pi * (static_cast<double>(i) + 0.5) / terms);
                     const double first = quarter_rad * 0.25 * (1.0 + node) * (1.0 + node);
-                    const std::array<double, 2> distances{first, first + quarter_rad};
+                    PerPulse distances{};
+                    for (std::size_t k = 0; k < kept_pulses; ++k) {
+                        distances[k] = first + static_cast<double>(k) * quarter_rad;
+                    }
                     // The extremum lies before the end of its quarter in the direction in which the phase leaves it.
                     const double psi = direction * (static_cast<double>(quarter + 1) * quarter_rad - first);
-                    const auto seconds = crossings_s(half, device.coupling, side, psi, distances);
-                    for (std::size_t pulse = 0; pulse < 2; ++pulse) {
+                    const PerPulse seconds = crossings_s(half, device.coupling, side, psi, distances, pulses);
+                    for (std::size_t pulse = 0; pulse < pulses; ++pulse) {
                         values[pulse][i] = std::abs(seconds[pulse]) * root / std::sqrt(2.0 * distances[pulse]);
                     }
                 }
-                for (std::size_t pulse = 0; pulse < 2; ++pulse) {
+                for (std::size_t pulse = 0; pulse < pulses; ++pulse) {
                     const auto coefficients = powers(values[pulse], negligible_s * root / longest_root, used);
                     auto& row = times[direction > 0 ? 0 : 1][side < 0 ? 0 : 1][pulse][quarter];
                     for (std::size_t k = 0; k < terms; ++k) row[k][lane] = coefficients[k];

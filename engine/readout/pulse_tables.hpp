@@ -3,12 +3,13 @@
 #include <span>
 
 #include "engine/gyro/device.hpp"
+#include "engine/readout/electronics.hpp"
 #include "engine/simd/lanes.hpp"
 
 namespace ringlock::readout {
 
-/// When the comparators switch next to a turn: times of the two quarter-fringe pulses nearest to the zero-rate point on
-/// each side, as functions of the phase there.
+/// When the phase passes quarter fringes next to a turn: times of the pulses nearest to the zero-rate point on each
+/// side, as functions of the phase there.
 ///
 /// With x the phase turned upright (psi + coupling phase at minima, its negative at maxima), d the phase from the
 /// extremum to the pulse and a the phase acceleration, t sqrt(a) = sqrt(2 d) R, and R is a smooth function of sqrt(d),
@@ -25,13 +26,16 @@ struct PulseTables {
 
     /// Polynomial in 2 sqrt(d1/(pi/2)) - 1, d1 the distance of the first pulse: [quarter][power].
     using Times = std::array<std::array<simd::Lanes, terms>, quarters>;
-    /// [minimum, maximum][before, after][first, second pulse]
-    std::array<std::array<std::array<Times, 2>, 2>, 2> times;
+    /// [minimum, maximum][before, after][pulse, nearest first]
+    std::array<std::array<std::array<Times, kept_pulses>, 2>, 2> times;
     std::size_t used = 1;  ///< terms that some gyro needs: what others do without is zero
+    /// For each gyro, what R - 1 is in proportion to, but for the sinusoid's own curvature: it goes with
+    /// b/sqrt(a), and this is the inverse of that of the tables; 0 without lock-in. [sides: positive, negative]
+    simd::Lanes inverse_bend[2];
 
-    /// Makes the tables of one gyro. `b_rad_s`: its coupling. Throws RunError where the phase does not pass two quarter
-    /// fringes on either side of a turn.
-    void make(std::size_t lane, const gyro::Device& device);
+    /// Makes the tables of one gyro for so many pulses on each side, at most kept_pulses. Throws RunError where the
+    /// phase does not pass as many quarter fringes on either side of a turn.
+    void make(std::size_t lane, const gyro::Device& device, std::size_t pulses);
 
     /// Polynomial of a table at the quarter and distance, for tests: t sqrt(a)/sqrt(2 d).
     static double at(const Times& times, std::size_t lane, std::size_t quarter, double first_distance_rad);

@@ -117,6 +117,76 @@ Finding temperature_leaves_a_threshold(const Scenario& s) {
                     change_k, std::abs(relative) * change_k, most)};
 }
 
+Finding keys_are_the_instruments(const Scenario& s) {
+    static const Readout standard;
+    if (s.readout.model == ReadoutModel::instrument) return {};
+    const Readout& r = s.readout;
+    std::string key;
+    if (r.phase_from != standard.phase_from) key = "phase_from";
+    if (r.comparator_noise_relative != standard.comparator_noise_relative) key = "comparator_noise_relative";
+    if (r.comparator_hysteresis_relative != standard.comparator_hysteresis_relative) {
+        key = "comparator_hysteresis_relative";
+    }
+    if (r.detector_bandwidth_hz != standard.detector_bandwidth_hz) key = "detector_bandwidth_hz";
+    if (r.adc_bits != standard.adc_bits) key = "adc_bits";
+    if (key.empty()) return {};
+    return Complaint{{"readout." + key, "readout.model"},
+                     fmt::format("readout.{} is a property of the instrument, which this readout model leaves out; set "
+                                 "readout.model = \"instrument\"",
+                                 key)};
+}
+
+/// Largest rate of the phase in fringes a second: the dither's, with its spread, and the input.
+double peak_beat_hz(const Scenario& s) {
+    const double spread = 1.0 + sigmas * s.ensemble.dither_amplitude_sd_relative;
+    const double asymmetry =
+        1.0 + std::abs(s.effects.at("dither_asymmetry").at("ratio")) + sigmas * s.ensemble.dither_asymmetry_sd_ratio;
+    const double input = std::max(std::abs(s.input.rate_deg_h), std::abs(s.input.sweep_stop_deg_h));
+    return (peak_rate_deg_h(s) * spread * asymmetry + input) / s.gyro.scale_factor_arcsec;
+}
+
+Finding comparators_follow_the_fringes(const Scenario& s) {
+    const Readout& r = s.readout;
+    if (r.model != ReadoutModel::instrument || r.detector_bandwidth_hz == 0.0) return {};
+    const double beat = peak_beat_hz(s);
+    const double left = 1.0 / std::hypot(1.0, beat / r.detector_bandwidth_hz);
+    const double needed = r.comparator_hysteresis_relative + sigmas * r.comparator_noise_relative;
+    if (left > needed && r.detector_bandwidth_hz > beat) return {};
+    return Complaint{
+        {"readout.detector_bandwidth_hz", "dither.peak_rate_deg_s", "gyro.scale_factor_arcsec",
+         "readout.comparator_hysteresis_relative", "readout.comparator_noise_relative"},
+        fmt::format("a bandwidth of {:g} Hz leaves {:.3g} of the fringes' amplitude where the dither is fastest ({:g} "
+                    "fringes a second); the bandwidth must exceed that rate, and what is left the comparators' "
+                    "hysteresis and six sigma of their noise, {:.3g}, or the counter loses fringes",
+                    r.detector_bandwidth_hz, left, beat, needed)};
+}
+
+Finding comparators_do_not_chatter(const Scenario& s) {
+    const Readout& r = s.readout;
+    constexpr double least = 4.0;
+    if (r.model != ReadoutModel::instrument ||
+        r.comparator_hysteresis_relative >= least * r.comparator_noise_relative) {
+        return {};
+    }
+    return Complaint{{"readout.comparator_hysteresis_relative", "readout.comparator_noise_relative"},
+                     fmt::format("comparators with noise of {:g} switch back and forth where the phase is slow; their "
+                                 "hysteresis of {:g} must be at least {:g} times the noise",
+                                 r.comparator_noise_relative, r.comparator_hysteresis_relative, least)};
+}
+
+Finding converter_holds_the_detectors(const Scenario& s) {
+    constexpr double range = 1.25;
+    const auto& ellipse = s.effects.at("readout_ellipse");
+    const double largest = std::max(1.0 + ellipse.at("gain") + std::abs(ellipse.at("offset_sin")),
+                                    1.0 + std::abs(ellipse.at("offset_cos"))) +
+                           sigmas * s.readout.detector_noise_relative;
+    if (s.readout.model != ReadoutModel::instrument || s.readout.adc_bits == 0 || largest <= range) return {};
+    return Complaint{
+        {"readout.adc_bits", "readout.detector_noise_relative", "effects.readout_ellipse.gain",
+         "effects.readout_ellipse.offset_sin", "effects.readout_ellipse.offset_cos"},
+        fmt::format("the detectors reach {:.3g} fringe amplitudes, the converter holds {:g}", largest, range)};
+}
+
 Finding sample_holds_a_cycle(const Scenario& s) {
     const double cycle = 1.0 / s.dither.frequency_hz;
     if (s.output.sample_interval_s >= cycle) return {};
@@ -153,6 +223,17 @@ constexpr std::array all_rules = {
          noise_leaves_the_dither},
     Rule{"The temperature changes the lock-in threshold by no more than 0.9 of itself over the run.",
          temperature_leaves_a_threshold},
+    Rule{"Keys that only the instrument has stay at their defaults with other readout models.",
+         keys_are_the_instruments},
+    Rule{
+        "The instrument's bandwidth exceeds the fastest rate of fringes, and leaves there more of their amplitude than "
+        "hysteresis and six standard deviations of the comparators' noise.",
+        comparators_follow_the_fringes},
+    Rule{"The instrument's comparators have a hysteresis of at least four standard deviations of their noise.",
+         comparators_do_not_chatter},
+    Rule{"The instrument's detectors, with six standard deviations of their noise, stay within the converter's range "
+         "of 1.25 fringe amplitudes.",
+         converter_holds_the_detectors},
     Rule{"A sample of the output is at least one dither cycle long.", sample_holds_a_cycle},
     Rule{"A run holds at least three samples.", run_holds_samples},
 };

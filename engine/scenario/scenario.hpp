@@ -28,15 +28,22 @@ struct NoiseInjection {
     bool operator==(const NoiseInjection&) const = default;
 };
 
-enum class ReadoutModel { ideal, instrument };
+enum class ReadoutModel { ideal, latched, instrument };
+enum class PhaseFrom { detectors, detectors_and_pulses };
 enum class AngleOutput { interpolated, quarter_fringe };
 
 /// What the electronics can know of the phase.
 struct Readout {
-    ReadoutModel model = ReadoutModel::instrument;
+    ReadoutModel model = ReadoutModel::latched;
     AngleOutput angle_output = AngleOutput::interpolated;
     double clock_hz = 100e6;                 ///< counter clock that times pulses and turns
     double detector_noise_relative = 0.005;  ///< rms noise of each detector sample over the fringe amplitude
+    // Of the instrument only:
+    PhaseFrom phase_from = PhaseFrom::detectors_and_pulses;
+    double comparator_noise_relative = 0.005;      ///< rms noise of a comparator's input when it switches
+    double comparator_hysteresis_relative = 0.03;  ///< comparators switch this far beyond zero
+    double detector_bandwidth_hz = 10e6;           ///< of detectors and comparators; 0: unlimited
+    std::int64_t adc_bits = 12;                    ///< 0: continuous
     bool operator==(const Readout&) const = default;
 };
 

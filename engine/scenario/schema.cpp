@@ -17,7 +17,8 @@ namespace ringlock::scenario {
 namespace {
 
 /// Words of each enumeration, in the order of its values.
-std::vector<std::string> words_of(ReadoutModel) { return {"ideal", "instrument"}; }
+std::vector<std::string> words_of(ReadoutModel) { return {"ideal", "latched", "instrument"}; }
+std::vector<std::string> words_of(PhaseFrom) { return {"detectors", "detectors_and_pulses"}; }
 std::vector<std::string> words_of(AngleOutput) { return {"interpolated", "quarter_fringe"}; }
 std::vector<std::string> words_of(PropagationMethod) { return {"turn_map", "direct"}; }
 
@@ -29,6 +30,10 @@ Bounds above(double min, double max, std::string why) {
     return {.min = min, .max = max, .min_excluded = true, .why = std::move(why)};
 }
 Bounds zero_or(double min, double max, std::string why) {
+    return {.min = min, .max = max, .or_zero = true, .why = std::move(why)};
+}
+
+Bounds zero_or_whole(std::int64_t min, std::int64_t max, std::string why) {
     return {.min = min, .max = max, .or_zero = true, .why = std::move(why)};
 }
 
@@ -107,8 +112,10 @@ std::vector<Section> base_sections() {
          "What the electronics can know of the phase; compensators see nothing else.",
          {
              key(RINGLOCK_KEY(readout, model), none,
-                 "ideal: phases and times without error; instrument: pulse clock, quadrature detectors with noise, "
-                 "quarter-fringe counter."),
+                 "ideal: phases and times without error; latched: quadrature detectors with noise, sampled at the "
+                 "zero-rate point itself, quarter-fringe counter, noiseless pulses on a clock; instrument: noisy "
+                 "comparators with hysteresis, a converter, a finite bandwidth, and the zero-rate point found from the "
+                 "pulses."),
              key(RINGLOCK_KEY(readout, angle_output), none,
                  "interpolated: the angle from the quadrature phase; quarter_fringe: from the up/down counter alone, "
                  "in steps of K/4."),
@@ -117,6 +124,19 @@ std::vector<Section> base_sections() {
              key(RINGLOCK_KEY(readout, detector_noise_relative),
                  between(0.0, 0.5, "beyond it the fringe cannot be followed"),
                  "Rms noise of each detector sample over the amplitude of the fringe."),
+             key(RINGLOCK_KEY(readout, phase_from), none,
+                 "Of the instrument: the phase at the zero-rate point from the sampled detectors alone, or also from "
+                 "the times of the four nearest pulses on either side."),
+             key(RINGLOCK_KEY(readout, comparator_noise_relative), between(0.0, 0.1, "a quarter fringe is 1.57"),
+                 "Of the instrument: rms noise at each comparator's input when it switches, over the amplitude of the "
+                 "fringe."),
+             key(RINGLOCK_KEY(readout, comparator_hysteresis_relative), between(0.0, 0.3, "a quarter fringe is 1.57"),
+                 "Of the instrument: comparators switch this far beyond zero, over the amplitude of the fringe."),
+             key(RINGLOCK_KEY(readout, detector_bandwidth_hz), zero_or(1e4, 1e12, "0 is unlimited"),
+                 "Of the instrument: first-order low-pass of detectors and comparators."),
+             key(RINGLOCK_KEY(readout, adc_bits), zero_or_whole(4, 24, "0 is a continuous converter"),
+                 "Of the instrument: bits of the converter of the detectors, which spans 1.25 fringe amplitudes to "
+                 "either side."),
          }},
         {"input",
          "Rate of the case about the input axis, the dither apart.",

@@ -301,7 +301,7 @@ std::vector<std::pair<std::string, double>> stages() {
     }
     const auto map = propagate::make_turn_map(devices, calibration.amplitude_margin_rad, table_tolerance_rad);
     const std::vector<gyro::Ellipse> ellipses(simd::lanes);
-    const readout::LaneReadout readout(devices, ellipses, {false, true, 100e6, 0.005}, true);
+    const readout::LaneReadout readout(devices, ellipses, {false, true, 100e6, 0.005}, readout::Wanted::accelerations);
     dither::LaneDither dither(devices, bench::turn_phase_rms_rad, who);
     compensate::FirstOrder corrected(calibration, compensate::FirstOrder::corrected);
     compensate::Exact exact(calibration, table_tolerance_rad);
@@ -322,7 +322,7 @@ std::vector<std::pair<std::string, double>> stages() {
                              2 * piece, simd::lanes, noise.front().data());
          }},
         {"readout: zero-rate point, quadrature, four pulses",
-         [&] { readout.read(drive, turns, noise, 1, readings, angles); }},
+         [&] { readout.read(drive, turns, {noise}, 1, readings, angles); }},
         {"corrected compensator", [&] { corrected.observe(readings, errors[0]); }},
         {"exact compensator", [&] { exact.observe(readings, errors[1]); }},
         {"output counts of three arms",
@@ -387,9 +387,9 @@ int main(int argc, char** argv) {
     DirectTrajectories direct(trajectories.devices());
     Study ideal(scenario::ReadoutModel::ideal,
                 {"noise_injected", "noise_injected+compensated", "noise_injected+compensated_exact"});
-    Study instrument(scenario::ReadoutModel::instrument,
+    Study instrument(scenario::ReadoutModel::latched,
                      {"noise_injected", "noise_injected+compensated", "noise_injected+compensated_exact"});
-    Study plain(scenario::ReadoutModel::instrument, {"noise_injected"});
+    Study plain(scenario::ReadoutModel::latched, {"noise_injected"});
     constexpr int pieces = 400;
     constexpr double turns = 1.0 * pieces * piece * simd::lanes;
     std::int64_t drawn = 0;

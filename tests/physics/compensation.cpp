@@ -124,7 +124,7 @@ TEST(Compensation, WithAnIdealReadoutTheCorrectionLeavesThirdOrderOnly) {
 TEST(Compensation, DetectorNoiseLeavesItsOwnShare) {
     // Noise of s rad in the turn's phase leaves s of the error (the derivative of the kick has the kick's rms).
     auto scenario = base();
-    scenario.readout.model = scenario::ReadoutModel::instrument;
+    scenario.readout.model = scenario::ReadoutModel::latched;
     for (const double noise : {0.005, 0.02}) {
         scenario.readout.detector_noise_relative = noise;
         const auto corrected = spread(scenario, 8, 60, 50, corrected_of);

@@ -191,7 +191,7 @@ Left run(const scenario::Scenario& scenario, bool injected, const std::vector<gy
 
 TEST(FirstOrderCompensator, IsItsFormula) {
     auto scenario = ideal_readout();
-    scenario.readout.model = scenario::ReadoutModel::instrument;
+    scenario.readout.model = scenario::ReadoutModel::latched;
     scenario.readout.clock_hz = 1e6;  // coarse: intervals of a few ticks
     scenario.readout.detector_noise_relative = 0.02;
     Gyros gyros{40.0, 300.0, 0.01, 0.0};
@@ -340,7 +340,7 @@ TEST(ExactCompensator, DetectorNoiseLeavesItsShare) {
     // The derivative of a kick has the kick's rms: noise of s rad leaves s of it, as with first order. Correlation of
     // the two ends of neighbouring half cycles is in raw and left alike.
     auto scenario = ideal_readout();
-    scenario.readout.model = scenario::ReadoutModel::instrument;
+    scenario.readout.model = scenario::ReadoutModel::latched;
     for (const double noise : {0.005, 0.02}) {
         scenario.readout.detector_noise_relative = noise;
         const Gyros gyros;

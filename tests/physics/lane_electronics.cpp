@@ -34,7 +34,7 @@ TEST(LaneReadout, CountAndNoisyQuadratureAreJoinedSafelyAtQuarterBoundaries) {
                     deviates[0][i] = (std::sin(psi + noises[i]) - std::sin(psi)) / rms;
                     deviates[1][i] = (std::cos(psi + noises[i]) - std::cos(psi)) / rms;
                 }
-                const Read got = read(turns, number, electronics, deviates);
+                const Read got = read(turns, number, electronics, {deviates});
                 for (std::size_t i = 0; i < noises.size(); ++i) {
                     EXPECT_NEAR(got.phase_rad(i), psi + noises[i], 1e-12 * (1.0 + std::abs(psi)))
                         << count << " " << within << " " << noises[i];

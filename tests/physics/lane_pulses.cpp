@@ -32,7 +32,7 @@ double worst_pulse_s(double threshold_deg_h, double rate_deg_h, double amplitude
         turn.rate_off_deg_h = rate_off_deg_h;
         const int direction = i % 2 == 0 ? 1 : -1;
         readout::PulseTables tables;
-        tables.make(0, turn.device());
+        tables.make(0, turn.device(), 2);
         const TurnPath path = turn.path(direction);
         const double psi = path.zero_rate_phase_rad();
         const double d1 = first_distance_rad(direction, psi);

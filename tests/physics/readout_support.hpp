@@ -73,14 +73,14 @@ struct Row {
 };
 
 inline Read read(const std::vector<Turn>& which, std::int64_t number, const readout::Electronics& electronics,
-                 const std::vector<simd::Lanes>& noise = {}) {
+                 const readout::ElectronicNoise& noise = {}, readout::Wanted wanted = readout::Wanted::accelerations) {
     std::vector<gyro::Device> devices;
     std::vector<gyro::Ellipse> ellipses;
     for (const Turn& turn : which) {
         devices.push_back(turn.device());
         ellipses.push_back(turn.setup.ellipse);
     }
-    const readout::LaneReadout readout(devices, ellipses, electronics, true);
+    const readout::LaneReadout readout(devices, ellipses, electronics, wanted);
     const Row row(which, number);
     Read result;
     readout.read(row.drive, row.turns, noise, 1, result.readings, result.angles);

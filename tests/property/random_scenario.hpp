@@ -36,10 +36,19 @@ class RandomScenarios {
             s.gyro = {.scale_factor_arcsec = uniform(0.3, 1.5), .lockin_threshold_deg_h = uniform(50.0, 800.0)};
             s.dither = {.frequency_hz = uniform(100.0, 400.0), .peak_rate_deg_s = uniform(60.0, 200.0)};
             s.noise_injection.turn_phase_rms_rad = uniform(0.1, 4.0);
-            s.readout.model = coin() ? scenario::ReadoutModel::instrument : scenario::ReadoutModel::ideal;
+            s.readout.model = coin()   ? scenario::ReadoutModel::instrument
+                              : coin() ? scenario::ReadoutModel::latched
+                                       : scenario::ReadoutModel::ideal;
             s.readout.angle_output =
                 coin() ? scenario::AngleOutput::interpolated : scenario::AngleOutput::quarter_fringe;
             s.readout.detector_noise_relative = uniform(0.0, 0.02);
+            if (s.readout.model == scenario::ReadoutModel::instrument) {
+                s.readout.phase_from = coin() ? scenario::PhaseFrom::detectors : s.readout.phase_from;
+                s.readout.comparator_noise_relative = coin() ? uniform(0.0, 0.02) : 0.0;
+                s.readout.comparator_hysteresis_relative = uniform(0.0, 0.1);
+                s.readout.detector_bandwidth_hz = coin() ? uniform(2e6, 2e7) : 0.0;
+                s.readout.adc_bits = coin() ? whole(6, 16) : 0;
+            }
             s.input.rate_deg_h = uniform(-50.0, 50.0);
             s.effects["quantum_noise"]["deg_rt_h"] = coin() ? uniform(0.0, 0.01) : 0.0;
             s.effects["rate_random_walk"]["deg_h_rt_h"] = coin() ? uniform(0.0, 1.0) : 0.0;

@@ -1,0 +1,200 @@
+#include "engine/readout/fraction_recovery.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/readout/fraction_recovery.cpp"
+#include "engine/core/units.hpp"
+#include "engine/readout/pulse_readout.hpp"
+#include "engine/simd/targets.hpp"
+// The above must come first.
+#include "engine/gyro/turn_series-inl.hpp"
+#include "engine/readout/pulse_tables-inl.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace ringlock::readout::HWY_NAMESPACE {
+
+namespace gm = gyro::HWY_NAMESPACE;
+
+using D = hn::CappedTag<double, simd::lanes>;
+using V = hn::Vec<D>;
+
+constexpr double model_rad = 1e-6;        // what parabola, tables and coupling may be wrong by
+constexpr double largest_step_rad = 0.2;  // beyond it pulses and detectors contradict each other
+constexpr double memory_cycles = 512.0;
+
+void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, const PulseTables& tables,
+                   const Electronics& electronics, FractionRecovery::State& state, LaneReadings& readings,
+                   LaneAngles& angles) {
+    const D d;
+    const V zero = hn::Zero(d);
+    const V one = hn::Set(d, 1.0);
+    const V half = hn::Set(d, 0.5);
+    const V two_pi = hn::Set(d, 6.283185307179586);
+    const V per_rad = hn::Set(d, 0.15915494309189535);
+    const V quarter_rad = hn::Set(d, 1.5707963267948966);
+    const auto squared = [](double value) { return value * value; };
+    const double step =
+        electronics.adc_bits > 0 ? 2.0 * Electronics::adc_range * std::ldexp(1.0, -electronics.adc_bits) : 0.0;
+    const V sample_weight =
+        hn::Set(d, 1.0 / (squared(electronics.detector_noise_relative) + squared(step) / 12.0 + squared(model_rad)));
+    const V pulse_variance = hn::Set(d, squared(electronics.comparator_noise_relative) + squared(model_rad));
+    const V tick_variance = hn::Set(d, electronics.clock_hz > 0.0 ? 1.0 / (12.0 * squared(electronics.clock_hz)) : 0.0);
+    // Half cycles share a turn's noise: half of the one before's deviation is in the one after, 3/4 of the variance
+    // new.
+    const V after_variance = hn::Set(d, 0.75 * squared(known.amplitude_relative));
+    const V hysteresis = hn::Set(d, electronics.comparator_hysteresis_relative);
+    const V least = hn::Set(d, least_distance_rad(electronics));
+    const double low_pass = low_pass_s(electronics);
+    const V blunting = hn::Set(d, 0.5 * low_pass * low_pass);
+    for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
+        const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
+        const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
+        const V mean_amplitude = load(known.amplitude_rad);
+        const V b = load(known.b_rad_s);
+        V last_fringes = load(state.last_fringes);
+        V last_whole = load(state.last_whole);
+        V last_gain = load(state.last_gain);
+        V cycle_gain = load(state.cycle_gain);
+        V cycles = load(state.cycles);
+        V contradictions = load(state.contradictions);
+        for (std::size_t i = 0; i < readings.turns; ++i) {
+            const bool minimum = readings.minimum(i);
+            const V sign = hn::Set(d, minimum ? 1.0 : -1.0);
+            const std::size_t direction = minimum ? 0 : 1;
+            const std::size_t after_side = minimum ? 0 : 1;
+            const std::int64_t before_turns = state.turns + static_cast<std::int64_t>(i);
+            const V read = load(readings.phase_fringes[i]);
+            // The swing shows the amplitude of the half cycle that ends here, but for the input rate's share.
+            V deviation = zero;
+            if (before_turns > 0) {
+                const V gain = (load(readings.phase_whole[i]) - last_whole) + (read - last_fringes);
+                const V share = cycle_gain * load(known.half_share[1 - after_side]);
+                deviation = sm::fma(d, half * two_pi, hn::Neg(sign) * (gain - share), hn::Neg(mean_amplitude));
+            }
+            const V amplitude[2] = {mean_amplitude + deviation, sm::fma(d, half, deviation, mean_amplitude)};
+
+            const V first = load(readings.pulses.first_quarter[i]);
+            const V near = (first - sign * read * hn::Set(d, 4.0)) * quarter_rad;
+            const V inside = hn::Max(hn::Min(near, quarter_rad), zero);
+            const V x = sm::fma(d, hn::Sqrt(inside + inside), hn::Set(d, 1.1283791670955126), hn::Neg(one));
+            const auto factors = pulse_factors<kept_pulses>(d, tables.times[direction], tables.used, lane,
+                                                            quarter_of(d, first - one), x);
+            V s0 = sample_weight;
+            V s1 = zero;
+            V s2 = zero;
+            V sy = zero;
+            V sgy = zero;
+            for (std::size_t side = 0; side < 2; ++side) {
+                const V a = amplitude[side] * load(known.w2_per_amplitude[direction][side]);
+                const std::size_t half_sign = side == 0 ? 1 - after_side : after_side;
+                const V bend = b / hn::Sqrt(a) * load(tables.inverse_bend[half_sign]);
+                const V curve = load(known.w2[half_sign]) / a * hn::Set(d, 1.0 / 12.0);
+                for (std::size_t pulse = 0; pulse < kept_pulses; ++pulse) {
+                    const V time = load(readings.pulses.time_s[side][pulse][i]);
+                    const V nominal = sm::fma(d, hn::Set(d, static_cast<double>(pulse)), quarter_rad, near);
+                    const V distance = side == 0 ? nominal - hysteresis : nominal + hysteresis;
+                    const V bent = curve * nominal;
+                    const V factor = one + sm::fma(d, bend, factors.values[side][pulse] - one - bent, bent);
+                    const V slope = a * time / (factor * factor);
+                    const V y = sm::fma(d, half * slope, time, hn::Neg(distance));
+                    V variance = sm::fma(d, (distance + distance) * a, tick_variance, pulse_variance);
+                    if (side == 1) variance = sm::fma(d, distance * distance, after_variance, variance);
+                    V weight = one / variance;
+                    if (pulse == 0) {
+                        weight = hn::IfThenElseZero(hn::And(time != zero, distance > least), weight);
+                    }
+                    const V weighted = weight * slope;
+                    s0 = s0 + weight;
+                    s1 = s1 + weighted;
+                    s2 = sm::fma(d, weighted, slope, s2);
+                    sy = sm::fma(d, weight, y, sy);
+                    sgy = sm::fma(d, weighted, y, sgy);
+                }
+            }
+            const V inverse = one / s2;
+            const V e = sm::fma(d, s1 * inverse, sgy, hn::Neg(sy)) / sm::fnma(d, s1 * inverse, s1, s0);
+            const V tau = sm::fma(d, e, s1, sgy) * inverse;
+            const V a_mean = mean_amplitude * load(known.w2_per_amplitude[direction][0]);
+            V change = sm::fnma(d, a_mean, sm::fma(d, half * tau, tau, blunting), e);
+            const auto agree = hn::Abs(change) < hn::Set(d, largest_step_rad);
+            change = sign * hn::IfThenElseZero(agree, change);
+            contradictions = contradictions + hn::IfThenElse(agree, zero, one);
+
+            const V raw_sine = load(readings.sine[i]);
+            const V raw_cosine = load(readings.cosine[i]);
+            const V size =
+                one / hn::Sqrt(hn::Max(sm::fma(d, raw_sine, raw_sine, raw_cosine * raw_cosine), hn::Set(d, 1e-300)));
+            V turn_s, turn_c;
+            gm::sincos_small(d, change, turn_s, turn_c);
+            store(size * sm::fma(d, raw_sine, turn_c, raw_cosine * turn_s), readings.sine[i]);
+            store(size * sm::fnma(d, raw_sine, turn_s, raw_cosine * turn_c), readings.cosine[i]);
+            const V change_fringes = change * per_rad;
+            const V fringes = read + change_fringes;
+            store(fringes, readings.phase_fringes[i]);
+            if (electronics.interpolate) {
+                store(load(angles.angle_fringes[i]) + change_fringes, angles.angle_fringes[i]);
+            }
+
+            const V whole = load(readings.phase_whole[i]);
+            if (before_turns > 0) {
+                const V gain = (whole - last_whole) + (fringes - last_fringes);
+                if (before_turns > 1) {
+                    cycles = hn::Min(cycles + one, hn::Set(d, memory_cycles));
+                    cycle_gain = cycle_gain + (gain + last_gain - cycle_gain) / cycles;
+                }
+                last_gain = gain;
+            }
+            last_fringes = fringes;
+            last_whole = whole;
+        }
+        store(last_fringes, state.last_fringes);
+        store(last_whole, state.last_whole);
+        store(last_gain, state.last_gain);
+        store(cycle_gain, state.cycle_gain);
+        store(cycles, state.cycles);
+        store(contradictions, state.contradictions);
+    }
+}
+
+}  // namespace ringlock::readout::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ringlock::readout {
+
+HWY_EXPORT(recover_lanes);
+
+FractionRecovery::FractionRecovery(std::span<const gyro::Device> devices, const Electronics& electronics,
+                                   double amplitude_rms_rad)
+    : lanes_(devices.size()), electronics_(electronics) {
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+        const gyro::Device& device = devices[std::min(lane, devices.size() - 1)];
+        const double amplitude = device.dither_amplitude_rad;
+        known_.amplitude_rad[lane] = amplitude;
+        known_.b_rad_s[lane] = device.coupling.b_rad_s;
+        known_.half_share[0][lane] = device.positive_duration_s / device.period_s();
+        known_.half_share[1][lane] = device.negative_duration_s / device.period_s();
+        known_.amplitude_relative = amplitude_rms_rad / amplitude;
+        for (const std::size_t which : {0U, 1U}) {
+            const double duration = which == 0 ? device.positive_duration_s : device.negative_duration_s;
+            known_.w2[which][lane] = (units::pi / duration) * (units::pi / duration);
+            for (const std::size_t side : {0U, 1U}) {
+                const double half_sign = (which == 0) == (side == 1) ? 1.0 : -1.0;
+                const gyro::HalfCycle half = device.half_cycle(half_sign, amplitude);
+                known_.w2_per_amplitude[which][side][lane] =
+                    half.end_acceleration_rad_s2(side == 0 ? 1 : 0) / amplitude;
+            }
+        }
+        tables_.make(lane, device, kept_pulses);
+    }
+}
+
+void FractionRecovery::recover(LaneReadings& readings, LaneAngles& angles) {
+    HWY_DYNAMIC_DISPATCH(recover_lanes)(lanes_, known_, tables_, electronics_, state_, readings, angles);
+    state_.turns += static_cast<std::int64_t>(readings.turns);
+}
+
+}  // namespace ringlock::readout
+#endif
