@@ -157,6 +157,31 @@ TEST(Scenarios, ADriftingThresholdShowsInTheRandomWalk) {
     EXPECT_NEAR(drifting / still, std::sqrt((std::pow(1.2, 3) - 1.0) / 0.6), 0.03);
 }
 
+TEST(Studies, AnglesBetweenTwoSamplesMayBeMoreThanCountsHold) {
+    // 2.4e9 fringes from sample to sample; counts go round after 2^32. Records of hours at a high rate do the same.
+    scenario::Scenario scenario;
+    scenario.gyro = {.scale_factor_arcsec = 1e-3, .lockin_threshold_deg_h = 0.0};
+    scenario.dither = {.frequency_hz = 10.0, .peak_rate_deg_s = 1e4};
+    scenario.readout.model = scenario::ReadoutModel::ideal;
+    scenario.input.rate_deg_h = 1000.0;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    scenario.ensemble.gyros = 1;
+    scenario.ensemble.duration_s = 7200.0;
+    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
+    scenario.output.sample_interval_s = 2400.0;
+    scenario.arms = {"ideal"};
+    std::vector<double> angle_arcsec;
+    const study::Study study = study::run(scenario, 1, [&](const study::SampledAngles& samples) {
+        angle_arcsec.insert(angle_arcsec.end(), samples.angle_arcsec.begin(), samples.angle_arcsec.end());
+    });
+    // A fringe is 1e-3 arcsec.
+    EXPECT_NEAR(study.arms[0].gyros[0].rate_error_deg_h, 0.0, 1e-6);
+    ASSERT_EQ(angle_arcsec.size(), 4U);
+    for (std::size_t i = 1; i < 4; ++i) {
+        EXPECT_NEAR(angle_arcsec[i] - angle_arcsec[0], 2.4e6 * static_cast<double>(i), 1e-3);
+    }
+}
+
 TEST(Claims, NoBiasInstabilityWithoutFlickerHoweverWellTheTurnsAreRandomised) {
     for (const double rms : {0.3, 1.0, 1.5, 2.1, 3.0}) {
         scenario::Scenario scenario;
