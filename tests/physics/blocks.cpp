@@ -76,6 +76,16 @@ TEST(GyroBlock, FollowsARampLikeTheDirectIntegrator) {
     for (const std::string arm : {"uncompensated", "noise_injected"}) expect_agreement(scenario, arm, 300);
 }
 
+TEST(GyroBlock, FollowsAStepBetweenTwoPiecesLikeTheDirectIntegrator) {
+    // The half cycle under way when the tables are made anew has the old rate, its second half is gone through by the
+    // new tables.
+    auto scenario = quiet();
+    scenario.effects["lockin_second_harmonic"]["ratio"] = 0.2;
+    scenario.effects["bias_step"]["step_deg_h"] = 3000.0;
+    scenario.effects["bias_step"]["time_s"] = 64.0 / scenario.dither.frequency_hz;
+    for (const std::string arm : {"uncompensated", "noise_injected"}) expect_agreement(scenario, arm, 160);
+}
+
 TEST(GyroBlock, RemakesTablesAFewTimesOnly) {
     auto ramp = quiet();
     ramp.effects["bias_ramp"]["deg_h_per_h"] = 1000.0;
