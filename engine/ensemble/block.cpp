@@ -56,7 +56,8 @@ std::vector<gyro::Ellipse> ellipses_of(const std::vector<gyro::Setup>& setups) {
 std::unique_ptr<propagate::LanePropagator> make_propagator(const scenario::Scenario& scenario,
                                                            const std::vector<gyro::Device>& devices,
                                                            TrajectoryKind kind) {
-    if (scenario.propagation.method == scenario::PropagationMethod::direct && kind != TrajectoryKind::ideal) {
+    // Without lock-in too: the turn map would ask for the fringes that this method is chosen to do without.
+    if (scenario.propagation.method == scenario::PropagationMethod::direct) {
         return std::make_unique<propagate::DirectPropagator>(devices, scenario.propagation.direct_tolerance_rad);
     }
     // Without lock-in there is nothing to tabulate; the map is that of the plain phase.

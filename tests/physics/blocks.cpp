@@ -86,6 +86,21 @@ TEST(GyroBlock, FollowsAStepBetweenTwoPiecesLikeTheDirectIntegrator) {
     for (const std::string arm : {"uncompensated", "noise_injected"}) expect_agreement(scenario, arm, 160);
 }
 
+TEST(GyroBlock, WithoutLockInTheDirectIntegratorNeedsNoFringes) {
+    // 28 fringes in a half cycle: no turn map has a fast middle there, that of a gyro without lock-in neither.
+    auto scenario = quiet();
+    scenario.readout.model = scenario::ReadoutModel::ideal;
+    scenario.dither.peak_rate_deg_s = 1.5;
+    const Outcome outcome = go(scenario, true, "ideal", 2, 64);
+    const double rate_deg_h = scenario.input.rate_deg_h;
+    for (std::size_t i = 0; i < outcome.angle_arcsec.size(); ++i) {
+        const double turned_arcsec = rate_deg_h * static_cast<double>(i) / scenario.dither.frequency_hz;
+        for (std::size_t g = 0; g < 2; ++g) {
+            EXPECT_NEAR(outcome.angle_arcsec[i][g] - outcome.angle_arcsec[0][g], turned_arcsec, 1e-9) << i;
+        }
+    }
+}
+
 TEST(GyroBlock, RemakesTablesAFewTimesOnly) {
     auto ramp = quiet();
     ramp.effects["bias_ramp"]["deg_h_per_h"] = 1000.0;
