@@ -180,5 +180,24 @@ TEST(Ensemble, NamesAGyroThatFailsAndSimulatesTheOthers) {
     EXPECT_EQ(records[2].seen, 0);
 }
 
+TEST(Ensemble, AFailureOfTheSinkIsTheRunsNotAGyros) {
+    struct Full final : ensemble::BlockSink {
+        void cycles(std::size_t /*arm*/, std::span<const simd::LaneCounts> /*counts*/) override {
+            throw RunError("disk full");
+        }
+        void finish(const ensemble::BlockResult& /*result*/) override {}
+    };
+    auto scenario = quiet();
+    scenario.ensemble.gyros = 64;
+    const std::vector<scenario::Arm> arms{scenario::parse_arm("uncompensated")};
+    int blocks = 0;
+    const auto make_sink = [&](std::int64_t /*gyro*/, std::size_t /*gyros*/) {
+        ++blocks;
+        return std::make_unique<Full>();
+    };
+    EXPECT_EQ(message_of<RunError>([&] { ensemble::run(scenario, arms, 0, 64, 1, make_sink, {}); }), "disk full");
+    EXPECT_EQ(blocks, 1) << "nothing is tried again";
+}
+
 }  // namespace
 }  // namespace ringlock::test
