@@ -173,8 +173,7 @@ struct GyroBlock::State {
         noisy = scenario.readout.model == scenario::ReadoutModel::instrument &&
                 scenario.readout.detector_noise_relative > 0.0;
         environment = scenario.environment;
-        const bool follows_temperature =
-            environment.temperature_ramp_k_per_h != 0.0 || environment.temperature_swing_k != 0.0;
+        const bool follows_temperature = scenario::temperature_varies(environment);
         for (const effects::Effect* effect : effects::registry()) {
             const auto values = scenario.effects.find(std::string(effect->name()));
             if (values == scenario.effects.end() || !effect->active(values->second)) continue;

@@ -182,6 +182,19 @@ TEST(Studies, AnglesBetweenTwoSamplesMayBeMoreThanCountsHold) {
     }
 }
 
+TEST(Studies, ATemperatureThatStaysTakesNoClosedFormAway) {
+    scenario::Scenario scenario;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    scenario.effects["lockin_temperature"]["relative_per_k"] = 0.02;
+    const auto arm = scenario::parse_arm("uncompensated");
+    scenario.environment.temperature_period_s = 3600.0;
+    EXPECT_TRUE(study::has_closed_form(scenario, arm));
+    scenario.environment.temperature_swing_k = 1.0;
+    EXPECT_FALSE(study::has_closed_form(scenario, arm));
+    scenario.environment = {.temperature_ramp_k_per_h = 1.0};
+    EXPECT_FALSE(study::has_closed_form(scenario, arm));
+}
+
 TEST(Claims, NoBiasInstabilityWithoutFlickerHoweverWellTheTurnsAreRandomised) {
     for (const double rms : {0.3, 1.0, 1.5, 2.1, 3.0}) {
         scenario::Scenario scenario;
