@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <string>
 
+#include "analysis/study/result_file.hpp"
 #include "analysis/study/summary.hpp"
 #include "engine/scenario/parse.hpp"
 #include "tests/support/gyro_records.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -179,6 +181,30 @@ TEST(Studies, AnglesBetweenTwoSamplesMayBeMoreThanCountsHold) {
     ASSERT_EQ(angle_arcsec.size(), 4U);
     for (std::size_t i = 1; i < 4; ++i) {
         EXPECT_NEAR(angle_arcsec[i] - angle_arcsec[0], 2.4e6 * static_cast<double>(i), 1e-3);
+    }
+}
+
+TEST(Studies, TheSizeOfTheResultIsKnownBeforehand) {
+    scenario::Scenario scenario;
+    scenario.ensemble.gyros = 500;
+    scenario.ensemble.duration_s = 3.1;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    scenario.readout.model = scenario::ReadoutModel::ideal;
+    scenario.arms = {"ideal", "uncompensated"};
+    const TemporaryDirectory directory;
+    for (const bool record : {false, true}) {
+        scenario.output.angle_record = record;
+        const auto path = directory / (record ? "with.h5" : "without.h5");
+        study::ResultWriter writer(path, study::Study(scenario));
+        const study::Study study =
+            study::run(scenario, 2, [&](const study::SampledAngles& samples) { writer.write_samples(samples); });
+        store::Provenance provenance;
+        writer.finish(study, study::summarise(study), provenance);
+        // Names, units and descriptions of some hundred objects come on top.
+        const auto size = static_cast<double>(std::filesystem::file_size(path));
+        const auto expected = static_cast<double>(study::expected_size_bytes(study));
+        EXPECT_GT(size, expected);
+        EXPECT_LT(size, expected + 60e3);
     }
 }
 
