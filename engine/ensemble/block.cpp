@@ -302,12 +302,6 @@ const readout::LaneReadings& GyroBlock::readings(std::size_t arm) const { return
 
 const readout::LaneAngles& GyroBlock::angles(std::size_t arm) const { return state_->branch_of(arm).angles(); }
 
-double GyroBlock::found_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const {
-    const Listener& listener = *state_->branch_of(arm).listener(arm);
-    if (!listener.compensator) return 0.0;
-    return units::two_pi * (listener.errors.whole[lane] + listener.errors.fringes[turn][lane]);
-}
-
 double GyroBlock::lockin_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const {
     const readout::LaneAngles& angles = state_->branch_of(arm).angles();
     return units::two_pi * (angles.lockin_whole[lane] + angles.lockin_fringes[turn][lane]);
