@@ -34,10 +34,12 @@ void BoundedRecord::add(std::span<const simd::LaneCounts> counts) {
 std::vector<double> BoundedRecord::phase(std::size_t lane, double unit_per_count) const {
     std::vector<double> out(rows_.size());
     if (rows_.size() < 2) return out;
-    const auto increment = [&](std::size_t i) {
-        const auto later = static_cast<std::uint64_t>(rows_[i][lane]);
-        return static_cast<std::int64_t>(later - static_cast<std::uint64_t>(rows_[i - 1][lane]));
+    const auto wrapped_increment = [&](std::size_t i) {
+        return static_cast<std::uint64_t>(rows_[i][lane]) - static_cast<std::uint64_t>(rows_[i - 1][lane]);
     };
+    // Less the first one: the line takes away what all have in common, however often that wraps round.
+    const std::uint64_t first = wrapped_increment(1);
+    const auto increment = [&](std::size_t i) { return static_cast<std::int64_t>(wrapped_increment(i) - first); };
     Wide total = 0;
     for (std::size_t i = 1; i < rows_.size(); ++i) total += increment(i);
     const Wide mean = nearest_quotient(total, static_cast<Wide>(rows_.size() - 1));

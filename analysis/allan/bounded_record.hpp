@@ -36,8 +36,8 @@ class BoundedRecord {
     /// \param unit_per_count  unit of phase that one count stands for
     /// \return size() values, the first of them 0
     ///
-    /// Counts may wrap around: an increment over interval() must fit 64 bits, the sum of many need not. The line is
-    /// taken away in whole counts, before anything is rounded.
+    /// Counts may wrap around: two increments over interval() must differ by less than 2^63, they themselves need not
+    /// be smaller. The line is taken away in whole counts, before anything is rounded.
     std::vector<double> phase(std::size_t lane, double unit_per_count) const;
 
    private:

@@ -170,8 +170,10 @@ std::uint64_t expected_size_bytes(const Study& study) {
     const auto gyros = static_cast<std::uint64_t>(study.gyros.size());
     const auto arms = static_cast<std::uint64_t>(study.arms.size());
     const auto samples = study.scenario.output.angle_record ? static_cast<std::uint64_t>(study.schedule.samples) : 0;
+    const std::uint64_t taus = study.factors.size();
+    // Doubles, then bytes: alpha at each tau, `red` and `described`.
     const std::uint64_t statistics =
-        8 * (3 * coefficient_columns.size() + 1 + allan_columns.size() * study.factors.size());
+        8 * (3 * coefficient_columns.size() + pooling_columns.size() + 1 + allan_columns.size() * taus) + taus + 2;
     std::uint64_t bytes = gyros * (8 * drawn_parameters.size() + arms * (8 * samples + statistics));
     for (const ArmStatistics& arm : study.arms) bytes += has_closed_form(study.scenario, arm.arm) ? 8 * gyros : 0;
     return bytes;

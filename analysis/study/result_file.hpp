@@ -33,7 +33,7 @@ class ResultWriter {
     std::vector<store::Dataset> records_;  // one for each arm, or none
 };
 
-/// Bytes a result file of this study will take, but for some kilobytes.
+/// Bytes a result file of this study will take, but for some tens of kilobytes that hold names and units.
 std::uint64_t expected_size_bytes(const Study& study);
 
 /// Reads a result without its angle records. Throws InputError where the file is no result or is damaged.

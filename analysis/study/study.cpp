@@ -55,6 +55,8 @@ class ArmStream {
             record_.add({&row, 1});
             take_sample(row);
         }
+        // Counts wrap round within hours at high rates, which may be between two samples: never within a piece.
+        if (!counts.empty()) turn_to(counts.back());
     }
 
     GyroStatistics finish(std::size_t lane, const gyro::Setup& setup) const {
@@ -89,19 +91,23 @@ class ArmStream {
    private:
     __extension__ using Wide = __int128;  // counts do not wrap round in it
 
-    void take_sample(const simd::LaneCounts& row) {
-        std::array<Wide, simd::lanes> angle{};
+    /// Goes on to a later cycle, less than 2^31 fringes away.
+    void turn_to(const simd::LaneCounts& row) {
         for (std::size_t lane = 0; lane < gyros_; ++lane) {
-            // The first sample is an angle by itself; from then on differences tell, which may wrap round.
-            if (sample_ == 0) {
-                origin_[lane] = row[lane];
-            } else {
-                turned_[lane] += static_cast<std::int64_t>(static_cast<std::uint64_t>(row[lane]) -
-                                                           static_cast<std::uint64_t>(last_[lane]));
-            }
-            angle[lane] = origin_[lane] + turned_[lane];
+            turned_[lane] += static_cast<std::int64_t>(static_cast<std::uint64_t>(row[lane]) -
+                                                       static_cast<std::uint64_t>(last_[lane]));
         }
         last_ = row;
+    }
+
+    void take_sample(const simd::LaneCounts& row) {
+        turn_to(row);
+        std::array<Wide, simd::lanes> angle{};
+        for (std::size_t lane = 0; lane < gyros_; ++lane) {
+            // The first sample is an angle by itself; from then on differences tell.
+            if (sample_ == 0) origin_[lane] = row[lane];
+            angle[lane] = origin_[lane] + turned_[lane];
+        }
         ++sample_;
         if (!on_samples_) return;
         waiting_rows_.push_back(angle);

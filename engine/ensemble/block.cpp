@@ -66,7 +66,8 @@ std::vector<gyro::Ellipse> ellipses_of(const std::vector<gyro::Setup>& setups) {
 std::unique_ptr<propagate::LanePropagator> make_propagator(const scenario::Scenario& scenario,
                                                            const std::vector<gyro::Device>& devices,
                                                            TrajectoryKind kind) {
-    if (scenario.propagation.method == scenario::PropagationMethod::direct && kind != TrajectoryKind::ideal) {
+    // Without lock-in too: the turn map would ask for the fringes that this method is chosen to do without.
+    if (scenario.propagation.method == scenario::PropagationMethod::direct) {
         return std::make_unique<propagate::DirectPropagator>(devices, scenario.propagation.direct_tolerance_rad);
     }
     // Without lock-in there is nothing to tabulate; the map is that of the plain phase.
@@ -197,8 +198,7 @@ struct GyroBlock::State {
         noisy_comparators = scenario.readout.model == scenario::ReadoutModel::instrument &&
                             scenario.readout.comparator_noise_relative > 0.0;
         environment = scenario.environment;
-        const bool follows_temperature =
-            environment.temperature_ramp_k_per_h != 0.0 || environment.temperature_swing_k != 0.0;
+        const bool follows_temperature = scenario::temperature_varies(environment);
         for (const effects::Effect* effect : effects::registry()) {
             const auto values = scenario.effects.find(std::string(effect->name()));
             if (values == scenario.effects.end() || !effect->active(values->second)) continue;
@@ -338,12 +338,6 @@ std::span<const simd::LaneCounts> GyroBlock::counts(std::size_t arm) const {
 const readout::LaneReadings& GyroBlock::readings(std::size_t arm) const { return state_->branch_of(arm).readings(); }
 
 const readout::LaneAngles& GyroBlock::angles(std::size_t arm) const { return state_->branch_of(arm).angles(); }
-
-double GyroBlock::found_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const {
-    const Listener& listener = *state_->branch_of(arm).listener(arm);
-    if (!listener.compensator) return 0.0;
-    return units::two_pi * (listener.errors.whole[lane] + listener.errors.fringes[turn][lane]);
-}
 
 double GyroBlock::lockin_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const {
     const readout::LaneAngles& angles = state_->branch_of(arm).angles();

@@ -30,7 +30,7 @@ class GyroBlock {
     GyroBlock& operator=(GyroBlock&&) noexcept;
     ~GyroBlock();
 
-    /// Goes through the next `turns` turns, an even number but for the last piece.
+    /// Goes through the next `turns` turns, at least one; an even number but for the last piece.
     void advance(std::size_t turns);
 
     /// Output of an arm at the minima of the piece, [minimum][gyro] in counts of 1/counts_per_fringe fringes.
@@ -39,9 +39,7 @@ class GyroBlock {
     const readout::LaneReadings& readings(std::size_t arm) const;
     /// What is true of these turns.
     const readout::LaneAngles& angles(std::size_t arm) const;
-    /// Lock-in error that an arm's compensator has found at turn i of the piece for a gyro [rad]; 0 without one.
-    double found_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const;
-    /// Lock-in error there [rad].
+    /// Lock-in error of the trajectory of an arm at a turn of the piece [rad].
     double lockin_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const;
 
     const std::vector<gyro::Setup>& setups() const;

@@ -16,7 +16,7 @@ bool drive_repeats(const scenario::Scenario& scenario) {
         // The effect itself is asked, so that a new one cannot be forgotten here.
         return values != scenario.effects.end() && effect->active(values->second) &&
                (effect->rate_process(values->second, {scenario.ensemble.seed, 0}) != nullptr ||
-                (scenario.environment != scenario::Environment{} &&
+                (scenario::temperature_varies(scenario.environment) &&
                  effect->threshold_factor(values->second, 1.0) != 1.0));
     });
 }

@@ -11,11 +11,7 @@ std::int64_t total_gyros(const scenario::Scenario& scenario) {
 }
 
 double input_rate_deg_h(const scenario::Scenario& scenario, std::int64_t gyro) {
-    const auto& input = scenario.input;
-    if (input.sweep_points == 1) return input.rate_deg_h;
-    const double fraction =
-        static_cast<double>(gyro / scenario.ensemble.gyros) / static_cast<double>(input.sweep_points - 1);
-    return input.rate_deg_h + fraction * (input.sweep_stop_deg_h - input.rate_deg_h);
+    return scenario::input_rate_deg_h(scenario.input, gyro / scenario.ensemble.gyros);
 }
 
 random::Identity identity(const scenario::Scenario& scenario, std::int64_t gyro) {

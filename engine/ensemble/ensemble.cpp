@@ -46,6 +46,21 @@ class Failures {
     std::vector<std::pair<std::int64_t, std::string>> failures_;
 };
 
+/// A trajectory that cannot be followed: a failure of that gyro, where one of a sink (a disk that is full) is the
+/// run's.
+struct TrajectoryFailure {
+    std::string why;
+};
+
+template <class Step>
+auto follow(Step&& step) {
+    try {
+        return step();
+    } catch (const RunError& error) {
+        throw TrajectoryFailure{error.what()};
+    }
+}
+
 /// Gyros of a block: full ones where that leaves work for every thread, to the end as well.
 std::int64_t block_size(std::int64_t gyros, int threads) {
     constexpr std::int64_t blocks_per_thread = 2;
@@ -64,13 +79,13 @@ void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm>
               std::size_t gyros, BlockSink& sink, const Monitor& monitor) {
     const Schedule schedule(scenario);
     const std::size_t piece = piece_turns(scenario);
-    GyroBlock block(scenario, arms, first, gyros);
+    GyroBlock block = follow([&] { return GyroBlock(scenario, arms, first, gyros); });
     const std::int64_t counted = static_cast<std::int64_t>(gyros) * block.trajectories();
     for (std::int64_t turn = 0; turn < schedule.turns();) {
         if (monitor.cancelled && monitor.cancelled()) throw Interrupted();
         const auto turns =
             static_cast<std::size_t>(std::min(static_cast<std::int64_t>(piece), schedule.turns() - turn));
-        block.advance(turns);
+        follow([&] { block.advance(turns); });
         for (std::size_t arm = 0; arm < arms.size(); ++arm) sink.cycles(arm, block.counts(arm));
         turn += static_cast<std::int64_t>(turns);
         if (monitor.on_progress) monitor.on_progress(0, static_cast<std::int64_t>(turns) * counted);
@@ -114,14 +129,14 @@ void run(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms
                     const std::int64_t gyros = std::min(size, last - gyro);
                     try {
                         simulate_block(gyro, gyros);
-                    } catch (const RunError& together) {
+                    } catch (const TrajectoryFailure& together) {
                         // Which ones? Those of the block that can be simulated are so by themselves.
                         for (std::int64_t one = gyro; one < gyro + gyros; ++one) {
                             try {
                                 if (gyros == 1) throw together;
                                 simulate_block(one, 1);
-                            } catch (const RunError& error) {
-                                failures.add(one, error.what());
+                            } catch (const TrajectoryFailure& failure) {
+                                failures.add(one, failure.why);
                             }
                         }
                     }

@@ -50,7 +50,7 @@ std::int64_t expected_turns(const scenario::Scenario& scenario, std::span<const 
 ///
 /// What a gyro does depends on its number, never on block or thread: results are the same for any number of threads.
 /// Gyros that fail do not stop the others; their failures are reported together in one RunError at the end.
-/// Cancellation stops all and throws Interrupted.
+/// What a sink throws stops all and is passed on; cancellation stops all and throws Interrupted.
 void run(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first, std::int64_t last,
          int threads, const SinkFactory& make_sink, const Monitor& monitor);
 

@@ -48,6 +48,18 @@ void TurnMapLanes<Turns>::cover(const gyro::LaneDrive& drive) {
     extremes(drive.amplitude_rad, low_amplitude, high_amplitude);
     if (!begun_ || drive.rates_vary) extremes(drive.rate_rad_s, low_rate, high_rate);
     if (!begun_ || drive.thresholds_vary) extremes(drive.b_rad_s, low_b, high_b);
+    if (Turns::evaluates_first_half_cycle && begun_) {
+        // The tables so far have it, new ones must.
+        const auto include = [&](const std::vector<simd::Lanes>& rows, simd::Lanes& low, simd::Lanes& high) {
+            for (std::size_t lane = 0; lane < devices_.size(); ++lane) {
+                low[lane] = std::min(low[lane], rows[0][lane]);
+                high[lane] = std::max(high[lane], rows[0][lane]);
+            }
+        };
+        include(drive.amplitude_rad, low_amplitude, high_amplitude);
+        if (drive.rates_vary) include(drive.rate_rad_s, low_rate, high_rate);
+        if (drive.thresholds_vary) include(drive.b_rad_s, low_b, high_b);
+    }
     for (std::size_t lane = 0; lane < devices_.size(); ++lane) {
         const gyro::Device& device = devices_[lane];
         HalfCycleRanges ranges = tables_.ranges(lane);

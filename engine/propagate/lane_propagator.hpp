@@ -31,11 +31,14 @@ class LanePropagator {
 struct MoebiusTurns {
     using Tables = TurnTables;
     using State = TurnState;
+    /// The half cycle under way between two pieces is evaluated by the later piece's tables, not kept in the state.
+    static constexpr bool evaluates_first_half_cycle = false;
     static constexpr auto step = step_turns;
 };
 struct TabulatedTurns {
     using Tables = PhaseTables;
     using State = PhaseState;
+    static constexpr bool evaluates_first_half_cycle = true;
     static constexpr auto step = step_phases;
 };
 

@@ -100,8 +100,10 @@ bool has_exact_cycle(const gyro::Device& device) {
     if (device.coupling.second_ratio != 0.0) return false;
     const double amplitude = device.dither_amplitude_rad;
     const auto fast = [&](double sign) {
-        const HalfTurnProblem problem = beginning(device.half_cycle(sign, amplitude), device.coupling);
-        return has_fast_middle(problem.half, problem.b_rad_s);
+        const gyro::HalfCycle half = device.half_cycle(sign, amplitude);
+        // A harmonic of the dither makes the rates of the two halves unequal.
+        return has_fast_middle(beginning(half, device.coupling).half, device.coupling.b_rad_s) &&
+               has_fast_middle(ending(half, device.coupling).half, device.coupling.b_rad_s);
     };
     return fast(1.0) && fast(-1.0);
 }

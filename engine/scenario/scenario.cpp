@@ -15,6 +15,10 @@ EffectSettings default_effect_settings() {
     return settings;
 }
 
+bool temperature_varies(const Environment& environment) {
+    return environment.temperature_ramp_k_per_h != 0.0 || environment.temperature_swing_k != 0.0;
+}
+
 double temperature_change_k(const Environment& environment, double time_s) {
     const double phase = 2.0 * std::numbers::pi * std::fmod(time_s / environment.temperature_period_s, 1.0);
     return environment.temperature_ramp_k_per_h * time_s / 3600.0 + environment.temperature_swing_k * std::sin(phase);

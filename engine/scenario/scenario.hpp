@@ -63,6 +63,9 @@ struct Environment {
     bool operator==(const Environment&) const = default;
 };
 
+/// Whether the temperature changes at all.
+bool temperature_varies(const Environment& environment);
+
 /// Temperature less that at the start [K].
 double temperature_change_k(const Environment& environment, double time_s);
 

@@ -80,6 +80,9 @@ Provenance read_provenance(const Group& root) {
     const Group group = root.group("provenance");
     Provenance provenance;
     each_member(provenance, [&]<class T>(const char* name, T& value) {
+        // Absent from results of earlier programs.
+        const bool younger = name == std::string_view("turns_per_s") || name == std::string_view("instruction_set");
+        if (younger && !group.has_attribute(name)) return;
         if constexpr (std::same_as<T, std::string>)
             value = group.string_attribute(name);
         else if constexpr (std::same_as<T, double>)

@@ -29,7 +29,8 @@ Provenance collect_provenance(std::span<const char* const> arguments, std::int64
 /// Writes the group /provenance, one attribute for each member.
 void write_provenance(Group& root, const Provenance& provenance);
 
-/// Reads it back. Throws InputError where the group or a member is missing.
+/// Reads it back. Throws InputError where the group or a member is missing; turns_per_s and instruction_set, which
+/// earlier programs did not write, are then 0 and empty.
 Provenance read_provenance(const Group& root);
 
 }  // namespace ringlock::store

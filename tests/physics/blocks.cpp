@@ -76,6 +76,31 @@ TEST(GyroBlock, FollowsARampLikeTheDirectIntegrator) {
     for (const std::string arm : {"uncompensated", "noise_injected"}) expect_agreement(scenario, arm, 300);
 }
 
+TEST(GyroBlock, FollowsAStepBetweenTwoPiecesLikeTheDirectIntegrator) {
+    // The half cycle under way when the tables are made anew has the old rate, its second half is gone through by the
+    // new tables.
+    auto scenario = quiet();
+    scenario.effects["lockin_second_harmonic"]["ratio"] = 0.2;
+    scenario.effects["bias_step"]["step_deg_h"] = 3000.0;
+    scenario.effects["bias_step"]["time_s"] = 64.0 / scenario.dither.frequency_hz;
+    for (const std::string arm : {"uncompensated", "noise_injected"}) expect_agreement(scenario, arm, 160);
+}
+
+TEST(GyroBlock, WithoutLockInTheDirectIntegratorNeedsNoFringes) {
+    // 28 fringes in a half cycle: no turn map has a fast middle there, that of a gyro without lock-in neither.
+    auto scenario = quiet();
+    scenario.readout.model = scenario::ReadoutModel::ideal;
+    scenario.dither.peak_rate_deg_s = 1.5;
+    const Outcome outcome = go(scenario, true, "ideal", 2, 64);
+    const double rate_deg_h = scenario.input.rate_deg_h;
+    for (std::size_t i = 0; i < outcome.angle_arcsec.size(); ++i) {
+        const double turned_arcsec = rate_deg_h * static_cast<double>(i) / scenario.dither.frequency_hz;
+        for (std::size_t g = 0; g < 2; ++g) {
+            EXPECT_NEAR(outcome.angle_arcsec[i][g] - outcome.angle_arcsec[0][g], turned_arcsec, 1e-9) << i;
+        }
+    }
+}
+
 TEST(GyroBlock, RemakesTablesAFewTimesOnly) {
     auto ramp = quiet();
     ramp.effects["bias_ramp"]["deg_h_per_h"] = 1000.0;
@@ -153,6 +178,25 @@ TEST(Ensemble, NamesAGyroThatFailsAndSimulatesTheOthers) {
         EXPECT_EQ(records[g].setup.input_rate_deg_h, 200000.0 * static_cast<double>(g));
     }
     EXPECT_EQ(records[2].seen, 0);
+}
+
+TEST(Ensemble, AFailureOfTheSinkIsTheRunsNotAGyros) {
+    struct Full final : ensemble::BlockSink {
+        void cycles(std::size_t /*arm*/, std::span<const simd::LaneCounts> /*counts*/) override {
+            throw RunError("disk full");
+        }
+        void finish(const ensemble::BlockResult& /*result*/) override {}
+    };
+    auto scenario = quiet();
+    scenario.ensemble.gyros = 64;
+    const std::vector<scenario::Arm> arms{scenario::parse_arm("uncompensated")};
+    int blocks = 0;
+    const auto make_sink = [&](std::int64_t /*gyro*/, std::size_t /*gyros*/) {
+        ++blocks;
+        return std::make_unique<Full>();
+    };
+    EXPECT_EQ(message_of<RunError>([&] { ensemble::run(scenario, arms, 0, 64, 1, make_sink, {}); }), "disk full");
+    EXPECT_EQ(blocks, 1) << "nothing is tried again";
 }
 
 }  // namespace

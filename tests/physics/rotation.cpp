@@ -272,6 +272,23 @@ TEST(Rotation, WhatHasNoFastMiddleIsRefused) {
         EXPECT_FALSE(propagate::has_exact_cycle(gyro::Device(setup)));
         EXPECT_THROW(propagate::exact_cycle(gyro::Device(setup)), RunError);
     }
+    // With a harmonic of the dither only one half of a half cycle may have none.
+    for (const double phase_rad : {0.0, 0.8, 1.6, -0.8, -2.3, 3.0}) {
+        for (const double peak_deg_s : {3.0, 4.0, 5.0, 6.0, 7.0, 8.0}) {
+            gyro::Setup setup = at_rate(15.0);
+            setup.dither_peak_rate_deg_s = peak_deg_s;
+            setup.dither_harmonic_ratio = 0.3;
+            setup.dither_harmonic_phase_rad = phase_rad;
+            const gyro::Device device(setup);
+            bool formed = true;
+            try {
+                propagate::exact_cycle(device);
+            } catch (const RunError&) {
+                formed = false;
+            }
+            EXPECT_EQ(propagate::has_exact_cycle(device), formed) << phase_rad << " rad, " << peak_deg_s << " deg/s";
+        }
+    }
     // The dither must reverse the input.
     EXPECT_FALSE(propagate::has_exact_cycle(gyro::Device(at_rate(-110.0 * units::deg_h_per_deg_s))));
 }

@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <string>
 
+#include "analysis/study/result_file.hpp"
 #include "analysis/study/summary.hpp"
 #include "engine/scenario/parse.hpp"
 #include "tests/support/gyro_records.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -155,6 +157,68 @@ TEST(Scenarios, ADriftingThresholdShowsInTheRandomWalk) {
     scenario.effects["lockin_temperature"]["relative_per_k"] = 0.02;
     const double drifting = *run(scenario).arms[0].arw_deg_rt_h.median;
     EXPECT_NEAR(drifting / still, std::sqrt((std::pow(1.2, 3) - 1.0) / 0.6), 0.03);
+}
+
+TEST(Studies, AnglesBetweenTwoSamplesMayBeMoreThanCountsHold) {
+    // 2.4e9 fringes from sample to sample; counts go round after 2^32. Records of hours at a high rate do the same.
+    scenario::Scenario scenario;
+    scenario.gyro = {.scale_factor_arcsec = 1e-3, .lockin_threshold_deg_h = 0.0};
+    scenario.dither = {.frequency_hz = 10.0, .peak_rate_deg_s = 1e4};
+    scenario.readout.model = scenario::ReadoutModel::ideal;
+    scenario.input.rate_deg_h = 1000.0;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    scenario.ensemble.gyros = 1;
+    scenario.ensemble.duration_s = 7200.0;
+    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
+    scenario.output.sample_interval_s = 2400.0;
+    scenario.arms = {"ideal"};
+    std::vector<double> angle_arcsec;
+    const study::Study study = study::run(scenario, 1, [&](const study::SampledAngles& samples) {
+        angle_arcsec.insert(angle_arcsec.end(), samples.angle_arcsec.begin(), samples.angle_arcsec.end());
+    });
+    // A fringe is 1e-3 arcsec.
+    EXPECT_NEAR(study.arms[0].gyros[0].rate_error_deg_h, 0.0, 1e-6);
+    ASSERT_EQ(angle_arcsec.size(), 4U);
+    for (std::size_t i = 1; i < 4; ++i) {
+        EXPECT_NEAR(angle_arcsec[i] - angle_arcsec[0], 2.4e6 * static_cast<double>(i), 1e-3);
+    }
+}
+
+TEST(Studies, TheSizeOfTheResultIsKnownBeforehand) {
+    scenario::Scenario scenario;
+    scenario.ensemble.gyros = 500;
+    scenario.ensemble.duration_s = 3.1;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    scenario.readout.model = scenario::ReadoutModel::ideal;
+    scenario.arms = {"ideal", "uncompensated"};
+    const TemporaryDirectory directory;
+    for (const bool record : {false, true}) {
+        scenario.output.angle_record = record;
+        const auto path = directory / (record ? "with.h5" : "without.h5");
+        study::ResultWriter writer(path, study::Study(scenario));
+        const study::Study study =
+            study::run(scenario, 2, [&](const study::SampledAngles& samples) { writer.write_samples(samples); });
+        store::Provenance provenance;
+        writer.finish(study, study::summarise(study), provenance);
+        // Names, units and descriptions of some hundred objects come on top.
+        const auto size = static_cast<double>(std::filesystem::file_size(path));
+        const auto expected = static_cast<double>(study::expected_size_bytes(study));
+        EXPECT_GT(size, expected);
+        EXPECT_LT(size, expected + 60e3);
+    }
+}
+
+TEST(Studies, ATemperatureThatStaysTakesNoClosedFormAway) {
+    scenario::Scenario scenario;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    scenario.effects["lockin_temperature"]["relative_per_k"] = 0.02;
+    const auto arm = scenario::parse_arm("uncompensated");
+    scenario.environment.temperature_period_s = 3600.0;
+    EXPECT_TRUE(study::has_closed_form(scenario, arm));
+    scenario.environment.temperature_swing_k = 1.0;
+    EXPECT_FALSE(study::has_closed_form(scenario, arm));
+    scenario.environment = {.temperature_ramp_k_per_h = 1.0};
+    EXPECT_FALSE(study::has_closed_form(scenario, arm));
 }
 
 TEST(Claims, NoBiasInstabilityWithoutFlickerHoweverWellTheTurnsAreRandomised) {

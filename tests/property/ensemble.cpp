@@ -106,6 +106,7 @@ TEST(EnsembleProperty, RatesOfASweepAreComparedInPairs) {
         const std::int64_t member = random.whole(0, sweep.ensemble.gyros - 1);
         const std::int64_t gyro = point * sweep.ensemble.gyros + member;
         single.input = {.rate_deg_h = input_rate_deg_h(sweep, gyro), .sweep_stop_deg_h = 0.0, .sweep_points = 1};
+        EXPECT_EQ(input_rate_deg_h(sweep, 2 * sweep.ensemble.gyros), sweep.input.sweep_stop_deg_h);
         EXPECT_TRUE(same(draw_setup(sweep, gyro), draw_setup(sweep, member)));
         EXPECT_EQ(simulate(sweep, gyro).counts, simulate(single, member).counts) << to_toml(sweep);
     }

@@ -65,6 +65,19 @@ TEST(AllanBoundedRecord, CountsMayWrapAround) {
     }
 }
 
+// An increment near half of what counts hold falls to either side of where they go round.
+TEST(AllanBoundedRecord, IncrementsMayBeAsLargeAsCountsHold) {
+    std::vector<LaneCounts> rows(101);
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+        const std::uint64_t increment = (std::uint64_t{1} << 63) + (i % 2 == 0 ? 5 : 0) - (i % 2 == 0 ? 0 : 5);
+        rows[i][3] = static_cast<std::int64_t>(static_cast<std::uint64_t>(rows[i - 1][3]) + increment);
+    }
+    BoundedRecord record(101, 101);
+    record.add(rows);
+    const std::vector<double> phase = record.phase(3, 1.0);
+    for (std::size_t i = 0; i < rows.size(); ++i) EXPECT_EQ(phase[i], i % 2 == 0 ? 0.0 : -5.0) << i;
+}
+
 TEST(AllanBoundedRecord, IsEmptyOrStillWithoutData) {
     BoundedRecord record(5, 4);
     EXPECT_TRUE(record.phase(0, 1.0).empty());

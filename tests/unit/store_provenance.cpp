@@ -28,6 +28,8 @@ TEST(StoreProvenance, ComesBackFromAFile) {
     const std::array arguments{"ringlock"};
     Provenance written = collect_provenance(arguments, 2, "a.toml");
     written.wall_s = 1.5;
+    written.turns_per_s = 2e7;
+    written.instruction_set = "AVX2";
     File file = File::create(directory / "a.h5");
     write_provenance(file, written);
     file.close();
@@ -42,6 +44,26 @@ TEST(StoreProvenance, ComesBackFromAFile) {
     EXPECT_EQ(read.date_utc, written.date_utc);
     EXPECT_EQ(read.threads, 2);
     EXPECT_EQ(read.wall_s, 1.5);
+    EXPECT_EQ(read.turns_per_s, 2e7);
+    EXPECT_EQ(read.instruction_set, "AVX2");
+}
+
+TEST(StoreProvenance, OfAnEarlierProgramIsReadAsItIs) {
+    const test::TemporaryDirectory directory;
+    File file = File::create(directory / "a.h5");
+    Group group = file.create_group("provenance");
+    for (const char* text : {"program_version", "git_hash", "compiler", "hdf5_version", "command_line", "scenario_file",
+                             "host", "date_utc"}) {
+        group.set_attribute(text, std::string_view(text));
+    }
+    group.set_attribute("threads", 2);
+    EXPECT_THROW(read_provenance(file), InputError) << "wall_s is missing, which every program wrote";
+    group.set_attribute("wall_s", 1.5);
+    const Provenance read = read_provenance(file);
+    EXPECT_EQ(read.host, "host");
+    EXPECT_EQ(read.threads, 2);
+    EXPECT_EQ(read.turns_per_s, 0.0);
+    EXPECT_EQ(read.instruction_set, "");
 }
 
 TEST(StoreProvenance, AFileWithoutIsRefused) {
