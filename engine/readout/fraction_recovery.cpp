@@ -41,9 +41,6 @@ void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, cons
         hn::Set(d, 1.0 / (squared(electronics.detector_noise_relative) + squared(step) / 12.0 + squared(model_rad)));
     const V pulse_variance = hn::Set(d, squared(electronics.comparator_noise_relative) + squared(model_rad));
     const V tick_variance = hn::Set(d, electronics.clock_hz > 0.0 ? 1.0 / (12.0 * squared(electronics.clock_hz)) : 0.0);
-    // Half cycles share a turn's noise: half of the one before's deviation is in the one after, 3/4 of the variance
-    // new.
-    const V after_variance = hn::Set(d, 0.75 * squared(known.amplitude_relative));
     const V hysteresis = hn::Set(d, electronics.comparator_hysteresis_relative);
     const V least = hn::Set(d, least_distance_rad(electronics));
     const double low_pass = low_pass_s(electronics);
@@ -53,6 +50,10 @@ void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, cons
         const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
         const V mean_amplitude = load(known.amplitude_rad);
         const V b = load(known.b_rad_s);
+        // Half cycles share a turn's noise: half of the one before's deviation is in the one after, 3/4 of the variance
+        // new.
+        const V amplitude_relative = load(known.amplitude_relative);
+        const V after_variance = amplitude_relative * amplitude_relative * hn::Set(d, 0.75);
         V last_fringes = load(state.last_fringes);
         V last_whole = load(state.last_whole);
         V last_gain = load(state.last_gain);
@@ -176,7 +177,7 @@ FractionRecovery::FractionRecovery(std::span<const gyro::Device> devices, const 
         known_.b_rad_s[lane] = device.coupling.b_rad_s;
         known_.half_share[0][lane] = device.positive_duration_s / device.period_s();
         known_.half_share[1][lane] = device.negative_duration_s / device.period_s();
-        known_.amplitude_relative = amplitude_rms_rad / amplitude;
+        known_.amplitude_relative[lane] = amplitude_rms_rad / amplitude;
         for (const std::size_t which : {0U, 1U}) {
             const double duration = which == 0 ? device.positive_duration_s : device.negative_duration_s;
             known_.w2[which][lane] = (units::pi / duration) * (units::pi / duration);

@@ -50,7 +50,7 @@ class FractionRecovery {
         simd::Lanes half_share[2];           ///< of the half cycles of positive and negative sign in the period
         simd::Lanes w2_per_amplitude[2][2];  ///< acceleration over amplitude, [minimum, maximum][before, after]
         simd::Lanes w2[2];
-        double amplitude_relative = 0.0;
+        simd::Lanes amplitude_relative;
     };
 
    private:

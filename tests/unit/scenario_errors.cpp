@@ -115,10 +115,11 @@ const BadCase bad_cases[] = {
     {"NumberForBoolean", "[output]\nangle_record = 1",
      "s.toml:2:16: key \"output.angle_record\" = 1: must be true or false, not a whole number"},
     {"NumberForWord", "[readout]\nmodel = 3",
-     "\"readout.model\" = 3: must be one of \"ideal\", \"instrument\", not a "
+     "\"readout.model\" = 3: must be one of \"ideal\", \"latched\", \"instrument\", not a "
      "whole number"},
     {"UnknownWord", "[readout]\nmodel = \"instrumnt\"",
-     "s.toml:2:9: key \"readout.model\" = \"instrumnt\": must be one of \"ideal\", \"instrument\" (did you mean "
+     "s.toml:2:9: key \"readout.model\" = \"instrumnt\": must be one of \"ideal\", \"latched\", \"instrument\" (did "
+     "you mean "
      "\"instrument\"?)"},
     {"MistypedKey", "[ensemble]\ngyors = 3",
      "s.toml:2:1: key \"ensemble.gyors\" = 3: unknown key (did you mean \"gyros\"?); keys of [ensemble]: gyros, "},
