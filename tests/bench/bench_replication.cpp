@@ -101,6 +101,15 @@ void device() {
     row({"M, last digit of 783.4 rad/s +- 1/2", fmt::format("+- {:.2f} rad", depth * 0.05 / 783.4)});
     row({"theta/rate, theta = 2 pi^2 rate/(K w)",
          fmt::format("{:.5f} rad/(deg/h)", gyro::Device(rp::paper_device(1.0)).input_rate_rad_s * 0.5 * period)});
+    const double b = device.coupling.b_rad_s;
+    const double acceleration = device.dither_amplitude_rad * w * w;
+    row({"coupling b", fmt::format("{:.1f} rad/s", b)});
+    row({"phase acceleration at a turn, psi''", fmt::format("{:.4g} rad/s^2", acceleration)});
+    row({"how long a turn lasts, 1/sqrt(psi'')", fmt::format("{:.1f} us", 1e6 / std::sqrt(acceleration))});
+    row({"by how much lock-in moves a turn, b/psi'', at most", fmt::format("{:.2f} us", 1e6 * b / acceleration)});
+    row({"phase that this is, b^2/(2 psi'')", fmt::format("{:.4f} rad", 0.5 * b * b / acceleration)});
+    row({"second harmonic of a reading, kappa^2/16",
+         fmt::format("{:.4f} rad", std::pow(gyro::turn_kick_rad(setup), 2) / 16.0)});
     row({"kick of a turn, kappa", fmt::format("{:.5f} rad", gyro::turn_kick_rad(setup))});
     row({"the same over a period", fmt::format("{:.4f} deg/h", rp::turn_kick_deg_h(setup))});
     row({"largest correction of a cycle, corrected", fmt::format("{:.3f} deg/h", 2.0 * rp::turn_kick_deg_h(setup))});
@@ -119,6 +128,25 @@ void half_turns() {
                  minimum ? "+1, +1" : "+1, -1"});
         }
     }
+}
+
+void turns() {
+    head({"turn", "amplitude/kappa", "angle added to psi_0 [pi]", "(7) asks for"});
+    for (const bool minimum : {true, false}) {
+        const rp::HalfTurnFit before = rp::fit_half_turn(minimum, false, 64);
+        const rp::HalfTurnFit after = rp::fit_half_turn(minimum, true, 64);
+        const double sine = before.sine + after.sine;
+        const double cosine = before.cosine + after.cosine;
+        row({minimum ? "minimum" : "maximum", number(std::hypot(sine, cosine) / std::sqrt(2.0), 4),
+             fmt::format("{:+.4f}", std::atan2(cosine, sine) / units::pi), minimum ? "+1/4" : "-1/4"});
+    }
+}
+
+void averaging() {
+    const rp::AveragedCycle average = rp::averaged_cycle(64);
+    head({"over one cycle, in units of b T J_0(M)", "sine of the mean phase", "cosine"});
+    row({"exact average of sin(psi - M cos(w t))", number(average.plain_sine, 4), number(average.plain_cosine, 4)});
+    row({"integrated equation of motion", number(average.exact_sine, 4), number(average.exact_cosine, 4)});
 }
 
 /// rms over phases of the exact lock-in error of a cycle and of what is left when the formula is taken away, with and
@@ -217,25 +245,47 @@ void readings() {
     }
 }
 
+void implied() {
+    head({"from", "follows", "smallest", "largest"});
+    const double worst = rp::worst_error_after_deg_h;
+    row({"worst error 2.489 deg/h is 0.622 %", fmt::format("input {:.1f} deg/h", worst / 0.00622),
+         number(worst / 0.006225, 1), number(worst / 0.006215, 1)});
+    row({"worst error 2.489 deg/h, column 4 is 1.0062 x input",
+         fmt::format("input {:.1f} deg/h", worst / (rp::column_4_over_input - 1.0)),
+         number(worst / (rp::column_4_over_input - 1.0 + 5e-5), 1),
+         number(worst / (rp::column_4_over_input - 1.0 - 5e-5), 1)});
+    row({"reading 15.625 deg/h, error 0.625", "input 15 deg/h", "", ""});
+    row({"error 6.25 % of a reading in steps of 15.625 deg/h, input 100 deg/h",
+         fmt::format("reading {:.2f} deg/h", 6.0 * rp::reading_step_deg_h), "", ""});
+}
+
 void table_1() {
-    head({"input [deg/h]", "multiples of 15.625 next to it", "nearest, less input [deg/h]",
-          "share of first 8 ms from a minimum that read it", "from a maximum", "share of periods from any instant"});
+    head({"input [deg/h]", "multiples of 15.625 on either side", "nearest, less input [deg/h]", "in per cent",
+          "share that reads it: 8 ms from a minimum", "8 ms from a maximum", "one period"});
+    double all[3] = {1.0, 1.0, 1.0};
     for (const double rate : rates_deg_h) {
         const double step = rp::reading_step_deg_h;
         const double below = std::floor(rate / step) * step;
         const double nearest = std::nearbyint(rate / step);
-        const auto share = [&](int kind) {
+        std::vector<std::string> cells = {number(rate, 0), fmt::format("{:.3f}, {:.3f}", below, below + step),
+                                          fmt::format("{:+.3f}", nearest * step - rate),
+                                          fmt::format("{:+.2f}", 100.0 * (nearest * step / rate - 1.0))};
+        int column = 0;
+        for (const int kind : {0, 1, 4}) {
             const double interval = kind < 3 ? rp::reading_interval_s : units::two_pi / 783.4;
             int hits = 0;
             const std::vector<double> errors = reading_errors(rate, kind, 1000);
             for (const double error : errors) {
                 hits += std::nearbyint((error + rate) * interval / 0.125) == nearest ? 1 : 0;
             }
-            return fmt::format("{:.2f}", hits / static_cast<double>(errors.size()));
-        };
-        row({number(rate, 0), fmt::format("{:.3f}, {:.3f}", below, below + step),
-             fmt::format("{:+.3f}", nearest * step - rate), share(0), share(1), share(4)});
+            const double share = hits / static_cast<double>(errors.size());
+            all[column++] *= share;
+            cells.push_back(fmt::format("{:.2f} +- {:.2f}", share,
+                                        std::sqrt(share * (1.0 - share) / static_cast<double>(errors.size()))));
+        }
+        row(cells);
     }
+    row({"all five", "", "", "", number(all[0], 4), number(all[1], 4), number(all[2], 4)});
 }
 
 void corrections() {
@@ -265,39 +315,54 @@ void corrections() {
 
 void likelihood() {
     const double kick = rp::turn_kick_deg_h(rp::paper_device(0.0));
-    const rp::FactorEstimate estimate = rp::estimate_factor(rp::applied_deg_h, kick);
+    using Turns = rp::CorrectionDensity::Turns;
+    const rp::CorrectionDensity densities[] = {rp::CorrectionDensity(Turns::two_whole),
+                                               rp::CorrectionDensity(Turns::half_whole_half)};
     int beyond = 0;
     double largest = 0.0;
     for (const double each : rp::applied_deg_h) {
         beyond += std::abs(each) > 2.0 * kick ? 1 : 0;
         largest = std::max(largest, std::abs(each));
     }
-    // P(|sin a + sin b| > 1), which a correction with twice the coefficients needs to pass the bound of the right ones.
-    double p = 0.0;
-    constexpr int steps = 100000;
-    for (int i = 0; i < steps; ++i) p += 2.0 * rp::turn_pair_density(1.0 + (i + 0.5) / steps) / steps;
-    double at_least = 0.0;
-    const double binomial[] = {1, 6, 15, 20, 15, 6, 1};
-    for (int k = beyond; k <= 6; ++k) at_least += binomial[k] * std::pow(p, k) * std::pow(1.0 - p, 6 - k);
-    head({"figure", "value"});
-    row({"corrections beyond the bound of the right coefficients", fmt::format("{} of 6", beyond)});
-    row({"corrections beyond that of the printed ones",
-         fmt::format("0 of 6 (largest {:.2f} of {:.3f} deg/h)", largest, 4.0 * kick)});
-    row({"chance that a correction of printed size is beyond the bound of the right one", number(p)});
-    row({fmt::format("chance of {} and more of 6", beyond), number(at_least)});
-    row({"smallest factor that allows all six (1: right, 2: printed)", number(estimate.smallest)});
-    row({"likeliest factor", number(estimate.likeliest)});
-    row({"median of the factor, 95 % below", fmt::format("{:.2f}, {:.2f}", estimate.median, estimate.upper_95)});
-    row({"psi'' read too small by, for right coefficients to reach the largest",
-         fmt::format("{:.2f} times", std::pow(largest / (2.0 * kick), 2))});
+    const auto figure = [&](const std::string& title, const auto& text) {
+        row({title, text(densities[0]), text(densities[1])});
+    };
+    head({"figure", "two whole turns a cycle", "half a turn, a whole one, half a turn"});
+    figure("corrections beyond the bound of the right coefficients",
+           [&](const auto&) { return fmt::format("{} of 6", beyond); });
+    figure("corrections beyond the bound of the printed ones",
+           [&](const auto&) { return fmt::format("{} of 6", largest > 4.0 * kick ? "some" : "0"); });
+    figure("chance that printed coefficients pass the bound of the right ones, one correction",
+           [&](const auto& density) { return number(density.beyond(1.0)); });
+    figure(fmt::format("chance of {} and more of 6", beyond), [&](const auto& density) {
+        const double p = density.beyond(1.0);
+        const double binomial[] = {1, 6, 15, 20, 15, 6, 1};
+        double at_least = 0.0;
+        for (int k = beyond; k <= 6; ++k) at_least += binomial[k] * std::pow(p, k) * std::pow(1.0 - p, 6 - k);
+        return number(at_least);
+    });
+    const auto estimate = [&](const auto& density) { return rp::estimate_factor(density, rp::applied_deg_h, kick); };
+    figure("smallest factor that allows all six (1: right, 2: printed)",
+           [&](const auto& density) { return number(estimate(density).smallest); });
+    figure("likeliest factor", [&](const auto& density) { return number(estimate(density).likeliest, 2); });
+    figure("median of the factor", [&](const auto& density) { return number(estimate(density).median, 2); });
+    figure("95 % of the factor are below", [&](const auto& density) { return number(estimate(density).upper_95, 2); });
+    figure("times that psi'' must be read too small for right coefficients to reach the largest",
+           [&](const auto&) { return number(std::pow(largest / (2.0 * kick), 2), 2); });
     fmt::print("\n");
-    head({"error of each correction, rms [deg/h]", "log likelihood, right coefficients", "log likelihood, printed",
-          "printed over right"});
+    head({"error of each correction, rms [deg/h]", "two whole turns: log likelihood, right", "printed",
+          "printed over right", "half, whole, half: right", "printed", "printed over right"});
     for (const double error : {0.0, 0.1, 0.3, 0.5, 1.0, 1.5, 2.0, 3.0}) {
-        const double right = rp::log_likelihood(rp::applied_deg_h, 1.0, kick, error);
-        const double printed = rp::log_likelihood(rp::applied_deg_h, 2.0, kick, error);
-        row({number(error, 1), std::isfinite(right) ? number(right, 2) : "none", number(printed, 2),
-             std::isfinite(right) ? fmt::format("{:.2g}", std::exp(printed - right)) : "infinite"});
+        std::vector<std::string> cells = {number(error, 1)};
+        for (const auto& density : densities) {
+            const double right = rp::log_likelihood(density, rp::applied_deg_h, 1.0, kick, error);
+            const double printed = rp::log_likelihood(density, rp::applied_deg_h, 2.0, kick, error);
+            const bool possible = std::isfinite(right);
+            cells.push_back(possible ? number(right, 2) : "impossible");
+            cells.push_back(number(printed, 2));
+            cells.push_back(possible ? fmt::format("{:.2g}", std::exp(printed - right)) : "-");
+        }
+        row(cells);
     }
 }
 
@@ -454,6 +519,10 @@ void coefficients(const char* file) {
     };
     fmt::print("\nAllan deviation of the rate at one cycle, {:.4f} ms [deg/h] (68 % interval):\n\n",
                1e3 * together.arms.front().allan.front().tau_s);
+    // Half a kick, a whole one and half a kick make a cycle's; of the difference of two cycles in a row the turn
+    // between them drops out, and the variance is (1/4 + 1 + 1 + 1/4) times that of a kick.
+    fmt::print("First order, turns fully randomised: {:.4f} deg/h.\n\n",
+               rp::turn_kick_deg_h(rp::paper_device(0.0)) * std::sqrt(0.5 * 0.5 * 2.5));
     head(titles);
     for (std::size_t i = 0; i < points; ++i) {
         line(number(studies[i].scenario.input.rate_deg_h, 0), summaries[i], one_cycle_text);
@@ -477,9 +546,9 @@ void coefficients(const char* file) {
 }
 
 const std::pair<const char*, std::function<void()>> blocks[] = {
-    {"device", device},         {"half-turns", half_turns}, {"cycles", cycles},
-    {"readings", readings},     {"table-1", table_1},       {"corrections", corrections},
-    {"likelihood", likelihood}, {"search", search},         {"one-cycle", one_cycle},
+    {"device", device},     {"half-turns", half_turns}, {"turns", turns},     {"averaging", averaging},
+    {"cycles", cycles},     {"likelihood", likelihood}, {"search", search},   {"one-cycle", one_cycle},
+    {"readings", readings}, {"implied", implied},       {"table-1", table_1}, {"corrections", corrections},
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <boost/math/special_functions/bessel.hpp>
 #include <cmath>
 #include <complex>
 #include <limits>
@@ -162,13 +163,41 @@ HalfTurnFit fit_half_turn(bool minimum, bool after, int phases) {
         const Turn turn(path, k);
         const double psi = turn.path.zero_rate_phase_rad();
         const double beyond = turn.lockin_to_extremum_rad;
-        gains[i] = lockin_to_middle_rad(path, k, after) + (after ? -beyond : beyond);
+        // In the middle the lock-in goes to and fro by b/g within each fringe, -b cos(psi)/g, which is not the turn's.
+        const gyro::HalfCycle half = path.half_cycle_after(after ? k : k + 1);
+        const double middle_s = path.turn_time_s(k) + (after ? 0.5 : -0.5) * half.duration_s;
+        const double ripple = path.device().coupling.b_rad_s *
+                              std::cos(path.at(std::vector<double>{middle_s})[0].remainder_rad) /
+                              half.drive_rate_rad_s(0.5 * half.duration_s);
+        gains[i] = lockin_to_middle_rad(path, k, after) + (after ? ripple - beyond : beyond - ripple);
         design.row(i) << 1.0, std::sin(psi), std::cos(psi);
         acceleration = turn.path.acceleration_rad_s2(after ? 1 : -1);
     }
     const Eigen::Vector3d fit = design.colPivHouseholderQr().solve(gains);
     const double unit = path.device().coupling.b_rad_s * std::sqrt(units::pi / acceleration);
     return {fit[0], fit[1] / unit, fit[2] / unit};
+}
+
+AveragedCycle averaged_cycle(int phases) {
+    const gyro::Setup setup = paper_device(0.0);
+    const double depth = gyro::modulation_depth_rad(setup);
+    propagate::GyroPath path(gyro::Device(setup), 1e-11);
+    const double unit = path.device().coupling.b_rad_s * cycle_s(setup) * boost::math::cyl_bessel_j(0, depth);
+    AveragedCycle result;
+    constexpr int points = 1 << 15;  // many to a fringe: the mean of a periodic function is then exact
+    for (int i = 0; i < phases; ++i) {
+        const double psi = units::two_pi * i / phases;
+        double mean = 0.0;
+        for (int k = 0; k < points; ++k) mean += std::sin(psi - depth * std::cos(units::two_pi * k / points)) / points;
+        const double plain = mean * path.device().coupling.b_rad_s * cycle_s(setup) / unit;
+        path.restart(psi - depth);
+        const double exact = lockin_between_turns_rad(path, 0, 2) / unit;
+        result.plain_sine += 2.0 * plain * std::sin(psi) / phases;
+        result.plain_cosine += 2.0 * plain * std::cos(psi) / phases;
+        result.exact_sine += 2.0 * exact * std::sin(psi) / phases;
+        result.exact_cosine += 2.0 * exact * std::cos(psi) / phases;
+    }
+    return result;
 }
 
 double turn_pair_density(double u) {
@@ -178,29 +207,64 @@ double turn_pair_density(double u) {
     return std::comp_ellint_1(std::sqrt(std::min(inside, 1.0 - 1e-15))) / (units::pi * units::pi);
 }
 
-double log_likelihood(std::span<const double> corrections_deg_h, double factor, double kick_deg_h, double error_deg_h) {
-    const double unit = factor * kick_deg_h;
-    double sum = 0.0;
-    for (const double correction : corrections_deg_h) {
-        double density = 0.0;
-        if (error_deg_h == 0.0) {
-            density = turn_pair_density(correction / unit) / unit;
+CorrectionDensity::CorrectionDensity(Turns turns) : turns_(turns), cells_(cells) {
+    constexpr int phases = 4000;
+    double total = 0.0;
+    for (int i = 0; i < cells; ++i) {
+        const double u = 4.0 * (i + 0.5) / cells - 2.0;
+        double& value = cells_[static_cast<std::size_t>(i)];
+        if (turns == Turns::two_whole) {
+            value = turn_pair_density(u);
         } else {
-            // The density is infinite at 0, but so weakly that midpoints do.
-            constexpr int steps = 8000;
-            for (int i = 0; i < steps; ++i) {
-                const double u = 4.0 * (i + 0.5) / steps - 2.0;
-                const double z = (correction - unit * u) / error_deg_h;
-                density += turn_pair_density(u) * std::exp(-0.5 * z * z);
+            for (int k = 0; k < phases; ++k) {
+                value += 2.0 * turn_pair_density(2.0 * (u - std::sin(units::pi * ((k + 0.5) / phases - 0.5)))) / phases;
             }
-            density *= 4.0 / (steps * error_deg_h * std::sqrt(units::two_pi));
         }
-        sum += std::log(density);
+        total += value * 4.0 / cells;
+    }
+    for (double& value : cells_) value /= total;
+}
+
+double CorrectionDensity::operator()(double u) const {
+    if (turns_ == Turns::two_whole) return turn_pair_density(u);
+    const double place = (u + 2.0) * cells / 4.0 - 0.5;
+    if (!(std::abs(u) < 2.0)) return 0.0;
+    const int i = std::clamp(static_cast<int>(std::floor(place)), 0, cells - 2);
+    const double along = std::clamp(place - i, 0.0, 1.0);
+    return (1.0 - along) * cell(i) + along * cell(i + 1);
+}
+
+double CorrectionDensity::beyond(double u) const {
+    double sum = 0.0;
+    for (int i = 0; i < cells; ++i) {
+        if (std::abs(4.0 * (i + 0.5) / cells - 2.0) > u) sum += cell(i) * 4.0 / cells;
     }
     return sum;
 }
 
-FactorEstimate estimate_factor(std::span<const double> corrections_deg_h, double kick_deg_h) {
+double log_likelihood(const CorrectionDensity& density, std::span<const double> corrections_deg_h, double factor,
+                      double kick_deg_h, double error_deg_h) {
+    const double unit = factor * kick_deg_h;
+    double sum = 0.0;
+    for (const double correction : corrections_deg_h) {
+        double likelihood = 0.0;
+        if (error_deg_h == 0.0) {
+            likelihood = density(correction / unit) / unit;
+        } else {
+            for (int i = 0; i < CorrectionDensity::cells; ++i) {
+                const double u = 4.0 * (i + 0.5) / CorrectionDensity::cells - 2.0;
+                const double z = (correction - unit * u) / error_deg_h;
+                likelihood += density.cell(i) * std::exp(-0.5 * z * z);
+            }
+            likelihood *= 4.0 / (CorrectionDensity::cells * error_deg_h * std::sqrt(units::two_pi));
+        }
+        sum += std::log(likelihood);
+    }
+    return sum;
+}
+
+FactorEstimate estimate_factor(const CorrectionDensity& density, std::span<const double> corrections_deg_h,
+                               double kick_deg_h) {
     FactorEstimate estimate;
     for (const double correction : corrections_deg_h) {
         estimate.smallest = std::max(estimate.smallest, 0.5 * std::abs(correction) / kick_deg_h);
@@ -213,7 +277,7 @@ FactorEstimate estimate_factor(std::span<const double> corrections_deg_h, double
     double best = -1.0;
     for (int i = 0; i < steps; ++i) {
         const double factor = estimate.smallest * std::exp((i + 0.5) * step);
-        weights[static_cast<std::size_t>(i)] = std::exp(log_likelihood(corrections_deg_h, factor, kick_deg_h));
+        weights[static_cast<std::size_t>(i)] = std::exp(log_likelihood(density, corrections_deg_h, factor, kick_deg_h));
         total += weights[static_cast<std::size_t>(i)];
         if (weights[static_cast<std::size_t>(i)] > best) {
             best = weights[static_cast<std::size_t>(i)];

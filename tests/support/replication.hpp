@@ -61,15 +61,45 @@ struct HalfTurnFit {
 };
 HalfTurnFit fit_half_turn(bool minimum, bool after, int phases);
 
+/// The lock-in term averaged over a dither cycle without input, in units of b T J_0(M): how much of it goes with the
+/// sine of the mean phase and how much with its cosine.
+struct AveragedCycle {
+    double plain_sine = 0.0;  ///< of sin(psi - M cos(w t)): no lock-in in psi itself
+    double plain_cosine = 0.0;
+    double exact_sine = 0.0;  ///< of the exact motion from minimum to minimum
+    double exact_cosine = 0.0;
+};
+AveragedCycle averaged_cycle(int phases);
+
 /// Density of sin a + sin b, a and b uniform and independent: K(sqrt(1 - u^2/4))/pi^2, K the complete elliptic integral
 /// of the first kind.
 double turn_pair_density(double u);
 
-/// Log likelihood of corrections, each that of two turns of random phases with `factor` times the right coefficients
-/// (2: as printed) and normal errors of `error_deg_h`; `kick_deg_h` is turn_kick_deg_h(). Minus infinity where it
-/// cannot be.
-double log_likelihood(std::span<const double> corrections_deg_h, double factor, double kick_deg_h,
-                      double error_deg_h = 0.0);
+/// Corrections over a cycle, in kicks of one whole turn, where the phases of the turns are uniform and independent.
+class CorrectionDensity {
+   public:
+    enum class Turns {
+        two_whole,       ///< sin a + sin b
+        half_whole_half  ///< (sin a)/2 + sin b + (sin c)/2
+    };
+    explicit CorrectionDensity(Turns turns);
+
+    double operator()(double u) const;
+    /// Probability of a size beyond `u`.
+    double beyond(double u) const;
+    static constexpr int cells = 8000;  ///< between -2 and 2
+    /// Mean of the density over a cell.
+    double cell(int i) const { return cells_[static_cast<std::size_t>(i)]; }
+
+   private:
+    Turns turns_;
+    std::vector<double> cells_;
+};
+
+/// Log likelihood of corrections, each of a cycle of random phases, with `factor` times the right coefficients (2: as
+/// printed) and normal errors of `error_deg_h`; `kick_deg_h` is turn_kick_deg_h(). Minus infinity where it cannot be.
+double log_likelihood(const CorrectionDensity& density, std::span<const double> corrections_deg_h, double factor,
+                      double kick_deg_h, double error_deg_h = 0.0);
 
 /// The factor to which corrections point, if it is all that is not known.
 struct FactorEstimate {
@@ -78,7 +108,8 @@ struct FactorEstimate {
     double upper_95 = 0.0;  ///< of the posterior with a density of 1/factor beforehand
     double median = 0.0;
 };
-FactorEstimate estimate_factor(std::span<const double> corrections_deg_h, double kick_deg_h);
+FactorEstimate estimate_factor(const CorrectionDensity& density, std::span<const double> corrections_deg_h,
+                               double kick_deg_h);
 
 /// Readings of a counter of quarter fringes.
 struct ReadingStatistics {
