@@ -101,6 +101,7 @@ void device() {
     row({"M, last digit of 783.4 rad/s +- 1/2", fmt::format("+- {:.2f} rad", depth * 0.05 / 783.4)});
     row({"theta/rate, theta = 2 pi^2 rate/(K w)",
          fmt::format("{:.5f} rad/(deg/h)", gyro::Device(rp::paper_device(1.0)).input_rate_rad_s * 0.5 * period)});
+    row({"counts of the dither's swing in half a cycle", fmt::format("{:.1f}", 2.0 * depth / (0.5 * units::pi))});
     const double b = device.coupling.b_rad_s;
     const double acceleration = device.dither_amplitude_rad * w * w;
     row({"coupling b", fmt::format("{:.1f} rad/s", b)});
@@ -260,32 +261,46 @@ void implied() {
 }
 
 void table_1() {
-    head({"input [deg/h]", "multiples of 15.625 on either side", "nearest, less input [deg/h]", "in per cent",
-          "share that reads it: 8 ms from a minimum", "8 ms from a maximum", "one period"});
-    double all[3] = {1.0, 1.0, 1.0};
+    constexpr int kinds[] = {0, 1, 4};
+    const char* titles[] = {"8 ms from a minimum", "8 ms from a maximum", "one period"};
+    fmt::print("| input [deg/h] | nearest multiple | less input [deg/h] | in per cent | within 6.25 % |");
+    for (const char* title : titles) fmt::print(" {}: nearest | within 6.25 % |", title);
+    fmt::print("\n|---|---|---|---|---|---|---|---|---|---|---|\n");
+    double all[6] = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
     for (const double rate : rates_deg_h) {
         const double step = rp::reading_step_deg_h;
-        const double below = std::floor(rate / step) * step;
         const double nearest = std::nearbyint(rate / step);
-        std::vector<std::string> cells = {number(rate, 0), fmt::format("{:.3f}, {:.3f}", below, below + step),
+        const auto allowed = [&](double count) {
+            return std::abs(count * step - rate) <= 0.0625 * rate * (1.0 + 1e-12);
+        };
+        std::string within;
+        for (double count = std::floor(0.9 * rate / step); count * step < 1.1 * rate; ++count) {
+            if (allowed(count)) within += fmt::format("{}{:.3f}", within.empty() ? "" : ", ", count * step);
+        }
+        std::vector<std::string> cells = {number(rate, 0), number(nearest * step),
                                           fmt::format("{:+.3f}", nearest * step - rate),
-                                          fmt::format("{:+.2f}", 100.0 * (nearest * step / rate - 1.0))};
-        int column = 0;
-        for (const int kind : {0, 1, 4}) {
-            const double interval = kind < 3 ? rp::reading_interval_s : units::two_pi / 783.4;
-            int hits = 0;
-            const std::vector<double> errors = reading_errors(rate, kind, 1000);
+                                          fmt::format("{:+.2f}", 100.0 * (nearest * step / rate - 1.0)), within};
+        for (std::size_t k = 0; k < 3; ++k) {
+            const double interval = kinds[k] < 3 ? rp::reading_interval_s : units::two_pi / 783.4;
+            const std::vector<double> errors = reading_errors(rate, kinds[k], 1000);
+            int hits[2] = {};
             for (const double error : errors) {
-                hits += std::nearbyint((error + rate) * interval / 0.125) == nearest ? 1 : 0;
+                const double count = std::nearbyint((error + rate) * interval / 0.125);
+                hits[0] += count == nearest ? 1 : 0;
+                hits[1] += allowed(count) ? 1 : 0;
             }
-            const double share = hits / static_cast<double>(errors.size());
-            all[column++] *= share;
-            cells.push_back(fmt::format("{:.2f} +- {:.2f}", share,
-                                        std::sqrt(share * (1.0 - share) / static_cast<double>(errors.size()))));
+            for (std::size_t which = 0; which < 2; ++which) {
+                const double share = hits[which] / static_cast<double>(errors.size());
+                all[2 * k + which] *= share;
+                cells.push_back(fmt::format("{:.2f} +- {:.2f}", share,
+                                            std::sqrt(share * (1.0 - share) / static_cast<double>(errors.size()))));
+            }
         }
         row(cells);
     }
-    row({"all five", "", "", "", number(all[0], 4), number(all[1], 4), number(all[2], 4)});
+    std::vector<std::string> cells = {"all five", "", "", "", ""};
+    for (const double share : all) cells.push_back(number(share));
+    row(cells);
 }
 
 void corrections() {
