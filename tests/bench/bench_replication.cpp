@@ -109,8 +109,10 @@ void device() {
     row({"how long a turn lasts, 1/sqrt(psi'')", fmt::format("{:.1f} us", 1e6 / std::sqrt(acceleration))});
     row({"by how much lock-in moves a turn, b/psi'', at most", fmt::format("{:.2f} us", 1e6 * b / acceleration)});
     row({"phase that this is, b^2/(2 psi'')", fmt::format("{:.4f} rad", 0.5 * b * b / acceleration)});
-    row({"second harmonic of a reading, kappa^2/16",
-         fmt::format("{:.4f} rad", std::pow(gyro::turn_kick_rad(setup), 2) / 16.0)});
+    row({"second harmonic of a reading, kappa^2 (1/(4 pi) - 1/16)",
+         fmt::format(
+             "{:.6f} rad, {:.5f} deg/h over a period", std::abs(rp::half_turn_second_harmonic_rad(setup)),
+             std::abs(rp::half_turn_second_harmonic_rad(setup)) * setup.scale_factor_arcsec / units::two_pi / period)});
     row({"kick of a turn, kappa", fmt::format("{:.5f} rad", gyro::turn_kick_rad(setup))});
     row({"the same over a period", fmt::format("{:.4f} deg/h", rp::turn_kick_deg_h(setup))});
     row({"largest correction of a cycle, corrected", fmt::format("{:.3f} deg/h", 2.0 * rp::turn_kick_deg_h(setup))});
@@ -119,14 +121,16 @@ void device() {
 }
 
 void half_turns() {
-    head({"half of a turn", "constant [rad]", "sin psi_0", "cos psi_0", "corrected", "as printed"});
+    head({"half of a turn", "sin psi_0", "cos psi_0", "right", "printed", "constant [rad]", "cos 2 psi_0 [rad]",
+          "sin 2 psi_0 [rad]"});
     for (const bool minimum : {true, false}) {
         for (const bool after : {false, true}) {
             const rp::HalfTurnFit fit = rp::fit_half_turn(minimum, after, 64);
             row({fmt::format("{} a {}", after ? "after" : "before", minimum ? "minimum" : "maximum"),
-                 fmt::format("{:+.5f}", fit.constant_rad), fmt::format("{:+.4f}", fit.sine),
-                 fmt::format("{:+.4f}", fit.cosine), minimum ? "+1/2, +1/2" : "+1/2, -1/2",
-                 minimum ? "+1, +1" : "+1, -1"});
+                 fmt::format("{:+.4f}", fit.sine), fmt::format("{:+.4f}", fit.cosine),
+                 minimum ? "+1/2, +1/2" : "+1/2, -1/2", minimum ? "+1, +1" : "+1, -1",
+                 fmt::format("{:+.5f}", fit.constant_rad), fmt::format("{:+.6f}", fit.second_cosine_rad),
+                 fmt::format("{:+.6f}", fit.second_sine_rad)});
         }
     }
 }
@@ -536,8 +540,14 @@ void coefficients(const char* file) {
                1e3 * together.arms.front().allan.front().tau_s);
     // Half a kick, a whole one and half a kick make a cycle's; of the difference of two cycles in a row the turn
     // between them drops out, and the variance is (1/4 + 1 + 1 + 1/4) times that of a kick.
-    fmt::print("First order, turns fully randomised: {:.4f} deg/h.\n\n",
-               rp::turn_kick_deg_h(rp::paper_device(0.0)) * std::sqrt(0.5 * 0.5 * 2.5));
+    fmt::print(
+        "Turns fully randomised, uncorrected to first order: {:.4f} deg/h; second harmonics of the readings: {:.5f} "
+        "deg/h.\n\n",
+        rp::turn_kick_deg_h(rp::paper_device(0.0)) * std::sqrt(0.5 * 0.5 * 2.5),
+        // Readings h cos(2 psi_0) in themselves, independent: second differences have 6 of their variances.
+        std::abs(rp::half_turn_second_harmonic_rad(rp::paper_device(0.0))) *
+            (rp::turn_kick_deg_h(rp::paper_device(0.0)) / gyro::turn_kick_rad(rp::paper_device(0.0))) *
+            std::sqrt(0.5 * 0.5 * 6.0));
     head(titles);
     for (std::size_t i = 0; i < points; ++i) {
         line(number(studies[i].scenario.input.rate_deg_h, 0), summaries[i], one_cycle_text);

@@ -115,6 +115,10 @@ TEST(Replication, HalfTurnsHaveHalfThePrintedCoefficients) {
             const double a = device.half_cycle(1.0, device.dither_amplitude_rad).end_acceleration_rad_s2();
             const double delay = gyro::half_turn_delay_rad(paper_device()) - 0.5 * b * b / a;
             EXPECT_NEAR(fit.constant_rad, minimum == after ? -delay : delay, 0.01 * delay);
+            // Fourth order is kappa^2 = 2 % of that and more.
+            const double second = replication::half_turn_second_harmonic_rad(paper_device());
+            EXPECT_NEAR(fit.second_cosine_rad, minimum == after ? second : -second, 0.05 * std::abs(second));
+            EXPECT_NEAR(fit.second_sine_rad, 0.0, 0.05 * std::abs(second));
         }
     }
 }
@@ -248,7 +252,7 @@ TEST(Replication, PrintedCoefficientsTurnTheErrorOfACycleRound) {
             corrected += std::pow(cycle.lockin_deg_h - cycle.corrected_deg_h, 2);
         }
         EXPECT_NEAR(std::sqrt(printed / error), 1.0, 0.005) << rate;
-        // The second harmonic of the reading, (kappa^2/16) cos(2 psi) at either end, beside an error of some kappa.
+        // The second harmonic of the reading, 0.017 kappa^2 cos(2 psi) at either end, beside an error of some kappa.
         EXPECT_LT(std::sqrt(corrected / error), 0.01) << rate;
     }
 }

@@ -155,7 +155,7 @@ double extremum_phase_rad(propagate::GyroPath& path, std::int64_t turn) {
 HalfTurnFit fit_half_turn(bool minimum, bool after, int phases) {
     propagate::GyroPath path(gyro::Device(paper_device(0.0)), 1e-11);
     const std::int64_t k = minimum ? 2 : 1;
-    Eigen::MatrixXd design(phases, 3);
+    Eigen::MatrixXd design(phases, 5);
     Eigen::VectorXd gains(phases);
     double acceleration = 0.0;
     for (int i = 0; i < phases; ++i) {
@@ -170,12 +170,12 @@ HalfTurnFit fit_half_turn(bool minimum, bool after, int phases) {
                               std::cos(path.at(std::vector<double>{middle_s})[0].remainder_rad) /
                               half.drive_rate_rad_s(0.5 * half.duration_s);
         gains[i] = lockin_to_middle_rad(path, k, after) + (after ? ripple - beyond : beyond - ripple);
-        design.row(i) << 1.0, std::sin(psi), std::cos(psi);
+        design.row(i) << 1.0, std::sin(psi), std::cos(psi), std::cos(2.0 * psi), std::sin(2.0 * psi);
         acceleration = turn.path.acceleration_rad_s2(after ? 1 : -1);
     }
-    const Eigen::Vector3d fit = design.colPivHouseholderQr().solve(gains);
+    const Eigen::VectorXd fit = design.colPivHouseholderQr().solve(gains);
     const double unit = path.device().coupling.b_rad_s * std::sqrt(units::pi / acceleration);
-    return {fit[0], fit[1] / unit, fit[2] / unit};
+    return {fit[0], fit[1] / unit, fit[2] / unit, fit[3], fit[4]};
 }
 
 AveragedCycle averaged_cycle(int phases) {
@@ -200,6 +200,13 @@ AveragedCycle averaged_cycle(int phases) {
     return result;
 }
 
+double half_turn_second_harmonic_rad(const gyro::Setup& setup) {
+    const double kappa = gyro::turn_kick_rad(setup);
+    // From the dither's turn kappa^2/16 (docs/physics.md); the lock-in on the way from there to the extremum, at
+    // -b sin(psi)/a, takes b^2/(2 a) (1 - cos(2 psi)) of it away, b^2/(2 a) = kappa^2/(4 pi).
+    return kappa * kappa * (1.0 / 16.0 - 0.25 / units::pi);
+}
+
 double turn_pair_density(double u) {
     const double inside = 1.0 - 0.25 * u * u;
     if (inside < 0.0) return 0.0;
@@ -208,7 +215,7 @@ double turn_pair_density(double u) {
 }
 
 CorrectionDensity::CorrectionDensity(Turns turns) : turns_(turns), cells_(cells) {
-    constexpr int phases = 4000;
+    constexpr int phases = 1000;
     double total = 0.0;
     for (int i = 0; i < cells; ++i) {
         const double u = 4.0 * (i + 0.5) / cells - 2.0;

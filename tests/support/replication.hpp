@@ -53,11 +53,14 @@ Cycle exact_cycle(propagate::GyroPath& path, Span span, double clock_hz = 0.0);
 double extremum_phase_rad(propagate::GyroPath& path, std::int64_t turn);
 
 /// A half of a turn by integration, fitted over `phases` phases of the extremum:
-/// lock-in = constant + sine sin(psi_0) + cosine cos(psi_0), the coefficients in units of b sqrt(pi/psi'').
+/// lock-in = constant + sine sin(psi_0) + cosine cos(psi_0) + harmonics of 2 psi_0, the coefficients of the first in
+/// units of b sqrt(pi/psi'').
 struct HalfTurnFit {
     double constant_rad = 0.0;
     double sine = 0.0;
     double cosine = 0.0;
+    double second_cosine_rad = 0.0;  ///< of cos(2 psi_0)
+    double second_sine_rad = 0.0;
 };
 HalfTurnFit fit_half_turn(bool minimum, bool after, int phases);
 
@@ -70,6 +73,10 @@ struct AveragedCycle {
     double exact_cosine = 0.0;
 };
 AveragedCycle averaged_cycle(int phases);
+
+/// The second harmonic of half a turn, counted from the extremum, after a minimum and before a maximum: the coefficient
+/// of cos(2 psi_0) [rad]. The other halves have the opposite.
+double half_turn_second_harmonic_rad(const gyro::Setup& setup);
 
 /// Density of sin a + sin b, a and b uniform and independent: K(sqrt(1 - u^2/4))/pi^2, K the complete elliptic integral
 /// of the first kind.
