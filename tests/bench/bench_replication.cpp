@@ -69,6 +69,12 @@ void head(const std::vector<std::string>& cells) {
 }
 std::string number(double value, int digits = 3) { return fmt::format("{:.{}f}", value, digits); }
 
+/// With its sign, but for a zero, whose sign is of rounding.
+std::string signed_number(double value, int digits) {
+    const bool zero = std::abs(value) < 0.5 * std::pow(10.0, -digits);
+    return zero ? fmt::format("{:.{}f}", 0.0, digits) : fmt::format("{:+.{}f}", value, digits);
+}
+
 double quantile(std::vector<double> values, double level) {
     std::sort(values.begin(), values.end());
     return values[static_cast<std::size_t>(level * static_cast<double>(values.size() - 1) + 0.5)];
@@ -129,14 +135,14 @@ void half_turns() {
             row({fmt::format("{} a {}", after ? "after" : "before", minimum ? "minimum" : "maximum"),
                  fmt::format("{:+.4f}", fit.sine), fmt::format("{:+.4f}", fit.cosine),
                  minimum ? "+1/2, +1/2" : "+1/2, -1/2", minimum ? "+1, +1" : "+1, -1",
-                 fmt::format("{:+.5f}", fit.constant_rad), fmt::format("{:+.6f}", fit.second_cosine_rad),
-                 fmt::format("{:+.6f}", fit.second_sine_rad)});
+                 fmt::format("{:+.5f}", fit.constant_rad), signed_number(fit.second_cosine_rad, 5),
+                 signed_number(fit.second_sine_rad, 5)});
         }
     }
 }
 
 void turns() {
-    head({"turn", "amplitude/kappa", "angle added to psi_0 [pi]", "(7) asks for"});
+    head({"turn", "amplitude/kappa", "angle added to psi_0 [pi]", "right"});
     for (const bool minimum : {true, false}) {
         const rp::HalfTurnFit before = rp::fit_half_turn(minimum, false, 64);
         const rp::HalfTurnFit after = rp::fit_half_turn(minimum, true, 64);
@@ -150,8 +156,10 @@ void turns() {
 void averaging() {
     const rp::AveragedCycle average = rp::averaged_cycle(64);
     head({"over one cycle, in units of b T J_0(M)", "sine of the mean phase", "cosine"});
-    row({"exact average of sin(psi - M cos(w t))", number(average.plain_sine, 4), number(average.plain_cosine, 4)});
-    row({"integrated equation of motion", number(average.exact_sine, 4), number(average.exact_cosine, 4)});
+    row({"exact average of sin(psi - M cos(w t))", signed_number(average.plain_sine, 4),
+         signed_number(average.plain_cosine, 4)});
+    row({"integrated equation of motion", signed_number(average.exact_sine, 4),
+         signed_number(average.exact_cosine, 4)});
 }
 
 /// rms over phases of the exact lock-in error of a cycle and of what is left when the formula is taken away, with and
@@ -562,7 +570,7 @@ void coefficients(const char* file) {
             const auto n = static_cast<double>(arm.gyros.size());
             for (const auto& gyro : arm.gyros) mean += gyro.rate_error_deg_h / n;
             for (const auto& gyro : arm.gyros) square += std::pow(gyro.rate_error_deg_h - mean, 2) / (n - 1.0);
-            cells.push_back(fmt::format("{:+.4f} +- {:.4f}", 1e3 * mean, 1e3 * std::sqrt(square / n)));
+            cells.push_back(fmt::format("{} +- {:.4f}", signed_number(1e3 * mean, 4), 1e3 * std::sqrt(square / n)));
         }
         row(cells);
     };
