@@ -387,7 +387,10 @@ void likelihood() {
             const bool possible = std::isfinite(right);
             cells.push_back(possible ? number(right, 2) : "impossible");
             cells.push_back(number(printed, 2));
-            cells.push_back(possible ? fmt::format("{:.2g}", std::exp(printed - right)) : "-");
+            const double ratio = std::exp(printed - right);
+            cells.push_back(!possible     ? "-"
+                            : ratio > 1e6 ? "> 1e6"
+                                          : fmt::format("{:.{}f}", ratio, ratio < 10.0 ? 2 : 0));
         }
         row(cells);
     }
