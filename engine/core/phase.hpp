@@ -23,6 +23,11 @@ struct Phase {
     /// The phase as one number [rad]; loses digits as it grows.
     double value_rad() const { return static_cast<double>(fringes) * units::two_pi + remainder_rad; }
 
+    /// Whole quarter fringes, as an up/down counter counts them: floor(phase/(pi/2)).
+    std::int64_t quarters() const {
+        return 4 * fringes + static_cast<std::int64_t>(std::floor(4.0 * remainder_rad / units::two_pi));
+    }
+
    private:
     /// Counts the whole fringes of `angle_rad` and returns the rest. 2 pi is taken in three parts of 24, 24 and 53
     /// bits: products with up to 2^29 fringes are exact, so that neither one large angle nor a long run loses digits.

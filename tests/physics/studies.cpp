@@ -1,8 +1,10 @@
 // Whole studies: what the scenarios say in their first lines, and what may not be claimed.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <mutex>
 #include <string>
 
 #include "analysis/study/result_file.hpp"
@@ -61,6 +63,73 @@ void expect_answer_of_gao_deng(double duration_s) {
 
 TEST(Scenarios, GaoDeng2007ShortensToItsAnswer) { expect_answer_of_gao_deng(60.0); }
 TEST(LongScenarios, GaoDeng2007) { expect_answer_of_gao_deng(600.0); }
+
+TEST(Scenarios, GaoDengTable1TurnsItsErrorsRound) {
+    scenario::Scenario scenario = from_file("gao-deng-2007-table1.toml");
+    EXPECT_EQ(scenario.ensemble.duration_s, 60.0);
+    EXPECT_EQ(scenario.readout.angle_output, scenario::AngleOutput::quarter_fringe);
+    scenario.ensemble.gyros = 8;
+    // Readings are whole counts: from sample to sample the angle moves by multiples of K/4.
+    const double count_arcsec = 0.25 * scenario.gyro.scale_factor_arcsec;
+    double worst = 0.0;
+    std::int64_t moved = 0;
+    std::mutex mutex;
+    const study::Study study = study::run(scenario, 2, [&](const study::SampledAngles& samples) {
+        if (scenario.arms[samples.arm].starts_with("compensated")) return;  // less a correction that is no count
+        const std::lock_guard lock(mutex);
+        const std::size_t length = samples.angle_arcsec.size() / samples.gyros;
+        for (std::size_t gyro = 0; gyro < samples.gyros; ++gyro) {
+            for (std::size_t i = 1; i < length; ++i) {
+                const double* const angle = samples.angle_arcsec.data() + gyro * length + i;
+                const double counts = (angle[0] - angle[-1]) / count_arcsec;
+                worst = std::max(worst, std::abs(counts - std::nearbyint(counts)));
+                ++moved;
+            }
+        }
+    });
+    EXPECT_GT(moved, 400000);
+    // The dither is stripped at its own turn, from which the lock-in moves the phase's by b/a at most: b^2/(2
+    // a), 1.2e-3 of a count.
+    EXPECT_LT(worst, 1.3e-3);
+    const study::Summary summary = study::summarise(study);
+    const double answer[] = {0.105, -0.048, 0.061, -0.095};
+    // A count over a minute is K/4/60 s = 0.002 deg/h, the mean of eight gyros has less.
+    for (std::size_t i = 0; i < 4; ++i) {
+        const double rate = 100.0 * (static_cast<double>(i) + 1.0);
+        const auto error = [&](const char* name) { return arm(summary, name).sweep[i].output_rate_deg_h.mean - rate; };
+        EXPECT_NEAR(error("uncompensated"), answer[i], 0.002) << rate;
+        EXPECT_NEAR(error("compensated_published"), -answer[i], 0.002) << rate;
+        EXPECT_NEAR(error("compensated"), 0.0, 0.002) << rate;
+    }
+}
+
+TEST(Scenarios, GaoDengCoefficientsAreAlikeAtAllRates) {
+    scenario::Scenario scenario = from_file("gao-deng-2007-coefficients.toml");
+    EXPECT_EQ(scenario.input.sweep_stop_deg_h, 500.0);
+    scenario.input.sweep_points = 3;
+    scenario.ensemble.gyros = 16;
+    scenario.ensemble.duration_s = 120.0;
+    const study::Study study = study::run(scenario, 2);
+    const study::Summary summary = study::summarise(study);
+    const study::Figure& injected = arm(summary, "noise_injected").arw_deg_rt_h;
+    const study::Figure& published = arm(summary, "noise_injected+compensated_published").arw_deg_rt_h;
+    const study::Figure& corrected = arm(summary, "noise_injected+compensated").arw_deg_rt_h;
+    ASSERT_TRUE(injected.median && published.median && corrected.median);
+    EXPECT_NEAR(*injected.median / summary.theory.arw_deg_rt_h, 1.0, 0.05);
+    EXPECT_NEAR(*published.median / *injected.median, 1.0, 0.005);
+    EXPECT_NEAR(*corrected.median, 1.3e-6, 0.1e-6);
+    const auto& raw = study.arms[0].gyros;
+    const auto& turned = study.arms[1].gyros;
+    double sum = 0.0;
+    double scale = 0.0;
+    for (std::size_t i = 0; i < raw.size(); ++i) {
+        sum += std::pow(raw[i].rate_error_deg_h + turned[i].rate_error_deg_h, 2);
+        scale += std::pow(raw[i].rate_error_deg_h, 2);
+    }
+    // Each gyro's error with its sign turned, but for what the corrected coefficients leave.
+    EXPECT_LT(std::sqrt(sum / scale), 0.01);
+    EXPECT_LT(arm(summary, "noise_injected+compensated_exact").arw_deg_rt_h.hi.value(), 1e-8);
+}
 
 TEST(Scenarios, DeadBandEndsWhereItSays) {
     scenario::Scenario scenario = from_file("dead-band.toml");
