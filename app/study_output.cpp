@@ -138,6 +138,11 @@ std::string rate_cell(double rate_deg_h) {
     return fmt::format("{:.4f}", std::abs(rate_deg_h) < half_a_digit ? 0.0 : rate_deg_h);
 }
 
+std::string ratio_cell(double ratio) {
+    constexpr double least_in_decimals = 1e-3;
+    return ratio < least_in_decimals ? fmt::format("{:.2g}", ratio) : fmt::format("{:.4f}", ratio);
+}
+
 report::Table arm_table(const study::Summary& summary) {
     report::Table table({{"arm", report::Align::left},
                          {"ARW [deg/sqrt(h)]", report::Align::right},
@@ -151,7 +156,7 @@ report::Table arm_table(const study::Summary& summary) {
         const auto& floor = arm.bias_instability_deg_h;
         table.add_row({arm.name, arw_cell(arm), shown ? interval_cell(arw.median_lo, arw.median_hi) : "-",
                        shown && summary.theory.arw_deg_rt_h > 0.0
-                           ? fmt::format("{:.4f}", *arw.median / summary.theory.arw_deg_rt_h)
+                           ? ratio_cell(*arw.median / summary.theory.arw_deg_rt_h)
                            : "-",
                        floor ? fmt::format("{:.3g}", *floor->median) : "none claimed",
                        fmt::format("{} ({} .. {})", rate_cell(arm.rate_error_deg_h.mean),
@@ -212,9 +217,9 @@ std::string reduction_text(const study::Summary& summary) {
         const auto& reduction = arm.arw_reduction;
         if (!reduction) continue;
         text += fmt::format("ARW of noise_injected over that of {}: ", arm.name);
-        text += reduction->ratio ? fmt::format("{:.4g} (95 %: {:.4g} .. {:.4g})\n", *reduction->ratio, reduction->lo,
-                                               *reduction->hi)
-                                 : fmt::format("> {:.2g}\n", reduction->lo);
+        text += reduction->ratio && reduction->hi ? fmt::format("{:.4g} (95 %: {:.4g} .. {:.4g})\n", *reduction->ratio,
+                                                                reduction->lo, *reduction->hi)
+                                                  : fmt::format("> {:.2g}\n", reduction->lo);
     }
     return text;
 }

@@ -208,12 +208,12 @@ std::optional<ScaleFactor> line_of(const Study& study, const ArmStatistics& arm)
 
 std::optional<Reduction> reduction(const Figure& raw, const Figure& left) {
     if (!raw.median) return std::nullopt;
-    if (!left.median) {
-        if (!left.hi || !(*left.hi > 0.0)) return std::nullopt;
-        return Reduction{std::nullopt, *raw.median_lo / *left.hi, std::nullopt};
-    }
-    if (!(*left.median_lo > 0.0)) return std::nullopt;
-    return Reduction{*raw.median / *left.median, *raw.median_lo / *left.median_hi, *raw.median_hi / *left.median_lo};
+    const std::optional<double> most = left.median ? left.median_hi : left.hi;
+    if (!most || !(*most > 0.0)) return std::nullopt;
+    Reduction result{std::nullopt, *raw.median_lo / *most, std::nullopt};
+    if (left.median && *left.median > 0.0) result.ratio = *raw.median / *left.median;
+    if (left.median && *left.median_lo > 0.0) result.hi = *raw.median_hi / *left.median_lo;
+    return result;
 }
 
 }  // namespace

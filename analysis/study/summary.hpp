@@ -56,8 +56,8 @@ struct Step {
 /// Angle random walk of arm `noise_injected` over that of another: what a cure takes away.
 struct Reduction {
     std::optional<double> ratio;  ///< of the medians; absent where the other's is not resolved
-    double lo = 0.0;              ///< from the medians' intervals, or from the other's upper limit
-    std::optional<double> hi;
+    double lo = 0.0;              ///< from the medians' 95 % intervals, or from the other's upper limit
+    std::optional<double> hi;     ///< absent where the other's interval begins at zero
 };
 
 struct ArmSummary {
