@@ -154,13 +154,12 @@ report::Table arm_table(const study::Summary& summary) {
         const study::Figure& arw = arm.arw_deg_rt_h;
         const bool shown = arm.noise_injected && arw.median;
         const auto& floor = arm.bias_instability_deg_h;
-        table.add_row({arm.name, arw_cell(arm), shown ? interval_cell(arw.median_lo, arw.median_hi) : "-",
-                       shown && summary.theory.arw_deg_rt_h > 0.0
-                           ? ratio_cell(*arw.median / summary.theory.arw_deg_rt_h)
-                           : "-",
-                       floor ? fmt::format("{:.3g}", *floor->median) : "none claimed",
-                       fmt::format("{} ({} .. {})", rate_cell(arm.rate_error_deg_h.mean),
-                                   rate_cell(arm.rate_error_deg_h.lo), rate_cell(arm.rate_error_deg_h.hi))});
+        table.add_row(
+            {arm.name, arw_cell(arm), shown ? interval_cell(arw.median_lo, arw.median_hi) : "-",
+             shown && summary.theory.arw_deg_rt_h > 0.0 ? ratio_cell(*arw.median / summary.theory.arw_deg_rt_h) : "-",
+             floor ? fmt::format("{:.3g}", *floor->median) : "none claimed",
+             fmt::format("{} ({} .. {})", rate_cell(arm.rate_error_deg_h.mean), rate_cell(arm.rate_error_deg_h.lo),
+                         rate_cell(arm.rate_error_deg_h.hi))});
     }
     return table;
 }
@@ -171,7 +170,7 @@ std::string signed_cell(const study::SignedFigure& figure) {
 }
 
 std::string size_cell(const study::SizeFigure& figure) {
-    if (!figure.value) return fmt::format("< {:.2g}", figure.hi);
+    if (!figure.value) return figure.hi > 0.0 ? fmt::format("< {:.2g}", figure.hi) : "none";
     return fmt::format("{:.3g} ({:.2g} .. {:.2g})", *figure.value, figure.lo, figure.hi);
 }
 
@@ -195,13 +194,13 @@ std::string scale_factor_text(const study::Study& study, const study::Summary& s
         slopes.add_row({arm.name, signed_cell(line.scale_factor_ppm), size_cell(line.repeatability_ppm),
                         fmt::format("{:.3g}", line.noise_ppm), size_cell(line.beyond_noise_ppm),
                         signed_cell(line.bias_deg_h)});
-        deviations.add_row({arm.name, size_cell(line.largest_deviation_deg_h),
-                            line.largest_deviation_deg_h.value ? fmt::format("{:.4g}", line.largest_deviation_at_deg_h)
-                                                               : "-",
-                            size_cell(line.nonlinearity_ppm),
-                            fmt::format("{:.3g} ({:.2g} .. {:.2g})", line.gyro_deviation_deg_h,
-                                        line.gyro_deviation_lo_deg_h, line.gyro_deviation_hi_deg_h),
-                            fmt::format("{:.3g}", line.scatter_deg_h)});
+        deviations.add_row(
+            {arm.name, size_cell(line.largest_deviation_deg_h),
+             line.largest_deviation_deg_h.value ? fmt::format("{:.4g}", line.largest_deviation_at_deg_h) : "-",
+             size_cell(line.nonlinearity_ppm),
+             fmt::format("{:.3g} ({:.2g} .. {:.2g})", line.gyro_deviation_deg_h, line.gyro_deviation_lo_deg_h,
+                         line.gyro_deviation_hi_deg_h),
+             fmt::format("{:.3g}", line.scatter_deg_h)});
     }
     return fmt::format(
         "\nStraight lines through the rates, {} gyros at each, full scale {:.4g} deg/h; in brackets 95 % intervals,\n"
@@ -217,9 +216,9 @@ std::string reduction_text(const study::Summary& summary) {
         const auto& reduction = arm.arw_reduction;
         if (!reduction) continue;
         text += fmt::format("ARW of noise_injected over that of {}: ", arm.name);
-        text += reduction->ratio && reduction->hi ? fmt::format("{:.4g} (95 %: {:.4g} .. {:.4g})\n", *reduction->ratio,
-                                                                reduction->lo, *reduction->hi)
-                                                  : fmt::format("> {:.2g}\n", reduction->lo);
+        text += reduction->ratio && reduction->hi
+                    ? fmt::format("{:.4g} (95 %: {:.4g} .. {:.4g})\n", *reduction->ratio, reduction->lo, *reduction->hi)
+                    : fmt::format("> {:.2g}\n", reduction->lo);
     }
     return text;
 }

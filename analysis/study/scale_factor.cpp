@@ -34,8 +34,7 @@ Moments moments(const std::vector<double>& values) {
 SignedFigure mean_of(const std::vector<double>& values, double unit) {
     const Moments m = moments(values);
     const auto n = static_cast<double>(values.size());
-    const double half =
-        quantile(complement(boost::math::students_t(n - 1.0), 0.5 * outside)) * m.sd / std::sqrt(n);
+    const double half = quantile(complement(boost::math::students_t(n - 1.0), 0.5 * outside)) * m.sd / std::sqrt(n);
     SignedFigure figure{m.mean * unit, (m.mean - half) * unit, (m.mean + half) * unit};
     if (figure.lo <= 0.0 && figure.hi >= 0.0) figure.mean.reset();
     return figure;
@@ -107,8 +106,7 @@ std::optional<ScaleFactor> scale_factor(std::span<const double> input_rates_deg_
     for (std::size_t j = 0; j < rates; ++j) {
         std::vector<double> deviations(gyros);
         for (std::size_t m = 0; m < gyros; ++m) {
-            deviations[m] =
-                errors_deg_h[j * gyros + m] - middles[m] - slopes[m] * (input_rates_deg_h[j] - centre);
+            deviations[m] = errors_deg_h[j * gyros + m] - middles[m] - slopes[m] * (input_rates_deg_h[j] - centre);
             largest[m] = std::max(largest[m], std::abs(deviations[m]));
         }
         const Moments shared = moments(deviations);

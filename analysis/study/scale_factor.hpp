@@ -22,17 +22,17 @@ struct SizeFigure {
 };
 
 struct ScaleFactor {
-    double full_scale_deg_h = 0.0;      ///< largest input rate of the sweep, in size
-    SignedFigure scale_factor_ppm;      ///< slope of output over input rate less one, mean over the gyros
-    SizeFigure repeatability_ppm;       ///< standard deviation of the gyros' slopes, as measured
-    double noise_ppm = 0.0;             ///< what the scatter about the lines puts into it
-    SizeFigure beyond_noise_ppm;        ///< what is left of it without that
-    SignedFigure bias_deg_h;            ///< the lines at input rate zero, mean over the gyros
-    double bias_spread_deg_h = 0.0;     ///< standard deviation of the same over the gyros
-    SizeFigure largest_deviation_deg_h; ///< from the line, of the mean over the gyros; over all rates together
+    double full_scale_deg_h = 0.0;       ///< largest input rate of the sweep, in size
+    SignedFigure scale_factor_ppm;       ///< slope of output over input rate less one, mean over the gyros
+    SizeFigure repeatability_ppm;        ///< standard deviation of the gyros' slopes, as measured
+    double noise_ppm = 0.0;              ///< what the scatter about the lines puts into it
+    SizeFigure beyond_noise_ppm;         ///< what is left of it without that
+    SignedFigure bias_deg_h;             ///< the lines at input rate zero, mean over the gyros
+    double bias_spread_deg_h = 0.0;      ///< standard deviation of the same over the gyros
+    SizeFigure largest_deviation_deg_h;  ///< from the line, of the mean over the gyros; over all rates together
     double largest_deviation_at_deg_h = 0.0;
-    SizeFigure nonlinearity_ppm;         ///< that over full scale
-    double gyro_deviation_deg_h = 0.0;   ///< largest deviation of a gyro from its own line: median over the gyros ...
+    SizeFigure nonlinearity_ppm;           ///< that over full scale
+    double gyro_deviation_deg_h = 0.0;     ///< largest deviation of a gyro from its own line: median over the gyros ...
     double gyro_deviation_lo_deg_h = 0.0;  ///< ... and their central 68.27 %
     double gyro_deviation_hi_deg_h = 0.0;
     double scatter_deg_h = 0.0;  ///< rms deviation of a gyro's rates from its line and what all gyros share

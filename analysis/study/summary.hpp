@@ -68,8 +68,8 @@ struct ArmSummary {
     std::optional<Figure> bias_instability_deg_h;
     MeanFigure rate_error_deg_h;
     std::vector<EnsemblePoint> allan;
-    std::vector<SweepPoint> sweep;  ///< empty without a sweep
-    std::vector<Step> steps;        ///< of the closed form, in the order of the sweep
+    std::vector<SweepPoint> sweep;            ///< empty without a sweep
+    std::vector<Step> steps;                  ///< of the closed form, in the order of the sweep
     std::optional<ScaleFactor> scale_factor;  ///< of sweeps of three rates and more, with two gyros and more
     std::optional<Reduction> arw_reduction;   ///< of arms behind injected noise, beside `noise_injected` itself
 };
