@@ -204,6 +204,7 @@ TEST(LongScenarios, WhatIdealReadoutLeavesIsOfTheInjectedNoiseNotOfTables) {
     EXPECT_NEAR(left_deg_h(4.0, 1e-7) / usual, 1.0, 0.01);
     // Counts of 2^-32 fringes, rounded to 1/sqrt(12) of one, would leave sqrt(3) of that over the averaging time.
     const double counts_deg_h = std::sqrt(3.0 / 12.0) * 0.5 / 4294967296.0 / 263.0;
+    std::printf("counts of 2^-32 fringes: %.2g deg/h\n", counts_deg_h);
     EXPECT_LT(counts_deg_h, 1e-3 * usual);
 }
 
