@@ -285,7 +285,7 @@ TEST_F(RunCommand, SweepsOfThreeRatesShowTheLineThroughThem) {
         "nonlinearity_ppm",       "gyro_deviation_deg_h",           "scatter_deg_h"};
     const auto sweep = [](int points) {
         return "[input]\nrate_deg_h = 0.0\nsweep_stop_deg_h = 60.0\nsweep_points = " + std::to_string(points) +
-               "\n[ensemble]\ngyros = 3\nduration_s = 10.0\n"
+               "\n[ensemble]\ngyros = 3\nduration_s = 60.0\n"
                "[arms]\nnames = [\"uncompensated\", \"noise_injected\", \"noise_injected+compensated\"]\n";
     };
     write("two.toml", sweep(2));
