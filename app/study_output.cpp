@@ -33,6 +33,49 @@ Json json_mean(const study::MeanFigure& figure) {
     return {{"mean", number(figure.mean)}, {"lo", number(figure.lo)}, {"hi", number(figure.hi)}};
 }
 
+Json json_signed(const study::SignedFigure& figure) {
+    return {{"mean", number(figure.mean)}, {"lo", number(figure.lo)}, {"hi", number(figure.hi)}};
+}
+
+Json json_size(const study::SizeFigure& figure) {
+    return {{"value", number(figure.value)}, {"lo", number(figure.lo)}, {"hi", number(figure.hi)}};
+}
+
+/// The line through the rates of a sweep; every field is null where there is none.
+void add_scale_factor(Json& json, const std::optional<study::ScaleFactor>& line) {
+    const auto add = [&](const char* name, const auto& what) { json[name] = line ? what(*line) : Json(nullptr); };
+    using Line = study::ScaleFactor;
+    add("scale_factor_error_ppm", [](const Line& l) { return json_signed(l.scale_factor_ppm); });
+    add("scale_factor_repeatability_ppm", [](const Line& l) {
+        Json repeatability = json_size(l.repeatability_ppm);
+        repeatability["noise"] = number(l.noise_ppm);
+        repeatability["beyond_noise"] = json_size(l.beyond_noise_ppm);
+        return repeatability;
+    });
+    add("bias_deg_h", [](const Line& l) {
+        Json bias = json_signed(l.bias_deg_h);
+        bias["sd"] = number(l.bias_spread_deg_h);
+        return bias;
+    });
+    add("largest_deviation_deg_h", [](const Line& l) {
+        Json deviation = json_size(l.largest_deviation_deg_h);
+        deviation["input_rate_deg_h"] = l.largest_deviation_at_deg_h;
+        return deviation;
+    });
+    add("nonlinearity_ppm", [](const Line& l) { return json_size(l.nonlinearity_ppm); });
+    add("gyro_deviation_deg_h", [](const Line& l) {
+        return Json{{"median", number(l.gyro_deviation_deg_h)},
+                    {"lo", number(l.gyro_deviation_lo_deg_h)},
+                    {"hi", number(l.gyro_deviation_hi_deg_h)}};
+    });
+    add("scatter_deg_h", [](const Line& l) { return number(l.scatter_deg_h); });
+}
+
+Json json_reduction(const std::optional<study::Reduction>& reduction) {
+    if (!reduction) return nullptr;
+    return {{"ratio", number(reduction->ratio)}, {"lo", number(reduction->lo)}, {"hi", number(reduction->hi)}};
+}
+
 bool has_closed_form(const study::ArmSummary& arm) {
     return std::any_of(arm.sweep.begin(), arm.sweep.end(),
                        [](const study::SweepPoint& point) { return point.closed_form_rate_deg_h.has_value(); });
@@ -43,7 +86,9 @@ Json json_arm(const study::ArmSummary& arm) {
               {"arw_deg_rt_h", arm.noise_injected ? json_figure(arm.arw_deg_rt_h) : Json(nullptr)},
               {"bias_instability_deg_h",
                arm.bias_instability_deg_h ? json_figure(*arm.bias_instability_deg_h) : Json(nullptr)},
+              {"arw_reduction", json_reduction(arm.arw_reduction)},
               {"rate_error_deg_h", json_mean(arm.rate_error_deg_h)}};
+    add_scale_factor(json, arm.scale_factor);
     json["allan"] = Json::array();
     for (const study::EnsemblePoint& point : arm.allan) {
         json["allan"].push_back({{"tau_s", point.tau_s},
@@ -93,6 +138,11 @@ std::string rate_cell(double rate_deg_h) {
     return fmt::format("{:.4f}", std::abs(rate_deg_h) < half_a_digit ? 0.0 : rate_deg_h);
 }
 
+std::string ratio_cell(double ratio) {
+    constexpr double least_in_decimals = 1e-3;
+    return ratio < least_in_decimals ? fmt::format("{:.2g}", ratio) : fmt::format("{:.4f}", ratio);
+}
+
 report::Table arm_table(const study::Summary& summary) {
     report::Table table({{"arm", report::Align::left},
                          {"ARW [deg/sqrt(h)]", report::Align::right},
@@ -104,15 +154,73 @@ report::Table arm_table(const study::Summary& summary) {
         const study::Figure& arw = arm.arw_deg_rt_h;
         const bool shown = arm.noise_injected && arw.median;
         const auto& floor = arm.bias_instability_deg_h;
-        table.add_row({arm.name, arw_cell(arm), shown ? interval_cell(arw.median_lo, arw.median_hi) : "-",
-                       shown && summary.theory.arw_deg_rt_h > 0.0
-                           ? fmt::format("{:.4f}", *arw.median / summary.theory.arw_deg_rt_h)
-                           : "-",
-                       floor ? fmt::format("{:.3g}", *floor->median) : "none claimed",
-                       fmt::format("{} ({} .. {})", rate_cell(arm.rate_error_deg_h.mean),
-                                   rate_cell(arm.rate_error_deg_h.lo), rate_cell(arm.rate_error_deg_h.hi))});
+        table.add_row(
+            {arm.name, arw_cell(arm), shown ? interval_cell(arw.median_lo, arw.median_hi) : "-",
+             shown && summary.theory.arw_deg_rt_h > 0.0 ? ratio_cell(*arw.median / summary.theory.arw_deg_rt_h) : "-",
+             floor ? fmt::format("{:.3g}", *floor->median) : "none claimed",
+             fmt::format("{} ({} .. {})", rate_cell(arm.rate_error_deg_h.mean), rate_cell(arm.rate_error_deg_h.lo),
+                         rate_cell(arm.rate_error_deg_h.hi))});
     }
     return table;
+}
+
+std::string signed_cell(const study::SignedFigure& figure) {
+    const std::string mean = figure.mean ? fmt::format("{:.3g}", *figure.mean) : "none seen";
+    return fmt::format("{} ({:.2g} .. {:.2g})", mean, figure.lo, figure.hi);
+}
+
+std::string size_cell(const study::SizeFigure& figure) {
+    if (!figure.value) return figure.hi > 0.0 ? fmt::format("< {:.2g}", figure.hi) : "none";
+    return fmt::format("{:.3g} ({:.2g} .. {:.2g})", *figure.value, figure.lo, figure.hi);
+}
+
+/// The straight line through the rates of a sweep, arm by arm.
+std::string scale_factor_text(const study::Study& study, const study::Summary& summary) {
+    if (!summary.arms.front().scale_factor) return "";
+    report::Table slopes({{"arm", report::Align::left},
+                          {"scale factor error [ppm]", report::Align::right},
+                          {"repeatability [ppm]", report::Align::right},
+                          {"of it noise", report::Align::right},
+                          {"beyond noise [ppm]", report::Align::right},
+                          {"bias [deg/h]", report::Align::right}});
+    report::Table deviations({{"arm", report::Align::left},
+                              {"largest deviation [deg/h]", report::Align::right},
+                              {"at", report::Align::right},
+                              {"nonlinearity [ppm of full scale]", report::Align::right},
+                              {"of one gyro [deg/h]", report::Align::right},
+                              {"scatter [deg/h]", report::Align::right}});
+    for (const study::ArmSummary& arm : summary.arms) {
+        const study::ScaleFactor& line = *arm.scale_factor;
+        slopes.add_row({arm.name, signed_cell(line.scale_factor_ppm), size_cell(line.repeatability_ppm),
+                        fmt::format("{:.3g}", line.noise_ppm), size_cell(line.beyond_noise_ppm),
+                        signed_cell(line.bias_deg_h)});
+        deviations.add_row(
+            {arm.name, size_cell(line.largest_deviation_deg_h),
+             line.largest_deviation_deg_h.value ? fmt::format("{:.4g}", line.largest_deviation_at_deg_h) : "-",
+             size_cell(line.nonlinearity_ppm),
+             fmt::format("{:.3g} ({:.2g} .. {:.2g})", line.gyro_deviation_deg_h, line.gyro_deviation_lo_deg_h,
+                         line.gyro_deviation_hi_deg_h),
+             fmt::format("{:.3g}", line.scatter_deg_h)});
+    }
+    return fmt::format(
+        "\nStraight lines through the rates, {} gyros at each, full scale {:.4g} deg/h; in brackets 95 % intervals,\n"
+        "of one gyro's largest deviation 68 % of the gyros (docs/scale-factor.md)\n{}\n{}",
+        study.scenario.ensemble.gyros, summary.arms.front().scale_factor->full_scale_deg_h, slopes.text(),
+        deviations.text());
+}
+
+/// What the cures take away of the injected random walk.
+std::string reduction_text(const study::Summary& summary) {
+    std::string text;
+    for (const study::ArmSummary& arm : summary.arms) {
+        const auto& reduction = arm.arw_reduction;
+        if (!reduction) continue;
+        text += fmt::format("ARW of noise_injected over that of {}: ", arm.name);
+        text += reduction->ratio && reduction->hi
+                    ? fmt::format("{:.4g} (95 %: {:.4g} .. {:.4g})\n", *reduction->ratio, reduction->lo, *reduction->hi)
+                    : fmt::format("> {:.2g}\n", reduction->lo);
+    }
+    return text;
 }
 
 /// Where the arm stands on the staircase.
@@ -166,6 +274,7 @@ std::string sweep_text(const study::Study& study, const study::Summary& summary)
     const auto& input = study.scenario.input;
     text += fmt::format("Rates are {:.4g} deg/h apart.\n", std::abs(input.sweep_stop_deg_h - input.rate_deg_h) /
                                                                static_cast<double>(input.sweep_points - 1));
+    text += scale_factor_text(study, summary);
     return text;
 }
 
@@ -257,6 +366,7 @@ std::string study_text(const study::Study& study, const study::Summary& summary,
                         fmt::format("theory: angle random walk with turns fully randomised {:.5g} deg/sqrt(h), dead "
                                     "band +-{:.4g} deg/h (first order)",
                                     summary.theory.arw_deg_rt_h, summary.theory.dead_band_deg_h));
+    text += reduction_text(summary);
     const bool deterministic =
         std::any_of(summary.arms.begin(), summary.arms.end(), [](const auto& arm) { return !arm.noise_injected; });
     if (deterministic) {

@@ -193,6 +193,29 @@ std::vector<Step> steps(const Study& study, const ArmStatistics& arm) {
     return out;
 }
 
+std::optional<ScaleFactor> line_of(const Study& study, const ArmStatistics& arm) {
+    const auto members = static_cast<std::size_t>(study.scenario.ensemble.gyros);
+    std::vector<double> rates;
+    std::vector<double> errors;
+    for (std::size_t g = 0; g < arm.gyros.size(); ++g) {
+        if (g % members == 0) {
+            rates.push_back(ensemble::input_rate_deg_h(study.scenario, static_cast<std::int64_t>(g)));
+        }
+        errors.push_back(arm.gyros[g].rate_error_deg_h);
+    }
+    return scale_factor(rates, errors);
+}
+
+std::optional<Reduction> reduction(const Figure& raw, const Figure& left) {
+    if (!raw.median) return std::nullopt;
+    const std::optional<double> most = left.median ? left.median_hi : left.hi;
+    if (!most || !(*most > 0.0)) return std::nullopt;
+    Reduction result{std::nullopt, *raw.median_lo / *most, std::nullopt};
+    if (left.median && *left.median > 0.0) result.ratio = *raw.median / *left.median;
+    if (left.median && *left.median_lo > 0.0) result.hi = *raw.median_hi / *left.median_lo;
+    return result;
+}
+
 }  // namespace
 
 std::optional<double> locked_up_to_deg_h(const ArmSummary& arm) {
@@ -227,7 +250,15 @@ Summary summarise(const Study& study) {
         out.allan = ensemble_allan(arm);
         out.sweep = sweep(study, arm);
         out.steps = steps(study, arm);
+        out.scale_factor = line_of(study, arm);
         summary.arms.push_back(std::move(out));
+    }
+    const auto raw = std::find_if(summary.arms.begin(), summary.arms.end(),
+                                  [](const ArmSummary& arm) { return arm.name == "noise_injected"; });
+    if (raw == summary.arms.end()) return summary;
+    for (ArmSummary& arm : summary.arms) {
+        if (!arm.noise_injected || arm.name == raw->name) continue;
+        arm.arw_reduction = reduction(raw->arw_deg_rt_h, arm.arw_deg_rt_h);
     }
     return summary;
 }

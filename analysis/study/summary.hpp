@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/study/scale_factor.hpp"
 #include "analysis/study/study.hpp"
 
 namespace ringlock::study {
@@ -52,6 +53,13 @@ struct Step {
     double last_deg_h = 0.0;
 };
 
+/// Angle random walk of arm `noise_injected` over that of another: what a cure takes away.
+struct Reduction {
+    std::optional<double> ratio;  ///< of the medians; absent where the other's is not resolved
+    double lo = 0.0;              ///< from the medians' 95 % intervals, or from the other's upper limit
+    std::optional<double> hi;     ///< absent where the other's interval begins at zero
+};
+
 struct ArmSummary {
     std::string name;
     std::int64_t gyros = 0;
@@ -60,8 +68,10 @@ struct ArmSummary {
     std::optional<Figure> bias_instability_deg_h;
     MeanFigure rate_error_deg_h;
     std::vector<EnsemblePoint> allan;
-    std::vector<SweepPoint> sweep;  ///< empty without a sweep
-    std::vector<Step> steps;        ///< of the closed form, in the order of the sweep
+    std::vector<SweepPoint> sweep;            ///< empty without a sweep
+    std::vector<Step> steps;                  ///< of the closed form, in the order of the sweep
+    std::optional<ScaleFactor> scale_factor;  ///< of sweeps of three rates and more, with two gyros and more
+    std::optional<Reduction> arw_reduction;   ///< of arms behind injected noise, beside `noise_injected` itself
 };
 
 struct Theory {

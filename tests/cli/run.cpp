@@ -279,6 +279,52 @@ TEST_F(RunCommand, SweepsShowTheClosedFormWhereTheDriveRepeatsItself) {
     EXPECT_THAT(read("still.svg"), HasSubstr("uncompensated, closed form"));
 }
 
+TEST_F(RunCommand, SweepsOfThreeRatesShowTheLineThroughThem) {
+    const char* const fields[] = {
+        "scale_factor_error_ppm", "scale_factor_repeatability_ppm", "bias_deg_h",   "largest_deviation_deg_h",
+        "nonlinearity_ppm",       "gyro_deviation_deg_h",           "scatter_deg_h"};
+    const auto sweep = [](int points) {
+        return "[input]\nrate_deg_h = 0.0\nsweep_stop_deg_h = 60.0\nsweep_points = " + std::to_string(points) +
+               "\n[ensemble]\ngyros = 3\nduration_s = 60.0\n"
+               "[arms]\nnames = [\"uncompensated\", \"noise_injected\", \"noise_injected+compensated\"]\n";
+    };
+    write("two.toml", sweep(2));
+    for (const auto& [name, arm] : json::parse(run({"run", "two.toml", "--json"}).out)["arms"].items()) {
+        for (const char* field : fields) EXPECT_TRUE(arm.contains(field) && arm[field].is_null()) << name << field;
+    }
+    EXPECT_THAT(run({"analyze", "two.h5"}).out, testing::Not(HasSubstr("Straight lines")));
+
+    write("three.toml", sweep(3));
+    const json arms = json::parse(run({"run", "three.toml", "--json"}).out)["arms"];
+    for (const auto& [name, arm] : arms.items()) {
+        SCOPED_TRACE(name);
+        for (const char* field : fields) ASSERT_TRUE(arm.contains(field)) << field;
+        for (const char* field : {"scale_factor_error_ppm", "bias_deg_h"}) {
+            expect_numbers(arm[field], {"lo", "hi"});
+            const bool holds_zero = arm[field]["lo"] <= 0.0 && arm[field]["hi"] >= 0.0;
+            EXPECT_EQ(arm[field]["mean"].is_null(), holds_zero) << field;
+        }
+        expect_numbers(arm["bias_deg_h"], {"sd"});
+        expect_numbers(arm["scale_factor_repeatability_ppm"], {"value", "lo", "hi", "noise"});
+        expect_numbers(arm["scale_factor_repeatability_ppm"]["beyond_noise"], {"lo", "hi"});
+        expect_numbers(arm["largest_deviation_deg_h"], {"lo", "hi", "input_rate_deg_h"});
+        expect_numbers(arm["nonlinearity_ppm"], {"lo", "hi"});
+        expect_numbers(arm["gyro_deviation_deg_h"], {"median", "lo", "hi"});
+        EXPECT_TRUE(arm["scatter_deg_h"].is_number());
+        // Parts per million of a full scale of 60 deg/h.
+        EXPECT_NEAR(arm["nonlinearity_ppm"]["hi"], arm["largest_deviation_deg_h"]["hi"].get<double>() / 60e-6, 1e-6);
+    }
+    EXPECT_TRUE(arms["uncompensated"]["arw_reduction"].is_null());
+    EXPECT_TRUE(arms["noise_injected"]["arw_reduction"].is_null());
+    expect_numbers(arms["noise_injected+compensated"]["arw_reduction"], {"lo"});
+    EXPECT_EQ(json::parse(run({"analyze", "three.h5", "--json"}).out)["arms"], arms);
+    const std::string table = run({"analyze", "three.h5"}).out;
+    for (const char* text : {"Straight lines through the rates, 3 gyros at each, full scale 60 deg/h",
+                             "repeatability [ppm]", "nonlinearity [ppm of full scale]", "ARW of noise_injected over"}) {
+        EXPECT_THAT(table, HasSubstr(text));
+    }
+}
+
 TEST_F(RunCommand, TurnsOfSharedTrajectoriesCountOnce) {
     const auto turns = [&](const std::string& arms) -> std::int64_t {
         write("t.toml", "[ensemble]\ngyros = 3\nduration_s = 10.0\n[arms]\nnames = [" + arms + "]\n");

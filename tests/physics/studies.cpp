@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <mutex>
 #include <string>
@@ -176,6 +177,106 @@ TEST(Scenarios, TheStaircaseIsTheOneOfTheClosedForm) {
         EXPECT_NEAR(plain.steps[n].first_deg_h, steps[n].first, 1e-9);
         EXPECT_NEAR(plain.steps[n].last_deg_h, steps[n].second, 1e-9);
     }
+}
+
+TEST(Scenarios, TheRateSweepShortensToItsAnswer) {
+    scenario::Scenario scenario = from_file("rate-sweep.toml");
+    EXPECT_EQ(scenario.input.rate_deg_h, -10.0);
+    EXPECT_EQ(scenario.input.sweep_stop_deg_h, 500.0);
+    scenario.input.sweep_points = 18;
+    scenario.ensemble.duration_s = 30.0;
+    const study::Study study = study::run(scenario, 2);
+    const study::Summary summary = study::summarise(study);
+    const double duration_s = study.schedule.sample_interval_s * static_cast<double>(study.schedule.samples - 1);
+    double squares = 0.0;
+    for (int j = 0; j < 18; ++j) squares += std::pow(30.0 * (j - 8.5), 2);
+    for (const study::ArmSummary& each : summary.arms) ASSERT_TRUE(each.scale_factor) << each.name;
+
+    // Behind injected noise the random walk is all there is: over the record it scatters the rates by N/sqrt(T), and
+    // that the slopes. 16 gyros at 18 rates: 240 degrees of freedom, 4.6 %; 15 of the slopes, 18 %; 3 of each allowed.
+    const double rate_noise_deg_h = summary.theory.arw_deg_rt_h / std::sqrt(duration_s / 3600.0);
+    for (const char* name : {"noise_injected", "noise_injected+compensated_published"}) {
+        const study::ScaleFactor& line = *arm(summary, name).scale_factor;
+        EXPECT_NEAR(line.scatter_deg_h / rate_noise_deg_h, 1.0, 0.14) << name;
+        EXPECT_NEAR(line.noise_ppm, 1e6 * line.scatter_deg_h / std::sqrt(squares), 1e-9) << name;
+        EXPECT_NEAR(*line.repeatability_ppm.value / line.noise_ppm, 1.0, 0.55) << name;
+        EXPECT_FALSE(line.nonlinearity_ppm.value) << name;
+        EXPECT_FALSE(line.scale_factor_ppm.mean) << name;
+    }
+    // A corrected gyro has the floor of the quantum noise, the same at all rates: bias, not slope.
+    for (const char* name : {"compensated_exact", "noise_injected+compensated_exact"}) {
+        const study::ScaleFactor& line = *arm(summary, name).scale_factor;
+        EXPECT_LT(*line.repeatability_ppm.value, 0.3) << name;
+        EXPECT_FALSE(line.nonlinearity_ppm.value) << name;
+        EXPECT_LT(line.nonlinearity_ppm.hi, 2.0) << name;
+        EXPECT_LT(std::abs(line.bias_deg_h.lo) + std::abs(line.bias_deg_h.hi),
+                  4.0 * 1e-4 / std::sqrt(duration_s / 3600.0));
+    }
+    // Uncompensated gyros lock at bands up to 3.02 deg/h to either side.
+    const study::ScaleFactor& raw = *arm(summary, "uncompensated").scale_factor;
+    EXPECT_GT(raw.gyro_deviation_deg_h, 0.3);
+    EXPECT_LT(raw.gyro_deviation_hi_deg_h, 3.3);
+    EXPECT_GT(*raw.repeatability_ppm.value, 30.0);
+}
+
+/// The answer of ideal-readout.toml, for an ensemble of that size and duration.
+study::Summary ideal_readout(std::int64_t gyros, double duration_s) {
+    scenario::Scenario scenario = from_file("ideal-readout.toml");
+    scenario.ensemble.gyros = gyros;
+    scenario.ensemble.duration_s = duration_s;
+    const study::Summary summary = run(scenario);
+    const auto& published = arm(summary, "noise_injected+compensated_published").arw_reduction;
+    const auto& corrected = arm(summary, "noise_injected+compensated").arw_reduction;
+    EXPECT_TRUE(published && published->ratio && published->hi && corrected && corrected->ratio && corrected->hi);
+    EXPECT_NEAR(*published->ratio, 1.0, 0.02);
+    EXPECT_LE(corrected->lo, 1800.0);
+    EXPECT_GE(*corrected->hi, 1600.0);
+    return summary;
+}
+
+TEST(Scenarios, IdealReadoutShortensToItsAnswer) {
+    const auto exact = arm(ideal_readout(16, 3600.0), "noise_injected+compensated_exact").arw_reduction;
+    ASSERT_TRUE(exact);
+    EXPECT_GT(exact->lo, 1e6);
+}
+
+TEST(LongScenarios, IdealReadout) {
+    const study::Summary summary = ideal_readout(32, 18000.0);
+    const auto& exact = arm(summary, "noise_injected+compensated_exact").arw_reduction;
+    ASSERT_TRUE(exact && exact->ratio && exact->hi);
+    std::printf("injected over exact: %.4g (%.4g .. %.4g)\n", *exact->ratio, exact->lo, *exact->hi);
+    EXPECT_GT(exact->lo, 1e6);
+}
+
+TEST(LongScenarios, WhatIdealReadoutLeavesIsOfTheInjectedNoiseNotOfTables) {
+    // Allan deviations at four minutes, over the ensemble.
+    const auto left_deg_h = [](double turn_phase_rms_rad, double tolerance_rad) {
+        scenario::Scenario scenario = from_file("ideal-readout.toml");
+        scenario.ensemble.gyros = 16;
+        scenario.ensemble.duration_s = 7200.0;
+        scenario.noise_injection.turn_phase_rms_rad = turn_phase_rms_rad;
+        scenario.propagation.turn_map_tolerance_rad = tolerance_rad;
+        scenario.arms = {"noise_injected+compensated_exact"};
+        const study::Study study = study::run(scenario, 2);
+        for (const study::EnsemblePoint& point : study::summarise(study).arms[0].allan) {
+            if (point.tau_s < 250.0) continue;
+            std::printf(
+                "rms %g rad, tables to %g rad, off by %.2g: Allan deviation %.4g deg/h (%.2g .. %.2g) at %.0f s\n",
+                turn_phase_rms_rad, tolerance_rad, study.turn_map_error_rad, point.dev_deg_h, point.lo, point.hi,
+                point.tau_s);
+            return point.dev_deg_h;
+        }
+        return 0.0;
+    };
+    const double usual = left_deg_h(4.0, 1e-10);
+    // Two hours hold 27 spans of 263 s, 16 gyros 440: 3.4 %. The noise is the same but for its size.
+    EXPECT_NEAR(left_deg_h(8.0, 1e-10) / usual, 2.0, 0.2);
+    EXPECT_NEAR(left_deg_h(4.0, 1e-12) / usual, 1.0, 0.01);
+    EXPECT_NEAR(left_deg_h(4.0, 1e-7) / usual, 1.0, 0.01);
+    // Counts of 2^-32 fringes, rounded to 1/sqrt(12) of one, would leave sqrt(3) of that over the averaging time.
+    const double counts_deg_h = std::sqrt(3.0 / 12.0) * 0.5 / 4294967296.0 / 263.0;
+    std::printf("counts of 2^-32 fringes: %.2g deg/h\n", counts_deg_h);
+    EXPECT_LT(counts_deg_h, 1e-3 * usual);
 }
 
 TEST(Scenarios, TheDirectIntegratorGivesTheSameStudyAsTheTurnMap) {
