@@ -35,6 +35,8 @@ const char* compensator_name(scenario::Compensator compensator) {
             return "corrected";
         case scenario::Compensator::exact:
             return "exact";
+        case scenario::Compensator::adaptive:
+            return "adaptive";
         case scenario::Compensator::none:
             break;
     }

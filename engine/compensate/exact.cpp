@@ -66,9 +66,39 @@ HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V inver
     return false;
 }
 
-/// Rows [first_row, last_row) of the readings; errors are told less errors.whole.
+/// What was known of the rate or the coupling has changed: from the last reading to the dither's turn anew, so that the
+/// error told there makes no step.
+bool place_last_turn(D d, bool minimum, std::size_t lane, Exact::State& state) {
+    const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
+    const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
+    const V sign = hn::Set(d, minimum ? 1.0 : -1.0);
+    const V per_rad = hn::Set(d, 0.15915494309189535);
+    const V scale_angle = load(state.scale_angle);
+    const V phase_sine = load(state.coupling_sine);
+    const V phase_cosine = load(state.coupling_cosine);
+    V sine = sign * sm::fma(d, load(state.read_cosine), phase_sine, load(state.read_sine) * phase_cosine);
+    V cosine = sm::fnma(d, load(state.read_sine), phase_sine, load(state.read_cosine) * phase_cosine);
+    const gm::UprightSide<V> side{load(state.read_amplitude_rad), load(state.read_angular_frequency_rad_s),
+                                  sign * load(state.rate_rad_s),  load(state.b_rad_s),
+                                  load(state.read_scale_s),       scale_angle};
+    V phase_rad, lockin_rad;
+    if (!walk_to_dither_turn(d, side, hn::Set(d, 1.0) / scale_angle, sine, cosine, phase_rad, lockin_rad)) {
+        return false;
+    }
+    store(sine, state.sine);
+    store(cosine, state.cosine);
+    store(sm::fma(d, sign * phase_rad, per_rad, load(state.read_fringes)), state.turn_fringes);
+    store(sm::fma(d, sign * (lockin_rad - load(state.read_lockin_rad)), per_rad, load(state.error_fringes)),
+          state.error_fringes);
+    store(lockin_rad, state.read_lockin_rad);
+    return true;
+}
+
+/// Rows [first_row, last_row) of the readings; errors are told less errors.whole. `changed`: rate or coupling are
+/// others than at the row before.
 bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const readout::LaneReadings& readings,
-                   std::size_t first_row, std::size_t last_row, bool begun, Exact::State& state, LaneErrors& errors) {
+                   std::size_t first_row, std::size_t last_row, bool begun, bool changed, Exact::State& state,
+                   LaneErrors& errors) {
     const D d;
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
@@ -79,6 +109,12 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
     for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
         const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
         const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
+        if (begun && changed && !place_last_turn(d, !readings.minimum(first_row), lane, state)) return false;
+        const V phase_sine = load(state.coupling_sine);
+        const V phase_cosine = load(state.coupling_cosine);
+        const V coupling_x = hn::Max(
+            hn::Min((load(state.b_rad_s) - load(tables.centre()[2])) * load(tables.inverse_half_width()[2]), one),
+            hn::Neg(one));
         const V mean_amplitude = load(state.amplitude_rad);
         const V b = load(state.b_rad_s);
         const V scale_angle = load(state.scale_angle);
@@ -102,8 +138,10 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
             const V raw_cosine = load(readings.cosine[i]);
             const V size =
                 one / hn::Sqrt(hn::Max(sm::fma(d, raw_sine, raw_sine, raw_cosine * raw_cosine), hn::Set(d, 1e-300)));
-            V sine = sign * raw_sine * size;
-            V cosine = raw_cosine * size;
+            const V read_sine = raw_sine * size;
+            const V read_cosine = raw_cosine * size;
+            V sine = sign * sm::fma(d, read_cosine, phase_sine, read_sine * phase_cosine);
+            V cosine = sm::fnma(d, read_sine, phase_sine, read_cosine * phase_cosine);
             const std::size_t after = minimum ? 0 : 1;
             const V w_after = load(state.angular_frequency_rad_s[after]);
             const V w_before = load(state.angular_frequency_rad_s[1 - after]);
@@ -141,7 +179,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                                        hn::Neg(first.z_re * (last_sine - sine)));  // Im z (e_0 - e_1)
                 const V gain_rad = sm::fma(d, bend, hn::Set(d, 2.0), first.shift * (two_pi + two_pi));
                 const V amplitude = half * (sm::fma(d, moved, two_pi, hn::Neg(plain_rotation)) - gain_rad);
-                const pm::HalfMapOf<V> map = pm::evaluate(d, part, lane, scaled(amplitude), rate_x, zero);
+                const pm::HalfMapOf<V> map = pm::evaluate(d, part, lane, scaled(amplitude), rate_x, coupling_x);
                 const sm::Complex<V> z{map.z_re, map.z_im};
                 const sm::Complex<V> unit{one, zero};
                 const sm::Complex<V> e0{last_cosine, hn::Neg(last_sine)};
@@ -161,6 +199,15 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
             last_cosine = cosine;
             last_fringes = turn_fringes;
             last_whole = load(readings.phase_whole[i]);
+            if (i + 1 == last_row) {
+                store(read_sine, state.read_sine);
+                store(read_cosine, state.read_cosine);
+                store(load(readings.phase_fringes[i]), state.read_fringes);
+                store(lockin_rad, state.read_lockin_rad);
+                store(side.amplitude, state.read_amplitude_rad);
+                store(side.w, state.read_angular_frequency_rad_s);
+                store(side.scale_s, state.read_scale_s);
+            }
         }
         store(error, state.error_fringes);
         store(error_whole, state.error_whole);
@@ -185,15 +232,17 @@ namespace {
 constexpr double baseline_s = 16.0;     // the input rate is averaged over one to two of them
 constexpr double least_margin = 0.001;  // of the amplitude
 // The rate is estimated at turns that do not depend on the size of later pieces; sooner after a short first one.
-constexpr std::int64_t most_turns_between_estimates = 128;
+constexpr std::size_t most_turns_between_estimates = 128;
 
 }  // namespace
 
-Exact::Exact(const Calibration& calibration, double tolerance_rad) : calibration_(calibration), tables_(tolerance_rad) {
+Exact::Exact(const Calibration& calibration, double tolerance_rad, double coupling_share)
+    : calibration_(calibration), coupling_share_(coupling_share), tables_(tolerance_rad) {
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
         const std::size_t which = std::min(lane, calibration.lanes - 1);
         state_.amplitude_rad[lane] = calibration.dither_amplitude_rad[which];
         state_.b_rad_s[lane] = calibration.b_rad_s[which];
+        state_.coupling_cosine[lane] = 1.0;
         state_.duration_s[0][lane] = calibration.positive_duration_s[which];
         state_.duration_s[1][lane] = calibration.negative_duration_s[which];
         const double root = std::sqrt(state_.amplitude_rad[lane]);
@@ -218,7 +267,8 @@ void Exact::make_tables(std::size_t lane) {
     const double width = 16.0 * units::two_pi + 0.01 * std::abs(state_.rate_rad_s[lane]);
     const double rate = state_.rate_rad_s[lane];
     const double b = state_.b_rad_s[lane];
-    tables_.make(lane, device, {{a - margin, a + margin}, {rate - width, rate + width}, {b, b}});
+    const double spread = coupling_share_ * b;
+    tables_.make(lane, device, {{a - margin, a + margin}, {rate - width, rate + width}, {b - spread, b + spread}});
 }
 
 void Exact::see_minima(const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row,
@@ -250,6 +300,7 @@ void Exact::estimate_rate() {
             (latest_.whole[lane] - older_.whole[lane]) + (latest_.fringes[lane] - older_.fringes[lane]);
         period_s = state_.duration_s[0][lane] + state_.duration_s[1][lane];
         state_.rate_rad_s[lane] = turned * units::two_pi / (cycles * period_s);
+        changed_ = true;
     }
     // All gyros of a study are dithered at one frequency.
     if (0.5 * static_cast<double>(latest_.turn - newer_.turn) * period_s >= baseline_s) {
@@ -258,42 +309,68 @@ void Exact::estimate_rate() {
     }
 }
 
+void Exact::set_coupling(std::size_t lane, double b_rad_s, double phase_rad) {
+    state_.b_rad_s[lane] = b_rad_s;
+    state_.coupling_cosine[lane] = std::cos(phase_rad);
+    state_.coupling_sine[lane] = std::sin(phase_rad);
+    changed_ = true;
+}
+
+void Exact::solve(const readout::LaneReadings& readings, std::size_t first, std::size_t last, LaneErrors& errors) {
+    for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
+        if (!begun_ || !tables_.ranges(lane).rate_rad_s.covers(state_.rate_rad_s[lane]) ||
+            !tables_.ranges(lane).b_rad_s.covers(state_.b_rad_s[lane])) {
+            make_tables(lane);
+        }
+    }
+    if (!HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, readings, first, last, begun_, changed_,
+                                             state_, errors)) {
+        throw RunError(
+            "compensated_exact: the phase does not reverse near a turn of the dither; the input rate is too high for "
+            "it");
+    }
+    changed_ = false;
+}
+
 void Exact::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
     errors.fringes.resize(readings.turns);
     errors.whole = state_.error_whole;
     if (readings.turns == 0) return;
-    const auto solve = [&](std::size_t first, std::size_t last) {
-        if (HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, readings, first, last, begun_, state_,
-                                                errors)) {
-            return;
-        }
-        throw RunError(
-            "compensated_exact: the phase does not reverse near a turn of the dither; the input rate is too high for "
-            "it");
-    };
+    std::size_t row = 0;
     if (!begun_) {
-        see_minima(readings, 0, readings.turns, nullptr);
+        // The rate first from the phase as it is, then from the phase less the lock-in's share.
+        row = std::min(readings.turns, most_turns_between_estimates);
+        see_minima(readings, 0, row, nullptr);
         estimate_rate();
-        for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) make_tables(lane);
-        solve(0, readings.turns);
+        const State start = state_;
+        solve(readings, 0, row, errors);
+        older_.turn = -1;
+        see_minima(readings, 0, row, &errors);
+        estimate_rate();
+        const simd::Lanes rate_rad_s = state_.rate_rad_s;
+        state_ = start;
+        state_.rate_rad_s = rate_rad_s;
+        solve(readings, 0, row, errors);
         begun_ = true;
-        turns_ = static_cast<std::int64_t>(readings.turns);
-        next_estimate_ = turns_ + std::clamp<std::int64_t>(turns_, 2, most_turns_between_estimates);
-        return;
+        count_turns(row);
     }
-    for (std::size_t row = 0; row < readings.turns;) {
+    while (row < readings.turns) {
         const std::size_t rows = std::min(readings.turns - row, static_cast<std::size_t>(next_estimate_ - turns_));
-        solve(row, row + rows);
+        solve(readings, row, row + rows, errors);
         see_minima(readings, row, row + rows, &errors);
         row += rows;
-        turns_ += static_cast<std::int64_t>(rows);
-        if (turns_ < next_estimate_) continue;
-        next_estimate_ = turns_ + std::clamp<std::int64_t>(turns_, 2, most_turns_between_estimates);
-        estimate_rate();
-        for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
-            if (!tables_.ranges(lane).rate_rad_s.covers(state_.rate_rad_s[lane])) make_tables(lane);
+        if (turns_ + static_cast<std::int64_t>(rows) < next_estimate_) {
+            turns_ += static_cast<std::int64_t>(rows);
+            continue;
         }
+        count_turns(rows);
+        estimate_rate();
     }
+}
+
+void Exact::count_turns(std::size_t rows) {
+    turns_ += static_cast<std::int64_t>(rows);
+    next_estimate_ = turns_ + std::clamp<std::int64_t>(turns_, 2, most_turns_between_estimates);
 }
 
 }  // namespace ringlock::compensate

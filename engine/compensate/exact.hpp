@@ -28,7 +28,11 @@ namespace ringlock::compensate {
 class Exact final : public LaneCompensator {
    public:
     /// `tolerance_rad`: of the tables, for one turn. Throws RunError where a dither has too few fringes for a turn map.
-    Exact(const Calibration& calibration, double tolerance_rad);
+    /// `coupling_share`: half width of the tables in the coupling, for one that set_coupling() moves.
+    Exact(const Calibration& calibration, double tolerance_rad, double coupling_share = 0.0);
+
+    /// From the next reading on.
+    void set_coupling(std::size_t lane, double b_rad_s, double phase_rad);
 
     void observe(const readout::LaneReadings& readings, LaneErrors& errors) override;
 
@@ -42,6 +46,10 @@ class Exact final : public LaneCompensator {
         simd::Lanes sine, cosine, turn_fringes, turn_whole;
         simd::Lanes error_fringes;  ///< at the dither's turn
         simd::Lanes error_whole;
+        simd::Lanes coupling_cosine, coupling_sine;  ///< of the coupling phase
+        // The last reading and how the dither's turn was reached from it, for a rate or a coupling known better since.
+        simd::Lanes read_sine, read_cosine, read_fringes, read_lockin_rad;
+        simd::Lanes read_amplitude_rad, read_angular_frequency_rad_s, read_scale_s;
     };
 
    private:
@@ -54,14 +62,18 @@ class Exact final : public LaneCompensator {
     void see_minima(const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row,
                     const LaneErrors* errors);
     void estimate_rate();
+    void solve(const readout::LaneReadings& readings, std::size_t first, std::size_t last, LaneErrors& errors);
+    void count_turns(std::size_t rows);
     void make_tables(std::size_t lane);
 
     Calibration calibration_;
+    double coupling_share_;
     propagate::TurnTables tables_;
     State state_;
     bool begun_ = false;
-    Minimum older_;  ///< the rate is counted from here: one to two baselines ago
-    Minimum newer_;  ///< less than one ago
+    bool changed_ = false;  ///< rate or coupling, since the last row
+    Minimum older_;         ///< the rate is counted from here: one to two baselines ago
+    Minimum newer_;         ///< less than one ago
     Minimum latest_;
     std::int64_t turns_ = 0;  ///< seen
     std::int64_t next_estimate_ = 0;

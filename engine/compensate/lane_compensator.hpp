@@ -28,6 +28,8 @@ struct LaneErrors {
 class LaneCompensator {
    public:
     virtual ~LaneCompensator() = default;
+    /// Whether readings are to be as sampled, with pulses, before the phase is recovered from them.
+    virtual bool wants_samples() const { return false; }
     /// Takes the next readings, consecutive and without gaps, and gives the error accumulated up to each. An error
     /// never depends on later readings, but that the first piece of a run may be taken as one.
     virtual void observe(const readout::LaneReadings& readings, LaneErrors& errors) = 0;

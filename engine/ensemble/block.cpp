@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "engine/compensate/adaptive.hpp"
 #include "engine/compensate/exact.hpp"
 #include "engine/compensate/first_order.hpp"
 #include "engine/dither/lane_dither.hpp"
@@ -77,6 +78,11 @@ std::unique_ptr<propagate::LanePropagator> make_propagator(const scenario::Scena
     return propagate::make_turn_map(devices, margin, scenario.propagation.turn_map_tolerance_rad);
 }
 
+/// The coupling as the compensators and the electronics are told it.
+double told_b_rad_s(const scenario::Scenario& scenario, const gyro::Device& device) {
+    return device.coupling.b_rad_s * (1.0 + scenario.calibration.threshold_error_relative);
+}
+
 std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Scenario& scenario,
                                                               const std::vector<gyro::Device>& devices,
                                                               const scenario::Arm& arm, TrajectoryKind kind) {
@@ -84,7 +90,7 @@ std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Sc
     calibration.lanes = devices.size();
     calibration.amplitude_margin_rad = dither::LaneDither::amplitude_margin_rad(injected_rms_rad(scenario, kind));
     for (std::size_t lane = 0; lane < devices.size(); ++lane) {
-        calibration.b_rad_s[lane] = devices[lane].coupling.b_rad_s;
+        calibration.b_rad_s[lane] = told_b_rad_s(scenario, devices[lane]);
         calibration.dither_amplitude_rad[lane] = devices[lane].dither_amplitude_rad;
         calibration.positive_duration_s[lane] = devices[lane].positive_duration_s;
         calibration.negative_duration_s[lane] = devices[lane].negative_duration_s;
@@ -96,6 +102,9 @@ std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Sc
             return std::make_unique<compensate::FirstOrder>(calibration, compensate::FirstOrder::corrected);
         case scenario::Compensator::exact:
             return std::make_unique<compensate::Exact>(calibration, scenario.propagation.turn_map_tolerance_rad);
+        case scenario::Compensator::adaptive:
+            return std::make_unique<compensate::Adaptive>(calibration, make_electronics(scenario),
+                                                          scenario.propagation.turn_map_tolerance_rad);
         case scenario::Compensator::none:
             break;
     }
@@ -111,7 +120,9 @@ class Branch {
         for (std::size_t i = 0; i < arms.size(); ++i) {
             if (kind_of(arms[i]) != kind) continue;
             listeners_.push_back({i, make_compensator(scenario, devices_, arms[i], kind), {}, {}});
-            compensated_ = compensated_ || listeners_.back().compensator != nullptr;
+            const auto& compensator = listeners_.back().compensator;
+            compensated_ = compensated_ || compensator != nullptr;
+            samples_wanted_ = samples_wanted_ || (compensator && compensator->wants_samples());
         }
         if (listeners_.empty()) return;
         propagator_ = make_propagator(scenario, devices_, kind);
@@ -119,12 +130,14 @@ class Branch {
         const bool instrument = scenario.readout.model == scenario::ReadoutModel::instrument;
         every_turn_ = compensated_ || instrument;
         readout_.emplace(devices_, ellipses_of(setups), electronics,
-                         instrument     ? readout::Wanted::pulses
-                         : compensated_ ? readout::Wanted::accelerations
-                                        : readout::Wanted::phase);
+                         instrument || samples_wanted_ ? readout::Wanted::pulses
+                         : compensated_                ? readout::Wanted::accelerations
+                                                       : readout::Wanted::phase);
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
             // Amplitudes are half the difference of two turns' noise.
-            recovery_.emplace(devices_, electronics, injected_rms_rad(scenario, kind) / std::numbers::sqrt2);
+            std::vector<gyro::Device> told = devices_;
+            for (gyro::Device& device : told) device.coupling.b_rad_s = told_b_rad_s(scenario, device);
+            recovery_.emplace(told, electronics, injected_rms_rad(scenario, kind) / std::numbers::sqrt2);
         }
     }
 
@@ -136,9 +149,13 @@ class Branch {
         dither_.next(turns, angle_arcsec, threshold_factor, drive_);
         propagator_->step(drive_, turns_);
         readout_->read(drive_, turns_, noise, every_turn_ ? 1 : 2, readings_, angles_);
-        if (recovery_) recovery_->recover(readings_, angles_);
+        if (samples_wanted_) samples_ = readings_;
+        if (recovery_) recovery_->recover(readings_, &angles_);
         for (Listener& listener : listeners_) {
-            if (listener.compensator) listener.compensator->observe(readings_, listener.errors);
+            if (listener.compensator) {
+                const bool samples = listener.compensator->wants_samples();
+                listener.compensator->observe(samples ? samples_ : readings_, listener.errors);
+            }
             output_counts(angles_, listener.compensator ? &listener.errors : nullptr, turns, listener.counts);
         }
     }
@@ -165,9 +182,11 @@ class Branch {
     std::optional<readout::FractionRecovery> recovery_;
     bool compensated_ = false;
     bool every_turn_ = false;
+    bool samples_wanted_ = false;
     gyro::LaneDrive drive_;
     gyro::LaneTurns turns_;
     readout::LaneReadings readings_;
+    readout::LaneReadings samples_;  ///< as they were before the phase was recovered from pulses
     readout::LaneAngles angles_;
 };
 

@@ -83,10 +83,11 @@ void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm>
     const std::int64_t counted = static_cast<std::int64_t>(gyros) * block.trajectories();
     for (std::int64_t turn = 0; turn < schedule.turns();) {
         if (monitor.cancelled && monitor.cancelled()) throw Interrupted();
-        const auto turns =
-            static_cast<std::size_t>(std::min(static_cast<std::int64_t>(piece), schedule.turns() - turn));
+        const bool settling = turn < schedule.settle_turns();
+        const std::int64_t end = settling ? schedule.settle_turns() : schedule.turns();
+        const auto turns = static_cast<std::size_t>(std::min(static_cast<std::int64_t>(piece), end - turn));
         follow([&] { block.advance(turns); });
-        for (std::size_t arm = 0; arm < arms.size(); ++arm) sink.cycles(arm, block.counts(arm));
+        for (std::size_t arm = 0; arm < arms.size() && !settling; ++arm) sink.cycles(arm, block.counts(arm));
         turn += static_cast<std::int64_t>(turns);
         if (monitor.on_progress) monitor.on_progress(0, static_cast<std::int64_t>(turns) * counted);
     }

@@ -9,6 +9,7 @@ Schedule::Schedule(const scenario::Scenario& scenario) {
     const double frequency = scenario.dither.frequency_hz;
     cycle_s = 1.0 / frequency;
     cycles_per_sample = std::max<std::int64_t>(1, std::llround(scenario.output.sample_interval_s * frequency));
+    settle_cycles = std::llround(scenario.ensemble.settle_s * frequency);
     sample_interval_s = static_cast<double>(cycles_per_sample) / frequency;
     // The small slack keeps a duration of whole samples from losing one to rounding.
     samples = 1 + static_cast<std::int64_t>(std::floor(scenario.ensemble.duration_s / sample_interval_s + 1e-9));

@@ -11,13 +11,15 @@ struct Schedule {
 
     double cycle_s;  ///< period of the nominal dither
     std::int64_t cycles_per_sample;
-    std::int64_t samples;      ///< of one record, the one at time 0 included
-    double sample_interval_s;  ///< cycles_per_sample periods of the nominal dither
+    std::int64_t settle_cycles;  ///< before the record
+    std::int64_t samples;        ///< of one record, the one at time 0 included
+    double sample_interval_s;    ///< cycles_per_sample periods of the nominal dither
 
     /// Minima of the phase, one a cycle, those of the first and the last sample included.
     std::int64_t cycles() const { return cycles_per_sample * (samples - 1) + 1; }
-    /// Zero-rate points of one trajectory.
-    std::int64_t turns() const { return 2 * cycles_per_sample * (samples - 1) + 1; }
+    /// Zero-rate points of one trajectory before the record, and with it.
+    std::int64_t settle_turns() const { return 2 * settle_cycles; }
+    std::int64_t turns() const { return settle_turns() + 2 * cycles_per_sample * (samples - 1) + 1; }
 };
 
 }  // namespace ringlock::ensemble

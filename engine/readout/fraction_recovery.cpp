@@ -24,9 +24,17 @@ constexpr double model_rad = 1e-6;        // what parabola, tables and coupling 
 constexpr double largest_step_rad = 0.2;  // beyond it pulses and detectors contradict each other
 constexpr double memory_cycles = 512.0;
 
-void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, const PulseTables& tables,
-                   const Electronics& electronics, FractionRecovery::State& state, LaneReadings& readings,
-                   LaneAngles& angles) {
+/// Products of a column of the pulses' equations with the others, weighted sums.
+template <class V>
+struct Column {
+    V one, slope, first, second, y;
+};
+
+/// `angles` may be absent. With `learning`, what is left of normal equations after a turn is `keep`.
+template <bool learning>
+void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const PulseTables& tables,
+                 const Electronics& electronics, double keep, FractionRecovery::State& state, LaneReadings& readings,
+                 LaneAngles* angles) {
     const D d;
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
@@ -60,6 +68,7 @@ void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, cons
         V cycle_gain = load(state.cycle_gain);
         V cycles = load(state.cycles);
         V contradictions = load(state.contradictions);
+        V normal[5] = {load(state.xx), load(state.xy), load(state.yy), load(state.x), load(state.y)};
         for (std::size_t i = 0; i < readings.turns; ++i) {
             const bool minimum = readings.minimum(i);
             const V sign = hn::Set(d, minimum ? 1.0 : -1.0);
@@ -80,13 +89,19 @@ void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, cons
             const V near = (first - sign * read * hn::Set(d, 4.0)) * quarter_rad;
             const V inside = hn::Max(hn::Min(near, quarter_rad), zero);
             const V x = sm::fma(d, hn::Sqrt(inside + inside), hn::Set(d, 1.1283791670955126), hn::Neg(one));
-            const auto factors = pulse_factors<kept_pulses>(d, tables.times[direction], tables.used, lane,
-                                                            quarter_of(d, first - one), x);
+            const auto quarter = quarter_of(d, first - one);
+            const auto factors = pulse_factors<kept_pulses>(d, tables.times[direction], tables.used, lane, quarter, x);
+            PulseFactors<V, kept_pulses> turned;  // of a coupling a quarter fringe on
+            if constexpr (learning) {
+                turned = pulse_factors<kept_pulses>(d, tables.times[direction], tables.used, lane,
+                                                    quarter_of(d, minimum ? first : first - one - one), x);
+            }
             V s0 = sample_weight;
             V s1 = zero;
             V s2 = zero;
             V sy = zero;
             V sgy = zero;
+            Column<V> bends[2] = {{zero, zero, zero, zero, zero}, {zero, zero, zero, zero, zero}};
             for (std::size_t side = 0; side < 2; ++side) {
                 const V a = amplitude[side] * load(known.w2_per_amplitude[direction][side]);
                 const std::size_t half_sign = side == 0 ? 1 - after_side : after_side;
@@ -112,6 +127,19 @@ void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, cons
                     s2 = sm::fma(d, weighted, slope, s2);
                     sy = sm::fma(d, weight, y, sy);
                     sgy = sm::fma(d, weighted, y, sgy);
+                    if constexpr (learning) {
+                        const V scale = (distance + distance) / factor;
+                        const V of_quarter = bend * (turned.values[side][pulse] - one - bent);
+                        const V p[2] = {scale * (factor - one - bent), scale * of_quarter};
+                        for (std::size_t k = 0; k < 2; ++k) {
+                            const V heavy = weight * p[k];
+                            bends[k].one = bends[k].one + heavy;
+                            bends[k].slope = sm::fma(d, heavy, slope, bends[k].slope);
+                            bends[k].first = sm::fma(d, heavy, p[0], bends[k].first);
+                            bends[k].second = sm::fma(d, heavy, p[1], bends[k].second);
+                            bends[k].y = sm::fma(d, heavy, y, bends[k].y);
+                        }
+                    }
                 }
             }
             const V inverse = one / s2;
@@ -122,6 +150,23 @@ void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, cons
             const auto agree = hn::Abs(change) < hn::Set(d, largest_step_rad);
             change = sign * hn::IfThenElseZero(agree, change);
             contradictions = contradictions + hn::IfThenElse(agree, zero, one);
+
+            if constexpr (learning) {
+                // What of the bends e and tau do not explain.
+                const V determinant = one / sm::fnma(d, s1, s1, s0 * s2);
+                const auto apart = [&](const Column<V>& column, V product, V with_one, V with_slope) HWY_ATTR {
+                    const V of_one = sm::fnma(d, s1, with_slope, s2 * with_one) * determinant;
+                    const V of_slope = sm::fnma(d, s1, with_one, s0 * with_slope) * determinant;
+                    return product - sm::fma(d, column.one, of_one, column.slope * of_slope);
+                };
+                const V turn[5] = {apart(bends[0], bends[0].first, bends[0].one, bends[0].slope),
+                                   apart(bends[0], bends[0].second, bends[1].one, bends[1].slope),
+                                   apart(bends[1], bends[1].second, bends[1].one, bends[1].slope),
+                                   apart(bends[0], bends[0].y, sy, sgy), apart(bends[1], bends[1].y, sy, sgy)};
+                for (std::size_t k = 0; k < 5; ++k) {
+                    normal[k] = sm::fma(d, normal[k], hn::Set(d, keep), hn::IfThenElseZero(agree, turn[k]));
+                }
+            }
 
             const V raw_sine = load(readings.sine[i]);
             const V raw_cosine = load(readings.cosine[i]);
@@ -134,8 +179,8 @@ void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, cons
             const V change_fringes = change * per_rad;
             const V fringes = read + change_fringes;
             store(fringes, readings.phase_fringes[i]);
-            if (electronics.interpolate) {
-                store(load(angles.angle_fringes[i]) + change_fringes, angles.angle_fringes[i]);
+            if (angles != nullptr && electronics.interpolate) {
+                store(load(angles->angle_fringes[i]) + change_fringes, angles->angle_fringes[i]);
             }
 
             const V whole = load(readings.phase_whole[i]);
@@ -156,7 +201,18 @@ void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, cons
         store(cycle_gain, state.cycle_gain);
         store(cycles, state.cycles);
         store(contradictions, state.contradictions);
+        if constexpr (learning) {
+            simd::Lanes* const to[5] = {&state.xx, &state.xy, &state.yy, &state.x, &state.y};
+            for (std::size_t k = 0; k < 5; ++k) store(normal[k], *to[k]);
+        }
     }
+}
+
+void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, const PulseTables& tables,
+                   const Electronics& electronics, double forget, FractionRecovery::State& state,
+                   LaneReadings& readings, LaneAngles* angles) {
+    const auto recover = forget > 0.0 ? recover_all<true> : recover_all<false>;
+    recover(lanes, known, tables, electronics, 1.0 - forget, state, readings, angles);
 }
 
 }  // namespace ringlock::readout::HWY_NAMESPACE
@@ -171,10 +227,9 @@ FractionRecovery::FractionRecovery(std::span<const gyro::Device> devices, const 
                                    double amplitude_rms_rad)
     : lanes_(devices.size()), electronics_(electronics) {
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
-        const gyro::Device& device = devices[std::min(lane, devices.size() - 1)];
+        const gyro::Device& device = devices_.emplace_back(devices[std::min(lane, devices.size() - 1)]);
         const double amplitude = device.dither_amplitude_rad;
         known_.amplitude_rad[lane] = amplitude;
-        known_.b_rad_s[lane] = device.coupling.b_rad_s;
         known_.half_share[0][lane] = device.positive_duration_s / device.period_s();
         known_.half_share[1][lane] = device.negative_duration_s / device.period_s();
         known_.amplitude_relative[lane] = amplitude_rms_rad / amplitude;
@@ -188,13 +243,54 @@ FractionRecovery::FractionRecovery(std::span<const gyro::Device> devices, const 
                     half.end_acceleration_rad_s2(side == 0 ? 1 : 0) / amplitude;
             }
         }
-        tables_.make(lane, device, kept_pulses);
+        make_tables(lane);
     }
 }
 
-void FractionRecovery::recover(LaneReadings& readings, LaneAngles& angles) {
-    HWY_DYNAMIC_DISPATCH(recover_lanes)(lanes_, known_, tables_, electronics_, state_, readings, angles);
+void FractionRecovery::make_tables(std::size_t lane) {
+    known_.b_rad_s[lane] = devices_[lane].coupling.b_rad_s;
+    tables_.make(lane, devices_[lane], kept_pulses);
+}
+
+void FractionRecovery::recover(LaneReadings& readings, LaneAngles* angles) {
+    HWY_DYNAMIC_DISPATCH(recover_lanes)
+    (lanes_, known_, tables_, electronics_, forget_, state_, readings, angles);
     state_.turns += static_cast<std::int64_t>(readings.turns);
+}
+
+void FractionRecovery::learn(double memory_turns) {
+    forget_ = 1.0 / memory_turns;
+    // Nothing known: wrong by as much as there is.
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) state_.xx[lane] = state_.yy[lane] = 1.0;
+}
+
+FractionRecovery::Learnt FractionRecovery::learnt(std::size_t lane) const {
+    const double xx = state_.xx[lane];
+    const double xy = state_.xy[lane];
+    const double yy = state_.yy[lane];
+    const double determinant = xx * yy - xy * xy;
+    if (!(determinant > 0.0)) return {};
+    return {(yy * state_.x[lane] - xy * state_.y[lane]) / determinant,
+            (xx * state_.y[lane] - xy * state_.x[lane]) / determinant};
+}
+
+FractionRecovery::Coupling FractionRecovery::coupling(std::size_t lane) const {
+    const gyro::Coupling& told = devices_[lane].coupling;
+    const auto [x, y] = learnt(lane);
+    return {told.b_rad_s * std::hypot(1.0 + x, y), told.phase_rad + std::atan2(y, 1.0 + x)};
+}
+
+bool FractionRecovery::retell(std::size_t lane, double tolerance) {
+    const auto [x, y] = learnt(lane);
+    if (std::hypot(x, y) <= tolerance) return false;
+    const Coupling now = coupling(lane);
+    const double grown = now.b_rad_s / devices_[lane].coupling.b_rad_s;
+    devices_[lane].coupling.b_rad_s = now.b_rad_s;
+    devices_[lane].coupling.phase_rad = now.phase_rad;
+    make_tables(lane);
+    for (auto* const normal : {&state_.xx, &state_.xy, &state_.yy}) (*normal)[lane] *= grown * grown;
+    state_.x[lane] = state_.y[lane] = 0.0;
+    return true;
 }
 
 }  // namespace ringlock::readout

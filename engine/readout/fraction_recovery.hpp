@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "engine/readout/lane_readings.hpp"
 #include "engine/readout/pulse_tables.hpp"
@@ -28,9 +29,24 @@ class FractionRecovery {
     /// \param amplitude_rms_rad spread of the half cycles' amplitudes about the device's
     FractionRecovery(std::span<const gyro::Device> devices, const Electronics& electronics, double amplitude_rms_rad);
 
-    /// Improves phase_fringes, sine and cosine (of unit size afterwards) of consecutive readings with pulses, and the
-    /// angle output where that is interpolated.
-    void recover(LaneReadings& readings, LaneAngles& angles);
+    /// Improves phase_fringes, sine and cosine (of unit size afterwards) of consecutive readings with pulses, and,
+    /// where given and interpolated, the angle output.
+    void recover(LaneReadings& readings, LaneAngles* angles);
+
+    /// What the pulses tell of the coupling itself: with b and phase e those of the tables, a coupling
+    /// b ((1 + x) sin(psi + e) + y cos(psi + e)) adds x P + y Q to the left-hand sides above, P = 2 D (R - 1)/R and Q
+    /// the same of a coupling a quarter fringe on. What is orthogonal to e and tau is kept as normal equations of x and
+    /// y, those of a turn with the weight exp(-turns since/memory).
+    void learn(double memory_turns);
+    struct Coupling {
+        double b_rad_s;
+        double phase_rad;
+    };
+    /// That of the tables with what has been learnt by now.
+    Coupling coupling(std::size_t lane) const;
+    /// Makes the tables anew for coupling(), where it has left theirs by more than that share: the equations are linear
+    /// about theirs only. True where it did.
+    bool retell(std::size_t lane, double tolerance);
 
     /// Turns at which pulses and detectors contradicted each other, so that the detectors' phase was kept.
     std::int64_t contradictions(std::size_t lane) const {
@@ -43,6 +59,7 @@ class FractionRecovery {
         simd::Lanes cycle_gain{};                  ///< mean over cycles [fringes]
         simd::Lanes cycles{};
         simd::Lanes contradictions{};
+        simd::Lanes xx{}, xy{}, yy{}, x{}, y{};  ///< normal equations of the coupling
         std::int64_t turns = 0;
     };
     struct Known {
@@ -54,8 +71,18 @@ class FractionRecovery {
     };
 
    private:
+    /// x and y above.
+    struct Learnt {
+        double x = 0.0;
+        double y = 0.0;
+    };
+    Learnt learnt(std::size_t lane) const;
+    void make_tables(std::size_t lane);
+
     std::size_t lanes_;
+    std::vector<gyro::Device> devices_;
     Electronics electronics_;
+    double forget_ = 0.0;  // share of a turn before that the next leaves; 0: nothing is learnt
     Known known_;
     PulseTables tables_;
     State state_;

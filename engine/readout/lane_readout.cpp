@@ -101,7 +101,7 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
                 // middle.
                 const V quarters = phase * hn::Set(d, 4.0);
                 const V in_quarter = (quarters - hn::Floor(quarters) - hn::Set(d, 0.5)) * quarter;
-                error = sm::fraction(d, in_quarter + error) - in_quarter;
+                if (!electronics.ideal) error = sm::fraction(d, in_quarter + error) - in_quarter;
                 store(sine, readings.sine[i]);
                 store(cosine, readings.cosine[i]);
                 store(phase + error, readings.phase_fringes[i]);

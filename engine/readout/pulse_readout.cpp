@@ -146,7 +146,7 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& tables, cons
             const V apart = hn::IfThenElse(told, seen[1][0] - seen[0][0], seen[1][1] - seen[0][1]) * tick_s;
             const V skew_s = (hysteresis + hysteresis) * scale[1] * scale[1] / apart;
             const V middle = sm::fnma(d, skew_s, clock, half * sum);
-            const V latch = clocked ? hn::Floor(middle) : middle;
+            const V latch = electronics.ideal ? t0 : clocked ? hn::Floor(middle) : middle;
             const V off_s = (clocked ? (latch - tick_fraction) * tick_s : latch) - t0;
             const V side_scale = hn::IfThenElse(off_s < zero, scale[0], scale[1]);
             const V beyond = sm::fma(d, half, off_s * off_s, blunting) / (side_scale * side_scale);
@@ -173,7 +173,7 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& tables, cons
                         per_rad;
             }
             const V named = sign * (counted + half) * quarter;  // middle of the quarter fringe
-            error = sm::fraction(d, phase + error - named) + (named - phase);
+            if (!electronics.ideal) error = sm::fraction(d, phase + error - named) + (named - phase);
             store(sine, readings.sine[i]);
             store(cosine, readings.cosine[i]);
             store(phase + error, readings.phase_fringes[i]);

@@ -22,9 +22,9 @@ constexpr std::array compensators = {
     CompensatorName{"compensated_published", Compensator::published},
     CompensatorName{"compensated", Compensator::corrected},
     CompensatorName{"compensated_exact", Compensator::exact},
+    CompensatorName{"compensated_adaptive", Compensator::adaptive},
 };
-constexpr std::array<std::string_view, 3> planned_compensators = {"compensated_adaptive", "compensated_extrapolated",
-                                                                  "compensated_two_train"};
+constexpr std::array<std::string_view, 2> planned_compensators = {"compensated_extrapolated", "compensated_two_train"};
 
 std::vector<Arm> all_arms() {
     std::vector<Arm> arms = {

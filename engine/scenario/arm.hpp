@@ -11,6 +11,7 @@ enum class Compensator {
     published,  ///< equations of Gao and Deng 2007 as printed
     corrected,  ///< the same with corrected coefficients
     exact,      ///< the turn map inverted
+    adaptive,   ///< the same with a coupling that it learns
 };
 
 struct Arm {

@@ -47,6 +47,12 @@ struct Readout {
     bool operator==(const Readout&) const = default;
 };
 
+/// What the compensators are told of the gyros, against the truth.
+struct Calibration {
+    double threshold_error_relative = 0.0;  ///< lock-in threshold as told over the true one, less one
+    bool operator==(const Calibration&) const = default;
+};
+
 /// Rate of the case about the input axis, the dither apart.
 struct InputRate {
     double rate_deg_h = 15.0;
@@ -72,6 +78,7 @@ double temperature_change_k(const Environment& environment, double time_s);
 /// How many gyros, for how long, and how they differ.
 struct Ensemble {
     std::int64_t gyros = 64;
+    double settle_s = 0.0;  ///< simulated before the record begins; rounded to whole dither cycles
     double duration_s = 600.0;
     std::uint64_t seed = 1;
     double initial_phase_spread_rad = 2.0 * std::numbers::pi;  ///< full width of a uniform distribution
@@ -113,6 +120,7 @@ struct Scenario {
     Dither dither;
     NoiseInjection noise_injection;
     Readout readout;
+    Calibration calibration;
     InputRate input;
     Environment environment;
     EffectSettings effects = default_effect_settings();

@@ -138,6 +138,13 @@ std::vector<Section> base_sections() {
                  "Of the instrument: bits of the converter of the detectors, which spans 1.25 fringe amplitudes to "
                  "either side."),
          }},
+        {"calibration",
+         "What compensators and electronics are told of the gyros.",
+         {
+             key(RINGLOCK_KEY(calibration, threshold_error_relative),
+                 between(-0.9, 9.0, "a threshold is positive and not unknown by powers of ten"),
+                 "Lock-in threshold as told over the true one, less one."),
+         }},
         {"input",
          "Rate of the case about the input axis, the dither apart.",
          {
@@ -165,6 +172,8 @@ std::vector<Section> base_sections() {
              key(RINGLOCK_KEY(ensemble, gyros),
                  between<std::int64_t>(1, 10'000'000, "a study needs a gyro, and each one's results are kept"),
                  "Independent gyros at each input rate."),
+             key(RINGLOCK_KEY(ensemble, settle_s), between(0.0, 1e9, "30 years"),
+                 "Simulated time of each gyro before its record begins, for compensators that learn."),
              key(RINGLOCK_KEY(ensemble, duration_s), above(0.0, 1e9, "30 years"), "Simulated time of each gyro."),
              key(RINGLOCK_KEY(ensemble, seed), between<std::int64_t>(0, largest_integer, "integers of TOML are signed"),
                  "Seed of every random number; the same seed gives the same result."),

@@ -301,7 +301,7 @@ TEST(FractionRecovery, AWrongCouplingCostsSecondOrderOnly) {
             truth.advance(100);
             readout::LaneReadings readings = block.readings(0);
             readout::LaneAngles angles = block.angles(0);
-            recovery.recover(readings, angles);
+            recovery.recover(readings, &angles);
             for (std::size_t i = 0; i < 100 && piece > 5; ++i) {
                 for (std::size_t g = 0; g < lanes; ++g) {
                     const double off =
