@@ -39,6 +39,10 @@ void copy_rows(const readout::LaneReadings& from, std::size_t first, std::size_t
     copy(from.accel_before_rad_s2, to.accel_before_rad_s2);
     copy(from.accel_after_rad_s2, to.accel_after_rad_s2);
     copy(from.pulses.first_quarter, to.pulses.first_quarter);
+    for (std::size_t number = 0; number < 4 && !from.pulses.known_shift_rad[0].empty(); ++number) {
+        to.pulses.known_shift_rad[number].resize(rows);
+        copy(from.pulses.known_shift_rad[number], to.pulses.known_shift_rad[number]);
+    }
     for (std::size_t side = 0; side < 2; ++side) {
         for (std::size_t pulse = 0; pulse < readout::kept_pulses; ++pulse) {
             copy(from.pulses.time_s[side][pulse], to.pulses.time_s[side][pulse]);

@@ -16,6 +16,7 @@
 #include "engine/ensemble/output_counts.hpp"
 #include "engine/ensemble/trajectory_kind.hpp"
 #include "engine/propagate/lane_propagator.hpp"
+#include "engine/readout/ellipse_correction.hpp"
 #include "engine/readout/fraction_recovery.hpp"
 #include "engine/readout/lane_readout.hpp"
 
@@ -128,11 +129,13 @@ class Branch {
         propagator_ = make_propagator(scenario, devices_, kind);
         const readout::Electronics electronics = make_electronics(scenario);
         const bool instrument = scenario.readout.model == scenario::ReadoutModel::instrument;
-        every_turn_ = compensated_ || instrument;
+        every_turn_ = compensated_ || instrument || scenario.readout.ellipse_correction;
         readout_.emplace(devices_, ellipses_of(setups), electronics,
                          instrument || samples_wanted_ ? readout::Wanted::pulses
                          : compensated_                ? readout::Wanted::accelerations
                                                        : readout::Wanted::phase);
+        interpolated_ = electronics.interpolate;
+        if (scenario.readout.ellipse_correction) ellipse_.emplace(devices_.size());
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
             // Amplitudes are half the difference of two turns' noise.
             std::vector<gyro::Device> told = devices_;
@@ -149,6 +152,7 @@ class Branch {
         dither_.next(turns, angle_arcsec, threshold_factor, drive_);
         propagator_->step(drive_, turns_);
         readout_->read(drive_, turns_, noise, every_turn_ ? 1 : 2, readings_, angles_);
+        if (ellipse_) ellipse_->correct(readings_, angles_, interpolated_);
         if (samples_wanted_) samples_ = readings_;
         if (recovery_) recovery_->recover(readings_, &angles_);
         for (Listener& listener : listeners_) {
@@ -179,7 +183,9 @@ class Branch {
     std::unique_ptr<propagate::LanePropagator> propagator_;
     std::optional<readout::LaneReadout> readout_;
     std::vector<Listener> listeners_;
+    std::optional<readout::EllipseCorrection> ellipse_;
     std::optional<readout::FractionRecovery> recovery_;
+    bool interpolated_ = false;
     bool compensated_ = false;
     bool every_turn_ = false;
     bool samples_wanted_ = false;

@@ -53,6 +53,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
     const V least = hn::Set(d, least_distance_rad(electronics));
     const double low_pass = low_pass_s(electronics);
     const V blunting = hn::Set(d, 0.5 * low_pass * low_pass);
+    const bool shifted = !readings.pulses.known_shift_rad[0].empty();
     for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
         const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
         const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
@@ -96,6 +97,14 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                 turned = pulse_factors<kept_pulses>(d, tables.times[direction], tables.used, lane,
                                                     quarter_of(d, minimum ? first : first - one - one), x);
             }
+            V shift[kept_pulses] = {zero, zero, zero, zero};
+            for (std::size_t pulse = 0; pulse < kept_pulses && shifted; ++pulse) {
+                const auto number = quarter_of(d, sign * (first + hn::Set(d, static_cast<double>(pulse))));
+                const auto& known_shift = readings.pulses.known_shift_rad;
+                const V low = hn::IfThenElse(number.odd, load(known_shift[1][i]), load(known_shift[0][i]));
+                const V high = hn::IfThenElse(number.odd, load(known_shift[3][i]), load(known_shift[2][i]));
+                shift[pulse] = hn::IfThenElse(number.upper, high, low);
+            }
             V s0 = sample_weight;
             V s1 = zero;
             V s2 = zero;
@@ -110,7 +119,8 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                 for (std::size_t pulse = 0; pulse < kept_pulses; ++pulse) {
                     const V time = load(readings.pulses.time_s[side][pulse][i]);
                     const V nominal = sm::fma(d, hn::Set(d, static_cast<double>(pulse)), quarter_rad, near);
-                    const V distance = side == 0 ? nominal - hysteresis : nominal + hysteresis;
+                    V distance = side == 0 ? nominal - hysteresis : nominal + hysteresis;
+                    if (shifted) distance = sm::fma(d, sign, shift[pulse], distance);
                     const V bent = curve * nominal;
                     const V factor = one + sm::fma(d, bend, factors.values[side][pulse] - one - bent, bent);
                     const V slope = a * time / (factor * factor);

@@ -15,6 +15,9 @@ struct LanePulses {
     /// Number of the quarter fringe of the nearest pulses, counted upright: the phase itself at minima, its negative at
     /// maxima; in quarter fringes, on the branch of phase_fringes. [turn]
     std::vector<simd::Lanes> first_quarter;
+    /// Phase at which comparators are known to switch less the quarter fringe's own, by its number modulo 4; empty
+    /// where nothing is known of the detectors' ellipse. [number][turn]
+    std::vector<simd::Lanes> known_shift_rad[4];
 
     void resize(std::size_t wanted) {
         for (auto& side : time_s) {

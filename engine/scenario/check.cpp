@@ -117,6 +117,12 @@ Finding temperature_leaves_a_threshold(const Scenario& s) {
                     change_k, std::abs(relative) * change_k, most)};
 }
 
+Finding ideal_detectors_need_no_correction(const Scenario& s) {
+    if (s.readout.model != ReadoutModel::ideal || !s.readout.ellipse_correction) return {};
+    return Complaint{{"readout.ellipse_correction", "readout.model"},
+                     "an ideal readout has no ellipse to correct; set readout.model = \"latched\" or \"instrument\""};
+}
+
 Finding keys_are_the_instruments(const Scenario& s) {
     static const Readout standard;
     if (s.readout.model == ReadoutModel::instrument) return {};
@@ -223,6 +229,7 @@ constexpr std::array all_rules = {
          noise_leaves_the_dither},
     Rule{"The temperature changes the lock-in threshold by no more than 0.9 of itself over the run.",
          temperature_leaves_a_threshold},
+    Rule{"An ideal readout has no ellipse to correct.", ideal_detectors_need_no_correction},
     Rule{"Keys that only the instrument has stay at their defaults with other readout models.",
          keys_are_the_instruments},
     Rule{

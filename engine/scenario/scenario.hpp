@@ -38,6 +38,7 @@ struct Readout {
     AngleOutput angle_output = AngleOutput::interpolated;
     double clock_hz = 100e6;                 ///< counter clock that times pulses and turns
     double detector_noise_relative = 0.005;  ///< rms noise of each detector sample over the fringe amplitude
+    bool ellipse_correction = false;         ///< learn the detectors' ellipse and make it a circle
     // Of the instrument only:
     PhaseFrom phase_from = PhaseFrom::detectors_and_pulses;
     double comparator_noise_relative = 0.005;      ///< rms noise of a comparator's input when it switches

@@ -124,6 +124,8 @@ std::vector<Section> base_sections() {
              key(RINGLOCK_KEY(readout, detector_noise_relative),
                  between(0.0, 0.5, "beyond it the fringe cannot be followed"),
                  "Rms noise of each detector sample over the amplitude of the fringe."),
+             key(RINGLOCK_KEY(readout, ellipse_correction), none,
+                 "Learn gain, offsets and orthogonality of the detectors from their own readings, and take them away."),
              key(RINGLOCK_KEY(readout, phase_from), none,
                  "Of the instrument: the phase at the zero-rate point from the sampled detectors alone, or also from "
                  "the times of the four nearest pulses on either side."),
