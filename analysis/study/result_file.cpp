@@ -35,6 +35,10 @@ const char* compensator_name(scenario::Compensator compensator) {
             return "corrected";
         case scenario::Compensator::exact:
             return "exact";
+        case scenario::Compensator::extrapolated:
+            return "extrapolated";
+        case scenario::Compensator::two_train:
+            return "two_train";
         case scenario::Compensator::none:
             break;
     }

@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "engine/compensate/exact.hpp"
+#include "engine/compensate/extrapolated.hpp"
 #include "engine/compensate/first_order.hpp"
+#include "engine/compensate/two_train.hpp"
 #include "engine/dither/lane_dither.hpp"
 #include "engine/effects/effect.hpp"
 #include "engine/ensemble/draw.hpp"
@@ -96,6 +98,10 @@ std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Sc
             return std::make_unique<compensate::FirstOrder>(calibration, compensate::FirstOrder::corrected);
         case scenario::Compensator::exact:
             return std::make_unique<compensate::Exact>(calibration, scenario.propagation.turn_map_tolerance_rad);
+        case scenario::Compensator::extrapolated:
+            return std::make_unique<compensate::Extrapolated>(calibration, make_electronics(scenario));
+        case scenario::Compensator::two_train:
+            return std::make_unique<compensate::TwoTrain>(calibration);
         case scenario::Compensator::none:
             break;
     }

@@ -22,9 +22,10 @@ constexpr std::array compensators = {
     CompensatorName{"compensated_published", Compensator::published},
     CompensatorName{"compensated", Compensator::corrected},
     CompensatorName{"compensated_exact", Compensator::exact},
+    CompensatorName{"compensated_extrapolated", Compensator::extrapolated},
+    CompensatorName{"compensated_two_train", Compensator::two_train},
 };
-constexpr std::array<std::string_view, 3> planned_compensators = {"compensated_adaptive", "compensated_extrapolated",
-                                                                  "compensated_two_train"};
+constexpr std::array<std::string_view, 1> planned_compensators = {"compensated_adaptive"};
 
 std::vector<Arm> all_arms() {
     std::vector<Arm> arms = {

@@ -129,7 +129,7 @@ TEST(Arm, TellsUnknownFromNotThereYet) {
         return "";
     };
     EXPECT_THAT(message("compensated_adaptive"), HasSubstr("known but not there yet"));
-    EXPECT_THAT(message("noise_injected+compensated_two_train"), HasSubstr("known but not there yet"));
+    EXPECT_THAT(message("noise_injected+compensated_adaptive"), HasSubstr("known but not there yet"));
     EXPECT_THAT(message("noise_injected+compensatd"), HasSubstr("did you mean \"noise_injected+compensated\"?"));
     EXPECT_THAT(message("ideal+compensated"), HasSubstr("unknown arm"));
     EXPECT_THAT(message(""), HasSubstr("unknown arm"));
