@@ -38,7 +38,8 @@ namespace ringlock::compensate {
 /// The first 8 s settle the high-passes and the next 8 s are only learnt from: B = 0 until 16 s. The correction is the
 /// sum of B's current value times the trains' increments, so that a better B makes no step.
 ///
-/// State: 36 numbers a gyro, 288 bytes; per turn, two square roots and some thirty multiplications.
+/// State: 33 numbers a gyro, 264 bytes; a cycle takes four square roots, eight divisions and some forty
+/// multiplications.
 class TwoTrain final : public LaneCompensator {
    public:
     /// Of the calibration only the durations are used, for the period.
