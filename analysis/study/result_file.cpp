@@ -37,6 +37,10 @@ const char* compensator_name(scenario::Compensator compensator) {
             return "exact";
         case scenario::Compensator::adaptive:
             return "adaptive";
+        case scenario::Compensator::extrapolated:
+            return "extrapolated";
+        case scenario::Compensator::two_train:
+            return "two_train";
         case scenario::Compensator::none:
             break;
     }

@@ -7,6 +7,7 @@
 #include "engine/core/units.hpp"
 #include "engine/simd/targets.hpp"
 // The above must come first.
+#include "engine/compensate/acceleration_average-inl.hpp"
 #include "engine/simd/math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -18,21 +19,7 @@ namespace sm = simd::HWY_NAMESPACE;
 using D = hn::CappedTag<double, simd::lanes>;
 using V = hn::Vec<D>;
 
-constexpr double memory_turns = 512.0;
-
-/// Mean of the positive values seen.
-struct Average {
-    V mean, count;
-
-    HWY_INLINE V update(D d, V value) {
-        const V zero = hn::Zero(d);
-        const auto seen = value > zero;
-        count = hn::IfThenElse(seen, hn::Min(count + hn::Set(d, 1.0), hn::Set(d, memory_turns)), count);
-        const V share = (value - mean) / hn::Max(count, hn::Set(d, 1.0));
-        mean = mean + hn::IfThenElseZero(seen, share);
-        return mean;
-    }
-};
+using Average = AverageOf<V>;
 
 void observe_lanes(std::size_t lanes, const readout::LaneReadings& readings, FirstOrder::State& state,
                    LaneErrors& errors) {

@@ -9,7 +9,9 @@
 
 #include "engine/compensate/adaptive.hpp"
 #include "engine/compensate/exact.hpp"
+#include "engine/compensate/extrapolated.hpp"
 #include "engine/compensate/first_order.hpp"
+#include "engine/compensate/two_train.hpp"
 #include "engine/dither/lane_dither.hpp"
 #include "engine/effects/effect.hpp"
 #include "engine/ensemble/draw.hpp"
@@ -106,6 +108,10 @@ std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Sc
         case scenario::Compensator::adaptive:
             return std::make_unique<compensate::Adaptive>(calibration, make_electronics(scenario),
                                                           scenario.propagation.turn_map_tolerance_rad);
+        case scenario::Compensator::extrapolated:
+            return std::make_unique<compensate::Extrapolated>(calibration, make_electronics(scenario));
+        case scenario::Compensator::two_train:
+            return std::make_unique<compensate::TwoTrain>(calibration);
         case scenario::Compensator::none:
             break;
     }

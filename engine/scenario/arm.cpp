@@ -23,8 +23,9 @@ constexpr std::array compensators = {
     CompensatorName{"compensated", Compensator::corrected},
     CompensatorName{"compensated_exact", Compensator::exact},
     CompensatorName{"compensated_adaptive", Compensator::adaptive},
+    CompensatorName{"compensated_extrapolated", Compensator::extrapolated},
+    CompensatorName{"compensated_two_train", Compensator::two_train},
 };
-constexpr std::array<std::string_view, 2> planned_compensators = {"compensated_extrapolated", "compensated_two_train"};
 
 std::vector<Arm> all_arms() {
     std::vector<Arm> arms = {
@@ -56,11 +57,7 @@ Arm parse_arm(std::string_view name) {
     if (found != arms.end()) return *found;
 
     const std::vector<std::string> known = arm_names();
-    const std::string_view compensator = name.starts_with(injected_prefix) ? name.substr(injected_prefix.size()) : name;
-    const bool planned =
-        std::find(planned_compensators.begin(), planned_compensators.end(), compensator) != planned_compensators.end();
-    throw InputError(fmt::format("arm {}: {}; arms are: {}", in_quotes(name),
-                                 planned ? "known but not there yet" : "unknown arm" + did_you_mean(name, known),
+    throw InputError(fmt::format("arm {}: unknown arm{}; arms are: {}", in_quotes(name), did_you_mean(name, known),
                                  fmt::join(known, ", ")));
 }
 

@@ -8,10 +8,12 @@ namespace ringlock::scenario {
 
 enum class Compensator {
     none,
-    published,  ///< equations of Gao and Deng 2007 as printed
-    corrected,  ///< the same with corrected coefficients
-    exact,      ///< the turn map inverted
-    adaptive,   ///< the same with a coupling that it learns
+    published,     ///< equations of Gao and Deng 2007 as printed
+    corrected,     ///< the same with corrected coefficients
+    exact,         ///< the turn map inverted
+    adaptive,      ///< the same with a coupling that it learns
+    extrapolated,  ///< the pulses of both sides extrapolated to the turn (Lim 1982)
+    two_train,     ///< two trains of corrections, scaled by what they explain of the output (Fan et al. 2011)
 };
 
 struct Arm {

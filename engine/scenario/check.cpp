@@ -142,6 +142,17 @@ Finding keys_are_the_instruments(const Scenario& s) {
                                  key)};
 }
 
+Finding pulses_are_there(const Scenario& s) {
+    if (s.readout.model != ReadoutModel::latched) return {};
+    for (const std::string& name : s.arms) {
+        const Compensator compensator = parse_arm(name).compensator;
+        if (compensator != Compensator::extrapolated && compensator != Compensator::adaptive) continue;
+        return Complaint{{"arms.names", "readout.model"},
+                         fmt::format("arm \"{}\" needs the pulses' times; set readout.model = \"instrument\"", name)};
+    }
+    return {};
+}
+
 /// Largest rate of the phase in fringes a second: the dither's, with its spread, and the input.
 double peak_beat_hz(const Scenario& s) {
     const double spread = 1.0 + sigmas * s.ensemble.dither_amplitude_sd_relative;
@@ -232,6 +243,9 @@ constexpr std::array all_rules = {
     Rule{"An ideal readout has no ellipse to correct.", ideal_detectors_need_no_correction},
     Rule{"Keys that only the instrument has stay at their defaults with other readout models.",
          keys_are_the_instruments},
+    Rule{"compensated_extrapolated and compensated_adaptive need the times of pulses, which the latched readout does "
+         "not keep.",
+         pulses_are_there},
     Rule{
         "The instrument's bandwidth exceeds the fastest rate of fringes, and leaves there more of their amplitude than "
         "hysteresis and six standard deviations of the comparators' noise.",

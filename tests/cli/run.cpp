@@ -76,7 +76,7 @@ TEST_F(RunCommand, BadScenariosAreRefusedWithPlaceKeyValueAndWhatIsAllowed) {
     expect_scenario_refused("[arms]\nnames = [\"uncompensatd\"]\n",
                             says("bad.toml:2:10", "arms.names", "uncompensatd", "did you mean \"uncompensated\"?"));
     expect_scenario_refused("[arms]\nnames = [\"compensated_adaptive\"]\n",
-                            says("bad.toml:2:10", "compensated_adaptive", "not there yet", "arms are: ideal"));
+                            says("bad.toml:2:9", "compensated_adaptive", "readout.model = \"instrument\""));
     expect_scenario_refused("[arms]\nnames = []\n", says("bad.toml:2:9", "arms.names", "empty"));
     expect_scenario_refused("[arms]\nnames = [\"ideal\", \"ideal\"]\n", says("bad.toml:2:19", "stands twice"));
     expect_scenario_refused("[effects.missed_counts]\nprobability_per_turn = 0.1\n",

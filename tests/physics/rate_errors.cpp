@@ -233,7 +233,7 @@ TEST(BiasBehindInjectedNoise, FirstOrderLeavesTheDelaysOfAnAsymmetricDither) {
 
 TEST(BiasBehindInjectedNoise, ADetectorOffsetLeavesKappaOverTheRootOfTwoACycle) {
     const double kappa = gyro::turn_kick_rad(paper_device());
-    const auto scenario = quiet(scenario::ReadoutModel::instrument);
+    const auto scenario = quiet(scenario::ReadoutModel::latched);
     for (const char* arm : {"noise_injected+compensated", "noise_injected+compensated_exact"}) {
         for (const double offset : {0.05, -0.05}) {
             const double expected = -deg_h_of_rad_per_cycle(kappa * offset / std::sqrt(2.0));

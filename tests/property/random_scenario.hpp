@@ -10,6 +10,17 @@
 
 namespace ringlock::test {
 
+/// All arms that the readout of a scenario can serve, in their usual order: a latched one keeps no pulses.
+inline std::vector<std::string> served_arms(const scenario::Scenario& s) {
+    std::vector<std::string> names = scenario::arm_names();
+    std::erase_if(names, [&](const std::string& name) {
+        const scenario::Compensator compensator = scenario::parse_arm(name).compensator;
+        return s.readout.model == scenario::ReadoutModel::latched &&
+               (compensator == scenario::Compensator::extrapolated || compensator == scenario::Compensator::adaptive);
+    });
+    return names;
+}
+
 /// Small scenarios at random from a seed of their own, so that a failure comes back.
 class RandomScenarios {
    public:
@@ -21,9 +32,9 @@ class RandomScenarios {
     }
     bool coin() { return whole(0, 1) == 1; }
 
-    /// Some arms, in any order.
-    std::vector<std::string> arms() {
-        std::vector<std::string> names = scenario::arm_names();
+    /// Some of the arms that a scenario's readout can serve, in any order.
+    std::vector<std::string> arms(const scenario::Scenario& s) {
+        std::vector<std::string> names = served_arms(s);
         std::shuffle(names.begin(), names.end(), engine_);
         names.resize(static_cast<std::size_t>(whole(1, static_cast<std::int64_t>(names.size()))));
         return names;
@@ -58,7 +69,7 @@ class RandomScenarios {
             s.ensemble.seed = static_cast<std::uint64_t>(whole(0, 1'000'000));
             s.ensemble.lockin_threshold_sd_relative = uniform(0.0, 0.1);
             s.output.sample_interval_s = uniform(0.05, 0.3);
-            s.arms = arms();
+            s.arms = arms(s);
             if (scenario::check(s).empty()) return s;
         }
     }

@@ -158,8 +158,6 @@ const BadCase bad_cases[] = {
     {"UnknownArm", "[arms]\nnames = [\"idael\"]",
      "s.toml:2:10: key \"arms.names\" = \"idael\": arm \"idael\": unknown arm (did you mean \"ideal\"?); arms are: "
      "ideal, "},
-    {"PlannedArm", "[arms]\nnames = [\"noise_injected+compensated_adaptive\"]",
-     "known but not there yet; arms are: ideal, "},
     {"DuplicateKey", "[ensemble]\ngyros = 1\ngyros = 2", "s.toml:3:"},
     {"DuplicateSection", "[gyro]\n[gyro]\n", "s.toml:2:"},
     {"SyntaxError", "[gyro\n", "s.toml:1:6: not valid TOML: "},

@@ -72,7 +72,8 @@ TEST(ScenarioProperty, ResolvedTextParsesBackToAnEqualScenario) {
         ASSERT_EQ(back, scenario) << text;
         ASSERT_EQ(to_toml(back), text);
     }
-    EXPECT_GT(kept, 1900) << "the scenarios are hardly random";
+    // Arms that need pulses are refused beside a latched readout.
+    EXPECT_GT(kept, 1000) << "the scenarios are hardly random";
 }
 
 /// Parses or refuses with a message; anything else fails the test.

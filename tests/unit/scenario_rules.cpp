@@ -100,6 +100,19 @@ TEST(ScenarioRules, InjectedNoiseLeavesTheDither) {
     EXPECT_EQ(complaint(noisy + "[arms]\nnames = [\"ideal\", \"uncompensated\"]"), "");
 }
 
+TEST(ScenarioRules, AnArmThatExtrapolatesPulsesNeedsThem) {
+    const std::string arms = "[arms]\nnames = [\"ideal\", \"noise_injected+compensated_extrapolated\"]\n[readout]\n";
+    EXPECT_THAT(complaint(arms + "model = \"latched\""),
+                AllOf(HasSubstr("s.toml:2:"), HasSubstr("key \"arms.names\""),
+                      HasSubstr("arm \"noise_injected+compensated_extrapolated\" needs the pulses' times; set "
+                                "readout.model = \"instrument\"")));
+    EXPECT_THAT(complaint("[arms]\nnames = [\"compensated_adaptive\"]\n"),
+                HasSubstr("arm \"compensated_adaptive\" needs the pulses' times"));
+    EXPECT_EQ(complaint(arms + "model = \"instrument\""), "");
+    EXPECT_EQ(complaint(arms + "model = \"ideal\""), "");
+    EXPECT_EQ(complaint("[arms]\nnames = [\"compensated_two_train\"]\n[readout]\nmodel = \"latched\""), "");
+}
+
 TEST(ScenarioRules, ASampleHoldsACycleAndARunHoldsSamples) {
     EXPECT_THAT(complaint("[output]\nsample_interval_s = 0.008"),
                 AllOf(HasSubstr("s.toml:2:21: key \"output.sample_interval_s\" = 0.008: "), HasSubstr("0.00802041 s")));
