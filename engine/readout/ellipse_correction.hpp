@@ -13,8 +13,9 @@ namespace ringlock::readout {
 ///     A s^2 + B s c + C c^2 + D s + E c = 1
 ///
 /// has its centre in (o_s, o_c), and 1 + g = sqrt(C/A), sin e = B/(2 sqrt(A C)). A...E are fitted by least squares to
-/// all readings so far, older ones with the weight exp(-turns since/65536). A few made-up readings on the unit circle
-/// keep the fit where phases do not move, as in a locked gyro.
+/// all readings so far, older ones with the weight exp(-turns since/65536). Made-up readings on the unit
+/// circle, eight and a thousandth of all, keep the fit where phases do not move, as in a locked gyro; they hide a
+/// thousandth of the ellipse.
 ///
 /// The noise of the detectors makes the ellipse larger by its variance, and leaves its centre and shape.
 class EllipseCorrection {
