@@ -217,6 +217,7 @@ void ResultWriter::finish(const Study& study, const Summary& summary, const stor
     store::File& root = file_.file();
     root.set_attribute("turns", study.turns);
     root.set_attribute("tables_remade", study.tables_remade);
+    root.set_attribute("contradictory_readings", study.contradictory_readings);
     root.set_attribute("turn_map_error_rad", study.turn_map_error_rad);
     root.set_attribute("sample_interval_s", study.schedule.sample_interval_s);
     root.set_attribute("theory_arw_deg_rt_h", summary.theory.arw_deg_rt_h);
@@ -326,6 +327,10 @@ Study read_result(const std::filesystem::path& path) {
     Study study(scenario::parse_string(text[0], path.string() + ":/scenario"));
     study.turns = file.int_attribute("turns");
     study.tables_remade = file.int_attribute("tables_remade");
+    // Absent from results of earlier programs.
+    if (file.has_attribute("contradictory_readings")) {
+        study.contradictory_readings = file.int_attribute("contradictory_readings");
+    }
     study.turn_map_error_rad = file.double_attribute("turn_map_error_rad");
     // What is not drawn is in the scenario.
     std::fill(study.gyros.begin(), study.gyros.end(), ensemble::nominal_setup(study.scenario));

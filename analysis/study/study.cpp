@@ -157,6 +157,7 @@ class BlockStatistics final : public ensemble::BlockSink {
         const std::lock_guard lock(mutex_);  // sums of whole numbers and a maximum: their order does not matter
         study_.turns += result.turns;
         study_.tables_remade += result.tables_remade;
+        study_.contradictory_readings += result.contradictory_readings;
         study_.turn_map_error_rad = std::max(study_.turn_map_error_rad, result.turn_map_error_rad);
     }
 

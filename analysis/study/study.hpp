@@ -40,9 +40,10 @@ struct Study {
     std::vector<std::int64_t> factors;  ///< averaging factors of the Allan deviations in dither cycles: octaves
     std::vector<gyro::Setup> gyros;     ///< parameters as drawn
     std::vector<ArmStatistics> arms;
-    std::int64_t turns = 0;           ///< zero-rate points of distinct physical trajectories
-    std::int64_t tables_remade = 0;   ///< turn maps made anew because a drive left their ranges
-    double turn_map_error_rad = 0.0;  ///< largest error measured between the nodes of the turn maps
+    std::int64_t turns = 0;                   ///< zero-rate points of distinct physical trajectories
+    std::int64_t tables_remade = 0;           ///< turn maps made anew because a drive left their ranges
+    std::int64_t contradictory_readings = 0;  ///< turns at which pulses and detectors contradicted each other
+    double turn_map_error_rad = 0.0;          ///< largest error measured between the nodes of the turn maps
 };
 
 /// Whether the mean rate of the arm's gyros is known in closed form: a drive that repeats itself, and nothing

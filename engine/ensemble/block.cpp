@@ -170,6 +170,9 @@ class Branch {
         }
     }
 
+    std::int64_t contradictory_readings(std::size_t lane) const {
+        return recovery_ ? recovery_->contradictions(lane) : 0;
+    }
     TrajectoryKind kind() const { return kind_; }
     const std::vector<gyro::Device>& devices() const { return devices_; }
     const propagate::LanePropagator& propagator() const { return *propagator_; }
@@ -391,6 +394,14 @@ double GyroBlock::table_error_rad() const {
         }
     }
     return worst;
+}
+
+std::int64_t GyroBlock::contradictory_readings() const {
+    std::int64_t sum = 0;
+    for (const Branch& branch : state_->branches) {
+        for (std::size_t lane = 0; lane < state_->setups.size(); ++lane) sum += branch.contradictory_readings(lane);
+    }
+    return sum;
 }
 
 std::int64_t GyroBlock::tables_remade() const {

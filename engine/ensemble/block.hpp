@@ -47,6 +47,8 @@ class GyroBlock {
     int trajectories() const;
     double table_error_rad() const;  ///< largest measured when the turn maps were tabulated; 0: no tables
     std::int64_t tables_remade() const;
+    /// Turns at which pulses and detectors contradicted each other, so that the detectors' phase was kept.
+    std::int64_t contradictory_readings() const;
 
    private:
     struct State;

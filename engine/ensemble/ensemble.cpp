@@ -91,7 +91,8 @@ void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm>
         turn += static_cast<std::int64_t>(turns);
         if (monitor.on_progress) monitor.on_progress(0, static_cast<std::int64_t>(turns) * counted);
     }
-    sink.finish({first, block.setups(), counted * schedule.turns(), block.tables_remade(), block.table_error_rad()});
+    sink.finish({first, block.setups(), counted * schedule.turns(), block.tables_remade(),
+                 block.contradictory_readings(), block.table_error_rad()});
     if (monitor.on_progress) monitor.on_progress(static_cast<std::int64_t>(gyros), 0);
 }
 

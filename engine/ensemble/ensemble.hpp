@@ -18,6 +18,7 @@ struct BlockResult {
     std::vector<gyro::Setup> setups;  ///< of each gyro, as drawn
     std::int64_t turns = 0;           ///< zero-rate points of the trajectories simulated, without that of `ideal`
     std::int64_t tables_remade = 0;   ///< turn maps made anew because the drive left their ranges
+    std::int64_t contradictory_readings = 0;  ///< turns at which pulses and detectors contradicted each other
     double turn_map_error_rad = 0.0;  ///< largest interpolation error measured when the tables were made; 0: no tables
 };
 
