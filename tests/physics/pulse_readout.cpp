@@ -274,6 +274,32 @@ TEST(PulseReadout, APhaseThatBarelyReachesAQuarterFringeLosesNoCount) {
     }
 }
 
+TEST(FractionRecovery, PulsesThatContradictTheDetectorsAreCountedAndLeftAside) {
+    scenario::Scenario scenario = instrument();
+    scenario.readout.phase_from = scenario::PhaseFrom::detectors;
+    const std::vector<scenario::Arm> arms{scenario::parse_arm("noise_injected")};
+    ensemble::GyroBlock block(scenario, arms, 0, lanes);
+    block.advance(100);
+    std::vector<gyro::Device> devices;
+    for (const gyro::Setup& setup : block.setups()) devices.emplace_back(setup);
+    readout::Electronics electronics = perfect_instrument;
+    electronics.detector_noise_relative = electronics.comparator_noise_relative = 0.005;
+    electronics.comparator_hysteresis_relative = 0.03;
+    readout::FractionRecovery recovery(devices, electronics, 3.0 / std::sqrt(2.0));
+    readout::LaneReadings readings = block.readings(0);
+    // One gyro's counter runs a tenth slow at turns 40 to 49.
+    for (std::size_t i = 40; i < 50; ++i) {
+        for (auto& side : readings.pulses.time_s) {
+            for (auto& pulse : side) pulse[i][3] *= 0.9;
+        }
+    }
+    readout::LaneAngles angles = block.angles(0);
+    const readout::LaneReadings sampled = readings;
+    recovery.recover(readings, &angles);
+    for (std::size_t g = 0; g < lanes; ++g) EXPECT_EQ(recovery.contradictions(g), g == 3 ? 10 : 0) << g;
+    for (std::size_t i = 40; i < 50; ++i) EXPECT_EQ(readings.phase_fringes[i][3], sampled.phase_fringes[i][3]);
+}
+
 TEST(FractionRecovery, AWrongCouplingCostsSecondOrderOnly) {
     scenario::Scenario scenario = noiseless();
     const auto rms = [&](double factor) {

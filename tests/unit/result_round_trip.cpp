@@ -73,6 +73,7 @@ TEST_F(ResultFile, GivesTheStudyBack) {
     EXPECT_EQ(read.factors, study.factors);
     EXPECT_EQ(read.turns, study.turns);
     EXPECT_EQ(read.tables_remade, study.tables_remade);
+    EXPECT_EQ(read.contradictory_readings, study.contradictory_readings);
     EXPECT_EQ(read.turn_map_error_rad, study.turn_map_error_rad);
     ASSERT_EQ(read.gyros.size(), 6U);
     for (std::size_t g = 0; g < read.gyros.size(); ++g) EXPECT_TRUE(same(read.gyros[g], study.gyros[g])) << g;
