@@ -127,17 +127,17 @@ Finding keys_are_the_instruments(const Scenario& s) {
     static const Readout standard;
     if (s.readout.model == ReadoutModel::instrument) return {};
     const Readout& r = s.readout;
-    std::string key;
-    if (r.phase_from != standard.phase_from) key = "phase_from";
-    if (r.comparator_noise_relative != standard.comparator_noise_relative) key = "comparator_noise_relative";
+    std::string_view key;
+    if (r.phase_from != standard.phase_from) key = "readout.phase_from";
+    if (r.comparator_noise_relative != standard.comparator_noise_relative) key = "readout.comparator_noise_relative";
     if (r.comparator_hysteresis_relative != standard.comparator_hysteresis_relative) {
-        key = "comparator_hysteresis_relative";
+        key = "readout.comparator_hysteresis_relative";
     }
-    if (r.detector_bandwidth_hz != standard.detector_bandwidth_hz) key = "detector_bandwidth_hz";
-    if (r.adc_bits != standard.adc_bits) key = "adc_bits";
+    if (r.detector_bandwidth_hz != standard.detector_bandwidth_hz) key = "readout.detector_bandwidth_hz";
+    if (r.adc_bits != standard.adc_bits) key = "readout.adc_bits";
     if (key.empty()) return {};
-    return Complaint{{"readout." + key, "readout.model"},
-                     fmt::format("readout.{} is a property of the instrument, which this readout model leaves out; set "
+    return Complaint{{key, "readout.model"},
+                     fmt::format("{} is a property of the instrument, which this readout model leaves out; set "
                                  "readout.model = \"instrument\"",
                                  key)};
 }

@@ -100,6 +100,30 @@ TEST(ScenarioRules, InjectedNoiseLeavesTheDither) {
     EXPECT_EQ(complaint(noisy + "[arms]\nnames = [\"ideal\", \"uncompensated\"]"), "");
 }
 
+TEST(ScenarioRules, KeysOfTheInstrumentNeedTheInstrument) {
+    for (const char* key : {"phase_from = \"detectors\"", "comparator_noise_relative = 0.001",
+                            "comparator_hysteresis_relative = 0.1", "detector_bandwidth_hz = 2e6", "adc_bits = 8"}) {
+        const std::string name(key, std::string_view(key).find(' '));
+        const std::string line = std::string("[readout]\n") + key + "\n";
+        EXPECT_THAT(complaint(line), AllOf(HasSubstr("s.toml:2:"), HasSubstr("key \"readout." + name + "\" = "),
+                                           HasSubstr("set readout.model = \"instrument\"")));
+        EXPECT_EQ(complaint(line + "model = \"instrument\""), "");
+    }
+}
+
+TEST(ScenarioRules, TheInstrumentFollowsTheFringes) {
+    const std::string instrument = "[readout]\nmodel = \"instrument\"\n";
+    EXPECT_THAT(complaint(instrument + "detector_bandwidth_hz = 5e5"),
+                AllOf(HasSubstr("s.toml:3:"), HasSubstr("the counter loses fringes")));
+    EXPECT_EQ(complaint(instrument + "detector_bandwidth_hz = 0"), "");
+    EXPECT_THAT(complaint(instrument + "comparator_hysteresis_relative = 0.01"),
+                AllOf(HasSubstr("s.toml:3:"), HasSubstr("at least 4 times the noise")));
+    EXPECT_THAT(complaint(instrument + "[effects.readout_ellipse]\noffset_sin = 0.3"),
+                AllOf(HasSubstr("s.toml:4:"), HasSubstr("the converter holds 1.25")));
+    EXPECT_THAT(complaint("[readout]\nmodel = \"ideal\"\nellipse_correction = true"),
+                AllOf(HasSubstr("s.toml:3:"), HasSubstr("no ellipse to correct")));
+}
+
 TEST(ScenarioRules, AnArmThatExtrapolatesPulsesNeedsThem) {
     const std::string arms = "[arms]\nnames = [\"ideal\", \"noise_injected+compensated_extrapolated\"]\n[readout]\n";
     EXPECT_THAT(complaint(arms + "model = \"latched\""),
