@@ -20,13 +20,24 @@ constexpr double confidence = 0.682689492137;
 /// 95 % limit of an angle random walk [deg/sqrt(h)] that a record does not show.
 ///
 /// The fit gives one; where it cannot (a record too short or without noise), any term is at most the whole Allan
-/// deviation: N^2/tau <= sigma^2(tau), and the upper chi-squared limit of the smallest of these holds.
+/// deviation: N^2/tau <= sigma^2(tau), and the smallest upper chi-squared limit of these holds.
 double upper_limit(const GyroStatistics& gyro) {
     if (gyro.noise.arw_deg_rt_h.hi) return *gyro.noise.arw_deg_rt_h.hi;
-    double limit = std::numeric_limits<double>::infinity();
+    // A turn's kick is read in two halves, in the cycles before and after it: over m cycles a random walk shows
+    // 1 - 1/(4 m) of its variance.
+    constexpr double fewest_cycles = 8.0;
+    std::vector<allan::Point> points;
     for (const allan::Point& point : gyro.allan) {
+        const bool last = &point == &gyro.allan.back();
         if (!(point.edf > 0.0)) continue;
-        const double hi = point.dev * std::sqrt(point.edf / quantile(boost::math::chi_squared(point.edf), 0.05));
+        if (point.tau_s >= fewest_cycles * gyro.allan.front().tau_s || (last && points.empty()))
+            points.push_back(point);
+    }
+    // The least of several limits is one only where each holds with as much less doubt.
+    const double doubt = 0.05 / static_cast<double>(std::max<std::size_t>(points.size(), 1));
+    double limit = std::numeric_limits<double>::infinity();
+    for (const allan::Point& point : points) {
+        const double hi = point.dev * std::sqrt(point.edf / quantile(boost::math::chi_squared(point.edf), doubt));
         limit = std::min(limit, hi * std::sqrt(point.tau_s) * units::deg_rt_h_per_arcsec_rt_s);
     }
     return limit;

@@ -430,6 +430,23 @@ TEST(Claims, TheQuantumNoiseFloorIsWhatACorrectedGyroIsLeftWith) {
     EXPECT_NEAR(*arw.median, 3e-4, 0.05 * 3e-4);
 }
 
+TEST(Claims, ALimitOfARecordTooShortIsAboveTheRandomWalkThatIsThere) {
+    for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+        scenario::Scenario scenario;
+        scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+        scenario.arms = {"noise_injected"};
+        scenario.ensemble.gyros = 16;
+        scenario.ensemble.duration_s = 15.0;
+        scenario.ensemble.seed = seed;
+        const study::Summary summary = run(scenario);
+        const study::Figure& arw = summary.arms.at(0).arw_deg_rt_h;
+        EXPECT_FALSE(arw.median);
+        ASSERT_TRUE(arw.hi);
+        EXPECT_GT(*arw.hi, summary.theory.arw_deg_rt_h);
+        EXPECT_LT(*arw.hi, 2.0 * summary.theory.arw_deg_rt_h);
+    }
+}
+
 TEST(Claims, AGyroWithoutLockInHasNoRandomWalkOnlyALimit) {
     scenario::Scenario scenario;
     scenario.gyro.lockin_threshold_deg_h = 0.0;
