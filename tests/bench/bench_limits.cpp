@@ -20,7 +20,10 @@
 #include "analysis/report/plot.hpp"
 #include "engine/compensate/exact.hpp"
 #include "engine/compensate/first_order.hpp"
+#include "engine/core/units.hpp"
 #include "engine/ensemble/block.hpp"
+#include "engine/ensemble/draw.hpp"
+#include "engine/gyro/theory.hpp"
 #include "engine/readout/fraction_recovery.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/parse.hpp"
@@ -31,6 +34,9 @@ namespace {
 using namespace ringlock;
 namespace li = ringlock::test::limits;
 using li::Ratio;
+
+/// How well a turn shows the coupling phase at the instrument's defaults, see docs/compensation.md.
+constexpr double shown_by_a_turn_rad = 0.1;
 
 void row(const std::vector<std::string>& cells) {
     for (const std::string& cell : cells) fmt::print("| {} ", cell);
@@ -184,6 +190,61 @@ std::vector<Measured> table(const std::string& what, const std::vector<Point>& p
     return measured;
 }
 
+/// Rate that a coupling phase off by e leaves, over -sin e: (kappa^2/2) (K/2 pi) f_D.
+double rate_per_phase_deg_h(const scenario::Scenario& scenario) {
+    const gyro::Setup setup = ensemble::nominal_setup(scenario);
+    const double kappa = gyro::turn_kick_rad(setup);
+    return 0.5 * kappa * kappa * setup.scale_factor_arcsec / units::two_pi * setup.dither_frequency_hz;
+}
+
+/// What a coupling phase that is not told leaves of a rate, and what of it is expected.
+void coupling_phase() {
+    const std::vector<Point> points = coupling_phase_points();
+    const std::vector<Measured> measured = table("coupling phase", points, Reference::first);
+    const double per_sine_deg_h = rate_per_phase_deg_h(points.front().scenario);
+    fmt::print("\nMean rate error over the gyros [1e-3 deg/h], +- its standard error:\n\n");
+    const std::vector<std::string>& arms = measured.front().walks.arms;
+    std::vector<std::string> titles = {"coupling phase", "-(kappa^2/2) sin e a cycle"};
+    for (const std::string& arm : arms) titles.push_back(short_name(arm));
+    head(titles);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const double phase_rad = points[i].scenario.effects.at("detector_phase_offset").at("phase_rad");
+        std::vector<std::string> cells = {
+            points[i].label,
+            phase_rad == 0.0 ? "0" : fmt::format("{:.2f}", -1e3 * per_sine_deg_h * std::sin(phase_rad))};
+        for (const std::vector<double>& rates : measured[i].walks.rate_error_deg_h) {
+            double mean = 0.0, square = 0.0;
+            const auto n = static_cast<double>(rates.size());
+            for (const double rate : rates) mean += rate / n;
+            for (const double rate : rates) square += std::pow(rate - mean, 2) / (n - 1.0);
+            cells.push_back(fmt::format("{:.2f} +- {:.2f}", 1e3 * mean, 1e3 * std::sqrt(square / n)));
+        }
+        row(cells);
+    }
+}
+
+/// Allan deviation times the root of the averaging time over the bound: one figure where there is a walk alone.
+void averaging_time() {
+    const scenario::Scenario scenario = base();
+    const li::Walks walks = li::walks(scenario);
+    const double bound = li::walk_deg_rt_h(scenario, li::bounds(scenario).known_rad);
+    std::vector<std::string> titles = {"averaging time [s]"};
+    for (const std::string& arm : walks.arms) titles.push_back(short_name(arm));
+    head(titles);
+    for (std::size_t i = 0; i < walks.tau_s.size(); ++i) {
+        if (walks.tau_s[i] < 0.9 || i % 2 != 0) continue;
+        std::vector<std::string> cells = {fmt::format("{:.1f}", walks.tau_s[i])};
+        for (const auto& arm : walks.squared_at) cells.push_back(text(li::over(arm[i], bound)));
+        row(cells);
+    }
+    const double wander = rate_per_phase_deg_h(scenario) * shown_by_a_turn_rad /
+                          std::sqrt(2.0 * scenario.dither.frequency_hz) * units::deg_rt_h_per_arcsec_rt_s;
+    fmt::print(
+        "\nA coupling phase learnt with {:g} rad a turn: {:.4f} deg/h per radian, in the long run {:.3g} deg/sqrt(h), "
+        "{:.2f} times the bound.\n",
+        shown_by_a_turn_rad, rate_per_phase_deg_h(scenario), wander, wander / bound);
+}
+
 void draw(const std::vector<Point>& points, const std::vector<Measured>& measured, const std::string& file) {
     report::Figure figure;
     figure.title = "What is left of the random walk, over the noise of detectors and comparators";
@@ -317,8 +378,9 @@ const std::pair<const char*, std::function<void()>> blocks[] = {
     {"clock", [] { table("clock", clock_points(), Reference::own); }},
     {"threshold", [] { table("told too large by", threshold_points(), Reference::first); }},
     {"injected-noise", [] { table("injected noise", injected_noise_points(), Reference::own); }},
-    {"coupling-phase", [] { table("coupling phase", coupling_phase_points(), Reference::first); }},
+    {"coupling-phase", coupling_phase},
     {"phase-from", [] { table("phase from", phase_from_points(), Reference::last); }},
+    {"averaging-time", averaging_time},
     {"cost", cost},
 };
 

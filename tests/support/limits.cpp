@@ -7,6 +7,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "engine/core/units.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/gyro/device.hpp"
 #include "engine/scenario/arm.hpp"
@@ -50,10 +51,10 @@ std::vector<std::string> compensated_arms() {
     return arms;
 }
 
-const std::vector<double>& Walks::of(const std::string& arm) const {
+std::size_t Walks::index(const std::string& arm) const {
     const auto found = std::find(arms.begin(), arms.end(), arm);
     if (found == arms.end()) throw std::out_of_range("no arm " + arm);
-    return squared[static_cast<std::size_t>(found - arms.begin())];
+    return static_cast<std::size_t>(found - arms.begin());
 }
 
 Walks walks(const scenario::Scenario& scenario) {
@@ -62,9 +63,20 @@ Walks walks(const scenario::Scenario& scenario) {
     for (const study::ArmStatistics& arm : study.arms) {
         walks.arms.push_back(arm.arm.name);
         std::vector<double>& squared = walks.squared.emplace_back();
+        std::vector<double>& rates = walks.rate_error_deg_h.emplace_back();
+        std::vector<std::vector<double>>& at = walks.squared_at.emplace_back();
+        walks.tau_s.clear();
+        for (const allan::Point& point : arm.gyros.front().allan) walks.tau_s.push_back(point.tau_s);
+        at.resize(walks.tau_s.size());
         for (const study::GyroStatistics& gyro : arm.gyros) {
             // Errors of single readings are angle noise, whatever becomes of their sum.
             squared.push_back(std::pow(gyro.noise.pooling.arw_beside_angle_noise_deg_rt_h, 2));
+            rates.push_back(gyro.rate_error_deg_h);
+            for (std::size_t i = 0; i < at.size(); ++i) {
+                const double walk =
+                    gyro.allan[i].dev * std::sqrt(gyro.allan[i].tau_s) * units::deg_rt_h_per_arcsec_rt_s;
+                at[i].push_back(walk * walk);
+            }
         }
     }
     return walks;

@@ -27,12 +27,17 @@ std::vector<std::string> compensated_arms();
 inline constexpr const char* exact_arm = "noise_injected+compensated_exact";
 inline constexpr const char* adaptive_arm = "noise_injected+compensated_adaptive";
 
-/// Squared random walks of the gyros, [arm][gyro].
+/// Of the gyros, [arm][gyro].
 struct Walks {
     std::vector<std::string> arms;
-    std::vector<std::vector<double>> squared;
+    std::vector<std::vector<double>> squared;           ///< random walk beside angle noise, of the whole record
+    std::vector<std::vector<double>> rate_error_deg_h;  ///< mean over the record
+    std::vector<double> tau_s;
+    /// Allan variance times averaging time, [arm][time][gyro]: the squared walk at all times if there is nothing else.
+    std::vector<std::vector<std::vector<double>>> squared_at;
 
-    const std::vector<double>& of(const std::string& arm) const;
+    const std::vector<double>& of(const std::string& arm) const { return squared[index(arm)]; }
+    std::size_t index(const std::string& arm) const;
 };
 /// Runs the scenario on two threads. Its arms are what is asked for.
 Walks walks(const scenario::Scenario& scenario);
