@@ -20,13 +20,16 @@ constexpr double confidence = 0.682689492137;
 /// 95 % limit of an angle random walk [deg/sqrt(h)] that a record does not show.
 ///
 /// The fit gives one; where it cannot (a record too short or without noise), any term is at most the whole Allan
-/// deviation: N^2/tau <= sigma^2(tau), and the upper chi-squared limit of the smallest of these holds.
+/// deviation, and the upper chi-squared limit of the smallest of these holds: N^2/tau <= sigma^2(tau)/(1 - 3/(8 m)).
+/// Angles are read at turns, where half a kick is still to come: the difference of two intervals of m cycles has
+/// 2 (2 m - 1) whole kicks, a half at either end and none between, not 4 m.
 double upper_limit(const GyroStatistics& gyro) {
     if (gyro.noise.arw_deg_rt_h.hi) return *gyro.noise.arw_deg_rt_h.hi;
     double limit = std::numeric_limits<double>::infinity();
     for (const allan::Point& point : gyro.allan) {
         if (!(point.edf > 0.0)) continue;
-        const double hi = point.dev * std::sqrt(point.edf / quantile(boost::math::chi_squared(point.edf), 0.05));
+        const double seen = 1.0 - 0.375 / static_cast<double>(point.m);
+        const double hi = point.dev * std::sqrt(point.edf / quantile(boost::math::chi_squared(point.edf), 0.05) / seen);
         limit = std::min(limit, hi * std::sqrt(point.tau_s) * units::deg_rt_h_per_arcsec_rt_s);
     }
     return limit;
