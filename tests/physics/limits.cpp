@@ -3,9 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 
+#include "engine/core/units.hpp"
+#include "engine/ensemble/draw.hpp"
+#include "engine/gyro/theory.hpp"
 #include "engine/scenario/parse.hpp"
 
 namespace ringlock::test {
@@ -52,6 +56,33 @@ TEST(Limits, TheExactCompensatorIsWithinATenthOfTheBound) {
     EXPECT_LE(shown("exact over bound", ratio), 1.1);
     // It reads the phase no better than the bound: no walk is below it but by chance.
     EXPECT_GE(ratio.hi, 1.0);
+}
+
+TEST(Limits, ACouplingPhaseThatIsNotToldLeavesARate) {
+    scenario::Scenario scenario = what_limits({limits::exact_arm});
+    scenario.ensemble.gyros = 32;
+    scenario.ensemble.settle_s = 20.0;
+    scenario.ensemble.duration_s = 300.0;
+    // Asymmetries have a rate of their own behind the instrument.
+    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
+    const double phase_rad = 0.3;
+    scenario.effects["detector_phase_offset"]["phase_rad"] = phase_rad;
+    const limits::Walks walks = limits::walks(scenario);
+    double mean = 0.0;
+    double squares = 0.0;
+    for (const double rate : walks.rate_error_deg_h[0]) {
+        mean += rate / 32.0;
+        squares += rate * rate;
+    }
+    const double standard_error = std::sqrt((squares / 32.0 - mean * mean) / 31.0);
+    const gyro::Setup setup = ensemble::nominal_setup(scenario);
+    const double kappa = gyro::turn_kick_rad(setup);
+    const double expected = -0.5 * kappa * kappa * std::sin(phase_rad) * setup.scale_factor_arcsec / units::two_pi *
+                            setup.dither_frequency_hz;
+    std::printf("rate %.5f +- %.5f deg/h, expected %.5f\n", mean, standard_error, expected);
+    // Three standard errors, and a kappa^2 of it for the next order.
+    EXPECT_NEAR(mean, expected, 3.0 * standard_error + kappa * kappa * std::abs(expected));
+    EXPECT_LT(standard_error, 0.02 * std::abs(expected));
 }
 
 TEST(Limits, TheAdaptiveCompensatorIsWithinATenthOfTheExactOne) {
