@@ -20,24 +20,21 @@ constexpr double confidence = 0.682689492137;
 /// 95 % limit of an angle random walk [deg/sqrt(h)] that a record does not show.
 ///
 /// The fit gives one; where it cannot (a record too short or without noise), any term is at most the whole Allan
-/// deviation: N^2/tau <= sigma^2(tau), and the smallest upper chi-squared limit of these holds.
+/// deviation, and the smallest upper chi-squared limit of these holds: N^2/tau <= sigma^2(tau)/(1 - 3/(8 m)). Angles
+/// are read at turns, where half a kick is still to come: the difference of two intervals of m cycles has 2 (2 m - 1)
+/// whole kicks, a half at either end and none between, not 4 m.
 double upper_limit(const GyroStatistics& gyro) {
     if (gyro.noise.arw_deg_rt_h.hi) return *gyro.noise.arw_deg_rt_h.hi;
-    // A turn's kick is read in two halves, in the cycles before and after it: over m cycles a random walk shows
-    // 1 - 1/(4 m) of its variance.
-    constexpr double fewest_cycles = 8.0;
-    std::vector<allan::Point> points;
-    for (const allan::Point& point : gyro.allan) {
-        const bool last = &point == &gyro.allan.back();
-        if (!(point.edf > 0.0)) continue;
-        if (point.tau_s >= fewest_cycles * gyro.allan.front().tau_s || (last && points.empty()))
-            points.push_back(point);
-    }
+    const auto known = [](const allan::Point& point) { return point.edf > 0.0; };
     // The least of several limits is one only where each holds with as much less doubt.
-    const double doubt = 0.05 / static_cast<double>(std::max<std::size_t>(points.size(), 1));
+    const auto several = std::count_if(gyro.allan.begin(), gyro.allan.end(), known);
+    const double doubt = 0.05 / static_cast<double>(std::max<std::int64_t>(several, 1));
     double limit = std::numeric_limits<double>::infinity();
-    for (const allan::Point& point : points) {
-        const double hi = point.dev * std::sqrt(point.edf / quantile(boost::math::chi_squared(point.edf), doubt));
+    for (const allan::Point& point : gyro.allan) {
+        if (!known(point)) continue;
+        const double seen = 1.0 - 0.375 / static_cast<double>(point.m);
+        const double hi =
+            point.dev * std::sqrt(point.edf / quantile(boost::math::chi_squared(point.edf), doubt) / seen);
         limit = std::min(limit, hi * std::sqrt(point.tau_s) * units::deg_rt_h_per_arcsec_rt_s);
     }
     return limit;

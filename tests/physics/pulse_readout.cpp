@@ -11,6 +11,7 @@
 #include "engine/ensemble/block.hpp"
 #include "engine/readout/fraction_recovery.hpp"
 #include "tests/physics/readout_support.hpp"
+#include "tests/support/limits.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -180,6 +181,43 @@ TEST(PulseReadout, TheRecoveredPhaseIsAsGoodAsSampleAndEightPulses) {
     EXPECT_LT(recovered.rms_rad, 1.05 * 0.005 / 3.0 * std::sqrt(1.004));
     EXPECT_GT(recovered.rms_rad, 0.99 * 0.005 / 3.0);
     EXPECT_LT(std::abs(recovered.mean_rad), 4.0 * 0.0017 / 400.0 + 1e-6);
+}
+
+/// Rms of the recovered phase's error over the bound for a processor that has seen no more than the turn itself, and
+/// over that for one that has.
+std::pair<double, double> over_bounds(const char* name, const scenario::Scenario& scenario) {
+    const PhaseError error = phase_error(scenario, 11000);
+    const limits::Bounds bounds = limits::bounds(scenario);
+    std::printf("%s: %.5g rad rms, %.4f of the bound, %.4f of that with psi'' known\n", name, error.rms_rad,
+                error.rms_rad / bounds.learnt_rad, error.rms_rad / bounds.known_rad);
+    return {error.rms_rad / bounds.learnt_rad, error.rms_rad / bounds.known_rad};
+}
+
+TEST(PulseReadout, TheRecoveredPhaseIsNotBetterThanItsBound) {
+    // 160000 turns tell an rms to 0.18 %: four of these are allowed below.
+    const auto check = [](const char* name, const scenario::Scenario& scenario, double most) {
+        const auto [learnt, known] = over_bounds(name, scenario);
+        EXPECT_GT(learnt, 0.993) << name;
+        EXPECT_GE(known, learnt) << name;
+        EXPECT_LT(learnt, most) << name;
+    };
+    check("defaults", instrument(), 1.02);
+    scenario::Scenario scenario = instrument();
+    scenario.readout.detector_noise_relative = 0.02;
+    check("detectors 2 %", scenario, 1.05);
+    scenario = instrument();
+    scenario.readout.comparator_noise_relative = 0.02;
+    scenario.readout.comparator_hysteresis_relative = 0.12;
+    check("comparators 2 %", scenario, 1.05);
+    scenario = instrument();
+    scenario.readout.detector_noise_relative = scenario.readout.comparator_noise_relative = 0.0005;
+    check("0.05 %", scenario, 1.3);
+    scenario = instrument();
+    scenario.readout.clock_hz = 3e6;
+    check("3 MHz", scenario, 1.05);
+    scenario = instrument();
+    scenario.readout.adc_bits = 7;
+    check("7 bits", scenario, 1.05);
 }
 
 TEST(PulseReadout, TheConverterRoundsToItsSteps) {

@@ -461,5 +461,31 @@ TEST(Claims, AGyroWithoutLockInHasNoRandomWalkOnlyALimit) {
     EXPECT_LT(*arw.hi, 1e-9);
 }
 
+TEST(Claims, ALimitCountsTheKicksThatSingleCyclesDoNotSee) {
+    scenario::Scenario scenario;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    scenario.readout.model = scenario::ReadoutModel::ideal;
+    scenario.arms = {"noise_injected"};
+    scenario.ensemble.gyros = 64;
+    scenario.ensemble.duration_s = 30.0;
+    study::Study study = study::run(scenario, 2);
+    // Single cycles show 5/8 of the variance.
+    double variance = 0.0;
+    for (const study::GyroStatistics& gyro : study.arms[0].gyros) {
+        variance += std::pow(gyro.allan.front().dev, 2) * gyro.allan.front().tau_s / 3600.0 / 64.0;
+    }
+    const double theory = study::summarise(study).theory.arw_deg_rt_h;
+    EXPECT_NEAR(variance / (theory * theory), 0.625, 0.02);
+    // As if no fit had been possible: Allan deviations alone are left to give a limit.
+    for (study::GyroStatistics& gyro : study.arms[0].gyros) gyro.noise = {};
+    const study::Figure arw = study::summarise(study).arms.at(0).arw_deg_rt_h;
+    EXPECT_FALSE(arw.median);
+    ASSERT_TRUE(arw.hi);
+    std::printf("limit over the truth: %.4f\n", *arw.hi / theory);
+    // More than half of the limits at 95 %, each the smallest over the averaging times, hold.
+    EXPECT_GE(*arw.hi, theory);
+    EXPECT_LT(*arw.hi, 1.1 * theory);
+}
+
 }  // namespace
 }  // namespace ringlock::test
