@@ -96,9 +96,9 @@ bool place_last_turn(D d, bool minimum, std::size_t lane, Exact::State& state) {
 
 /// Rows [first_row, last_row) of the readings; errors are told less errors.whole. `changed`: rate or coupling are
 /// others than at the row before.
-bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const readout::LaneReadings& readings,
-                   std::size_t first_row, std::size_t last_row, bool begun, bool changed, Exact::State& state,
-                   LaneErrors& errors) {
+bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const Exact::Parts& parts,
+                   const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row, bool begun,
+                   bool changed, Exact::State& state, LaneErrors& errors) {
     const D d;
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
@@ -112,9 +112,6 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
         if (begun && changed && !place_last_turn(d, !readings.minimum(first_row), lane, state)) return false;
         const V phase_sine = load(state.coupling_sine);
         const V phase_cosine = load(state.coupling_cosine);
-        const V coupling_x = hn::Max(
-            hn::Min((load(state.b_rad_s) - load(tables.centre()[2])) * load(tables.inverse_half_width()[2]), one),
-            hn::Neg(one));
         const V mean_amplitude = load(state.amplitude_rad);
         const V b = load(state.b_rad_s);
         const V scale_angle = load(state.scale_angle);
@@ -122,8 +119,6 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
         const V rate = load(state.rate_rad_s);
         const V centre = load(tables.centre()[0]);
         const V inverse = load(tables.inverse_half_width()[0]);
-        const V rate_x = hn::Max(hn::Min((rate - load(tables.centre()[1])) * load(tables.inverse_half_width()[1]), one),
-                                 hn::Neg(one));
         V last_sine = load(state.sine);
         V last_cosine = load(state.cosine);
         V last_fringes = load(state.turn_fringes);
@@ -170,7 +165,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 const auto scaled = [&](V amplitude) HWY_ATTR {
                     return hn::Max(hn::Min((amplitude - centre) * inverse, one), hn::Neg(one));
                 };
-                const propagate::TurnTables::Part& part = tables.part(minimum ? -1.0 : 1.0, 0);
+                const propagate::TurnTables::Part& part = parts[minimum ? 0 : 1];
                 // To first order for the amplitude, then in full: exp(-i x_0) and exp(-i x_1).
                 const V moved =
                     sm::fma(d, hn::Neg(sign) * (turn_fringes - load(readings.phase_fringes[i])), one, swing);
@@ -179,7 +174,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                                        hn::Neg(first.z_re * (last_sine - sine)));  // Im z (e_0 - e_1)
                 const V gain_rad = sm::fma(d, bend, hn::Set(d, 2.0), first.shift * (two_pi + two_pi));
                 const V amplitude = half * (sm::fma(d, moved, two_pi, hn::Neg(plain_rotation)) - gain_rad);
-                const pm::HalfMapOf<V> map = pm::evaluate(d, part, lane, scaled(amplitude), rate_x, coupling_x);
+                const pm::HalfMapOf<V> map = pm::evaluate(d, part, lane, scaled(amplitude), zero, zero);
                 const sm::Complex<V> z{map.z_re, map.z_im};
                 const sm::Complex<V> unit{one, zero};
                 const sm::Complex<V> e0{last_cosine, hn::Neg(last_sine)};
@@ -316,6 +311,37 @@ void Exact::set_coupling(std::size_t lane, double b_rad_s, double phase_rad) {
     changed_ = true;
 }
 
+void Exact::take_parts() {
+    for (const std::size_t which : {0U, 1U}) {
+        const propagate::TurnTables::Part& whole = tables_.part(which == 0 ? -1.0 : 1.0, 0);
+        const auto [amplitudes, rates, couplings] = whole.terms;
+        propagate::TurnTables::Part& part = parts_[which];
+        part.terms = {amplitudes, 1, 1};
+        part.coefficients.assign(3 * amplitudes, simd::Lanes{});
+        for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+            const auto scaled = [&](double value, std::size_t variable) {
+                const double x =
+                    (value - tables_.centre()[variable][lane]) * tables_.inverse_half_width()[variable][lane];
+                return std::clamp(x, -1.0, 1.0);
+            };
+            const double rate_x = scaled(state_.rate_rad_s[lane], 1);
+            const double coupling_x = scaled(state_.b_rad_s[lane], 2);
+            for (std::size_t k = 0; k < 3 * amplitudes; ++k) {
+                double sum = 0.0;
+                for (std::size_t c = couplings; c-- > 0;) {
+                    double over_rate = 0.0;
+                    for (std::size_t r = rates; r-- > 0;) {
+                        const std::size_t row = 3 * amplitudes * (c * rates + r) + k;
+                        over_rate = over_rate * rate_x + whole.coefficients[row][lane];
+                    }
+                    sum = sum * coupling_x + over_rate;
+                }
+                part.coefficients[k][lane] = sum;
+            }
+        }
+    }
+}
+
 void Exact::solve(const readout::LaneReadings& readings, std::size_t first, std::size_t last, LaneErrors& errors) {
     for (std::size_t lane = 0; lane < calibration_.lanes; ++lane) {
         if (!begun_ || !tables_.ranges(lane).rate_rad_s.covers(state_.rate_rad_s[lane]) ||
@@ -323,8 +349,9 @@ void Exact::solve(const readout::LaneReadings& readings, std::size_t first, std:
             make_tables(lane);
         }
     }
-    if (!HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, readings, first, last, begun_, changed_,
-                                             state_, errors)) {
+    if (!begun_ || changed_) take_parts();
+    if (!HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, parts_, readings, first, last, begun_,
+                                             changed_, state_, errors)) {
         throw RunError(
             "compensated_exact: the phase does not reverse near a turn of the dither; the input rate is too high for "
             "it");

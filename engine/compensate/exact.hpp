@@ -1,5 +1,5 @@
 #pragma once
-#include <optional>
+#include <array>
 
 #include "engine/compensate/lane_compensator.hpp"
 #include "engine/propagate/turn_tables.hpp"
@@ -52,6 +52,10 @@ class Exact final : public LaneCompensator {
         simd::Lanes read_amplitude_rad, read_angular_frequency_rad_s, read_scale_s;
     };
 
+    /// Half turns at the rate and the coupling as known, polynomials in the amplitude: [end at a minimum, at a
+    /// maximum].
+    using Parts = std::array<propagate::TurnTables::Part, 2>;
+
    private:
     /// A minimum of the phase and where it was read.
     struct Minimum {
@@ -65,10 +69,12 @@ class Exact final : public LaneCompensator {
     void solve(const readout::LaneReadings& readings, std::size_t first, std::size_t last, LaneErrors& errors);
     void count_turns(std::size_t rows);
     void make_tables(std::size_t lane);
+    void take_parts();
 
     Calibration calibration_;
     double coupling_share_;
     propagate::TurnTables tables_;
+    Parts parts_;
     State state_;
     bool begun_ = false;
     bool changed_ = false;  ///< rate or coupling, since the last row
