@@ -105,13 +105,14 @@ Finding noise_leaves_the_dither(const Scenario& s) {
 
 Finding temperature_leaves_a_threshold(const Scenario& s) {
     constexpr double most = 0.9;
-    const double change_k = std::abs(s.environment.temperature_ramp_k_per_h) * s.ensemble.duration_s / 3600.0 +
-                            s.environment.temperature_swing_k;
+    const double simulated_s = s.ensemble.settle_s + s.ensemble.duration_s;
+    const double change_k =
+        std::abs(s.environment.temperature_ramp_k_per_h) * simulated_s / 3600.0 + s.environment.temperature_swing_k;
     const double relative = s.effects.at("lockin_temperature").at("relative_per_k");
     if (std::abs(relative) * change_k <= most) return {};
     return Complaint{
         {"effects.lockin_temperature.relative_per_k", "environment.temperature_ramp_k_per_h",
-         "environment.temperature_swing_k", "ensemble.duration_s"},
+         "environment.temperature_swing_k", "ensemble.duration_s", "ensemble.settle_s"},
         fmt::format("the temperature changes by up to {:g} K, the threshold by {:g} of itself; it must not "
                     "change by more than {:g}",
                     change_k, std::abs(relative) * change_k, most)};

@@ -19,7 +19,9 @@
 
 #include "analysis/report/plot.hpp"
 #include "engine/compensate/exact.hpp"
+#include "engine/compensate/extrapolated.hpp"
 #include "engine/compensate/first_order.hpp"
+#include "engine/compensate/two_train.hpp"
 #include "engine/core/units.hpp"
 #include "engine/ensemble/block.hpp"
 #include "engine/ensemble/draw.hpp"
@@ -349,6 +351,8 @@ void cost() {
             return per_gyro(sizeof(compensate::Exact::State) + sizeof(readout::FractionRecovery::State) +
                             2 * sizeof(simd::Lanes));
         }
+        if (name == "compensated_extrapolated") return per_gyro(sizeof(compensate::Extrapolated::State));
+        if (name == "compensated_two_train") return per_gyro(sizeof(compensate::TwoTrain::State));
         return "-";
     };
     head({"", "ns a turn and gyro", "state, bytes a gyro", "with tables, kB a gyro"});
