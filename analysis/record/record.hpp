@@ -1,0 +1,85 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+/// Measured data from files.
+namespace ringlock::record {
+
+/// What the operator says about the instrument: a starting point, not truth.
+struct Declared {
+    std::optional<double> scale_factor_arcsec;  ///< K: arcsec of rotation per fringe, 2 pi of optical phase
+    std::optional<double> lockin_threshold_deg_h;
+    std::optional<double> dither_frequency_hz;
+    std::optional<double> dither_peak_rate_deg_s;
+    std::optional<double> bias_deg_h;
+    std::optional<double> clock_hz;
+    std::optional<double> readout_noise_rad;
+    std::optional<double> input_rate_deg_h;
+};
+
+/// Consecutive zero-rate points, one row each.
+struct Turns {
+    std::vector<double> time_s;               ///< when the phase rate crosses zero
+    std::vector<std::int8_t> direction;       ///< +1 at a phase minimum, -1 at a maximum
+    std::vector<std::int64_t> quarter_count;  ///< up/down count of quarter fringes: floor(phase/(pi/2))
+    std::vector<double> sine, cosine;         ///< quadrature detectors at the zero-rate point, any common scale
+    std::vector<double> accel_before_rad_s2;  ///< magnitude of the phase acceleration from the nearest pulses on that
+    std::vector<double> accel_after_rad_s2;   ///< side; 0 where none was seen
+
+    std::size_t size() const { return time_s.size(); }
+};
+
+enum class SampleKind { angle_increment_arcsec, angle_arcsec, quarter_count };
+
+/// Uniform samples without gaps.
+struct Samples {
+    double rate_hz = 0.0;
+    double t0_s = 0.0;
+    SampleKind kind = SampleKind::angle_increment_arcsec;
+    std::vector<double> values;                            ///< [arcsec]; empty for counts
+    std::vector<std::int64_t> counts;                      ///< cumulative; of kind quarter_count only
+    std::map<std::string, std::vector<double>> witnesses;  ///< accel_x, accel_y, accel_z, temperature_c: as long
+
+    std::size_t size() const { return kind == SampleKind::quarter_count ? counts.size() : values.size(); }
+};
+
+/// A quantity at times of its own, linear between them.
+struct Track {
+    std::vector<double> time_s;
+    std::vector<double> value;
+
+    bool empty() const { return time_s.empty(); }
+    /// Beyond the ends: the value there.
+    double at(double time) const;
+};
+
+/// An rlg-record, version 1 (docs/record.md): turns, samples or both.
+struct Record {
+    std::string title, instrument, source, licence;
+    Declared declared;
+    std::optional<Turns> turns;
+    std::optional<Samples> samples;
+    Track temperature_c;     ///< /environment
+    Track input_rate_deg_h;  ///< /reference
+};
+
+/// Reads the HDF5 or the CSV form, told apart by their content. Throws InputError, naming file and dataset or line,
+/// where the file cannot be read, is no record, or check() finds something.
+Record read_record(const std::string& path);
+
+/// Writes the HDF5 form, whole or not at all.
+void write_record(const std::string& path, const Record& record);
+
+/// One thing that is wrong with a record: what and where.
+struct Finding {
+    std::string where;  ///< dataset, with the row where there is one
+    std::string what;   ///< value found and what is allowed
+};
+
+/// Lengths, order, values that are not finite, counts that jump, turns that do not alternate, ...
+std::vector<Finding> check(const Record& record);
+
+}  // namespace ringlock::record
