@@ -28,6 +28,8 @@ const std::vector<Stated>& stated() {
         {"bias_step",
          {{"step_deg_h", 2.0}, {"time_s", 10.125}},
          [](double t, double, double) { return t >= 10.125 ? 2.0 : 0.0; }},
+        {"bias_temperature", {{"deg_h_per_k", 0.3}}, [](double, double k, double) { return 0.3 * k; }},
+        {"scale_factor_error", {{"relative", 1e-3}}, [](double, double, double rate) { return 1e-3 * rate; }},
     };
     return all;
 }
