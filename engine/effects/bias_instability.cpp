@@ -9,13 +9,16 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"deg_h", 0.0, 0.0, 1000.0, "bias instability B; the Allan deviation is flat at 0.664 B"},
+    Parameter{"deg_h", 0.0, 0.0, 1000.0, Role::deviation, "bias instability B; the Allan deviation is flat at 0.664 B"},
 };
 
 /// Correlation times: one a decade from 0.01 s to 1e7 s. The Allan deviation is then within 3 % of its flat value for
 /// averaging times of 0.1 s to 1e6 s.
 constexpr std::size_t terms = 10;
 constexpr std::array<double, terms> correlation_times_s = {1e-2, 1e-1, 1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7};
+
+/// Standard deviation s of each term: with one a decade the sum of 2 s^2 T / (1 + (2 pi f T)^2) is s^2 / (2 ln(10) f).
+double term_sd(double deg_h) { return deg_h * std::sqrt(std::numbers::ln10 / std::numbers::pi); }
 
 /// Exact transition of the sum over one interval. With x = dt/T and h = tanh(x/2), a term of unit variance goes from
 /// r to (1-h)/(1+h) r + 2 sqrt(h)/(1+h) z; given both ends its integral has the mean T h (r0 + r1) and the variance
@@ -49,9 +52,7 @@ struct Transition {
 class Process final : public RateProcess {
    public:
     Process(double deg_h, const random::Identity& who)
-        // One term a decade, each of variance s^2: sum of 2 s^2 T / (1 + (2 pi f T)^2) = s^2 / (2 ln(10) f).
-        : sd_arcsec_s_(deg_h * std::sqrt(std::numbers::ln10 / std::numbers::pi)),
-          normal_(who, random::Purpose::bias_instability) {
+        : sd_arcsec_s_(term_sd(deg_h)), normal_(who, random::Purpose::bias_instability) {
         for (double& rate : rates_) rate = normal_();
     }
 
@@ -96,6 +97,12 @@ class BiasInstability final : public Effect {
     }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("deg_h") != 0.0; }
+    RateNoise rate_noise(const Values& values) const override {
+        const double deg_h = term_sd(values.at("deg_h"));
+        RateNoise noise;
+        for (const double time_s : correlation_times_s) noise.terms.push_back({time_s, deg_h * deg_h});
+        return noise;
+    }
     std::unique_ptr<RateProcess> rate_process(const Values& values, const random::Identity& who) const override {
         return std::make_unique<Process>(values.at("deg_h"), who);
     }

@@ -6,19 +6,7 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"deg_h_per_h", 0.0, -1000.0, 1000.0, "slope R of the rate"},
-};
-
-class Process final : public RateProcess {
-   public:
-    explicit Process(double deg_h_per_h) : slope_arcsec_s2_(deg_h_per_h / 3600.0) {}
-
-    double angle_arcsec(double start_s, double duration_s) override {
-        return slope_arcsec_s2_ * (start_s + 0.5 * duration_s) * duration_s;
-    }
-
-   private:
-    double slope_arcsec_s2_;
+    Parameter{"deg_h_per_h", 0.0, -1000.0, 1000.0, Role::size, "slope R of the rate"},
 };
 
 class BiasRamp final : public Effect {
@@ -30,8 +18,10 @@ class BiasRamp final : public Effect {
     }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("deg_h_per_h") != 0.0; }
-    std::unique_ptr<RateProcess> rate_process(const Values& values, const random::Identity& /*who*/) const override {
-        return std::make_unique<Process>(values.at("deg_h_per_h"));
+    bool adds_angle() const override { return true; }
+    double added_angle_arcsec(const Values& values, const Interval& at) const override {
+        const double slope_arcsec_s2 = values.at("deg_h_per_h") / 3600.0;
+        return slope_arcsec_s2 * (at.start_s + 0.5 * at.duration_s) * at.duration_s;
     }
 };
 

@@ -7,21 +7,8 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"step_deg_h", 0.0, -1e4, 1e4, "change of the rate"},
-    Parameter{"time_s", 0.0, 0.0, 1e9, "when it happens, from the start"},
-};
-
-class Process final : public RateProcess {
-   public:
-    Process(double step_deg_h, double time_s) : step_arcsec_s_(step_deg_h), time_s_(time_s) {}
-
-    double angle_arcsec(double start_s, double duration_s) override {
-        return step_arcsec_s_ * std::clamp(start_s + duration_s - time_s_, 0.0, duration_s);
-    }
-
-   private:
-    double step_arcsec_s_;
-    double time_s_;
+    Parameter{"step_deg_h", 0.0, -1e4, 1e4, Role::size, "change of the rate"},
+    Parameter{"time_s", 0.0, 0.0, 1e9, Role::time, "when it happens, from the start"},
 };
 
 class BiasStep final : public Effect {
@@ -31,8 +18,10 @@ class BiasStep final : public Effect {
     std::string_view equation() const override { return "rate = step for t >= time, else 0."; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("step_deg_h") != 0.0; }
-    std::unique_ptr<RateProcess> rate_process(const Values& values, const random::Identity& /*who*/) const override {
-        return std::make_unique<Process>(values.at("step_deg_h"), values.at("time_s"));
+    bool adds_angle() const override { return true; }
+    double added_angle_arcsec(const Values& values, const Interval& at) const override {
+        return values.at("step_deg_h") *
+               std::clamp(at.start_s + at.duration_s - values.at("time_s"), 0.0, at.duration_s);
     }
 };
 

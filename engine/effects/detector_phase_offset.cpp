@@ -7,7 +7,7 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"phase_rad", 0.0, -units::pi, units::pi, "phase of the coupling against the sine detector"},
+    Parameter{"phase_rad", 0.0, -units::pi, units::pi, Role::phase, "phase of the coupling against the sine detector"},
 };
 
 class DetectorPhaseOffset final : public Effect {

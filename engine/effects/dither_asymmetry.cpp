@@ -6,7 +6,7 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"ratio", 0.0, -0.5, 0.5, "positive half cycles stronger by it, and shorter"},
+    Parameter{"ratio", 0.0, -0.5, 0.5, Role::size, "positive half cycles stronger by it, and shorter"},
 };
 
 class DitherAsymmetry final : public Effect {

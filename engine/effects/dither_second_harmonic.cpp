@@ -7,8 +7,8 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"ratio", 0.0, -0.3, 0.3, "second harmonic of the dither rate over the first"},
-    Parameter{"phase_rad", 0.0, -units::pi, units::pi, "phase of the second harmonic at the turns"},
+    Parameter{"ratio", 0.0, -0.3, 0.3, Role::size, "second harmonic of the dither rate over the first"},
+    Parameter{"phase_rad", 0.0, -units::pi, units::pi, Role::phase, "phase of the second harmonic at the turns"},
 };
 
 class DitherSecondHarmonic final : public Effect {

@@ -1,5 +1,6 @@
 #include "engine/effects/effect.hpp"
 
+#include <cmath>
 #include <utility>
 
 namespace ringlock::effects {
@@ -24,6 +25,19 @@ class OneByOne final : public LaneRateProcess {
 };
 
 }  // namespace
+
+double angle_variance_arcsec2(const RateNoise& noise, double duration_s) {
+    const double t = duration_s;
+    double variance = (noise.white_deg2_h2_s + noise.walk_deg2_h2_per_s * t * t / 3.0) * t;
+    for (const GaussMarkov& term : noise.terms) {
+        // Twice the integral of (t - s) exp(-s/T) over s from 0 to t.
+        const double x = t / term.time_s;
+        const double bracket =
+            x < 1e-2 ? x * x * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0)))) : x + std::expm1(-x);
+        variance += 2.0 * term.variance_deg2_h2 * term.time_s * term.time_s * bracket;
+    }
+    return variance;
+}
 
 std::unique_ptr<LaneRateProcess> Effect::lane_rate_process(const Values& values, const random::LaneIdentities& who,
                                                            std::size_t lanes) const {

@@ -14,19 +14,60 @@
 /// Effects beyond the base equation. One file each, one line in registry.cpp.
 namespace ringlock::effects {
 
+/// How a parameter enters what a gyro puts out: what a fit to a record has to do to find it.
+enum class Role {
+    size,   ///< proportionally, about zero
+    phase,  ///< phase of the size before it, with which it makes two amplitudes, size cos(phase) and size sin(phase),
+            ///< that enter proportionally; of the lock-in threshold where no size stands before it
+    time,   ///< where in time something happens: to be searched
+    frequency,  ///< to be searched
+    deviation,  ///< standard deviation of a random process: its square enters variances proportionally
+    probability,
+    setting,  ///< any other way
+};
+
 /// One parameter of an effect: its name carries the unit, as in a scenario's [effects.NAME] table.
 struct Parameter {
     std::string_view name;
     double default_value;  ///< the value at which an effect that is not asked for stands
     double min;
     double max;
+    Role role;
     std::string_view doc;  ///< one line
 };
 
 /// The value of every parameter of one effect.
 using Values = std::map<std::string, double>;
 
-/// A rate that varies in time, given as the angle it adds.
+/// A stretch of time and what a gyro is exposed to in it: values at both ends, linear between them.
+struct Interval {
+    double start_s = 0.0;  ///< since the start, of the run or of the record
+    double duration_s = 0.0;
+    double temperature_change_k[2] = {0.0, 0.0};  ///< temperature less that at the start
+    double input_rate_deg_h[2] = {0.0, 0.0};      ///< of the case, the dither apart
+};
+
+/// A stationary random rate of exponential autocorrelation, variance exp(-|t|/time).
+struct GaussMarkov {
+    double time_s = 0.0;
+    double variance_deg2_h2 = 0.0;
+};
+
+/// A random rate as the sum of independent ones; 1 deg/h is 1 arcsec/s.
+struct RateNoise {
+    /// White: two-sided power spectral density of the rate [(deg/h)^2 s]. The angle after t has the variance density t
+    /// [arcsec^2]; the density of an angle random walk of N deg/sqrt(h) is 3600 N^2.
+    double white_deg2_h2_s = 0.0;
+    /// Random walk of the rate, from zero at the start: growth of its variance in time [(deg/h)^2/s]. That of K
+    /// (deg/h)/sqrt(h) is K^2/3600.
+    double walk_deg2_h2_per_s = 0.0;
+    std::vector<GaussMarkov> terms = {};  ///< in the order of their times
+};
+
+/// Variance of the angle [arcsec^2] that the rate adds in the first `duration_s` after the start.
+double angle_variance_arcsec2(const RateNoise& noise, double duration_s);
+
+/// A random rate, given as the angle it adds.
 class RateProcess {
    public:
     virtual ~RateProcess() = default;
@@ -43,7 +84,7 @@ struct LaneIntervals {
     std::span<const simd::Lanes> duration_s;
 };
 
-/// A rate process of a block of gyros.
+/// A rate that varies in time, of a block of gyros.
 class LaneRateProcess {
    public:
     virtual ~LaneRateProcess() = default;
@@ -65,7 +106,14 @@ class Effect {
     virtual void configure(const Values& /*values*/, gyro::Setup& /*setup*/) const {}
     /// What the lock-in threshold is multiplied by when the temperature has changed by so much since the start.
     virtual double threshold_factor(const Values& /*values*/, double /*temperature_change_k*/) const { return 1.0; }
-    /// A rate process for one gyro, or null where the effect has none.
+    /// True where added_angle_arcsec() is not always zero.
+    virtual bool adds_angle() const { return false; }
+    /// Rotation [arcsec] that the effect adds to the output over the interval, chance apart; angles of intervals that
+    /// follow each other add up.
+    virtual double added_angle_arcsec(const Values& /*values*/, const Interval& /*interval*/) const { return 0.0; }
+    /// The random rate that rate_process() draws from.
+    virtual RateNoise rate_noise(const Values& /*values*/) const { return {}; }
+    /// A random rate for one gyro, or null where the effect has none.
     virtual std::unique_ptr<RateProcess> rate_process(const Values& /*values*/, const random::Identity& /*who*/) const {
         return nullptr;
     }

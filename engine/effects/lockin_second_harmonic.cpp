@@ -7,8 +7,9 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"ratio", 0.0, -0.5, 0.5, "coupling at twice the phase over that at the phase itself"},
-    Parameter{"phase_rad", 0.0, -units::pi, units::pi, "phase of the second harmonic against the sine detector"},
+    Parameter{"ratio", 0.0, -0.5, 0.5, Role::size, "coupling at twice the phase over that at the phase itself"},
+    Parameter{"phase_rad", 0.0, -units::pi, units::pi, Role::phase,
+              "phase of the second harmonic against the sine detector"},
 };
 
 class LockinSecondHarmonic final : public Effect {

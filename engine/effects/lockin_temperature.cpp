@@ -6,7 +6,7 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"relative_per_k", 0.0, -0.5, 0.5, "relative change of the threshold with each kelvin"},
+    Parameter{"relative_per_k", 0.0, -0.5, 0.5, Role::size, "relative change of the threshold with each kelvin"},
 };
 
 class LockinTemperature final : public Effect {

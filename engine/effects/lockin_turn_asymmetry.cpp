@@ -6,7 +6,7 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"ratio", 0.0, -0.9, 0.9, "threshold stronger by it at minima of the phase, weaker at maxima"},
+    Parameter{"ratio", 0.0, -0.9, 0.9, Role::size, "threshold stronger by it at minima of the phase, weaker at maxima"},
 };
 
 class LockinTurnAsymmetry final : public Effect {

@@ -8,7 +8,7 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"deg_rt_h", 1e-4, 0.0, 10.0, "angle random walk of the quantum noise floor"},
+    Parameter{"deg_rt_h", 1e-4, 0.0, 10.0, Role::deviation, "angle random walk of the quantum noise floor"},
 };
 
 class Process final : public RateProcess {
@@ -63,6 +63,10 @@ class QuantumNoise final : public Effect {
     }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("deg_rt_h") != 0.0; }
+    RateNoise rate_noise(const Values& values) const override {
+        const double arcsec_rt_s = values.at("deg_rt_h") / units::deg_rt_h_per_arcsec_rt_s;
+        return {.white_deg2_h2_s = arcsec_rt_s * arcsec_rt_s};
+    }
     std::unique_ptr<RateProcess> rate_process(const Values& values, const random::Identity& who) const override {
         return std::make_unique<Process>(values.at("deg_rt_h"), who);
     }

@@ -8,7 +8,8 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"deg_h_rt_h", 0.0, 0.0, 1000.0, "rate random walk K: rms change of the rate after one hour"},
+    Parameter{"deg_h_rt_h", 0.0, 0.0, 1000.0, Role::deviation,
+              "rate random walk K: rms change of the rate after one hour"},
 };
 
 /// The rate r is a Wiener process. Over dt its change and the angle beyond r dt are jointly normal:
@@ -43,6 +44,10 @@ class RateRandomWalk final : public Effect {
     }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("deg_h_rt_h") != 0.0; }
+    RateNoise rate_noise(const Values& values) const override {
+        const double deg_h_rt_s = values.at("deg_h_rt_h") / 60.0;
+        return {.walk_deg2_h2_per_s = deg_h_rt_s * deg_h_rt_s};
+    }
     std::unique_ptr<RateProcess> rate_process(const Values& values, const random::Identity& who) const override {
         return std::make_unique<Process>(values.at("deg_h_rt_h"), who);
     }

@@ -6,10 +6,10 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"gain", 0.0, -0.5, 0.5, "relative gain error of the sine detector"},
-    Parameter{"offset_sin", 0.0, -0.5, 0.5, "offset of the sine detector, in fringe amplitudes"},
-    Parameter{"offset_cos", 0.0, -0.5, 0.5, "offset of the cosine detector, in fringe amplitudes"},
-    Parameter{"orthogonality_rad", 0.0, -0.7, 0.7, "how far the cosine detector is out of quadrature"},
+    Parameter{"gain", 0.0, -0.5, 0.5, Role::size, "relative gain error of the sine detector"},
+    Parameter{"offset_sin", 0.0, -0.5, 0.5, Role::size, "offset of the sine detector, in fringe amplitudes"},
+    Parameter{"offset_cos", 0.0, -0.5, 0.5, Role::size, "offset of the cosine detector, in fringe amplitudes"},
+    Parameter{"orthogonality_rad", 0.0, -0.7, 0.7, Role::size, "how far the cosine detector is out of quadrature"},
 };
 
 class ReadoutEllipse final : public Effect {

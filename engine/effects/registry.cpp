@@ -9,6 +9,7 @@
     X(bias_instability)       \
     X(bias_ramp)              \
     X(bias_step)              \
+    X(bias_temperature)       \
     X(detector_phase_offset)  \
     X(dither_asymmetry)       \
     X(dither_second_harmonic) \
@@ -17,7 +18,8 @@
     X(lockin_turn_asymmetry)  \
     X(quantum_noise)          \
     X(rate_random_walk)       \
-    X(readout_ellipse)
+    X(readout_ellipse)        \
+    X(scale_factor_error)
 
 namespace ringlock::effects {
 
@@ -39,9 +41,8 @@ const Effect* find(std::string_view name) {
 }
 
 std::span<const std::string_view> planned() {
-    static constexpr std::array<std::string_view, 7> names = {
-        "bias_temperature", "case_motion", "count_quantization", "dither_residue",
-        "missed_counts",    "resampling",  "scale_factor_error"};
+    static constexpr std::array<std::string_view, 5> names = {"case_motion", "count_quantization", "dither_residue",
+                                                              "missed_counts", "resampling"};
     return names;
 }
 

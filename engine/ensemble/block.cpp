@@ -14,6 +14,7 @@
 #include "engine/compensate/two_train.hpp"
 #include "engine/dither/lane_dither.hpp"
 #include "engine/effects/effect.hpp"
+#include "engine/ensemble/added_angles.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/output_counts.hpp"
 #include "engine/ensemble/trajectory_kind.hpp"
@@ -238,6 +239,9 @@ struct GyroBlock::State {
             if (values == scenario.effects.end() || !effect->active(values->second)) continue;
             if (follows_temperature && effect->threshold_factor(values->second, 1.0) != 1.0) {
                 threshold_effects.emplace_back(effect, values->second);
+            }
+            if (effect->adds_angle()) {
+                processes.push_back(added_angles(*effect, values->second, scenario, setups));
             }
             if (auto process = effect->lane_rate_process(values->second, who, setups.size())) {
                 processes.push_back(std::move(process));

@@ -15,7 +15,7 @@ bool drive_repeats(const scenario::Scenario& scenario) {
         const auto values = scenario.effects.find(std::string(effect->name()));
         // The effect itself is asked, so that a new one cannot be forgotten here.
         return values != scenario.effects.end() && effect->active(values->second) &&
-               (effect->rate_process(values->second, {scenario.ensemble.seed, 0}) != nullptr ||
+               (effect->adds_angle() || effect->rate_process(values->second, {scenario.ensemble.seed, 0}) != nullptr ||
                 (scenario::temperature_varies(scenario.environment) &&
                  effect->threshold_factor(values->second, 1.0) != 1.0));
     });

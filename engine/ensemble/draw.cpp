@@ -14,6 +14,10 @@ double input_rate_deg_h(const scenario::Scenario& scenario, std::int64_t gyro) {
     return scenario::input_rate_deg_h(scenario.input, gyro / scenario.ensemble.gyros);
 }
 
+double input_rate_at_deg_h(const scenario::Scenario& /*scenario*/, const gyro::Setup& setup, double /*time_s*/) {
+    return setup.input_rate_deg_h;
+}
+
 random::Identity identity(const scenario::Scenario& scenario, std::int64_t gyro) {
     return {scenario.ensemble.seed, static_cast<std::uint64_t>(gyro % scenario.ensemble.gyros)};
 }

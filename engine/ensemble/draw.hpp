@@ -13,6 +13,9 @@ std::int64_t total_gyros(const scenario::Scenario& scenario);
 /// Input rate of gyro g [deg/h].
 double input_rate_deg_h(const scenario::Scenario& scenario, std::int64_t gyro);
 
+/// Input rate of a gyro at a time since the start of the run [deg/h]: constant.
+double input_rate_at_deg_h(const scenario::Scenario& scenario, const gyro::Setup& setup, double time_s);
+
 /// Who gyro g is to the random streams: the same member at another rate draws the same numbers, so that rates are
 /// compared in pairs like arms.
 random::Identity identity(const scenario::Scenario& scenario, std::int64_t gyro);

@@ -122,6 +122,60 @@ TEST(BiasInstability, AngleIsExactForConsecutiveUnequalIntervals) {
     }
 }
 
+/// Angles of two consecutive intervals as the effect describes its rate: the variance of their sum gives the
+/// covariance.
+Moments described(std::string_view name, const Values& values) {
+    const RateNoise noise = find(name)->rate_noise(values);
+    const double first = angle_variance_arcsec2(noise, interval_a);
+    const double both = angle_variance_arcsec2(noise, interval_a + interval_b);
+    // A random walk has gone a W(a) on when the second begins; the others are stationary.
+    const double walked = noise.walk_deg2_h2_per_s * interval_a * interval_b * interval_b;
+    const double second = angle_variance_arcsec2(noise, interval_b) + walked;
+    return {first, second, 0.5 * (both - first - second)};
+}
+
+TEST(RateNoise, DescribesTheRateThatTheProcessDraws) {
+    const std::vector<std::pair<std::string, Values>> random_effects = {
+        {"quantum_noise", {{"deg_rt_h", 0.7}}},
+        {"rate_random_walk", {{"deg_h_rt_h", 42.0}}},
+        {"bias_instability", {{"deg_h", 0.3}}},
+    };
+    for (const auto& [name, values] : random_effects) {
+        SCOPED_TRACE(name);
+        expect_moments(measure(name, values, 2), described(name, values));
+    }
+}
+
+TEST(RateNoise, IsInTheUnitsOfTheCoefficients) {
+    // 0.0022506 deg/sqrt(h) is 0.13504 arcsec/sqrt(s); a rate walk of 1 deg/h in an hour.
+    EXPECT_NEAR(find("quantum_noise")->rate_noise({{"deg_rt_h", 0.13504 / 60.0}}).white_deg2_h2_s, 0.13504 * 0.13504,
+                1e-16);
+    EXPECT_NEAR(find("rate_random_walk")->rate_noise({{"deg_h_rt_h", 1.0}}).walk_deg2_h2_per_s * 3600.0, 1.0, 1e-15);
+    const RateNoise flicker = find("bias_instability")->rate_noise({{"deg_h", 2.0}});
+    const Flicker expected(2.0);
+    ASSERT_EQ(flicker.terms.size(), expected.times_s.size());
+    for (std::size_t i = 0; i < flicker.terms.size(); ++i) {
+        EXPECT_DOUBLE_EQ(flicker.terms[i].time_s, expected.times_s[i]);
+        EXPECT_DOUBLE_EQ(flicker.terms[i].variance_deg2_h2, expected.variance);
+    }
+}
+
+TEST(RateNoise, VarianceOfTheAngleIsTwiceTheIntegralOfTheCovariance) {
+    // Var = 2 int_0^t (t - s) r(s) ds of a stationary rate, by the midpoint rule (error of order 1e-8 of it); terms
+    // with x = t/T on both sides of the change of formula at 0.01.
+    RateNoise noise{.terms = {{0.3, 2.0}, {10.0, 5.0}, {100.5, 1.0}, {99.5, 1.0}, {1e6, 3.0}}};
+    const double t = 1.0;
+    constexpr int steps = 20000;
+    double expected = 0.0;
+    for (int i = 0; i < steps; ++i) {
+        const double s = (i + 0.5) * t / steps;
+        for (const GaussMarkov& term : noise.terms) {
+            expected += 2.0 * (t - s) * term.variance_deg2_h2 * std::exp(-s / term.time_s) * t / steps;
+        }
+    }
+    EXPECT_NEAR(angle_variance_arcsec2(noise, t) / expected, 1.0, 1e-8);
+}
+
 TEST(BiasInstability, DensityOfTheSumIsFlatInAllanDeviationOverTheStatedBand) {
     const double floor = std::sqrt(2.0 * std::numbers::ln2 / std::numbers::pi);
     const Flicker flicker(1.0);
@@ -182,37 +236,6 @@ TEST(RateProcesses, RepeatForOneIdentityAndDifferBetweenGyros) {
         EXPECT_EQ(once, make(name, values, 3)->angle_arcsec(0.0, 1.0)) << name;
         EXPECT_NE(once, make(name, values, 4)->angle_arcsec(0.0, 1.0)) << name;
     }
-}
-
-TEST(BiasStep, ActsFromItsTimeOnAndInPartOfTheIntervalItFallsInto) {
-    const auto process = make("bias_step", {{"step_deg_h", 2.0}, {"time_s", 10.0}});
-    EXPECT_EQ(process->angle_arcsec(0.0, 9.0), 0.0);
-    EXPECT_DOUBLE_EQ(process->angle_arcsec(9.0, 4.0), 6.0);
-    EXPECT_DOUBLE_EQ(process->angle_arcsec(13.0, 1.0), 2.0);
-}
-
-TEST(BiasRamp, GrowsWithTheSquareOfTime) {
-    const auto process = make("bias_ramp", {{"deg_h_per_h", 3600.0}});  // 1 arcsec/s^2
-    EXPECT_DOUBLE_EQ(process->angle_arcsec(0.0, 2.0), 2.0);
-    EXPECT_DOUBLE_EQ(process->angle_arcsec(2.0, 2.0), 6.0);
-}
-
-TEST(BaseVibration, IsTheIntegralOfTheLine) {
-    const double f = 37.0;
-    const double phase = 0.4;
-    const auto process = make("base_vibration", {{"frequency_hz", f}, {"rate_deg_h", 5.0}, {"phase_rad", phase}});
-    const double w = 2.0 * std::numbers::pi * f;
-    for (const auto& [start, duration] : {std::pair{0.0, 0.004}, {0.004, 0.011}, {0.015, 1.0}}) {
-        const double expected = 5.0 / w * (std::cos(w * start + phase) - std::cos(w * (start + duration) + phase));
-        EXPECT_NEAR(process->angle_arcsec(start, duration), expected, 1e-14);
-    }
-}
-
-TEST(BaseVibration, AddsUpToTheSameAngleLateInALongRun) {
-    const Values values = {{"frequency_hz", 10.0}, {"rate_deg_h", 1.0}, {"phase_rad", 0.0}};
-    const auto process = make("base_vibration", values);
-    // A quarter of a period: the integral is A/(2 pi f).
-    EXPECT_NEAR(process->angle_arcsec(1e7, 0.025), 1.0 / (20.0 * std::numbers::pi), 1e-9);
 }
 
 }  // namespace

@@ -1,0 +1,38 @@
+#include <array>
+
+#include "engine/effects/effect.hpp"
+
+namespace ringlock::effects {
+namespace {
+
+constexpr std::array parameters_of = {
+    Parameter{"deg_h_per_k", 0.0, -100.0, 100.0, Role::size, "change of the bias with each kelvin"},
+};
+
+class BiasTemperature final : public Effect {
+   public:
+    std::string_view name() const override { return "bias_temperature"; }
+    std::string_view summary() const override {
+        return "A bias that follows the temperature of section [environment].";
+    }
+    std::string_view equation() const override {
+        return "rate = deg_h_per_k dT, dT the temperature less that at the start; the temperature is linear over each "
+               "half cycle.";
+    }
+    std::span<const Parameter> parameters() const override { return parameters_of; }
+    bool active(const Values& values) const override { return values.at("deg_h_per_k") != 0.0; }
+    bool adds_angle() const override { return true; }
+    double added_angle_arcsec(const Values& values, const Interval& at) const override {
+        const double mean_change_k = 0.5 * (at.temperature_change_k[0] + at.temperature_change_k[1]);
+        return values.at("deg_h_per_k") * mean_change_k * at.duration_s;
+    }
+};
+
+}  // namespace
+
+const Effect& bias_temperature() {
+    static const BiasTemperature effect;
+    return effect;
+}
+
+}  // namespace ringlock::effects

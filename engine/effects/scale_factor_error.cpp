@@ -1,0 +1,40 @@
+#include <array>
+
+#include "engine/effects/effect.hpp"
+
+namespace ringlock::effects {
+namespace {
+
+constexpr std::array parameters_of = {
+    Parameter{"relative", 0.0, -0.1, 0.1, Role::size, "output angle per input angle, less one"},
+};
+
+class ScaleFactorError final : public Effect {
+   public:
+    std::string_view name() const override { return "scale_factor_error"; }
+    std::string_view summary() const override { return "The gyro puts out more angle than it is turned by."; }
+    /// The light counts C (1 + relative) for C. Of the input that leaves relative times its angle. Of the dither it
+    /// makes every swing longer by the same factor, which is a dither of another amplitude and nothing else: at the
+    /// minima of the dither angle, where the output is taken, the whole of it has come back.
+    std::string_view equation() const override {
+        return "rate = relative times the input rate. The swings of the dither grow as well, but cancel over each "
+               "cycle: "
+               "that is a larger dither.peak_rate_deg_s, and left to it (docs/effects.md).";
+    }
+    std::span<const Parameter> parameters() const override { return parameters_of; }
+    bool active(const Values& values) const override { return values.at("relative") != 0.0; }
+    bool adds_angle() const override { return true; }
+    double added_angle_arcsec(const Values& values, const Interval& at) const override {
+        const double mean_rate_arcsec_s = 0.5 * (at.input_rate_deg_h[0] + at.input_rate_deg_h[1]);
+        return values.at("relative") * mean_rate_arcsec_s * at.duration_s;
+    }
+};
+
+}  // namespace
+
+const Effect& scale_factor_error() {
+    static const ScaleFactorError effect;
+    return effect;
+}
+
+}  // namespace ringlock::effects

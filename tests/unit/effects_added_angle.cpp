@@ -1,0 +1,137 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "engine/effects/effect.hpp"
+
+namespace ringlock::effects {
+namespace {
+
+/// The rate [deg/h] that an effect's equation names, at one time.
+struct Stated {
+    std::string name;
+    Values values;
+    std::function<double(double time_s, double temperature_change_k, double input_rate_deg_h)> rate_deg_h;
+};
+
+const std::vector<Stated>& stated() {
+    static const std::vector<Stated> all = {
+        {"base_vibration",
+         {{"frequency_hz", 3.7}, {"rate_deg_h", 5.0}, {"phase_rad", 0.4}},
+         [](double t, double, double) { return 5.0 * std::sin(2.0 * std::numbers::pi * 3.7 * t + 0.4); }},
+        {"bias_ramp", {{"deg_h_per_h", -90.0}}, [](double t, double, double) { return -90.0 * t / 3600.0; }},
+        {"bias_step",
+         {{"step_deg_h", 2.0}, {"time_s", 10.125}},
+         [](double t, double, double) { return t >= 10.125 ? 2.0 : 0.0; }},
+        {"bias_temperature", {{"deg_h_per_k", 0.3}}, [](double, double k, double) { return 0.3 * k; }},
+        {"scale_factor_error", {{"relative", 1e-3}}, [](double, double, double rate) { return 1e-3 * rate; }},
+    };
+    return all;
+}
+
+/// What a gyro is exposed to between two times, if both are linear in time.
+Interval between(double from_s, double to_s) {
+    const auto temperature = [](double t) { return 3.0 - 0.25 * t; };
+    const auto rate = [](double t) { return -40.0 + 6.0 * t; };
+    return {from_s, to_s - from_s, {temperature(from_s), temperature(to_s)}, {rate(from_s), rate(to_s)}};
+}
+
+TEST(AddedAngles, AreThoseOfAllEffectsThatSayTheyAddOne) {
+    std::size_t adding = 0;
+    for (const Effect* effect : registry()) {
+        adding += effect->adds_angle() ? 1 : 0;
+    }
+    EXPECT_EQ(adding, stated().size());
+    for (const Stated& s : stated()) EXPECT_TRUE(find(s.name)->adds_angle()) << s.name;
+}
+
+TEST(AddedAngles, AreTheIntegralsOfTheStatedRates) {
+    for (const Stated& s : stated()) {
+        for (const auto& [from, to] : {std::pair{0.0, 0.004}, {0.004, 0.015}, {9.0, 11.0}, {11.0, 40.0}}) {
+            // The midpoint rule, with a step that ends where the bias steps; its error is h^2/24 times the change of
+            // the slope, below 1e-6 arcsec for the vibration's 20 ms.
+            const int steps = 8 * static_cast<int>(std::ceil((to - from) * 1000.0));
+            double expected = 0.0;
+            for (int i = 0; i < steps; ++i) {
+                const double t = from + (i + 0.5) * (to - from) / steps;
+                expected += s.rate_deg_h(t, 3.0 - 0.25 * t, -40.0 + 6.0 * t) * (to - from) / steps;
+            }
+            EXPECT_NEAR(find(s.name)->added_angle_arcsec(s.values, between(from, to)), expected, 1e-6)
+                << s.name << " from " << from << " to " << to;
+        }
+    }
+}
+
+TEST(AddedAngles, OfIntervalsThatFollowEachOtherAddUp) {
+    std::mt19937_64 engine(20070303);
+    std::uniform_real_distribution<double> length(0.0, 0.5);
+    for (const Stated& s : stated()) {
+        const Effect& effect = *find(s.name);
+        double sum = 0.0;
+        double t = 0.0;
+        for (int i = 0; i < 200; ++i) {
+            const double next = t + length(engine);
+            sum += effect.added_angle_arcsec(s.values, between(t, next));
+            t = next;
+        }
+        const double whole = effect.added_angle_arcsec(s.values, between(0.0, t));
+        EXPECT_NEAR(sum, whole, 1e-12 * (1.0 + std::abs(whole))) << s.name;  // rounding
+    }
+}
+
+TEST(AddedAngles, AreProportionalToTheSize) {
+    for (const Stated& s : stated()) {
+        const Effect& effect = *find(s.name);
+        for (const Parameter& p : effect.parameters()) {
+            if (p.role != Role::size) continue;
+            Values twice = s.values;
+            twice.at(std::string(p.name)) *= 2.0;
+            const Interval at = between(10.0, 10.5);
+            EXPECT_EQ(effect.added_angle_arcsec(twice, at), 2.0 * effect.added_angle_arcsec(s.values, at)) << s.name;
+            twice.at(std::string(p.name)) = 0.0;
+            EXPECT_EQ(effect.added_angle_arcsec(twice, at), 0.0) << s.name;
+        }
+    }
+}
+
+TEST(BiasStep, ActsFromItsTimeOnAndInPartOfTheIntervalItFallsInto) {
+    const Values values = {{"step_deg_h", 2.0}, {"time_s", 10.0}};
+    const Effect& effect = *find("bias_step");
+    EXPECT_EQ(effect.added_angle_arcsec(values, {.start_s = 0.0, .duration_s = 9.0}), 0.0);
+    EXPECT_DOUBLE_EQ(effect.added_angle_arcsec(values, {.start_s = 9.0, .duration_s = 4.0}), 6.0);
+    EXPECT_DOUBLE_EQ(effect.added_angle_arcsec(values, {.start_s = 13.0, .duration_s = 1.0}), 2.0);
+}
+
+TEST(BiasRamp, GrowsWithTheSquareOfTime) {
+    const Values values = {{"deg_h_per_h", 3600.0}};  // 1 arcsec/s^2
+    const Effect& effect = *find("bias_ramp");
+    EXPECT_DOUBLE_EQ(effect.added_angle_arcsec(values, {.start_s = 0.0, .duration_s = 2.0}), 2.0);
+    EXPECT_DOUBLE_EQ(effect.added_angle_arcsec(values, {.start_s = 2.0, .duration_s = 2.0}), 6.0);
+}
+
+TEST(BaseVibration, IsTheIntegralOfTheLine) {
+    const double f = 37.0;
+    const double phase = 0.4;
+    const Values values = {{"frequency_hz", f}, {"rate_deg_h", 5.0}, {"phase_rad", phase}};
+    const double w = 2.0 * std::numbers::pi * f;
+    for (const auto& [start, duration] : {std::pair{0.0, 0.004}, {0.004, 0.011}, {0.015, 1.0}}) {
+        const double expected = 5.0 / w * (std::cos(w * start + phase) - std::cos(w * (start + duration) + phase));
+        EXPECT_NEAR(find("base_vibration")->added_angle_arcsec(values, {.start_s = start, .duration_s = duration}),
+                    expected, 1e-14);
+    }
+}
+
+TEST(BaseVibration, AddsUpToTheSameAngleLateInALongRun) {
+    const Values values = {{"frequency_hz", 10.0}, {"rate_deg_h", 1.0}, {"phase_rad", 0.0}};
+    // A quarter of a period: the integral is A/(2 pi f).
+    EXPECT_NEAR(find("base_vibration")->added_angle_arcsec(values, {.start_s = 1e7, .duration_s = 0.025}),
+                1.0 / (20.0 * std::numbers::pi), 1e-9);
+}
+
+}  // namespace
+}  // namespace ringlock::effects
