@@ -1,11 +1,54 @@
 #pragma once
+#include <array>
+
+#include "analysis/record/record.hpp"
 #include "analysis/record/series.hpp"
 
-/// The two kinds of file behind read_series.
+/// The two kinds of file behind read_series and read_record.
 namespace ringlock::record {
 
 Series read_text_series(const std::string& path, const std::optional<std::string>& column);
 Series read_hdf5_series(const std::string& path, const std::optional<std::string>& column);
+
+/// Both leave check() to the caller. `file` is HDF5.
+Record read_csv_record(const std::string& path);
+Record read_hdf5_record(const std::string& path);
+
+/// Names of the witnesses that samples may have.
+inline constexpr std::array<const char*, 4> witness_names = {"accel_x", "accel_y", "accel_z", "temperature_c"};
+
+/// Names of /declared.
+struct DeclaredName {
+    const char* name;
+    std::optional<double> Declared::*field;
+};
+inline constexpr std::array<DeclaredName, 8> declared_names = {
+    {{"scale_factor_arcsec", &Declared::scale_factor_arcsec},
+     {"lockin_threshold_deg_h", &Declared::lockin_threshold_deg_h},
+     {"dither_frequency_hz", &Declared::dither_frequency_hz},
+     {"dither_peak_rate_deg_s", &Declared::dither_peak_rate_deg_s},
+     {"bias_deg_h", &Declared::bias_deg_h},
+     {"clock_hz", &Declared::clock_hz},
+     {"readout_noise_rad", &Declared::readout_noise_rad},
+     {"input_rate_deg_h", &Declared::input_rate_deg_h}}};
+
+/// The optional texts at the root.
+struct TextName {
+    const char* name;
+    std::string Record::*field;
+};
+inline constexpr std::array<TextName, 4> text_names = {{{"title", &Record::title},
+                                                        {"instrument", &Record::instrument},
+                                                        {"source", &Record::source},
+                                                        {"licence", &Record::licence}}};
+
+/// "angle_increment_arcsec", ...
+const char* name_of(SampleKind kind);
+inline constexpr std::array<SampleKind, 3> sample_kinds = {SampleKind::angle_increment_arcsec, SampleKind::angle_arcsec,
+                                                           SampleKind::quarter_count};
+
+inline constexpr const char* format_name = "rlg-record";
+inline constexpr std::int64_t format_version = 1;
 
 /// "a, b, c", at most the first 20.
 std::string listed(const std::vector<std::string>& names);

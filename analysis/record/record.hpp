@@ -64,22 +64,41 @@ struct Record {
     std::optional<Samples> samples;
     Track temperature_c;     ///< /environment
     Track input_rate_deg_h;  ///< /reference
+    /// Of a file: names that no record has, such as "/turns/note". They were left aside and are never written.
+    std::vector<std::string> ignored;
 };
 
+/// Whether a file is HDF5, by its signature; a pipe is not. Throws InputError where it cannot be opened or is a folder.
+bool is_hdf5(const std::string& path);
+/// The root attribute `format` of an HDF5 file: what it is; empty where there is none.
+std::string hdf5_format(const std::string& path);
+
 /// Reads the HDF5 or the CSV form, told apart by their content. Throws InputError, naming file and dataset or line,
-/// where the file cannot be read, is no record, or check() finds something.
+/// where the file cannot be read, is no record, or check() finds an error. Accelerations that the file leaves out are
+/// zeros.
 Record read_record(const std::string& path);
 
-/// Writes the HDF5 form, whole or not at all.
+/// Writes the HDF5 form, whole or not at all, unchecked; accelerations without any row are left out. Only another
+/// record is replaced. Throws InputError where the file cannot be written, RunError where the disk refuses.
 void write_record(const std::string& path, const Record& record);
+
+/// Throws InputError where write_record() would not write there: before the work, not after it.
+void check_output(const std::string& path);
+
+enum class Severity {
+    error,    ///< no record: reading refuses it
+    warning,  ///< strange, but it may be so
+};
 
 /// One thing that is wrong with a record: what and where.
 struct Finding {
-    std::string where;  ///< dataset, with the row where there is one
+    std::string where;  ///< dataset, with the row, counted from 0, where there is one
     std::string what;   ///< value found and what is allowed
+    Severity severity = Severity::error;
 };
 
-/// Lengths, order, values that are not finite, counts that jump, turns that do not alternate, ...
+/// Lengths, order, values that are not finite, counts that jump, turns that do not alternate, ... One finding a kind
+/// and column: the first place, and how many there are.
 std::vector<Finding> check(const Record& record);
 
 }  // namespace ringlock::record

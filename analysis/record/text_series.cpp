@@ -1,62 +1,15 @@
 #include <fmt/format.h>
 
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
-#include <cstring>
-#include <memory>
 #include <string_view>
 
 #include "analysis/record/readers.hpp"
+#include "analysis/record/text_lines.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::record {
 namespace {
-
-bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
-
-std::string_view trimmed(std::string_view s) {
-    while (!s.empty() && is_space(s.front())) s.remove_prefix(1);
-    while (!s.empty() && is_space(s.back())) s.remove_suffix(1);
-    return s;
-}
-
-/// The fields of one row, one after the other. White space around fields never counts; an empty field between commas
-/// does.
-class Fields {
-   public:
-    Fields(std::string_view row, bool commas) : rest_(row), commas_(commas) {}
-
-    bool next(std::string_view& field) {
-        if (done_) return false;
-        if (commas_) {
-            const std::size_t comma = rest_.find(',');
-            field = trimmed(rest_.substr(0, comma));
-            done_ = comma == std::string_view::npos;
-            if (!done_) rest_.remove_prefix(comma + 1);
-            return true;
-        }
-        while (!rest_.empty() && is_space(rest_.front())) rest_.remove_prefix(1);
-        if (rest_.empty()) return false;
-        std::size_t end = 0;
-        while (end < rest_.size() && !is_space(rest_[end])) ++end;
-        field = rest_.substr(0, end);
-        rest_.remove_prefix(end);
-        return true;
-    }
-
-   private:
-    std::string_view rest_;
-    bool commas_;
-    bool done_ = false;
-};
-
-bool parse(std::string_view field, double& value) {
-    if (field.size() > 1 && field.front() == '+' && field[1] != '-') field.remove_prefix(1);
-    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-    return error == std::errc() && end == field.data() + field.size();
-}
 
 class TextReader {
    public:
@@ -91,7 +44,7 @@ class TextReader {
         if (equals == std::string_view::npos || trimmed(text.substr(0, equals)) != "rate_hz") return;
         const std::string_view value = trimmed(text.substr(equals + 1));
         double rate = 0.0;
-        if (!parse(value, rate) || !(rate > 0.0) || !std::isfinite(rate)) {
+        if (!parse_number(value, rate) || !(rate > 0.0) || !std::isfinite(rate)) {
             throw InputError(fmt::format("{}:{}: rate_hz = '{}': must be a positive number", path_, number_, value));
         }
         out_.rate_hz = rate;
@@ -106,7 +59,7 @@ class TextReader {
         double value = 0.0;
         for (Fields fields(text, commas_); fields.next(field);) {
             names.emplace_back(field);
-            numbers = numbers && (field.empty() || parse(field, value));
+            numbers = numbers && (field.empty() || parse_number(field, value));
         }
         columns_ = names.size();
         if (numbers) {
@@ -152,7 +105,7 @@ class TextReader {
                                          count == 1 ? "column" : "columns", columns_));
         }
         double value = 0.0;
-        if (!parse(mine, value)) {
+        if (!parse_number(mine, value)) {
             if (mine.empty()) missing("is empty");
             throw InputError(fmt::format("{}:{}: column {}: '{}' is not a number", path_, number_, out_.column, mine));
         }
@@ -180,38 +133,8 @@ class TextReader {
 }  // namespace
 
 Series read_text_series(const std::string& path, const std::optional<std::string>& column) {
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
-    if (!file) throw InputError(fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
     TextReader reader(path, column);
-    constexpr std::size_t longest_line = std::size_t{1} << 22;
-    std::vector<char> buffer(std::size_t{1} << 18);
-    std::size_t filled = 0;
-    for (;;) {
-        const std::size_t got = std::fread(buffer.data() + filled, 1, buffer.size() - filled, file.get());
-        if (got == 0) {
-            if (std::ferror(file.get())) {
-                throw InputError(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
-            }
-            if (filled > 0) reader.line({buffer.data(), filled});
-            break;
-        }
-        filled += got;
-        std::size_t begin = 0;
-        while (const void* found = std::memchr(buffer.data() + begin, '\n', filled - begin)) {
-            const auto end = static_cast<std::size_t>(static_cast<const char*>(found) - buffer.data());
-            reader.line({buffer.data() + begin, end - begin});
-            begin = end + 1;
-        }
-        std::memmove(buffer.data(), buffer.data() + begin, filled - begin);
-        filled -= begin;
-        if (filled == buffer.size()) {
-            if (buffer.size() >= longest_line) {
-                throw InputError(
-                    fmt::format("{}: a line is longer than {} bytes; is this a text file?", path, longest_line));
-            }
-            buffer.resize(2 * buffer.size());
-        }
-    }
+    for_each_line(path, [&](std::string_view line) { reader.line(line); });
     return reader.finish();
 }
 

@@ -194,6 +194,13 @@ void Dataset::write_block(std::uint64_t first_row, std::uint64_t n_rows, std::ui
 }
 
 template <Element T>
+bool Dataset::holds() const {
+    const Lock lock;
+    const Id stored(H5Dget_type(id().get()));
+    return fits<T>(stored.get());
+}
+
+template <Element T>
 std::vector<T> Dataset::read() const try {
     const Lock lock;
     return read_selection<T>(select_all());
@@ -262,6 +269,7 @@ Dataset Group::write(const std::string& name, std::span<const T> values, const L
     template void Dataset::write_rows<T>(std::uint64_t, std::uint64_t, std::span<const T>);           \
     template void Dataset::write_block<T>(std::uint64_t, std::uint64_t, std::uint64_t, std::uint64_t, \
                                           std::span<const T>);                                        \
+    template bool Dataset::holds<T>() const;                                                          \
     template std::vector<T> Dataset::read<T>() const;                                                 \
     template std::vector<T> Dataset::read_rows<T>(std::uint64_t, std::uint64_t) const;                \
     template Dataset Group::create_dataset<T>(const std::string&, const Shape&, const Label&);        \

@@ -94,6 +94,9 @@ class Dataset : public Node {
     const Shape& shape() const { return shape_; }
     std::string unit() const;         ///< empty where a foreign file gives none
     std::string description() const;  ///< likewise
+    /// Whether read() reads it into T.
+    template <Element T>
+    bool holds() const;
 
     /// Whole dataset, rows one after the other.
     template <Element T>

@@ -1,0 +1,423 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <span>
+
+#include "analysis/record/readers.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::record {
+namespace {
+
+/// What of one kind is wrong: the first place, and how many.
+struct Tally {
+    std::size_t first = 0;
+    std::size_t count = 0;
+
+    void note(std::size_t row) {
+        if (count++ == 0) first = row;
+    }
+};
+
+double median(std::vector<double> values) {
+    if (values.empty()) return 0.0;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+class Checker {
+   public:
+    explicit Checker(const Record& record) : record_(record) {}
+
+    std::vector<Finding> run() {
+        if (!record_.turns && !record_.samples) error("/", "has neither turns nor samples; a record has one of them");
+        check_declared();
+        if (record_.turns) check_turns(*record_.turns);
+        if (record_.samples) check_samples(*record_.samples);
+        check_track("/environment", "temperature_c", record_.temperature_c);
+        check_track("/reference", "input_rate_deg_h", record_.input_rate_deg_h);
+        for (const std::string& name : record_.ignored) {
+            warn(name, "means nothing in a record and is left aside");
+        }
+        return std::move(findings_);
+    }
+
+   private:
+    void error(std::string where, std::string what) {
+        findings_.push_back({std::move(where), std::move(what), Severity::error});
+    }
+    void warn(std::string where, std::string what) {
+        findings_.push_back({std::move(where), std::move(what), Severity::warning});
+    }
+    static std::string row(const std::string& column, std::size_t number) {
+        return fmt::format("{}, row {} (counted from 0)", column, number);
+    }
+    /// One finding for the tally; `what` says what the first row is.
+    template <class What>
+    void report(Severity severity, const std::string& column, const Tally& tally, const What& what) {
+        if (tally.count == 0) return;
+        std::string text = what(tally.first);
+        if (tally.count > 1) text += fmt::format("; {} such rows", tally.count);
+        findings_.push_back({row(column, tally.first), std::move(text), severity});
+    }
+
+    bool same_length(const std::string& column, std::size_t length, const std::string& other, std::size_t wanted) {
+        if (length == wanted) return true;
+        error(column, fmt::format("has {} rows where {} has {}; all columns must be as long", length, other, wanted));
+        return false;
+    }
+
+    /// True where all values are finite.
+    bool finite(const std::string& column, std::span<const double> values) {
+        Tally bad;
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            if (!std::isfinite(values[i])) bad.note(i);
+        }
+        report(Severity::error, column, bad, [&](std::size_t i) {
+            return fmt::format(
+                "is {}; every value must be a finite number (cut the record there, or fill the gap "
+                "knowingly)",
+                values[i]);
+        });
+        return bad.count == 0;
+    }
+
+    bool in_order(const std::string& column, std::span<const double> time_s) {
+        Tally bad;
+        for (std::size_t i = 1; i < time_s.size(); ++i) {
+            if (!(time_s[i] > time_s[i - 1])) bad.note(i);
+        }
+        report(Severity::error, column, bad, [&](std::size_t i) {
+            return fmt::format("is {} s after {} s; times must increase from row to row", time_s[i], time_s[i - 1]);
+        });
+        return bad.count == 0;
+    }
+
+    void check_declared() {
+        const Declared& d = record_.declared;
+        const auto must = [&](const char* name, const std::optional<double>& value, bool zero_too, bool negative_too) {
+            if (!value) return;
+            const bool right = std::isfinite(*value) && (negative_too || *value > 0.0 || (zero_too && *value == 0.0));
+            if (right) return;
+            error(fmt::format("/declared, attribute {}", name),
+                  fmt::format("is {}; must be a {} number (or leave it out)", *value,
+                              negative_too ? "finite"
+                              : zero_too   ? "finite, not negative"
+                                           : "finite, positive"));
+        };
+        must("scale_factor_arcsec", d.scale_factor_arcsec, false, false);
+        must("lockin_threshold_deg_h", d.lockin_threshold_deg_h, true, false);
+        must("dither_frequency_hz", d.dither_frequency_hz, false, false);
+        must("dither_peak_rate_deg_s", d.dither_peak_rate_deg_s, true, false);
+        must("bias_deg_h", d.bias_deg_h, true, true);
+        must("clock_hz", d.clock_hz, true, false);
+        must("readout_noise_rad", d.readout_noise_rad, true, false);
+        must("input_rate_deg_h", d.input_rate_deg_h, true, true);
+    }
+
+    void check_turns(const Turns& t) {
+        const std::size_t n = t.size();
+        if (n == 0) {
+            error("/turns", "has no rows");
+            return;
+        }
+        const std::string time = "/turns/time_s";
+        bool lengths = same_length("/turns/direction", t.direction.size(), time, n);
+        lengths = same_length("/turns/quarter_count", t.quarter_count.size(), time, n) && lengths;
+        lengths = same_length("/turns/sin", t.sine.size(), time, n) && lengths;
+        lengths = same_length("/turns/cos", t.cosine.size(), time, n) && lengths;
+        lengths = same_length("/turns/accel_before_rad_s2", t.accel_before_rad_s2.size(), time, n) && lengths;
+        lengths = same_length("/turns/accel_after_rad_s2", t.accel_after_rad_s2.size(), time, n) && lengths;
+
+        const bool times_finite = finite(time, t.time_s);
+        const bool ordered = times_finite && in_order(time, t.time_s);
+        const bool detectors = finite("/turns/sin", t.sine) & finite("/turns/cos", t.cosine);
+        check_acceleration("/turns/accel_before_rad_s2", t.accel_before_rad_s2);
+        check_acceleration("/turns/accel_after_rad_s2", t.accel_after_rad_s2);
+        const bool alternate = check_directions(t.direction);
+        if (detectors && t.sine.size() == t.cosine.size()) check_radius(t);
+        if (!lengths || !alternate) return;
+        if (ordered) check_half_periods(t);
+        const bool steady = check_swings(t);
+        if (detectors && steady) compare_counts(t);
+    }
+
+    void check_acceleration(const std::string& column, std::span<const double> values) {
+        if (!finite(column, values)) return;
+        Tally bad;
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            if (values[i] < 0.0) bad.note(i);
+        }
+        report(Severity::error, column, bad, [&](std::size_t i) {
+            return fmt::format("is {}; must be a magnitude, or 0 where none was seen", values[i]);
+        });
+    }
+
+    bool check_directions(std::span<const std::int8_t> direction) {
+        Tally wrong;
+        Tally repeated;
+        for (std::size_t i = 0; i < direction.size(); ++i) {
+            if (direction[i] != 1 && direction[i] != -1) {
+                wrong.note(i);
+            } else if (i > 0 && direction[i] == direction[i - 1]) {
+                repeated.note(i);
+            }
+        }
+        report(Severity::error, "/turns/direction", wrong, [&](std::size_t i) {
+            return fmt::format("is {}; must be +1 at a phase minimum, -1 at a maximum", direction[i]);
+        });
+        report(Severity::error, "/turns/direction", repeated, [&](std::size_t i) {
+            return fmt::format(
+                "is {:+} as the row before; minima and maxima must alternate (a row is missing or stands "
+                "twice; cut the record there)",
+                direction[i]);
+        });
+        return wrong.count == 0 && repeated.count == 0;
+    }
+
+    void check_radius(const Turns& t) {
+        std::vector<double> radii(t.sine.size());
+        for (std::size_t i = 0; i < radii.size(); ++i) radii[i] = std::hypot(t.sine[i], t.cosine[i]);
+        constexpr double least = 1e-6;  // of the usual radius; detectors are a few thousandths wrong at best
+        const double usual = median(radii);
+        Tally dark;
+        for (std::size_t i = 0; i < radii.size(); ++i) {
+            if (radii[i] <= least * usual || !std::isfinite(radii[i])) dark.note(i);
+        }
+        report(Severity::error, "/turns/sin and cos", dark, [&](std::size_t i) {
+            return fmt::format("are {} and {}: no phase can be told from a circle of radius {}", t.sine[i], t.cosine[i],
+                               radii[i]);
+        });
+        constexpr std::size_t enough = 4;
+        const auto constant = [](std::span<const double> values) {
+            return std::all_of(values.begin(), values.end(), [&](double v) { return v == values.front(); });
+        };
+        if (radii.size() >= enough && constant(t.sine) && constant(t.cosine)) {
+            warn("/turns/sin and cos", fmt::format("are {} and {} in every row; are the detectors connected?",
+                                                   t.sine.front(), t.cosine.front()));
+        }
+    }
+
+    /// Half cycles of one sign last alike: the drive has one frequency.
+    void check_half_periods(const Turns& t) {
+        constexpr double longest = 1.75;  // of the usual one; a missing pair of rows makes it 3
+        constexpr double shortest = 0.25;
+        constexpr std::size_t enough = 8;
+        if (t.size() < enough) return;
+        std::array<std::vector<double>, 2> halves;
+        for (std::size_t i = 1; i < t.size(); ++i) halves[i % 2].push_back(t.time_s[i] - t.time_s[i - 1]);
+        const std::array<double, 2> usual = {median(halves[0]), median(halves[1])};
+        Tally bad;
+        for (std::size_t i = 1; i < t.size(); ++i) {
+            const double ratio = (t.time_s[i] - t.time_s[i - 1]) / usual[i % 2];
+            if (!(ratio >= shortest && ratio <= longest)) bad.note(i);
+        }
+        report(Severity::error, "/turns/time_s", bad, [&](std::size_t i) {
+            return fmt::format(
+                "is {:.6g} s after the row before, where half cycles of that sign usually last {:.6g} s; "
+                "rows must be consecutive turns (cut the record where some are missing)",
+                t.time_s[i] - t.time_s[i - 1], usual[i % 2]);
+        });
+        if (!record_.declared.dither_frequency_hz) return;
+        const double measured = 1.0 / (usual[0] + usual[1]);
+        const double declared = *record_.declared.dither_frequency_hz;
+        if (declared > 0.0 && std::abs(std::log2(measured / declared)) > 0.5) {
+            warn("/declared, attribute dither_frequency_hz",
+                 fmt::format("is {:g} Hz where the turns come at {:.6g} Hz", declared, measured));
+        }
+    }
+
+    /// Counts gained in the half cycles: alike from half cycle to half cycle of one sign but for noise, drift and
+    /// counts that were missed. False where they make no sense.
+    bool check_swings(const Turns& t) {
+        constexpr std::size_t enough = 9;
+        if (t.size() < enough) return true;
+        std::vector<double> swing(t.size() - 1);  // upright
+        Tally huge;
+        std::size_t falling = 0;
+        for (std::size_t i = 1; i < t.size(); ++i) {
+            const double gain = static_cast<double>(t.quarter_count[i]) - static_cast<double>(t.quarter_count[i - 1]);
+            swing[i - 1] = t.direction[i - 1] * gain;
+            if (swing[i - 1] < 0.0) ++falling;
+            if (std::abs(gain) > 1e15) huge.note(i);
+        }
+        report(Severity::error, "/turns/quarter_count", huge, [&](std::size_t i) {
+            return fmt::format("is {} after {}; no counter gains as much in half a cycle", t.quarter_count[i],
+                               t.quarter_count[i - 1]);
+        });
+        if (huge.count > 0) return false;
+        if (10 * falling > 9 * swing.size()) {
+            error("/turns/quarter_count",
+                  "falls after minima and rises after maxima; direction or count has the wrong sign");
+            return false;
+        }
+        // Half cycles of the same sign on either side of each tell what was to be expected of it, so that steady
+        // rates, drifting amplitudes and steps of the rate are no jumps.
+        constexpr std::ptrdiff_t reach = 4;
+        std::vector<double> off(swing.size());
+        for (std::size_t i = 0; i < swing.size(); ++i) {
+            std::array<double, 2 * reach + 1> near{};
+            std::size_t found = 0;
+            for (std::ptrdiff_t k = -reach; k <= reach; ++k) {
+                const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(i) + 2 * k;
+                if (at >= 0 && at < static_cast<std::ptrdiff_t>(swing.size())) {
+                    near[found++] = swing[static_cast<std::size_t>(at)];
+                }
+            }
+            std::nth_element(near.begin(), near.begin() + found / 2, near.begin() + found);
+            off[i] = std::abs(swing[i] - near[found / 2]);
+        }
+        // 30 standard deviations of what is usual: no noise does that, and a few counts missed are no jump.
+        constexpr double deviations = 30.0;
+        constexpr double normal = 1.4826;  // standard deviation of a normal distribution over its median size
+        constexpr double least = 32.0;     // quarter fringes
+        const double usual = normal * median(off);
+        const double most = std::max(least, deviations * usual);
+        Tally jumps;
+        for (std::size_t i = 0; i < off.size(); ++i) {
+            if (off[i] > most) jumps.note(i + 1);
+        }
+        report(Severity::error, "/turns/quarter_count", jumps, [&](std::size_t i) {
+            return fmt::format(
+                "jumps: {} counts since the row before, {:.0f} off the half cycles around it, which "
+                "differ by {:.3g} rms among themselves; cut the record there",
+                t.quarter_count[i] - t.quarter_count[i - 1], off[i - 1], usual);
+        });
+        return jumps.count == 0;
+    }
+
+    /// Whether count and detectors keep naming the same quarter fringe. Where they do not, counts were missed, or the
+    /// detectors' circle is none: an effect to be found, and no fault of the record.
+    void compare_counts(const Turns& t) {
+        const std::size_t n = t.size();
+        std::array<std::size_t, 4> shifts{};
+        std::vector<double> apart(n);  // quadrature less the middle of the counted quarter, in quarters of [0, 4)
+        for (std::size_t i = 0; i < n; ++i) {
+            const double quarters = std::atan2(t.sine[i], t.cosine[i]) * 4.0 / units::two_pi;
+            const auto counted = static_cast<double>(((t.quarter_count[i] % 4) + 4) % 4);
+            const double difference = quarters - counted - 0.5;
+            apart[i] = difference - 4.0 * std::floor(difference / 4.0);
+            ++shifts[static_cast<std::size_t>(std::floor(apart[i] + 0.5)) % 4];
+        }
+        const auto likeliest = static_cast<double>(std::max_element(shifts.begin(), shifts.end()) - shifts.begin());
+        constexpr double tolerance = 0.75;  // half a quarter, and as much again for noise at its ends
+        Tally other;
+        for (std::size_t i = 0; i < n; ++i) {
+            const double off = std::remainder(apart[i] - likeliest, 4.0);
+            if (std::abs(off) > tolerance) other.note(i);
+        }
+        const double share = static_cast<double>(other.count) / static_cast<double>(n);
+        if (share <= 0.03) return;
+        warn(row("/turns/quarter_count", other.first),
+             fmt::format("names another quarter fringe than the detectors, here and at {:.3g} % of the turns (counts "
+                         "may have been missed)",
+                         100.0 * share));
+    }
+
+    void check_samples(const Samples& s) {
+        if (!(s.rate_hz > 0.0) || !std::isfinite(s.rate_hz)) {
+            error("/samples, attribute rate_hz",
+                  fmt::format("is {}; must be a positive number of samples a second", s.rate_hz));
+        }
+        if (!std::isfinite(s.t0_s)) error("/samples, attribute t0_s", fmt::format("is {}; must be finite", s.t0_s));
+        const std::string column = fmt::format("/samples/{}", name_of(s.kind));
+        const bool counted = s.kind == SampleKind::quarter_count;
+        if (counted ? !s.values.empty() : !s.counts.empty()) {
+            error("/samples", fmt::format("has {} beside {}; must have one of them", counted ? "angles" : "counts",
+                                          name_of(s.kind)));
+        }
+        const std::size_t n = s.size();
+        if (n == 0) error(column, "has no rows");
+        const bool all_finite = counted || finite(column, s.values);
+        for (const auto& [name, values] : s.witnesses) {
+            const std::string witness = fmt::format("/samples/{}", name);
+            same_length(witness, values.size(), column, n);
+            finite(witness, values);
+            const bool known = std::any_of(witness_names.begin(), witness_names.end(),
+                                           [&, &called = name](const char* one) { return called == one; });
+            if (!known) warn(witness, "is no witness that a record has; it is left aside");
+        }
+        if (!all_finite || n == 0) return;
+        constexpr std::size_t enough = 3;
+        const bool stuck =
+            counted ? std::all_of(s.counts.begin(), s.counts.end(), [&](auto v) { return v == s.counts.front(); })
+                    : std::all_of(s.values.begin(), s.values.end(), [&](auto v) { return v == s.values.front(); });
+        if (stuck && n >= enough) {
+            warn(column, fmt::format("is {} in every row; did the gyro run?",
+                                     counted ? static_cast<double>(s.counts.front()) : s.values.front()));
+            return;
+        }
+        check_steps(s, column);
+    }
+
+    /// Increments far off all others.
+    void check_steps(const Samples& s, const std::string& column) {
+        const std::size_t n = s.size();
+        constexpr std::size_t enough = 16;
+        if (n < enough) return;
+        std::vector<double> gain;
+        gain.reserve(n);
+        const bool increments = s.kind == SampleKind::angle_increment_arcsec;
+        if (increments) gain = s.values;
+        for (std::size_t i = 1; i < n && !increments; ++i) {
+            gain.push_back(s.kind == SampleKind::quarter_count
+                               ? static_cast<double>(s.counts[i]) - static_cast<double>(s.counts[i - 1])
+                               : s.values[i] - s.values[i - 1]);
+        }
+        const double middle = median(gain);
+        std::vector<double> off(gain.size());
+        for (std::size_t i = 0; i < gain.size(); ++i) off[i] = std::abs(gain[i] - middle);
+        const double usual = median(off);
+        if (!(usual > 0.0) || !std::isfinite(usual)) return;
+        constexpr double far = 1000.0;
+        Tally jumps;
+        for (std::size_t i = 0; i < off.size(); ++i) {
+            if (off[i] > far * usual) jumps.note(increments ? i : i + 1);
+        }
+        report(Severity::warning, column, jumps, [&](std::size_t i) {
+            return fmt::format("gains {:.6g} where samples usually gain {:.6g} +- {:.3g}; is it a glitch?",
+                               gain[increments ? i : i - 1], middle, usual);
+        });
+    }
+
+    void check_track(const std::string& group, const std::string& name, const Track& track) {
+        const std::string time = group + "/time_s";
+        const std::string column = fmt::format("{}/{}", group, name);
+        if (track.time_s.empty() && track.value.empty()) return;
+        const bool same = same_length(column, track.value.size(), time, track.time_s.size());
+        const bool times = finite(time, track.time_s);
+        finite(column, track.value);
+        if (!times || !in_order(time, track.time_s) || !same) return;
+        const auto covers = [&](double first_s, double last_s, const char* what) {
+            const double duration = last_s - first_s;
+            constexpr double slack = 0.01;
+            const double early = std::max(0.0, track.time_s.front() - first_s);
+            const double late = std::max(0.0, last_s - track.time_s.back());
+            if (!(duration > 0.0) || !std::isfinite(duration) || early + late <= slack * duration) return;
+            warn(time,
+                 fmt::format("goes from {:.6g} to {:.6g} s, {} from {:.6g} to {:.6g} s; beyond its ends the value "
+                             "there is taken",
+                             track.time_s.front(), track.time_s.back(), what, first_s, last_s));
+        };
+        if (record_.turns && !record_.turns->time_s.empty()) {
+            covers(record_.turns->time_s.front(), record_.turns->time_s.back(), "the turns");
+        }
+        if (record_.samples && record_.samples->size() > 0 && record_.samples->rate_hz > 0.0) {
+            const double length = static_cast<double>(record_.samples->size()) / record_.samples->rate_hz;
+            covers(record_.samples->t0_s, record_.samples->t0_s + length, "the samples");
+        }
+    }
+
+    const Record& record_;
+    std::vector<Finding> findings_;
+};
+
+}  // namespace
+
+std::vector<Finding> check(const Record& record) { return Checker(record).run(); }
+
+}  // namespace ringlock::record

@@ -1,0 +1,74 @@
+#include "analysis/record/record.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+
+#include "analysis/record/readers.hpp"
+#include "engine/core/error.hpp"
+
+namespace ringlock::record {
+
+double Track::at(double time) const {
+    const auto after = std::upper_bound(time_s.begin(), time_s.end(), time);
+    if (after == time_s.begin()) return value.front();
+    if (after == time_s.end()) return value.back();
+    const auto i = static_cast<std::size_t>(after - time_s.begin());
+    const double share = (time - time_s[i - 1]) / (time_s[i] - time_s[i - 1]);
+    return value[i - 1] + share * (value[i] - value[i - 1]);
+}
+
+const char* name_of(SampleKind kind) {
+    switch (kind) {
+        case SampleKind::angle_increment_arcsec:
+            return "angle_increment_arcsec";
+        case SampleKind::angle_arcsec:
+            return "angle_arcsec";
+        case SampleKind::quarter_count:
+            break;
+    }
+    return "quarter_count";
+}
+
+bool is_hdf5(const std::string& path) {
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored)) {
+        throw InputError(fmt::format("{}: is a directory, must be a data file", path));
+    }
+    constexpr std::array<unsigned char, 8> signature = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
+    if (!file) throw InputError(fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
+    // A pipe must be read once only and is always text.
+    if (!std::filesystem::is_regular_file(path, ignored)) return false;
+    // At the start, or behind a block of the user's of 512, 1024, ... bytes, which MATLAB writes.
+    for (long at = 0; at >= 0 && at < (1L << 40); at = at == 0 ? 512 : 2 * at) {
+        std::array<unsigned char, 8> head{};
+        if (std::fseek(file.get(), at, SEEK_SET) != 0) return false;
+        if (std::fread(head.data(), 1, head.size(), file.get()) != head.size()) return false;
+        if (head == signature) return true;
+    }
+    return false;
+}
+
+Record read_record(const std::string& path) {
+    Record record = is_hdf5(path) ? read_hdf5_record(path) : read_csv_record(path);
+    constexpr std::size_t most = 20;
+    std::string report;
+    std::size_t errors = 0;
+    for (const Finding& finding : check(record)) {
+        if (finding.severity != Severity::error) continue;
+        if (++errors > most) continue;
+        report += fmt::format("{}{}: {}: {}", report.empty() ? "" : "\n", path, finding.where, finding.what);
+    }
+    if (errors > most) report += fmt::format("\n{}: and {} more", path, errors - most);
+    if (errors > 0) throw InputError(report);
+    return record;
+}
+
+}  // namespace ringlock::record
