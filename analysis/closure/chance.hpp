@@ -1,0 +1,17 @@
+#pragma once
+#include <vector>
+
+/// How probable something is by chance.
+namespace ringlock::closure {
+
+/// P(chi-squared with so many degrees of freedom > x).
+double chi2_tail(double x, int freedom);
+
+/// P(the least of `count` independent p-values <= p).
+double of_several(double p, double count);
+
+/// Davies (Biometrika 74, 1987, 33): a bound for the largest chi-squared of one degree over a nuisance, from how much
+/// its root varies over the search.
+double davies_bound(double chi2, const std::vector<double>& roots);
+
+}  // namespace ringlock::closure

@@ -1,0 +1,46 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/closure/independence.hpp"
+#include "analysis/closure/turn_fit.hpp"
+#include "analysis/record/record.hpp"
+
+/// The closed loop with measured data: fit, residual, trace, add, report (docs/closure.md).
+namespace ringlock::closure {
+
+enum class Verdict { nothing_missing, closed, unexplained };
+std::string_view name_of(Verdict verdict);
+
+/// An effect that the loop has added.
+struct Step {
+    std::string effect;
+    std::vector<Estimate> parameters;
+    double heldout_error_before = 0.0;
+    double heldout_error_after = 0.0;
+    double heldout_log_score_gain = 0.0;
+    double p_value = 1.0;
+    std::vector<std::string> confounded_with;  ///< effects that explain this record as well
+    std::string experiment;                    ///< what would tell them apart
+};
+
+/// What a record says of the model.
+struct Closure {
+    Verdict verdict = Verdict::nothing_missing;
+    std::vector<Estimate> base;
+    std::vector<Step> steps;
+    std::string unit;  ///< of the errors: rad or arcsec
+    double heldout_before = 0.0;
+    double heldout_after = 0.0;
+    double noise_floor = 0.0;
+    std::vector<ResidualTest> tests;                ///< of the final residual
+    std::optional<ResidualTest> unexplained;
+    std::vector<std::string> notes;                 ///< what was assumed
+    double level = 0.0;                             ///< probability of any false alarm
+};
+
+/// Runs the loop on /turns. Throws InputError where the record does not suffice.
+Closure close_turns(const record::Record& record);
+
+}  // namespace ringlock::closure

@@ -1,0 +1,256 @@
+#include "analysis/closure/hypotheses.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <unsupported/Eigen/FFT>
+
+#include "analysis/closure/chance.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+using effects::Effect;
+using effects::Parameter;
+using effects::Role;
+using effects::Values;
+
+std::string name_of(const Parameter& parameter) { return std::string(parameter.name); }
+
+const Parameter* first_of(const Effect& effect, Role role) {
+    for (const Parameter& parameter : effect.parameters()) {
+        if (parameter.role == role) return &parameter;
+    }
+    return nullptr;
+}
+
+/// What the effect with these values adds to the phases.
+std::vector<double> added(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
+                          const Values& values) {
+    TurnParameters p = fit.parameters();
+    p.effects.push_back({&effect, values});
+    std::vector<double> series = fit.model().predict(p).phase_rad;
+    for (std::size_t i = 0; i < series.size(); ++i) series[i] -= without.phase_rad[i];
+    return series;
+}
+
+void scale(std::vector<double>& series, double factor) {
+    for (double& value : series) value *= factor;
+}
+
+/// Step of a size by which the phases' change is taken: small against the bounds, large against rounding.
+double step_of(const Parameter& size) { return 1e-3 * std::min(1.0, size.max); }
+
+/// Sizes, each by itself or with the phase after it as two amplitudes.
+std::optional<Candidate> sizes(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
+                               Values values) {
+    std::vector<std::vector<double>> columns;
+    struct Entry {
+        const Parameter* size;
+        const Parameter* phase;
+    };
+    std::vector<Entry> entries;
+    const auto parameters = effect.parameters();
+    for (std::size_t k = 0; k < parameters.size(); ++k) {
+        if (parameters[k].role != Role::size) continue;
+        const Parameter& size = parameters[k];
+        const bool turned = k + 1 < parameters.size() && parameters[k + 1].role == Role::phase;
+        entries.push_back({&size, turned ? &parameters[k + 1] : nullptr});
+        const double step = step_of(size);
+        for (int part = 0; part < (turned ? 2 : 1); ++part) {
+            Values at = values;
+            at.at(name_of(size)) = step;
+            if (turned) at.at(name_of(parameters[k + 1])) = part == 0 ? 0.0 : 0.5 * units::pi;
+            columns.push_back(added(fit, without, effect, at));
+            scale(columns.back(), 1.0 / step);
+        }
+    }
+    if (entries.empty()) return std::nullopt;
+    for (const auto& column : columns) {
+        // Nothing of it is left beside what the model has: this record cannot tell.
+        const double all = Eigen::Map<const Eigen::VectorXd>(column.data(), static_cast<Eigen::Index>(column.size())).norm();
+        if (all == 0.0) return std::nullopt;
+    }
+    const TurnFit::Score score = fit.score(columns);
+    if (score.rank < static_cast<int>(columns.size())) return std::nullopt;
+    Candidate candidate{&effect, std::move(values), score.chi2, chi2_tail(score.chi2, score.rank), 1.0};
+    Eigen::Index k = 0;
+    for (const Entry& entry : entries) {
+        double size = score.value(k++);
+        if (entry.phase != nullptr) {
+            const double other = score.value(k++);
+            candidate.values.at(name_of(*entry.phase)) = std::atan2(other, size);
+            size = std::hypot(size, other);
+        }
+        candidate.values.at(name_of(*entry.size)) = std::clamp(size, 0.98 * entry.size->min, 0.98 * entry.size->max);
+    }
+    return candidate;
+}
+
+/// The phase of the base coupling itself.
+std::optional<Candidate> coupling_phase(const TurnFit& fit, const Effect& effect, Values values) {
+    // A quarter turn on from a coupling that can be seen, whatever the fit has found without it.
+    const std::string name = name_of(effect.parameters().front());
+    TurnParameters p = fit.parameters();
+    const double found = p.threshold_deg_h;
+    p.threshold_deg_h = std::max(found, fit.model().series().setup.lockin_threshold_deg_h);
+    values.at(name) = 0.5 * units::pi;
+    p.effects.push_back({&effect, values});
+    std::vector<double> column = fit.model().predict(p).phase_rad;
+    TurnParameters bare = fit.parameters();
+    bare.threshold_deg_h = 0.0;
+    const auto nothing = fit.model().predict(bare).phase_rad;
+    for (std::size_t i = 0; i < column.size(); ++i) column[i] -= nothing[i];
+    const TurnFit::Score score = fit.score({column});
+    if (score.rank < 1) return std::nullopt;
+    Candidate candidate{&effect, values, score.chi2, chi2_tail(score.chi2, 1), 1.0};
+    candidate.values.at(name) = std::atan2(score.value(0) * p.threshold_deg_h, found);
+    return candidate;
+}
+
+std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
+                                      Values values) {
+    const Parameter& size = *first_of(effect, Role::size);
+    const Parameter& time = *first_of(effect, Role::time);
+    const double end = fit.model().series().time_s.back();
+    constexpr int places = 80;
+    const auto score_at = [&](double t, double& value) {
+        Values at = values;
+        at.at(name_of(size)) = 1.0;
+        at.at(name_of(time)) = t;
+        const auto score = fit.score({added(fit, without, effect, at)});
+        if (score.rank < 1) return 0.0;
+        value = score.value(0);
+        return value / std::sqrt(score.covariance(0, 0));
+    };
+    std::vector<double> roots;
+    double best = 0.0;
+    Candidate candidate{&effect, values};
+    const auto consider = [&](double t) {
+        double value = 0.0;
+        const double root = score_at(t, value);
+        if (std::abs(root) > best) {
+            best = std::abs(root);
+            candidate.values.at(name_of(time)) = t;
+            candidate.values.at(name_of(size)) = value;
+        }
+        return root;
+    };
+    for (int k = 1; k < places; ++k) roots.push_back(consider(end * k / places));
+    const double centre = candidate.values.at(name_of(time));
+    for (int k = -7; k <= 7; ++k) {
+        if (k != 0) consider(centre + end / places * k / 8.0);
+    }
+    candidate.chi2 = best * best;
+    candidate.p_value = davies_bound(candidate.chi2, roots);
+    candidate.searched = candidate.p_value / std::max(chi2_tail(candidate.chi2, 1), 1e-300);
+    return candidate;
+}
+
+std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::Prediction& without,
+                                           const Effect& effect, Values values) {
+    const Parameter& size = *first_of(effect, Role::size);
+    const Parameter& phase = *first_of(effect, Role::phase);
+    const Parameter& frequency = *first_of(effect, Role::frequency);
+    const Eigen::VectorXd residual = fit.residual();
+    const auto n = static_cast<std::size_t>(residual.size());
+    std::size_t padded = 1;
+    while (padded < 4 * n) padded *= 2;
+    std::vector<double> in(padded, 0.0);
+    for (std::size_t i = 0; i < n; ++i) in[i] = residual(static_cast<Eigen::Index>(i));
+    std::vector<std::complex<double>> out;
+    Eigen::FFT<double> fft;
+    fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
+    fft.fwd(out, in);
+    const double bin_hz = 1.0 / (static_cast<double>(padded) * fit.model().series().interval_s);
+    // Slower than three periods in the record is drift; next to half the turns' rate it is the dither's amplitude.
+    const auto lowest = static_cast<std::size_t>(3.0 * static_cast<double>(padded) / static_cast<double>(n)) + 1;
+    std::size_t peak = lowest;
+    for (std::size_t k = lowest; k < padded / 2 - lowest; ++k) {
+        if (std::norm(out[k]) > std::norm(out[peak])) peak = k;
+    }
+    const auto score_at = [&](double f, Candidate& candidate) {
+        std::vector<std::vector<double>> columns;
+        for (const double turned : {0.0, 0.5 * units::pi}) {
+            Values at = values;
+            at.at(name_of(size)) = 1.0;
+            at.at(name_of(frequency)) = f;
+            at.at(name_of(phase)) = turned;
+            columns.push_back(added(fit, without, effect, at));
+        }
+        const auto score = fit.score(columns);
+        if (score.rank < 2 || score.chi2 <= candidate.chi2) return;
+        candidate.chi2 = score.chi2;
+        candidate.values.at(name_of(frequency)) = f;
+        candidate.values.at(name_of(size)) = std::hypot(score.value(0), score.value(1));
+        candidate.values.at(name_of(phase)) = std::atan2(score.value(1), score.value(0));
+    };
+    Candidate candidate{&effect, values};
+    const double centre = static_cast<double>(peak) * bin_hz;
+    for (int k = -2; k <= 2; ++k) score_at(centre + 0.5 * k * bin_hz, candidate);
+    // Between the Fourier frequencies there is more to find: half as many again (Quinn & Hannan 2001, section 3).
+    candidate.searched = 0.75 * static_cast<double>(n) * 2.0;
+    candidate.p_value = of_several(chi2_tail(candidate.chi2, 2), candidate.searched);
+    return candidate;
+}
+
+std::optional<Candidate> spread(const TurnFit& fit, const Effect& effect, Values values) {
+    const Parameter& deviation = *first_of(effect, Role::deviation);
+    const TurnFit::Spread found = fit.spread({&effect, values}, name_of(deviation), deviation.max);
+    values.at(name_of(deviation)) = found.deviation;
+    // A variance cannot be negative: half of the time there is no gain at all (Chernoff 1954).
+    return Candidate{&effect, std::move(values), found.chi2, 0.5 * chi2_tail(found.chi2, 1), 1.0};
+}
+
+/// Dither and detectors tell of these by themselves (side_channels.hpp).
+bool told_elsewhere(const Effect& effect) {
+    gyro::Setup setup;
+    Values values = values_at_rest(effect);
+    for (const Parameter& parameter : effect.parameters()) {
+        if (parameter.role == Role::size) values.at(name_of(parameter)) = step_of(parameter);
+    }
+    effect.configure(values, setup);
+    const gyro::Setup plain;
+    return setup.dither_asymmetry_ratio != plain.dither_asymmetry_ratio ||
+           setup.dither_harmonic_ratio != plain.dither_harmonic_ratio || setup.ellipse.gain != plain.ellipse.gain;
+}
+
+}  // namespace
+
+Values values_at_rest(const Effect& effect) {
+    Values values;
+    for (const Parameter& parameter : effect.parameters()) {
+        const bool active = parameter.role == Role::size || parameter.role == Role::deviation ||
+                            parameter.role == Role::probability || parameter.role == Role::phase;
+        values[name_of(parameter)] = active ? 0.0 : parameter.default_value;
+    }
+    return values;
+}
+
+std::vector<Candidate> screen(const TurnFit& fit) {
+    std::vector<Candidate> candidates;
+    const TurnModel::Prediction without = fit.model().predict(fit.parameters());
+    for (const Effect* effect : effects::registry()) {
+        TurnParameters p = fit.parameters();
+        if (p.find(effect->name()) != nullptr || told_elsewhere(*effect)) continue;
+        const Values rest = values_at_rest(*effect);
+        std::optional<Candidate> candidate;
+        if (first_of(*effect, Role::frequency) != nullptr) {
+            if (effect->adds_angle()) candidate = at_some_frequency(fit, without, *effect, rest);
+        } else if (first_of(*effect, Role::time) != nullptr) {
+            if (effect->adds_angle()) candidate = at_some_time(fit, without, *effect, rest);
+        } else if (first_of(*effect, Role::deviation) != nullptr) {
+            candidate = spread(fit, *effect, rest);
+        } else if (first_of(*effect, Role::size) != nullptr) {
+            candidate = sizes(fit, without, *effect, rest);
+        } else if (first_of(*effect, Role::phase) != nullptr) {
+            candidate = coupling_phase(fit, *effect, rest);
+        }
+        if (candidate) candidates.push_back(std::move(*candidate));
+    }
+    return candidates;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,42 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "analysis/closure/hypotheses.hpp"
+#include "analysis/record/record.hpp"
+
+namespace ringlock::closure {
+
+/// A figure with its standard error, from the scatter of its means over stretches of the record: whatever the noise of
+/// single turns is, and whether it has a colour.
+struct BlockMean {
+    double value = 0.0;
+    double sd = 0.0;
+    std::vector<double> of_stretch;       ///< means over stretches, all of the record
+    std::vector<std::uint8_t> counts;     ///< 1: the stretch is among the turns that count
+};
+
+/// What times and accelerations of the turns say of the dither's shape (docs/closure.md):
+///   late    how late minima are against the middle between the maxima next to them, over four [s];
+///   sides   acceleration of positive half cycles over that of negative ones, a quarter of the logarithm;
+///   turns   acceleration at minima over that at maxima, a quarter of the logarithm of the product of both sides.
+/// An asymmetry r makes late = r T/4, sides = r; a second harmonic of ratio r and phase f makes late = -r sin f/w,
+/// turns = r cos f.
+struct DitherShape {
+    BlockMean late_s;
+    std::optional<BlockMean> sides, turns;  ///< none where the record has no accelerations
+};
+DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit);
+
+/// How the radius of the quadrature circle follows its phase.
+struct RadiusFold {
+    gyro::Ellipse ellipse;              ///< the best one
+    Eigen::Matrix4d covariance;         ///< of gain, offset_sin, offset_cos, orthogonality_rad
+    double chi2 = 0.0;                  ///< of all four together
+};
+RadiusFold radius_fold(const record::Turns& turns, const Rows& rows);
+
+/// The effects that these columns tell of and that the fit does not have yet.
+std::vector<Candidate> screen_side_channels(const record::Turns& turns, const TurnFit& fit, const JoinedPhase& joined);
+
+}  // namespace ringlock::closure

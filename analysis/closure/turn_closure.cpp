@@ -1,0 +1,239 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+
+#include "analysis/closure/chance.hpp"
+#include "analysis/closure/closure.hpp"
+#include "analysis/closure/hypotheses.hpp"
+#include "analysis/closure/side_channels.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// One family-wise level for everything that a record is asked.
+constexpr double level = 0.003;
+constexpr double level_of_effects = 0.002;
+constexpr double level_of_residual = level - level_of_effects;
+/// Log-likelihoods that are closer tell nothing: a false model gains so much over the true one with a probability of
+/// exp(-4) at most.
+constexpr double tie = 4.0;
+constexpr std::size_t most_steps = 8;
+constexpr std::size_t most_contenders = 5;
+
+/// Contiguous blocks: of ten, three are only reported.
+Rows chosen_blocks(std::size_t turns) {
+    constexpr std::size_t blocks = 40;
+    constexpr std::uint8_t chooses[10] = {1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
+    Rows rows(turns);
+    for (std::size_t i = 0; i < turns; ++i) rows[i] = chooses[i * blocks / turns % 10];
+    return rows;
+}
+
+/// A model of the record with all that it was fitted to.
+struct Fitted {
+    JoinedPhase joined;
+    TurnSeries series;
+    std::unique_ptr<TurnModel> model;
+    std::unique_ptr<TurnFit> fit;
+};
+
+bool on_phase(const std::string& effect) { return effect == "readout_ellipse" || effect == "missed_counts"; }
+
+std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParameters& start, const Rows& rows) {
+    auto fitted = std::make_shared<Fitted>();
+    gyro::Setup setup;
+    bool count_again = false;
+    for (const ActiveEffect& active : start.effects) {
+        if (active.effect->name() == "readout_ellipse") active.effect->configure(active.values, setup);
+        if (active.effect->name() == "missed_counts") count_again = true;
+    }
+    fitted->joined = join(*record.turns, setup.ellipse, count_again);
+    fitted->series = prepare(record, fitted->joined);
+    fitted->model = std::make_unique<TurnModel>(fitted->series, fitted->joined.phase_rad);
+    TurnParameters parameters = start;
+    if (parameters.readout_sd_rad == 0.0) {
+        parameters.readout_sd_rad = std::max(fitted->joined.readout_sd_rad, 1e-6);
+        parameters.threshold_deg_h = fitted->series.setup.lockin_threshold_deg_h;
+    }
+    fitted->fit = std::make_unique<TurnFit>(*fitted->model, parameters, rows);
+    return fitted;
+}
+
+struct Score {
+    double error = 0.0;
+    double log_score = 0.0;
+    double floor = 0.0;
+};
+
+/// One-step predictions of the turns that do not count.
+Score heldout(const TurnFit& fit) {
+    Score score;
+    double count = 0.0;
+    for (std::size_t i = 0; i < fit.innovations().size(); ++i) {
+        if (fit.rows()[i]) continue;
+        const double e = fit.innovations()[i];
+        const double sd = fit.sd_rad()[i];
+        score.error += e * e * sd * sd;
+        score.floor += sd * sd;
+        score.log_score -= 0.5 * e * e + std::log(sd);
+        count += 1.0;
+    }
+    score.error = std::sqrt(score.error / count);
+    score.floor = std::sqrt(score.floor / count);
+    return score;
+}
+
+int free_parameters(const effects::Effect& effect) {
+    int count = 0;
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        if (parameter.role != effects::Role::setting) ++count;
+    }
+    return count;
+}
+
+/// What would tell two effects apart that this record cannot.
+std::string experiment_for(const std::string& effect, const std::vector<std::string>& others) {
+    const auto has = [&](std::string_view name) {
+        return effect == name || std::find(others.begin(), others.end(), name) != others.end();
+    };
+    if (has("bias_temperature") || has("lockin_temperature")) {
+        return "record with the temperature changed against time: held, then stepped up and down";
+    }
+    if (has("scale_factor_error")) return "record at three input rates or more, of both signs";
+    if (has("dither_asymmetry") && has("dither_second_harmonic")) {
+        return "record the accelerations on both sides of the turns";
+    }
+    if (has("detector_phase_offset") || has("lockin_second_harmonic") || has("lockin_turn_asymmetry")) {
+        return "record with more injected noise, so that all phases come at all turns, or for longer";
+    }
+    if (has("bias_step") || has("bias_ramp") || has("rate_random_walk") || has("bias_instability") ||
+        has("quantum_noise")) {
+        return "record for longer: their Allan deviations and their courses in time part with the averaging time";
+    }
+    return "record for longer";
+}
+
+}  // namespace
+
+std::string_view name_of(Verdict verdict) {
+    switch (verdict) {
+        case Verdict::nothing_missing:
+            return "nothing_missing";
+        case Verdict::closed:
+            return "closed";
+        case Verdict::unexplained:
+            break;
+    }
+    return "unexplained";
+}
+
+Closure close_turns(const record::Record& record) {
+    Closure closure;
+    closure.unit = "rad";
+    closure.level = level;
+    const record::Turns& turns = *record.turns;
+    const Rows rows = chosen_blocks(turns.size());
+    auto now = fit_record(record, {}, rows);
+    if (!now->series.scale_factor_declared) {
+        closure.notes.push_back(fmt::format("the record declares no scale factor; {:g} arcsec per fringe assumed, with "
+                                            "which all rates scale",
+                                            now->series.setup.scale_factor_arcsec));
+    }
+    closure.heldout_before = heldout(*now->fit).error;
+    const auto tests_of_effects = static_cast<double>(effects::registry().size());
+
+    while (closure.steps.size() < most_steps) {
+        auto candidates = screen_side_channels(turns, *now->fit, now->joined);
+        const std::size_t beside = candidates.size();
+        std::vector<Candidate> passing;
+        const auto take_passing = [&] {
+            for (Candidate& candidate : candidates) {
+                if (candidate.p_value * tests_of_effects < level_of_effects) passing.push_back(std::move(candidate));
+            }
+            candidates.clear();
+        };
+        take_passing();
+        (void)beside;
+        const bool side = !passing.empty();
+        if (!side) {
+            candidates = screen(*now->fit);
+            take_passing();
+        }
+        if (passing.empty()) break;
+        const auto merit = [](const Candidate& c) {
+            return c.chi2 - 2.0 * std::log(c.searched) - 2.0 * free_parameters(*c.effect);
+        };
+        std::sort(passing.begin(), passing.end(),
+                  [&](const Candidate& a, const Candidate& b) { return merit(a) > merit(b); });
+        if (passing.size() > most_contenders) passing.resize(most_contenders);
+
+        // In full: all parameters of the model with it.
+        struct Contender {
+            Candidate candidate;
+            std::shared_ptr<Fitted> fitted;
+            double merit;
+        };
+        std::vector<Contender> contenders;
+        for (Candidate& candidate : passing) {
+            TurnParameters start = now->fit->parameters();
+            start.effects.push_back({candidate.effect, candidate.values});
+            const std::string name(candidate.effect->name());
+            if (side && !contenders.empty() && (on_phase(name) || on_phase(std::string(contenders[0].candidate.effect->name())))) continue;
+            auto fitted = fit_record(record, start, rows);
+            const double gain = side ? 0.5 * merit(candidate)
+                                     : fitted->fit->log_likelihood() - now->fit->log_likelihood() -
+                                           std::log(candidate.searched) - free_parameters(*candidate.effect);
+            contenders.push_back({std::move(candidate), fitted, gain});
+        }
+        std::sort(contenders.begin(), contenders.end(),
+                  [](const Contender& a, const Contender& b) { return a.merit > b.merit; });
+        Contender& best = contenders.front();
+        Step step;
+        step.effect = std::string(best.candidate.effect->name());
+        step.p_value = best.candidate.p_value;
+        for (std::size_t k = 1; k < contenders.size(); ++k) {
+            if (best.merit - contenders[k].merit < tie) {
+                step.confounded_with.emplace_back(contenders[k].candidate.effect->name());
+            }
+        }
+        if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
+        const Score before = heldout(*now->fit);
+        now = best.fitted;
+        const Score after = heldout(*now->fit);
+        step.heldout_error_before = before.error;
+        step.heldout_error_after = after.error;
+        step.heldout_log_score_gain = after.log_score - before.log_score;
+        closure.steps.push_back(std::move(step));
+    }
+
+    const Score last = heldout(*now->fit);
+    closure.heldout_after = last.error;
+    closure.noise_floor = last.floor;
+    closure.tests = test_residual(*now->fit);
+    const auto worst = std::min_element(closure.tests.begin(), closure.tests.end(),
+                                        [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
+    if (of_several(worst->p_value, static_cast<double>(closure.tests.size())) < level_of_residual) {
+        closure.unexplained = *worst;
+    }
+    // The figures that are kept: from the whole record.
+    const auto whole = fit_record(record, now->fit->parameters(), Rows(turns.size(), 1));
+    for (const Estimate& estimate : whole->fit->estimates()) {
+        if (estimate.effect.empty()) {
+            closure.base.push_back(estimate);
+            continue;
+        }
+        for (Step& step : closure.steps) {
+            if (step.effect == estimate.effect) step.parameters.push_back(estimate);
+        }
+    }
+    closure.verdict = closure.unexplained     ? Verdict::unexplained
+                      : closure.steps.empty() ? Verdict::nothing_missing
+                                              : Verdict::closed;
+    return closure;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,370 @@
+#include "analysis/closure/turn_fit.hpp"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <boost/math/tools/minima.hpp>
+#include <cmath>
+#include <limits>
+
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+constexpr std::size_t drift_terms = 4;            // polynomials of the dither's amplitude
+constexpr double least_radius_sd_rad = 1e-7;  // below: a radius that shows no noise tells nothing of the phase's
+
+/// Legendre polynomial of that degree at x.
+double legendre(std::size_t degree, double x) {
+    double last = 1.0;
+    double now = x;
+    if (degree == 0) return last;
+    for (std::size_t k = 1; k < degree; ++k) {
+        const double next = ((2.0 * static_cast<double>(k) + 1.0) * x * now - static_cast<double>(k) * last) /
+                            static_cast<double>(k + 1);
+        last = now;
+        now = next;
+    }
+    return now;
+}
+
+/// A standard deviation of the model that the likelihood decides.
+struct Knob {
+    std::string effect, name;
+    double* value;
+};
+
+std::vector<Knob> knobs(TurnParameters& p) {
+    std::vector<Knob> all{{"", "injected_noise_rad", &p.injected_sd_rad},
+                          {"", "amplitude_wander_rad", &p.wander_sd_rad},
+                          {"", "readout_noise_rad", &p.readout_sd_rad}};
+    if (p.wander_memory_turns < 1e11) all.push_back({"", "wander_memory_turns", &p.wander_memory_turns});
+    for (ActiveEffect& active : p.effects) {
+        for (const effects::Parameter& parameter : active.effect->parameters()) {
+            if (parameter.role != effects::Role::deviation) continue;
+            const std::string name(parameter.name);
+            all.push_back({std::string(active.effect->name()), name, &active.values.at(name)});
+        }
+    }
+    return all;
+}
+
+bool deterministic(effects::Role role) {
+    using effects::Role;
+    return role == Role::size || role == Role::phase || role == Role::time || role == Role::frequency;
+}
+
+/// Minus the log-likelihood by the logarithms of the knobs.
+class Objective final : public ceres::FirstOrderFunction {
+   public:
+    Objective(std::size_t size, std::function<double(const double*)> value) : size_(size), value_(std::move(value)) {}
+    int NumParameters() const override { return static_cast<int>(size_); }
+    bool Evaluate(const double* x, double* cost, double* gradient) const override {
+        *cost = value_(x);
+        if (gradient == nullptr) return std::isfinite(*cost);
+        constexpr double step = 1e-3;
+        std::vector<double> at(x, x + size_);
+        for (std::size_t i = 0; i < size_; ++i) {
+            at[i] = x[i] + step;
+            const double ahead = value_(at.data());
+            at[i] = x[i] - step;
+            const double behind = value_(at.data());
+            at[i] = x[i];
+            gradient[i] = (ahead - behind) / (2.0 * step);
+        }
+        return std::isfinite(*cost);
+    }
+
+   private:
+    std::size_t size_;
+    std::function<double(const double*)> value_;
+};
+
+}  // namespace
+
+TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows)
+    : model_(&model), parameters_(start), rows_(std::move(rows)), nuisance_(2 + drift_terms, 0.0) {
+    fit_deterministic(4);
+    fit_noise();
+    fit_deterministic(2);
+    fit_noise();
+    fit_deterministic(1);
+    finish();
+}
+
+std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& prediction) const {
+    const std::size_t n = model_->series().size();
+    std::vector<Column> all;
+    std::vector<double> ones(n, 1.0);
+    all.push_back({"", "offset", ones});
+    for (std::size_t k = 0; k <= drift_terms; ++k) {
+        std::vector<double> drift(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            const double x = 2.0 * static_cast<double>(i) / static_cast<double>(n - 1) - 1.0;
+            drift[i] = prediction.frame.sign[i] * legendre(k, x);
+        }
+        all.push_back({"", "amplitude", std::move(drift)});
+    }
+    const auto change = [&](TurnParameters& p, double& value, double step) {
+        value += step;
+        std::vector<double> series = model_->predict(p).phase_rad;
+        value -= step;
+        for (std::size_t i = 0; i < n; ++i) series[i] = (series[i] - prediction.phase_rad[i]) / step;
+        return series;
+    };
+    TurnParameters p = parameters_;
+    all.push_back({"", "bias_deg_h", change(p, p.bias_deg_h, 1e-2)});
+    all.push_back({"", "lockin_threshold_deg_h", change(p, p.threshold_deg_h, 1e-3 * std::max(1.0, p.threshold_deg_h))});
+    for (ActiveEffect& active : p.effects) {
+        for (const effects::Parameter& parameter : active.effect->parameters()) {
+            if (!deterministic(parameter.role)) continue;
+            const std::string name(parameter.name);
+            double& value = active.values.at(name);
+            double step = 1e-4 * std::max(std::abs(value), 1e-2);
+            if (value + step > parameter.max) step = -step;
+            all.push_back({std::string(active.effect->name()), name, change(p, value, step)});
+        }
+    }
+    return all;
+}
+
+void TurnFit::fit_deterministic(int iterations) {
+    const std::size_t n = model_->series().size();
+    for (int pass = 0; pass < iterations; ++pass) {
+        prediction_ = model_->predict(parameters_);
+        const std::vector<Column> all = columns(prediction_);
+        rest_.resize(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            rest_[i] = model_->phase_rad()[i] - prediction_.phase_rad[i];
+            for (std::size_t k = 0; k < nuisance_.size(); ++k) rest_[i] -= nuisance_[k] * all[k].series[i];
+        }
+        TurnParameters guess = parameters_;
+        if (guess.injected_sd_rad == 0.0) {
+            guess.injected_sd_rad = 1.0;
+            guess.wander_sd_rad = 1e-3;
+        }
+        const Whitening whitening(prediction_.frame, model_->noise(guess));
+        Eigen::MatrixXd x(n, all.size());
+        Eigen::VectorXd y(n);
+        const auto put = [&](const std::vector<double>& series, auto&& column) {
+            const auto white = whitening.apply(series);
+            for (std::size_t i = 0; i < n; ++i) column(static_cast<Eigen::Index>(i)) = rows_[i] ? white[i] : 0.0;
+        };
+        put(rest_, y);
+        Eigen::VectorXd scale(all.size());
+        for (std::size_t k = 0; k < all.size(); ++k) {
+            auto column = x.col(static_cast<Eigen::Index>(k));
+            put(all[k].series, column);
+            scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
+            column /= scale(static_cast<Eigen::Index>(k));
+        }
+        Eigen::VectorXd step = Eigen::MatrixXd(x.transpose() * x).ldlt().solve(x.transpose() * y);
+        step = step.cwiseQuotient(scale);
+        std::size_t k = 0;
+        for (double& value : nuisance_) value += step(static_cast<Eigen::Index>(k++));
+        parameters_.bias_deg_h += step(static_cast<Eigen::Index>(k++));
+        parameters_.threshold_deg_h = std::max(0.0, parameters_.threshold_deg_h + step(static_cast<Eigen::Index>(k++)));
+        for (ActiveEffect& active : parameters_.effects) {
+            for (const effects::Parameter& parameter : active.effect->parameters()) {
+                if (!deterministic(parameter.role)) continue;
+                double& value = active.values.at(std::string(parameter.name));
+                value = std::clamp(value + step(static_cast<Eigen::Index>(k++)), parameter.min, parameter.max);
+            }
+        }
+        for (std::size_t j = 0; j < all.size(); ++j) {
+            for (std::size_t i = 0; i < n; ++i) rest_[i] -= step(static_cast<Eigen::Index>(j)) * all[j].series[i];
+        }
+    }
+}
+
+double TurnFit::objective(const TurnParameters& parameters, const std::vector<double>& rest) const {
+    const Whitening whitening(prediction_.frame, model_->noise(parameters));
+    const auto white = whitening.apply(rest);
+    // The radius of the quadrature has the noise of the phase: as many degrees of freedom again.
+    double sum = 0.0;
+    const double radius = model_->series().radius_sd_rad;
+    if (radius > least_radius_sd_rad) {
+        const double over = radius / std::max(parameters.readout_sd_rad, 1e-12);
+        sum += static_cast<double>(white.size()) * (0.5 * over * over + std::log(parameters.readout_sd_rad));
+    }
+    for (std::size_t i = 0; i < white.size(); ++i) {
+        if (rows_[i]) sum += 0.5 * white[i] * white[i] + std::log(whitening.sd_rad()[i]);
+    }
+    return sum;
+}
+
+void TurnFit::fit_noise() {
+    TurnParameters trial = parameters_;
+    if (trial.injected_sd_rad == 0.0) {
+        double best = std::numeric_limits<double>::infinity();
+        for (double injected = 1e-4; injected < 1e3; injected *= 4.0) {
+            for (double wander = 1e-7; wander < 1e2; wander *= 10.0) {
+                trial.injected_sd_rad = injected;
+                trial.wander_sd_rad = wander;
+                const double value = objective(trial, rest_);
+                if (value < best) {
+                    best = value;
+                    parameters_.injected_sd_rad = injected;
+                    parameters_.wander_sd_rad = wander;
+                }
+            }
+        }
+        trial = parameters_;
+    }
+    const std::vector<Knob> all = knobs(trial);
+    constexpr double least = 1e-9;
+    std::vector<double> x;
+    for (const Knob& knob : all) x.push_back(std::log(std::max(*knob.value, least)));
+    const auto set = [&](const double* at) {
+        for (std::size_t i = 0; i < all.size(); ++i) *all[i].value = std::exp(std::clamp(at[i], -25.0, 25.0));
+    };
+    ceres::GradientProblem problem(new Objective(x.size(), [&](const double* at) {
+        set(at);
+        return objective(trial, rest_);
+    }));
+    ceres::GradientProblemSolver::Options options;
+    options.logging_type = ceres::SILENT;
+    options.max_num_iterations = 60;
+    options.function_tolerance = 1e-9;
+    options.gradient_tolerance = 1e-4;
+    ceres::GradientProblemSolver::Summary summary;
+    ceres::Solve(options, problem, x.data(), &summary);
+    set(x.data());
+    parameters_ = trial;
+}
+
+void TurnFit::finish() {
+    const std::size_t n = model_->series().size();
+    prediction_ = model_->predict(parameters_);
+    const std::vector<Column> all = columns(prediction_);
+    for (std::size_t i = 0; i < n; ++i) {
+        rest_[i] = model_->phase_rad()[i] - prediction_.phase_rad[i];
+        for (std::size_t k = 0; k < nuisance_.size(); ++k) rest_[i] -= nuisance_[k] * all[k].series[i];
+    }
+    whitening_ = std::make_shared<Whitening>(prediction_.frame, model_->noise(parameters_));
+    innovations_ = whitening_->apply(rest_);
+    sd_rad_ = whitening_->sd_rad();
+    log_likelihood_ = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        if (rows_[i]) log_likelihood_ -= 0.5 * innovations_[i] * innovations_[i] + std::log(sd_rad_[i]);
+    }
+    Eigen::MatrixXd x(n, all.size());
+    Eigen::VectorXd scale(all.size());
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        const auto white = whitening_->apply(all[k].series);
+        auto column = x.col(static_cast<Eigen::Index>(k));
+        for (std::size_t i = 0; i < n; ++i) column(static_cast<Eigen::Index>(i)) = rows_[i] ? white[i] : 0.0;
+        scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
+        column /= scale(static_cast<Eigen::Index>(k));
+    }
+    const Eigen::MatrixXd covariance =
+        Eigen::MatrixXd(x.transpose() * x).ldlt().solve(Eigen::MatrixXd::Identity(x.cols(), x.cols()));
+    estimates_.clear();
+    for (std::size_t k = nuisance_.size(); k < all.size(); ++k) {
+        Estimate estimate{all[k].effect, all[k].name, 0.0, 0.0};
+        const auto index = static_cast<Eigen::Index>(k);
+        estimate.sd = std::sqrt(std::max(covariance(index, index), 0.0)) / scale(index);
+        if (estimate.effect.empty()) {
+            estimate.value = estimate.name == "bias_deg_h" ? parameters_.bias_deg_h : parameters_.threshold_deg_h;
+        } else {
+            estimate.value = parameters_.find(estimate.effect)->values.at(estimate.name);
+        }
+        estimates_.push_back(estimate);
+    }
+    // Curvature of the likelihood in the logarithms of the standard deviations.
+    TurnParameters trial = parameters_;
+    const std::vector<Knob> turned = knobs(trial);
+    const auto m = static_cast<Eigen::Index>(turned.size());
+    std::vector<double> centre;
+    for (const Knob& knob : turned) centre.push_back(std::log(std::max(*knob.value, 1e-12)));
+    Eigen::MatrixXd hessian(m, m);
+    constexpr double h = 0.02;
+    const auto at = [&](Eigen::Index i, double di, Eigen::Index j, double dj) {
+        for (std::size_t k = 0; k < turned.size(); ++k) {
+            double value = centre[k];
+            if (static_cast<Eigen::Index>(k) == i) value += di;
+            if (static_cast<Eigen::Index>(k) == j) value += dj;
+            *turned[k].value = std::exp(value);
+        }
+        return objective(trial, rest_);
+    };
+    for (Eigen::Index i = 0; i < m; ++i) {
+        for (Eigen::Index j = 0; j <= i; ++j) {
+            hessian(i, j) = hessian(j, i) = (at(i, h, j, h) - at(i, h, j, -h) - at(i, -h, j, h) + at(i, -h, j, -h)) / (4.0 * h * h);
+        }
+    }
+    const Eigen::MatrixXd inverse = hessian.completeOrthogonalDecomposition().pseudoInverse();
+    for (Eigen::Index i = 0; i < m; ++i) {
+        const Knob& knob = turned[static_cast<std::size_t>(i)];
+        const double value = std::exp(centre[static_cast<std::size_t>(i)]);
+        const double variance = inverse(i, i);
+        estimates_.push_back({knob.effect, knob.name, value,
+                              value * (variance > 0.0 ? std::sqrt(variance) : std::numeric_limits<double>::infinity())});
+    }
+    // Orthonormal basis, for scores.
+    Eigen::HouseholderQR<Eigen::MatrixXd> qr(x);
+    basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(x.rows(), x.cols());
+}
+
+Eigen::VectorXd TurnFit::whitened(const std::vector<double>& series) const {
+    const auto white = whitening_->apply(series);
+    Eigen::VectorXd column(static_cast<Eigen::Index>(white.size()));
+    for (std::size_t i = 0; i < white.size(); ++i) column(static_cast<Eigen::Index>(i)) = rows_[i] ? white[i] : 0.0;
+    const double all = column.norm();
+    column -= basis_ * (basis_.transpose() * column);
+    // What the model's own parameters can do as well leaves rounding only.
+    constexpr double told_apart = 1e-5;
+    if (column.norm() < told_apart * all) column.setZero();
+    return column;
+}
+
+Eigen::VectorXd TurnFit::residual() const {
+    Eigen::VectorXd y(static_cast<Eigen::Index>(innovations_.size()));
+    for (std::size_t i = 0; i < innovations_.size(); ++i) y(static_cast<Eigen::Index>(i)) = rows_[i] ? innovations_[i] : 0.0;
+    return y;
+}
+
+TurnFit::Spread TurnFit::spread(const ActiveEffect& effect, const std::string& parameter, double most) const {
+    TurnParameters trial = parameters_;
+    trial.effects.push_back(effect);
+    double& deviation = trial.effects.back().values.at(parameter);
+    const double without = objective(parameters_, rest_);
+    const auto gain = [&](double logarithm) {
+        deviation = std::exp(logarithm);
+        return without - objective(trial, rest_);
+    };
+    const double step = std::log(10.0);
+    double best = std::log(most);
+    double best_gain = 0.0;
+    double x = best;
+    for (int k = 0; k < 11; ++k, x -= step) {
+        const double here = gain(x);
+        if (here <= best_gain) continue;
+        best_gain = here;
+        best = x;
+    }
+    if (best_gain <= 0.0) return {};
+    const auto [at, value] = boost::math::tools::brent_find_minima([&](double l) { return -gain(l); }, best - step,
+                                                                   best + step, 12);
+    return {std::exp(at), 2.0 * std::max(-value, best_gain)};
+}
+
+TurnFit::Score TurnFit::score(const std::vector<std::vector<double>>& series) const {
+    const auto n = static_cast<Eigen::Index>(innovations_.size());
+    const auto k = static_cast<Eigen::Index>(series.size());
+    Eigen::MatrixXd x(n, k);
+    for (Eigen::Index j = 0; j < k; ++j) x.col(j) = whitened(series[static_cast<std::size_t>(j)]);
+    const Eigen::VectorXd y = residual();
+    Score score;
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(x.transpose() * x);
+    const Eigen::VectorXd projected = x.transpose() * y;
+    score.covariance = decomposition.pseudoInverse();
+    score.value = score.covariance * projected;
+    score.chi2 = projected.dot(score.value);
+    score.rank = static_cast<int>(decomposition.rank());
+    return score;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,87 @@
+#pragma once
+#include <Eigen/Dense>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "analysis/closure/turn_model.hpp"
+
+namespace ringlock::closure {
+
+/// Which turns count: 1 or 0 each.
+using Rows = std::vector<std::uint8_t>;
+
+/// A parameter as fitted; of the base model where `effect` is empty.
+struct Estimate {
+    std::string effect, name;
+    double value = 0.0;
+    double sd = 0.0;
+};
+
+/// The model fitted to the turns that count, by maximum likelihood.
+///
+/// The filter goes through all turns; the likelihood is that of the innovations of those that count, each given all
+/// phases before it. What follows deterministically is fitted by Gauss and Newton in the whitened phases, what is random by
+/// the likelihood of the rest (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter", 1989, 3.4).
+class TurnFit {
+   public:
+    TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows);
+
+    const TurnModel& model() const { return *model_; }
+    const TurnParameters& parameters() const { return parameters_; }
+    /// Base parameters and those of effects, with standard errors.
+    const std::vector<Estimate>& estimates() const { return estimates_; }
+    double log_likelihood() const { return log_likelihood_; }
+    const Rows& rows() const { return rows_; }
+
+    /// Innovations of all turns over their standard deviations, and these [rad].
+    const std::vector<double>& innovations() const { return innovations_; }
+    const std::vector<double>& sd_rad() const { return sd_rad_; }
+
+    /// Regression of the innovations that count on further series of phase, whitened and freed of what the model's own
+    /// parameters could take of them: estimates, covariance and the chi-squared of all together.
+    struct Score {
+        Eigen::VectorXd value;
+        Eigen::MatrixXd covariance;
+        double chi2 = 0.0;
+        int rank = 0;
+    };
+    Score score(const std::vector<std::vector<double>>& series) const;
+    /// One series whitened and freed likewise, rows that do not count zero.
+    Eigen::VectorXd whitened(const std::vector<double>& series) const;
+    Eigen::VectorXd residual() const;
+
+    /// Twice the gain of the log-likelihood by a random effect, and its standard deviation (of the parameter of that
+    /// role), all else as fitted.
+    struct Spread {
+        double deviation = 0.0;
+        double chi2 = 0.0;
+    };
+    Spread spread(const ActiveEffect& effect, const std::string& parameter, double most) const;
+
+   private:
+    struct Column {
+        std::string effect, name;
+        std::vector<double> series;
+    };
+    void fit_deterministic(int iterations);
+    void fit_noise();
+    std::vector<Column> columns(const TurnModel::Prediction& prediction) const;
+    void finish();
+    double objective(const TurnParameters& parameters, const std::vector<double>& rest) const;
+
+    const TurnModel* model_;
+    TurnParameters parameters_;
+    Rows rows_;
+    std::vector<double> nuisance_;  ///< offset, amplitude and its drift
+    TurnModel::Prediction prediction_;
+    std::vector<double> rest_;      ///< phases less all that is deterministic
+    std::vector<Estimate> estimates_;
+    std::vector<double> innovations_, sd_rad_;
+    double log_likelihood_ = 0.0;
+    Eigen::MatrixXd basis_;  ///< orthonormal, of the model's own whitened columns in the rows that count
+    std::shared_ptr<Whitening> whitening_;
+};
+
+}  // namespace ringlock::closure

@@ -1,0 +1,59 @@
+#pragma once
+#include <Eigen/Dense>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "analysis/closure/turn_kicks.hpp"
+#include "analysis/closure/turn_series.hpp"
+#include "analysis/closure/whitening.hpp"
+#include "engine/effects/effect.hpp"
+
+namespace ringlock::closure {
+
+/// An effect that is in the model.
+struct ActiveEffect {
+    const effects::Effect* effect;
+    effects::Values values;
+};
+
+/// Everything that the phases of a turn record depend on.
+struct TurnParameters {
+    double bias_deg_h = 0.0;
+    double threshold_deg_h = 0.0;
+    double injected_sd_rad = 0.0;  ///< noise of the dither at the turns
+    double wander_sd_rad = 0.0;    ///< what the dither's amplitude gains from turn to turn
+    double wander_memory_turns = 1e12;
+    double readout_sd_rad = 0.0;
+    std::vector<ActiveEffect> effects;
+
+    ActiveEffect* find(std::string_view effect);
+};
+
+/// The phases that parameters foretell for the turns of a record, chance apart.
+class TurnModel {
+   public:
+    /// Both are kept by reference.
+    TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad) : series_(series), phase_rad_(phase_rad) {}
+
+    struct Prediction {
+        std::vector<double> phase_rad;  ///< but for offset and dither
+        TurnFrame frame;
+        std::vector<double> turn_s;     ///< when the dither turned, from when the phase did
+    };
+    Prediction predict(const TurnParameters& parameters) const;
+    TurnNoise noise(const TurnParameters& parameters) const;
+    gyro::Setup setup(const TurnParameters& parameters) const;
+
+    const TurnSeries& series() const { return series_; }
+    const std::vector<double>& phase_rad() const { return phase_rad_; }
+
+   private:
+    /// Swing of the dither after each turn over the mean one of its sign.
+    std::vector<double> dither_swings(const std::vector<TurnKicks::Kick>& kicks) const;
+
+    const TurnSeries& series_;
+    const std::vector<double>& phase_rad_;
+};
+
+}  // namespace ringlock::closure

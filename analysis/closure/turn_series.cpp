@@ -1,0 +1,155 @@
+#include "analysis/closure/turn_series.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/error.hpp"
+#include "engine/core/units.hpp"
+#include "engine/gyro/device.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+constexpr double quarter_rad = 0.5 * units::pi;
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+/// Whole quarters that most of the differences have: the counter's zero.
+std::int64_t most_frequent_quarter(const std::vector<double>& quarters, std::size_t count) {
+    int votes[4] = {};
+    for (std::size_t i = 0; i < count; ++i) ++votes[std::llround(quarters[i]) & 3];
+    return std::max_element(votes, votes + 4) - votes;
+}
+
+}  // namespace
+
+JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool count_again) {
+    const std::size_t n = turns.size();
+    JoinedPhase joined;
+    joined.phase_rad.resize(n);
+    joined.miscounts.resize(n);
+    std::vector<double> angle(n);
+    std::vector<double> radius(n);
+    // sin = S ((1 + gain) sin psi + offset_sin), cos = S (cos(psi + orthogonality) + offset_cos); S from the radii.
+    double scale = 1.0;
+    const auto round = [&](std::size_t i, double& s, double& c) {
+        s = (turns.sine[i] / scale - ellipse.offset_sin) / (1.0 + ellipse.gain);
+        c = turns.cosine[i] / scale - ellipse.offset_cos;
+        c = (c + s * std::sin(ellipse.orthogonality_rad)) / std::cos(ellipse.orthogonality_rad);
+    };
+    for (int pass = 0; pass < 3; ++pass) {
+        for (std::size_t i = 0; i < n; ++i) {
+            double s = 0.0;
+            double c = 0.0;
+            round(i, s, c);
+            radius[i] = std::hypot(s, c);
+            angle[i] = std::atan2(s, c);
+        }
+        scale *= median(radius);
+    }
+    double squares = 0.0;
+    const double mid = median(radius);
+    for (double& r : radius) r = std::abs(r - mid);
+    std::vector<double> sorted = radius;
+    const double robust = 1.4826 * median(sorted);
+    std::size_t counted = 0;
+    for (const double r : radius) {
+        if (r > 6.0 * robust) continue;
+        squares += r * r;
+        ++counted;
+    }
+    joined.readout_sd_rad = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(counted, 1)));
+
+    std::vector<double> off(n);  // quadrature less middle of the counted quarter, in quarters of (-2, 2]
+    for (std::size_t i = 0; i < n; ++i) {
+        const double q = angle[i] / quarter_rad - (static_cast<double>(turns.quarter_count[i] % 4) + 0.5);
+        off[i] = q - 4.0 * std::round(0.25 * q);
+    }
+    std::int64_t now = most_frequent_quarter(off, std::min<std::size_t>(n, 64));
+    if (now > 2) now -= 4;
+    const std::int64_t first = now;
+    const double margin = 0.5 + std::min(0.15 + 6.0 * joined.readout_sd_rad / quarter_rad, 0.4);
+    for (std::size_t i = 0; i < n; ++i) {
+        double rest = off[i] - static_cast<double>(now);
+        rest -= 4.0 * std::round(0.25 * rest);
+        if (std::abs(rest) > margin) {
+            now += std::llround(rest);
+            joined.miscounted.push_back(i);
+        }
+        joined.miscounts[i] = now - first;
+        const std::int64_t count = turns.quarter_count[i] + (count_again ? now : first);
+        const double middle = (static_cast<double>(count) + 0.5) * quarter_rad;
+        joined.phase_rad[i] = angle[i] + units::two_pi * std::round((middle - angle[i]) / units::two_pi);
+    }
+    return joined;
+}
+
+TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
+    constexpr std::size_t fewest = 400;
+    const record::Turns& turns = *record.turns;
+    const std::size_t n = turns.size();
+    if (n < fewest) {
+        throw InputError(fmt::format("/turns: {} turns are too few to fit and to predict; a closed loop needs at least {}",
+                                     n, fewest));
+    }
+    TurnSeries series;
+    const record::Declared& declared = record.declared;
+    gyro::Setup& setup = series.setup;
+    series.radius_sd_rad = joined.readout_sd_rad;
+    series.scale_factor_declared = declared.scale_factor_arcsec.has_value();
+    setup.scale_factor_arcsec = declared.scale_factor_arcsec.value_or(setup.scale_factor_arcsec);
+    setup.lockin_threshold_deg_h = declared.lockin_threshold_deg_h.value_or(setup.lockin_threshold_deg_h);
+    for (std::size_t i = 0; i < n; ++i) {
+        series.time_s.push_back(turns.time_s[i] - turns.time_s[0]);
+        series.direction.push_back(turns.direction[i]);
+    }
+    series.input_rate_deg_h.assign(n, declared.input_rate_deg_h.value_or(0.0));
+    for (std::size_t i = 0; i < n && !record.input_rate_deg_h.empty(); ++i) {
+        series.input_rate_deg_h[i] = record.input_rate_deg_h.at(turns.time_s[i]);
+    }
+    series.interval_s = series.time_s.back() / static_cast<double>(n - 1);
+    // Rotation lengthens swings of one sign and shortens those of the other: no matter of the dither's amplitude.
+    const double rotation_rad = units::two_pi / setup.scale_factor_arcsec * series.interval_s;
+    double swings_of[2] = {};
+    std::size_t counts_of[2] = {};
+    series.swing.resize(n);
+    for (std::size_t i = 0; i + 1 < n; ++i) {
+        series.swing[i] = (joined.phase_rad[i + 1] - joined.phase_rad[i]) * turns.direction[i] -
+                          turns.direction[i] * rotation_rad * series.input_rate_deg_h[i];
+        const std::size_t side = turns.direction[i] > 0 ? 0 : 1;
+        swings_of[side] += series.swing[i];
+        ++counts_of[side];
+    }
+    for (int side = 0; side < 2; ++side) swings_of[side] /= static_cast<double>(counts_of[side]);
+    const double swings = 0.5 * (swings_of[0] + swings_of[1]);
+    if (!(std::min(swings_of[0], swings_of[1]) > 100.0)) {
+        throw InputError(fmt::format("/turns: half cycles swing by {:.4g} rad of phase on average; minima (direction 1) "
+                                     "must be followed by maxima (-1) at least 100 rad above them",
+                                     swings));
+    }
+    for (std::size_t i = 0; i + 1 < n; ++i) series.swing[i] /= swings_of[turns.direction[i] > 0 ? 0 : 1];
+    series.swing[n - 1] = 1.0;
+    series.amplitude_rad = 0.5 * swings;
+    setup.dither_frequency_hz = 0.5 / series.interval_s;
+    const double w = units::pi / series.interval_s;
+    // A = 2 pi Omega_D/(K w)
+    setup.dither_peak_rate_deg_s = series.amplitude_rad * w * setup.scale_factor_arcsec /
+                                   (units::two_pi * units::deg_h_per_deg_s);
+    series.acceleration_rad_s2 = series.amplitude_rad * w * w;
+    if (!record.temperature_c.empty()) {
+        const double start = record.temperature_c.at(turns.time_s[0]);
+        for (std::size_t i = 0; i < n; ++i) {
+            series.temperature_change_k.push_back(record.temperature_c.at(turns.time_s[i]) - start);
+        }
+    }
+    return series;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,48 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "analysis/record/record.hpp"
+#include "engine/gyro/setup.hpp"
+
+namespace ringlock::closure {
+
+/// The unwrapped phase at the turns, as count and quadrature together tell it.
+struct JoinedPhase {
+    std::vector<double> phase_rad;
+    std::vector<std::int64_t> miscounts;  ///< quarters that the counter has been off by since the first turn
+    std::vector<std::size_t> miscounted;  ///< turns at which that changed
+    double readout_sd_rad = 0.0;          ///< of the phase, from the scatter of the quadrature's radius
+};
+
+/// Joins count and quadrature of the turns. The quadrature's phase, made round by `ellipse`, is taken on the branch
+/// nearest to the middle of the quarter fringe that the counter names; an error of the counter, to within one quarter,
+/// does not matter at the boundaries.
+///
+/// The counter's zero is its own: only how its difference from the quadrature changes is looked at. Where `count_again`,
+/// the quarters that the counter has lost or gained are given back, so that nothing is left of them in the phase;
+/// otherwise two of them and more become whole fringes.
+JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool count_again);
+
+/// A turn record prepared for the fit.
+struct TurnSeries {
+    gyro::Setup setup;  ///< as declared, or standard, with dither frequency and amplitude as measured; no effects
+    bool scale_factor_declared = false;
+    std::vector<double> time_s;  ///< of the zero-rate points, since the first
+    std::vector<int> direction;
+    std::vector<double> swing;   ///< of the half cycle after each turn, over the mean one
+    double interval_s = 0.0;
+    double amplitude_rad = 0.0;  ///< half the mean swing
+    double acceleration_rad_s2 = 0.0;
+    double radius_sd_rad = 0.0;  ///< of the quadrature, over its mean
+    std::vector<double> temperature_change_k;  ///< since the first turn; empty where unknown
+    std::vector<double> input_rate_deg_h;      ///< as referenced or declared, zero where neither
+
+    std::size_t size() const { return time_s.size(); }
+};
+
+/// Throws InputError where the record has too few turns, or too little dither, for a fit.
+TurnSeries prepare(const record::Record& record, const JoinedPhase& joined);
+
+}  // namespace ringlock::closure

@@ -1,0 +1,64 @@
+#pragma once
+#include <span>
+#include <vector>
+
+namespace ringlock::closure {
+
+/// A stationary rate with an exponential autocorrelation, in optical phase.
+struct PhaseRateTerm {
+    double time_s;             ///< of correlation
+    double variance_rad2_s2;
+};
+
+/// What is random in the phase at the turns of one gyro (docs/closure.md). With s = -1 at minima and 1 at maxima
+///
+///     psi_n = a_n + before_n(psi_n) + s m_n + w_n,            z_n = psi_n + v_n,
+///     a_{n+1} = a_n + kick_n(psi_n) + (rates over the interval),
+///     m_{n+1} = (1 - 1/memory) m_n + ...:
+///
+/// w is the injected noise, v the readout's, m the wander of the dither's amplitude.
+struct TurnNoise {
+    double injected_rad2 = 0.0;             ///< variance of w
+    double readout_rad2 = 0.0;              ///< variance of v
+    double wander_rad2 = 0.0;               ///< variance that m gains from turn to turn
+    double wander_memory_turns = 1e12;      ///< over which m forgets itself
+    double white_rad2_per_s = 0.0;          ///< variance that white rate noise adds to a
+    double walk_rad2_per_s3 = 0.0;          ///< variance a second of a rate that walks [(rad/s)^2/s]
+    std::vector<PhaseRateTerm> rates;
+};
+
+/// The turns as the filter needs to know them.
+struct TurnFrame {
+    double interval_s = 0.0;                ///< mean time from turn to turn
+    std::vector<double> sign;               ///< -1 at minima, 1 at maxima
+    std::vector<double> before_slope;       ///< derivative of what the lock-in adds before the turn to its phase
+    std::vector<double> kick_slope;         ///< of all that it adds at the turn
+};
+
+/// The Kalman filter that turns phases into innovations, independent and of unit variance where the noise is as said.
+///
+/// Lock-in is computed from phases that were read, z; what the reading's error v makes of it is in the filter: it
+/// enters the measurement as (1 - before') v and a as -kick' v (Jazwinski, "Stochastic Processes and Filtering Theory",
+/// 1970, section 7.3: correlated noises).
+class Whitening {
+   public:
+    static constexpr int most_states = 14;
+
+    Whitening(const TurnFrame& frame, const TurnNoise& noise);
+
+    /// Innovations over their standard deviations. Linear in `series`: columns of a regression go the same way.
+    std::vector<double> apply(std::span<const double> series) const;
+    /// Standard deviation of each innovation [rad].
+    const std::vector<double>& sd_rad() const { return sd_; }
+
+   private:
+    std::size_t states_;
+    const TurnFrame& frame_;
+    double decay_ = 1.0;                    // of m
+    std::vector<double> rate_decay_;
+    std::vector<double> rate_gain_s_;       // a gains this times the rate
+    std::vector<double> gains_;             // [turn][state]
+    std::vector<double> sd_;
+};
+
+}  // namespace ringlock::closure
