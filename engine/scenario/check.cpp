@@ -67,6 +67,20 @@ Finding sweep_is_not_too_large(const Scenario& s) {
                                  s.ensemble.gyros, s.input.sweep_points, most)};
 }
 
+Finding turns_can_be_counted(const Scenario& s) {
+    // A gyro has two trajectories at most, and twice this fits 64 bits.
+    constexpr double most = 1e18;
+    const double simulated_s = s.ensemble.settle_s + s.ensemble.duration_s;
+    const double half_cycles = static_cast<double>(s.ensemble.gyros) * static_cast<double>(s.input.sweep_points) *
+                               simulated_s * 2.0 * s.dither.frequency_hz;
+    if (half_cycles <= most) return {};
+    return Complaint{
+        {"ensemble.duration_s", "ensemble.settle_s", "ensemble.gyros", "dither.frequency_hz", "input.sweep_points"},
+        fmt::format(
+            "{:.3g} half cycles of the dither, of all gyros together, are more than the {:g} that a run can hold",
+            half_cycles, most)};
+}
+
 Finding turn_map_has_fringes(const Scenario& s) {
     constexpr double fewest = 100.0;
     const double fringes = phase_amplitude_rad(s) / units::pi;
@@ -234,6 +248,7 @@ constexpr std::array all_rules = {
          dither_reverses_the_rate},
     Rule{"A sweep of more than one point ends at another rate than it starts from.", sweep_goes_somewhere},
     Rule{"The gyros of all points of the sweep are at most 100000000.", sweep_is_not_too_large},
+    Rule{"The half cycles of all gyros, those before the record with them, are at most 1e18.", turns_can_be_counted},
     Rule{"The turn map needs at least 100 fringes in a half cycle: 2 Omega_D / (K w_D) >= 100.", turn_map_has_fringes},
     Rule{"The turn map needs kicks below 1 rad: 2 pi Omega_L / sqrt(K Omega_D w_D) < 1.", turn_map_has_small_kicks},
     Rule{"Injected noise leaves at least half of each half cycle's swing within six standard deviations (checked where "

@@ -61,6 +61,18 @@ TEST(ScenarioRules, ASweepIsNotTooLarge) {
                 AllOf(HasSubstr("s.toml:5:9: key \"ensemble.gyros\" = 1001: "), HasSubstr("100000000 gyros")));
 }
 
+TEST(ScenarioRules, TurnsCanBeCounted) {
+    // The extremes of each key by itself are allowed: 1e9 s twice at 1e5 Hz are 4e14 half cycles.
+    const std::string longest =
+        "[dither]\nfrequency_hz = 1e5\npeak_rate_deg_s = 1e4\n[propagation]\nmethod = \"direct\"\n"
+        "[ensemble]\nduration_s = 1e9\nsettle_s = 1e9\ngyros = ";
+    EXPECT_EQ(complaint(longest + "2500"), "");
+    EXPECT_THAT(complaint(longest + "2501"), AllOf(HasSubstr("s.toml:7:14: key \"ensemble.duration_s\""),
+                                                   HasSubstr("1e+18 half cycles of the dither")));
+    EXPECT_THAT(complaint(longest + "100\n[input]\nrate_deg_h = 0\nsweep_points = 100000"),
+                HasSubstr("4e+21 half cycles"));
+}
+
 TEST(ScenarioRules, TemperatureLeavesAThreshold) {
     EXPECT_THAT(
         complaint("[effects.lockin_temperature]\nrelative_per_k = 0.1\n[environment]\ntemperature_swing_k = 20"),
