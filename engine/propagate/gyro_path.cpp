@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/gyro/fast_motion.hpp"
 #include "engine/propagate/direct.hpp"
 #include "engine/propagate/direct_lanes.hpp"
-#include "engine/propagate/half_turn.hpp"
 #include "engine/propagate/turn_map.hpp"
 
 namespace ringlock::propagate {
@@ -18,8 +18,7 @@ std::unique_ptr<Propagator> make_propagator(const gyro::Device& device, double t
     bool fast = b > 0.0;
     for (const double sign : {1.0, -1.0}) {
         const gyro::HalfCycle half = device.half_cycle(sign, a);
-        fast = fast && has_fast_middle(beginning(half, device.coupling).half, b) &&
-               has_fast_middle(ending(half, device.coupling).half, b);
+        fast = fast && gyro::has_fast_middle(half.upright(0), b) && gyro::has_fast_middle(half.upright(1), b);
     }
     if (!fast) return std::make_unique<DirectIntegrator>(device.coupling, tolerance_rad);
     const HalfCycleRanges ranges{{a, a}, {device.input_rate_rad_s, device.input_rate_rad_s}, {b, b}};

@@ -10,6 +10,7 @@
 
 #include "engine/core/units.hpp"
 #include "engine/scenario/arm.hpp"
+#include "engine/scenario/fast_motion.hpp"
 
 namespace ringlock::scenario {
 namespace {
@@ -102,6 +103,20 @@ Finding turn_map_has_small_kicks(const Scenario& s) {
         fmt::format("lock-in moves the phase by up to {:.3g} rad at a turn; the turn map needs less than {:g} "
                     "rad; set propagation.method = \"direct\" or a stronger dither",
                     kick, largest)};
+}
+
+Finding turn_map_has_fast_middles(const Scenario& s) {
+    if (s.propagation.method != PropagationMethod::turn_map || fast_middles(s)) return {};
+    return Complaint{
+        {"input.rate_deg_h", "input.sweep_stop_deg_h", "noise_injection.turn_phase_rms_rad", "dither.peak_rate_deg_s",
+         "dither.frequency_hz", "gyro.scale_factor_arcsec", "gyro.lockin_threshold_deg_h",
+         "calibration.threshold_error_relative", "ensemble.dither_amplitude_sd_relative",
+         "ensemble.dither_asymmetry_sd_ratio", "ensemble.lockin_threshold_sd_relative", "propagation.method"},
+        "with what rates, noise, effects and spread may take from it, the dither is too slow in the middle of some "
+        "half "
+        "cycle for the turn map (which needs a phase that runs fast there); set propagation.method = \"direct\" or a "
+        "stronger "
+        "dither"};
 }
 
 Finding noise_leaves_the_dither(const Scenario& s) {
@@ -251,6 +266,12 @@ constexpr std::array all_rules = {
     Rule{"The half cycles of all gyros, those before the record with them, are at most 1e18.", turns_can_be_counted},
     Rule{"The turn map needs at least 100 fringes in a half cycle: 2 Omega_D / (K w_D) >= 100.", turn_map_has_fringes},
     Rule{"The turn map needs kicks below 1 rad: 2 pi Omega_L / sqrt(K Omega_D w_D) < 1.", turn_map_has_small_kicks},
+    Rule{"The turn map needs a phase that runs fast in the middle of every half cycle, with all that rates, injected "
+         "noise, "
+         "effects, spread and the room that tables leave for them may take from it: where the dither is at 0.9 of its "
+         "peak and above, g >= 4 b and g^2 >= 105 a (g: phase rate, a: its greatest acceleration, b: coupling; "
+         "docs/turn-map.md).",
+         turn_map_has_fast_middles},
     Rule{"Injected noise leaves at least half of each half cycle's swing within six standard deviations (checked where "
          "an arm injects noise).",
          noise_leaves_the_dither},

@@ -106,6 +106,19 @@ TEST(ScenarioRules, TheTurnMapNeedsSmallKicks) {
     EXPECT_EQ(complaint("[gyro]\nlockin_threshold_deg_h = 2000\n[propagation]\nmethod = \"direct\""), "");
 }
 
+TEST(ScenarioRules, TheTurnMapNeedsFastMiddles) {
+    // 0.9 - rate/peak >= sqrt(104.6/M): with M = 317 rad, rates up to 0.32 of the peak of 19800 deg/h, less what noise,
+    // spread and tables take.
+    const std::string weak = "[dither]\npeak_rate_deg_s = 5.5\n[gyro]\nlockin_threshold_deg_h = 50\n";
+    EXPECT_EQ(complaint(weak + "[input]\nrate_deg_h = 5000"), "");
+    EXPECT_THAT(complaint(weak + "[input]\nrate_deg_h = -6500"),
+                AllOf(HasSubstr("s.toml:6:14: key \"input.rate_deg_h\" = -6500.0: "), HasSubstr("runs fast")));
+    EXPECT_EQ(complaint(weak + "[input]\nrate_deg_h = -6500\n[propagation]\nmethod = \"direct\""), "");
+    EXPECT_THAT(complaint(weak + "[noise_injection]\nturn_phase_rms_rad = 37"),
+                HasSubstr("s.toml:6:22: key \"noise_injection.turn_phase_rms_rad\""));
+    EXPECT_THAT(complaint(weak + "[effects.base_vibration]\nrate_deg_h = 5000"), HasSubstr("runs fast"));
+}
+
 TEST(ScenarioRules, InjectedNoiseLeavesTheDither) {
     const std::string noisy = "[noise_injection]\nturn_phase_rms_rad = 800\n";
     EXPECT_THAT(complaint(noisy), HasSubstr("s.toml:2:22: key \"noise_injection.turn_phase_rms_rad\" = 800.0: "));
