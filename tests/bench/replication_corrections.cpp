@@ -45,7 +45,7 @@ void corrections() {
           "largest, corrected", "95 % below, printed", "largest, printed", "largest, printed, clocks of 1 to 100 MHz"});
     for (const double rate : rates_deg_h) {
         const gyro::Setup setup = rp::paper_device(rate);
-        propagate::GyroPath path(gyro::Device(setup), tolerance_rad);
+        test::GyroPath path(gyro::Device(setup), tolerance_rad);
         for (const Span span : {Span::minimum_to_minimum, Span::minimum_and_maximum, Span::maximum_and_minimum}) {
             Uniform uniform(354);
             std::vector<double> sizes;
@@ -180,7 +180,7 @@ void one_cycle() {
     head({"input [deg/h]", "lock-in error, rms [deg/h]", "left by the printed coefficients", "of the error",
           "left by the corrected ones", "of the error"});
     for (int rate = 0; rate <= 500; rate += 50) {
-        propagate::GyroPath path(gyro::Device(rp::paper_device(rate)), tolerance_rad);
+        test::GyroPath path(gyro::Device(rp::paper_device(rate)), tolerance_rad);
         Uniform uniform(2007);
         double raw = 0.0, printed = 0.0, corrected = 0.0;
         double ratio_printed[2] = {}, ratio_corrected[2] = {};

@@ -101,7 +101,7 @@ struct CycleFormula {
 };
 CycleFormula cycle_formula(double rate_deg_h, int phases) {
     const gyro::Setup setup = rp::paper_device(rate_deg_h);
-    propagate::GyroPath path(gyro::Device(setup), tolerance_rad);
+    test::GyroPath path(gyro::Device(setup), tolerance_rad);
     CycleFormula result;
     for (int i = 0; i < phases; ++i) {
         path.restart(units::two_pi * i / phases);

@@ -17,7 +17,7 @@ namespace {
 std::vector<double> reading_errors(double rate_deg_h, int kind, int gyros) {
     const gyro::Setup setup = rp::paper_device(rate_deg_h);
     const gyro::Device device(setup);
-    propagate::GyroPath path(device, tolerance_rad);
+    test::GyroPath path(device, tolerance_rad);
     Uniform uniform(15625);
     const double period = device.period_s();
     const double count_arcsec = 0.25 * setup.scale_factor_arcsec;
