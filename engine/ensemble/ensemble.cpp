@@ -75,25 +75,49 @@ std::size_t piece_turns(const scenario::Scenario& scenario) {
     return scenario.propagation.method == scenario::PropagationMethod::direct ? 8 : 128;
 }
 
+/// Tells the monitor what a block does. Where the block fails and its gyros go through the same turns again one by one,
+/// no turn is told twice.
+class BlockProgress {
+   public:
+    explicit BlockProgress(const Monitor& monitor) : monitor_(monitor) {}
+
+    void begin_again() {
+        already_ += told_;
+        told_ = 0;
+    }
+    void advance(std::int64_t gyros, std::int64_t turns) {
+        const std::int64_t again = std::min(already_, turns);
+        already_ -= again;
+        told_ += turns - again;
+        if (monitor_.on_progress && (gyros > 0 || turns > again)) monitor_.on_progress(gyros, turns - again);
+    }
+    bool cancelled() const { return monitor_.cancelled && monitor_.cancelled(); }
+
+   private:
+    const Monitor& monitor_;
+    std::int64_t told_ = 0;     ///< since the last beginning
+    std::int64_t already_ = 0;  ///< told before it and not gone through again so far
+};
+
 void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first,
-              std::size_t gyros, BlockSink& sink, const Monitor& monitor) {
+              std::size_t gyros, BlockSink& sink, BlockProgress& progress) {
     const Schedule schedule(scenario);
     const std::size_t piece = piece_turns(scenario);
     GyroBlock block = follow([&] { return GyroBlock(scenario, arms, first, gyros); });
     const std::int64_t counted = static_cast<std::int64_t>(gyros) * block.trajectories();
     for (std::int64_t turn = 0; turn < schedule.turns();) {
-        if (monitor.cancelled && monitor.cancelled()) throw Interrupted();
+        if (progress.cancelled()) throw Interrupted();
         const bool settling = turn < schedule.settle_turns();
         const std::int64_t end = settling ? schedule.settle_turns() : schedule.turns();
         const auto turns = static_cast<std::size_t>(std::min(static_cast<std::int64_t>(piece), end - turn));
         follow([&] { block.advance(turns); });
         for (std::size_t arm = 0; arm < arms.size() && !settling; ++arm) sink.cycles(arm, block.counts(arm));
         turn += static_cast<std::int64_t>(turns);
-        if (monitor.on_progress) monitor.on_progress(0, static_cast<std::int64_t>(turns) * counted);
+        progress.advance(0, static_cast<std::int64_t>(turns) * counted);
     }
     sink.finish({first, block.setups(), counted * schedule.turns(), block.tables_remade(),
                  block.contradictory_readings(), block.table_error_rad()});
-    if (monitor.on_progress) monitor.on_progress(static_cast<std::int64_t>(gyros), 0);
+    progress.advance(static_cast<std::int64_t>(gyros), 0);
 }
 
 }  // namespace
@@ -116,9 +140,9 @@ void run(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms
     oneapi::tbb::task_arena arena(threads);
     Failures failures;
     const std::int64_t size = block_size(last - first, threads);
-    const auto simulate_block = [&](std::int64_t gyro, std::int64_t gyros) {
+    const auto simulate_block = [&](std::int64_t gyro, std::int64_t gyros, BlockProgress& progress) {
         const auto sink = make_sink(gyro, static_cast<std::size_t>(gyros));
-        simulate(scenario, arms, gyro, static_cast<std::size_t>(gyros), *sink, monitor);
+        simulate(scenario, arms, gyro, static_cast<std::size_t>(gyros), *sink, progress);
     };
     arena.execute([&] {
         // Its own context: cancelling this loop must not cancel a loop of the caller around it.
@@ -129,14 +153,16 @@ void run(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms
                 for (std::int64_t block = blocks.begin(); block != blocks.end(); ++block) {
                     const std::int64_t gyro = first + block * size;
                     const std::int64_t gyros = std::min(size, last - gyro);
+                    BlockProgress progress(monitor);
                     try {
-                        simulate_block(gyro, gyros);
+                        simulate_block(gyro, gyros, progress);
                     } catch (const TrajectoryFailure& together) {
+                        progress.begin_again();
                         // Which ones? Those of the block that can be simulated are so by themselves.
                         for (std::int64_t one = gyro; one < gyro + gyros; ++one) {
                             try {
                                 if (gyros == 1) throw together;
-                                simulate_block(one, 1);
+                                simulate_block(one, 1, progress);
                             } catch (const TrajectoryFailure& failure) {
                                 failures.add(one, failure.why);
                             }

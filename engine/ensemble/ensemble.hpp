@@ -44,7 +44,8 @@ struct Monitor {
     std::function<void(std::int64_t gyros, std::int64_t turns)> on_progress;
 };
 
-/// Turns that the whole ensemble will count.
+/// Turns that the whole ensemble will count. A scenario without complaints (scenario/check.hpp) has no more than 64
+/// bits hold.
 std::int64_t expected_turns(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms);
 
 /// Simulates gyros [first, last) of the scenario on `threads` threads of oneTBB, in blocks of at most simd::lanes.

@@ -36,6 +36,14 @@ struct HalfCycle {
                amplitude_rad * (sign * 2.0 * s * s + harmonic_ratio * std::sin(x + harmonic_phase_rad) * std::sin(x));
     }
     double plain_phase_total_rad() const { return rate_rad_s * duration_s + 2.0 * sign * amplitude_rad; }
+    /// The half cycle as its turn at `end` sees it, 0 at the beginning, with sign +1: psi -> -psi turns a negative one
+    /// upright, psi(t) -> pi - psi(T - t) runs it backwards.
+    HalfCycle upright(int end) const {
+        // sin(2 w (T - t) + f) = -sin(2 w t - f)
+        const double back = end == 0 ? 1.0 : -1.0;
+        return {
+            1.0, amplitude_rad, duration_s, sign * rate_rad_s, back * sign * harmonic_ratio, back * harmonic_phase_rad};
+    }
     /// Phase rate of drive and input, g(t) [rad/s].
     double drive_rate_rad_s(double t_s) const {
         const double w = angular_frequency_rad_s();

@@ -10,6 +10,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/propagate/half_turn.cpp"
 #include "engine/core/error.hpp"
+#include "engine/gyro/fast_motion.hpp"
 #include "engine/simd/lanes.hpp"
 #include "engine/simd/targets.hpp"
 // The above must come first.
@@ -241,34 +242,6 @@ HWY_EXPORT(solve);
 
 namespace {
 
-constexpr double least_adiabaticity = 100.0;
-constexpr double full_adiabaticity = 300.0;
-constexpr double least_beat = 4.0;   // g over b: the slow solution is a series in b/g, too
-constexpr double latest_sine = 0.9;  // the slow solution must hold from here to the middle
-
-double greatest_acceleration_rad_s2(const gyro::HalfCycle& half) {
-    const double w = half.angular_frequency_rad_s();
-    return half.amplitude_rad * w * w * (1.0 + 2.0 * std::abs(half.harmonic_ratio));
-}
-
-/// Time from which the motion is fast: g^2 >= adiabaticity * (greatest phase acceleration), up to the middle. NaN where
-/// there is none. It need not be exact: any time at which the motion is fast will do.
-double fast_from_s(const gyro::HalfCycle& half, double b_rad_s, double adiabaticity) {
-    const double fast = std::max(std::sqrt(adiabaticity * greatest_acceleration_rad_s2(half)), least_beat * b_rad_s);
-    const double w = half.angular_frequency_rad_s();
-    double late = std::asin(latest_sine) / w;
-    for (int i = 0; i <= 8; ++i) {
-        if (!(half.drive_rate_rad_s(late + 0.125 * i * (0.5 * half.duration_s - late)) >= fast)) return std::nan("");
-    }
-    if (half.drive_rate_rad_s(0.0) >= fast) return 0.0;
-    double early = 0.0;
-    for (int i = 0; i < 30; ++i) {
-        const double middle = 0.5 * (early + late);
-        (half.drive_rate_rad_s(middle) >= fast ? late : early) = middle;
-    }
-    return late;
-}
-
 /// Fills one lane. K goes as 1/(t - zero), and the substitution t - zero = (start - zero) stretch^u takes that out of
 /// the quadrature.
 void prepare(Batch& batch, std::size_t lane, const HalfTurnProblem& problem, double start_s) {
@@ -282,7 +255,7 @@ void prepare(Batch& batch, std::size_t lane, const HalfTurnProblem& problem, dou
     batch.b_rad_s[lane] = problem.b_rad_s;
     batch.turn_asymmetry[lane] = problem.turn_asymmetry;
     batch.fast_from_s[lane] = start_s;
-    batch.longest_step_s[lane] = std::sqrt(0.8 / greatest_acceleration_rad_s2(half));
+    batch.longest_step_s[lane] = std::sqrt(0.8 / gyro::greatest_acceleration_rad_s2(half));
     const double sine = half.drive_rate_rad_s(0.0) / (half.amplitude_rad * w);
     const double zero = -std::asin(std::clamp(sine, -1.0, 1.0)) / w;
     const double stretch = std::log((0.5 * half.duration_s - zero) / (start_s - zero));
@@ -300,31 +273,12 @@ void prepare(Batch& batch, std::size_t lane, const HalfTurnProblem& problem, dou
 }  // namespace
 
 HalfTurnProblem beginning(const gyro::HalfCycle& half, const gyro::Coupling& coupling) {
-    return {{1.0, half.amplitude_rad, half.duration_s, half.sign * half.rate_rad_s, half.sign * half.harmonic_ratio,
-             half.harmonic_phase_rad},
-            coupling.b_rad_s,
-            half.sign * coupling.turn_asymmetry};
+    return {half.upright(0), coupling.b_rad_s, half.sign * coupling.turn_asymmetry};
 }
 
 HalfTurnProblem ending(const gyro::HalfCycle& half, const gyro::Coupling& coupling) {
-    // sin(2 w (T - t) + f) = -sin(2 w t - f), cos(w (T - t)) = -cos(w t)
-    HalfTurnProblem problem = beginning(half, coupling);
-    problem.half.harmonic_ratio = -problem.half.harmonic_ratio;
-    problem.half.harmonic_phase_rad = -problem.half.harmonic_phase_rad;
-    problem.turn_asymmetry = -problem.turn_asymmetry;
-    return problem;
-}
-
-double fast_motion_from_s(const gyro::HalfCycle& half, double b_rad_s) {
-    for (double adiabaticity = full_adiabaticity; adiabaticity >= least_adiabaticity; adiabaticity *= 0.9) {
-        const double t = fast_from_s(half, b_rad_s, adiabaticity);
-        if (!std::isnan(t)) return t;
-    }
-    return std::nan("");
-}
-
-bool has_fast_middle(const gyro::HalfCycle& half, double b_rad_s) {
-    return !std::isnan(fast_motion_from_s(half, b_rad_s));
+    // cos(w (T - t)) = -cos(w t)
+    return {half.upright(1), coupling.b_rad_s, -half.sign * coupling.turn_asymmetry};
 }
 
 void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfTurn> turns) {
@@ -333,7 +287,7 @@ void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfT
         const std::size_t count = std::min(simd::lanes, problems.size() - first);
         for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
             const HalfTurnProblem& problem = problems[first + std::min(lane, count - 1)];
-            const double start = fast_motion_from_s(problem.half, problem.b_rad_s);
+            const double start = gyro::fast_motion_from_s(problem.half, problem.b_rad_s);
             if (std::isnan(start)) {
                 throw RunError(
                     fmt::format("turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s and a coupling "

@@ -39,12 +39,4 @@ void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfT
 /// One of them. `half.sign` must be +1.
 HalfTurn exact_half_turn(const gyro::HalfCycle& half, double b_rad_s);
 
-/// Time from the turn, up to the middle of the half cycle, from which motion is fast: its rate is large beside the
-/// coupling and changes little in a fringe. NaN where it never is. `half.sign` must be +1.
-double fast_motion_from_s(const gyro::HalfCycle& half, double b_rad_s);
-
-/// Whether exact_half_turn can be formed: enough fringes between the turn and the middle, and coupling that is weak
-/// beside the rate there.
-bool has_fast_middle(const gyro::HalfCycle& half, double b_rad_s);
-
 }  // namespace ringlock::propagate

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/core/error.hpp"
+#include "engine/gyro/fast_motion.hpp"
 #include "engine/propagate/direct_lanes.hpp"
 #include "engine/propagate/fast_frame.hpp"
 #include "engine/propagate/half_turn.hpp"
@@ -30,10 +31,8 @@ Upright upright(const gyro::HalfCycle& half, const gyro::Coupling& coupling, int
     Upright turn{
         problem.half,
         {coupling.b_rad_s, 0.0, problem.turn_asymmetry, coupling.second_ratio, end == 0 ? second : units::pi - second}};
-    // The frame is a series in the coupling over the rate; the factor 2 leaves it room for its harmonics.
-    const double strength =
-        2.0 * coupling.b_rad_s * (1.0 + std::abs(coupling.second_ratio)) * (1.0 + std::abs(coupling.turn_asymmetry));
-    turn.fast_from_s = fast_motion_from_s(turn.half, strength);
+    // The frame is a series in the coupling over the rate.
+    turn.fast_from_s = gyro::fast_motion_from_s(turn.half, gyro::strength_with_harmonics_rad_s(coupling));
     if (std::isnan(turn.fast_from_s)) {
         throw RunError(
             fmt::format("turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s and a coupling of {:.4g} "

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/core/phase.hpp"
+#include "engine/gyro/fast_motion.hpp"
 #include "engine/propagate/circle_map.hpp"
 #include "engine/propagate/half_turn.hpp"
 
@@ -102,8 +103,8 @@ bool has_exact_cycle(const gyro::Device& device) {
     const auto fast = [&](double sign) {
         const gyro::HalfCycle half = device.half_cycle(sign, amplitude);
         // A harmonic of the dither makes the rates of the two halves unequal.
-        return has_fast_middle(beginning(half, device.coupling).half, device.coupling.b_rad_s) &&
-               has_fast_middle(ending(half, device.coupling).half, device.coupling.b_rad_s);
+        return gyro::has_fast_middle(half.upright(0), device.coupling.b_rad_s) &&
+               gyro::has_fast_middle(half.upright(1), device.coupling.b_rad_s);
     };
     return fast(1.0) && fast(-1.0);
 }

@@ -47,18 +47,10 @@ inline Engine make_engine(Identity who, Purpose purpose) {
 /// Independent standard normal deviates of one identity and purpose.
 class NormalStream {
    public:
-    NormalStream(Identity who, Purpose purpose) : gyro_(who.gyro), engine_(make_engine(who, purpose)) {}
+    NormalStream(Identity who, Purpose purpose) : engine_(make_engine(who, purpose)) {}
     double operator()() { return normal_(engine_); }
 
-    /// Goes to the deviates of step `step` (a turn, say), whatever was drawn before. The normal deviates use a varying
-    /// number of words; a counter of its own for each step keeps every step where it is.
-    void seek(std::uint64_t step) {
-        engine_.setcounter({{0, step, 0, gyro_}}, 0);
-        normal_.reset();
-    }
-
    private:
-    std::uint64_t gyro_;
     Engine engine_;
     boost::random::normal_distribution<double> normal_;
 };

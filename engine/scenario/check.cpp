@@ -10,6 +10,7 @@
 
 #include "engine/core/units.hpp"
 #include "engine/scenario/arm.hpp"
+#include "engine/scenario/fast_motion.hpp"
 
 namespace ringlock::scenario {
 namespace {
@@ -67,6 +68,20 @@ Finding sweep_is_not_too_large(const Scenario& s) {
                                  s.ensemble.gyros, s.input.sweep_points, most)};
 }
 
+Finding turns_can_be_counted(const Scenario& s) {
+    // A gyro has two trajectories at most, and twice this fits 64 bits.
+    constexpr double most = 1e18;
+    const double simulated_s = s.ensemble.settle_s + s.ensemble.duration_s;
+    const double half_cycles = static_cast<double>(s.ensemble.gyros) * static_cast<double>(s.input.sweep_points) *
+                               simulated_s * 2.0 * s.dither.frequency_hz;
+    if (half_cycles <= most) return {};
+    return Complaint{
+        {"ensemble.duration_s", "ensemble.settle_s", "ensemble.gyros", "dither.frequency_hz", "input.sweep_points"},
+        fmt::format(
+            "{:.3g} half cycles of the dither, of all gyros together, are more than the {:g} that a run can hold",
+            half_cycles, most)};
+}
+
 Finding turn_map_has_fringes(const Scenario& s) {
     constexpr double fewest = 100.0;
     const double fringes = phase_amplitude_rad(s) / units::pi;
@@ -88,6 +103,20 @@ Finding turn_map_has_small_kicks(const Scenario& s) {
         fmt::format("lock-in moves the phase by up to {:.3g} rad at a turn; the turn map needs less than {:g} "
                     "rad; set propagation.method = \"direct\" or a stronger dither",
                     kick, largest)};
+}
+
+Finding turn_map_has_fast_middles(const Scenario& s) {
+    if (s.propagation.method != PropagationMethod::turn_map || fast_middles(s)) return {};
+    return Complaint{
+        {"input.rate_deg_h", "input.sweep_stop_deg_h", "noise_injection.turn_phase_rms_rad", "dither.peak_rate_deg_s",
+         "dither.frequency_hz", "gyro.scale_factor_arcsec", "gyro.lockin_threshold_deg_h",
+         "calibration.threshold_error_relative", "ensemble.dither_amplitude_sd_relative",
+         "ensemble.dither_asymmetry_sd_ratio", "ensemble.lockin_threshold_sd_relative", "propagation.method"},
+        "with what rates, noise, effects and spread may take from it, the dither is too slow in the middle of some "
+        "half "
+        "cycle for the turn map (which needs a phase that runs fast there); set propagation.method = \"direct\" or a "
+        "stronger "
+        "dither"};
 }
 
 Finding noise_leaves_the_dither(const Scenario& s) {
@@ -234,8 +263,15 @@ constexpr std::array all_rules = {
          dither_reverses_the_rate},
     Rule{"A sweep of more than one point ends at another rate than it starts from.", sweep_goes_somewhere},
     Rule{"The gyros of all points of the sweep are at most 100000000.", sweep_is_not_too_large},
+    Rule{"The half cycles of all gyros, those before the record with them, are at most 1e18.", turns_can_be_counted},
     Rule{"The turn map needs at least 100 fringes in a half cycle: 2 Omega_D / (K w_D) >= 100.", turn_map_has_fringes},
     Rule{"The turn map needs kicks below 1 rad: 2 pi Omega_L / sqrt(K Omega_D w_D) < 1.", turn_map_has_small_kicks},
+    Rule{"The turn map needs a phase that runs fast in the middle of every half cycle, with all that rates, injected "
+         "noise, "
+         "effects, spread and the room that tables leave for them may take from it: where the dither is at 0.9 of its "
+         "peak and above, g >= 4 b and g^2 >= 105 a (g: phase rate, a: its greatest acceleration, b: coupling; "
+         "docs/turn-map.md).",
+         turn_map_has_fast_middles},
     Rule{"Injected noise leaves at least half of each half cycle's swing within six standard deviations (checked where "
          "an arm injects noise).",
          noise_leaves_the_dither},

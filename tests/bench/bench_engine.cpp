@@ -35,18 +35,18 @@
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/ensemble.hpp"
 #include "engine/ensemble/output_counts.hpp"
-#include "engine/propagate/direct.hpp"
 #include "engine/propagate/direct_lanes.hpp"
 #include "engine/propagate/lane_propagator.hpp"
 #include "engine/propagate/turn_kernel.hpp"
-#include "engine/propagate/turn_map.hpp"
 #include "engine/readout/lane_readout.hpp"
 #include "engine/simd/target.hpp"
 #include "tests/bench/noisy_dither.hpp"
 #include "tests/bench/random_and_sincos.hpp"
 #include "tests/bench/reference_cost.hpp"
+#include "tests/support/direct.hpp"
 #include "tests/support/long_drive.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/turn_map.hpp"
 
 extern char** environ;
 
@@ -127,8 +127,8 @@ double worst_turn_error_rad(int turns) {
         const double a = c.device.dither_amplitude_rad;
         const double rate = c.device.input_rate_rad_s;
         const double b = c.device.coupling.b_rad_s;
-        propagate::TurnMap map(c.device, {{0.95 * a, 1.05 * a}, {rate, rate}, {b, b}}, table_tolerance_rad);
-        propagate::DirectIntegrator direct(c.device.coupling, 1e-12);
+        test::TurnMap map(c.device, {{0.95 * a, 1.05 * a}, {rate, rate}, {b, b}}, table_tolerance_rad);
+        test::DirectIntegrator direct(c.device.coupling, 1e-12);
         errors[i] = std::abs(map.lockin_gain_rad(c.phase_rad, c.half) - direct.lockin_gain_rad(c.phase_rad, c.half));
     });
     return *std::max_element(errors.begin(), errors.end());

@@ -29,6 +29,7 @@
 #include "engine/readout/fraction_recovery.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/parse.hpp"
+#include "tests/bench/page.hpp"
 #include "tests/support/limits.hpp"
 
 namespace {
@@ -391,25 +392,6 @@ const std::pair<const char*, std::function<void()>> blocks[] = {
 }  // namespace
 
 int main(int argc, char** argv) {
-    try {
-        const std::string wanted = argc > 1 ? argv[1] : "";
-        if (wanted == "--list") {
-            for (const auto& [title, print] : blocks) fmt::print("{}\n", title);
-            return 0;
-        }
-        if (argc > 2) figure_file = argv[2];
-        bool found = false;
-        for (const auto& [title, print] : blocks) {
-            if (!wanted.empty() && wanted != title) continue;
-            if (wanted.empty()) fmt::print("\n{}\n\n", title);
-            print();
-            found = true;
-        }
-        if (found) return 0;
-        fmt::print(stderr, "bench_limits: no block {}\n", wanted);
-        return 2;
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "bench_limits: {}\n", error.what());
-        return 1;
-    }
+    if (argc > 2) figure_file = argv[2];
+    return bench::print_blocks("bench_limits", argc > 1 ? argv[1] : "", blocks);
 }

@@ -4,12 +4,12 @@
 #include <cmath>
 
 #include "engine/core/phase.hpp"
-#include "engine/propagate/direct.hpp"
+#include "tests/support/direct.hpp"
 #include "tests/support/drive.hpp"
 
 namespace ringlock::bench {
 
-double go_through(propagate::Propagator& propagator, const gyro::Device& device, int turns) {
+double go_through(test::Propagator& propagator, const gyro::Device& device, int turns) {
     test::Drive drive(device, turn_phase_rms_rad, {1, 0});
     Phase input(device.initial_phase_rad);
     double lockin_rad = 0.0;
@@ -25,7 +25,7 @@ double go_through(propagate::Propagator& propagator, const gyro::Device& device,
 }
 
 std::vector<SolvedHalfCycle> solved_half_cycles(const gyro::Device& device) {
-    propagate::DirectIntegrator direct(device.coupling, 1e-13);
+    test::DirectIntegrator direct(device.coupling, 1e-13);
     test::Drive drive(device, turn_phase_rms_rad, {2, 0});
     std::vector<SolvedHalfCycle> solved;
     for (int turn = 0; turn < 40; ++turn) {
@@ -36,8 +36,7 @@ std::vector<SolvedHalfCycle> solved_half_cycles(const gyro::Device& device) {
     return solved;
 }
 
-double worst_error_rad(propagate::Propagator& propagator, const std::vector<SolvedHalfCycle>& solved,
-                       double give_up_rad) {
+double worst_error_rad(test::Propagator& propagator, const std::vector<SolvedHalfCycle>& solved, double give_up_rad) {
     double worst = 0.0;
     for (const SolvedHalfCycle& one : solved) {
         worst = std::max(worst, std::abs(propagator.lockin_gain_rad(one.phase_rad, one.half) - one.gain_rad));

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "engine/gyro/device.hpp"
-#include "engine/propagate/propagator.hpp"
+#include "tests/support/propagator.hpp"
 
 namespace ringlock::bench {
 
@@ -12,7 +12,7 @@ inline constexpr double turn_phase_rms_rad = 3.0;
 
 /// Goes through `turns` turns of the noise-injected dither, the same for all propagators, and returns the lock-in phase
 /// gained [rad].
-double go_through(propagate::Propagator& propagator, const gyro::Device& device, int turns);
+double go_through(test::Propagator& propagator, const gyro::Device& device, int turns);
 
 /// A half cycle of the noise-injected dither and what the lock-in adds in it, by the direct integrator at 1e-13 rad.
 /// tests/physics/reference_integrators.cpp holds that to 1e-12 rad.
@@ -26,7 +26,7 @@ struct SolvedHalfCycle {
 std::vector<SolvedHalfCycle> solved_half_cycles(const gyro::Device& device);
 
 /// Worst error of `propagator` over `solved` [rad]. Stops at the first one above `give_up_rad`.
-double worst_error_rad(propagate::Propagator& propagator, const std::vector<SolvedHalfCycle>& solved,
+double worst_error_rad(test::Propagator& propagator, const std::vector<SolvedHalfCycle>& solved,
                        double give_up_rad = std::numeric_limits<double>::infinity());
 
 }  // namespace ringlock::bench

@@ -17,7 +17,7 @@ namespace ringlock::bench {
 
 namespace {
 
-using Make = std::function<std::shared_ptr<propagate::Propagator>(double tolerance_rad)>;
+using Make = std::function<std::shared_ptr<test::Propagator>(double tolerance_rad)>;
 
 /// The loosest tolerance that serves, found from above: what a user arrives at who knows the error.
 Reference loosest(const std::string& name, const std::vector<SolvedHalfCycle>& solved, double error_rad,

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "engine/gyro/device.hpp"
-#include "engine/propagate/propagator.hpp"
+#include "tests/support/propagator.hpp"
 
 namespace ringlock::bench {
 
@@ -13,7 +13,7 @@ struct Reference {
     std::string name;
     double tolerance_rad;    ///< of one step, as the library counts it
     double worst_error_rad;  ///< of a half cycle of the noise-injected dither, measured
-    std::shared_ptr<propagate::Propagator> propagator;
+    std::shared_ptr<test::Propagator> propagator;
 };
 
 /// Boost.odeint's Fehlberg 7(8) and CVODE's Adams method, each with its own step control alone and with steps held

@@ -4,7 +4,9 @@
 
 #include "engine/core/error.hpp"
 #include "engine/ensemble/block.hpp"
+#include "engine/ensemble/schedule.hpp"
 #include "engine/propagate/lane_propagator.hpp"
+#include "engine/scenario/check.hpp"
 #include "tests/physics/support.hpp"
 #include "tests/support/expect_throw.hpp"
 #include "tests/support/gyro_records.hpp"
@@ -178,6 +180,55 @@ TEST(Ensemble, NamesAGyroThatFailsAndSimulatesTheOthers) {
         EXPECT_EQ(records[g].setup.input_rate_deg_h, 200000.0 * static_cast<double>(g));
     }
     EXPECT_EQ(records[2].seen, 0);
+}
+
+TEST(Ensemble, TellsNoTurnTwiceWhereABlockBeginsAgain) {
+    auto scenario = quiet();
+    scenario.ensemble.gyros = 1;
+    scenario.ensemble.duration_s = 1.0;
+    scenario.output.sample_interval_s = 0.1;
+    scenario.ensemble.dither_amplitude_sd_relative = 0.0;
+    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
+    // The turn map has fast middles up to 0.9 - sqrt(104.6/M) = 0.7712 of the dither's peak rate, 302 880 deg/h: the
+    // last of three gyros passes that at the step, which is in its second piece of 128 turns.
+    scenario.input.rate_deg_h = 0.0;
+    scenario.input.sweep_stop_deg_h = 302700.0;
+    scenario.input.sweep_points = 3;
+    scenario.effects["bias_step"] = {{"step_deg_h", 400.0}, {"time_s", 0.8}};
+    struct Nothing final : ensemble::BlockSink {
+        void cycles(std::size_t /*arm*/, std::span<const simd::LaneCounts> /*counts*/) override {}
+        void finish(const ensemble::BlockResult& /*result*/) override {}
+    };
+    const std::vector<scenario::Arm> arms{scenario::parse_arm("uncompensated")};
+    std::int64_t gyros_told = 0;
+    std::int64_t turns_told = 0;
+    const ensemble::Monitor monitor{{}, [&](std::int64_t gyros, std::int64_t turns) {
+                                        EXPECT_GE(turns, 0);
+                                        gyros_told += gyros;
+                                        turns_told += turns;
+                                    }};
+    const std::string message = message_of<RunError>([&] {
+        ensemble::run(
+            scenario, arms, 0, 3, 1, [](std::int64_t, std::size_t) { return std::make_unique<Nothing>(); }, monitor);
+    });
+    EXPECT_THAT(message, testing::HasSubstr("1 of 3 gyros"));
+    EXPECT_EQ(gyros_told, 2);
+    EXPECT_EQ(turns_told, 2 * ensemble::Schedule(scenario).turns() + 128);
+    EXPECT_EQ(ensemble::expected_turns(scenario, arms), 3 * ensemble::Schedule(scenario).turns());
+}
+
+TEST(Ensemble, CountsTheTurnsOfTheLongestRun) {
+    // As much as the rules allow: 2500 gyros, two trajectories each, 2e9 s at 1e5 Hz.
+    scenario::Scenario scenario;
+    scenario.dither = {.frequency_hz = 1e5, .peak_rate_deg_s = 1e4};
+    scenario.propagation.method = scenario::PropagationMethod::direct;
+    scenario.ensemble.gyros = 2500;
+    scenario.ensemble.duration_s = 1e9;
+    scenario.ensemble.settle_s = 1e9;
+    ASSERT_TRUE(scenario::check(scenario).empty());
+    const std::vector<scenario::Arm> arms{scenario::parse_arm("uncompensated"), scenario::parse_arm("noise_injected")};
+    const auto turns = static_cast<double>(ensemble::expected_turns(scenario, arms));
+    EXPECT_NEAR(turns, 2e18, 1e10);  // but for the turn at time 0 of each trajectory and a share of a sample
 }
 
 TEST(Ensemble, AFailureOfTheSinkIsTheRunsNotAGyros) {

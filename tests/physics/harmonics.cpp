@@ -85,8 +85,8 @@ TEST(LockinSecondHarmonic, TheTurnMapTakesIt) {
 
 TEST(LockinSecondHarmonic, OutsideItsTableTheTurnMapIntegratesAndCounts) {
     const gyro::Device device(with("lockin_second_harmonic", {{"ratio", 0.1}, {"phase_rad", 0.2}}));
-    propagate::TurnMap map(device, ranges(device, 5.0), 1e-10);
-    propagate::DirectIntegrator direct(device.coupling, 1e-12);
+    TurnMap map(device, ranges(device, 5.0), 1e-10);
+    DirectIntegrator direct(device.coupling, 1e-12);
     const auto half = device.half_cycle(1.0, 1.2 * device.dither_amplitude_rad);
     EXPECT_NEAR(map.lockin_gain_rad(1.0, half), direct.lockin_gain_rad(1.0, half), 1e-9);
     EXPECT_EQ(map.outside(), 1);

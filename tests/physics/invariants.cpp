@@ -35,13 +35,13 @@ TEST_P(Invariants, WithoutDitherTheMeanRateIsAdlers) {
     for (const double ratio : {0.2, 0.99, 1.01, 1.5, 4.0, -2.0}) {
         const double rate = ratio * b;
         const gyro::HalfCycle half{1.0, 0.0, 0.05, rate};
-        std::unique_ptr<propagate::Propagator> propagator;
+        std::unique_ptr<Propagator> propagator;
         if (GetParam() == Method::direct) {
-            propagator = std::make_unique<propagate::DirectIntegrator>(gyro::Coupling{b, 0.4}, 1e-12);
+            propagator = std::make_unique<DirectIntegrator>(gyro::Coupling{b, 0.4}, 1e-12);
         } else {
             gyro::Device device(paper_device());
             device.coupling = {b, 0.4};
-            propagator = std::make_unique<propagate::TurnMap>(device, ranges(device, 0.0), 1e-10);
+            propagator = std::make_unique<TurnMap>(device, ranges(device, 0.0), 1e-10);
         }
         Phase phase(0.3);
         const int intervals = 40;

@@ -74,7 +74,7 @@ TEST(Propagators, DirectIntegratorAgreesWithAnIndependentIntegrator) {
         const double phase = uniform(-3.0, 3.0);
         // Its errors of 1e-14 in each of 1e4 steps and more add up to some 1e-10 rad, with little regularity.
         Odeint odeint(device.coupling, 1e-14);
-        propagate::DirectIntegrator direct(device.coupling, 1e-13);
+        DirectIntegrator direct(device.coupling, 1e-13);
         EXPECT_NEAR(direct.lockin_gain_rad(phase, half), odeint.lockin_gain_rad(phase, half), 1e-9);
     }
 }
@@ -108,10 +108,10 @@ TEST(Propagators, DirectIntegratorKeepsItsTolerance) {
     const gyro::Device device(paper_device());
     const auto half = device.half_cycle(1.0, device.dither_amplitude_rad);
     for (const double phase : {-2.0, 0.3, 2.5}) {
-        propagate::DirectIntegrator fine(device.coupling, 1e-14);
+        DirectIntegrator fine(device.coupling, 1e-14);
         const double exact = fine.lockin_gain_rad(phase, half);
         for (const double tolerance : {1e-4, 1e-6, 1e-8, 1e-10}) {
-            propagate::DirectIntegrator coarse(device.coupling, tolerance);
+            DirectIntegrator coarse(device.coupling, tolerance);
             EXPECT_NEAR(coarse.lockin_gain_rad(phase, half), exact, tolerance);
             EXPECT_LT(coarse.steps(), fine.steps());
         }
@@ -121,9 +121,9 @@ TEST(Propagators, DirectIntegratorKeepsItsTolerance) {
 TEST(Propagators, TurnMapOutsideItsTableIsExactAndCounted) {
     const gyro::Device device(paper_device());
     const double a = device.dither_amplitude_rad;
-    propagate::TurnMap map(device, ranges(device, 5.0), 1e-10);
+    TurnMap map(device, ranges(device, 5.0), 1e-10);
     const auto half = device.half_cycle(1.0, 1.2 * a);
-    propagate::DirectIntegrator direct(device.coupling, 1e-12);
+    DirectIntegrator direct(device.coupling, 1e-12);
     EXPECT_EQ(map.outside(), 0);
     EXPECT_NEAR(map.lockin_gain_rad(1.0, half), direct.lockin_gain_rad(1.0, half), 1e-9);
     EXPECT_EQ(map.outside(), 1);
@@ -133,7 +133,7 @@ TEST(Propagators, TurnMapMeasuresTheErrorOfItsTables) {
     const gyro::Device device(paper_device());
     const double a = device.dither_amplitude_rad;
     for (const double tolerance : {1e-6, 1e-8, 1e-10}) {
-        const propagate::TurnMap map(device, ranges(device, 0.05 * a), tolerance);
+        const TurnMap map(device, ranges(device, 0.05 * a), tolerance);
         EXPECT_LE(map.measured_error_rad(), tolerance);
         EXPECT_GT(map.measured_error_rad(), 0.0);
     }

@@ -53,12 +53,10 @@ Case random_case(Uniform& uniform, int i) {
     return {device, half, uniform(-3.0, 3.0)};
 }
 
-double gain_rad(propagate::Propagator& propagator, const Case& one) {
-    return propagator.lockin_gain_rad(one.phase_rad, one.half);
-}
+double gain_rad(Propagator& propagator, const Case& one) { return propagator.lockin_gain_rad(one.phase_rad, one.half); }
 
 double direct_gain_rad(const Case& one, double tolerance_rad) {
-    propagate::DirectIntegrator direct(one.device.coupling, tolerance_rad);
+    DirectIntegrator direct(one.device.coupling, tolerance_rad);
     return gain_rad(direct, one);
 }
 
@@ -129,8 +127,7 @@ void against_extended_precision(int half_cycles, std::uint64_t seed) {
         // Wider than what injected noise of 3 rad asks for.
         const double a = one.half.amplitude_rad;
         const double b = one.device.coupling.b_rad_s;
-        propagate::TurnMap map(one.device, {{0.998 * a, 1.001 * a}, {one.half.rate_rad_s, one.half.rate_rad_s}, {b, b}},
-                               1e-10);
+        TurnMap map(one.device, {{0.998 * a, 1.001 * a}, {one.half.rate_rad_s, one.half.rate_rad_s}, {b, b}}, 1e-10);
         worst_table = std::max(worst_table, error_rad(gain_rad(map, one)));
     }
     expect_falling(tolerances, worst, "direct integrator");

@@ -48,7 +48,7 @@ TEST(GyroPath, IsTheIntegratorsAtAnyTime) {
         if (i % 3 == 1) setup.dither_harmonic_ratio = 0.01;  // no path backwards in time
         if (i % 3 == 2) setup.lockin_turn_asymmetry = 0.1;
         const gyro::Device device(setup);
-        propagate::GyroPath path(device, 1e-11);
+        GyroPath path(device, 1e-11);
         // Close to both turns, in the middle of either half cycle, two cycles on.
         const std::vector<double> times = {0.0,
                                            1e-5,
@@ -79,7 +79,7 @@ TEST(GyroPath, CountsAreThoseOfThePlainPhaseWithoutLockIn) {
     setup.input_rate_deg_h = 100.0;
     setup.initial_phase_rad = 0.1;
     const gyro::Device device(setup);
-    propagate::GyroPath path(device, 1e-11);
+    GyroPath path(device, 1e-11);
     const std::vector<std::int64_t> counts = path.quarter_counts(0.0, replication::reading_interval_s, 5);
     const double w = units::two_pi * setup.dither_frequency_hz;
     const auto counter = [&](double t) {
@@ -137,7 +137,7 @@ TEST(Replication, TheAverageOverACycleGoesWithTheSine) {
 TEST(Replication, TheMeanPhaseAdvancesBetweenTheTurns) {
     for (const double rate : {100.0, 200.0, 400.0}) {
         const gyro::Setup setup = replication::paper_device(rate);
-        propagate::GyroPath path(gyro::Device(setup), 1e-10);
+        GyroPath path(gyro::Device(setup), 1e-10);
         double error = 0.0;
         double with_theta = 0.0;
         double without_theta = 0.0;
@@ -189,7 +189,7 @@ TEST(Replication, ReadingsOf8MillisecondsComeInTheirSteps) {
     // 8 ms after a minimum the dither is still 20.4 us short of the next: (a/2) t^2 are left, 8.0 deg/h.
     const gyro::Setup setup = replication::paper_device(100.0);
     const gyro::Device device(setup);
-    propagate::GyroPath path(device, 1e-10);
+    GyroPath path(device, 1e-10);
     const int gyros = 400;
     double from_minimum = 0.0;
     double from_maximum = 0.0;
@@ -223,7 +223,7 @@ TEST(Replication, OneCycleIsCorrectedByThreeDegPerHourAtMost) {
     }
     EXPECT_NEAR(largest, 2.0 * kick, 0.001);
     // The formula with true phases and accelerations stays within it at all orders: its terms are sines.
-    propagate::GyroPath path(gyro::Device(replication::paper_device(100.0)), 1e-10);
+    GyroPath path(gyro::Device(replication::paper_device(100.0)), 1e-10);
     for (int i = 0; i < 20; ++i) {
         path.restart(units::two_pi * i / 20);
         for (const Span span : replication::spans) {
@@ -240,7 +240,7 @@ TEST(Replication, OneCycleIsCorrectedByThreeDegPerHourAtMost) {
 
 TEST(Replication, PrintedCoefficientsTurnTheErrorOfACycleRound) {
     for (const double rate : {15.0, 100.0, 300.0}) {
-        propagate::GyroPath path(gyro::Device(replication::paper_device(rate)), 1e-10);
+        GyroPath path(gyro::Device(replication::paper_device(rate)), 1e-10);
         double error = 0.0;
         double printed = 0.0;
         double corrected = 0.0;

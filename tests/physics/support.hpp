@@ -12,8 +12,8 @@
 #include "engine/core/phase.hpp"
 #include "engine/gyro/device.hpp"
 #include "engine/gyro/theory.hpp"
-#include "engine/propagate/direct.hpp"
-#include "engine/propagate/turn_map.hpp"
+#include "tests/support/direct.hpp"
+#include "tests/support/turn_map.hpp"
 
 namespace ringlock::test {
 
@@ -48,10 +48,10 @@ inline propagate::HalfCycleRanges ranges(const gyro::Device& device, double marg
 
 enum class Method { turn_map, direct };
 
-inline std::unique_ptr<propagate::Propagator> make_propagator(Method method, const gyro::Device& device,
-                                                              double margin_rad = 0.0, double tolerance_rad = 1e-11) {
-    if (method == Method::direct) return std::make_unique<propagate::DirectIntegrator>(device.coupling, tolerance_rad);
-    return std::make_unique<propagate::TurnMap>(device, ranges(device, margin_rad), tolerance_rad);
+inline std::unique_ptr<Propagator> make_propagator(Method method, const gyro::Device& device, double margin_rad = 0.0,
+                                                   double tolerance_rad = 1e-11) {
+    if (method == Method::direct) return std::make_unique<DirectIntegrator>(device.coupling, tolerance_rad);
+    return std::make_unique<TurnMap>(device, ranges(device, margin_rad), tolerance_rad);
 }
 
 /// A map of the circle psi -> psi + shift + 2 arg(1 + z exp(-i psi)), which is what any stretch of the motion is.

@@ -76,7 +76,7 @@ double worst_half_cycle(int half_cycles, double rate_width_deg_h, double b_width
             gyro::Coupling coupling = device.coupling;
             coupling.b_rad_s = uniform(ranges.b_rad_s.lowest, ranges.b_rad_s.highest);
             const double phase = uniform(-3.14, 3.14);
-            propagate::DirectIntegrator direct(coupling, 1e-12);
+            DirectIntegrator direct(coupling, 1e-12);
             exact.push_back(direct.lockin_gain_rad(phase, half));
 
             state.coupling_phase_fringes[lane] = coupling.phase_rad / units::two_pi;

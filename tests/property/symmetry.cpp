@@ -3,13 +3,13 @@
 #include <functional>
 #include <memory>
 
-#include "engine/propagate/direct.hpp"
-#include "engine/propagate/turn_map.hpp"
 #include "tests/property/random_scenario.hpp"
+#include "tests/support/direct.hpp"
+#include "tests/support/turn_map.hpp"
 
 // Symmetries of psi' = g(t) + b sin(psi + e) over one half cycle, whose g is the same seen from both ends. They follow
 // from the equation alone, so that each propagator can be held against itself.
-namespace ringlock::propagate {
+namespace ringlock::test {
 namespace {
 
 struct Case {
@@ -34,7 +34,7 @@ std::unique_ptr<Propagator> turn_map(const gyro::Coupling& coupling, const gyro:
     const double b = coupling.b_rad_s;
     return std::make_unique<TurnMap>(
         device,
-        HalfCycleRanges{
+        propagate::HalfCycleRanges{
             {half.amplitude_rad - 20.0, half.amplitude_rad + 20.0}, {half.rate_rad_s, half.rate_rad_s}, {b, b}},
         1e-11);
 }
@@ -115,4 +115,4 @@ INSTANTIATE_TEST_SUITE_P(Propagators, Symmetry, testing::Values("direct", "turn_
                          [](const auto& name) { return std::string(name.param); });
 
 }  // namespace
-}  // namespace ringlock::propagate
+}  // namespace ringlock::test

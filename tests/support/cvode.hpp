@@ -2,14 +2,14 @@
 #include <cstdint>
 #include <memory>
 
-#include "engine/propagate/propagator.hpp"
+#include "tests/support/propagator.hpp"
 
 namespace ringlock::test {
 
 /// CVODE of SUNDIALS (Hindmarsh et al., ACM Transactions on Mathematical Software 31, 2005) as it is meant to be used
 /// on this equation: nothing is stiff, so Adams formulas of up to order 12 with functional iteration, no linear solver.
 /// Integrates the deviation from the plain phase (deviation.hpp).
-class Cvode final : public propagate::Propagator {
+class Cvode final : public Propagator {
    public:
     /// `tolerance_rad` is the absolute tolerance of CVODE's local error test, in effect for one step.
     /// `relative_tolerance` goes with the size of x, a fraction of a radian. No step is longer than

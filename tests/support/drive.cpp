@@ -1,10 +1,11 @@
 #include "tests/support/drive.hpp"
 
+#include <boost/random/normal_distribution.hpp>
+
 namespace ringlock::test {
 
 Drive::Drive(const gyro::Device& device, double turn_phase_rms_rad, random::Identity who)
-    : device_(device), rms_rad_(turn_phase_rms_rad) {
-    if (rms_rad_ > 0.0) stream_.emplace(who, random::Purpose::noise_injection);
+    : device_(device), rms_rad_(turn_phase_rms_rad), who_(who) {
     noise_rad_ = noise_at(0);
     next_noise_rad_ = noise_at(1);
     before_ = device_.half_cycle(-1.0, device_.dither_amplitude_rad - 0.5 * noise_rad_);
@@ -12,9 +13,11 @@ Drive::Drive(const gyro::Device& device, double turn_phase_rms_rad, random::Iden
 }
 
 double Drive::noise_at(std::int64_t turn) {
-    if (!stream_) return 0.0;
-    stream_->seek(static_cast<std::uint64_t>(turn));
-    return rms_rad_ * (*stream_)();
+    if (rms_rad_ == 0.0) return 0.0;
+    // Normal deviates use a varying number of words: a counter of its own keeps every turn where it is.
+    random::Engine engine = random::make_engine(who_, random::Purpose::noise_injection);
+    engine.setcounter({{0, static_cast<std::uint64_t>(turn), 0, who_.gyro}}, 0);
+    return rms_rad_ * boost::random::normal_distribution<double>()(engine);
 }
 
 double Drive::time_s() const {

@@ -1,6 +1,5 @@
 #pragma once
 #include <cstdint>
-#include <optional>
 
 #include "engine/gyro/device.hpp"
 #include "engine/random/stream.hpp"
@@ -40,7 +39,7 @@ class Drive {
 
     gyro::Device device_;
     double rms_rad_;
-    std::optional<random::NormalStream> stream_;
+    random::Identity who_;
     std::int64_t turn_ = 0;
     double noise_rad_ = 0.0;
     double next_noise_rad_ = 0.0;

@@ -1,12 +1,12 @@
 #pragma once
 #include <cstdint>
 
-#include "engine/propagate/propagator.hpp"
+#include "tests/support/propagator.hpp"
 
 namespace ringlock::test {
 
 /// Boost.odeint's Fehlberg 7(8) with its own step control, on the deviation from the plain phase (deviation.hpp).
-class Odeint final : public propagate::Propagator {
+class Odeint final : public Propagator {
    public:
     /// `tolerance_rad`: of the local error of one step. `longest_step_fringes`: no step is longer than this share of
     /// the half cycle's shortest fringe; 0: the step control is left alone.

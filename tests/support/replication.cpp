@@ -51,7 +51,7 @@ struct Turn {
     TurnPath path;
     double lockin_to_extremum_rad;
 
-    Turn(propagate::GyroPath& gyro, std::int64_t turn)
+    Turn(GyroPath& gyro, std::int64_t turn)
         : sign(turn % 2 == 0 ? 1.0 : -1.0),
           path(gyro.half_cycle_after(turn + 1), gyro.half_cycle_after(turn), gyro.device().coupling,
                gyro.at_turn(turn).remainder_rad),
@@ -78,7 +78,7 @@ struct Turn {
 };
 
 /// Phase that the lock-in adds from one turn to another.
-double lockin_between_turns_rad(propagate::GyroPath& path, std::int64_t first, std::int64_t last) {
+double lockin_between_turns_rad(GyroPath& path, std::int64_t first, std::int64_t last) {
     double sum = 0.0;
     for (std::int64_t turn = first; turn < last; ++turn) {
         const Phase from = path.at_turn(turn);
@@ -92,7 +92,7 @@ double lockin_between_turns_rad(propagate::GyroPath& path, std::int64_t first, s
 }
 
 /// Phase that the lock-in adds from the middle of the half cycle before a turn to the turn, or on to the next middle.
-double lockin_to_middle_rad(propagate::GyroPath& path, std::int64_t turn, bool after) {
+double lockin_to_middle_rad(GyroPath& path, std::int64_t turn, bool after) {
     const gyro::HalfCycle half = path.half_cycle_after(after ? turn : turn + 1);
     const double time = path.turn_time_s(turn) + (after ? 0.5 : -0.5) * half.duration_s;
     const Phase middle = path.at(std::vector<double>{time})[0];
@@ -126,7 +126,7 @@ double first_order_correction_deg_h(const gyro::Setup& setup, Span span, double 
     return (phasor(setup, span, shift_rad) * std::polar(1.0, phase_rad)).imag() * turn_kick_deg_h(setup);
 }
 
-Cycle exact_cycle(propagate::GyroPath& path, Span span, double clock_hz) {
+Cycle exact_cycle(GyroPath& path, Span span, double clock_hz) {
     const bool whole = whole_turns(span);
     const std::int64_t first = begins_at_minimum(span) ? 2 : 1;
     const std::int64_t last = first + (whole ? 1 : 2);
@@ -148,12 +148,10 @@ Cycle exact_cycle(propagate::GyroPath& path, Span span, double clock_hz) {
     return {lockin * to_deg_h, correction * to_deg_h};
 }
 
-double extremum_phase_rad(propagate::GyroPath& path, std::int64_t turn) {
-    return Turn(path, turn).path.zero_rate_phase_rad();
-}
+double extremum_phase_rad(GyroPath& path, std::int64_t turn) { return Turn(path, turn).path.zero_rate_phase_rad(); }
 
 HalfTurnFit fit_half_turn(bool minimum, bool after, int phases) {
-    propagate::GyroPath path(gyro::Device(paper_device(0.0)), 1e-11);
+    GyroPath path(gyro::Device(paper_device(0.0)), 1e-11);
     const std::int64_t k = minimum ? 2 : 1;
     Eigen::MatrixXd design(phases, 5);
     Eigen::VectorXd gains(phases);
@@ -181,7 +179,7 @@ HalfTurnFit fit_half_turn(bool minimum, bool after, int phases) {
 AveragedCycle averaged_cycle(int phases) {
     const gyro::Setup setup = paper_device(0.0);
     const double depth = gyro::modulation_depth_rad(setup);
-    propagate::GyroPath path(gyro::Device(setup), 1e-11);
+    GyroPath path(gyro::Device(setup), 1e-11);
     const double unit = path.device().coupling.b_rad_s * cycle_s(setup) * boost::math::cyl_bessel_j(0, depth);
     AveragedCycle result;
     constexpr int points = 1 << 15;  // many to a fringe: the mean of a periodic function is then exact

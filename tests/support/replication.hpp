@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "engine/gyro/setup.hpp"
-#include "engine/propagate/gyro_path.hpp"
+#include "tests/support/gyro_path.hpp"
 
 /// Table 1 of Gao and Deng (2007) against what the equation of motion does: what docs/replication.md reports.
 namespace ringlock::test::replication {
@@ -47,10 +47,10 @@ struct Cycle {
 };
 
 /// With a clock, the phase accelerations are those of two pulses timed in its ticks; without, those of the drive.
-Cycle exact_cycle(propagate::GyroPath& path, Span span, double clock_hz = 0.0);
+Cycle exact_cycle(GyroPath& path, Span span, double clock_hz = 0.0);
 
 /// psi at the extremum near a turn of the dither, within a fringe.
-double extremum_phase_rad(propagate::GyroPath& path, std::int64_t turn);
+double extremum_phase_rad(GyroPath& path, std::int64_t turn);
 
 /// A half of a turn by integration, fitted over `phases` phases of the extremum:
 /// lock-in = constant + sine sin(psi_0) + cosine cos(psi_0) + harmonics of 2 psi_0, the coefficients of the first in

@@ -3,13 +3,13 @@
 
 #include "engine/core/phase.hpp"
 #include "engine/gyro/motion.hpp"
-#include "engine/propagate/propagator.hpp"
+#include "tests/support/propagator.hpp"
 
 namespace ringlock::test {
 
 /// The equation of motion by the scalar series of the phase itself, order 20: what the vectorised integrator, whose
 /// variable, order and arithmetic are others, is held against.
-class SeriesIntegrator final : public propagate::Propagator {
+class SeriesIntegrator final : public Propagator {
    public:
     SeriesIntegrator(gyro::Coupling coupling, double tolerance_rad)
         : coupling_(coupling), tolerance_rad_(tolerance_rad) {}

@@ -61,6 +61,18 @@ TEST(ScenarioRules, ASweepIsNotTooLarge) {
                 AllOf(HasSubstr("s.toml:5:9: key \"ensemble.gyros\" = 1001: "), HasSubstr("100000000 gyros")));
 }
 
+TEST(ScenarioRules, TurnsCanBeCounted) {
+    // The extremes of each key by itself are allowed: 1e9 s twice at 1e5 Hz are 4e14 half cycles.
+    const std::string longest =
+        "[dither]\nfrequency_hz = 1e5\npeak_rate_deg_s = 1e4\n[propagation]\nmethod = \"direct\"\n"
+        "[ensemble]\nduration_s = 1e9\nsettle_s = 1e9\ngyros = ";
+    EXPECT_EQ(complaint(longest + "2500"), "");
+    EXPECT_THAT(complaint(longest + "2501"), AllOf(HasSubstr("s.toml:7:14: key \"ensemble.duration_s\""),
+                                                   HasSubstr("1e+18 half cycles of the dither")));
+    EXPECT_THAT(complaint(longest + "100\n[input]\nrate_deg_h = 0\nsweep_points = 100000"),
+                HasSubstr("4e+21 half cycles"));
+}
+
 TEST(ScenarioRules, TemperatureLeavesAThreshold) {
     EXPECT_THAT(
         complaint("[effects.lockin_temperature]\nrelative_per_k = 0.1\n[environment]\ntemperature_swing_k = 20"),
@@ -92,6 +104,19 @@ TEST(ScenarioRules, TheTurnMapNeedsSmallKicks) {
                 AllOf(HasSubstr("s.toml:2:26: key \"gyro.lockin_threshold_deg_h\" = 2000.0: "), HasSubstr("1.01 rad"),
                       HasSubstr("propagation.method = \"direct\"")));
     EXPECT_EQ(complaint("[gyro]\nlockin_threshold_deg_h = 2000\n[propagation]\nmethod = \"direct\""), "");
+}
+
+TEST(ScenarioRules, TheTurnMapNeedsFastMiddles) {
+    // 0.9 - rate/peak >= sqrt(104.6/M): with M = 317 rad, rates up to 0.32 of the peak of 19800 deg/h, less what noise,
+    // spread and tables take.
+    const std::string weak = "[dither]\npeak_rate_deg_s = 5.5\n[gyro]\nlockin_threshold_deg_h = 50\n";
+    EXPECT_EQ(complaint(weak + "[input]\nrate_deg_h = 5000"), "");
+    EXPECT_THAT(complaint(weak + "[input]\nrate_deg_h = -6500"),
+                AllOf(HasSubstr("s.toml:6:14: key \"input.rate_deg_h\" = -6500.0: "), HasSubstr("runs fast")));
+    EXPECT_EQ(complaint(weak + "[input]\nrate_deg_h = -6500\n[propagation]\nmethod = \"direct\""), "");
+    EXPECT_THAT(complaint(weak + "[noise_injection]\nturn_phase_rms_rad = 37"),
+                HasSubstr("s.toml:6:22: key \"noise_injection.turn_phase_rms_rad\""));
+    EXPECT_THAT(complaint(weak + "[effects.base_vibration]\nrate_deg_h = 5000"), HasSubstr("runs fast"));
 }
 
 TEST(ScenarioRules, InjectedNoiseLeavesTheDither) {

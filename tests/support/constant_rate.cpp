@@ -1,11 +1,11 @@
-#include "engine/propagate/constant_rate.hpp"
+#include "tests/support/constant_rate.hpp"
 
 #include <cmath>
 #include <complex>
 
 #include "engine/propagate/circle_map.hpp"
 
-namespace ringlock::propagate {
+namespace ringlock::test {
 
 double constant_rate_gain_rad(double phase_rad, double rate_rad_s, double duration_s, const gyro::Coupling& coupling) {
     const double b = coupling.b_rad_s;
@@ -17,10 +17,10 @@ double constant_rate_gain_rad(double phase_rad, double rate_rad_s, double durati
         // phi = psi + 2 arg(1 + i k exp(-i psi)) turns uniformly at sqrt(g^2 - b^2).
         const double beat = std::sqrt((g - b) * (g + b));
         const std::complex<double> ik(0.0, b / (g + beat));
-        const double into = twice_arg(ik, -psi);
+        const double into = propagate::twice_arg(ik, -psi);
         const double phi = psi + into + beat * duration_s;
         const double slowed = -b * b / (g + beat) * duration_s;  // (beat - g) t without cancellation
-        return sign * (into + slowed + twice_arg(-ik, -phi));
+        return sign * (into + slowed + propagate::twice_arg(-ik, -phi));
     }
     // Locked or just so: the matrix exponential; the phase moves by less than a fringe, so that the branch is clear.
     const double lambda = 0.5 * std::sqrt((b - g) * (b + g));
@@ -33,4 +33,4 @@ double constant_rate_gain_rad(double phase_rad, double rate_rad_s, double durati
     return sign * (2.0 * std::arg(factor) - g * duration_s);
 }
 
-}  // namespace ringlock::propagate
+}  // namespace ringlock::test

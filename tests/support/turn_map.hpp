@@ -2,17 +2,17 @@
 #include <cstdint>
 
 #include "engine/propagate/phase_tables.hpp"
-#include "engine/propagate/propagator.hpp"
 #include "engine/propagate/turn_tables.hpp"
+#include "tests/support/propagator.hpp"
 
-namespace ringlock::propagate {
+namespace ringlock::test {
 
-/// The production propagator for one half cycle of one gyro at a time: tables and kernel are those of a run, Moebius
-/// maps or, where the coupling has a second harmonic, series in the phase.
+/// One half cycle of one gyro at a time by the tables and the kernel of a run: Moebius maps or, where the coupling has
+/// a second harmonic, series in the phase.
 class TurnMap final : public Propagator {
    public:
     /// Half cycles outside `ranges` are solved exactly one by one, slowly, never extrapolated.
-    TurnMap(const gyro::Device& device, const HalfCycleRanges& ranges, double tolerance_rad);
+    TurnMap(const gyro::Device& device, const propagate::HalfCycleRanges& ranges, double tolerance_rad);
 
     /// `half` must have the durations and the harmonic of the device.
     double lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half) override;
@@ -29,9 +29,9 @@ class TurnMap final : public Propagator {
 
     gyro::Device device_;
     double tolerance_rad_;
-    TurnTables tables_;
-    PhaseTables phase_tables_;
+    propagate::TurnTables tables_;
+    propagate::PhaseTables phase_tables_;
     std::int64_t outside_ = 0;
 };
 
-}  // namespace ringlock::propagate
+}  // namespace ringlock::test

@@ -1,13 +1,13 @@
-#include "engine/propagate/turn_map.hpp"
+#include "tests/support/turn_map.hpp"
 
-#include "engine/propagate/constant_rate.hpp"
 #include "engine/propagate/direct_lanes.hpp"
 #include "engine/propagate/phase_kernel.hpp"
 #include "engine/propagate/turn_kernel.hpp"
+#include "tests/support/constant_rate.hpp"
 
-namespace ringlock::propagate {
+namespace ringlock::test {
 
-TurnMap::TurnMap(const gyro::Device& device, const HalfCycleRanges& ranges, double tolerance_rad)
+TurnMap::TurnMap(const gyro::Device& device, const propagate::HalfCycleRanges& ranges, double tolerance_rad)
     : device_(device), tolerance_rad_(tolerance_rad), tables_(tolerance_rad), phase_tables_(tolerance_rad) {
     if (!(ranges.amplitude_rad.highest > 0.0)) return;
     if (is_moebius()) {
@@ -22,14 +22,14 @@ double TurnMap::lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half) {
     if (half.amplitude_rad == 0.0 && is_moebius()) {
         return constant_rate_gain_rad(phase_rad, half.rate_rad_s, half.duration_s, device_.coupling);
     }
-    const HalfCycleRanges& ranges = is_moebius() ? tables_.ranges(0) : phase_tables_.ranges(0);
+    const propagate::HalfCycleRanges& ranges = is_moebius() ? tables_.ranges(0) : phase_tables_.ranges(0);
     const bool inside = ranges.amplitude_rad.covers(half.amplitude_rad) && ranges.rate_rad_s.covers(half.rate_rad_s);
-    TurnTables alone(tolerance_rad_);
+    propagate::TurnTables alone(tolerance_rad_);
     if (!inside && !is_moebius()) {  // a table for one half cycle would take longer
         ++outside_;
-        const Stretch stretch{half, device_.coupling, phase_rad / units::two_pi, half.duration_s};
-        StretchResult result;
-        integrate({&stretch, 1}, tolerance_rad_, {&result, 1});
+        const propagate::Stretch stretch{half, device_.coupling, phase_rad / units::two_pi, half.duration_s};
+        propagate::StretchResult result;
+        propagate::integrate({&stretch, 1}, tolerance_rad_, {&result, 1});
         return result.lockin_rad;
     }
     if (!inside) {
@@ -52,15 +52,15 @@ double TurnMap::lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half) {
     const double coupling_phase = device_.coupling.phase_rad / units::two_pi;
     gyro::LaneTurns turns;
     if (is_moebius()) {
-        TurnState state;
+        propagate::TurnState state;
         state.coupling_phase_fringes[0] = coupling_phase;
-        step_turns(inside ? tables_ : alone, drive, 1, state, &turns);
+        propagate::step_turns(inside ? tables_ : alone, drive, 1, state, &turns);
     } else {
-        PhaseState state;
+        propagate::PhaseState state;
         state.coupling_phase_fringes[0] = coupling_phase;
-        step_phases(phase_tables_, drive, 1, state, &turns);
+        propagate::step_phases(phase_tables_, drive, 1, state, &turns);
     }
     return turns.lockin_fringes[1][0] * units::two_pi;
 }
 
-}  // namespace ringlock::propagate
+}  // namespace ringlock::test

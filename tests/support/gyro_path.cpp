@@ -1,14 +1,14 @@
-#include "engine/propagate/gyro_path.hpp"
+#include "tests/support/gyro_path.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "engine/propagate/direct.hpp"
+#include "engine/gyro/fast_motion.hpp"
 #include "engine/propagate/direct_lanes.hpp"
-#include "engine/propagate/half_turn.hpp"
-#include "engine/propagate/turn_map.hpp"
+#include "tests/support/direct.hpp"
+#include "tests/support/turn_map.hpp"
 
-namespace ringlock::propagate {
+namespace ringlock::test {
 
 namespace {
 
@@ -18,11 +18,10 @@ std::unique_ptr<Propagator> make_propagator(const gyro::Device& device, double t
     bool fast = b > 0.0;
     for (const double sign : {1.0, -1.0}) {
         const gyro::HalfCycle half = device.half_cycle(sign, a);
-        fast = fast && has_fast_middle(beginning(half, device.coupling).half, b) &&
-               has_fast_middle(ending(half, device.coupling).half, b);
+        fast = fast && gyro::has_fast_middle(half.upright(0), b) && gyro::has_fast_middle(half.upright(1), b);
     }
     if (!fast) return std::make_unique<DirectIntegrator>(device.coupling, tolerance_rad);
-    const HalfCycleRanges ranges{{a, a}, {device.input_rate_rad_s, device.input_rate_rad_s}, {b, b}};
+    const propagate::HalfCycleRanges ranges{{a, a}, {device.input_rate_rad_s, device.input_rate_rad_s}, {b, b}};
     return std::make_unique<TurnMap>(device, ranges, tolerance_rad);
 }
 
@@ -58,7 +57,7 @@ Phase GyroPath::at_turn(std::int64_t turn) {
 }
 
 std::vector<Phase> GyroPath::at(std::span<const double> times_s) {
-    std::vector<Stretch> stretches;
+    std::vector<propagate::Stretch> stretches;
     std::vector<Phase> phases;
     std::vector<bool> backwards;
     for (const double time : times_s) {
@@ -76,8 +75,8 @@ std::vector<Phase> GyroPath::at(std::span<const double> times_s) {
         phases.push_back(from);
         backwards.push_back(back);
     }
-    std::vector<StretchResult> results(stretches.size());
-    integrate(stretches, tolerance_rad_, results);
+    std::vector<propagate::StretchResult> results(stretches.size());
+    propagate::integrate(stretches, tolerance_rad_, results);
     for (std::size_t i = 0; i < stretches.size(); ++i) {
         const double sign = backwards[i] ? -1.0 : 1.0;
         phases[i].add(sign * stretches[i].half.plain_phase_rad(stretches[i].end_s));
@@ -95,4 +94,4 @@ std::vector<std::int64_t> GyroPath::quarter_counts(double first_s, double interv
     return counts;
 }
 
-}  // namespace ringlock::propagate
+}  // namespace ringlock::test

@@ -6,9 +6,9 @@
 
 #include "engine/core/phase.hpp"
 #include "engine/gyro/device.hpp"
-#include "engine/propagate/propagator.hpp"
+#include "tests/support/propagator.hpp"
 
-namespace ringlock::propagate {
+namespace ringlock::test {
 
 /// The phase of one gyro under its noise-free dither at any time: from turn to turn by the exact map, from the nearest
 /// turn to the time by the direct integrator. Time 0 is the first turn, a minimum of the phase.
@@ -46,4 +46,4 @@ class GyroPath {
     std::vector<Phase> turns_;
 };
 
-}  // namespace ringlock::propagate
+}  // namespace ringlock::test

@@ -1,9 +1,9 @@
 #pragma once
 #include "engine/gyro/half_cycle.hpp"
 
-namespace ringlock::propagate {
+namespace ringlock::test {
 
 /// Lock-in phase [rad] gained over `duration_s` at a constant phase rate, in closed form (Adler's equation).
 double constant_rate_gain_rad(double phase_rad, double rate_rad_s, double duration_s, const gyro::Coupling& coupling);
 
-}  // namespace ringlock::propagate
+}  // namespace ringlock::test

@@ -1,7 +1,7 @@
 #pragma once
 #include "engine/gyro/half_cycle.hpp"
 
-namespace ringlock::propagate {
+namespace ringlock::test {
 
 /// Solves the equation of motion over one half cycle of the dither. Thread-compatible: one object per gyro.
 class Propagator {
@@ -16,4 +16,4 @@ class Propagator {
     virtual double lockin_gain_rad(double phase_rad, const gyro::HalfCycle& half) = 0;
 };
 
-}  // namespace ringlock::propagate
+}  // namespace ringlock::test

@@ -1,12 +1,12 @@
 #pragma once
 #include <cstdint>
 
-#include "engine/propagate/propagator.hpp"
+#include "tests/support/propagator.hpp"
 
-namespace ringlock::propagate {
+namespace ringlock::test {
 
-/// The reference for one half cycle of one gyro at a time: integrate() of direct_lanes.hpp in one lane. Nothing about
-/// the dither is assumed but its equation.
+/// The reference for one half cycle of one gyro at a time: propagate::integrate() of direct_lanes.hpp in one lane.
+/// Nothing about the dither is assumed but its equation.
 class DirectIntegrator final : public Propagator {
    public:
     /// `tolerance_rad`: error over a half cycle, shared out among its steps (about one a fringe).
@@ -24,4 +24,4 @@ class DirectIntegrator final : public Propagator {
     std::int64_t steps_ = 0;
 };
 
-}  // namespace ringlock::propagate
+}  // namespace ringlock::test

@@ -1,0 +1,72 @@
+#include "engine/gyro/fast_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace ringlock::gyro {
+
+namespace {
+
+constexpr double full_adiabaticity = 300.0;
+constexpr double least_adiabaticity = 100.0;
+constexpr double relaxed = 0.9;      // from one that is tried to the next: 104.6 is the last
+constexpr double least_beat = 4.0;   // g over b: the slow solution is a series in b/g, too
+constexpr double latest_sine = 0.9;  // the slow solution must hold from here to the middle
+
+double needed_rate_rad_s(const HalfCycle& half, double b_rad_s, double adiabaticity) {
+    return std::max(std::sqrt(adiabaticity * greatest_acceleration_rad_s2(half)), least_beat * b_rad_s);
+}
+
+/// From where on the motion must be fast.
+double latest_s(const HalfCycle& half) { return std::asin(latest_sine) / half.angular_frequency_rad_s(); }
+
+bool is_fast_from_there(const HalfCycle& half, double needed_rad_s) {
+    const double late = latest_s(half);
+    for (int i = 0; i <= 8; ++i) {
+        if (!(half.drive_rate_rad_s(late + 0.125 * i * (0.5 * half.duration_s - late)) >= needed_rad_s)) return false;
+    }
+    return true;
+}
+
+/// Time from which the motion is fast: g^2 >= adiabaticity * (greatest phase acceleration), up to the middle. NaN where
+/// there is none. It need not be exact: any time at which the motion is fast will do.
+double fast_from_s(const HalfCycle& half, double b_rad_s, double adiabaticity) {
+    const double fast = needed_rate_rad_s(half, b_rad_s, adiabaticity);
+    if (!is_fast_from_there(half, fast)) return std::nan("");
+    if (half.drive_rate_rad_s(0.0) >= fast) return 0.0;
+    double early = 0.0;
+    double late = latest_s(half);
+    for (int i = 0; i < 30; ++i) {
+        const double middle = 0.5 * (early + late);
+        (half.drive_rate_rad_s(middle) >= fast ? late : early) = middle;
+    }
+    return late;
+}
+
+}  // namespace
+
+double greatest_acceleration_rad_s2(const HalfCycle& half) {
+    const double w = half.angular_frequency_rad_s();
+    return half.amplitude_rad * w * w * (1.0 + 2.0 * std::abs(half.harmonic_ratio));
+}
+
+double fast_motion_from_s(const HalfCycle& half, double b_rad_s) {
+    for (double adiabaticity = full_adiabaticity; adiabaticity >= least_adiabaticity; adiabaticity *= relaxed) {
+        const double t = fast_from_s(half, b_rad_s, adiabaticity);
+        if (!std::isnan(t)) return t;
+    }
+    return std::nan("");
+}
+
+bool has_fast_middle(const HalfCycle& half, double b_rad_s) {
+    // The last one tried asks for the least.
+    double adiabaticity = full_adiabaticity;
+    while (adiabaticity * relaxed >= least_adiabaticity) adiabaticity *= relaxed;
+    return is_fast_from_there(half, needed_rate_rad_s(half, b_rad_s, adiabaticity));
+}
+
+double strength_with_harmonics_rad_s(const Coupling& coupling) {
+    return 2.0 * coupling.b_rad_s * (1.0 + std::abs(coupling.second_ratio)) * (1.0 + std::abs(coupling.turn_asymmetry));
+}
+
+}  // namespace ringlock::gyro

@@ -1,0 +1,130 @@
+#include "engine/scenario/fast_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "engine/core/units.hpp"
+#include "engine/gyro/device.hpp"
+#include "engine/gyro/fast_motion.hpp"
+#include "engine/scenario/arm.hpp"
+
+namespace ringlock::scenario {
+
+namespace {
+
+constexpr double sigmas = 6.0;  // draws further out are treated as impossible, as by the other rules
+
+/// A value of an effect that is always there, at its default where it was not asked for.
+double parameter(const Scenario& s, const char* effect, const char* name) { return s.effects.at(effect).at(name); }
+
+double simulated_h(const Scenario& s) { return (s.ensemble.settle_s + s.ensemble.duration_s) / 3600.0; }
+
+double largest_asymmetry(const Scenario& s) {
+    return std::abs(parameter(s, "dither_asymmetry", "ratio")) + sigmas * s.ensemble.dither_asymmetry_sd_ratio;
+}
+
+/// How far the rate of a half cycle may be from the input rate [deg/h].
+double varying_rate_deg_h(const Scenario& s) {
+    // Ten terms of variance B^2 ln(10)/pi each, see bias_instability.cpp.
+    const double instability =
+        parameter(s, "bias_instability", "deg_h") * std::sqrt(10.0 * std::numbers::ln10 / std::numbers::pi);
+    const double walk = parameter(s, "rate_random_walk", "deg_h_rt_h") * std::sqrt(simulated_h(s));
+    const double quantum = parameter(s, "quantum_noise", "deg_rt_h") / units::deg_rt_h_per_arcsec_rt_s *
+                           std::sqrt(2.0 * s.dither.frequency_hz / (1.0 - largest_asymmetry(s)));
+    return std::abs(parameter(s, "base_vibration", "rate_deg_h")) + std::abs(parameter(s, "bias_step", "step_deg_h")) +
+           std::abs(parameter(s, "bias_ramp", "deg_h_per_h")) * simulated_h(s) +
+           sigmas * std::hypot(instability, walk, quantum);
+}
+
+/// The same with the room that tables leave on either side, see lane_propagator.cpp: up to twice what varies or
+/// 5000 deg/h, and 200 deg/h in any case.
+double tabulated_rate_deg_h(const Scenario& s) {
+    const double varies = varying_rate_deg_h(s);
+    return varies > 0.0 ? varies + std::max(200.0, std::min(2.0 * varies, 5000.0)) : 0.0;
+}
+
+/// Largest coupling over that of the gyro, of the run's tables: the temperature's part with as much room, at most half.
+double tabulated_coupling(const Scenario& s) {
+    const double change_k =
+        std::abs(s.environment.temperature_ramp_k_per_h) * simulated_h(s) + s.environment.temperature_swing_k;
+    const double varies = std::abs(parameter(s, "lockin_temperature", "relative_per_k")) * change_k;
+    return varies > 0.0 ? 1.0 + varies + std::max(0.05, std::min(2.0 * varies, 0.5)) : 1.0;
+}
+
+/// What a table is asked to cover; the couplings go up to, and the amplitudes down from, those of the gyro.
+struct Room {
+    double margin_rad;
+    double lowest_rate_deg_h, highest_rate_deg_h;
+    double coupling;
+    bool with_harmonics;  ///< of dither and coupling
+};
+
+bool fast(const Scenario& s, const Room& room) {
+    gyro::Setup setup;
+    setup.scale_factor_arcsec = s.gyro.scale_factor_arcsec;
+    setup.lockin_threshold_deg_h =
+        s.gyro.lockin_threshold_deg_h * (1.0 + sigmas * s.ensemble.lockin_threshold_sd_relative) * room.coupling;
+    setup.dither_frequency_hz = s.dither.frequency_hz;
+    setup.dither_peak_rate_deg_s = s.dither.peak_rate_deg_s * (1.0 - sigmas * s.ensemble.dither_amplitude_sd_relative);
+    if (room.with_harmonics) {
+        setup.dither_harmonic_ratio = parameter(s, "dither_second_harmonic", "ratio");
+        setup.dither_harmonic_phase_rad = parameter(s, "dither_second_harmonic", "phase_rad");
+        setup.lockin_second_ratio = parameter(s, "lockin_second_harmonic", "ratio");
+        setup.lockin_turn_asymmetry = parameter(s, "lockin_turn_asymmetry", "ratio");
+    }
+    const double spread = sigmas * s.ensemble.dither_asymmetry_sd_ratio;
+    for (const double off : {-spread, spread}) {
+        setup.dither_asymmetry_ratio = parameter(s, "dither_asymmetry", "ratio") + off;
+        gyro::Device device(setup);
+        // Amplitudes, rates and couplings inside are faster: the worst are at the corners.
+        const double amplitude = device.dither_amplitude_rad - room.margin_rad;
+        if (amplitude <= 0.0) return false;
+        const bool series = setup.lockin_second_ratio != 0.0;
+        const double b = series ? gyro::strength_with_harmonics_rad_s(device.coupling) : device.coupling.b_rad_s;
+        for (const double rate : {room.lowest_rate_deg_h, room.highest_rate_deg_h}) {
+            device.input_rate_rad_s = device.phase_per_arcsec * rate;
+            for (const double sign : {1.0, -1.0}) {
+                for (const int end : {0, 1}) {
+                    if (!gyro::has_fast_middle(device.half_cycle(sign, amplitude).upright(end), b)) return false;
+                }
+            }
+        }
+    }
+    return true;
+}
+
+}  // namespace
+
+bool fast_middles(const Scenario& s) {
+    const double last = s.input.sweep_points > 1 ? s.input.sweep_stop_deg_h : s.input.rate_deg_h;
+    const double lowest = std::min(s.input.rate_deg_h, last);
+    const double highest = std::max(s.input.rate_deg_h, last);
+    // Eight standard deviations of half the difference of two turns, see LaneDither::amplitude_margin_rad().
+    const double noise_rad = 8.0 / std::numbers::sqrt2 * s.noise_injection.turn_phase_rms_rad;
+    bool driven[2] = {};    // without and with noise injected
+    bool inverted[2] = {};  // by a compensator with tables of its own
+    for (const std::string& name : s.arms) {
+        const Arm arm = parse_arm(name);
+        driven[arm.noise_injected] = true;
+        inverted[arm.noise_injected] |=
+            arm.compensator == Compensator::exact || arm.compensator == Compensator::adaptive;
+    }
+    const double room = tabulated_rate_deg_h(s);
+    // The compensators' tables are of the sinusoid, the threshold as told, and the rate as measured, see exact.cpp.
+    const double amplitude_rad =
+        s.dither.peak_rate_deg_s * units::deg_h_per_deg_s / (s.gyro.scale_factor_arcsec * s.dither.frequency_hz);
+    const double measured = varying_rate_deg_h(s) + 0.02 * std::max(std::abs(lowest), std::abs(highest)) +
+                            16.0 * s.gyro.scale_factor_arcsec;
+    const double told = (1.0 + s.calibration.threshold_error_relative) * 1.02;
+    for (const bool noisy : {false, true}) {
+        const double margin = noisy ? noise_rad : 0.0;
+        const double wider = std::max(margin, 0.002 * amplitude_rad);
+        if (driven[noisy] && !fast(s, {margin, lowest - room, highest + room, tabulated_coupling(s), true}))
+            return false;
+        if (inverted[noisy] && !fast(s, {wider, lowest - measured, highest + measured, told, false})) return false;
+    }
+    return true;
+}
+
+}  // namespace ringlock::scenario
