@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "engine/readout/lane_readout.hpp"
+#include "engine/readout/pulse_alignment.hpp"
 #include "tests/physics/readout_support.hpp"
 
 namespace ringlock::test {
@@ -76,6 +77,78 @@ TEST(PulseTables, WithAnAsymmetryAreOffByItsShareOfTheTimeBetweenTheTurns) {
             const double worst = worst_pulse_s(300.0, rate_deg_h, 0.0, 0.0, Beyond::nothing, asymmetry, 503);
             EXPECT_LT(worst, 1.1 * share * between_s);
             EXPECT_GT(worst, 0.5 * share * between_s);  // the statement is worth making
+        }
+    }
+}
+
+TEST(PulseAlignment, GivesBothSidesOfAnAsymmetricDitherOneExtremum) {
+    for (const Beyond beyond : {Beyond::nothing, Beyond::harmonic_and_asymmetry, Beyond::second_coupling}) {
+        for (const double asymmetry : {0.001, -0.01}) {
+            Uniform uniform(508);
+            double raw = 0.0;
+            double aligned = 0.0;
+            double longest_s = 0.0;  // between the turns of phase and dither
+            for (int i = 0; i < 60; ++i) {
+                Turn turn = random_turn(uniform, 0.0, beyond);
+                turn.setup.dither_asymmetry_ratio = asymmetry;
+                turn.setup.dither_harmonic_ratio = 0.0;
+                turn.before_ratio = turn.after_ratio = 1.0;
+                const int direction = i % 2 == 0 ? 1 : -1;
+                const gyro::Device device = turn.device();
+                const TurnPath path = turn.path(direction);
+                const double psi = path.zero_rate_phase_rad();
+                const double d1 = first_distance_rad(direction, psi);
+                longest_s = std::max(longest_s, std::abs(path.zero_rate_time_s()));
+                // As if sampled at the extremum.
+                readout::LaneReadings readings;
+                readings.first_turn = direction > 0 ? 0 : 1;
+                readings.resize(1);
+                readings.pulses.resize(1);
+                readings.sine[0][0] = std::sin(psi);
+                readings.cosine[0][0] = std::cos(psi);
+                std::vector<double> distances;
+                for (std::size_t k = 0; k < readout::kept_pulses; ++k) {
+                    distances.push_back(d1 + static_cast<double>(k) * quarter_rad);
+                }
+                for (const std::size_t side : {0U, 1U}) {
+                    for (std::size_t k = 0; k < readout::kept_pulses; k += 2) {
+                        const auto times = path.crossing_times_s(side == 0 ? -1 : 1, {distances[k], distances[k + 1]});
+                        readings.pulses.time_s[side][k][0][0] = times[0] - path.zero_rate_time_s();
+                        readings.pulses.time_s[side][k + 1][0][0] = times[1] - path.zero_rate_time_s();
+                    }
+                }
+                readout::PulseTables tables;
+                tables.make(0, device, readout::kept_pulses);
+                const double floor = std::floor(direction * psi / quarter_rad);
+                const auto quarter = static_cast<std::size_t>(floor - 4.0 * std::floor(0.25 * floor));
+                const auto worst = [&] {
+                    double most = 0.0;
+                    for (const std::size_t side : {0U, 1U}) {
+                        const gyro::HalfCycle half = turn.half(side == 0 ? -direction : direction, 1.0);
+                        const double a = half.end_acceleration_rad_s2(side == 0 ? 1 : 0);
+                        for (std::size_t k = 0; k < readout::kept_pulses; ++k) {
+                            const auto& table = tables.times[direction > 0 ? 0 : 1][side][k];
+                            const double t =
+                                std::sqrt(2.0 * distances[k] / a) * readout::PulseTables::at(table, 0, quarter, d1);
+                            // Near the extremum a time says little: as phase, in units of the farthest pulse's.
+                            const double weight = std::sqrt(distances[k] / distances.back());
+                            most =
+                                std::max(most, weight * std::abs(std::abs(readings.pulses.time_s[side][k][0][0]) - t));
+                        }
+                    }
+                    return most;
+                };
+                raw = std::max(raw, worst());
+                readout::PulseAlignment alignment(std::vector{device});
+                alignment.align(readings);
+                aligned = std::max(aligned, worst());
+            }
+            const double share = std::abs(std::pow((1.0 + asymmetry) / (1.0 - asymmetry), 2) - 1.0);
+            std::printf("asymmetry %g: pulses off by %.2g s, aligned by %.2g s; turns %.2g s apart\n", asymmetry, raw,
+                        aligned, longest_s);
+            EXPECT_GT(raw, 0.5 * share * longest_s);
+            // The tables' own error, and the share's next order.
+            EXPECT_LT(aligned, 2e-11 + 1e-3 * share * longest_s);
         }
     }
 }
