@@ -6,6 +6,7 @@
 
 #include "engine/readout/lane_readout.hpp"
 #include "engine/readout/pulse_alignment.hpp"
+#include "engine/simd/target.hpp"
 #include "tests/physics/readout_support.hpp"
 
 namespace ringlock::test {
@@ -151,6 +152,117 @@ TEST(PulseAlignment, GivesBothSidesOfAnAsymmetricDitherOneExtremum) {
             EXPECT_LT(aligned, 2e-11 + 1e-3 * share * longest_s);
         }
     }
+}
+
+/// What is in them does not matter.
+readout::LaneReadings made_up_readings(std::size_t turns) {
+    Uniform uniform(509);
+    readout::LaneReadings readings;
+    readings.resize(turns);
+    readings.pulses.resize(turns);
+    for (std::size_t i = 0; i < turns; ++i) {
+        for (std::size_t g = 0; g < lanes; ++g) {
+            const double phase = uniform(-20.0, 20.0);
+            readings.sine[i][g] = std::sin(phase);
+            readings.cosine[i][g] = std::cos(phase);
+            readings.phase_fringes[i][g] = phase / units::two_pi;
+            readings.phase_whole[i][g] = (i % 2 == 0 ? 0.0 : 2005.0) + static_cast<double>(i);
+            for (const double side : {-1.0, 1.0}) {
+                for (std::size_t k = 0; k < readout::kept_pulses; ++k) {
+                    const double time_s = side * uniform(1e-5, 2e-5) * static_cast<double>(k + 1);
+                    readings.pulses.time_s[side < 0.0 ? 0 : 1][k][i][g] = k == 0 && i % 5 == g % 5 ? 0.0 : time_s;
+                }
+            }
+        }
+    }
+    return readings;
+}
+
+using PulseTimes = std::vector<simd::Lanes>;  // [turn][side][pulse]
+
+PulseTimes aligned_times(const std::vector<gyro::Device>& devices, const readout::LaneReadings& all,
+                         std::size_t piece) {
+    readout::PulseAlignment alignment(devices);
+    PulseTimes times;
+    for (std::size_t first = 0; first < all.turns; first += piece) {
+        const std::size_t count = std::min(piece, all.turns - first);
+        readout::LaneReadings part;
+        part.first_turn = static_cast<std::int64_t>(first);
+        part.resize(count);
+        part.pulses.resize(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            part.sine[i] = all.sine[first + i];
+            part.cosine[i] = all.cosine[first + i];
+            part.phase_fringes[i] = all.phase_fringes[first + i];
+            part.phase_whole[i] = all.phase_whole[first + i];
+            for (const std::size_t side : {0U, 1U}) {
+                for (std::size_t k = 0; k < readout::kept_pulses; ++k) {
+                    part.pulses.time_s[side][k][i] = all.pulses.time_s[side][k][first + i];
+                }
+            }
+        }
+        alignment.align(part);
+        for (std::size_t i = 0; i < count; ++i) {
+            for (const auto& side : part.pulses.time_s) {
+                for (const auto& column : side) times.push_back(column[i]);
+            }
+        }
+    }
+    return times;
+}
+
+TEST(PulseAlignment, PiecesLaneMatesAndInstructionSetsDoNotMatter) {
+    Uniform uniform(510);
+    std::vector<gyro::Device> devices;
+    for (std::size_t g = 0; g < lanes; ++g) {
+        Turn turn = random_turn(uniform, 0.0, g % 3 == 0 ? Beyond::second_coupling : Beyond::nothing);
+        if (g % 4 == 1) turn.setup.dither_asymmetry_ratio = 0.0;
+        devices.push_back(turn.device());
+    }
+    const readout::LaneReadings readings = made_up_readings(200);
+    const PulseTimes reference = aligned_times(devices, readings, 200);
+    const auto differing = [&](const PulseTimes& other, std::size_t lane, std::size_t of) {
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < reference.size(); ++i) count += other[i][lane] != reference[i][of] ? 1 : 0;
+        return count;
+    };
+    std::size_t moved = 0;
+    for (std::size_t g = 0; g < lanes; ++g) {
+        std::size_t row = 0;
+        for (std::size_t i = 0; i < readings.turns; ++i) {
+            for (const auto& side : readings.pulses.time_s) {
+                for (const auto& column : side) {
+                    const double seen = column[i][g];
+                    const double time = reference[row++][g];
+                    if (g % 4 == 1 || seen == 0.0) {
+                        EXPECT_EQ(time, seen);
+                    }
+                    moved += time != seen ? 1 : 0;
+                }
+            }
+        }
+    }
+    EXPECT_GT(moved, reference.size() * lanes / 4);  // half of all pulses, of three gyros in four
+    for (const std::string& target : simd::available_targets()) {
+        simd::use_target(target);
+        for (const std::size_t piece : {1U, 7U, 200U}) {
+            const PulseTimes same = aligned_times(devices, readings, piece);
+            for (std::size_t g = 0; g < lanes; ++g) EXPECT_EQ(differing(same, g, g), 0U) << target << " " << piece;
+        }
+        for (const std::size_t g : {0U, 1U, 15U}) {
+            readout::LaneReadings alone = readings;
+            for (auto* column : {&alone.sine, &alone.cosine, &alone.phase_fringes, &alone.phase_whole}) {
+                for (simd::Lanes& row : *column) row[0] = row[g];
+            }
+            for (auto& side : alone.pulses.time_s) {
+                for (auto& column : side) {
+                    for (simd::Lanes& row : column) row[0] = row[g];
+                }
+            }
+            EXPECT_EQ(differing(aligned_times({devices[g]}, alone, 200), 0, g), 0U) << target << " " << g;
+        }
+    }
+    simd::use_best_target();
 }
 
 TEST(PulseTables, HoldAtFastInputs) {
