@@ -22,10 +22,10 @@ namespace ringlock::compensate {
 /// over the kick's kappa = b sqrt(2 pi/a) that is up to 1/sqrt(4 pi D): a third at the first pulse, an eighth at the
 /// fourth, with the sign of each second quarter fringe. Half a kick and tau differ only by how they depend on g, so
 /// that the straight line enlarges these tails where it is carried to g = 0. Four pulses leave 0.78 of the error's rms
-/// (1.13 with three, 0.43 with six, 0.21 with 16, 0.055 with 64: the sum of the above over psi_0), whatever the
-/// threshold; the estimate is 1.07 times the kick and has a correlation of 0.81 with it, so that 0.61 times the
-/// estimate would leave 0.59. The default instrument's comparators and clock add 0.015 rad a cycle, 0.0002 deg/sqrt(h);
-/// the amplitudes of half cycles, of which the mean is known, a tenth of that behind injected noise of 3 rad.
+/// (1.13 with three: the sum of the above over psi_0), whatever the threshold; the estimate is 1.07 times the kick and
+/// has a correlation of 0.81 with it, so that 0.61 times the estimate would leave 0.59. The default instrument's
+/// comparators and clock add 0.015 rad a cycle, 0.0002 deg/sqrt(h); the amplitudes of half cycles, of which the mean is
+/// known, a tenth of that behind injected noise of 3 rad. What more pulses would leave: docs/readout.md.
 class Extrapolated final : public LaneCompensator {
    public:
     /// `electronics`: as the readings' pulses were taken; noise and hysteresis are known to the operator.

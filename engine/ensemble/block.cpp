@@ -22,6 +22,7 @@
 #include "engine/readout/ellipse_correction.hpp"
 #include "engine/readout/fraction_recovery.hpp"
 #include "engine/readout/lane_readout.hpp"
+#include "engine/readout/pulse_alignment.hpp"
 
 namespace ringlock::ensemble {
 
@@ -147,6 +148,7 @@ class Branch {
             // Amplitudes are half the difference of two turns' noise.
             std::vector<gyro::Device> told = devices_;
             for (gyro::Device& device : told) device.coupling.b_rad_s = told_b_rad_s(scenario, device);
+            alignment_.emplace(told);
             recovery_.emplace(told, electronics, injected_rms_rad(scenario, kind) / std::numbers::sqrt2);
         }
     }
@@ -161,7 +163,10 @@ class Branch {
         readout_->read(drive_, turns_, noise, every_turn_ ? 1 : 2, readings_, angles_);
         if (ellipse_) ellipse_->correct(readings_, angles_, interpolated_);
         if (samples_wanted_) samples_ = readings_;
-        if (recovery_) recovery_->recover(readings_, &angles_);
+        if (recovery_) {
+            alignment_->align(readings_);
+            recovery_->recover(readings_, &angles_);
+        }
         for (Listener& listener : listeners_) {
             if (listener.compensator) {
                 const bool samples = listener.compensator->wants_samples();
@@ -194,6 +199,7 @@ class Branch {
     std::optional<readout::LaneReadout> readout_;
     std::vector<Listener> listeners_;
     std::optional<readout::EllipseCorrection> ellipse_;
+    std::optional<readout::PulseAlignment> alignment_;
     std::optional<readout::FractionRecovery> recovery_;
     bool interpolated_ = false;
     bool compensated_ = false;

@@ -141,11 +141,14 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& tables, cons
             const V counted = hn::IfThenElse(switched, floor, floor + one);
 
             // Sampling: half-way between the nearest pulses that were told apart, t_b and t_a, but for the hysteresis,
-            // for which t_a^2 - t_b^2 is 4 h/a with times from the zero-rate point.
-            const V sum = hn::IfThenElse(told, seen[0][0] + seen[1][0], seen[0][1] + seen[1][1]);
-            const V apart = hn::IfThenElse(told, seen[1][0] - seen[0][0], seen[1][1] - seen[0][1]) * tick_s;
+            // for which t_a^2 - t_b^2 is 4 h/a with times from the zero-rate point; these go with 1/sqrt(a), and
+            // sqrt(a) with the half cycle's angular frequency.
+            const V last = hn::IfThenElse(told, seen[0][0], seen[0][1]);
+            const V first = hn::IfThenElse(told, seen[1][0], seen[1][1]);
+            const V share = before.w / (before.w + after.w);
+            const V apart = (first - last) * tick_s;
             const V skew_s = (hysteresis + hysteresis) * scale[1] * scale[1] / apart;
-            const V middle = sm::fnma(d, skew_s, clock, half * sum);
+            const V middle = sm::fnma(d, skew_s, clock, sm::fma(d, share, last, (one - share) * first));
             const V latch = electronics.ideal ? t0 : clocked ? hn::Floor(middle) : middle;
             const V off_s = (clocked ? (latch - tick_fraction) * tick_s : latch) - t0;
             const V side_scale = hn::IfThenElse(off_s < zero, scale[0], scale[1]);

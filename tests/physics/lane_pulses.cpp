@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "engine/readout/lane_readout.hpp"
+#include "engine/readout/pulse_alignment.hpp"
+#include "engine/simd/target.hpp"
 #include "tests/physics/readout_support.hpp"
 
 namespace ringlock::test {
@@ -78,6 +80,189 @@ TEST(PulseTables, WithAnAsymmetryAreOffByItsShareOfTheTimeBetweenTheTurns) {
             EXPECT_GT(worst, 0.5 * share * between_s);  // the statement is worth making
         }
     }
+}
+
+TEST(PulseAlignment, GivesBothSidesOfAnAsymmetricDitherOneExtremum) {
+    for (const Beyond beyond : {Beyond::nothing, Beyond::harmonic_and_asymmetry, Beyond::second_coupling}) {
+        for (const double asymmetry : {0.001, -0.01}) {
+            Uniform uniform(508);
+            double raw = 0.0;
+            double aligned = 0.0;
+            double longest_s = 0.0;  // between the turns of phase and dither
+            for (int i = 0; i < 60; ++i) {
+                Turn turn = random_turn(uniform, 0.0, beyond);
+                turn.setup.dither_asymmetry_ratio = asymmetry;
+                turn.setup.dither_harmonic_ratio = 0.0;
+                turn.before_ratio = turn.after_ratio = 1.0;
+                const int direction = i % 2 == 0 ? 1 : -1;
+                const gyro::Device device = turn.device();
+                const TurnPath path = turn.path(direction);
+                const double psi = path.zero_rate_phase_rad();
+                const double d1 = first_distance_rad(direction, psi);
+                longest_s = std::max(longest_s, std::abs(path.zero_rate_time_s()));
+                // As if sampled at the extremum.
+                readout::LaneReadings readings;
+                readings.first_turn = direction > 0 ? 0 : 1;
+                readings.resize(1);
+                readings.pulses.resize(1);
+                readings.sine[0][0] = std::sin(psi);
+                readings.cosine[0][0] = std::cos(psi);
+                std::vector<double> distances;
+                for (std::size_t k = 0; k < readout::kept_pulses; ++k) {
+                    distances.push_back(d1 + static_cast<double>(k) * quarter_rad);
+                }
+                for (const std::size_t side : {0U, 1U}) {
+                    for (std::size_t k = 0; k < readout::kept_pulses; k += 2) {
+                        const auto times = path.crossing_times_s(side == 0 ? -1 : 1, {distances[k], distances[k + 1]});
+                        readings.pulses.time_s[side][k][0][0] = times[0] - path.zero_rate_time_s();
+                        readings.pulses.time_s[side][k + 1][0][0] = times[1] - path.zero_rate_time_s();
+                    }
+                }
+                readout::PulseTables tables;
+                tables.make(0, device, readout::kept_pulses);
+                const double floor = std::floor(direction * psi / quarter_rad);
+                const auto quarter = static_cast<std::size_t>(floor - 4.0 * std::floor(0.25 * floor));
+                const auto worst = [&] {
+                    double most = 0.0;
+                    for (const std::size_t side : {0U, 1U}) {
+                        const gyro::HalfCycle half = turn.half(side == 0 ? -direction : direction, 1.0);
+                        const double a = half.end_acceleration_rad_s2(side == 0 ? 1 : 0);
+                        for (std::size_t k = 0; k < readout::kept_pulses; ++k) {
+                            const auto& table = tables.times[direction > 0 ? 0 : 1][side][k];
+                            const double t =
+                                std::sqrt(2.0 * distances[k] / a) * readout::PulseTables::at(table, 0, quarter, d1);
+                            // Near the extremum a time says little: as phase, in units of the farthest pulse's.
+                            const double weight = std::sqrt(distances[k] / distances.back());
+                            most =
+                                std::max(most, weight * std::abs(std::abs(readings.pulses.time_s[side][k][0][0]) - t));
+                        }
+                    }
+                    return most;
+                };
+                raw = std::max(raw, worst());
+                readout::PulseAlignment alignment(std::vector{device});
+                alignment.align(readings);
+                aligned = std::max(aligned, worst());
+            }
+            const double share = std::abs(std::pow((1.0 + asymmetry) / (1.0 - asymmetry), 2) - 1.0);
+            std::printf("asymmetry %g: pulses off by %.2g s, aligned by %.2g s; turns %.2g s apart\n", asymmetry, raw,
+                        aligned, longest_s);
+            EXPECT_GT(raw, 0.5 * share * longest_s);
+            // The tables' own error, and the share's next order.
+            EXPECT_LT(aligned, 2e-11 + 1e-3 * share * longest_s);
+        }
+    }
+}
+
+/// What is in them does not matter.
+readout::LaneReadings made_up_readings(std::size_t turns) {
+    Uniform uniform(509);
+    readout::LaneReadings readings;
+    readings.resize(turns);
+    readings.pulses.resize(turns);
+    for (std::size_t i = 0; i < turns; ++i) {
+        for (std::size_t g = 0; g < lanes; ++g) {
+            const double phase = uniform(-20.0, 20.0);
+            readings.sine[i][g] = std::sin(phase);
+            readings.cosine[i][g] = std::cos(phase);
+            readings.phase_fringes[i][g] = phase / units::two_pi;
+            readings.phase_whole[i][g] = (i % 2 == 0 ? 0.0 : 2005.0) + static_cast<double>(i);
+            for (const double side : {-1.0, 1.0}) {
+                for (std::size_t k = 0; k < readout::kept_pulses; ++k) {
+                    const double time_s = side * uniform(1e-5, 2e-5) * static_cast<double>(k + 1);
+                    readings.pulses.time_s[side < 0.0 ? 0 : 1][k][i][g] = k == 0 && i % 5 == g % 5 ? 0.0 : time_s;
+                }
+            }
+        }
+    }
+    return readings;
+}
+
+using PulseTimes = std::vector<simd::Lanes>;  // [turn][side][pulse]
+
+PulseTimes aligned_times(const std::vector<gyro::Device>& devices, const readout::LaneReadings& all,
+                         std::size_t piece) {
+    readout::PulseAlignment alignment(devices);
+    PulseTimes times;
+    for (std::size_t first = 0; first < all.turns; first += piece) {
+        const std::size_t count = std::min(piece, all.turns - first);
+        readout::LaneReadings part;
+        part.first_turn = static_cast<std::int64_t>(first);
+        part.resize(count);
+        part.pulses.resize(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            part.sine[i] = all.sine[first + i];
+            part.cosine[i] = all.cosine[first + i];
+            part.phase_fringes[i] = all.phase_fringes[first + i];
+            part.phase_whole[i] = all.phase_whole[first + i];
+            for (const std::size_t side : {0U, 1U}) {
+                for (std::size_t k = 0; k < readout::kept_pulses; ++k) {
+                    part.pulses.time_s[side][k][i] = all.pulses.time_s[side][k][first + i];
+                }
+            }
+        }
+        alignment.align(part);
+        for (std::size_t i = 0; i < count; ++i) {
+            for (const auto& side : part.pulses.time_s) {
+                for (const auto& column : side) times.push_back(column[i]);
+            }
+        }
+    }
+    return times;
+}
+
+TEST(PulseAlignment, PiecesLaneMatesAndInstructionSetsDoNotMatter) {
+    Uniform uniform(510);
+    std::vector<gyro::Device> devices;
+    for (std::size_t g = 0; g < lanes; ++g) {
+        Turn turn = random_turn(uniform, 0.0, g % 3 == 0 ? Beyond::second_coupling : Beyond::nothing);
+        if (g % 4 == 1) turn.setup.dither_asymmetry_ratio = 0.0;
+        devices.push_back(turn.device());
+    }
+    const readout::LaneReadings readings = made_up_readings(200);
+    const PulseTimes reference = aligned_times(devices, readings, 200);
+    const auto differing = [&](const PulseTimes& other, std::size_t lane, std::size_t of) {
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < reference.size(); ++i) count += other[i][lane] != reference[i][of] ? 1 : 0;
+        return count;
+    };
+    std::size_t moved = 0;
+    for (std::size_t g = 0; g < lanes; ++g) {
+        std::size_t row = 0;
+        for (std::size_t i = 0; i < readings.turns; ++i) {
+            for (const auto& side : readings.pulses.time_s) {
+                for (const auto& column : side) {
+                    const double seen = column[i][g];
+                    const double time = reference[row++][g];
+                    if (g % 4 == 1 || seen == 0.0) {
+                        EXPECT_EQ(time, seen);
+                    }
+                    moved += time != seen ? 1 : 0;
+                }
+            }
+        }
+    }
+    EXPECT_GT(moved, reference.size() * lanes / 4);  // half of all pulses, of three gyros in four
+    for (const std::string& target : simd::available_targets()) {
+        simd::use_target(target);
+        for (const std::size_t piece : {1U, 7U, 200U}) {
+            const PulseTimes same = aligned_times(devices, readings, piece);
+            for (std::size_t g = 0; g < lanes; ++g) EXPECT_EQ(differing(same, g, g), 0U) << target << " " << piece;
+        }
+        for (const std::size_t g : {0U, 1U, 15U}) {
+            readout::LaneReadings alone = readings;
+            for (auto* column : {&alone.sine, &alone.cosine, &alone.phase_fringes, &alone.phase_whole}) {
+                for (simd::Lanes& row : *column) row[0] = row[g];
+            }
+            for (auto& side : alone.pulses.time_s) {
+                for (auto& column : side) {
+                    for (simd::Lanes& row : column) row[0] = row[g];
+                }
+            }
+            EXPECT_EQ(differing(aligned_times({devices[g]}, alone, 200), 0, g), 0U) << target << " " << g;
+        }
+    }
+    simd::use_best_target();
 }
 
 TEST(PulseTables, HoldAtFastInputs) {

@@ -65,7 +65,10 @@ double worst_pulse_s(double rate_deg_h, double asymmetry, double amplitude_off, 
                 }
             }
             if (near < least_rad) continue;  // the sampling's own instant hangs on the nearest pulses
-            const double sampled_s = 0.5 * (true_s[0][0] + true_s[1][0]);
+            // Times from the extremum go with 1/sqrt(a), sqrt(a) with the inverse of the half cycle's duration.
+            const double before_s = turns[i].half(-direction, 1.0).duration_s;
+            const double after_s = turns[i].half(direction, 1.0).duration_s;
+            const double sampled_s = (after_s * true_s[0][0] + before_s * true_s[1][0]) / (before_s + after_s);
             for (const std::size_t side : {0U, 1U}) {
                 for (std::size_t k = 0; k < readout::kept_pulses; ++k) {
                     worst = std::max(worst, std::abs(pulse(side, k) - (true_s[side][k] - sampled_s)));

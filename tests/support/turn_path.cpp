@@ -117,9 +117,14 @@ double TurnPath::acceleration_rad_s2(int side) const {
 }
 
 std::array<double, 2> TurnPath::crossing_times_s(int side, const std::array<double, 2>& distance_rad) const {
+    const std::vector<double> times = crossing_times_s(side, std::span<const double>(distance_rad));
+    return {times[0], times[1]};
+}
+
+std::vector<double> TurnPath::crossing_times_s(int side, std::span<const double> distance_rad) const {
     // The phase moves away from the extremum in the direction of `after` on both sides.
     const double sign = after_.sign;
-    std::array<double, 2> times{};
+    std::vector<double> times(distance_rad.size());
     std::size_t found = 0;
     double time = zero_time_s_;
     double phase = zero_phase_rad_;
@@ -130,19 +135,20 @@ std::array<double, 2> TurnPath::crossing_times_s(int side, const std::array<doub
         const double h = side * std::min(series.step_s(pulse_tolerance_rad), here.limit_s);
         const double gone = sign * (phase - zero_phase_rad_);
         const double reached = gone + sign * series.gain_rad(h);
-        while (found < 2 && reached >= distance_rad[found]) {
+        while (found < times.size() && reached >= distance_rad[found]) {
             const double wanted = distance_rad[found] - gone;
             times[found] = time + root([&](double x) { return sign * series.gain_rad(x) - wanted; },
                                        [&](double x) { return sign * series.rate_rad_s(x); },
                                        h * std::sqrt(wanted / (reached - gone)), h);
             ++found;
         }
-        if (found == 2) return times;
+        if (found == times.size()) return times;
         phase = series.phase_rad(h);
         // Land on the dither's turn exactly: the half cycle changes there.
         time = std::abs(h) == here.limit_s && (time > 0.0) != (side > 0) && time != 0.0 ? 0.0 : time + h;
     }
-    throw RunError("readout: fewer than two quarter-fringe pulses between a turn and the middle of its half cycle");
+    throw RunError(
+        "readout: fewer quarter-fringe pulses than asked for between a turn and the middle of its half cycle");
 }
 
 }  // namespace ringlock::test

@@ -1,5 +1,7 @@
 #pragma once
 #include <array>
+#include <span>
+#include <vector>
 
 #include "engine/gyro/half_cycle.hpp"
 
@@ -28,6 +30,8 @@ class TurnPath {
     /// Times at which the phase is `distance_rad[0]` < `distance_rad[1]` away from its extremum, before (side -1) or
     /// after (+1) it.
     std::array<double, 2> crossing_times_s(int side, const std::array<double, 2>& distance_rad) const;
+    /// The same of any number of distances, nearest first.
+    std::vector<double> crossing_times_s(int side, std::span<const double> distance_rad) const;
 
    private:
     /// Half cycle and time in it that hold at `time_s` when going towards `side`.
