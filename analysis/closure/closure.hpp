@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,6 +26,14 @@ struct Step {
     std::string experiment;                    ///< what would tell them apart
 };
 
+/// One-step predictions of the final model.
+struct Residual {
+    std::vector<double> time_s;
+    std::vector<double> innovation;
+    std::vector<double> sd;              ///< that the model foretells
+    std::vector<std::uint8_t> reported;  ///< 1: held out, used for nothing but the report
+};
+
 /// What a record says of the model.
 struct Closure {
     Verdict verdict = Verdict::nothing_missing;
@@ -38,9 +47,16 @@ struct Closure {
     std::optional<ResidualTest> unexplained;
     std::vector<std::string> notes;                 ///< what was assumed
     double level = 0.0;                             ///< probability of any false alarm
+    double mean_input_rate_deg_h = 0.0;             ///< known input, of which the bias is free
+    Residual residual;
 };
 
-/// Runs the loop on /turns. Throws InputError where the record does not suffice.
+/// Runs the loop on the record's turns, or on its samples where it has no turns. Throws InputError where the record does
+/// not suffice.
+Closure close_loop(const record::Record& record);
+
+/// The two of them.
 Closure close_turns(const record::Record& record);
+Closure close_samples(const record::Record& record);
 
 }  // namespace ringlock::closure

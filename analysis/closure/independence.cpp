@@ -263,6 +263,10 @@ std::string_view name_of(Where where) {
     return "amplitude";
 }
 
+std::string ResidualTest::description() const {
+    return fmt::format("{}{}{}, by chance p {:.2g}", view, detail.empty() ? "" : ", ", detail, p_value);
+}
+
 std::vector<ResidualTest> test_residual(const TurnFit& fit) {
     std::vector<ResidualTest> tests;
     test_phase(fit, tests);

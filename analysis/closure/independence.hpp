@@ -16,6 +16,8 @@ struct ResidualTest {
     std::string view;   ///< what the residual was held against
     double p_value = 1.0;
     std::string detail;  ///< the largest of what was seen
+
+    std::string description() const;
 };
 
 /// Holds the innovations that count against everything that the record has: phase at the turns and its harmonics,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <numbers>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/closure.hpp"
@@ -95,6 +96,18 @@ int free_parameters(const effects::Effect& effect) {
     return count;
 }
 
+/// Amplitude and frequency of the dither: means over the record.
+void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
+    const gyro::Setup& setup = fitted.series.setup;
+    const auto n = static_cast<double>(fitted.series.size());
+    // Ends of the record, each as uncertain as a turn is.
+    const double late_s = fitted.fit->sd_rad().front() / (fitted.series.acceleration_rad_s2 * fitted.series.interval_s);
+    base.push_back({"", "dither_frequency_hz", setup.dither_frequency_hz,
+                    setup.dither_frequency_hz * std::numbers::sqrt2 * late_s / fitted.series.time_s.back()});
+    base.push_back({"", "dither_peak_rate_deg_s", setup.dither_peak_rate_deg_s,
+                    setup.dither_peak_rate_deg_s * fitted.fit->sd_rad().front() / (fitted.series.amplitude_rad * std::sqrt(n))});
+}
+
 /// What would tell two effects apart that this record cannot.
 std::string experiment_for(const std::string& effect, const std::vector<std::string>& others) {
     const auto has = [&](std::string_view name) {
@@ -119,18 +132,6 @@ std::string experiment_for(const std::string& effect, const std::vector<std::str
 
 }  // namespace
 
-std::string_view name_of(Verdict verdict) {
-    switch (verdict) {
-        case Verdict::nothing_missing:
-            return "nothing_missing";
-        case Verdict::closed:
-            return "closed";
-        case Verdict::unexplained:
-            break;
-    }
-    return "unexplained";
-}
-
 Closure close_turns(const record::Record& record) {
     Closure closure;
     closure.unit = "rad";
@@ -148,7 +149,6 @@ Closure close_turns(const record::Record& record) {
 
     while (closure.steps.size() < most_steps) {
         auto candidates = screen_side_channels(turns, *now->fit, now->joined);
-        const std::size_t beside = candidates.size();
         std::vector<Candidate> passing;
         const auto take_passing = [&] {
             for (Candidate& candidate : candidates) {
@@ -157,7 +157,6 @@ Closure close_turns(const record::Record& record) {
             candidates.clear();
         };
         take_passing();
-        (void)beside;
         const bool side = !passing.empty();
         if (!side) {
             candidates = screen(*now->fit);
@@ -219,6 +218,14 @@ Closure close_turns(const record::Record& record) {
     if (of_several(worst->p_value, static_cast<double>(closure.tests.size())) < level_of_residual) {
         closure.unexplained = *worst;
     }
+    closure.residual.time_s = turns.time_s;
+    for (std::size_t i = 0; i < turns.size(); ++i) {
+        const double sd = now->fit->sd_rad()[i];
+        closure.residual.innovation.push_back(now->fit->innovations()[i] * sd);
+        closure.residual.sd.push_back(sd);
+        closure.residual.reported.push_back(rows[i] ? 0 : 1);
+        closure.mean_input_rate_deg_h += now->series.input_rate_deg_h[i] / static_cast<double>(turns.size());
+    }
     // The figures that are kept: from the whole record.
     const auto whole = fit_record(record, now->fit->parameters(), Rows(turns.size(), 1));
     for (const Estimate& estimate : whole->fit->estimates()) {
@@ -230,6 +237,7 @@ Closure close_turns(const record::Record& record) {
             if (step.effect == estimate.effect) step.parameters.push_back(estimate);
         }
     }
+    add_dither(closure.base, *whole);
     closure.verdict = closure.unexplained     ? Verdict::unexplained
                       : closure.steps.empty() ? Verdict::nothing_missing
                                               : Verdict::closed;

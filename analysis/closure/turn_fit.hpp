@@ -17,6 +17,7 @@ struct Estimate {
     std::string effect, name;
     double value = 0.0;
     double sd = 0.0;
+    std::string text = {};  ///< a name in place of a number
 };
 
 /// The model fitted to the turns that count, by maximum likelihood.

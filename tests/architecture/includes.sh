@@ -24,6 +24,7 @@ declare -A may=(
     [analysis/noise]="analysis/allan engine/core engine/random"
     [analysis/record]="analysis/allan analysis/noise engine/core engine/store"
     [analysis/study]="analysis/allan analysis/noise engine/*"
+    [analysis/closure]="analysis/record engine/*"
     [analysis/report]="analysis/* engine/*"
     [app]="analysis/* engine/*"
     [tests]="app analysis/* engine/*"

@@ -1,0 +1,251 @@
+#include "analysis/closure/report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "engine/core/atomic_path.hpp"
+#include "engine/core/error.hpp"
+#include "engine/core/units.hpp"
+#include "engine/scenario/render.hpp"
+#include "engine/store/atomic_file.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+using nlohmann::json;
+
+json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+
+json estimates_json(const std::vector<Estimate>& estimates) {
+    json object = json::object();
+    for (const Estimate& estimate : estimates) {
+        object[estimate.name] = {{"value", number(estimate.value)}, {"std", number(estimate.sd)}};
+        if (!estimate.text.empty()) object[estimate.name]["value"] = estimate.text;
+    }
+    return object;
+}
+
+std::string probability(double p) { return p < 1e-99 ? "< 1e-99" : fmt::format("{:.2g}", p); }
+
+void write_text(const std::filesystem::path& path, const std::string& text) {
+    AtomicPath target(path);
+    std::ofstream file(target.partial(), std::ios::binary);
+    file << text;
+    file.close();
+    if (!file) throw RunError(fmt::format("{}: cannot be written; is the disk full?", path.string()));
+    target.commit();
+}
+
+double value_of(const std::vector<Estimate>& estimates, std::string_view name, double otherwise) {
+    for (const Estimate& estimate : estimates) {
+        if (estimate.name == name && std::isfinite(estimate.value)) return estimate.value;
+    }
+    return otherwise;
+}
+
+}  // namespace
+
+nlohmann::json to_json(const Closure& closure) {
+    json object;
+    object["verdict"] = name_of(closure.verdict);
+    object["base"] = estimates_json(closure.base);
+    object["steps"] = json::array();
+    for (const Step& step : closure.steps) {
+        json s = {{"effect", step.effect},
+                  {"parameters", estimates_json(step.parameters)},
+                  {"heldout_error_before", number(step.heldout_error_before)},
+                  {"heldout_error_after", number(step.heldout_error_after)},
+                  {"heldout_log_score_gain", number(step.heldout_log_score_gain)},
+                  {"p_value", number(step.p_value)}};
+        if (!step.confounded_with.empty()) {
+            s["confounded_with"] = step.confounded_with;
+            s["experiment"] = step.experiment;
+        }
+        object["steps"].push_back(std::move(s));
+    }
+    object["heldout_error"] = {{"unit", closure.unit},
+                               {"before", number(closure.heldout_before)},
+                               {"after", number(closure.heldout_after)},
+                               {"noise_floor", number(closure.noise_floor)}};
+    json unexplained = {{"present", closure.unexplained.has_value()}};
+    if (closure.unexplained) {
+        unexplained["where"] = name_of(closure.unexplained->where);
+        unexplained["detail"] = closure.unexplained->description();
+    } else {
+        unexplained["where"] = nullptr;
+        unexplained["detail"] = "";
+    }
+    object["unexplained"] = std::move(unexplained);
+    object["tests"] = json::array();
+    for (const ResidualTest& test : closure.tests) {
+        object["tests"].push_back({{"where", name_of(test.where)},
+                                   {"view", test.view},
+                                   {"p_value", number(test.p_value)},
+                                   {"detail", test.detail}});
+    }
+    object["family_wise_level"] = closure.level;
+    object["notes"] = closure.notes;
+    return object;
+}
+
+std::string to_text(const Closure& closure) {
+    std::string text;
+    const auto line = [&](const std::string& s) { text += s + "\n"; };
+    switch (closure.verdict) {
+        case Verdict::nothing_missing:
+            line("nothing missing: what the base model leaves of this record is chance");
+            break;
+        case Verdict::closed:
+            line("closed: with the effects below, what is left of this record is chance");
+            break;
+        case Verdict::unexplained:
+            line(fmt::format("unexplained: structure is left that no effect of the library takes away, in {}: {}",
+                             name_of(closure.unexplained->where), closure.unexplained->description()));
+            break;
+    }
+    line("");
+    line("base model:");
+    for (const Estimate& e : closure.base) line(fmt::format("  {:<26} {:>14.8g} +- {:.2g}", e.name, e.value, e.sd));
+    for (std::size_t k = 0; k < closure.steps.size(); ++k) {
+        const Step& step = closure.steps[k];
+        line("");
+        line(fmt::format("step {}: {}   (by chance: p {})", k + 1, step.effect, probability(step.p_value)));
+        for (const Estimate& e : step.parameters) {
+            line(e.text.empty() ? fmt::format("  {:<26} {:>14.8g} +- {:.2g}", e.name, e.value, e.sd)
+                                : fmt::format("  {:<26} {:>14}", e.name, e.text));
+        }
+        line(fmt::format("  held-out error {:.6g} -> {:.6g} {}, log-score +{:.1f}", step.heldout_error_before,
+                         step.heldout_error_after, closure.unit, step.heldout_log_score_gain));
+        if (!step.confounded_with.empty()) {
+            line(fmt::format("  this record cannot tell it from: {}", fmt::join(step.confounded_with, ", ")));
+            line(fmt::format("  what would: {}", step.experiment));
+        }
+    }
+    line("");
+    line(fmt::format("held-out one-step error: {:.6g} {} before, {:.6g} after; the fitted noise alone would leave {:.6g}",
+                     closure.heldout_before, closure.unit, closure.heldout_after, closure.noise_floor));
+    line("");
+    line("residual held against:");
+    for (const ResidualTest& test : closure.tests) {
+        line(fmt::format("  {:<11} {:<62} p {}", name_of(test.where), test.view, probability(test.p_value)));
+    }
+    for (const std::string& note : closure.notes) line("note: " + note);
+    return text;
+}
+
+scenario::Scenario closed_scenario(const record::Record& record, const Closure& closure) {
+    scenario::Scenario scenario;
+    const scenario::Scenario standard;
+    for (auto& [effect, values] : scenario.effects) {
+        const effects::Effect* known = effects::find(effect);
+        for (const effects::Parameter& parameter : known->parameters()) {
+            // The standard device has quantum noise; this one has what was found.
+            if (parameter.role == effects::Role::deviation) values.at(std::string(parameter.name)) = 0.0;
+        }
+    }
+    scenario.gyro.scale_factor_arcsec = record.declared.scale_factor_arcsec.value_or(standard.gyro.scale_factor_arcsec);
+    scenario.gyro.lockin_threshold_deg_h =
+        value_of(closure.base, "lockin_threshold_deg_h", standard.gyro.lockin_threshold_deg_h);
+    scenario.dither.frequency_hz = value_of(closure.base, "dither_frequency_hz", standard.dither.frequency_hz);
+    scenario.dither.peak_rate_deg_s = value_of(closure.base, "dither_peak_rate_deg_s", standard.dither.peak_rate_deg_s);
+    const double input = closure.mean_input_rate_deg_h;
+    scenario.input.rate_deg_h = value_of(closure.base, "bias_deg_h", 0.0) + input;
+    scenario.input.sweep_stop_deg_h = scenario.input.rate_deg_h;
+    scenario.readout.detector_noise_relative =
+        std::clamp(value_of(closure.base, "readout_noise_rad", standard.readout.detector_noise_relative), 0.0, 0.1);
+    const double injected = value_of(closure.base, "injected_noise_rad", 0.0);
+    // Below a hundredth of a radian nothing is randomised: a dither without noise.
+    const bool noisy = injected > 0.01;
+    if (noisy) scenario.noise_injection.turn_phase_rms_rad = injected;
+    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
+    scenario.ensemble.dither_amplitude_sd_relative = 0.0;
+    if (record.turns) {
+        scenario.ensemble.duration_s = std::max(10.0, record.turns->time_s.back() - record.turns->time_s.front());
+    }
+    scenario.ensemble.gyros = 8;
+    scenario.output.sample_interval_s =
+        std::max(1.5 / scenario.dither.frequency_hz, std::min(1.0, scenario.ensemble.duration_s / 300.0));
+    if (!record.temperature_c.empty() && record.temperature_c.time_s.size() > 1) {
+        const auto& t = record.temperature_c;
+        const double span_h = (t.time_s.back() - t.time_s.front()) / 3600.0;
+        scenario.environment.temperature_ramp_k_per_h = (t.value.back() - t.value.front()) / span_h;
+    }
+    for (const Step& step : closure.steps) {
+        const auto found = scenario.effects.find(step.effect);
+        if (found == scenario.effects.end()) continue;
+        for (const Estimate& estimate : step.parameters) {
+            const auto value = found->second.find(estimate.name);
+            if (value != found->second.end()) value->second = estimate.value;
+        }
+    }
+    scenario.arms = noisy ? std::vector<std::string>{"ideal", "noise_injected", "noise_injected+compensated",
+                                                     "noise_injected+compensated_exact"}
+                          : std::vector<std::string>{"ideal", "uncompensated", "compensated", "compensated_exact"};
+    return scenario;
+}
+
+void write_closure(const std::filesystem::path& folder, const std::string& source, const record::Record& record,
+                   const Closure& closure) {
+    std::error_code failed;
+    std::filesystem::create_directories(folder, failed);
+    if (failed || !std::filesystem::is_directory(folder)) {
+        throw InputError(fmt::format("{}: the folder for the closed loop's files cannot be made ({}); give another with "
+                                     "-o",
+                                     folder.string(), failed ? failed.message() : "a file of that name is there"));
+    }
+    store::AtomicFile file(folder / "closure.h5");
+    store::File& h5 = file.file();
+    h5.set_attribute("format", std::string_view("rlg-closure"));
+    h5.set_attribute("format_version", 1);
+    h5.set_attribute("verdict", name_of(closure.verdict));
+    h5.set_attribute("source", std::string_view(source));
+    store::Group parameters = h5.create_group("parameters");
+    std::vector<std::string> names;
+    std::vector<double> values;
+    std::vector<double> sds;
+    const auto add = [&](const std::string& effect, const std::vector<Estimate>& estimates) {
+        for (const Estimate& estimate : estimates) {
+            names.push_back(effect + "." + estimate.name);
+            values.push_back(estimate.value);
+            sds.push_back(estimate.sd);
+        }
+    };
+    add("base", closure.base);
+    for (const Step& step : closure.steps) add(step.effect, step.parameters);
+    parameters.write("name", names, {"", "effect.parameter; the unit is in the name"});
+    parameters.write("value", values, {"1", "estimate from the whole record"});
+    parameters.write("std", sds, {"1", "standard error"});
+    store::Group residual = h5.create_group("residual");
+    const Residual& r = closure.residual;
+    residual.write("time_s", r.time_s, {"s", "time of the prediction"});
+    residual.write("innovation", r.innovation, {closure.unit, "measured less predicted one step before"});
+    residual.write("sd", r.sd, {closure.unit, "standard deviation that the model foretells"});
+    std::vector<std::int8_t> reported(r.reported.begin(), r.reported.end());
+    residual.write("reported", reported, {"1", "1: held out, used for nothing but the report"});
+    store::Group scores = h5.create_group("scores");
+    std::vector<std::string> steps{"base"};
+    std::vector<double> errors{closure.heldout_before};
+    std::vector<double> gains{0.0};
+    for (const Step& step : closure.steps) {
+        steps.push_back(step.effect);
+        errors.push_back(step.heldout_error_after);
+        gains.push_back(step.heldout_log_score_gain);
+    }
+    scores.write("step", steps, {"", "base model, then each effect added"});
+    scores.write("heldout_error", errors, {closure.unit, "rms one-step prediction error of the held-out part"});
+    scores.write("heldout_log_score_gain", gains, {"1", "over the step before"});
+    const scenario::Scenario closed = closed_scenario(record, closure);
+    std::string head = fmt::format("# What was found in {}: {}.\n# The device as fitted, with the effects that were added.\n",
+                                   source, name_of(closure.verdict));
+    const std::string rendered = scenario::to_toml(closed);
+    write_text(folder / "closure.json", to_json(closure).dump(2) + "\n");
+    write_text(folder / "closed.toml", head + "\n" + rendered);
+    file.commit();
+}
+
+}  // namespace ringlock::closure

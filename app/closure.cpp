@@ -1,0 +1,66 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "analysis/closure/closure.hpp"
+#include "analysis/closure/report.hpp"
+#include "analysis/record/record.hpp"
+#include "app/command.hpp"
+#include "app/output.hpp"
+#include "app/record_output.hpp"
+#include "engine/core/error.hpp"
+#include "engine/scenario/parse.hpp"
+
+namespace ringlock::app {
+
+namespace {
+
+/// What the record does not declare, the scenario says.
+void declare(record::Declared& declared, const scenario::Scenario& model) {
+    const auto fill = [](std::optional<double>& to, double value) {
+        if (!to) to = value;
+    };
+    fill(declared.scale_factor_arcsec, model.gyro.scale_factor_arcsec);
+    fill(declared.lockin_threshold_deg_h, model.gyro.lockin_threshold_deg_h);
+    fill(declared.dither_frequency_hz, model.dither.frequency_hz);
+    fill(declared.dither_peak_rate_deg_s, model.dither.peak_rate_deg_s);
+}
+
+}  // namespace
+
+void add_closure(CLI::App& root) {
+    struct Arguments {
+        std::string record;
+        std::string model;
+        std::string out;
+        bool json = false;
+    };
+    CLI::App* command = root.add_subcommand("closure", "Fit a measured record, trace what is left, add what is missing");
+    auto arguments = std::make_shared<Arguments>();
+    command->add_option("RECORD", arguments->record, "rlg-record (.h5), or samples as text")->required();
+    command->add_option("--model", arguments->model, "scenario (.toml) of the instrument, for what the record leaves open");
+    command->add_option("-o,--output", arguments->out, "folder for closed.toml, closure.h5 and closure.json");
+    command->add_flag("--json", arguments->json, "one JSON object on standard output");
+    command->callback([arguments] {
+        record::Record record = record::read_record(arguments->record);
+        tell_warnings(arguments->record, record);
+        if (!arguments->model.empty()) declare(record.declared, scenario::parse_file(arguments->model));
+        closure::Closure closure;
+        try {
+            closure = closure::close_loop(record);
+        } catch (const InputError& error) {
+            throw InputError(fmt::format("{}: {}", arguments->record, error.what()));
+        }
+        if (!arguments->out.empty()) {
+            const std::string name = std::filesystem::path(arguments->record).filename().string();
+            closure::write_closure(arguments->out, name, record, closure);
+        }
+        put(arguments->json ? closure::to_json(closure).dump() + "\n" : closure::to_text(closure));
+    });
+}
+
+}  // namespace ringlock::app
