@@ -16,6 +16,7 @@
     X(lockin_second_harmonic) \
     X(lockin_temperature)     \
     X(lockin_turn_asymmetry)  \
+    X(missed_counts)          \
     X(quantum_noise)          \
     X(rate_random_walk)       \
     X(readout_ellipse)        \
@@ -41,8 +42,8 @@ const Effect* find(std::string_view name) {
 }
 
 std::span<const std::string_view> planned() {
-    static constexpr std::array<std::string_view, 5> names = {"case_motion", "count_quantization", "dither_residue",
-                                                              "missed_counts", "resampling"};
+    static constexpr std::array<std::string_view, 4> names = {"case_motion", "count_quantization", "dither_residue",
+                                                              "resampling"};
     return names;
 }
 

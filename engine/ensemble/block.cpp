@@ -22,6 +22,7 @@
 #include "engine/readout/ellipse_correction.hpp"
 #include "engine/readout/fraction_recovery.hpp"
 #include "engine/readout/lane_readout.hpp"
+#include "engine/readout/missed_counts.hpp"
 #include "engine/readout/pulse_alignment.hpp"
 
 namespace ringlock::ensemble {
@@ -226,7 +227,7 @@ random::LaneIdentities identities(const scenario::Scenario& scenario, std::int64
 struct GyroBlock::State {
     State(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
           std::vector<gyro::Setup> drawn)
-        : setups(std::move(drawn)), who(identities(scenario, first_gyro, setups.size())) {
+        : setups(std::move(drawn)), who(identities(scenario, first_gyro, setups.size())), missed_counts(setups, who) {
         for (const TrajectoryKind kind :
              {TrajectoryKind::ideal, TrajectoryKind::plain, TrajectoryKind::noise_injected}) {
             Branch branch(scenario, arms, setups, who, kind);
@@ -317,6 +318,7 @@ struct GyroBlock::State {
                             pulses * turns, setups.size(), comparators.front().data());
             noise.comparators = comparators;
         }
+        noise.count_errors = count_errors = missed_counts.next(turns);
         return noise;
     }
 
@@ -327,6 +329,8 @@ struct GyroBlock::State {
 
     std::vector<gyro::Setup> setups;
     random::LaneIdentities who;
+    readout::MissedCounts missed_counts;
+    std::span<const simd::Lanes> count_errors;
     std::vector<Branch> branches;
     std::vector<std::unique_ptr<effects::LaneRateProcess>> processes;
     scenario::Environment environment;
@@ -382,6 +386,8 @@ std::span<const simd::LaneCounts> GyroBlock::counts(std::size_t arm) const {
 const readout::LaneReadings& GyroBlock::readings(std::size_t arm) const { return state_->branch_of(arm).readings(); }
 
 const readout::LaneAngles& GyroBlock::angles(std::size_t arm) const { return state_->branch_of(arm).angles(); }
+
+std::span<const simd::Lanes> GyroBlock::count_errors() const { return state_->count_errors; }
 
 double GyroBlock::lockin_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const {
     const readout::LaneAngles& angles = state_->branch_of(arm).angles();

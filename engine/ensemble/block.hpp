@@ -39,6 +39,9 @@ class GyroBlock {
     const readout::LaneReadings& readings(std::size_t arm) const;
     /// What is true of these turns.
     const readout::LaneAngles& angles(std::size_t arm) const;
+    /// Counts of the up/down counters less the true ones at these turns, [turn][gyro] in quarter fringes, for every arm
+    /// alike; empty where none is ever missed.
+    std::span<const simd::Lanes> count_errors() const;
     /// Lock-in error of the trajectory of an arm at a turn of the piece [rad].
     double lockin_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const;
 

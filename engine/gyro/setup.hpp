@@ -28,6 +28,7 @@ struct Setup {
     double input_rate_deg_h = 0.0;
     double initial_phase_rad = 0.0;  ///< optical phase at the first turn
     Ellipse ellipse;
+    double missed_count_probability = 0.0;  ///< of the counter, one pulse in a half cycle
 };
 
 }  // namespace ringlock::gyro

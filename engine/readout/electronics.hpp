@@ -22,11 +22,13 @@ struct Electronics {
     static constexpr double adc_range = 1.25;
 };
 
-/// Standard normal deviates, the same for all trajectories of a block; empty where the electronics have none.
+/// Chance in the electronics, the same for all trajectories of a block; empty where they have none. Standard normal
+/// deviates but for the counters'.
 struct ElectronicNoise {
     std::span<const simd::Lanes> detectors = {};  ///< [2 turn + detector][gyro]: sine, cosine
     /// [2 kept_pulses turn + kept_pulses side + pulse][gyro]: before, after the turn; nearest pulse first
     std::span<const simd::Lanes> comparators = {};
+    std::span<const simd::Lanes> count_errors = {};  ///< [turn][gyro]: count less the true one, quarter fringes
 };
 
 }  // namespace ringlock::readout

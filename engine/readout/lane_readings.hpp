@@ -36,7 +36,7 @@ struct LaneReadings {
     std::vector<simd::Lanes> sine;  ///< quadrature detectors
     std::vector<simd::Lanes> cosine;
     /// Unwrapped phase: the quadrature's on the branch nearest to the middle of the quarter fringe that the counter
-    /// names; fringes, less ...
+    /// names (wrong by whole fringes where it has missed counts); fringes, less ...
     std::vector<simd::Lanes> phase_fringes;
     std::vector<simd::Lanes> phase_whole;  ///< ... these whole ones
     /// Magnitude of the phase acceleration on either side; 0 where no two pulses were told apart.

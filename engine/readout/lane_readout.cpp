@@ -43,7 +43,7 @@ constexpr std::size_t turns_together = 16;
 template <bool extras>
 bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, const Electronics& electronics,
               bool accelerations, std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
-              std::span<const simd::Lanes> noise, std::size_t stride, LaneReadings& readings, LaneAngles& angles) {
+              const ElectronicNoise& noise, std::size_t stride, LaneReadings& readings, LaneAngles& angles) {
     const D d;
     const V zero = hn::Zero(d);
     const V per_rad = hn::Set(d, 0.15915494309189535);
@@ -88,10 +88,10 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
                     cosine = sm::fnma(
                         d, true_sine, load(constants.orthogonality_sine),
                         sm::fma(d, true_cosine, load(constants.orthogonality_cosine), load(constants.offset_cos)));
-                    if (!noise.empty()) {
+                    if (!noise.detectors.empty()) {
                         const V rms = hn::Set(d, electronics.detector_noise_relative);
-                        sine = sm::fma(d, rms, load(noise[2 * i]), sine);
-                        cosine = sm::fma(d, rms, load(noise[2 * i + 1]), cosine);
+                        sine = sm::fma(d, rms, load(noise.detectors[2 * i]), sine);
+                        cosine = sm::fma(d, rms, load(noise.detectors[2 * i + 1]), cosine);
                     }
                     error = sm::arg(d, sm::fma(d, cosine, true_cosine, sine * true_sine),
                                     sm::fnma(d, cosine, true_sine, sine * true_cosine)) *
@@ -104,10 +104,17 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
                 if (!electronics.ideal) error = sm::fraction(d, in_quarter + error) - in_quarter;
                 store(sine, readings.sine[i]);
                 store(cosine, readings.cosine[i]);
-                store(phase + error, readings.phase_fringes[i]);
+                V read = phase + error;
+                V output_error = electronics.interpolate ? error : hn::Neg(in_quarter);
+                if (!noise.count_errors.empty()) {
+                    const V off = quarter * load(noise.count_errors[i]);
+                    const V branch = sm::nearest(d, off - (in_quarter + error));
+                    read = read + branch;
+                    output_error = output_error + (electronics.interpolate ? branch : off);
+                }
+                store(read, readings.phase_fringes[i]);
                 const V swing = direction > 0 ? zero : load(constants.swing_whole);
                 store(load(drive.rotation_whole[i]) + lockin_whole + swing, readings.phase_whole[i]);
-                const V output_error = electronics.interpolate ? error : hn::Neg(in_quarter);
                 store(load(drive.rotation_fringes[i]) + lockin + output_error, angles.angle_fringes[i]);
                 store(load(drive.rotation_whole[i]) + lockin_whole, angles.angle_whole[i]);
                 found[(i - first) / stride].quarters = quarters;
@@ -171,7 +178,7 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
 
 bool read_lanes(const ReadoutConstants& constants, const PulseTables& pulses, const Electronics& electronics,
                 bool accelerations, std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
-                std::span<const simd::Lanes> noise, std::size_t stride, LaneReadings& readings, LaneAngles& angles) {
+                const ElectronicNoise& noise, std::size_t stride, LaneReadings& readings, LaneAngles& angles) {
     const auto read = constants.extras ? read_all<true> : read_all<false>;
     return read(constants, pulses, electronics, accelerations, lanes, drive, turns, noise, stride, readings, angles);
 }
@@ -205,7 +212,7 @@ void LaneReadout::read(const gyro::LaneDrive& drive, const gyro::LaneTurns& turn
         wanted_ == Wanted::pulses
             ? read_pulse_by_pulse(constants_, pulses_, electronics_, lanes_, drive, turns, noise, readings, angles)
             : HWY_DYNAMIC_DISPATCH(read_lanes)(constants_, pulses_, electronics_, wanted_ == Wanted::accelerations,
-                                               lanes_, drive, turns, noise.detectors, stride, readings, angles);
+                                               lanes_, drive, turns, noise, stride, readings, angles);
     if (!reversed) {
         throw RunError(
             "readout: the phase does not reverse near a turn of the dither; the input rate is too high for it");

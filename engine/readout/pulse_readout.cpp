@@ -179,15 +179,25 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& tables, cons
             if (!electronics.ideal) error = sm::fraction(d, phase + error - named) + (named - phase);
             store(sine, readings.sine[i]);
             store(cosine, readings.cosine[i]);
-            store(phase + error, readings.phase_fringes[i]);
+            V read_fringes = phase + error;
+            V output_error = electronics.interpolate ? error : named - phase;
+            V first_quarter = floor + one;
+            if (!noise.count_errors.empty()) {
+                const V off = quarter * load(noise.count_errors[i]);
+                const V branch = sm::nearest(d, off - (phase + error - named));
+                read_fringes = read_fringes + branch;
+                output_error = output_error + (electronics.interpolate ? branch : off);
+                // Which comparator switched, and in which direction, tells its number modulo 4: it moves along.
+                first_quarter = sm::fma(d, sign * branch, hn::Set(d, 4.0), first_quarter);
+            }
+            store(read_fringes, readings.phase_fringes[i]);
             const V swing = drive.direction(i) > 0 ? zero : load(constants.swing_whole);
             store(load(drive.rotation_whole[i]) + lockin_whole + swing, readings.phase_whole[i]);
-            const V output_error = electronics.interpolate ? error : named - phase;
             store(load(drive.rotation_fringes[i]) + lockin + output_error, angles.angle_fringes[i]);
             store(load(drive.rotation_whole[i]) + lockin_whole, angles.angle_whole[i]);
 
             LanePulses& pulses = readings.pulses;
-            store(floor + one, pulses.first_quarter[i]);
+            store(first_quarter, pulses.first_quarter[i]);
             for (std::size_t side = 0; side < 2; ++side) {
                 for (std::size_t pulse = 0; pulse < kept_pulses; ++pulse) {
                     V time_s = (seen[side][pulse] - latch) * tick_s;

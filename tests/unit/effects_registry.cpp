@@ -121,6 +121,32 @@ TEST(Effects, TheThresholdFollowsTheTemperature) {
     }
 }
 
+TEST(MissedCounts, SetTheProbability) {
+    EXPECT_EQ(configured("missed_counts", {{"probability_per_turn", 0.1}}).missed_count_probability, 0.1);
+}
+
+// What a fit relies on: a phase belongs to the size right before it, and everything that can act has a parameter that
+// makes it act.
+TEST(EffectRegistry, RolesMakeSense) {
+    for (const Effect* effect : registry()) {
+        bool acts = false;
+        const Parameter* before = nullptr;
+        for (const Parameter& p : effect->parameters()) {
+            acts = acts || (p.role != Role::time && p.role != Role::frequency && p.role != Role::setting);
+            if (p.role == Role::phase && before != nullptr) {
+                EXPECT_EQ(before->role, Role::size) << effect->name() << "." << p.name;
+            }
+            if (p.role == Role::deviation || p.role == Role::probability) {
+                EXPECT_EQ(p.min, 0.0) << effect->name() << "." << p.name;
+            }
+            before = &p;
+        }
+        EXPECT_TRUE(acts) << effect->name();
+        EXPECT_FALSE(effect->adds_angle() && effect->rate_process(defaults_of(*effect), {}) != nullptr)
+            << effect->name() << " either draws its rate or says what it adds";
+    }
+}
+
 TEST(LockinTurnAsymmetry, SetsTheDifferenceBetweenTheTurns) {
     EXPECT_EQ(configured("lockin_turn_asymmetry", {{"ratio", 0.1}}).lockin_turn_asymmetry, 0.1);
 }
@@ -134,6 +160,7 @@ TEST(EffectRegistry, ConstantsOfTheGyroAreLeftAloneByDefaults) {
         EXPECT_EQ(setup.lockin_second_ratio, untouched.lockin_second_ratio) << effect->name();
         EXPECT_EQ(setup.lockin_turn_asymmetry, untouched.lockin_turn_asymmetry) << effect->name();
         EXPECT_EQ(setup.coupling_phase_rad, untouched.coupling_phase_rad) << effect->name();
+        EXPECT_EQ(setup.missed_count_probability, untouched.missed_count_probability) << effect->name();
         EXPECT_EQ(setup.dither_asymmetry_ratio, untouched.dither_asymmetry_ratio) << effect->name();
     }
 }
