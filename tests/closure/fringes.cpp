@@ -310,6 +310,10 @@ RINGLOCK_INLINE void integrate(const LaneDevice& device, const LaneHalf& half, d
     const Side side = side_of(half);
     const V duration = load(half.duration_s);
     const V start = load(phase_rad);
+    if (!any(side.b != 0.0)) {
+        store(all(0.0), delta_rad);
+        return;
+    }
     const V near = side.w * root_of(side.amplitude * (1.0 + 2.0 * magnitude(d.dither_ratio))) / accuracy.turn_step;
     const V far = 1.0 / d.phase_step;
     V u = all(0.0);
@@ -394,6 +398,7 @@ RINGLOCK_INLINE bool find(const LaneDevice& device, const LaneHalf& half_before,
         const M moved = magnitude(next - u) > newton_tolerance * scale;
         u = open ? next : u;
         open &= moved;
+        if (any(magnitude(u * side.w) > 0.5 * pi)) return false;
     }
     solution_at<extras>(d, before, after, s, start, accuracy, u, gain, rate);
     store(u, extremum.time_s);
