@@ -1,0 +1,205 @@
+#include "tests/closure/samples.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "engine/core/error.hpp"
+
+namespace ringlock::test::closure {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr double two_pi = 2.0 * pi;
+constexpr double gravity_m_s2 = 9.80665;
+constexpr double arcsec_per_rad = 648000.0 / pi;
+
+/// x_k = 2 r cos(w) x_{k-1} - r^2 x_{k-2} + e_k, a pair of poles at r exp(+-i w), stationary and of the rms asked for.
+std::vector<double> resonance(std::size_t size, double rate_hz, const CaseMotion& motion, Random& random) {
+    const double r = std::exp(-pi * motion.width_hz / rate_hz);
+    const double w = two_pi * motion.centre_hz / rate_hz;
+    const double r2 = r * r;
+    const double a = 2.0 * r * std::cos(w);
+    // Variance of the process over that of e (Box & Jenkins, second-order autoregression)
+    const double variance = (1.0 + r2) / ((1.0 - r2) * ((1.0 + r2) * (1.0 + r2) - a * a));
+    const double innovation = motion.rms_arcsec / std::sqrt(variance);
+    const double correlation = a / (1.0 + r2);
+    std::vector<double> x(size);
+    for (std::size_t k = 0; k < size; ++k) {
+        if (k == 0) {
+            x[k] = motion.rms_arcsec * random.normal();
+        } else if (k == 1) {
+            x[k] =
+                correlation * x[0] + motion.rms_arcsec * std::sqrt(1.0 - correlation * correlation) * random.normal();
+        } else {
+            x[k] = a * x[k - 1] - r2 * x[k - 2] + innovation * random.normal();
+        }
+    }
+    return x;
+}
+
+/// Of values at i/from_hz, linear between.
+double at_time(const std::vector<double>& values, double from_hz, double time_s) {
+    const double place = std::clamp(time_s * from_hz, 0.0, static_cast<double>(values.size() - 1));
+    const auto i = std::min(values.size() - 2, static_cast<std::size_t>(place));
+    const double share = place - static_cast<double>(i);
+    return values[i] + share * (values[i + 1] - values[i]);
+}
+
+void check(const SampleTruth& truth) {
+    if (!(truth.rate_hz > 0.0)) throw InputError("truth: rate_hz must be positive");
+    if (truth.size == 0) throw InputError("truth: size must be positive");
+    if (!(truth.resampling.from_hz >= 0.0)) throw InputError("truth: resampling.from_hz must not be negative");
+    if (!(truth.case_motion.coherence >= 0.0 && truth.case_motion.coherence <= 1.0)) {
+        throw InputError("truth: case_motion.coherence must lie between 0 and 1");
+    }
+    const std::string& witness = truth.case_motion.witness;
+    if (witness != "accel_x" && witness != "accel_y" && witness != "accel_z") {
+        throw InputError("truth: case_motion.witness must be accel_x, accel_y or accel_z, not " + witness);
+    }
+}
+
+}  // namespace
+
+record::Record generate_samples(const SampleTruth& truth) {
+    check(truth);
+    const bool resampled = truth.resampling.from_hz > 0.0;
+    const double source_hz = resampled ? truth.resampling.from_hz : truth.rate_hz;
+    const double end_s = static_cast<double>(truth.size) / truth.rate_hz;
+    // Some more than the record takes, for what is interpolated at its end
+    const std::size_t intervals = resampled ? static_cast<std::size_t>(std::ceil(end_s * source_hz)) + 2 : truth.size;
+    std::vector<double> time_s(intervals + 1);
+    for (std::size_t i = 0; i <= intervals; ++i) time_s[i] = static_cast<double>(i) / source_hz;
+
+    std::vector<double> rate = mean_rates(truth.rates, truth.seed, time_s);
+    for (std::size_t i = 0; i < intervals; ++i) {
+        const double from = time_s[i];
+        const double to = time_s[i + 1];
+        rate[i] += truth.mean_rate_deg_h;
+        rate[i] += truth.bias_temperature_deg_h_per_k * truth.temperature.mean_change_k(from, to);
+        for (const RateLine& line : truth.lines) rate[i] += mean_of(line, from, to);
+        const JumpingLine& jump = truth.jumping_line;
+        const bool jumped = 0.5 * (from + to) >= jump.time_s;
+        rate[i] += mean_of({jump.frequency_hz, jumped ? jump.rate_after_deg_h : jump.rate_before_deg_h, 0.0}, from, to);
+    }
+
+    // The angle: what the rates add up to, and what is on the reading of it.
+    std::vector<double> case_angle(intervals + 1, 0.0);
+    std::vector<double> other_angle(intervals + 1, 0.0);
+    if (truth.case_motion.rms_arcsec != 0.0) {
+        Random motion(truth.seed, Purpose::case_motion);
+        case_angle = resonance(intervals + 1, source_hz, truth.case_motion, motion);
+        other_angle = resonance(intervals + 1, source_hz, truth.case_motion, motion);
+    }
+    std::vector<double> angle(intervals + 1);
+    Random white(truth.seed, Purpose::white_angle);
+    const DitherResidue& residue = truth.dither_residue;
+    double rotated = 0.0;
+    for (std::size_t i = 0; i <= intervals; ++i) {
+        if (i > 0) rotated += rate[i - 1] / source_hz;
+        angle[i] = rotated + case_angle[i] + truth.white_angle_arcsec * white.normal();
+        if (residue.amplitude_arcsec != 0.0) {
+            const double since_middle = time_s[i] - 0.5 * end_s;
+            const double turns =
+                residue.frequency_hz * since_middle + 0.5 * residue.drift_hz_per_s * since_middle * since_middle;
+            angle[i] += residue.amplitude_arcsec * std::sin(two_pi * (turns - std::floor(turns)) + residue.phase_rad);
+        }
+    }
+    if (truth.saturation_arcsec > 0.0) {
+        double before = angle[0];
+        double clipped = angle[0];
+        for (std::size_t i = 1; i <= intervals; ++i) {
+            const double increment = std::clamp(angle[i] - before, -truth.saturation_arcsec, truth.saturation_arcsec);
+            before = angle[i];
+            clipped += increment;
+            angle[i] = clipped;
+        }
+    }
+    if (truth.count_quantization_arcsec > 0.0) {
+        const double step = truth.count_quantization_arcsec;
+        for (double& a : angle) a = std::floor(a / step) * step;
+    }
+
+    // At the ends of the record's samples
+    std::vector<double> ends(truth.size + 1);
+    if (!resampled) {
+        ends = angle;
+    } else if (!truth.resampling.of_rate) {
+        for (std::size_t k = 0; k <= truth.size; ++k) {
+            ends[k] = at_time(angle, source_hz, static_cast<double>(k) / truth.rate_hz);
+        }
+    } else {
+        std::vector<double> increments(intervals);
+        for (std::size_t i = 0; i < intervals; ++i) increments[i] = angle[i + 1] - angle[i];
+        ends[0] = angle[0];
+        for (std::size_t k = 0; k < truth.size; ++k) {
+            const double middle_s = (static_cast<double>(k) + 0.5) / truth.rate_hz;
+            // Source increments stand for the rates in the middle of their intervals.
+            ends[k + 1] =
+                ends[k] + at_time(increments, source_hz, middle_s - 0.5 / source_hz) * source_hz / truth.rate_hz;
+        }
+    }
+
+    record::Record record;
+    record.title = "Synthetic record of a gyro's output";
+    record.instrument = "simulated";
+    record.source = "ringlock, tests/closure";
+    record.licence = "as ringlock";
+    record::Samples samples;
+    samples.rate_hz = truth.rate_hz;
+    samples.kind = truth.kind;
+    for (std::size_t k = 0; k < truth.size; ++k) {
+        switch (truth.kind) {
+            case record::SampleKind::angle_increment_arcsec:
+                samples.values.push_back(ends[k + 1] - ends[k]);
+                break;
+            case record::SampleKind::angle_arcsec:
+                samples.values.push_back(ends[k + 1] - ends[0]);
+                break;
+            case record::SampleKind::quarter_count:
+                samples.counts.push_back(static_cast<std::int64_t>(
+                    std::floor((ends[k + 1] - ends[0]) / (0.25 * truth.scale_factor_arcsec))));
+                break;
+        }
+    }
+    if (truth.declared) {
+        record.declared = *truth.declared;
+    } else if (truth.kind == record::SampleKind::quarter_count) {
+        record.declared.scale_factor_arcsec = truth.scale_factor_arcsec;
+    }
+
+    Random noise(truth.seed, Purpose::witness);
+    const auto mean_of_ends = [&](const std::vector<double>& values, std::size_t k) {
+        return 0.5 * (at_time(values, source_hz, static_cast<double>(k) / truth.rate_hz) +
+                      at_time(values, source_hz, static_cast<double>(k + 1) / truth.rate_hz));
+    };
+    if (truth.accelerometers || truth.case_motion.rms_arcsec != 0.0) {
+        for (const char* name : {"accel_x", "accel_y", "accel_z"}) {
+            std::vector<double>& witness = samples.witnesses[name];
+            const bool sees = truth.case_motion.rms_arcsec != 0.0 && truth.case_motion.witness == name;
+            for (std::size_t k = 0; k < truth.size; ++k) {
+                double value = truth.accelerometer_noise * noise.normal();
+                if (name[6] == 'z') value += gravity_m_s2;
+                if (sees) {
+                    value += gravity_m_s2 / arcsec_per_rad *
+                             (std::sqrt(truth.case_motion.coherence) * mean_of_ends(case_angle, k) +
+                              std::sqrt(1.0 - truth.case_motion.coherence) * mean_of_ends(other_angle, k));
+                }
+                witness.push_back(value);
+            }
+        }
+    }
+    if (!truth.temperature.constant()) {
+        std::vector<double>& witness = samples.witnesses["temperature_c"];
+        for (std::size_t k = 0; k < truth.size; ++k) {
+            const double from = static_cast<double>(k) / truth.rate_hz;
+            const double to = static_cast<double>(k + 1) / truth.rate_hz;
+            witness.push_back(truth.temperature.start_c + truth.temperature.mean_change_k(from, to) +
+                              truth.thermometer_noise_k * noise.normal());
+        }
+    }
+    record.samples = std::move(samples);
+    return record;
+}
+
+}  // namespace ringlock::test::closure
