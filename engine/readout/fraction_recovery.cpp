@@ -27,7 +27,7 @@ constexpr double memory_cycles = 512.0;
 /// Products of a column of the pulses' equations with the others, weighted sums.
 template <class V>
 struct Column {
-    V one, slope, first, second, y;
+    V one, slope, first, second, y, after;
 };
 
 /// `angles` may be absent. With `learning`, what is left of normal equations after a turn is `keep`.
@@ -62,7 +62,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
         // Half cycles share a turn's noise: half of the one before's deviation is in the one after, 3/4 of the variance
         // new.
         const V amplitude_relative = load(known.amplitude_relative);
-        const V after_variance = amplitude_relative * amplitude_relative * hn::Set(d, 0.75);
+        const V share_variance = amplitude_relative * amplitude_relative * hn::Set(d, 0.75);
         V last_fringes = load(state.last_fringes);
         V last_whole = load(state.last_whole);
         V last_gain = load(state.last_gain);
@@ -85,6 +85,20 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                 deviation = sm::fma(d, half * two_pi, hn::Neg(sign) * (gain - share), hn::Neg(mean_amplitude));
             }
             const V amplitude[2] = {mean_amplitude + deviation, sm::fma(d, half, deviation, mean_amplitude)};
+            const V accel[2] = {amplitude[0] * load(known.w2_per_amplitude[direction][0]),
+                                amplitude[1] * load(known.w2_per_amplitude[direction][1])};
+            const V raw_sine = load(readings.sine[i]);
+            const V raw_cosine = load(readings.cosine[i]);
+            const V size =
+                one / hn::Sqrt(hn::Max(sm::fma(d, raw_sine, raw_sine, raw_cosine * raw_cosine), hn::Set(d, 1e-300)));
+            // From the dither's turn, where the sides meet, to the vertex of the side before; and that of the other one
+            // less that.
+            const V lockin_rad_s =
+                sm::fma(d, raw_sine, load(known.coupling_cosine_rad_s), raw_cosine * load(known.coupling_sine_rad_s)) *
+                size;
+            const V standing_rad_s = sign * sm::fma(d, cycle_gain, load(known.rad_s_per_cycle_gain), lockin_rad_s);
+            const V vertex_s = hn::Neg(standing_rad_s / accel[0]);
+            const V vertices_s = vertex_s * (accel[0] / accel[1] - one);
 
             const V first = load(readings.pulses.first_quarter[i]);
             const V near = (first - sign * read * hn::Set(d, 4.0)) * quarter_rad;
@@ -110,9 +124,13 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
             V s2 = zero;
             V sy = zero;
             V sgy = zero;
-            Column<V> bends[2] = {{zero, zero, zero, zero, zero}, {zero, zero, zero, zero, zero}};
+            V share_one = zero;  // of the column of psi'' after the turn
+            V share_slope = zero;
+            V share_share = zero;
+            V share_y = zero;
+            Column<V> bends[2] = {{zero, zero, zero, zero, zero, zero}, {zero, zero, zero, zero, zero, zero}};
             for (std::size_t side = 0; side < 2; ++side) {
-                const V a = amplitude[side] * load(known.w2_per_amplitude[direction][side]);
+                const V a = accel[side];
                 const std::size_t half_sign = side == 0 ? 1 - after_side : after_side;
                 const V bend = b / hn::Sqrt(a) * load(tables.inverse_bend[half_sign]);
                 const V curve = load(known.w2[half_sign]) / a * hn::Set(d, 1.0 / 12.0);
@@ -124,10 +142,9 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                     const V bent = curve * nominal;
                     const V factor = one + sm::fma(d, bend, factors.values[side][pulse] - one - bent, bent);
                     const V slope = a * time / (factor * factor);
-                    const V y = sm::fma(d, half * slope, time, hn::Neg(distance));
-                    V variance = sm::fma(d, (distance + distance) * a, tick_variance, pulse_variance);
-                    if (side == 1) variance = sm::fma(d, distance * distance, after_variance, variance);
-                    V weight = one / variance;
+                    V y = sm::fma(d, half * slope, time, hn::Neg(distance));
+                    if (side == 1) y = sm::fnma(d, slope, vertices_s, y);
+                    V weight = one / sm::fma(d, (distance + distance) * a, tick_variance, pulse_variance);
                     if (pulse == 0) {
                         weight = hn::IfThenElseZero(hn::And(time != zero, distance > least), weight);
                     }
@@ -137,6 +154,14 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                     s2 = sm::fma(d, weighted, slope, s2);
                     sy = sm::fma(d, weight, y, sy);
                     sgy = sm::fma(d, weighted, y, sgy);
+                    const V of_share = sm::fma(d, slope, vertex_s, distance);
+                    if (side == 1) {
+                        const V heavy = weight * of_share;
+                        share_one = share_one + heavy;
+                        share_slope = sm::fma(d, heavy, slope, share_slope);
+                        share_share = sm::fma(d, heavy, of_share, share_share);
+                        share_y = sm::fma(d, heavy, y, share_y);
+                    }
                     if constexpr (learning) {
                         const V scale = (distance + distance) / factor;
                         const V of_quarter = bend * (turned.values[side][pulse] - one - bent);
@@ -148,8 +173,27 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                             bends[k].first = sm::fma(d, heavy, p[0], bends[k].first);
                             bends[k].second = sm::fma(d, heavy, p[1], bends[k].second);
                             bends[k].y = sm::fma(d, heavy, y, bends[k].y);
+                            if (side == 1) bends[k].after = sm::fma(d, heavy, of_share, bends[k].after);
                         }
                     }
+                }
+            }
+            // All products less what the share of psi'' explains of them (Sherman and Morrison 1950).
+            const V explained = share_variance / sm::fma(d, share_variance, share_share, one);
+            const auto without = [&](V& product, V u, V v)
+                                     HWY_ATTR { product = sm::fnma(d, explained * u, v, product); };
+            without(s0, share_one, share_one);
+            without(s1, share_one, share_slope);
+            without(s2, share_slope, share_slope);
+            without(sy, share_one, share_y);
+            without(sgy, share_slope, share_y);
+            if constexpr (learning) {
+                for (Column<V>& column : bends) {
+                    without(column.one, column.after, share_one);
+                    without(column.slope, column.after, share_slope);
+                    without(column.first, column.after, bends[0].after);
+                    without(column.second, column.after, bends[1].after);
+                    without(column.y, column.after, share_y);
                 }
             }
             const V inverse = one / s2;
@@ -162,7 +206,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
             contradictions = contradictions + hn::IfThenElse(agree, zero, one);
 
             if constexpr (learning) {
-                // What of the bends e and tau do not explain.
+                // What of the bends the three unknowns do not explain.
                 const V determinant = one / sm::fnma(d, s1, s1, s0 * s2);
                 const auto apart = [&](const Column<V>& column, V product, V with_one, V with_slope) HWY_ATTR {
                     const V of_one = sm::fnma(d, s1, with_slope, s2 * with_one) * determinant;
@@ -178,10 +222,6 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                 }
             }
 
-            const V raw_sine = load(readings.sine[i]);
-            const V raw_cosine = load(readings.cosine[i]);
-            const V size =
-                one / hn::Sqrt(hn::Max(sm::fma(d, raw_sine, raw_sine, raw_cosine * raw_cosine), hn::Set(d, 1e-300)));
             V turn_s, turn_c;
             gm::sincos_small(d, change, turn_s, turn_c);
             store(size * sm::fma(d, raw_sine, turn_c, raw_cosine * turn_s), readings.sine[i]);
@@ -243,6 +283,7 @@ FractionRecovery::FractionRecovery(std::span<const gyro::Device> devices, const 
         known_.half_share[0][lane] = device.positive_duration_s / device.period_s();
         known_.half_share[1][lane] = device.negative_duration_s / device.period_s();
         known_.amplitude_relative[lane] = amplitude_rms_rad / amplitude;
+        known_.rad_s_per_cycle_gain[lane] = units::two_pi / device.period_s();
         for (const std::size_t which : {0U, 1U}) {
             const double duration = which == 0 ? device.positive_duration_s : device.negative_duration_s;
             known_.w2[which][lane] = (units::pi / duration) * (units::pi / duration);
@@ -258,7 +299,10 @@ FractionRecovery::FractionRecovery(std::span<const gyro::Device> devices, const 
 }
 
 void FractionRecovery::make_tables(std::size_t lane) {
-    known_.b_rad_s[lane] = devices_[lane].coupling.b_rad_s;
+    const gyro::Coupling& coupling = devices_[lane].coupling;
+    known_.b_rad_s[lane] = coupling.b_rad_s;
+    known_.coupling_cosine_rad_s[lane] = coupling.b_rad_s * std::cos(coupling.phase_rad);
+    known_.coupling_sine_rad_s[lane] = coupling.b_rad_s * std::sin(coupling.phase_rad);
     tables_.make(lane, devices_[lane], kept_pulses);
 }
 
