@@ -30,11 +30,11 @@ struct Column {
     V one, slope, first, second, y, after;
 };
 
-/// `angles` may be absent. With `learning`, what is left of normal equations after a turn is `keep`.
+/// Rows [first_row, last_row) of the readings. `angles` may be absent.
 template <bool learning>
 void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const PulseTables& tables,
-                 const Electronics& electronics, double keep, FractionRecovery::State& state, LaneReadings& readings,
-                 LaneAngles* angles) {
+                 const Electronics& electronics, FractionRecovery::State& state, LaneReadings& readings,
+                 std::size_t first_row, std::size_t last_row, LaneAngles* angles) {
     const D d;
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
@@ -70,12 +70,12 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
         V cycles = load(state.cycles);
         V contradictions = load(state.contradictions);
         V normal[5] = {load(state.xx), load(state.xy), load(state.yy), load(state.x), load(state.y)};
-        for (std::size_t i = 0; i < readings.turns; ++i) {
+        for (std::size_t i = first_row; i < last_row; ++i) {
             const bool minimum = readings.minimum(i);
             const V sign = hn::Set(d, minimum ? 1.0 : -1.0);
             const std::size_t direction = minimum ? 0 : 1;
             const std::size_t after_side = minimum ? 0 : 1;
-            const std::int64_t before_turns = state.turns + static_cast<std::int64_t>(i);
+            const std::int64_t before_turns = state.turns + static_cast<std::int64_t>(i - first_row);
             const V read = load(readings.phase_fringes[i]);
             // The swing shows the amplitude of the half cycle that ends here, but for the input rate's share.
             V deviation = zero;
@@ -218,7 +218,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                                    apart(bends[1], bends[1].second, bends[1].one, bends[1].slope),
                                    apart(bends[0], bends[0].y, sy, sgy), apart(bends[1], bends[1].y, sy, sgy)};
                 for (std::size_t k = 0; k < 5; ++k) {
-                    normal[k] = sm::fma(d, normal[k], hn::Set(d, keep), hn::IfThenElseZero(agree, turn[k]));
+                    normal[k] = normal[k] + hn::IfThenElseZero(agree, turn[k]);
                 }
             }
 
@@ -259,10 +259,10 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
 }
 
 void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, const PulseTables& tables,
-                   const Electronics& electronics, double forget, FractionRecovery::State& state,
-                   LaneReadings& readings, LaneAngles* angles) {
-    const auto recover = forget > 0.0 ? recover_all<true> : recover_all<false>;
-    recover(lanes, known, tables, electronics, 1.0 - forget, state, readings, angles);
+                   const Electronics& electronics, bool learning, FractionRecovery::State& state,
+                   LaneReadings& readings, std::size_t first_row, std::size_t last_row, LaneAngles* angles) {
+    const auto recover = learning ? recover_all<true> : recover_all<false>;
+    recover(lanes, known, tables, electronics, state, readings, first_row, last_row, angles);
 }
 
 }  // namespace ringlock::readout::HWY_NAMESPACE
@@ -307,44 +307,25 @@ void FractionRecovery::make_tables(std::size_t lane) {
 }
 
 void FractionRecovery::recover(LaneReadings& readings, LaneAngles* angles) {
+    recover(readings, 0, readings.turns, angles);
+}
+
+void FractionRecovery::recover(LaneReadings& readings, std::size_t first_row, std::size_t last_row,
+                               LaneAngles* angles) {
     HWY_DYNAMIC_DISPATCH(recover_lanes)
-    (lanes_, known_, tables_, electronics_, forget_, state_, readings, angles);
-    state_.turns += static_cast<std::int64_t>(readings.turns);
+    (lanes_, known_, tables_, electronics_, learning_, state_, readings, first_row, last_row, angles);
+    state_.turns += static_cast<std::int64_t>(last_row - first_row);
 }
 
-void FractionRecovery::learn(double memory_turns) {
-    forget_ = 1.0 / memory_turns;
-    // Nothing known: wrong by as much as there is.
-    for (std::size_t lane = 0; lane < simd::lanes; ++lane) state_.xx[lane] = state_.yy[lane] = 1.0;
-}
-
-FractionRecovery::Learnt FractionRecovery::learnt(std::size_t lane) const {
-    const double xx = state_.xx[lane];
-    const double xy = state_.xy[lane];
-    const double yy = state_.yy[lane];
-    const double determinant = xx * yy - xy * xy;
-    if (!(determinant > 0.0)) return {};
-    return {(yy * state_.x[lane] - xy * state_.y[lane]) / determinant,
-            (xx * state_.y[lane] - xy * state_.x[lane]) / determinant};
-}
-
-FractionRecovery::Coupling FractionRecovery::coupling(std::size_t lane) const {
-    const gyro::Coupling& told = devices_[lane].coupling;
-    const auto [x, y] = learnt(lane);
-    return {told.b_rad_s * std::hypot(1.0 + x, y), told.phase_rad + std::atan2(y, 1.0 + x)};
-}
-
-bool FractionRecovery::retell(std::size_t lane, double tolerance) {
-    const auto [x, y] = learnt(lane);
-    if (std::hypot(x, y) <= tolerance) return false;
-    const Coupling now = coupling(lane);
-    const double grown = now.b_rad_s / devices_[lane].coupling.b_rad_s;
-    devices_[lane].coupling.b_rad_s = now.b_rad_s;
-    devices_[lane].coupling.phase_rad = now.phase_rad;
+void FractionRecovery::tell(std::size_t lane, const Coupling& coupling) {
+    devices_[lane].coupling.b_rad_s = coupling.b_rad_s;
+    devices_[lane].coupling.phase_rad = coupling.phase_rad;
     make_tables(lane);
-    for (auto* const normal : {&state_.xx, &state_.xy, &state_.yy}) (*normal)[lane] *= grown * grown;
-    state_.x[lane] = state_.y[lane] = 0.0;
-    return true;
+    forget_bends(lane);
+}
+
+void FractionRecovery::forget_bends(std::size_t lane) {
+    for (auto* const sum : {&state_.xx, &state_.xy, &state_.yy, &state_.x, &state_.y}) (*sum)[lane] = 0.0;
 }
 
 }  // namespace ringlock::readout

@@ -38,20 +38,33 @@ class FractionRecovery {
     /// where given and interpolated, the angle output.
     void recover(LaneReadings& readings, LaneAngles* angles);
 
+    /// The same for rows [first_row, last_row).
+    void recover(LaneReadings& readings, std::size_t first_row, std::size_t last_row, LaneAngles* angles);
+
     /// What the pulses tell of the coupling itself: with b and phase e those of the tables, a coupling
     /// b ((1 + x) sin(psi + e) + y cos(psi + e)) adds x P + y Q to the left-hand sides above, P = 2 D (R - 1)/R and Q
-    /// the same of a coupling a quarter fringe on. What is orthogonal to e, tau and the share is kept as normal
-    /// equations of x and y, those of a turn with the weight exp(-turns since/memory).
-    void learn(double memory_turns);
+    /// the same of a coupling a quarter fringe on. What is orthogonal to e, tau and the share adds up to normal
+    /// equations of x and y, weighted with the inverse of the noise's variance: of all turns since learn() or
+    /// forget_bends().
+    struct Bends {
+        double xx, xy, yy, x, y;
+    };
+    void learn() { learning_ = true; }
+    Bends bends(std::size_t lane) const {
+        return {state_.xx[lane], state_.xy[lane], state_.yy[lane], state_.x[lane], state_.y[lane]};
+    }
+    void forget_bends(std::size_t lane);
+
     struct Coupling {
         double b_rad_s;
         double phase_rad;
     };
-    /// That of the tables with what has been learnt by now.
-    Coupling coupling(std::size_t lane) const;
-    /// Makes the tables anew for coupling(), where it has left theirs by more than that share: the equations are linear
-    /// about theirs only. True where it did.
-    bool retell(std::size_t lane, double tolerance);
+    /// That of the tables.
+    Coupling told(std::size_t lane) const {
+        return {devices_[lane].coupling.b_rad_s, devices_[lane].coupling.phase_rad};
+    }
+    /// Makes the tables anew, for bends are linear about theirs only, and forgets those of the old ones.
+    void tell(std::size_t lane, const Coupling& coupling);
 
     /// Turns at which pulses and detectors contradicted each other, so that the detectors' phase was kept.
     std::int64_t contradictions(std::size_t lane) const {
@@ -78,18 +91,12 @@ class FractionRecovery {
     };
 
    private:
-    /// x and y above.
-    struct Learnt {
-        double x = 0.0;
-        double y = 0.0;
-    };
-    Learnt learnt(std::size_t lane) const;
     void make_tables(std::size_t lane);
 
     std::size_t lanes_;
     std::vector<gyro::Device> devices_;
     Electronics electronics_;
-    double forget_ = 0.0;  // share of a turn before that the next leaves; 0: nothing is learnt
+    bool learning_ = false;
     Known known_;
     PulseTables tables_;
     State state_;

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "analysis/report/plot.hpp"
+#include "engine/compensate/coupling_filter.hpp"
 #include "engine/compensate/exact.hpp"
 #include "engine/compensate/extrapolated.hpp"
 #include "engine/compensate/first_order.hpp"
@@ -349,7 +350,7 @@ void cost() {
         if (name == "compensated_exact") return per_gyro(sizeof(compensate::Exact::State));
         if (name == "compensated_adaptive") {
             return per_gyro(sizeof(compensate::Exact::State) + sizeof(readout::FractionRecovery::State) +
-                            2 * sizeof(simd::Lanes));
+                            simd::lanes * sizeof(compensate::CouplingFilter));
         }
         if (name == "compensated_extrapolated") return per_gyro(sizeof(compensate::Extrapolated::State));
         if (name == "compensated_two_train") return per_gyro(sizeof(compensate::TwoTrain::State));
