@@ -16,7 +16,7 @@ namespace ringlock::compensate {
 /// and the input do. FractionRecovery adds up the normal equations of that, CouplingFilter makes of those of 128 turns
 /// each what is known of the coupling, and this compensator inverts the turn map with it.
 ///
-/// Its state beyond Exact's are five sums, the filter's 17 numbers, and the pulse tables for the coupling as known,
+/// Its state beyond Exact's are five sums, the filter's 15 numbers, and the pulse tables for the coupling as known,
 /// which are made anew when the estimate has moved by a hundredth. Readings are to be as sampled, with pulses: it
 /// recovers the phase from them by itself.
 class Adaptive final : public LaneCompensator {
