@@ -63,8 +63,6 @@ TEST(Limits, ACouplingPhaseThatIsNotToldLeavesARate) {
     scenario.ensemble.gyros = 32;
     scenario.ensemble.settle_s = 20.0;
     scenario.ensemble.duration_s = 300.0;
-    // Asymmetries have a rate of their own behind the instrument.
-    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
     const double phase_rad = 0.3;
     scenario.effects["detector_phase_offset"]["phase_rad"] = phase_rad;
     const limits::Walks walks = limits::walks(scenario);
