@@ -360,29 +360,36 @@ void Exact::solve(const readout::LaneReadings& readings, std::size_t first, std:
 }
 
 void Exact::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
-    errors.fringes.resize(readings.turns);
-    errors.whole = state_.error_whole;
-    if (readings.turns == 0) return;
-    std::size_t row = 0;
+    observe(readings, 0, readings.turns, errors);
+}
+
+void Exact::observe(const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row,
+                    LaneErrors& errors) {
+    if (first_row == 0) {
+        errors.fringes.resize(readings.turns);
+        errors.whole = state_.error_whole;
+    }
+    if (first_row == last_row) return;
+    std::size_t row = first_row;
     if (!begun_) {
         // The rate first from the phase as it is, then from the phase less the lock-in's share.
-        row = std::min(readings.turns, most_turns_between_estimates);
-        see_minima(readings, 0, row, nullptr);
+        row = std::min(last_row, first_row + most_turns_between_estimates);
+        see_minima(readings, first_row, row, nullptr);
         estimate_rate();
         const State start = state_;
-        solve(readings, 0, row, errors);
+        solve(readings, first_row, row, errors);
         older_.turn = -1;
-        see_minima(readings, 0, row, &errors);
+        see_minima(readings, first_row, row, &errors);
         estimate_rate();
         const simd::Lanes rate_rad_s = state_.rate_rad_s;
         state_ = start;
         state_.rate_rad_s = rate_rad_s;
-        solve(readings, 0, row, errors);
+        solve(readings, first_row, row, errors);
         begun_ = true;
-        count_turns(row);
+        count_turns(row - first_row);
     }
-    while (row < readings.turns) {
-        const std::size_t rows = std::min(readings.turns - row, static_cast<std::size_t>(next_estimate_ - turns_));
+    while (row < last_row) {
+        const std::size_t rows = std::min(last_row - row, static_cast<std::size_t>(next_estimate_ - turns_));
         solve(readings, row, row + rows, errors);
         see_minima(readings, row, row + rows, &errors);
         row += rows;

@@ -35,6 +35,9 @@ class Exact final : public LaneCompensator {
     void set_coupling(std::size_t lane, double b_rad_s, double phase_rad);
 
     void observe(const readout::LaneReadings& readings, LaneErrors& errors) override;
+    /// Rows [first_row, last_row), in this order, all of the same readings into the same errors.
+    void observe(const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row,
+                 LaneErrors& errors);
 
     struct State {
         simd::Lanes amplitude_rad, b_rad_s;

@@ -16,6 +16,7 @@ struct Calibration {
     std::array<double, simd::lanes> positive_duration_s{};   ///< of half cycles of positive dither rate
     std::array<double, simd::lanes> negative_duration_s{};
     double amplitude_margin_rad = 0.0;  ///< half cycles' amplitudes stay within it of the mean
+    double amplitude_rms_rad = 0.0;     ///< their spread about it
 };
 
 /// Lock-in errors at the turns of a piece, to be taken away from the phases read there.

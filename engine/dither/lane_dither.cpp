@@ -136,10 +136,9 @@ void LaneDither::next(std::size_t turns, std::span<const simd::Lanes> extra_angl
     turn_ += static_cast<std::int64_t>(turns);
 }
 
-double LaneDither::amplitude_margin_rad(double noise_rms_rad) {
-    // Half the difference of two deviates has an rms of rms/sqrt(2); 8 of these.
-    return 8.0 * noise_rms_rad / std::sqrt(2.0);
-}
+double LaneDither::amplitude_rms_rad(double noise_rms_rad) { return noise_rms_rad / std::sqrt(2.0); }
+
+double LaneDither::amplitude_margin_rad(double noise_rms_rad) { return 8.0 * amplitude_rms_rad(noise_rms_rad); }
 
 }  // namespace ringlock::dither
 #endif

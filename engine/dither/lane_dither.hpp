@@ -26,6 +26,8 @@ class LaneDither {
     void next(std::size_t turns, std::span<const simd::Lanes> extra_angle_arcsec,
               std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive);
 
+    /// Rms of half cycles' amplitudes about the device's with noise of this rms: half the difference of two turns'.
+    static double amplitude_rms_rad(double noise_rms_rad);
     /// Amplitude that a half cycle can have with noise of this rms, beyond the device's, but for one in 1e15.
     static double amplitude_margin_rad(double noise_rms_rad);
 

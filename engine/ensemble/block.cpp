@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -17,13 +16,13 @@
 #include "engine/ensemble/added_angles.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/output_counts.hpp"
+#include "engine/ensemble/told.hpp"
 #include "engine/ensemble/trajectory_kind.hpp"
 #include "engine/propagate/lane_propagator.hpp"
 #include "engine/readout/ellipse_correction.hpp"
 #include "engine/readout/fraction_recovery.hpp"
 #include "engine/readout/lane_readout.hpp"
 #include "engine/readout/missed_counts.hpp"
-#include "engine/readout/pulse_alignment.hpp"
 
 namespace ringlock::ensemble {
 
@@ -36,20 +35,6 @@ struct Listener {
     compensate::LaneErrors errors;
     std::vector<simd::LaneCounts> counts;
 };
-
-readout::Electronics make_electronics(const scenario::Scenario& scenario) {
-    const auto& readout = scenario.readout;
-    readout::Electronics electronics{readout.model == scenario::ReadoutModel::ideal,
-                                     readout.angle_output == scenario::AngleOutput::interpolated, readout.clock_hz,
-                                     readout.detector_noise_relative};
-    if (readout.model == scenario::ReadoutModel::instrument) {
-        electronics.comparator_noise_relative = readout.comparator_noise_relative;
-        electronics.comparator_hysteresis_relative = readout.comparator_hysteresis_relative;
-        electronics.detector_bandwidth_hz = readout.detector_bandwidth_hz;
-        electronics.adc_bits = static_cast<int>(readout.adc_bits);
-    }
-    return electronics;
-}
 
 double injected_rms_rad(const scenario::Scenario& scenario, TrajectoryKind kind) {
     return kind == TrajectoryKind::noise_injected ? scenario.noise_injection.turn_phase_rms_rad : 0.0;
@@ -84,23 +69,10 @@ std::unique_ptr<propagate::LanePropagator> make_propagator(const scenario::Scena
     return propagate::make_turn_map(devices, margin, scenario.propagation.turn_map_tolerance_rad);
 }
 
-/// The coupling as the compensators and the electronics are told it.
-double told_b_rad_s(const scenario::Scenario& scenario, const gyro::Device& device) {
-    return device.coupling.b_rad_s * (1.0 + scenario.calibration.threshold_error_relative);
-}
-
 std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Scenario& scenario,
                                                               const std::vector<gyro::Device>& devices,
                                                               const scenario::Arm& arm, TrajectoryKind kind) {
-    compensate::Calibration calibration;
-    calibration.lanes = devices.size();
-    calibration.amplitude_margin_rad = dither::LaneDither::amplitude_margin_rad(injected_rms_rad(scenario, kind));
-    for (std::size_t lane = 0; lane < devices.size(); ++lane) {
-        calibration.b_rad_s[lane] = told_b_rad_s(scenario, devices[lane]);
-        calibration.dither_amplitude_rad[lane] = devices[lane].dither_amplitude_rad;
-        calibration.positive_duration_s[lane] = devices[lane].positive_duration_s;
-        calibration.negative_duration_s[lane] = devices[lane].negative_duration_s;
-    }
+    const compensate::Calibration calibration = calibration_of(scenario, devices, injected_rms_rad(scenario, kind));
     switch (arm.compensator) {
         case scenario::Compensator::published:
             return std::make_unique<compensate::FirstOrder>(calibration, compensate::FirstOrder::published);
@@ -109,10 +81,10 @@ std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Sc
         case scenario::Compensator::exact:
             return std::make_unique<compensate::Exact>(calibration, scenario.propagation.turn_map_tolerance_rad);
         case scenario::Compensator::adaptive:
-            return std::make_unique<compensate::Adaptive>(calibration, make_electronics(scenario),
+            return std::make_unique<compensate::Adaptive>(calibration, electronics_of(scenario),
                                                           scenario.propagation.turn_map_tolerance_rad);
         case scenario::Compensator::extrapolated:
-            return std::make_unique<compensate::Extrapolated>(calibration, make_electronics(scenario));
+            return std::make_unique<compensate::Extrapolated>(calibration, electronics_of(scenario));
         case scenario::Compensator::two_train:
             return std::make_unique<compensate::TwoTrain>(calibration);
         case scenario::Compensator::none:
@@ -136,7 +108,7 @@ class Branch {
         }
         if (listeners_.empty()) return;
         propagator_ = make_propagator(scenario, devices_, kind);
-        const readout::Electronics electronics = make_electronics(scenario);
+        const readout::Electronics electronics = electronics_of(scenario);
         const bool instrument = scenario.readout.model == scenario::ReadoutModel::instrument;
         every_turn_ = compensated_ || instrument || scenario.readout.ellipse_correction;
         readout_.emplace(devices_, ellipses_of(setups), electronics,
@@ -146,11 +118,10 @@ class Branch {
         interpolated_ = electronics.interpolate;
         if (scenario.readout.ellipse_correction) ellipse_.emplace(devices_.size());
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
-            // Amplitudes are half the difference of two turns' noise.
             std::vector<gyro::Device> told = devices_;
             for (gyro::Device& device : told) device.coupling.b_rad_s = told_b_rad_s(scenario, device);
-            alignment_.emplace(told);
-            recovery_.emplace(told, electronics, injected_rms_rad(scenario, kind) / std::numbers::sqrt2);
+            recovery_.emplace(told, electronics,
+                              dither::LaneDither::amplitude_rms_rad(injected_rms_rad(scenario, kind)));
         }
     }
 
@@ -164,10 +135,7 @@ class Branch {
         readout_->read(drive_, turns_, noise, every_turn_ ? 1 : 2, readings_, angles_);
         if (ellipse_) ellipse_->correct(readings_, angles_, interpolated_);
         if (samples_wanted_) samples_ = readings_;
-        if (recovery_) {
-            alignment_->align(readings_);
-            recovery_->recover(readings_, &angles_);
-        }
+        if (recovery_) recovery_->recover(readings_, &angles_);
         for (Listener& listener : listeners_) {
             if (listener.compensator) {
                 const bool samples = listener.compensator->wants_samples();
@@ -200,7 +168,6 @@ class Branch {
     std::optional<readout::LaneReadout> readout_;
     std::vector<Listener> listeners_;
     std::optional<readout::EllipseCorrection> ellipse_;
-    std::optional<readout::PulseAlignment> alignment_;
     std::optional<readout::FractionRecovery> recovery_;
     bool interpolated_ = false;
     bool compensated_ = false;

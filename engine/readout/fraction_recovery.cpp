@@ -27,14 +27,14 @@ constexpr double memory_cycles = 512.0;
 /// Products of a column of the pulses' equations with the others, weighted sums.
 template <class V>
 struct Column {
-    V one, slope, first, second, y;
+    V one, slope, first, second, y, after;
 };
 
-/// `angles` may be absent. With `learning`, what is left of normal equations after a turn is `keep`.
+/// Rows [first_row, last_row) of the readings. `angles` may be absent.
 template <bool learning>
 void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const PulseTables& tables,
-                 const Electronics& electronics, double keep, FractionRecovery::State& state, LaneReadings& readings,
-                 LaneAngles* angles) {
+                 const Electronics& electronics, FractionRecovery::State& state, LaneReadings& readings,
+                 std::size_t first_row, std::size_t last_row, LaneAngles* angles) {
     const D d;
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
@@ -62,7 +62,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
         // Half cycles share a turn's noise: half of the one before's deviation is in the one after, 3/4 of the variance
         // new.
         const V amplitude_relative = load(known.amplitude_relative);
-        const V after_variance = amplitude_relative * amplitude_relative * hn::Set(d, 0.75);
+        const V share_variance = amplitude_relative * amplitude_relative * hn::Set(d, 0.75);
         V last_fringes = load(state.last_fringes);
         V last_whole = load(state.last_whole);
         V last_gain = load(state.last_gain);
@@ -70,12 +70,12 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
         V cycles = load(state.cycles);
         V contradictions = load(state.contradictions);
         V normal[5] = {load(state.xx), load(state.xy), load(state.yy), load(state.x), load(state.y)};
-        for (std::size_t i = 0; i < readings.turns; ++i) {
+        for (std::size_t i = first_row; i < last_row; ++i) {
             const bool minimum = readings.minimum(i);
             const V sign = hn::Set(d, minimum ? 1.0 : -1.0);
             const std::size_t direction = minimum ? 0 : 1;
             const std::size_t after_side = minimum ? 0 : 1;
-            const std::int64_t before_turns = state.turns + static_cast<std::int64_t>(i);
+            const std::int64_t before_turns = state.turns + static_cast<std::int64_t>(i - first_row);
             const V read = load(readings.phase_fringes[i]);
             // The swing shows the amplitude of the half cycle that ends here, but for the input rate's share.
             V deviation = zero;
@@ -85,6 +85,28 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                 deviation = sm::fma(d, half * two_pi, hn::Neg(sign) * (gain - share), hn::Neg(mean_amplitude));
             }
             const V amplitude[2] = {mean_amplitude + deviation, sm::fma(d, half, deviation, mean_amplitude)};
+            const V accel[2] = {amplitude[0] * load(known.w2_per_amplitude[direction][0]),
+                                amplitude[1] * load(known.w2_per_amplitude[direction][1])};
+            const V raw_sine = load(readings.sine[i]);
+            const V raw_cosine = load(readings.cosine[i]);
+            const V size =
+                one / hn::Sqrt(hn::Max(sm::fma(d, raw_sine, raw_sine, raw_cosine * raw_cosine), hn::Set(d, 1e-300)));
+            // From the dither's turn, where the sides meet, to the vertex of the side before; and that of the other one
+            // less that.
+            const V lockin_rad_s =
+                sm::fma(d, raw_sine, load(known.coupling_cosine_rad_s), raw_cosine * load(known.coupling_sine_rad_s)) *
+                size;
+            const V standing_rad_s = sign * sm::fma(d, cycle_gain, load(known.rad_s_per_cycle_gain), lockin_rad_s);
+            const V vertex_s = hn::Neg(standing_rad_s / accel[0]);
+            const V vertices_s = vertex_s * (accel[0] / accel[1] - one);
+            // e after less e before is (a' - a) s^2/2, s the time from the sample to the dither's turn: about that of a
+            // sample at the vertex of the half cycle in which it lies.
+            const auto late = vertex_s > zero;
+            const V steeper = accel[1] - accel[0];
+            const V tau_there = hn::IfThenElseZero(late, hn::Neg(vertices_s));
+            const V turn_s_there = tau_there - vertex_s;
+            const V slope_of_deeper = steeper * turn_s_there;
+            const V deeper = slope_of_deeper * sm::fnma(d, half, vertex_s, hn::Neg(half * tau_there));
 
             const V first = load(readings.pulses.first_quarter[i]);
             const V near = (first - sign * read * hn::Set(d, 4.0)) * quarter_rad;
@@ -110,9 +132,13 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
             V s2 = zero;
             V sy = zero;
             V sgy = zero;
-            Column<V> bends[2] = {{zero, zero, zero, zero, zero}, {zero, zero, zero, zero, zero}};
+            V share_one = zero;  // of the column of psi'' after the turn
+            V share_slope = zero;
+            V share_share = zero;
+            V share_y = zero;
+            Column<V> bends[2] = {{zero, zero, zero, zero, zero, zero}, {zero, zero, zero, zero, zero, zero}};
             for (std::size_t side = 0; side < 2; ++side) {
-                const V a = amplitude[side] * load(known.w2_per_amplitude[direction][side]);
+                const V a = accel[side];
                 const std::size_t half_sign = side == 0 ? 1 - after_side : after_side;
                 const V bend = b / hn::Sqrt(a) * load(tables.inverse_bend[half_sign]);
                 const V curve = load(known.w2[half_sign]) / a * hn::Set(d, 1.0 / 12.0);
@@ -123,11 +149,13 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                     if (shifted) distance = sm::fma(d, sign, shift[pulse], distance);
                     const V bent = curve * nominal;
                     const V factor = one + sm::fma(d, bend, factors.values[side][pulse] - one - bent, bent);
-                    const V slope = a * time / (factor * factor);
-                    const V y = sm::fma(d, half * slope, time, hn::Neg(distance));
-                    V variance = sm::fma(d, (distance + distance) * a, tick_variance, pulse_variance);
-                    if (side == 1) variance = sm::fma(d, distance * distance, after_variance, variance);
-                    V weight = one / variance;
+                    V slope = a * time / (factor * factor);
+                    V y = sm::fma(d, half * slope, time, hn::Neg(distance));
+                    if (side == 1) {
+                        y = sm::fnma(d, slope, vertices_s, y + deeper);
+                        slope = slope - slope_of_deeper;
+                    }
+                    V weight = one / sm::fma(d, (distance + distance) * a, tick_variance, pulse_variance);
                     if (pulse == 0) {
                         weight = hn::IfThenElseZero(hn::And(time != zero, distance > least), weight);
                     }
@@ -137,6 +165,14 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                     s2 = sm::fma(d, weighted, slope, s2);
                     sy = sm::fma(d, weight, y, sy);
                     sgy = sm::fma(d, weighted, y, sgy);
+                    const V of_share = sm::fma(d, slope, vertex_s, distance);
+                    if (side == 1) {
+                        const V heavy = weight * of_share;
+                        share_one = share_one + heavy;
+                        share_slope = sm::fma(d, heavy, slope, share_slope);
+                        share_share = sm::fma(d, heavy, of_share, share_share);
+                        share_y = sm::fma(d, heavy, y, share_y);
+                    }
                     if constexpr (learning) {
                         const V scale = (distance + distance) / factor;
                         const V of_quarter = bend * (turned.values[side][pulse] - one - bent);
@@ -148,21 +184,44 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                             bends[k].first = sm::fma(d, heavy, p[0], bends[k].first);
                             bends[k].second = sm::fma(d, heavy, p[1], bends[k].second);
                             bends[k].y = sm::fma(d, heavy, y, bends[k].y);
+                            if (side == 1) bends[k].after = sm::fma(d, heavy, of_share, bends[k].after);
                         }
                     }
+                }
+            }
+            // All products less what the share of psi'' explains of them (Sherman and Morrison 1950).
+            const V explained = share_variance / sm::fma(d, share_variance, share_share, one);
+            const auto without = [&](V& product, V u, V v)
+                                     HWY_ATTR { product = sm::fnma(d, explained * u, v, product); };
+            without(s0, share_one, share_one);
+            without(s1, share_one, share_slope);
+            without(s2, share_slope, share_slope);
+            without(sy, share_one, share_y);
+            without(sgy, share_slope, share_y);
+            if constexpr (learning) {
+                for (Column<V>& column : bends) {
+                    without(column.one, column.after, share_one);
+                    without(column.slope, column.after, share_slope);
+                    without(column.first, column.after, bends[0].after);
+                    without(column.second, column.after, bends[1].after);
+                    without(column.y, column.after, share_y);
                 }
             }
             const V inverse = one / s2;
             const V e = sm::fma(d, s1 * inverse, sgy, hn::Neg(sy)) / sm::fnma(d, s1 * inverse, s1, s0);
             const V tau = sm::fma(d, e, s1, sgy) * inverse;
-            const V a_mean = mean_amplitude * load(known.w2_per_amplitude[direction][0]);
-            V change = sm::fnma(d, a_mean, sm::fma(d, half * tau, tau, blunting), e);
+            const V a_mean = mean_amplitude * hn::IfThenElse(late, load(known.w2_per_amplitude[direction][1]),
+                                                             load(known.w2_per_amplitude[direction][0]));
+            const V turned_s = hn::IfThenElse(late, tau + vertices_s, tau);
+            const V sampled_s = tau - vertex_s;  // from the sample to the dither's turn
+            V change = sm::fnma(d, a_mean, sm::fma(d, half * turned_s, turned_s, blunting),
+                                e + hn::IfThenElseZero(late, half * steeper * sampled_s * sampled_s));
             const auto agree = hn::Abs(change) < hn::Set(d, largest_step_rad);
             change = sign * hn::IfThenElseZero(agree, change);
             contradictions = contradictions + hn::IfThenElse(agree, zero, one);
 
             if constexpr (learning) {
-                // What of the bends e and tau do not explain.
+                // What of the bends the three unknowns do not explain.
                 const V determinant = one / sm::fnma(d, s1, s1, s0 * s2);
                 const auto apart = [&](const Column<V>& column, V product, V with_one, V with_slope) HWY_ATTR {
                     const V of_one = sm::fnma(d, s1, with_slope, s2 * with_one) * determinant;
@@ -174,14 +233,10 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                                    apart(bends[1], bends[1].second, bends[1].one, bends[1].slope),
                                    apart(bends[0], bends[0].y, sy, sgy), apart(bends[1], bends[1].y, sy, sgy)};
                 for (std::size_t k = 0; k < 5; ++k) {
-                    normal[k] = sm::fma(d, normal[k], hn::Set(d, keep), hn::IfThenElseZero(agree, turn[k]));
+                    normal[k] = normal[k] + hn::IfThenElseZero(agree, turn[k]);
                 }
             }
 
-            const V raw_sine = load(readings.sine[i]);
-            const V raw_cosine = load(readings.cosine[i]);
-            const V size =
-                one / hn::Sqrt(hn::Max(sm::fma(d, raw_sine, raw_sine, raw_cosine * raw_cosine), hn::Set(d, 1e-300)));
             V turn_s, turn_c;
             gm::sincos_small(d, change, turn_s, turn_c);
             store(size * sm::fma(d, raw_sine, turn_c, raw_cosine * turn_s), readings.sine[i]);
@@ -219,10 +274,10 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
 }
 
 void recover_lanes(std::size_t lanes, const FractionRecovery::Known& known, const PulseTables& tables,
-                   const Electronics& electronics, double forget, FractionRecovery::State& state,
-                   LaneReadings& readings, LaneAngles* angles) {
-    const auto recover = forget > 0.0 ? recover_all<true> : recover_all<false>;
-    recover(lanes, known, tables, electronics, 1.0 - forget, state, readings, angles);
+                   const Electronics& electronics, bool learning, FractionRecovery::State& state,
+                   LaneReadings& readings, std::size_t first_row, std::size_t last_row, LaneAngles* angles) {
+    const auto recover = learning ? recover_all<true> : recover_all<false>;
+    recover(lanes, known, tables, electronics, state, readings, first_row, last_row, angles);
 }
 
 }  // namespace ringlock::readout::HWY_NAMESPACE
@@ -243,6 +298,7 @@ FractionRecovery::FractionRecovery(std::span<const gyro::Device> devices, const 
         known_.half_share[0][lane] = device.positive_duration_s / device.period_s();
         known_.half_share[1][lane] = device.negative_duration_s / device.period_s();
         known_.amplitude_relative[lane] = amplitude_rms_rad / amplitude;
+        known_.rad_s_per_cycle_gain[lane] = units::two_pi / device.period_s();
         for (const std::size_t which : {0U, 1U}) {
             const double duration = which == 0 ? device.positive_duration_s : device.negative_duration_s;
             known_.w2[which][lane] = (units::pi / duration) * (units::pi / duration);
@@ -258,49 +314,33 @@ FractionRecovery::FractionRecovery(std::span<const gyro::Device> devices, const 
 }
 
 void FractionRecovery::make_tables(std::size_t lane) {
-    known_.b_rad_s[lane] = devices_[lane].coupling.b_rad_s;
+    const gyro::Coupling& coupling = devices_[lane].coupling;
+    known_.b_rad_s[lane] = coupling.b_rad_s;
+    known_.coupling_cosine_rad_s[lane] = coupling.b_rad_s * std::cos(coupling.phase_rad);
+    known_.coupling_sine_rad_s[lane] = coupling.b_rad_s * std::sin(coupling.phase_rad);
     tables_.make(lane, devices_[lane], kept_pulses);
 }
 
 void FractionRecovery::recover(LaneReadings& readings, LaneAngles* angles) {
+    recover(readings, 0, readings.turns, angles);
+}
+
+void FractionRecovery::recover(LaneReadings& readings, std::size_t first_row, std::size_t last_row,
+                               LaneAngles* angles) {
     HWY_DYNAMIC_DISPATCH(recover_lanes)
-    (lanes_, known_, tables_, electronics_, forget_, state_, readings, angles);
-    state_.turns += static_cast<std::int64_t>(readings.turns);
+    (lanes_, known_, tables_, electronics_, learning_, state_, readings, first_row, last_row, angles);
+    state_.turns += static_cast<std::int64_t>(last_row - first_row);
 }
 
-void FractionRecovery::learn(double memory_turns) {
-    forget_ = 1.0 / memory_turns;
-    // Nothing known: wrong by as much as there is.
-    for (std::size_t lane = 0; lane < simd::lanes; ++lane) state_.xx[lane] = state_.yy[lane] = 1.0;
-}
-
-FractionRecovery::Learnt FractionRecovery::learnt(std::size_t lane) const {
-    const double xx = state_.xx[lane];
-    const double xy = state_.xy[lane];
-    const double yy = state_.yy[lane];
-    const double determinant = xx * yy - xy * xy;
-    if (!(determinant > 0.0)) return {};
-    return {(yy * state_.x[lane] - xy * state_.y[lane]) / determinant,
-            (xx * state_.y[lane] - xy * state_.x[lane]) / determinant};
-}
-
-FractionRecovery::Coupling FractionRecovery::coupling(std::size_t lane) const {
-    const gyro::Coupling& told = devices_[lane].coupling;
-    const auto [x, y] = learnt(lane);
-    return {told.b_rad_s * std::hypot(1.0 + x, y), told.phase_rad + std::atan2(y, 1.0 + x)};
-}
-
-bool FractionRecovery::retell(std::size_t lane, double tolerance) {
-    const auto [x, y] = learnt(lane);
-    if (std::hypot(x, y) <= tolerance) return false;
-    const Coupling now = coupling(lane);
-    const double grown = now.b_rad_s / devices_[lane].coupling.b_rad_s;
-    devices_[lane].coupling.b_rad_s = now.b_rad_s;
-    devices_[lane].coupling.phase_rad = now.phase_rad;
+void FractionRecovery::tell(std::size_t lane, const Coupling& coupling) {
+    devices_[lane].coupling.b_rad_s = coupling.b_rad_s;
+    devices_[lane].coupling.phase_rad = coupling.phase_rad;
     make_tables(lane);
-    for (auto* const normal : {&state_.xx, &state_.xy, &state_.yy}) (*normal)[lane] *= grown * grown;
-    state_.x[lane] = state_.y[lane] = 0.0;
-    return true;
+    forget_bends(lane);
+}
+
+void FractionRecovery::forget_bends(std::size_t lane) {
+    for (auto* const sum : {&state_.xx, &state_.xy, &state_.yy, &state_.x, &state_.y}) (*sum)[lane] = 0.0;
 }
 
 }  // namespace ringlock::readout

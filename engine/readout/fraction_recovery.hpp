@@ -19,9 +19,14 @@ namespace ringlock::readout {
 ///     a t^2/(2 R^2) - D = -e + (a t/R^2) tau + noise,
 ///
 /// and the sample itself says 0 = e + noise. e and tau are fitted by least squares, each with the variance of its
-/// noise: comparator, clock (a tick's share at the phase's rate there), and, after the turn, the amplitude that is not
-/// known yet. The lock-in bends the two sides in opposite ways, so that an error of the coupling goes into tau; what it
-/// leaves in psi_0 is of second order in the coupling.
+/// noise: comparator and clock (a tick's share at the phase's rate there). After the turn injected noise gives the half
+/// cycle an amplitude that is not known yet: a is wrong by a share, the same at all pulses there, which adds that share
+/// of D to each. It is a third unknown, whose variance is known beforehand.
+/// The sides meet at the dither's turn, not at the zero-rate point: at a rate r there, lock-in and input, the parabola
+/// of a side has its vertex r/a before it, so that the side after has its own by (r/a)(1 - a/a') later than the side
+/// before, a' being its acceleration. At asymmetries of 1e-3 that is 2e-10 s. The lock-in bends the two sides in
+/// opposite ways, so that an error of the coupling goes into tau; what it leaves in psi_0 is of second order in the
+/// coupling.
 class FractionRecovery {
    public:
     /// \param devices           as the electronics know them: amplitude, durations, coupling
@@ -33,20 +38,33 @@ class FractionRecovery {
     /// where given and interpolated, the angle output.
     void recover(LaneReadings& readings, LaneAngles* angles);
 
+    /// The same for rows [first_row, last_row).
+    void recover(LaneReadings& readings, std::size_t first_row, std::size_t last_row, LaneAngles* angles);
+
     /// What the pulses tell of the coupling itself: with b and phase e those of the tables, a coupling
     /// b ((1 + x) sin(psi + e) + y cos(psi + e)) adds x P + y Q to the left-hand sides above, P = 2 D (R - 1)/R and Q
-    /// the same of a coupling a quarter fringe on. What is orthogonal to e and tau is kept as normal equations of x and
-    /// y, those of a turn with the weight exp(-turns since/memory).
-    void learn(double memory_turns);
+    /// the same of a coupling a quarter fringe on. What is orthogonal to e, tau and the share adds up to normal
+    /// equations of x and y, weighted with the inverse of the noise's variance: of all turns since learn() or
+    /// forget_bends().
+    struct Bends {
+        double xx, xy, yy, x, y;
+    };
+    void learn() { learning_ = true; }
+    Bends bends(std::size_t lane) const {
+        return {state_.xx[lane], state_.xy[lane], state_.yy[lane], state_.x[lane], state_.y[lane]};
+    }
+    void forget_bends(std::size_t lane);
+
     struct Coupling {
         double b_rad_s;
         double phase_rad;
     };
-    /// That of the tables with what has been learnt by now.
-    Coupling coupling(std::size_t lane) const;
-    /// Makes the tables anew for coupling(), where it has left theirs by more than that share: the equations are linear
-    /// about theirs only. True where it did.
-    bool retell(std::size_t lane, double tolerance);
+    /// That of the tables.
+    Coupling told(std::size_t lane) const {
+        return {devices_[lane].coupling.b_rad_s, devices_[lane].coupling.phase_rad};
+    }
+    /// Makes the tables anew, for bends are linear about theirs only, and forgets those of the old ones.
+    void tell(std::size_t lane, const Coupling& coupling);
 
     /// Turns at which pulses and detectors contradicted each other, so that the detectors' phase was kept.
     std::int64_t contradictions(std::size_t lane) const {
@@ -64,6 +82,8 @@ class FractionRecovery {
     };
     struct Known {
         simd::Lanes amplitude_rad, b_rad_s;
+        simd::Lanes coupling_cosine_rad_s, coupling_sine_rad_s;  ///< b times those of the coupling phase
+        simd::Lanes rad_s_per_cycle_gain;
         simd::Lanes half_share[2];           ///< of the half cycles of positive and negative sign in the period
         simd::Lanes w2_per_amplitude[2][2];  ///< acceleration over amplitude, [minimum, maximum][before, after]
         simd::Lanes w2[2];
@@ -71,18 +91,12 @@ class FractionRecovery {
     };
 
    private:
-    /// x and y above.
-    struct Learnt {
-        double x = 0.0;
-        double y = 0.0;
-    };
-    Learnt learnt(std::size_t lane) const;
     void make_tables(std::size_t lane);
 
     std::size_t lanes_;
     std::vector<gyro::Device> devices_;
     Electronics electronics_;
-    double forget_ = 0.0;  // share of a turn before that the next leaves; 0: nothing is learnt
+    bool learning_ = false;
     Known known_;
     PulseTables tables_;
     State state_;

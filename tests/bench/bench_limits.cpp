@@ -12,19 +12,23 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "analysis/report/plot.hpp"
+#include "engine/compensate/coupling_filter.hpp"
 #include "engine/compensate/exact.hpp"
 #include "engine/compensate/extrapolated.hpp"
 #include "engine/compensate/first_order.hpp"
 #include "engine/compensate/two_train.hpp"
 #include "engine/core/units.hpp"
+#include "engine/dither/lane_dither.hpp"
 #include "engine/ensemble/block.hpp"
 #include "engine/ensemble/draw.hpp"
+#include "engine/ensemble/told.hpp"
 #include "engine/gyro/theory.hpp"
 #include "engine/readout/fraction_recovery.hpp"
 #include "engine/scenario/arm.hpp"
@@ -37,9 +41,6 @@ namespace {
 using namespace ringlock;
 namespace li = ringlock::test::limits;
 using li::Ratio;
-
-/// How well a turn shows the coupling phase at the instrument's defaults, see docs/compensation.md.
-constexpr double shown_by_a_turn_rad = 0.1;
 
 void row(const std::vector<std::string>& cells) {
     for (const std::string& cell : cells) fmt::print("| {} ", cell);
@@ -227,8 +228,7 @@ void coupling_phase() {
 }
 
 /// Allan deviation times the root of the averaging time over the bound: one figure where there is a walk alone.
-void averaging_time() {
-    const scenario::Scenario scenario = base();
+void averaging_time(const scenario::Scenario& scenario) {
     const li::Walks walks = li::walks(scenario);
     const double bound = li::walk_deg_rt_h(scenario, li::bounds(scenario).known_rad);
     std::vector<std::string> titles = {"averaging time [s]"};
@@ -240,12 +240,89 @@ void averaging_time() {
         for (const auto& arm : walks.squared_at) cells.push_back(text(li::over(arm[i], bound)));
         row(cells);
     }
-    const double wander = rate_per_phase_deg_h(scenario) * shown_by_a_turn_rad /
-                          std::sqrt(2.0 * scenario.dither.frequency_hz) * units::deg_rt_h_per_arcsec_rt_s;
-    fmt::print(
-        "\nA coupling phase learnt with {:g} rad a turn: {:.4f} deg/h per radian, in the long run {:.3g} deg/sqrt(h), "
-        "{:.2f} times the bound.\n",
-        shown_by_a_turn_rad, rate_per_phase_deg_h(scenario), wander, wander / bound);
+}
+
+void averaging_times() {
+    averaging_time(base());
+    fmt::print("\nA record of 8000 s that begins after 4000 s:\n\n");
+    scenario::Scenario scenario = base();
+    scenario.arms = {li::exact_arm, li::adaptive_arm};
+    scenario.ensemble.settle_s = 4000.0;
+    scenario.ensemble.duration_s = 8000.0;
+    averaging_time(scenario);
+}
+
+/// How well turns show the coupling, and what they show in the mean, where the tables are those of the true one.
+struct Shown {
+    double by_a_turn = 0.0;  ///< error over the coupling, and of its phase [rad]: from the weights of the bends
+    double size_off = 0.0;   ///< mean over the gyros
+    double phase_off_rad = 0.0;
+    double standard_error = 0.0;  ///< of either
+};
+
+Shown shown(scenario::Scenario scenario, std::size_t turns) {
+    constexpr std::size_t first = 1024;
+    constexpr std::size_t piece = 128;
+    scenario.readout.phase_from = scenario::PhaseFrom::detectors;
+    const std::vector<scenario::Arm> arms{scenario::parse_arm(li::exact_arm)};
+    ensemble::GyroBlock block(scenario, arms, 0, simd::lanes);
+    const std::vector<gyro::Device> devices(block.setups().begin(), block.setups().end());
+    readout::FractionRecovery recovery(
+        devices, ensemble::electronics_of(scenario),
+        dither::LaneDither::amplitude_rms_rad(scenario.noise_injection.turn_phase_rms_rad));
+    recovery.learn();
+    for (std::size_t done = 0; done < first + turns; done += piece) {
+        for (std::size_t lane = 0; done == first && lane < simd::lanes; ++lane) recovery.forget_bends(lane);
+        block.advance(piece);
+        readout::LaneReadings readings = block.readings(0);
+        recovery.recover(readings, nullptr);
+    }
+    Shown shown;
+    double weight = 0.0;
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+        const auto bends = recovery.bends(lane);
+        weight += bends.yy / simd::lanes;
+        shown.size_off += bends.x / bends.xx / simd::lanes;
+        shown.phase_off_rad += bends.y / bends.yy / simd::lanes;
+    }
+    shown.by_a_turn = std::sqrt(static_cast<double>(turns) / weight);
+    shown.standard_error = 1.0 / std::sqrt(simd::lanes * weight);
+    return shown;
+}
+
+/// What the filter of the coupling makes of its turns in the long run, see docs/compensation.md.
+void learning() {
+    using Filter = compensate::CouplingFilter;
+    head({"", "shown by a turn", "memory of the size [s]", "size known to [1e-3]", "memory of the phase [h]",
+          "phase known to [1e-3 rad]", "rate left by it [1e-6 deg/h]", "its walk beyond that memory, over the bound",
+          "a tenth over the bound from [h]", "after a time t, from"});
+    const auto line = [](const std::string& label, const scenario::Scenario& scenario) {
+        const double second = shown(scenario, 4096).by_a_turn / std::sqrt(2.0 * scenario.dither.frequency_hz);
+        const double memory_s = std::sqrt(second / Filter::slope_walk_s_rt_s);
+        const double size = second * std::sqrt(std::numbers::sqrt2 / memory_s);
+        const double phase_memory_s = second / Filter::phase_walk_rad_rt_s;
+        const double phase_rad = std::sqrt(second * Filter::phase_walk_rad_rt_s);
+        const double per_radian = rate_per_phase_deg_h(scenario);
+        const double bound = li::walk_deg_rt_h(scenario, li::bounds(scenario).known_rad);
+        const double walk = per_radian * second * units::deg_rt_h_per_arcsec_rt_s / bound;
+        const double share = std::sqrt(3.0 * (1.1 * 1.1 - 1.0)) / walk;
+        row({label, fmt::format("{:.4f}", second * std::sqrt(2.0 * scenario.dither.frequency_hz)),
+             fmt::format("{:.0f}", memory_s), fmt::format("{:.2f}", 1e3 * size),
+             fmt::format("{:.1f}", phase_memory_s / 3600.0), fmt::format("{:.3f}", 1e3 * phase_rad),
+             fmt::format("{:.1f}", 1e6 * per_radian * phase_rad), fmt::format("{:.2f}", walk),
+             fmt::format("{:.1f}", share * phase_memory_s / 3600.0), fmt::format("{:.2f} t", share)});
+    };
+    for (const Point& point : detector_noise_points()) line("noise " + point.label, point.scenario);
+    for (const Point& point : clock_points()) line("clock " + point.label, point.scenario);
+    line("injected 30 rad", injected_noise_points().back().scenario);
+    fmt::print("\nMean over 16 gyros and 262144 turns of what bends show beside the true coupling:\n\n");
+    head({"clock", "size [1e-3]", "phase [1e-3 rad]"});
+    for (const Point& point : clock_points()) {
+        if (point.label != "1 MHz" && point.label != "3 MHz" && point.label != "100 MHz") continue;
+        const Shown of = shown(point.scenario, 262144);
+        row({point.label, fmt::format("{:.2f} +- {:.2f}", 1e3 * of.size_off, 1e3 * of.standard_error),
+             fmt::format("{:.2f} +- {:.2f}", 1e3 * of.phase_off_rad, 1e3 * of.standard_error)});
+    }
 }
 
 void draw(const std::vector<Point>& points, const std::vector<Measured>& measured, const std::string& file) {
@@ -350,7 +427,7 @@ void cost() {
         if (name == "compensated_exact") return per_gyro(sizeof(compensate::Exact::State));
         if (name == "compensated_adaptive") {
             return per_gyro(sizeof(compensate::Exact::State) + sizeof(readout::FractionRecovery::State) +
-                            2 * sizeof(simd::Lanes));
+                            simd::lanes * sizeof(compensate::CouplingFilter));
         }
         if (name == "compensated_extrapolated") return per_gyro(sizeof(compensate::Extrapolated::State));
         if (name == "compensated_two_train") return per_gyro(sizeof(compensate::TwoTrain::State));
@@ -385,7 +462,8 @@ const std::pair<const char*, std::function<void()>> blocks[] = {
     {"injected-noise", [] { table("injected noise", injected_noise_points(), Reference::own); }},
     {"coupling-phase", coupling_phase},
     {"phase-from", [] { table("phase from", phase_from_points(), Reference::last); }},
-    {"averaging-time", averaging_time},
+    {"averaging-time", averaging_times},
+    {"learning", learning},
     {"cost", cost},
 };
 

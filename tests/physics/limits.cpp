@@ -63,8 +63,6 @@ TEST(Limits, ACouplingPhaseThatIsNotToldLeavesARate) {
     scenario.ensemble.gyros = 32;
     scenario.ensemble.settle_s = 20.0;
     scenario.ensemble.duration_s = 300.0;
-    // Asymmetries have a rate of their own behind the instrument.
-    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
     const double phase_rad = 0.3;
     scenario.effects["detector_phase_offset"]["phase_rad"] = phase_rad;
     const limits::Walks walks = limits::walks(scenario);
@@ -134,14 +132,27 @@ TEST_F(LongLimits, WhileTheThresholdDriftsByATenthAnHour) {
         scenario::Scenario scenario = what_limits({limits::adaptive_arm});
         scenario.environment.temperature_ramp_k_per_h = kelvin_per_h;
         scenario.effects["lockin_temperature"]["relative_per_k"] = 0.01;
-        // It extrapolates from two means over a memory of 262 s, which must have been filled.
-        scenario.ensemble.settle_s = 1000.0;
         // Kicks, and the bound with them, go with the threshold: in the middle of the record it is the one without
         // drift.
         const double middle_h = (scenario.ensemble.settle_s + 0.5 * scenario.ensemble.duration_s) / 3600.0;
         scenario.gyro.lockin_threshold_deg_h /= 1.0 + 0.01 * kelvin_per_h * middle_h;
         EXPECT_LE(over_exact("adaptive under a drift over exact without", limits::walks(scenario)), 1.1)
             << kelvin_per_h;
+    }
+}
+
+TEST_F(LongLimits, TheAdaptiveCompensatorStaysThereBeyondTheMemoryOfTheSize) {
+    // Of averaging times up to an eighth of what it has learnt from: of the phase's wander a hundredth is left there.
+    scenario::Scenario scenario = what_limits({limits::exact_arm, limits::adaptive_arm});
+    scenario.ensemble.settle_s = 4000.0;
+    scenario.ensemble.duration_s = 8000.0;
+    const limits::Walks walks = limits::walks(scenario);
+    for (std::size_t i = 0; i < walks.tau_s.size() && walks.tau_s[i] < 600.0; ++i) {
+        if (walks.tau_s[i] < 0.9) continue;
+        std::printf("%.1f s, ", walks.tau_s[i]);
+        const auto over = limits::over(walks.squared_at[walks.index(limits::adaptive_arm)][i],
+                                       walks.squared_at[walks.index(limits::exact_arm)][i]);
+        EXPECT_LE(shown("adaptive over exact", over), 1.1) << walks.tau_s[i];
     }
 }
 

@@ -207,20 +207,27 @@ TEST(PulseReadout, TheRecoveredPhaseIsNotBetterThanItsBound) {
     check("defaults", instrument(), 1.02);
     scenario::Scenario scenario = instrument();
     scenario.readout.detector_noise_relative = 0.02;
-    check("detectors 2 %", scenario, 1.05);
+    check("detectors 2 %", scenario, 1.02);
     scenario = instrument();
     scenario.readout.comparator_noise_relative = 0.02;
     scenario.readout.comparator_hysteresis_relative = 0.12;
-    check("comparators 2 %", scenario, 1.05);
+    check("comparators 2 %", scenario, 1.02);
     scenario = instrument();
     scenario.readout.detector_noise_relative = scenario.readout.comparator_noise_relative = 0.0005;
-    check("0.05 %", scenario, 1.3);
+    check("0.05 %", scenario, 1.02);
     scenario = instrument();
     scenario.readout.clock_hz = 3e6;
-    check("3 MHz", scenario, 1.05);
+    check("3 MHz", scenario, 1.02);
     scenario = instrument();
     scenario.readout.adc_bits = 7;
-    check("7 bits", scenario, 1.05);
+    check("7 bits", scenario, 1.02);
+    for (const double rms_rad : {10.0, 30.0}) {
+        scenario = instrument();
+        scenario.noise_injection.turn_phase_rms_rad = rms_rad;
+        check(rms_rad > 20.0 ? "30 rad injected" : "10 rad injected", scenario, 1.02);
+        scenario.readout.detector_noise_relative = scenario.readout.comparator_noise_relative = 0.0005;
+        check(rms_rad > 20.0 ? "30 rad injected, 0.05 %" : "10 rad injected, 0.05 %", scenario, 1.02);
+    }
 }
 
 TEST(PulseReadout, TheConverterRoundsToItsSteps) {

@@ -3,31 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <random>
 #include <stdexcept>
 
 #include "engine/core/units.hpp"
 #include "engine/ensemble/draw.hpp"
+#include "engine/ensemble/told.hpp"
 #include "engine/gyro/device.hpp"
 #include "engine/scenario/arm.hpp"
 
 namespace ringlock::test::limits {
 
-readout::Electronics electronics(const scenario::Scenario& scenario) {
-    readout::Electronics electronics;
-    electronics.clock_hz = scenario.readout.clock_hz;
-    electronics.detector_noise_relative = scenario.readout.detector_noise_relative;
-    electronics.comparator_noise_relative = scenario.readout.comparator_noise_relative;
-    electronics.comparator_hysteresis_relative = scenario.readout.comparator_hysteresis_relative;
-    electronics.detector_bandwidth_hz = scenario.readout.detector_bandwidth_hz;
-    electronics.adc_bits = static_cast<int>(scenario.readout.adc_bits);
-    return electronics;
-}
-
 Bounds bounds(const scenario::Scenario& scenario) {
     const gyro::Device device(ensemble::nominal_setup(scenario));
-    const readout::Electronics of = electronics(scenario);
+    const readout::Electronics of = ensemble::electronics_of(scenario);
     const double a = device.half_cycle(1.0, device.dither_amplitude_rad).end_acceleration_rad_s2();
     // Half cycles have (n_{k+1} - n_k)/2 of the turns' noise: 1/2 of its variance, of which the one before tells a
     // quarter.

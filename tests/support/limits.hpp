@@ -9,9 +9,6 @@
 /// What the readout leaves of the random walk at best, and what compensators leave: for docs/compensation.md.
 namespace ringlock::test::limits {
 
-/// The scenario's electronics.
-readout::Electronics electronics(const scenario::Scenario& scenario);
-
 /// Bounds of the phase at a zero-rate point [rad], of the scenario's device without spread.
 struct Bounds {
     double known_rad = 0.0;      ///< the phase's acceleration being known
