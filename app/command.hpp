@@ -14,6 +14,7 @@ void add_run(CLI::App& root, std::span<const char* const> command_line);
 void add_analyze(CLI::App& root);
 void add_allan(CLI::App& root);
 void add_validate(CLI::App& root);
+void add_import(CLI::App& root);
 /// Commands of the contract that are not built yet: they say so.
 void add_planned(CLI::App& root);
 

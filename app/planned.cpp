@@ -10,21 +10,20 @@
 namespace ringlock::app {
 
 void add_planned(CLI::App& root) {
-    constexpr std::array<std::pair<const char*, const char*>, 6> planned = {{
+    constexpr std::array<std::pair<const char*, const char*>, 5> planned = {{
         {"merge", "Join the shards of one run (not there yet)"},
         {"replay", "Simulate one gyro of a result again, at full detail (not there yet)"},
         {"record", "Write what an instrumented gyro of the scenario would record (not there yet)"},
         {"closure", "Fit, trace the residual, add the missing effect (not there yet)"},
         {"report", "Write a report of a result (not there yet)"},
-        {"import", "Turn a CSV record into HDF5 (not there yet)"},
     }};
     for (const auto& [name, what] : planned) {
         CLI::App* command = root.add_subcommand(name, what);
         command->allow_extras();
         const std::string text = name;
         command->callback([text] {
-            throw InputError(
-                fmt::format("the command \"{}\" is not there yet; there are run, analyze, allan and validate", text));
+            throw InputError(fmt::format(
+                "the command \"{}\" is not there yet; there are run, analyze, allan, validate and import", text));
         });
     }
 }

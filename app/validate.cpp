@@ -1,38 +1,62 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 
+#include "analysis/record/probe.hpp"
+#include "analysis/record/record.hpp"
 #include "analysis/study/result_file.hpp"
 #include "app/command.hpp"
 #include "app/output.hpp"
+#include "app/record_output.hpp"
 #include "engine/core/error.hpp"
 #include "engine/scenario/parse.hpp"
 
 namespace ringlock::app {
+namespace {
+
+void validate_record(const std::string& path) {
+    const record::Record record = record::read_record(path);
+    tell_warnings(path, record);
+    put(fmt::format("{}: a valid record: {}\n", path, record_text(record)));
+}
+
+void validate(const std::string& path) {
+    const std::filesystem::path extension = std::filesystem::path(path).extension();
+    if (record::is_hdf5(path) || extension == ".h5" || extension == ".hdf5") {
+        const std::string format = record::hdf5_format(path);
+        if (format == "rlg-record") return validate_record(path);
+        if (format == "ringlock-result") {
+            record::try_reading(path, [&] { study::read_result(path); });
+            const study::Study study = study::read_result(path);
+            return put(fmt::format("{}: a valid result of {} gyros and {} arms\n", path, study.gyros.size(),
+                                   study.arms.size()));
+        }
+        throw InputError(
+            fmt::format("{}: /: attribute format is \"{}\"; it says what the file is and must be "
+                        "\"ringlock-result\" or \"rlg-record\"",
+                        path, format));
+    }
+    if (extension == ".toml") {
+        scenario::parse_file(path);
+        return put(fmt::format("{}: a valid scenario\n", path));
+    }
+    try {
+        validate_record(path);
+    } catch (const InputError& error) {
+        throw InputError(
+            fmt::format("{}\n{}: was taken for a record in the text form; scenarios end in .toml", error.what(), path));
+    }
+}
+
+}  // namespace
 
 void add_validate(CLI::App& root) {
-    CLI::App* command = root.add_subcommand("validate", "Say what is wrong in a scenario or result, and where");
+    CLI::App* command = root.add_subcommand("validate", "Say what is wrong in a scenario, record or result, and where");
     auto file = std::make_shared<std::string>();
-    command->add_option("FILE", *file, "scenario (.toml) or result (.h5)")->required();
-    command->callback([file] {
-        const std::filesystem::path path = *file;
-        if (path.extension() == ".toml") {
-            scenario::parse_file(path);
-            put(fmt::format("{}: a valid scenario\n", *file));
-        } else if (path.extension() == ".h5" || path.extension() == ".hdf5") {
-            const study::Study study = study::read_result(path);
-            put(fmt::format("{}: a valid result of {} gyros and {} arms\n", *file, study.gyros.size(),
-                            study.arms.size()));
-        } else {
-            throw InputError(
-                fmt::format("{}: \"{}\" is no extension that validate knows; scenarios end in .toml, results "
-                            "in .h5 (records are not there yet)",
-                            *file, path.extension().string()));
-        }
-    });
+    command->add_option("FILE", *file, "scenario (.toml), record (HDF5 or text) or result")->required();
+    command->callback([file] { validate(*file); });
 }
 
 }  // namespace ringlock::app

@@ -1,0 +1,94 @@
+// ringlock validate and import on measured data, from outside.
+#include "analysis/record/record.hpp"
+
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+
+#include <cmath>
+
+#include "tests/cli/program.hpp"
+#include "tests/unit/record_support.hpp"
+
+namespace ringlock::test {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class RecordProgram : public ProgramTest {
+   protected:
+    void expect_refused(const Arguments& arguments, const testing::Matcher<std::string>& message) const {
+        const auto before = left();
+        const Outcome r = run(arguments);
+        EXPECT_EQ(r.status, 2) << r.err;
+        EXPECT_EQ(r.out, "");
+        EXPECT_THAT(r.err, message);
+        EXPECT_EQ(left(), before);
+    }
+};
+
+TEST_F(RecordProgram, ValidatesBothForms) {
+    record::write_record((directory_ / "r.h5").string(), full_record());
+    Outcome r = run({"validate", "r.h5"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.out, AllOf(HasSubstr("r.h5: a valid record: 50 turns"), HasSubstr("40 angle increments at 100 Hz"),
+                             HasSubstr("accel_x"), HasSubstr("temperature"), HasSubstr("reference")));
+    EXPECT_EQ(r.err, "");
+    write("r.csv", "# rate_hz = 10\n# sensor = 3\nquarter_count\n1\n2\n4\n");
+    r = run({"validate", "r.csv"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.out, HasSubstr("3 counts of quarter fringes at 10 Hz"));
+    EXPECT_THAT(r.err, AllOf(HasSubstr("warning"), HasSubstr("line 2: sensor")));
+}
+
+TEST_F(RecordProgram, SaysWhatIsWrongAndWhere) {
+    record::Record damaged = full_record();
+    damaged.turns->sine[5] = std::nan("");
+    damaged.turns->time_s[9] = damaged.turns->time_s[8];
+    record::write_record((directory_ / "r.h5").string(), damaged);
+    for (const Arguments& arguments : std::vector<Arguments>{{"validate", "r.h5"}, {"import", "r.h5", "-o", "o.h5"}}) {
+        expect_refused(arguments, AllOf(HasSubstr("r.h5: /turns/sin, row 5"), HasSubstr("r.h5: /turns/time_s, row 9")));
+    }
+    write("r.csv", "# rate_hz = 10\nangle_arcsec\n1\nnan\n");
+    expect_refused({"validate", "r.csv"}, AllOf(HasSubstr("r.csv:4: column angle_arcsec"), HasSubstr(".toml")));
+    expect_refused({"import", "r.csv", "-o", "o.h5"}, HasSubstr("r.csv:4:"));
+    expect_refused({"validate", "missing.csv"}, HasSubstr("missing.csv"));
+    expect_refused({"validate", "."}, HasSubstr("directory"));
+    const std::string bytes = read("r.h5");
+    write("cut.h5", bytes.substr(0, bytes.size() / 2));
+    expect_refused({"validate", "cut.h5"}, HasSubstr("cut.h5"));
+}
+
+TEST_F(RecordProgram, ImportsText) {
+    write("r.csv", "# rate_hz = 10\n# title = bench\nangle_arcsec,accel_y\n1,5\n2,6\n4,7\n");
+    const Outcome r = run({"import", "r.csv", "-o", "r.h5"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.out, HasSubstr("3 angles at 10 Hz"));
+    const record::Record back = record::read_record((directory_ / "r.h5").string());
+    EXPECT_EQ(back.title, "bench");
+    EXPECT_EQ(back.samples->values, (std::vector<double>{1.0, 2.0, 4.0}));
+    EXPECT_EQ(back.samples->witnesses.at("accel_y"), (std::vector<double>{5.0, 6.0, 7.0}));
+    EXPECT_EQ(run({"import", "r.csv", "-o", "r.h5"}).status, 0) << "a record is replaced";
+
+    expect_refused({"import", "r.csv"}, HasSubstr("output"));
+    expect_refused({"import", "r.csv", "-o", "no/r.h5"}, HasSubstr("no/r.h5"));
+    const std::string before = read("r.csv");
+    expect_refused({"import", "r.csv", "-o", "r.csv"}, HasSubstr("move it away"));
+    EXPECT_EQ(read("r.csv"), before);
+}
+
+TEST_F(RecordProgram, AFullDiskLeavesNothing) {
+    std::string text = "# rate_hz = 10\nangle_arcsec\n";
+    for (int i = 0; i < 20000; ++i) text += std::to_string(i * i) + "\n";
+    write("r.csv", text);
+    const Outcome r = run({"import", "r.csv", "-o", "r.h5"}, [] {
+        const rlimit small{20000, 20000};
+        setrlimit(RLIMIT_FSIZE, &small);
+    });
+    EXPECT_EQ(r.status, 1) << r.err;
+    EXPECT_THAT(r.err, HasSubstr("r.h5"));
+    EXPECT_EQ(left(), std::set<std::string>{"r.csv"});
+}
+
+}  // namespace
+}  // namespace ringlock::test
