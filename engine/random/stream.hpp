@@ -23,6 +23,7 @@ enum class Purpose : std::uint64_t {
     bias_instability = 9,
     bootstrap = 10,
     comparator_noise = 11,
+    amplitude_wander = 12,
 };
 
 /// Who draws: the study's seed and the gyro's number.

@@ -176,6 +176,10 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& tables, cons
             if (!electronics.ideal) error = sm::fraction(d, phase + error - named) + (named - phase);
             store(sine, readings.sine[i]);
             store(cosine, readings.cosine[i]);
+            if (!readings.zero_rate_s.empty()) {
+                store(off_s + t0, readings.zero_rate_s[i]);
+                store(sm::fma(d, sign, counted + half, hn::Neg(half)), readings.count[i]);
+            }
             store(phase + error, readings.phase_fringes[i]);
             const V swing = drive.direction(i) > 0 ? zero : load(constants.swing_whole);
             store(load(drive.rotation_whole[i]) + lockin_whole + swing, readings.phase_whole[i]);
