@@ -15,6 +15,7 @@ void add_analyze(CLI::App& root);
 void add_allan(CLI::App& root);
 void add_validate(CLI::App& root);
 void add_import(CLI::App& root);
+void add_record(CLI::App& root);
 /// Commands of the contract that are not built yet: they say so.
 void add_planned(CLI::App& root);
 

@@ -61,6 +61,7 @@ int main(int argc, char** argv) {
     app::add_allan(root);
     app::add_validate(root);
     app::add_import(root);
+    app::add_record(root);
     app::add_planned(root);
     try {
         const ringlock::InterruptGuard guard;
