@@ -10,10 +10,9 @@
 namespace ringlock::app {
 
 void add_planned(CLI::App& root) {
-    constexpr std::array<std::pair<const char*, const char*>, 4> planned = {{
+    constexpr std::array<std::pair<const char*, const char*>, 3> planned = {{
         {"merge", "Join the shards of one run (not there yet)"},
         {"replay", "Simulate one gyro of a result again, at full detail (not there yet)"},
-        {"record", "Write what an instrumented gyro of the scenario would record (not there yet)"},
         {"report", "Write a report of a result (not there yet)"},
     }};
     for (const auto& [name, what] : planned) {
@@ -22,7 +21,8 @@ void add_planned(CLI::App& root) {
         const std::string text = name;
         command->callback([text] {
             throw InputError(fmt::format(
-                "the command \"{}\" is not there yet; there are run, analyze, allan, validate, import and closure", text));
+                "the command \"{}\" is not there yet; there are run, analyze, allan, validate, import, record and closure",
+                text));
         });
     }
 }

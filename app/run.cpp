@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -13,12 +12,12 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <thread>
 #include <vector>
 
 #include "analysis/report/plot.hpp"
 #include "analysis/study/result_file.hpp"
+#include "app/arguments.hpp"
 #include "app/command.hpp"
 #include "app/output.hpp"
 #include "app/study_output.hpp"
@@ -57,29 +56,6 @@ void print_schema(const std::string& form) {
     }
 }
 
-/// A whole number in plain decimal digits. CLI11 would take 010 for eight and cut what is too large without a word.
-std::int64_t whole_number(std::string_view option, const std::string& text, std::int64_t largest,
-                          std::string_view allowed) {
-    std::int64_t value = -1;
-    const char* const last = text.data() + text.size();
-    const auto [end, error] = std::from_chars(text.data(), last, value);
-    if (error != std::errc() || end != last || value < 0 || value > largest) {
-        throw InputError(fmt::format("{} {}: must be a whole number {}", option, text, allowed));
-    }
-    return value;
-}
-
-/// The scenario with what the command line changes, checked again.
-scenario::Scenario load(const Arguments& arguments) {
-    scenario::Scenario scenario = scenario::parse_file(arguments.scenario);
-    if (arguments.seed) {
-        constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();  // integers of TOML are signed
-        scenario.ensemble.seed = static_cast<std::uint64_t>(
-            whole_number("--seed", *arguments.seed, largest, fmt::format("between 0 and {}", largest)));
-    }
-    return scenario;
-}
-
 int thread_count(const std::string& asked) {
     constexpr int most = 4096;
     const auto threads = static_cast<int>(
@@ -94,7 +70,7 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     if (!arguments.shard.empty()) throw InputError("--shard is not there yet; run the whole ensemble");
     if (arguments.resume) throw InputError("--resume is not there yet; run the whole ensemble");
     const int threads = thread_count(arguments.threads);
-    const scenario::Scenario scenario = load(arguments);
+    const scenario::Scenario scenario = load_scenario(arguments.scenario, arguments.seed);
     const std::filesystem::path out =
         arguments.out ? std::filesystem::path(*arguments.out)
                       : std::filesystem::path(arguments.scenario).filename().replace_extension(".h5");

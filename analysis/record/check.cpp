@@ -407,7 +407,7 @@ class Checker {
             covers(record_.turns->time_s.front(), record_.turns->time_s.back(), "the turns");
         }
         if (record_.samples && record_.samples->size() > 0 && record_.samples->rate_hz > 0.0) {
-            const double length = static_cast<double>(record_.samples->size()) / record_.samples->rate_hz;
+            const double length = static_cast<double>(record_.samples->size() - 1) / record_.samples->rate_hz;
             covers(record_.samples->t0_s, record_.samples->t0_s + length, "the samples");
         }
     }

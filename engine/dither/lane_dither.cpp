@@ -84,8 +84,9 @@ namespace ringlock::dither {
 
 HWY_EXPORT(fill);
 
-LaneDither::LaneDither(std::span<const gyro::Device> devices, double noise_rms_rad, const random::LaneIdentities& who)
-    : lanes_(devices.size()), noise_rms_rad_(noise_rms_rad), who_(who) {
+LaneDither::LaneDither(std::span<const gyro::Device> devices, double noise_rms_rad, const random::LaneIdentities& who,
+                       const Wander& wander)
+    : lanes_(devices.size()), noise_rms_rad_(noise_rms_rad), who_(who), wander_(wander) {
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
         // Lanes without a gyro go through the motions of the last one.
         const gyro::Device& device = devices[std::min(lane, devices.size() - 1)];
@@ -102,6 +103,7 @@ LaneDither::LaneDither(std::span<const gyro::Device> devices, double noise_rms_r
             const double turned = device.input_rate_rad_s * duration_s / units::two_pi;
             constants_.turn_whole[side][lane] = std::nearbyint(turned);
             constants_.turn_fringes[side][lane] = turned - std::nearbyint(turned);
+            constants_.duration_s[side][lane] = duration_s;
             constants_.rate_per_arcsec[side][lane] = device.phase_per_arcsec / duration_s;
         }
     }
@@ -129,11 +131,40 @@ void LaneDither::next(std::size_t turns, std::span<const simd::Lanes> extra_angl
         random::normals(who_, random::Purpose::noise_injection, static_cast<std::uint64_t>(turn_) + 1, turns, lanes_,
                         deviates_.front().data());
     }
+    if (wander_.active() && turns > 0) {
+        deviates_.resize(turns);
+        add_wander();
+    }
+    const bool moved = noise_rms_rad_ > 0.0 || wander_.active();
     HWY_DYNAMIC_DISPATCH(fill)
-    (constants_, noise_rms_rad_, noise_rms_rad_ > 0.0 ? deviates_.data() : nullptr, extra_angle_arcsec,
+    (constants_, wander_.active() ? 1.0 : noise_rms_rad_, moved ? deviates_.data() : nullptr, extra_angle_arcsec,
      threshold_factor, lanes_, state_, drive);
     drive.constants_filled = !vary;
     turn_ += static_cast<std::int64_t>(turns);
+}
+
+void LaneDither::add_wander() {
+    const std::size_t turns = deviates_.size();
+    steps_.assign(turns, simd::Lanes{});
+    if (wander_.relative_rt_s != 0.0) {
+        random::normals(who_, random::Purpose::amplitude_wander, static_cast<std::uint64_t>(turn_), turns, lanes_,
+                        steps_.front().data());
+    }
+    for (std::size_t i = 0; i < turns; ++i) {
+        // Turn `number` ends a half cycle of positive sign where it is odd: a maximum.
+        const std::int64_t number = turn_ + static_cast<std::int64_t>(i) + 1;
+        const bool maximum = number % 2 != 0;
+        for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+            const auto& duration_s = constants_.duration_s;
+            const double time_s = static_cast<double>(number / 2) * (duration_s[0][lane] + duration_s[1][lane]) +
+                                  (maximum ? duration_s[0][lane] : 0.0);
+            walk_[lane] += wander_.relative_rt_s * std::sqrt(duration_s[maximum ? 0 : 1][lane]) * steps_[i][lane];
+            const double farther =
+                constants_.amplitude_rad[lane] * (wander_.drift_relative_per_s * time_s + walk_[lane]);
+            const double noise = noise_rms_rad_ > 0.0 ? noise_rms_rad_ * deviates_[i][lane] : 0.0;
+            deviates_[i][lane] = noise + (maximum ? farther : -farther);
+        }
+    }
 }
 
 double LaneDither::amplitude_rms_rad(double noise_rms_rad) { return noise_rms_rad / std::sqrt(2.0); }

@@ -10,15 +10,25 @@
 
 namespace ringlock::dither {
 
+/// Change of the amplitude at a turn at time t, relative: drift t + W(t), W a random walk of variance wander^2 t.
+struct Wander {
+    double relative_rt_s = 0.0;
+    double drift_relative_per_s = 0.0;
+
+    bool active() const { return relative_rt_s != 0.0 || drift_relative_per_s != 0.0; }
+};
+
 /// Drive of a block of gyros, piece after piece: the dither, optionally with random noise on its angle at each turn,
 /// and the rotation of the case.
 ///
 /// Noise is on the angle, not on the rate: the case swings between noisy turns and stays where it is. Before turn 0 the
-/// drive is free of noise. Rates that vary in time are constant over each half cycle: at their mean.
+/// drive is free of noise. The amplitude can drift and wander: turns are then farther out, or less far. Rates that vary
+/// in time are constant over each half cycle: at their mean.
 class LaneDither {
    public:
     /// `devices`: of each gyro, at most simd::lanes. `noise_rms_rad`: of each turn's angle in optical phase; 0: none.
-    LaneDither(std::span<const gyro::Device> devices, double noise_rms_rad, const random::LaneIdentities& who);
+    LaneDither(std::span<const gyro::Device> devices, double noise_rms_rad, const random::LaneIdentities& who,
+               const Wander& wander = {});
 
     /// Fills in the next `turns` turns. `extra_angle_arcsec`: what varying rates add over the half cycle that begins at
     /// each of them, [turn][gyro], or none; the half cycle's mean rate grows by it. `threshold_factor`: b of these half
@@ -39,6 +49,7 @@ class LaneDither {
         simd::Lanes turn_whole[2];     ///< ... these whole fringes
         simd::Lanes fringes_per_arcsec;
         simd::Lanes rate_per_arcsec[2];  ///< mean phase rate of 1 arcsec over a half cycle [rad/s]
+        simd::Lanes duration_s[2];
     };
     struct State {
         simd::Lanes rotation_fringes, rotation_whole;
@@ -47,6 +58,9 @@ class LaneDither {
     };
 
    private:
+    /// Makes noise, one deviate a turn, what the turns are off by: noise and change of the amplitude [rad].
+    void add_wander();
+
     std::size_t lanes_;
     double noise_rms_rad_;
     random::LaneIdentities who_;
@@ -54,6 +68,9 @@ class LaneDither {
     State state_;
     std::int64_t turn_ = 0;
     std::vector<simd::Lanes> deviates_;
+    Wander wander_;
+    simd::Lanes walk_{};  // W at the last turn
+    std::vector<simd::Lanes> steps_;
     const gyro::LaneDrive* filled_ = nullptr;  // has this dither's rates and couplings, if they are constant
 };
 

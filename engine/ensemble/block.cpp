@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -40,6 +41,33 @@ double injected_rms_rad(const scenario::Scenario& scenario, TrajectoryKind kind)
     return kind == TrajectoryKind::noise_injected ? scenario.noise_injection.turn_phase_rms_rad : 0.0;
 }
 
+dither::Wander wander_of(const scenario::Scenario& scenario) {
+    return {scenario.dither.amplitude_wander_relative_rt_s, scenario.dither.amplitude_drift_relative_per_h / 3600.0};
+}
+
+/// What drift and wander can make of the amplitudes.
+double wander_margin_rad(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices) {
+    double largest = 0.0;
+    for (const gyro::Device& device : devices) largest = std::max(largest, device.dither_amplitude_rad);
+    return largest * scenario::amplitude_change_relative(scenario.dither,
+                                                         scenario.ensemble.settle_s + scenario.ensemble.duration_s);
+}
+
+/// How far noise, drift and wander take the amplitude of a half cycle from the device's.
+double amplitude_margin_rad(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices,
+                            TrajectoryKind kind) {
+    return dither::LaneDither::amplitude_margin_rad(injected_rms_rad(scenario, kind)) +
+           wander_margin_rad(scenario, devices);
+}
+
+/// Their spread about it.
+double amplitude_rms_rad(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices,
+                         TrajectoryKind kind) {
+    constexpr double sigmas = 6.0;  // that the margin of the wander stands for
+    return std::hypot(dither::LaneDither::amplitude_rms_rad(injected_rms_rad(scenario, kind)),
+                      wander_margin_rad(scenario, devices) / sigmas);
+}
+
 std::vector<gyro::Device> make_devices(const std::vector<gyro::Setup>& setups, TrajectoryKind kind) {
     std::vector<gyro::Device> devices;
     for (const gyro::Setup& setup : setups) {
@@ -63,16 +91,16 @@ std::unique_ptr<propagate::LanePropagator> make_propagator(const scenario::Scena
         return std::make_unique<propagate::DirectPropagator>(devices, scenario.propagation.direct_tolerance_rad);
     }
     // Without lock-in there is nothing to tabulate; the map is that of the plain phase.
-    const double margin = kind == TrajectoryKind::ideal
-                              ? 0.0
-                              : dither::LaneDither::amplitude_margin_rad(injected_rms_rad(scenario, kind));
+    const double margin = kind == TrajectoryKind::ideal ? 0.0 : amplitude_margin_rad(scenario, devices, kind);
     return propagate::make_turn_map(devices, margin, scenario.propagation.turn_map_tolerance_rad);
 }
 
 std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Scenario& scenario,
                                                               const std::vector<gyro::Device>& devices,
                                                               const scenario::Arm& arm, TrajectoryKind kind) {
-    const compensate::Calibration calibration = calibration_of(scenario, devices, injected_rms_rad(scenario, kind));
+    compensate::Calibration calibration = calibration_of(scenario, devices, injected_rms_rad(scenario, kind));
+    calibration.amplitude_margin_rad = amplitude_margin_rad(scenario, devices, kind);
+    calibration.amplitude_rms_rad = amplitude_rms_rad(scenario, devices, kind);
     switch (arm.compensator) {
         case scenario::Compensator::published:
             return std::make_unique<compensate::FirstOrder>(calibration, compensate::FirstOrder::published);
@@ -97,8 +125,12 @@ std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Sc
 class Branch {
    public:
     Branch(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms,
-           const std::vector<gyro::Setup>& setups, const random::LaneIdentities& who, TrajectoryKind kind)
-        : kind_(kind), devices_(make_devices(setups, kind)), dither_(devices_, injected_rms_rad(scenario, kind), who) {
+           const std::vector<gyro::Setup>& setups, const random::LaneIdentities& who, TrajectoryKind kind,
+           Detail detail)
+        : kind_(kind),
+          devices_(make_devices(setups, kind)),
+          dither_(devices_, injected_rms_rad(scenario, kind), who, wander_of(scenario)),
+          detailed_(detail == Detail::hardware) {
         for (std::size_t i = 0; i < arms.size(); ++i) {
             if (kind_of(arms[i]) != kind) continue;
             listeners_.push_back({i, make_compensator(scenario, devices_, arms[i], kind), {}, {}});
@@ -110,18 +142,19 @@ class Branch {
         propagator_ = make_propagator(scenario, devices_, kind);
         const readout::Electronics electronics = electronics_of(scenario);
         const bool instrument = scenario.readout.model == scenario::ReadoutModel::instrument;
-        every_turn_ = compensated_ || instrument || scenario.readout.ellipse_correction;
+        every_turn_ = compensated_ || instrument || scenario.readout.ellipse_correction || detailed_;
         readout_.emplace(devices_, ellipses_of(setups), electronics,
                          instrument || samples_wanted_ ? readout::Wanted::pulses
-                         : compensated_                ? readout::Wanted::accelerations
+                         : compensated_ || detailed_   ? readout::Wanted::accelerations
                                                        : readout::Wanted::phase);
+        if (detailed_) readout_->keep_times();
         interpolated_ = electronics.interpolate;
         if (scenario.readout.ellipse_correction) ellipse_.emplace(devices_.size());
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
             std::vector<gyro::Device> told = devices_;
             for (gyro::Device& device : told) device.coupling.b_rad_s = told_b_rad_s(scenario, device);
             recovery_.emplace(told, electronics,
-                              dither::LaneDither::amplitude_rms_rad(injected_rms_rad(scenario, kind)));
+                              amplitude_rms_rad(scenario, devices_, kind));
         }
     }
 
@@ -133,6 +166,7 @@ class Branch {
         dither_.next(turns, angle_arcsec, threshold_factor, drive_);
         propagator_->step(drive_, turns_);
         readout_->read(drive_, turns_, noise, every_turn_ ? 1 : 2, readings_, angles_);
+        if (detailed_) hardware_ = readings_;
         if (ellipse_) ellipse_->correct(readings_, angles_, interpolated_);
         if (samples_wanted_) samples_ = readings_;
         if (recovery_) recovery_->recover(readings_, &angles_);
@@ -152,6 +186,7 @@ class Branch {
     const std::vector<gyro::Device>& devices() const { return devices_; }
     const propagate::LanePropagator& propagator() const { return *propagator_; }
     const readout::LaneReadings& readings() const { return readings_; }
+    const readout::LaneReadings& hardware() const { return hardware_; }
     const readout::LaneAngles& angles() const { return angles_; }
     const Listener* listener(std::size_t arm) const {
         for (const Listener& listener : listeners_) {
@@ -173,11 +208,36 @@ class Branch {
     bool compensated_ = false;
     bool every_turn_ = false;
     bool samples_wanted_ = false;
+    bool detailed_ = false;
     gyro::LaneDrive drive_;
     gyro::LaneTurns turns_;
     readout::LaneReadings readings_;
-    readout::LaneReadings samples_;  ///< as they were before the phase was recovered from pulses
+    readout::LaneReadings samples_;   ///< as they were before the phase was recovered from pulses
+    readout::LaneReadings hardware_;  ///< as the electronics have them, where asked for
     readout::LaneAngles angles_;
+};
+
+/// The input's profile less the mean that the gyros have for a rate.
+class Profile final : public effects::LaneRateProcess {
+   public:
+    Profile(const scenario::InputRate& input, const std::vector<gyro::Setup>& setups) : input_(input) {
+        for (const gyro::Setup& setup : setups) mean_deg_h_.push_back(setup.input_rate_deg_h);
+    }
+
+    void add_angles(const effects::LaneIntervals& intervals, std::span<simd::Lanes> angle_arcsec) override {
+        for (std::size_t i = 0; i < angle_arcsec.size(); ++i) {
+            for (std::size_t lane = 0; lane < mean_deg_h_.size(); ++lane) {
+                const double duration_s = intervals.duration_s[i][lane];
+                angle_arcsec[i][lane] +=
+                    scenario::profile_angle_arcsec(input_, intervals.start_s[i][lane], duration_s) -
+                    mean_deg_h_[lane] * duration_s;
+            }
+        }
+    }
+
+   private:
+    scenario::InputRate input_;
+    std::vector<double> mean_deg_h_;
 };
 
 random::LaneIdentities identities(const scenario::Scenario& scenario, std::int64_t first_gyro, std::size_t gyros) {
@@ -193,11 +253,11 @@ random::LaneIdentities identities(const scenario::Scenario& scenario, std::int64
 
 struct GyroBlock::State {
     State(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
-          std::vector<gyro::Setup> drawn)
+          std::vector<gyro::Setup> drawn, Detail detail)
         : setups(std::move(drawn)), who(identities(scenario, first_gyro, setups.size())), missed_counts(setups, who) {
         for (const TrajectoryKind kind :
              {TrajectoryKind::ideal, TrajectoryKind::plain, TrajectoryKind::noise_injected}) {
-            Branch branch(scenario, arms, setups, who, kind);
+            Branch branch(scenario, arms, setups, who, kind, detail);
             if (branch.empty()) continue;
             every_turn = every_turn || branch.every_turn();
             branches.push_back(std::move(branch));
@@ -221,11 +281,19 @@ struct GyroBlock::State {
                 processes.push_back(std::move(process));
             }
         }
+        if (scenario::has_profile(scenario.input)) {
+            processes.push_back(std::make_unique<Profile>(scenario.input, setups));
+        }
         for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
             const gyro::Device device(setups[std::min(lane, setups.size() - 1)]);
             duration_s[0][lane] = device.positive_duration_s;
             duration_s[1][lane] = device.negative_duration_s;
         }
+    }
+
+    double turn_time_s(std::int64_t number, std::size_t lane) const {
+        return static_cast<double>(number / 2) * (duration_s[0][lane] + duration_s[1][lane]) +
+               (number % 2 == 0 ? 0.0 : duration_s[0][lane]);
     }
 
     /// Angles that varying rates add over the half cycles that begin in the piece; none without such rates.
@@ -238,9 +306,7 @@ struct GyroBlock::State {
             const std::int64_t number = turn + static_cast<std::int64_t>(i);
             const std::size_t side = number % 2 == 0 ? 0 : 1;
             for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
-                interval_start_s[i][lane] =
-                    static_cast<double>(number / 2) * (duration_s[0][lane] + duration_s[1][lane]) +
-                    (side == 0 ? 0.0 : duration_s[0][lane]);
+                interval_start_s[i][lane] = turn_time_s(number, lane);
             }
             interval_s[i] = duration_s[side];
         }
@@ -328,11 +394,11 @@ std::vector<gyro::Setup> drawn(const scenario::Scenario& scenario, std::int64_t 
 }  // namespace
 
 GyroBlock::GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
-                     std::size_t gyros)
-    : GyroBlock(scenario, arms, first_gyro, drawn(scenario, first_gyro, gyros)) {}
+                     std::size_t gyros, Detail detail)
+    : GyroBlock(scenario, arms, first_gyro, drawn(scenario, first_gyro, gyros), detail) {}
 GyroBlock::GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
-                     std::vector<gyro::Setup> setups)
-    : state_(std::make_unique<State>(scenario, arms, first_gyro, std::move(setups))) {}
+                     std::vector<gyro::Setup> setups, Detail detail)
+    : state_(std::make_unique<State>(scenario, arms, first_gyro, std::move(setups), detail)) {}
 GyroBlock::GyroBlock(GyroBlock&&) noexcept = default;
 GyroBlock& GyroBlock::operator=(GyroBlock&&) noexcept = default;
 GyroBlock::~GyroBlock() = default;
@@ -351,6 +417,10 @@ std::span<const simd::LaneCounts> GyroBlock::counts(std::size_t arm) const {
 }
 
 const readout::LaneReadings& GyroBlock::readings(std::size_t arm) const { return state_->branch_of(arm).readings(); }
+
+const readout::LaneReadings& GyroBlock::hardware(std::size_t arm) const { return state_->branch_of(arm).hardware(); }
+
+double GyroBlock::turn_time_s(std::int64_t turn, std::size_t lane) const { return state_->turn_time_s(turn, lane); }
 
 const readout::LaneAngles& GyroBlock::angles(std::size_t arm) const { return state_->branch_of(arm).angles(); }
 

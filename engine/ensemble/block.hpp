@@ -13,6 +13,12 @@
 
 namespace ringlock::ensemble {
 
+/// What a block keeps of its turns.
+enum class Detail {
+    output,    ///< what the arms ask for
+    hardware,  ///< also what the electronics have of every turn: readings uncorrected, times, counts
+};
+
 /// Consecutive gyros of a study, at most simd::lanes, taken through all its arms at once, piece after piece. What a
 /// gyro does depends on the scenario and its own number, never on the block that it is in.
 ///
@@ -22,10 +28,10 @@ class GyroBlock {
    public:
     /// Throws RunError where a trajectory cannot be followed, as do the functions below.
     GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
-              std::size_t gyros);
+              std::size_t gyros, Detail detail = Detail::output);
     /// The same with parameters of the caller's in place of those that the study would draw.
     GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
-              std::vector<gyro::Setup> setups);
+              std::vector<gyro::Setup> setups, Detail detail = Detail::output);
     GyroBlock(GyroBlock&&) noexcept;
     GyroBlock& operator=(GyroBlock&&) noexcept;
     ~GyroBlock();
@@ -37,6 +43,11 @@ class GyroBlock {
     std::span<const simd::LaneCounts> counts(std::size_t arm) const;
     /// Readings of the trajectory of an arm. Where no arm of it has a compensator those at maxima are missing.
     const readout::LaneReadings& readings(std::size_t arm) const;
+    /// The readings as the electronics have them, before ellipse or phase are improved, with times and counts; of
+    /// Detail::hardware only.
+    const readout::LaneReadings& hardware(std::size_t arm) const;
+    /// Nominal time of a turn of the dither, counted from the start of the run [s].
+    double turn_time_s(std::int64_t turn, std::size_t lane) const;
     /// What is true of these turns.
     const readout::LaneAngles& angles(std::size_t arm) const;
     /// Counts of the up/down counters less the true ones at these turns, [turn][gyro] in quarter fringes, for every arm

@@ -10,6 +10,10 @@
 namespace ringlock::ensemble {
 
 bool drive_repeats(const scenario::Scenario& scenario) {
+    if (scenario::has_profile(scenario.input) || scenario.dither.amplitude_wander_relative_rt_s != 0.0 ||
+        scenario.dither.amplitude_drift_relative_per_h != 0.0) {
+        return false;
+    }
     const auto all = effects::registry();
     return std::none_of(all.begin(), all.end(), [&](const effects::Effect* effect) {
         const auto values = scenario.effects.find(std::string(effect->name()));

@@ -7,7 +7,8 @@
 namespace ringlock::ensemble {
 
 /// Whether a gyro of the scenario without injected noise sees the same drive in every cycle: no active effect adds a
-/// rate that varies in time, noise included, and none changes the threshold in time.
+/// rate that varies in time, noise included, and none changes the threshold in time; amplitude and input rate stay,
+/// too.
 bool drive_repeats(const scenario::Scenario& scenario);
 
 /// Mean output rate less input rate [deg/h] of a gyro whose drive repeats itself, without injected noise or correction:

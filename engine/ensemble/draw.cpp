@@ -3,6 +3,7 @@
 #include <boost/random/uniform_real_distribution.hpp>
 
 #include "engine/effects/effect.hpp"
+#include "engine/ensemble/schedule.hpp"
 
 namespace ringlock::ensemble {
 
@@ -11,6 +12,12 @@ std::int64_t total_gyros(const scenario::Scenario& scenario) {
 }
 
 double input_rate_deg_h(const scenario::Scenario& scenario, std::int64_t gyro) {
+    if (scenario::has_profile(scenario.input)) {
+        const Schedule schedule(scenario);
+        const double start_s = static_cast<double>(schedule.settle_cycles) * schedule.cycle_s;
+        const double duration_s = static_cast<double>(schedule.samples - 1) * schedule.sample_interval_s;
+        return scenario::profile_angle_arcsec(scenario.input, start_s, duration_s) / duration_s;
+    }
     return scenario::input_rate_deg_h(scenario.input, gyro / scenario.ensemble.gyros);
 }
 
@@ -28,7 +35,7 @@ gyro::Setup nominal_setup(const scenario::Scenario& scenario) {
     setup.lockin_threshold_deg_h = scenario.gyro.lockin_threshold_deg_h;
     setup.dither_frequency_hz = scenario.dither.frequency_hz;
     setup.dither_peak_rate_deg_s = scenario.dither.peak_rate_deg_s;
-    setup.input_rate_deg_h = scenario.input.rate_deg_h;
+    setup.input_rate_deg_h = input_rate_deg_h(scenario, 0);
     for (const effects::Effect* effect : effects::registry()) {
         const auto values = scenario.effects.find(std::string(effect->name()));
         if (values != scenario.effects.end() && effect->active(values->second))

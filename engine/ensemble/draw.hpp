@@ -10,7 +10,7 @@ namespace ringlock::ensemble {
 /// Gyros in a run: ensemble.gyros for each rate of the sweep. Gyro g is member g % gyros at rate g / gyros.
 std::int64_t total_gyros(const scenario::Scenario& scenario);
 
-/// Input rate of gyro g [deg/h].
+/// Input rate of gyro g [deg/h]; that of a profile is its mean over the record.
 double input_rate_deg_h(const scenario::Scenario& scenario, std::int64_t gyro);
 
 /// Input rate of a gyro at a time since the start of the run [deg/h]: constant.

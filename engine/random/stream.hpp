@@ -24,6 +24,7 @@ enum class Purpose : std::uint64_t {
     bootstrap = 10,
     comparator_noise = 11,
     missed_counts = 12,
+    amplitude_wander = 13,
 };
 
 /// Who draws: the study's seed and the gyro's number.

@@ -43,6 +43,10 @@ struct LaneReadings {
     std::vector<simd::Lanes> accel_before_rad_s2;
     std::vector<simd::Lanes> accel_after_rad_s2;
     LanePulses pulses;  ///< empty where nobody asked for them
+    // For records; empty where nobody asked for them:
+    std::vector<simd::Lanes>
+        zero_rate_s;                 ///< when the phase turned, as the electronics find it, from the dither's turn
+    std::vector<simd::Lanes> count;  ///< what the counter says, in quarter fringes, less those of phase_whole
 
     void resize(std::size_t wanted) {
         turns = wanted;

@@ -124,6 +124,11 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
             for (std::size_t i = first; i < end; i += stride) {
                 const auto& [sign, before, after, extra, after_side] = sides_of(i);
                 const auto& [walk, quarters, error] = found[(i - first) / stride];
+                const bool timed = !readings.zero_rate_s.empty();
+                if (timed) {
+                    store(hn::Floor(quarters), readings.count[i]);
+                    store(walk.time_s, readings.zero_rate_s[i]);
+                }
                 if (electronics.ideal) {
                     store(drive_acceleration<extras>(d, before, extra, walk.time_s), readings.accel_before_rad_s2[i]);
                     store(drive_acceleration<extras>(d, after, extra, walk.time_s), readings.accel_after_rad_s2[i]);
@@ -157,8 +162,10 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
                 const auto factors =
                     pulse_factors<2>(d, pulses.times[after_side], pulses.used, lane, quarter_of(d, floor), x);
                 const V turned_s = walk.time_s;
+                V nearest_s[2];
                 const auto side_acceleration = [&](std::size_t which, V scale) HWY_ATTR {
                     const V first_s = sm::fma(d, near_root * scale, factors.values[which][0], turned_s);
+                    nearest_s[which] = first_s;
                     const V second_s = sm::fma(d, far_root * scale, factors.values[which][1], turned_s);
                     const V interval = ticked_interval(d, tick_fraction, first_s, second_s, electronics.clock_hz);
                     return acceleration_of_pulses(d, measured_roots, interval);
@@ -170,6 +177,19 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
                 last_scale = scale_after;
                 store(side_acceleration(0, hn::Neg(scale_before)), readings.accel_before_rad_s2[i]);
                 store(side_acceleration(1, scale_after), readings.accel_after_rad_s2[i]);
+                if (timed) {
+                    // Half-way between the nearest pulses on either side, in whole ticks.
+                    const V half = hn::Set(d, 0.5);
+                    V middle = half * (nearest_s[0] + nearest_s[1]);
+                    if (electronics.clock_hz > 0.0) {
+                        const V clock = hn::Set(d, electronics.clock_hz);
+                        const V tick_before = hn::Floor(sm::fma(d, nearest_s[0], clock, tick_fraction));
+                        const V tick_after = hn::Floor(sm::fma(d, nearest_s[1], clock, tick_fraction));
+                        middle = (hn::Floor(half * (tick_before + tick_after)) - tick_fraction) *
+                                 hn::Set(d, 1.0 / electronics.clock_hz);
+                    }
+                    store(middle, readings.zero_rate_s[i]);
+                }
             }
         }
     }
@@ -208,6 +228,10 @@ void LaneReadout::read(const gyro::LaneDrive& drive, const gyro::LaneTurns& turn
     readings.first_turn = drive.first_turn;
     readings.resize(drive.turns);
     angles.resize(drive.turns);
+    if (times_) {
+        readings.zero_rate_s.resize(drive.turns);
+        readings.count.resize(drive.turns);
+    }
     const bool reversed =
         wanted_ == Wanted::pulses
             ? read_pulse_by_pulse(constants_, pulses_, electronics_, lanes_, drive, turns, noise, readings, angles)

@@ -33,6 +33,10 @@ class LaneReadout {
     LaneReadout(std::span<const gyro::Device> devices, std::span<const gyro::Ellipse> ellipses,
                 const Electronics& electronics, Wanted wanted);
 
+    /// From now on readings hold the times of the zero-rate points and the counter, too. Not where only the phase is
+    /// wanted.
+    void keep_times() { times_ = true; }
+
     /// Reads every `stride`-th turn of the piece, from the first; rows of turns in between are left as they are. With
     /// pulses, every turn is read. Throws RunError where the phase does not reverse near a turn.
     void read(const gyro::LaneDrive& drive, const gyro::LaneTurns& turns, const ElectronicNoise& noise,
@@ -42,6 +46,7 @@ class LaneReadout {
     std::size_t lanes_;
     Electronics electronics_;
     Wanted wanted_;
+    bool times_ = false;
     ReadoutConstants constants_;
     PulseTables pulses_;
 };

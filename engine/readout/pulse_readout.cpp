@@ -179,6 +179,10 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& tables, cons
             if (!electronics.ideal) error = sm::fraction(d, phase + error - named) + (named - phase);
             store(sine, readings.sine[i]);
             store(cosine, readings.cosine[i]);
+            if (!readings.zero_rate_s.empty()) {
+                store(off_s + t0, readings.zero_rate_s[i]);
+                store(sm::fma(d, sign, counted + half, hn::Neg(half)), readings.count[i]);
+            }
             V read_fringes = phase + error;
             V output_error = electronics.interpolate ? error : named - phase;
             V first_quarter = floor + one;

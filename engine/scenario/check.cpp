@@ -40,6 +40,14 @@ Finding dither_reverses_the_rate(const Scenario& s) {
         std::abs(s.effects.at("dither_asymmetry").at("ratio")) + sigmas * s.ensemble.dither_asymmetry_sd_ratio;
     const double smallest =
         peak_rate_deg_h(s) * (1.0 - sigmas * s.ensemble.dither_amplitude_sd_relative) * (1.0 - asymmetry);
+    const double swing = 1.0 - amplitude_change_relative(s.dither, s.ensemble.settle_s + s.ensemble.duration_s);
+    for (const double rate : s.input.profile_rate_deg_h) {
+        if (std::abs(rate) < 0.5 * smallest * swing) continue;
+        return Complaint{{"input.profile_rate_deg_h", "dither.peak_rate_deg_s"},
+                         fmt::format("the input rate of {:g} deg/h must stay below {:g} deg/h, half of the smallest "
+                                     "peak rate of the dither (the rate must reverse in every half cycle)",
+                                     rate, 0.5 * smallest * swing)};
+    }
     const bool sweep = s.input.sweep_points > 1;
     const bool stop_is_larger = sweep && std::abs(s.input.sweep_stop_deg_h) > std::abs(s.input.rate_deg_h);
     const double rate = stop_is_larger ? s.input.sweep_stop_deg_h : s.input.rate_deg_h;
@@ -50,6 +58,35 @@ Finding dither_reverses_the_rate(const Scenario& s) {
                      fmt::format("the input rate of {:g} deg/h must stay below {:g} deg/h, half of the smallest peak "
                                  "rate of the dither (the rate must reverse in every half cycle)",
                                  rate, 0.5 * smallest)};
+}
+
+Finding amplitude_stays(const Scenario& s) {
+    constexpr double most = 0.5;
+    const double change = amplitude_change_relative(s.dither, s.ensemble.settle_s + s.ensemble.duration_s);
+    if (change <= most) return {};
+    return Complaint{{"dither.amplitude_wander_relative_rt_s", "dither.amplitude_drift_relative_per_h",
+                      "ensemble.duration_s", "ensemble.settle_s"},
+                     fmt::format("the dither's amplitude changes by up to {:g} of itself; it must not change by more "
+                                 "than {:g} within {:g} sigma",
+                                 change, most, sigmas)};
+}
+
+Finding profile_is_a_profile(const Scenario& s) {
+    const auto& times = s.input.profile_time_s;
+    if (times.size() != s.input.profile_rate_deg_h.size()) {
+        return Complaint{{"input.profile_rate_deg_h", "input.profile_time_s"},
+                         fmt::format("a profile of {} times has as many rates, not {}", times.size(),
+                                     s.input.profile_rate_deg_h.size())};
+    }
+    for (std::size_t i = 1; i < times.size(); ++i) {
+        if (times[i] > times[i - 1]) continue;
+        return Complaint{
+            {"input.profile_time_s"},
+            fmt::format("{:g} s comes after {:g} s; times of a profile must increase", times[i], times[i - 1])};
+    }
+    if (times.empty() || s.input.sweep_points == 1) return {};
+    return Complaint{{"input.profile_time_s", "input.sweep_points"},
+                     "a rate that follows a profile cannot be swept; leave out one of the two"};
 }
 
 Finding sweep_goes_somewhere(const Scenario& s) {
@@ -261,6 +298,11 @@ constexpr std::array all_rules = {
     Rule{"The input rate, over the whole sweep, stays below half of the dither's smallest peak rate (six standard "
          "deviations of its spread and the asymmetry taken off), so that the rate reverses in every half cycle.",
          dither_reverses_the_rate},
+    Rule{"Wander and drift of the dither's amplitude stay within half of it over the run, six standard deviations "
+         "taken.",
+         amplitude_stays},
+    Rule{"A profile of the input rate has as many times as rates, in order of time, and there is no sweep beside it.",
+         profile_is_a_profile},
     Rule{"A sweep of more than one point ends at another rate than it starts from.", sweep_goes_somewhere},
     Rule{"The gyros of all points of the sweep are at most 100000000.", sweep_is_not_too_large},
     Rule{"The half cycles of all gyros, those before the record with them, are at most 1e18.", turns_can_be_counted},

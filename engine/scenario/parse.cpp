@@ -140,6 +140,7 @@ class Reader {
 
     void read_value(const Key& key, const toml::node& node) {
         if (key.type == Type::arms) return read_arms(key, node);
+        if (key.type == Type::reals) return read_reals(key, node);
         const std::optional<Value> value = convert(key, node);
         if (!value) {
             return wrong(key, node, fmt::format("must be {}, not {}", allowed_text(key), type_text(node)));
@@ -166,6 +167,28 @@ class Reader {
         if (key.type == Type::real && node.is_floating_point()) return node.as_floating_point()->get();
         if (key.type == Type::word && node.is_string()) return node.as_string()->get();
         return {};
+    }
+
+    void read_reals(const Key& key, const toml::node& node) {
+        const toml::array* list = node.as_array();
+        if (list == nullptr) {
+            return wrong(key, node, fmt::format("must be {}, not {}", allowed_text(key), type_text(node)));
+        }
+        std::vector<double> values;
+        for (const toml::node& element : *list) {
+            if (const auto* integer = element.as_integer()) {
+                values.push_back(static_cast<double>(integer->get()));
+            } else if (const auto* real = element.as_floating_point()) {
+                values.push_back(real->get());
+            } else {
+                return wrong(key, element, fmt::format("must be a number, not {}", type_text(element)));
+            }
+            if (!within_bounds(key, std::vector<double>{values.back()})) {
+                const std::string_view finite = std::isfinite(values.back()) ? "" : "finite and ";
+                return wrong(key, element, fmt::format("must be {}{} ({})", finite, range_text(key), key.bounds.why));
+            }
+        }
+        key.set(scenario_, values);
     }
 
     void read_arms(const Key& key, const toml::node& node) {

@@ -57,6 +57,8 @@ std::string_view type_name(Type type) {
             return "float";
         case Type::word:
             return "string";
+        case Type::reals:
+            return "list of floats";
         case Type::arms:
             break;
     }
@@ -112,7 +114,7 @@ std::string schema_json() {
                           {"default", json_of(key.default_value())},
                           {"allowed", allowed_text(key)},
                           {"doc", key.doc}};
-            if (key.type == Type::integer || key.type == Type::real) {
+            if (key.type == Type::integer || key.type == Type::real || key.type == Type::reals) {
                 entry["min"] = json_of(key.bounds.min);
                 entry["max"] = json_of(key.bounds.max);
             }

@@ -1,5 +1,6 @@
 #include "engine/scenario/scenario.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/effects/effect.hpp"
@@ -29,6 +30,40 @@ double input_rate_deg_h(const InputRate& input, std::int64_t point) {
     if (point == input.sweep_points - 1) return input.sweep_stop_deg_h;
     const double fraction = static_cast<double>(point) / static_cast<double>(input.sweep_points - 1);
     return input.rate_deg_h + fraction * (input.sweep_stop_deg_h - input.rate_deg_h);
+}
+
+bool has_profile(const InputRate& input) { return !input.profile_time_s.empty(); }
+
+double profile_rate_deg_h(const InputRate& input, double time_s) {
+    const auto& times = input.profile_time_s;
+    const auto& rates = input.profile_rate_deg_h;
+    const auto after = std::upper_bound(times.begin(), times.end(), time_s);
+    if (after == times.begin()) return rates.front();
+    if (after == times.end()) return rates.back();
+    const auto i = static_cast<std::size_t>(after - times.begin());
+    return rates[i - 1] + (time_s - times[i - 1]) / (times[i] - times[i - 1]) * (rates[i] - rates[i - 1]);
+}
+
+double profile_angle_arcsec(const InputRate& input, double start_s, double duration_s) {
+    // 1 deg/h is 1 arcsec/s. The rate is linear between the points: the trapezium is exact.
+    const double end_s = start_s + duration_s;
+    double angle = 0.0;
+    double from_s = start_s;
+    double from_rate = profile_rate_deg_h(input, start_s);
+    const auto& times = input.profile_time_s;
+    for (auto point = std::upper_bound(times.begin(), times.end(), start_s); point != times.end() && *point < end_s;
+         ++point) {
+        const double rate = input.profile_rate_deg_h[static_cast<std::size_t>(point - times.begin())];
+        angle += 0.5 * (from_rate + rate) * (*point - from_s);
+        from_s = *point;
+        from_rate = rate;
+    }
+    return angle + 0.5 * (from_rate + profile_rate_deg_h(input, end_s)) * (end_s - from_s);
+}
+
+double amplitude_change_relative(const Dither& dither, double duration_s) {
+    return 6.0 * dither.amplitude_wander_relative_rt_s * std::sqrt(duration_s) +
+           std::abs(dither.amplitude_drift_relative_per_h) * duration_s / 3600.0;
 }
 
 }  // namespace ringlock::scenario

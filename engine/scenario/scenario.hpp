@@ -19,6 +19,9 @@ struct Gyro {
 struct Dither {
     double frequency_hz = 783.4 / (2.0 * std::numbers::pi);  ///< Gao & Deng 2007: 783.4 rad/s
     double peak_rate_deg_s = 109.1;                          ///< Omega_D
+    /// The amplitude at a turn is Omega_D/w_D (1 + drift t + W(t)), W a random walk of variance wander^2 t.
+    double amplitude_wander_relative_rt_s = 0.0;
+    double amplitude_drift_relative_per_h = 0.0;
     bool operator==(const Dither&) const = default;
 };
 
@@ -59,6 +62,9 @@ struct InputRate {
     double rate_deg_h = 15.0;
     double sweep_stop_deg_h = 15.0;  ///< last rate of a sweep that starts at rate_deg_h
     std::int64_t sweep_points = 1;   ///< rates in the sweep; each gets ensemble.gyros gyros
+    /// A rate that varies in time in place of rate_deg_h: linear between these points, constant beyond them.
+    std::vector<double> profile_time_s = {};
+    std::vector<double> profile_rate_deg_h = {};
     bool operator==(const InputRate&) const = default;
 };
 
@@ -106,6 +112,18 @@ struct Output {
     bool operator==(const Output&) const = default;
 };
 
+enum class RecordKind { turns, samples };
+enum class RecordTrajectory { uncompensated, noise_injected };
+
+/// What `ringlock record` writes of a gyro.
+struct RecordSettings {
+    RecordKind kind = RecordKind::turns;
+    RecordTrajectory trajectory = RecordTrajectory::noise_injected;
+    double rate_hz = 100.0;               ///< of samples
+    double temperature_interval_s = 1.0;  ///< between rows of the temperature, where it changes
+    bool operator==(const RecordSettings&) const = default;
+};
+
 /// Effects beyond the base equation: effect name -> parameter -> value. Holds every effect of the registry with every
 /// one of its parameters, at its default where the scenario does not name it.
 using EffectSettings = std::map<std::string, std::map<std::string, double>>;
@@ -115,6 +133,15 @@ EffectSettings default_effect_settings();
 
 /// Input rate of one point of the sweep, 0 <= point < sweep_points; the points are evenly spaced, both ends included.
 double input_rate_deg_h(const InputRate& input, std::int64_t point);
+
+/// Whether the input rate follows a profile. The functions below need one.
+bool has_profile(const InputRate& input);
+double profile_rate_deg_h(const InputRate& input, double time_s);
+/// Rotation of the case by the profile between start_s and start_s + duration_s [arcsec].
+double profile_angle_arcsec(const InputRate& input, double start_s, double duration_s);
+
+/// Largest change of the dither's amplitude within six standard deviations over that time, relative.
+double amplitude_change_relative(const Dither& dither, double duration_s);
 
 struct Scenario {
     Gyro gyro;
@@ -131,6 +158,7 @@ struct Scenario {
                                      "noise_injected+compensated"};
     Propagation propagation;
     Output output;
+    RecordSettings record;
     bool operator==(const Scenario&) const = default;
 };
 

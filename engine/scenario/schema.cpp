@@ -21,6 +21,8 @@ std::vector<std::string> words_of(ReadoutModel) { return {"ideal", "latched", "i
 std::vector<std::string> words_of(PhaseFrom) { return {"detectors", "detectors_and_pulses"}; }
 std::vector<std::string> words_of(AngleOutput) { return {"interpolated", "quarter_fringe"}; }
 std::vector<std::string> words_of(PropagationMethod) { return {"turn_map", "direct"}; }
+std::vector<std::string> words_of(RecordKind) { return {"turns", "samples"}; }
+std::vector<std::string> words_of(RecordTrajectory) { return {"uncompensated", "noise_injected"}; }
 
 template <class Number>
 Bounds between(Number min, Number max, std::string why) {
@@ -62,6 +64,10 @@ Key key(std::string section, std::string name, Access access, Bounds bounds, std
         k.type = Type::arms;
         k.get = [access](const Scenario& s) -> Value { return access(s); };
         k.set = [access](Scenario& s, const Value& v) { access(s) = std::get<Field>(v); };
+    } else if constexpr (std::is_same_v<Field, std::vector<double>>) {
+        k.type = Type::reals;
+        k.get = [access](const Scenario& s) -> Value { return access(s); };
+        k.set = [access](Scenario& s, const Value& v) { access(s) = std::get<Field>(v); };
     } else {
         // Unsigned fields are signed in TOML.
         using Plain = std::conditional_t<std::is_same_v<Field, std::uint64_t>, std::int64_t, Field>;
@@ -99,6 +105,12 @@ std::vector<Section> base_sections() {
                  "Frequency; the default is 783.4 rad/s."),
              key(RINGLOCK_KEY(dither, peak_rate_deg_s), above(0.0, 1e4, "without dither there are no turns to follow"),
                  "Omega_D: peak rate of the case against the cavity."),
+             key(RINGLOCK_KEY(dither, amplitude_wander_relative_rt_s), between(0.0, 0.1, "a dither is driven steadily"),
+                 "Random walk of the amplitude from turn to turn, relative, per square root of a second, from zero at "
+                 "the start."),
+             key(RINGLOCK_KEY(dither, amplitude_drift_relative_per_h),
+                 between(-100.0, 100.0, "a dither is driven steadily"),
+                 "Steady change of the amplitude, relative to that at the start."),
          }},
         {"noise_injection",
          "Random noise on the dither angle, in arms that begin with noise_injected.",
@@ -156,6 +168,12 @@ std::vector<Section> base_sections() {
                  "Last rate of a sweep; not used where sweep_points is 1."),
              key(RINGLOCK_KEY(input, sweep_points), between<std::int64_t>(1, 100'000, "1 is no sweep"),
                  "Evenly spaced rates of the sweep, both ends included; each gets ensemble.gyros gyros."),
+             key(RINGLOCK_KEY(input, profile_time_s), between(-1e9, 1e9, "30 years"),
+                 "Times of a profile, from the start of the run, that takes the place of rate_deg_h: linear between "
+                 "its "
+                 "points, constant beyond them. The rate that results are compared with is its mean over the record."),
+             key(RINGLOCK_KEY(input, profile_rate_deg_h), between(-1e7, 1e7, "the dither must reverse it"),
+                 "Rates at these times."),
          }},
         {"environment",
          "Temperature of the gyros against that at the start, for effects that follow it: ramp t + swing sin(2 pi t / "
@@ -211,6 +229,17 @@ std::vector<Section> base_sections() {
                  "Time between samples of the decimated angle."),
              key(RINGLOCK_KEY(output, angle_record), none,
                  "Store the angle record of every gyro and arm, not only its statistics."),
+         }},
+        {"record",
+         "What `ringlock record` writes of one gyro over ensemble.duration_s.",
+         {
+             key(RINGLOCK_KEY(record, kind), none,
+                 "turns: every zero-rate point as the electronics have it; samples: increments of the stripped angle."),
+             key(RINGLOCK_KEY(record, trajectory), none, "With or without noise on the dither."),
+             key(RINGLOCK_KEY(record, rate_hz), between(1e-3, 1e6, "faster than any output"),
+                 "Samples a second; the angle is known at turns and interpolated linearly between them."),
+             key(RINGLOCK_KEY(record, temperature_interval_s), between(1e-3, 1e6, "a thermometer is slow"),
+                 "Time between rows of the temperature, where that changes."),
          }},
         {"arms",
          "What is done to the gyros; all arms share their random numbers gyro by gyro.",
@@ -277,6 +306,12 @@ const std::vector<Section>& schema() {
 
 bool within_bounds(const Key& key, const Value& value) {
     if (key.type == Type::integer) return number_within(key.bounds, std::get<std::int64_t>(value));
+    if (key.type == Type::reals) {
+        for (const double real : std::get<std::vector<double>>(value)) {
+            if (!std::isfinite(real) || !number_within(key.bounds, real)) return false;
+        }
+        return true;
+    }
     const double real = std::get<double>(value);
     return std::isfinite(real) && number_within(key.bounds, real);
 }
@@ -291,6 +326,7 @@ std::string range_text(const Key& key) {
             return fmt::format("a list of different arms of {}", list_text(arm_names()));
         case Type::integer:
         case Type::real:
+        case Type::reals:
             break;
     }
     return fmt::format("{}{} {} and {}{}", key.bounds.or_zero ? "0 or " : "",
@@ -300,6 +336,7 @@ std::string range_text(const Key& key) {
 
 std::string allowed_text(const Key& key) {
     if (key.type == Type::integer) return "a whole number " + range_text(key);
+    if (key.type == Type::reals) return "a list of numbers " + range_text(key);
     if (key.type == Type::real) return (key.bounds.or_zero ? "a number, " : "a number ") + range_text(key);
     return range_text(key);
 }
@@ -311,6 +348,11 @@ std::string to_toml(const Value& value) {
         std::string operator()(double v) const { return format_real(v); }
         std::string operator()(const std::string& v) const { return in_quotes(v); }
         std::string operator()(const std::vector<std::string>& v) const { return fmt::format("[{}]", list_text(v)); }
+        std::string operator()(const std::vector<double>& v) const {
+            std::vector<std::string> items;
+            for (const double value : v) items.push_back(format_real(value));
+            return fmt::format("[{}]", fmt::join(items, ", "));
+        }
     };
     return std::visit(Writer{}, value);
 }

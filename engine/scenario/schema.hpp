@@ -12,9 +12,9 @@
 /// The parser, the printed schema, the page docs/scenario.md and the resolved scenario all come from it.
 namespace ringlock::scenario {
 
-using Value = std::variant<bool, std::int64_t, double, std::string, std::vector<std::string>>;
+using Value = std::variant<bool, std::int64_t, double, std::string, std::vector<std::string>, std::vector<double>>;
 
-enum class Type { boolean, integer, real, word, arms };
+enum class Type { boolean, integer, real, word, arms, reals };
 
 /// What a number may be. The limits have the type of the key.
 struct Bounds {
@@ -29,7 +29,7 @@ struct Key {
     std::string section;  ///< "ensemble", "effects.quantum_noise"
     std::string name;     ///< with its unit
     Type type;
-    Bounds bounds;                   ///< of integers and reals
+    Bounds bounds;                   ///< of integers, reals and each of a list of reals
     std::vector<std::string> words;  ///< of Type::word
     std::string doc;                 ///< one line
     std::function<Value(const Scenario&)> get;
@@ -48,7 +48,7 @@ struct Section {
 /// All sections in the order in which they are printed.
 const std::vector<Section>& schema();
 
-/// True where a number of the key's type lies within its bounds; a real must be finite as well.
+/// True where a number of the key's type lies within its bounds, all of a list do; a real must be finite as well.
 bool within_bounds(const Key& key, const Value& value);
 
 /// "between 1 and 10000000", "above 0 and at most 10000", "one of "a", "b"".

@@ -23,6 +23,7 @@ declare -A may=(
     [analysis/allan]="engine/core engine/simd"
     [analysis/noise]="analysis/allan engine/core engine/random"
     [analysis/record]="analysis/allan analysis/noise engine/core engine/store"
+    [analysis/instrument]="analysis/record engine/*"
     [analysis/study]="analysis/allan analysis/noise engine/*"
     [analysis/closure]="analysis/record engine/*"
     [analysis/report]="analysis/* engine/*"

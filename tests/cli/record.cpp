@@ -77,6 +77,40 @@ TEST_F(RecordProgram, ImportsText) {
     EXPECT_EQ(read("r.csv"), before);
 }
 
+TEST_F(RecordProgram, RecordsAGyroOfAScenario) {
+    write("s.toml", "[ensemble]\nduration_s = 3.5\ngyros = 4\n");
+    Outcome r = run({"record", "s.toml", "-o", "r.h5"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.out, AllOf(HasSubstr("r.h5: gyro 0, seed 1:"), HasSubstr("turns over")));
+    EXPECT_EQ(run({"validate", "r.h5"}).status, 0);
+    r = run({"record", "s.toml", "-o", "again.h5", "--seed", "1", "--gyro", "0", "--json"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.out, AllOf(testing::StartsWith("{"), HasSubstr("\"kind\": \"turns\""), HasSubstr("\"rows\": ")));
+    EXPECT_EQ(read("again.h5"), read("r.h5")) << "the same scenario, seed and gyro are the same bytes";
+    ASSERT_EQ(run({"record", "s.toml", "-o", "again.h5", "--seed", "2"}).status, 0);
+    EXPECT_NE(read("again.h5"), read("r.h5"));
+
+    write("samples.toml", "[ensemble]\nduration_s = 3.5\n[record]\nkind = \"samples\"\nrate_hz = 50\n");
+    r = run({"record", "samples.toml", "-o", "samples.h5"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.out, HasSubstr("175 angle increments at 50 Hz"));
+}
+
+TEST_F(RecordProgram, RefusesRecordsThatCannotBe) {
+    write("s.toml", "[ensemble]\nduration_s = 3.5\ngyros = 4\n");
+    expect_refused({"record", "s.toml"}, HasSubstr("output"));
+    expect_refused({"record", "s.toml", "-o", "s.toml"}, HasSubstr("move it away"));
+    expect_refused({"record", "s.toml", "-o", "no/r.h5"}, HasSubstr("no/r.h5"));
+    expect_refused({"record", "s.toml", "-o", "r.h5", "--gyro", "4"}, HasSubstr("0 to 3"));
+    expect_refused({"record", "s.toml", "-o", "r.h5", "--gyro", "-1"}, HasSubstr("--gyro"));
+    expect_refused({"record", "s.toml", "-o", "r.h5", "--seed", "x"}, HasSubstr("--seed"));
+    expect_refused({"record", "none.toml", "-o", "r.h5"}, HasSubstr("none.toml"));
+    write("bad.toml", "[record]\nkind = \"turn\"\n[input]\nprofile_time_s = [0, \"x\"]\n");
+    expect_refused({"record", "bad.toml", "-o", "r.h5"},
+                   AllOf(HasSubstr("bad.toml:2:8: key \"record.kind\""), HasSubstr("did you mean \"turns\"?"),
+                         HasSubstr("bad.toml:4:22: key \"input.profile_time_s\"")));
+}
+
 TEST_F(RecordProgram, AFullDiskLeavesNothing) {
     std::string text = "# rate_hz = 10\nangle_arcsec\n";
     for (int i = 0; i < 20000; ++i) text += std::to_string(i * i) + "\n";

@@ -165,7 +165,7 @@ TEST_F(RunCommand, WrongCommandLinesAreRefused) {
 }
 
 TEST_F(RunCommand, PlannedCommandsSayThatTheyAreNotThereYet) {
-    for (const char* command : {"merge", "replay", "record", "closure", "report", "import"}) {
+    for (const char* command : {"merge", "replay", "closure", "report"}) {
         expect_refused({command}, AllOf(HasSubstr(command), HasSubstr("not there yet")));
         expect_refused({command, "a.h5", "-o", "b.h5", "--json"},
                        AllOf(HasSubstr(command), HasSubstr("not there yet")));

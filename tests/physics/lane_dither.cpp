@@ -43,8 +43,9 @@ struct Rows {
 };
 
 Rows go(const std::vector<gyro::Device>& all, double rms_rad, std::size_t turns, const std::vector<std::size_t>& pieces,
-        const std::vector<simd::Lanes>& angle = {}, const std::vector<simd::Lanes>& factor = {}) {
-    dither::LaneDither dither(all, rms_rad, identities());
+        const std::vector<simd::Lanes>& angle = {}, const std::vector<simd::Lanes>& factor = {},
+        const dither::Wander& wander = {}) {
+    dither::LaneDither dither(all, rms_rad, identities(), wander);
     gyro::LaneDrive drive;
     Rows rows;
     std::size_t done = 0;
@@ -231,6 +232,49 @@ TEST(LaneDither, RotationKeepsItsDigitsInALongRun) {
     }
 }
 
+// Turns of an amplitude A (1 + w) lie at -A w and 2 A + A w, so that the half cycle between has the mean of both; noise
+// comes on top of it.
+TEST(LaneDither, AmplitudesDriftAndWanderAroundTheMiddleOfTheSwing) {
+    const auto all = devices(11);
+    constexpr std::size_t turns = 4000;
+    constexpr double drift = 3e-5;
+    constexpr double wander = 2e-4;
+    for (const double rms_rad : {0.0, 4.0}) {
+        const Rows still = go(all, rms_rad, turns, {turns});
+        const Rows drifting = go(all, rms_rad, turns, {turns}, {}, {}, {.drift_relative_per_s = drift});
+        const Rows wandering = go(all, rms_rad, turns, {turns}, {}, {}, {.relative_rt_s = wander});
+        double sum = 0.0;
+        for (std::size_t lane = 0; lane < all.size(); ++lane) {
+            const double a = all[lane].dither_amplitude_rad;
+            const auto farther = [&](const Rows& rows, std::size_t i) {
+                const double off = units::two_pi * (rows.plain[i][lane] - still.plain[i][lane]);
+                return i % 2 == 0 ? -off : off;
+            };
+            const auto time_s = [&](std::size_t i) {
+                return static_cast<double>(i / 2) * all[lane].period_s() +
+                       (i % 2 == 0 ? 0.0 : all[lane].positive_duration_s);
+            };
+            double last = 0.0;
+            for (std::size_t i = 0; i + 1 < turns; ++i) {
+                // Fringes of some thousand, whole ones taken off: 1e-9 rad is their rounding.
+                EXPECT_NEAR(farther(drifting, i), a * drift * time_s(i), 1e-9);
+                for (const Rows* rows : {&drifting, &wandering}) {
+                    const double mean = 0.5 * (farther(*rows, i) + farther(*rows, i + 1));
+                    EXPECT_NEAR(rows->amplitude[i][lane] - still.amplitude[i][lane], mean, 1e-8);
+                }
+                const double now = farther(wandering, i) / a;
+                const double step_s = i == 0 ? 1.0 : time_s(i) - time_s(i - 1);
+                sum += (now - last) * (now - last) / (wander * wander * step_s);
+                last = now;
+            }
+            EXPECT_EQ(farther(wandering, 0), 0.0);
+        }
+        // A chi-square of that many squares over their number: five standard errors.
+        const auto squares = static_cast<double>(all.size() * (turns - 2));
+        EXPECT_NEAR(sum / squares, 1.0, 5.0 * std::sqrt(2.0 / squares));
+    }
+}
+
 TEST(LaneDither, PiecesOfAnySizeGiveTheSameBits) {
     const auto all = devices(11);
     const std::size_t turns = 1500;
@@ -238,9 +282,10 @@ TEST(LaneDither, PiecesOfAnySizeGiveTheSameBits) {
     for (const bool vary : {false, true}) {
         const auto angle = vary ? extra.angle : std::vector<simd::Lanes>();
         const auto factor = vary ? extra.factor : std::vector<simd::Lanes>();
-        const Rows whole = go(all, 4.0, turns, {turns}, angle, factor);
+        const dither::Wander wander = vary ? dither::Wander{1e-4, 1e-5} : dither::Wander{};
+        const Rows whole = go(all, 4.0, turns, {turns}, angle, factor, wander);
         for (const auto& pieces : std::vector<std::vector<std::size_t>>{{1}, {3, 50, 1, 201}, {0, 512}}) {
-            const Rows rows = go(all, 4.0, turns, pieces, angle, factor);
+            const Rows rows = go(all, 4.0, turns, pieces, angle, factor, wander);
             EXPECT_EQ(differing(rows.plain, whole.plain, all.size()), 0U);
             EXPECT_EQ(differing(rows.amplitude, whole.amplitude, all.size()), 0U);
             EXPECT_EQ(differing(rows.rate, whole.rate, all.size()), 0U);

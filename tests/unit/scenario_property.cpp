@@ -44,6 +44,13 @@ Value random_value(const Key& key, Random& random) {
             return random_real(key, random);
         case Type::word:
             return key.words[below(random, key.words.size())];
+        case Type::reals: {
+            const auto min = std::get<double>(key.bounds.min);
+            const auto max = std::get<double>(key.bounds.max);
+            std::vector<double> values(below(random, 5));
+            for (double& value : values) value = min + unit(random) * (max - min);
+            return values;
+        }
         case Type::arms:
             break;
     }

@@ -56,6 +56,47 @@ TEST(ScenarioRules, ASweepGoesSomewhere) {
     EXPECT_EQ(complaint("[input]\nrate_deg_h = 0\nsweep_stop_deg_h = 5\nsweep_points = 51"), "");
 }
 
+TEST(ScenarioRules, AProfileIsAProfile) {
+    const std::string profile = "[input]\nprofile_time_s = [0, 5.5]\n";
+    EXPECT_EQ(complaint(profile + "profile_rate_deg_h = [-3, 4]"), "");
+    EXPECT_THAT(
+        complaint(profile + "profile_rate_deg_h = [1]"),
+        AllOf(HasSubstr("s.toml:3:22: key \"input.profile_rate_deg_h\" = [1.0]: "), HasSubstr("as many rates")));
+    EXPECT_THAT(complaint(profile), HasSubstr("as many rates, not 0"));
+    EXPECT_THAT(complaint("[input]\nprofile_time_s = [0, 5, 5]\nprofile_rate_deg_h = [0, 1, 2]"),
+                AllOf(HasSubstr("s.toml:2:18: key \"input.profile_time_s\""), HasSubstr("5 s comes after 5 s")));
+    EXPECT_THAT(complaint(profile + "profile_rate_deg_h = [0, 1]\nsweep_points = 2\nsweep_stop_deg_h = 0"),
+                HasSubstr("cannot be swept"));
+    EXPECT_THAT(complaint(profile + "profile_rate_deg_h = [0, -2e5]"), HasSubstr("the rate must reverse"));
+    EXPECT_THAT(
+        complaint(profile + "profile_rate_deg_h = [0, 1e9]"),
+        AllOf(HasSubstr("s.toml:3:26: key \"input.profile_rate_deg_h\" = 1000000000.0: "), HasSubstr("between")));
+    EXPECT_THAT(complaint(profile + "profile_rate_deg_h = [0, nan]"), HasSubstr("finite"));
+    EXPECT_THAT(complaint("[input]\nprofile_time_s = 5"),
+                AllOf(HasSubstr("a list of numbers"), HasSubstr("whole number")));
+}
+
+TEST(ScenarioRules, TheAmplitudeStays) {
+    EXPECT_EQ(complaint("[dither]\namplitude_wander_relative_rt_s = 1e-3"), "");
+    EXPECT_THAT(complaint("[dither]\namplitude_wander_relative_rt_s = 0.01"),
+                AllOf(HasSubstr("s.toml:2:34: key \"dither.amplitude_wander_relative_rt_s\""), HasSubstr("0.5")));
+    EXPECT_THAT(complaint("[dither]\namplitude_drift_relative_per_h = -4"),
+                HasSubstr("key \"dither.amplitude_drift_relative_per_h\""));
+}
+
+TEST(InputProfile, IsLinearBetweenItsPointsAndIntegratedExactly) {
+    const InputRate input{.profile_time_s = {1.0, 2.0, 4.0}, .profile_rate_deg_h = {10.0, 20.0, 0.0}};
+    EXPECT_EQ(profile_rate_deg_h(input, 0.0), 10.0);
+    EXPECT_EQ(profile_rate_deg_h(input, 1.5), 15.0);
+    EXPECT_EQ(profile_rate_deg_h(input, 3.0), 10.0);
+    EXPECT_EQ(profile_rate_deg_h(input, 9.0), 0.0);
+    EXPECT_DOUBLE_EQ(profile_angle_arcsec(input, 0.0, 1.0), 10.0);
+    EXPECT_DOUBLE_EQ(profile_angle_arcsec(input, 0.0, 5.0), 10.0 + 15.0 + 20.0);
+    EXPECT_DOUBLE_EQ(profile_angle_arcsec(input, 1.5, 1.5), 0.25 * 35.0 + 15.0);
+    EXPECT_DOUBLE_EQ(profile_angle_arcsec(input, 6.0, 2.0), 0.0);
+    EXPECT_DOUBLE_EQ(profile_angle_arcsec(input, 2.0, 0.0), 0.0);
+}
+
 TEST(ScenarioRules, ASweepIsNotTooLarge) {
     EXPECT_THAT(complaint("[input]\nsweep_points = 100000\nsweep_stop_deg_h = 0\n[ensemble]\ngyros = 1001"),
                 AllOf(HasSubstr("s.toml:5:9: key \"ensemble.gyros\" = 1001: "), HasSubstr("100000000 gyros")));

@@ -50,6 +50,9 @@ TEST(Schema, EveryKeySetsWhatItGets) {
                     other = key.words.back() == std::get<std::string>(key.default_value()) ? key.words.front()
                                                                                            : key.words.back();
                     break;
+                case Type::reals:
+                    other = std::vector<double>{1.0, 2.0};
+                    break;
                 case Type::arms:
                     other = std::vector<std::string>{"ideal"};
                     break;

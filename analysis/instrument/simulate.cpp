@@ -1,0 +1,219 @@
+#include "analysis/instrument/simulate.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/error.hpp"
+#include "engine/core/interrupt.hpp"
+#include "engine/core/units.hpp"
+#include "engine/core/version.hpp"
+#include "engine/ensemble/block.hpp"
+#include "engine/ensemble/draw.hpp"
+#include "engine/ensemble/schedule.hpp"
+#include "engine/scenario/arm.hpp"
+#include "engine/scenario/check.hpp"
+
+namespace ringlock::instrument {
+namespace {
+
+using scenario::Scenario;
+
+constexpr std::size_t piece_turns = 4096;  // even
+constexpr std::int64_t most_rows = 200'000'000;
+
+/// The scenario with the one arm that is recorded, its rules checked.
+Scenario with_trajectory(Scenario scenario) {
+    const bool noisy = scenario.record.trajectory == scenario::RecordTrajectory::noise_injected;
+    scenario.arms = {noisy ? "noise_injected" : "uncompensated"};
+    const auto complaints = scenario::check(scenario);
+    if (!complaints.empty()) {
+        throw InputError(
+            fmt::format("the trajectory to be recorded (record.trajectory) breaks a rule of key \"{}\": {}",
+                        complaints.front().keys.front(), complaints.front().problem));
+    }
+    return scenario;
+}
+
+record::Declared declared(const Scenario& s, double start_s, double end_s) {
+    const bool ideal = s.readout.model == scenario::ReadoutModel::ideal;
+    const bool converted = s.readout.model == scenario::ReadoutModel::instrument && s.readout.adc_bits > 0;
+    // Steps of a converter of +-1.25 fringe amplitudes are uniform errors.
+    const double step = converted ? 2.5 / std::ldexp(1.0, static_cast<int>(s.readout.adc_bits)) : 0.0;
+    record::Declared d;
+    d.scale_factor_arcsec = s.gyro.scale_factor_arcsec;
+    d.lockin_threshold_deg_h = s.gyro.lockin_threshold_deg_h;
+    d.dither_frequency_hz = s.dither.frequency_hz;
+    d.dither_peak_rate_deg_s = s.dither.peak_rate_deg_s;
+    d.bias_deg_h = 0.0;
+    d.clock_hz = ideal ? 0.0 : s.readout.clock_hz;
+    d.readout_noise_rad = ideal ? 0.0 : std::hypot(s.readout.detector_noise_relative, step / std::sqrt(12.0));
+    d.input_rate_deg_h = scenario::has_profile(s.input)
+                             ? scenario::profile_angle_arcsec(s.input, start_s, end_s - start_s) / (end_s - start_s)
+                             : s.input.rate_deg_h;
+    return d;
+}
+
+record::Track input_rate(const Scenario& s, std::int64_t gyro, double start_s, double end_s) {
+    record::Track track;
+    const auto add = [&](double time_s, double rate) {
+        track.time_s.push_back(time_s);
+        track.value.push_back(rate);
+    };
+    if (!scenario::has_profile(s.input)) {
+        const double rate = ensemble::input_rate_deg_h(s, gyro);
+        add(start_s, rate);
+        add(end_s, rate);
+        return track;
+    }
+    add(start_s, scenario::profile_rate_deg_h(s.input, start_s));
+    for (std::size_t i = 0; i < s.input.profile_time_s.size(); ++i) {
+        const double time_s = s.input.profile_time_s[i];
+        if (time_s > start_s && time_s < end_s) add(time_s, s.input.profile_rate_deg_h[i]);
+    }
+    add(end_s, scenario::profile_rate_deg_h(s.input, end_s));
+    return track;
+}
+
+record::Track temperature(const Scenario& s, double start_s, double end_s) {
+    record::Track track;
+    if (!scenario::temperature_varies(s.environment)) return track;
+    const auto rows = static_cast<std::int64_t>(std::ceil((end_s - start_s) / s.record.temperature_interval_s));
+    for (std::int64_t i = 0; i <= rows; ++i) {
+        const double time_s = start_s + static_cast<double>(i) * s.record.temperature_interval_s;
+        track.time_s.push_back(time_s);
+        track.value.push_back(start_temperature_c + scenario::temperature_change_k(s.environment, time_s));
+    }
+    return track;
+}
+
+/// The stripped angle at turns, linear between them, as increments.
+class Sampler {
+   public:
+    Sampler(double rate_hz, double start_s) : start_s_(start_s) {
+        samples_.kind = record::SampleKind::angle_increment_arcsec;
+        samples_.rate_hz = rate_hz;
+        samples_.t0_s = start_s + 1.0 / rate_hz;
+    }
+
+    /// Angle in arcsec, less one that is the same for all turns.
+    void add(double time_s, double angle_arcsec) {
+        while (begun_) {
+            const double at_s = start_s_ + static_cast<double>(next_) / samples_.rate_hz;
+            if (at_s > time_s) break;
+            const double share = std::max(0.0, (at_s - time_s_) / (time_s - time_s_));
+            const double angle = angle_ + share * (angle_arcsec - angle_);
+            if (next_ > 0) samples_.values.push_back(angle - last_);
+            last_ = angle;
+            ++next_;
+        }
+        begun_ = true;
+        time_s_ = time_s;
+        angle_ = angle_arcsec;
+    }
+    record::Samples finish(std::size_t wanted) {
+        samples_.values.resize(std::min(wanted, samples_.values.size()));
+        return std::move(samples_);
+    }
+
+   private:
+    record::Samples samples_;
+    double start_s_;
+    bool begun_ = false;
+    double time_s_ = 0.0, angle_ = 0.0;  // of the last turn
+    std::int64_t next_ = 0;              // boundary between samples
+    double last_ = 0.0;                  // angle at the boundary before
+};
+
+void add_turns(const ensemble::GyroBlock& block, std::int64_t first_turn, double clock_hz, record::Turns& turns) {
+    const readout::LaneReadings& readings = block.hardware(0);
+    for (std::size_t i = 0; i < readings.turns; ++i) {
+        const std::int64_t number = first_turn + static_cast<std::int64_t>(i);
+        double time_s = block.turn_time_s(number, 0) + readings.zero_rate_s[i][0];
+        // Whole ticks, but for the rounding of sums.
+        if (clock_hz > 0.0) time_s = std::nearbyint(time_s * clock_hz) / clock_hz;
+        turns.time_s.push_back(time_s);
+        turns.direction.push_back(readings.minimum(i) ? 1 : -1);
+        const double off = block.count_errors().empty() ? 0.0 : block.count_errors()[i][0];
+        turns.quarter_count.push_back(4 * static_cast<std::int64_t>(readings.phase_whole[i][0]) +
+                                      static_cast<std::int64_t>(readings.count[i][0] + off));
+        turns.sine.push_back(readings.sine[i][0]);
+        turns.cosine.push_back(readings.cosine[i][0]);
+        turns.accel_before_rad_s2.push_back(readings.accel_before_rad_s2[i][0]);
+        turns.accel_after_rad_s2.push_back(readings.accel_after_rad_s2[i][0]);
+    }
+}
+
+}  // namespace
+
+record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
+    const std::int64_t gyros = ensemble::total_gyros(asked);
+    if (gyro < 0 || gyro >= gyros) {
+        throw InputError(fmt::format("gyro {}: the scenario has the gyros 0 to {}", gyro, gyros - 1));
+    }
+    const Scenario s = with_trajectory(asked);
+    const bool samples = s.record.kind == scenario::RecordKind::samples;
+    const double cycles = s.ensemble.duration_s * s.dither.frequency_hz;
+    const double rows = samples ? s.ensemble.duration_s * s.record.rate_hz : 2.0 * cycles;
+    if (!(rows <= static_cast<double>(most_rows)) || !(2.0 * cycles <= 1e12)) {
+        throw InputError(
+            fmt::format("key \"ensemble.duration_s\" = {:g}: a record of {:.3g} rows; at most {} are "
+                        "allowed",
+                        s.ensemble.duration_s, rows, most_rows));
+    }
+    if (samples && rows < 1.0) {
+        throw InputError(fmt::format("key \"record.rate_hz\" = {:g}: a record of {:g} s holds no sample",
+                                     s.record.rate_hz, s.ensemble.duration_s));
+    }
+    const std::vector<scenario::Arm> arms = {scenario::parse_arm(s.arms.front())};
+    ensemble::GyroBlock block(s, arms, gyro, 1, ensemble::Detail::hardware);
+    const ensemble::Schedule schedule(s);
+
+    std::int64_t turn = 0;
+    const auto advance = [&](std::int64_t until, const auto& use) {
+        while (turn < until) {
+            check_interrupt();
+            const auto turns = static_cast<std::size_t>(std::min<std::int64_t>(piece_turns, until - turn));
+            block.advance(turns);
+            use(turn, turns);
+            turn += static_cast<std::int64_t>(turns);
+        }
+    };
+    const std::int64_t settle_turns = schedule.settle_turns();
+    advance(settle_turns, [](std::int64_t, std::size_t) {});
+
+    record::Record out;
+    out.title = fmt::format("gyro {} of seed {}, {}", gyro, s.ensemble.seed, s.arms.front());
+    out.instrument = "simulated ring laser gyro";
+    out.source = fmt::format("ringlock {} record", version());
+    const double start_s = block.turn_time_s(settle_turns, 0);
+    const std::int64_t turns = std::max<std::int64_t>(2, std::llround(2.0 * cycles)) + 1;
+    const double end_s = block.turn_time_s(settle_turns + turns - 1, 0);
+    out.declared = declared(s, start_s, end_s);
+    if (samples) {
+        Sampler sampler(s.record.rate_hz, start_s);
+        const auto wanted = static_cast<std::size_t>(std::floor(rows + 1e-9));
+        // A few turns more, for the end of the last sample to lie between two of them.
+        advance(settle_turns + turns + 4, [&](std::int64_t first, std::size_t n) {
+            const readout::LaneAngles& angles = block.angles(0);
+            for (std::size_t i = 0; i < n; ++i) {
+                const double fringes = angles.angle_whole[i][0] + angles.angle_fringes[i][0];
+                sampler.add(block.turn_time_s(first + static_cast<std::int64_t>(i), 0),
+                            s.gyro.scale_factor_arcsec * fringes);
+            }
+        });
+        out.samples = sampler.finish(wanted);
+    } else {
+        const bool clocked = s.readout.model != scenario::ReadoutModel::ideal && s.readout.clock_hz > 0.0;
+        out.turns.emplace();
+        advance(settle_turns + turns, [&](std::int64_t first, std::size_t) {
+            add_turns(block, first, clocked ? s.readout.clock_hz : 0.0, *out.turns);
+        });
+    }
+    out.input_rate_deg_h = input_rate(s, gyro, start_s, end_s);
+    out.temperature_c = temperature(s, start_s, end_s);
+    return out;
+}
+
+}  // namespace ringlock::instrument

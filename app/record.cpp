@@ -1,0 +1,72 @@
+#include "analysis/record/record.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "analysis/instrument/simulate.hpp"
+#include "app/arguments.hpp"
+#include "app/command.hpp"
+#include "app/output.hpp"
+#include "app/record_output.hpp"
+
+namespace ringlock::app {
+namespace {
+
+struct Arguments {
+    std::string scenario;
+    std::string out;
+    std::string gyro = "0";
+    std::optional<std::string> seed;
+    bool json = false;
+};
+
+void run(const Arguments& arguments) {
+    const scenario::Scenario scenario = load_scenario(arguments.scenario, arguments.seed);
+    constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();
+    const std::int64_t gyro = whole_number("--gyro", arguments.gyro, largest, "from 0 on");
+    record::check_output(arguments.out);
+    const record::Record record = instrument::simulate_record(scenario, gyro);
+    record::write_record(arguments.out, record);
+    if (!arguments.json) {
+        put(fmt::format("{}: gyro {}, seed {}: {}\n", arguments.out, gyro, scenario.ensemble.seed,
+                        record_text(record)));
+        return;
+    }
+    nlohmann::ordered_json json{{"record", arguments.out},
+                                {"scenario", arguments.scenario},
+                                {"seed", scenario.ensemble.seed},
+                                {"gyro", gyro},
+                                {"kind", record.turns ? "turns" : "samples"},
+                                {"rows", record.turns ? record.turns->size() : record.samples->size()}};
+    if (record.turns) {
+        json["duration_s"] = record.turns->time_s.back() - record.turns->time_s.front();
+    } else {
+        json["rate_hz"] = record.samples->rate_hz;
+        json["duration_s"] = static_cast<double>(record.samples->size()) / record.samples->rate_hz;
+    }
+    put(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
+}  // namespace
+
+void add_record(CLI::App& root) {
+    CLI::App* command = root.add_subcommand("record", "Write what an instrumented gyro of a scenario would record");
+    auto arguments = std::make_shared<Arguments>();
+    command
+        ->add_option("SCENARIO.toml", arguments->scenario, "what to simulate; its section [record] says what is kept")
+        ->required();
+    command->add_option("-o,--output", arguments->out, "record to write (.h5)")->required();
+    command->add_option("--gyro", arguments->gyro, "number of the gyro in the ensemble, from 0")
+        ->capture_default_str()
+        ->type_name("N");
+    command->add_option("--seed", arguments->seed, "replaces ensemble.seed")->type_name("S");
+    command->add_flag("--json", arguments->json, "print one JSON object instead of a line");
+    command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace ringlock::app
