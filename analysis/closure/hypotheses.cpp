@@ -70,7 +70,8 @@ std::optional<Candidate> sizes(const TurnFit& fit, const TurnModel::Prediction& 
     if (entries.empty()) return std::nullopt;
     for (const auto& column : columns) {
         // Nothing of it is left beside what the model has: this record cannot tell.
-        const double all = Eigen::Map<const Eigen::VectorXd>(column.data(), static_cast<Eigen::Index>(column.size())).norm();
+        const double all =
+            Eigen::Map<const Eigen::VectorXd>(column.data(), static_cast<Eigen::Index>(column.size())).norm();
         if (all == 0.0) return std::nullopt;
     }
     const TurnFit::Score score = fit.score(columns);
@@ -204,17 +205,16 @@ std::optional<Candidate> spread(const TurnFit& fit, const Effect& effect, Values
     return Candidate{&effect, std::move(values), found.chi2, 0.5 * chi2_tail(found.chi2, 1), 1.0};
 }
 
-/// Dither and detectors tell of these by themselves (side_channels.hpp).
-bool told_elsewhere(const Effect& effect) {
+/// Effects that change what the lock-in does.
+bool of_the_coupling(const Effect& effect) {
+    const gyro::Setup plain;
     gyro::Setup setup;
     Values values = values_at_rest(effect);
-    for (const Parameter& parameter : effect.parameters()) {
-        if (parameter.role == Role::size) values.at(name_of(parameter)) = step_of(parameter);
-    }
+    for (auto& [name, value] : values) value = 1e-3;
     effect.configure(values, setup);
-    const gyro::Setup plain;
-    return setup.dither_asymmetry_ratio != plain.dither_asymmetry_ratio ||
-           setup.dither_harmonic_ratio != plain.dither_harmonic_ratio || setup.ellipse.gain != plain.ellipse.gain;
+    return setup.coupling_phase_rad != plain.coupling_phase_rad ||
+           setup.lockin_second_ratio != plain.lockin_second_ratio ||
+           setup.lockin_turn_asymmetry != plain.lockin_turn_asymmetry || effect.threshold_factor(values, 1.0) != 1.0;
 }
 
 }  // namespace
@@ -234,7 +234,8 @@ std::vector<Candidate> screen(const TurnFit& fit) {
     const TurnModel::Prediction without = fit.model().predict(fit.parameters());
     for (const Effect* effect : effects::registry()) {
         TurnParameters p = fit.parameters();
-        if (p.find(effect->name()) != nullptr || told_elsewhere(*effect)) continue;
+        if (p.find(effect->name()) != nullptr || told_by_other_columns(*effect)) continue;
+        if (!fit.model().series().all_phases_come && of_the_coupling(*effect)) continue;
         const Values rest = values_at_rest(*effect);
         std::optional<Candidate> candidate;
         if (first_of(*effect, Role::frequency) != nullptr) {

@@ -56,7 +56,8 @@ BlockMean block_mean(const std::vector<double>& series, const std::vector<std::u
 }
 
 /// Takes away what follows the phase at the turn, minima and maxima each by themselves, but for the means.
-void free_of_phase(std::vector<double>& series, const std::vector<std::uint8_t>& valid, const TurnFit& fit) {
+/// Gives the rms of it.
+double free_of_phase(std::vector<double>& series, const std::vector<std::uint8_t>& valid, const TurnFit& fit) {
     constexpr int harmonics = 4;
     constexpr int columns = 2 + 4 * harmonics;
     const auto& turns = fit.model().series();
@@ -82,12 +83,16 @@ void free_of_phase(std::vector<double>& series, const std::vector<std::uint8_t>&
     }
     normal.diagonal().array() += 1e-9 * normal.trace();
     const Eigen::VectorXd c = normal.ldlt().solve(right);
+    double squares = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
         if (!valid[i]) continue;
         fill(i);
         row(0) = row(1) = 0.0;
-        series[i] -= c.dot(row);
+        const double taken = c.dot(row);
+        series[i] -= taken;
+        squares += taken * taken;
     }
+    return std::sqrt(squares / static_cast<double>(n));
 }
 
 /// Chi-squared of a mean, with the doubt of its standard error in it: what a normal deviate of the same rarity has.
@@ -114,9 +119,11 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
         late[i] = -0.25 * series.direction[i] * second;
         valid[i] = 1;
     }
-    // Beneath: what the approximations of turn times leave.
-    constexpr double least_share = 1e-9;
-    DitherShape shape{block_mean(late, valid, fit.rows(), least_share * series.interval_s), {}, {}};
+    // Clocks that find the zero-rate point from pulses do not follow the lock-in's shift of it all the way.
+    const double followed_s = free_of_phase(late, valid, fit);
+    // Beneath: what the approximations of turn times leave, and a twentieth of what they do not follow.
+    const double least_s = std::hypot(1e-9 * series.interval_s, 0.05 * followed_s);
+    DitherShape shape{block_mean(late, valid, fit.rows(), least_s), {}, {}};
     std::vector<double> sides(n, 0.0);
     std::vector<double> minima(n, 0.0);
     std::fill(valid.begin(), valid.end(), std::uint8_t{0});
@@ -132,7 +139,10 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
         ++seen;
     }
     if (seen > n / 4) {
-        constexpr double least_ratio = 1e-5;
+        // Accelerations are computed from distances that the detectors have read: their ellipse is in them.
+        const gyro::Ellipse ellipse = fit.model().setup(fit.parameters()).ellipse;
+        const double least_ratio = 1e-5 + std::max({std::abs(ellipse.gain), std::abs(ellipse.offset_sin),
+                                                    std::abs(ellipse.offset_cos), std::abs(ellipse.orthogonality_rad)});
         free_of_phase(sides, valid, fit);
         free_of_phase(minima, valid, fit);
         shape.sides = block_mean(sides, valid, fit.rows(), least_ratio);
@@ -195,11 +205,12 @@ RadiusFold radius_fold(const record::Turns& turns, const Rows& rows) {
     return fold;
 }
 
-std::vector<Candidate> screen_side_channels(const record::Turns& turns, const TurnFit& fit, const JoinedPhase& joined) {
+std::vector<Candidate> screen_side_channels(const record::Turns& turns, const TurnFit& fit, const JoinedPhase& joined,
+                                            bool again) {
     std::vector<Candidate> candidates;
     TurnParameters p = fit.parameters();
     const auto wanted = [&](std::string_view name) -> const Effect* {
-        return p.find(name) == nullptr ? effects::find(name) : nullptr;
+        return again || p.find(name) == nullptr ? effects::find(name) : nullptr;
     };
     if (const Effect* effect = wanted("readout_ellipse")) {
         const RadiusFold fold = radius_fold(turns, fit.rows());
@@ -208,6 +219,8 @@ std::vector<Candidate> screen_side_channels(const record::Turns& turns, const Tu
         candidate.values.at("offset_sin") = fold.ellipse.offset_sin;
         candidate.values.at("offset_cos") = fold.ellipse.offset_cos;
         candidate.values.at("orthogonality_rad") = fold.ellipse.orthogonality_rad;
+        const char* const names[] = {"gain", "offset_sin", "offset_cos", "orthogonality_rad"};
+        for (Eigen::Index k = 0; k < 4; ++k) candidate.sd[names[k]] = std::sqrt(fold.covariance(k, k));
         candidates.push_back(candidate);
     }
     if (const Effect* effect = wanted("missed_counts")) {
@@ -219,8 +232,10 @@ std::vector<Candidate> screen_side_channels(const record::Turns& turns, const Tu
         const double surprise = missed > 0.0 ? missed * std::log(missed / (n * by_chance)) - missed : 0.0;
         Candidate candidate{effect, values_at_rest(*effect), 2.0 * surprise, chi2_tail(2.0 * surprise, 1), 1.0};
         candidate.values.at("probability_per_turn") = missed / n;
+        candidate.sd["probability_per_turn"] = std::sqrt(missed) / n;
         candidates.push_back(candidate);
     }
+    if (!fit.model().series().all_phases_come) return candidates;
     const Effect* asymmetry = wanted("dither_asymmetry");
     const Effect* harmonic = wanted("dither_second_harmonic");
     if (asymmetry == nullptr && harmonic == nullptr) return candidates;
@@ -231,11 +246,11 @@ std::vector<Candidate> screen_side_channels(const record::Turns& turns, const Tu
     double late = 0.0;
     double sides = 0.0;
     double minima = 0.0;
-    if (const ActiveEffect* active = p.find("dither_asymmetry")) {
+    if (const ActiveEffect* active = p.find("dither_asymmetry"); active != nullptr && !again) {
         late += 0.25 * period_s * active->values.at("ratio");
         sides += active->values.at("ratio");
     }
-    if (const ActiveEffect* active = p.find("dither_second_harmonic")) {
+    if (const ActiveEffect* active = p.find("dither_second_harmonic"); active != nullptr && !again) {
         late -= active->values.at("ratio") * std::sin(active->values.at("phase_rad")) / w;
         minima += active->values.at("ratio") * std::cos(active->values.at("phase_rad"));
     }
@@ -247,17 +262,19 @@ std::vector<Candidate> screen_side_channels(const record::Turns& turns, const Tu
         const double by_late = (shape.late_s.value - late) / (0.25 * period_s);
         const double late_sd = shape.late_s.sd / (0.25 * period_s);
         double ratio = by_late;
+        double sd = late_sd;
         double left = 0.0;
         if (shape.sides && std::isfinite(shape.sides->sd)) {
             const double by_sides = shape.sides->value - sides;
             const double weights = 1.0 / (late_sd * late_sd) + 1.0 / (shape.sides->sd * shape.sides->sd);
             ratio = (by_late / (late_sd * late_sd) + by_sides / (shape.sides->sd * shape.sides->sd)) / weights;
-            BlockMean rest = *shape.sides;
-            left = chi2_of(rest, sides + ratio);
+            sd = 1.0 / std::sqrt(weights);
+            left = chi2_of(*shape.sides, sides + ratio);
         }
         const double chi2 = std::max(0.0, from_late + from_sides - left);
         Candidate candidate{asymmetry, values_at_rest(*asymmetry), chi2, chi2_tail(chi2, 1), 1.0};
         candidate.values.at("ratio") = ratio;
+        candidate.sd["ratio"] = sd;
         candidates.push_back(candidate);
     }
     if (harmonic != nullptr) {
@@ -267,6 +284,12 @@ std::vector<Candidate> screen_side_channels(const record::Turns& turns, const Tu
         const double cosine = shape.turns ? shape.turns->value - minima : 0.0;
         candidate.values.at("ratio") = std::hypot(sine, cosine);
         candidate.values.at("phase_rad") = std::atan2(sine, cosine);
+        const double sine_sd = w * shape.late_s.sd;
+        const double cosine_sd = shape.turns ? shape.turns->sd : 0.0;
+        const double f = candidate.values.at("phase_rad");
+        candidate.sd["ratio"] = std::hypot(std::sin(f) * sine_sd, std::cos(f) * cosine_sd);
+        candidate.sd["phase_rad"] =
+            std::hypot(std::cos(f) * sine_sd, std::sin(f) * cosine_sd) / candidate.values.at("ratio");
         candidates.push_back(candidate);
     }
     return candidates;

@@ -10,6 +10,7 @@
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/hypotheses.hpp"
 #include "analysis/closure/side_channels.hpp"
+#include "engine/core/error.hpp"
 
 namespace ringlock::closure {
 
@@ -104,8 +105,9 @@ void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
     const double late_s = fitted.fit->sd_rad().front() / (fitted.series.acceleration_rad_s2 * fitted.series.interval_s);
     base.push_back({"", "dither_frequency_hz", setup.dither_frequency_hz,
                     setup.dither_frequency_hz * std::numbers::sqrt2 * late_s / fitted.series.time_s.back()});
-    base.push_back({"", "dither_peak_rate_deg_s", setup.dither_peak_rate_deg_s,
-                    setup.dither_peak_rate_deg_s * fitted.fit->sd_rad().front() / (fitted.series.amplitude_rad * std::sqrt(n))});
+    base.push_back(
+        {"", "dither_peak_rate_deg_s", setup.dither_peak_rate_deg_s,
+         setup.dither_peak_rate_deg_s * fitted.fit->sd_rad().front() / (fitted.series.amplitude_rad * std::sqrt(n))});
 }
 
 /// What would tell two effects apart that this record cannot.
@@ -140,9 +142,15 @@ Closure close_turns(const record::Record& record) {
     const Rows rows = chosen_blocks(turns.size());
     auto now = fit_record(record, {}, rows);
     if (!now->series.scale_factor_declared) {
-        closure.notes.push_back(fmt::format("the record declares no scale factor; {:g} arcsec per fringe assumed, with "
-                                            "which all rates scale",
-                                            now->series.setup.scale_factor_arcsec));
+        closure.notes.push_back(
+            fmt::format("the record declares no scale factor; {:g} arcsec per fringe assumed, with "
+                        "which all rates scale",
+                        now->series.setup.scale_factor_arcsec));
+    }
+    if (!now->series.all_phases_come) {
+        closure.notes.push_back(
+            "turns come at a part of the fringe only, as in a locked gyro: what the coupling does cannot be "
+            "told from the bias, and its effects are not looked for");
     }
     closure.heldout_before = heldout(*now->fit).error;
     const auto tests_of_effects = static_cast<double>(effects::registry().size());
@@ -181,13 +189,21 @@ Closure close_turns(const record::Record& record) {
             TurnParameters start = now->fit->parameters();
             start.effects.push_back({candidate.effect, candidate.values});
             const std::string name(candidate.effect->name());
-            if (side && !contenders.empty() && (on_phase(name) || on_phase(std::string(contenders[0].candidate.effect->name())))) continue;
-            auto fitted = fit_record(record, start, rows);
+            if (side && !contenders.empty() &&
+                (on_phase(name) || on_phase(std::string(contenders[0].candidate.effect->name()))))
+                continue;
+            std::shared_ptr<Fitted> fitted;
+            try {
+                fitted = fit_record(record, start, rows);
+            } catch (const RunError&) {
+                continue;  // no motion of a gyro with such parameters can be followed
+            }
             const double gain = side ? 0.5 * merit(candidate)
                                      : fitted->fit->log_likelihood() - now->fit->log_likelihood() -
                                            std::log(candidate.searched) - free_parameters(*candidate.effect);
             contenders.push_back({std::move(candidate), fitted, gain});
         }
+        if (contenders.empty()) break;
         std::sort(contenders.begin(), contenders.end(),
                   [](const Contender& a, const Contender& b) { return a.merit > b.merit; });
         Contender& best = contenders.front();
@@ -235,6 +251,17 @@ Closure close_turns(const record::Record& record) {
         }
         for (Step& step : closure.steps) {
             if (step.effect == estimate.effect) step.parameters.push_back(estimate);
+        }
+    }
+    for (const Candidate& candidate : screen_side_channels(turns, *whole->fit, whole->joined, true)) {
+        for (Step& step : closure.steps) {
+            if (step.effect != candidate.effect->name()) continue;
+            for (const effects::Parameter& parameter : candidate.effect->parameters()) {
+                const std::string name(parameter.name);
+                const auto sd = candidate.sd.find(name);
+                step.parameters.push_back(
+                    {step.effect, name, candidate.values.at(name), sd == candidate.sd.end() ? 0.0 : sd->second});
+            }
         }
     }
     add_dither(closure.base, *whole);

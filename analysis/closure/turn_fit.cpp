@@ -13,7 +13,7 @@ namespace ringlock::closure {
 
 namespace {
 
-constexpr std::size_t drift_terms = 4;            // polynomials of the dither's amplitude
+constexpr std::size_t drift_terms = 4;        // polynomials of the dither's amplitude
 constexpr double least_radius_sd_rad = 1e-7;  // below: a radius that shows no noise tells nothing of the phase's
 
 /// Legendre polynomial of that degree at x.
@@ -51,9 +51,11 @@ std::vector<Knob> knobs(TurnParameters& p) {
     return all;
 }
 
-bool deterministic(effects::Role role) {
+/// Parameters that the phases decide; those that other columns tell of (side_channels.hpp) stay as they are.
+bool fitted_in_phase(const effects::Effect& effect, effects::Role role) {
     using effects::Role;
-    return role == Role::size || role == Role::phase || role == Role::time || role == Role::frequency;
+    return (role == Role::size || role == Role::phase || role == Role::time || role == Role::frequency) &&
+           !told_by_other_columns(effect);
 }
 
 /// Minus the log-likelihood by the logarithms of the knobs.
@@ -86,6 +88,7 @@ class Objective final : public ceres::FirstOrderFunction {
 
 TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows)
     : model_(&model), parameters_(start), rows_(std::move(rows)), nuisance_(2 + drift_terms, 0.0) {
+    if (parameters_.bias_deg_h == 0.0) parameters_.bias_deg_h = model.series().mean_rate_deg_h;
     fit_deterministic(4);
     fit_noise();
     fit_deterministic(2);
@@ -116,10 +119,11 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
     };
     TurnParameters p = parameters_;
     all.push_back({"", "bias_deg_h", change(p, p.bias_deg_h, 1e-2)});
-    all.push_back({"", "lockin_threshold_deg_h", change(p, p.threshold_deg_h, 1e-3 * std::max(1.0, p.threshold_deg_h))});
+    all.push_back(
+        {"", "lockin_threshold_deg_h", change(p, p.threshold_deg_h, 1e-3 * std::max(1.0, p.threshold_deg_h))});
     for (ActiveEffect& active : p.effects) {
         for (const effects::Parameter& parameter : active.effect->parameters()) {
-            if (!deterministic(parameter.role)) continue;
+            if (!fitted_in_phase(*active.effect, parameter.role)) continue;
             const std::string name(parameter.name);
             double& value = active.values.at(name);
             double step = 1e-4 * std::max(std::abs(value), 1e-2);
@@ -160,7 +164,10 @@ void TurnFit::fit_deterministic(int iterations) {
             scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
             column /= scale(static_cast<Eigen::Index>(k));
         }
-        Eigen::VectorXd step = Eigen::MatrixXd(x.transpose() * x).ldlt().solve(x.transpose() * y);
+        Eigen::MatrixXd normal = x.transpose() * x;
+        Eigen::VectorXd right = x.transpose() * y;
+        add_priors(scale, normal, &right);
+        Eigen::VectorXd step = normal.ldlt().solve(right);
         step = step.cwiseQuotient(scale);
         std::size_t k = 0;
         for (double& value : nuisance_) value += step(static_cast<Eigen::Index>(k++));
@@ -168,7 +175,7 @@ void TurnFit::fit_deterministic(int iterations) {
         parameters_.threshold_deg_h = std::max(0.0, parameters_.threshold_deg_h + step(static_cast<Eigen::Index>(k++)));
         for (ActiveEffect& active : parameters_.effects) {
             for (const effects::Parameter& parameter : active.effect->parameters()) {
-                if (!deterministic(parameter.role)) continue;
+                if (!fitted_in_phase(*active.effect, parameter.role)) continue;
                 double& value = active.values.at(std::string(parameter.name));
                 value = std::clamp(value + step(static_cast<Eigen::Index>(k++)), parameter.min, parameter.max);
             }
@@ -177,6 +184,19 @@ void TurnFit::fit_deterministic(int iterations) {
             for (std::size_t i = 0; i < n; ++i) rest_[i] -= step(static_cast<Eigen::Index>(j)) * all[j].series[i];
         }
     }
+}
+
+/// A gyro that is locked shows its bias and its threshold together only: beside so weak a belief that no other record
+/// feels it, they would be without bounds.
+void TurnFit::add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, Eigen::VectorXd* right) const {
+    const auto bias = static_cast<Eigen::Index>(nuisance_.size());
+    const double declared = std::max(model_->series().setup.lockin_threshold_deg_h, 1.0);
+    const auto believe = [&](Eigen::Index k, double off, double sd) {
+        normal(k, k) += 1.0 / (sd * sd * scale(k) * scale(k));
+        if (right != nullptr) (*right)(k) += off / (sd * sd * scale(k));
+    };
+    believe(bias, model_->series().mean_rate_deg_h - parameters_.bias_deg_h, 0.1 * declared);
+    believe(bias + 1, declared - parameters_.threshold_deg_h, declared);
 }
 
 double TurnFit::objective(const TurnParameters& parameters, const std::vector<double>& rest) const {
@@ -259,8 +279,9 @@ void TurnFit::finish() {
         scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
         column /= scale(static_cast<Eigen::Index>(k));
     }
-    const Eigen::MatrixXd covariance =
-        Eigen::MatrixXd(x.transpose() * x).ldlt().solve(Eigen::MatrixXd::Identity(x.cols(), x.cols()));
+    Eigen::MatrixXd normal = x.transpose() * x;
+    add_priors(scale, normal, nullptr);
+    const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(x.cols(), x.cols()));
     estimates_.clear();
     for (std::size_t k = nuisance_.size(); k < all.size(); ++k) {
         Estimate estimate{all[k].effect, all[k].name, 0.0, 0.0};
@@ -292,7 +313,8 @@ void TurnFit::finish() {
     };
     for (Eigen::Index i = 0; i < m; ++i) {
         for (Eigen::Index j = 0; j <= i; ++j) {
-            hessian(i, j) = hessian(j, i) = (at(i, h, j, h) - at(i, h, j, -h) - at(i, -h, j, h) + at(i, -h, j, -h)) / (4.0 * h * h);
+            hessian(i, j) = hessian(j, i) =
+                (at(i, h, j, h) - at(i, h, j, -h) - at(i, -h, j, h) + at(i, -h, j, -h)) / (4.0 * h * h);
         }
     }
     const Eigen::MatrixXd inverse = hessian.completeOrthogonalDecomposition().pseudoInverse();
@@ -300,8 +322,9 @@ void TurnFit::finish() {
         const Knob& knob = turned[static_cast<std::size_t>(i)];
         const double value = std::exp(centre[static_cast<std::size_t>(i)]);
         const double variance = inverse(i, i);
-        estimates_.push_back({knob.effect, knob.name, value,
-                              value * (variance > 0.0 ? std::sqrt(variance) : std::numeric_limits<double>::infinity())});
+        estimates_.push_back(
+            {knob.effect, knob.name, value,
+             value * (variance > 0.0 ? std::sqrt(variance) : std::numeric_limits<double>::infinity())});
     }
     // Orthonormal basis, for scores.
     Eigen::HouseholderQR<Eigen::MatrixXd> qr(x);
@@ -322,7 +345,8 @@ Eigen::VectorXd TurnFit::whitened(const std::vector<double>& series) const {
 
 Eigen::VectorXd TurnFit::residual() const {
     Eigen::VectorXd y(static_cast<Eigen::Index>(innovations_.size()));
-    for (std::size_t i = 0; i < innovations_.size(); ++i) y(static_cast<Eigen::Index>(i)) = rows_[i] ? innovations_[i] : 0.0;
+    for (std::size_t i = 0; i < innovations_.size(); ++i)
+        y(static_cast<Eigen::Index>(i)) = rows_[i] ? innovations_[i] : 0.0;
     return y;
 }
 
@@ -346,8 +370,8 @@ TurnFit::Spread TurnFit::spread(const ActiveEffect& effect, const std::string& p
         best = x;
     }
     if (best_gain <= 0.0) return {};
-    const auto [at, value] = boost::math::tools::brent_find_minima([&](double l) { return -gain(l); }, best - step,
-                                                                   best + step, 12);
+    const auto [at, value] =
+        boost::math::tools::brent_find_minima([&](double l) { return -gain(l); }, best - step, best + step, 12);
     return {std::exp(at), 2.0 * std::max(-value, best_gain)};
 }
 

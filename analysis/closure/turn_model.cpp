@@ -14,6 +14,20 @@ ActiveEffect* TurnParameters::find(std::string_view effect) {
     return found == effects.end() ? nullptr : &*found;
 }
 
+bool told_by_other_columns(const effects::Effect& effect) {
+    const gyro::Setup plain;
+    gyro::Setup setup;
+    effects::Values values;
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        const bool counts = parameter.role == effects::Role::size || parameter.role == effects::Role::probability;
+        values[std::string(parameter.name)] = counts ? 1e-3 : 0.0;
+    }
+    effect.configure(values, setup);
+    return setup.dither_asymmetry_ratio != plain.dither_asymmetry_ratio ||
+           setup.dither_harmonic_ratio != plain.dither_harmonic_ratio || setup.ellipse.gain != plain.ellipse.gain ||
+           setup.missed_count_probability != plain.missed_count_probability;
+}
+
 gyro::Setup TurnModel::setup(const TurnParameters& parameters) const {
     gyro::Setup setup = series_.setup;
     setup.lockin_threshold_deg_h = parameters.threshold_deg_h;
@@ -30,8 +44,8 @@ std::vector<double> TurnModel::dither_swings(const std::vector<TurnKicks::Kick>&
     for (std::size_t i = 0; i + 1 < n; ++i) {
         // Were the lock-in left in it, kicks would depend on their own size.
         const double lockin = kicks[i].after_rad + kicks[i + 1].before_rad;
-        const double rotation = units::two_pi / series_.setup.scale_factor_arcsec * series_.interval_s *
-                                series_.input_rate_deg_h[i];
+        const double rotation =
+            units::two_pi / series_.setup.scale_factor_arcsec * series_.interval_s * series_.input_rate_deg_h[i];
         swing[i] = series_.direction[i] * (phase_rad_[i + 1] - phase_rad_[i] - lockin - rotation);
         const std::size_t side = series_.direction[i] > 0 ? 0 : 1;
         sums[side] += swing[i];
@@ -45,11 +59,57 @@ std::vector<double> TurnModel::dither_swings(const std::vector<TurnKicks::Kick>&
     return swing;
 }
 
+double TurnModel::temperature_change_k(std::size_t turn) const {
+    return series_.temperature_change_k.empty() ? 0.0 : series_.temperature_change_k[turn];
+}
+
+std::vector<double> TurnModel::smooth(const std::vector<double>& turn_s) const {
+    // A resonator keeps its time far better than a zero-rate point can be told from pulses that the lock-in moves.
+    constexpr std::ptrdiff_t reach = 64;  // turns to either side, of one parity each
+    const auto n = static_cast<std::ptrdiff_t>(turn_s.size());
+    std::vector<double> smoothed(turn_s.size());
+    const double start = turn_s.front();
+    const auto off = [&](std::ptrdiff_t i) {
+        return turn_s[static_cast<std::size_t>(i)] - start - series_.interval_s * static_cast<double>(i);
+    };
+    for (std::ptrdiff_t parity = 0; parity < 2; ++parity) {
+        double sum = 0.0;
+        double count = 0.0;
+        std::ptrdiff_t first = parity;
+        std::ptrdiff_t next = parity;
+        for (std::ptrdiff_t i = parity; i < n; i += 2) {
+            // As far to one side as to the other, that slopes do not matter.
+            const std::ptrdiff_t room = std::min({reach, i - parity, (n - 1 - i) / 2 * 2});
+            for (; next <= i + room; next += 2, count += 1.0) sum += off(next);
+            for (; first < i - room; first += 2, count -= 1.0) sum -= off(first);
+            while (next > i + room + 2) {
+                next -= 2;
+                sum -= off(next);
+                count -= 1.0;
+            }
+            smoothed[static_cast<std::size_t>(i)] = start + series_.interval_s * static_cast<double>(i) + sum / count;
+        }
+    }
+    return smoothed;
+}
+
 TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const {
     const std::size_t n = series_.size();
     const gyro::Setup device_setup = setup(parameters);
     const gyro::Device device(device_setup);
-    const TurnKicks kicks(device_setup);
+    // The rate changes how the phase leaves a turn: by parts in a million of itself, which long records show.
+    const auto [lowest, highest] =
+        std::minmax_element(series_.input_rate_deg_h.begin(), series_.input_rate_deg_h.end());
+    const double middle_deg_h = 0.5 * (*lowest + *highest);
+    const double reach_deg_h = 0.5 * (*highest - *lowest);
+    constexpr double matters_deg_h = 1.0;
+    std::vector<TurnKicks> kicks;
+    for (const double at : {0.0, -1.0, 1.0}) {
+        gyro::Setup there = device_setup;
+        there.input_rate_deg_h = parameters.bias_deg_h + middle_deg_h + at * reach_deg_h;
+        kicks.emplace_back(there);
+        if (reach_deg_h < matters_deg_h) break;
+    }
     Prediction prediction;
     TurnFrame& frame = prediction.frame;
     frame.interval_s = series_.interval_s;
@@ -60,51 +120,58 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     prediction.turn_s.resize(n);
     const double c = device.phase_per_arcsec;
     std::vector<TurnKicks::Kick> kick_of(n);
-    for (std::size_t i = 0; i < n; ++i) kick_of[i] = kicks.at(series_.direction[i], phase_rad_[i]);
-    const std::vector<double> swing = dither_swings(kick_of);
-    double lockin = 0.0;
-    double angle_arcsec = 0.0;
-    double last_s = 0.0;
-    double last_change_k = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
-        const int direction = series_.direction[i];
-        const double psi = phase_rad_[i];
-        const double change_k = series_.temperature_change_k.empty() ? 0.0 : series_.temperature_change_k[i];
-        double factor = 1.0;
-        for (const ActiveEffect& active : parameters.effects) {
-            factor *= active.effect->threshold_factor(active.values, change_k);
+        kick_of[i] = kicks.front().at(series_.direction[i], phase_rad_[i]);
+        if (kicks.size() == 1) continue;
+        const double x = (series_.input_rate_deg_h[i] - middle_deg_h) / reach_deg_h;
+        const TurnKicks::Kick low = kicks[1].at(series_.direction[i], phase_rad_[i]);
+        const TurnKicks::Kick high = kicks[2].at(series_.direction[i], phase_rad_[i]);
+        const auto bend = [&](double TurnKicks::Kick::*part) {
+            const double mid = kick_of[i].*part;
+            kick_of[i].*part += x * (0.5 * (high.*part - low.*part) + x * (0.5 * (high.*part + low.*part) - mid));
+        };
+        for (const auto part : {&TurnKicks::Kick::before_rad, &TurnKicks::Kick::after_rad,
+                                &TurnKicks::Kick::before_slope, &TurnKicks::Kick::after_slope}) {
+            bend(part);
         }
-        // Kicks go with the root of one over the acceleration, which goes with the swing of that half cycle.
-        const TurnKicks::Kick& kick = kick_of[i];
-        const double before = factor / std::sqrt(swing[i > 0 ? i - 1 : i]);
-        const double after = factor / std::sqrt(swing[i]);
-
+    }
+    const std::vector<double> swing = dither_swings(kick_of);
+    std::vector<double> factors(n, 1.0);
+    for (std::size_t i = 0; i < n; ++i) {
+        const double psi = phase_rad_[i];
+        for (const ActiveEffect& active : parameters.effects) {
+            factors[i] *= active.effect->threshold_factor(active.values, temperature_change_k(i));
+        }
         // From the zero-rate point to the dither's own turn.
         const double rate_deg_h = parameters.bias_deg_h + series_.input_rate_deg_h[i];
-        const double coupling = factor * device.coupling.b_rad_s * std::sin(psi + device.coupling.phase_rad);
-        const double turn_s =
-            series_.time_s[i] + direction * (c * rate_deg_h + coupling) / series_.acceleration_rad_s2;
-        prediction.turn_s[i] = turn_s;
-        if (i == 0) last_s = turn_s;
-        const double duration_s = turn_s - last_s;
-        const std::size_t before_i = i > 0 ? i - 1 : 0;
-        const effects::Interval interval{last_s,
-                                         duration_s,
-                                         {last_change_k, change_k},
-                                         {series_.input_rate_deg_h[before_i], series_.input_rate_deg_h[i]}};
-        angle_arcsec += duration_s * (parameters.bias_deg_h + 0.5 * (interval.input_rate_deg_h[0] +
-                                                                     interval.input_rate_deg_h[1]));
+        const double coupling = factors[i] * device.coupling.b_rad_s * std::sin(psi + device.coupling.phase_rad);
+        prediction.turn_s[i] =
+            series_.time_s[i] + series_.direction[i] * (c * rate_deg_h + coupling) / series_.acceleration_rad_s2;
+    }
+    const std::vector<double> turn_s = smooth(prediction.turn_s);
+    double lockin = 0.0;
+    double angle_arcsec = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        // Kicks go with the root of one over the acceleration, which goes with the swing of that half cycle.
+        const TurnKicks::Kick& kick = kick_of[i];
+        const double before = factors[i] / std::sqrt(swing[i > 0 ? i - 1 : i]);
+        const double after = factors[i] / std::sqrt(swing[i]);
+        const std::size_t last = i > 0 ? i - 1 : 0;
+        const effects::Interval interval{turn_s[last],
+                                         turn_s[i] - turn_s[last],
+                                         {temperature_change_k(last), temperature_change_k(i)},
+                                         {series_.input_rate_deg_h[last], series_.input_rate_deg_h[i]}};
+        angle_arcsec += interval.duration_s * parameters.bias_deg_h +
+                        (series_.input_angle_arcsec(turn_s[i]) - series_.input_angle_arcsec(turn_s[last]));
         for (const ActiveEffect& active : parameters.effects) {
             if (active.effect->adds_angle()) {
                 angle_arcsec += active.effect->added_angle_arcsec(active.values, interval);
             }
         }
-        last_s = turn_s;
-        last_change_k = change_k;
 
         prediction.phase_rad[i] = lockin + before * kick.before_rad + c * angle_arcsec;
         lockin += before * kick.before_rad + after * kick.after_rad;
-        frame.sign[i] = -direction;
+        frame.sign[i] = -series_.direction[i];
         frame.before_slope[i] = before * kick.before_slope;
         frame.kick_slope[i] = before * kick.before_slope + after * kick.after_slope;
     }

@@ -30,16 +30,21 @@ struct TurnParameters {
     ActiveEffect* find(std::string_view effect);
 };
 
+/// Whether times, accelerations or the quadrature circle tell of the effect by themselves: the dither's shape, the
+/// detectors, the counter.
+bool told_by_other_columns(const effects::Effect& effect);
+
 /// The phases that parameters foretell for the turns of a record, chance apart.
 class TurnModel {
    public:
     /// Both are kept by reference.
-    TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad) : series_(series), phase_rad_(phase_rad) {}
+    TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad)
+        : series_(series), phase_rad_(phase_rad) {}
 
     struct Prediction {
         std::vector<double> phase_rad;  ///< but for offset and dither
         TurnFrame frame;
-        std::vector<double> turn_s;     ///< when the dither turned, from when the phase did
+        std::vector<double> turn_s;  ///< when the dither turned, from when the phase did
     };
     Prediction predict(const TurnParameters& parameters) const;
     TurnNoise noise(const TurnParameters& parameters) const;
@@ -49,6 +54,9 @@ class TurnModel {
     const std::vector<double>& phase_rad() const { return phase_rad_; }
 
    private:
+    double temperature_change_k(std::size_t turn) const;
+    /// Times of the dither's turns by a resonator that drifts slowly.
+    std::vector<double> smooth(const std::vector<double>& turn_s) const;
     /// Swing of the dither after each turn over the mean one of its sign.
     std::vector<double> dither_swings(const std::vector<TurnKicks::Kick>& kicks) const;
 

@@ -28,6 +28,23 @@ std::int64_t most_frequent_quarter(const std::vector<double>& quarters, std::siz
     return std::max_element(votes, votes + 4) - votes;
 }
 
+bool all_phases_come(const std::vector<double>& phase_rad, const std::vector<int>& direction) {
+    constexpr std::size_t bins = 12;
+    double counts[2][bins] = {};
+    for (std::size_t i = 0; i < phase_rad.size(); ++i) {
+        const double fringes = phase_rad[i] / units::two_pi;
+        const auto bin = static_cast<std::size_t>((fringes - std::floor(fringes)) * static_cast<double>(bins)) % bins;
+        counts[direction[i] > 0 ? 0 : 1][bin] += 1.0;
+    }
+    const double least = 0.25 * 0.5 * static_cast<double>(phase_rad.size()) / static_cast<double>(bins);
+    for (const auto& of : counts) {
+        for (const double count : of) {
+            if (count < least) return false;
+        }
+    }
+    return true;
+}
+
 }  // namespace
 
 JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool count_again) {
@@ -91,13 +108,21 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
     return joined;
 }
 
+double TurnSeries::input_angle_arcsec(double time) const {
+    const auto next = static_cast<std::size_t>(std::upper_bound(input.time_s.begin(), input.time_s.end(), time) -
+                                               input.time_s.begin());
+    if (next == 0) return (time - input.time_s[0]) * input.value[0];
+    const std::size_t k = next - 1;
+    return input_angle[k] + 0.5 * (input.value[k] + input.at(time)) * (time - input.time_s[k]);
+}
+
 TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
     constexpr std::size_t fewest = 400;
     const record::Turns& turns = *record.turns;
     const std::size_t n = turns.size();
     if (n < fewest) {
-        throw InputError(fmt::format("/turns: {} turns are too few to fit and to predict; a closed loop needs at least {}",
-                                     n, fewest));
+        throw InputError(fmt::format(
+            "/turns: {} turns are too few to fit and to predict; a closed loop needs at least {}", n, fewest));
     }
     TurnSeries series;
     const record::Declared& declared = record.declared;
@@ -130,9 +155,10 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
     for (int side = 0; side < 2; ++side) swings_of[side] /= static_cast<double>(counts_of[side]);
     const double swings = 0.5 * (swings_of[0] + swings_of[1]);
     if (!(std::min(swings_of[0], swings_of[1]) > 100.0)) {
-        throw InputError(fmt::format("/turns: half cycles swing by {:.4g} rad of phase on average; minima (direction 1) "
-                                     "must be followed by maxima (-1) at least 100 rad above them",
-                                     swings));
+        throw InputError(
+            fmt::format("/turns: half cycles swing by {:.4g} rad of phase on average; minima (direction 1) "
+                        "must be followed by maxima (-1) at least 100 rad above them",
+                        swings));
     }
     for (std::size_t i = 0; i + 1 < n; ++i) series.swing[i] /= swings_of[turns.direction[i] > 0 ? 0 : 1];
     series.swing[n - 1] = 1.0;
@@ -140,9 +166,26 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
     setup.dither_frequency_hz = 0.5 / series.interval_s;
     const double w = units::pi / series.interval_s;
     // A = 2 pi Omega_D/(K w)
-    setup.dither_peak_rate_deg_s = series.amplitude_rad * w * setup.scale_factor_arcsec /
-                                   (units::two_pi * units::deg_h_per_deg_s);
+    setup.dither_peak_rate_deg_s =
+        series.amplitude_rad * w * setup.scale_factor_arcsec / (units::two_pi * units::deg_h_per_deg_s);
     series.acceleration_rad_s2 = series.amplitude_rad * w * w;
+    series.all_phases_come = all_phases_come(joined.phase_rad, series.direction);
+    series.input = record.input_rate_deg_h;
+    if (series.input.empty()) series.input = {{turns.time_s[0]}, {series.input_rate_deg_h[0]}};
+    for (double& time : series.input.time_s) time -= turns.time_s[0];
+    const auto& rows = series.input;
+    series.input_angle.assign(rows.time_s.size(), 0.0);
+    for (std::size_t k = 1; k < rows.time_s.size(); ++k) {
+        series.input_angle[k] = series.input_angle[k - 1] +
+                                0.5 * (rows.value[k] + rows.value[k - 1]) * (rows.time_s[k] - rows.time_s[k - 1]);
+    }
+    // Between turns of one kind: the dither is not in it.
+    const std::size_t last = (n - 1) / 2 * 2;
+    double input = 0.0;
+    for (std::size_t i = 0; i < last; ++i) input += series.input_rate_deg_h[i] / static_cast<double>(last);
+    series.mean_rate_deg_h = (joined.phase_rad[last] - joined.phase_rad[0]) / series.time_s[last] *
+                                 setup.scale_factor_arcsec / units::two_pi -
+                             input;
     if (!record.temperature_c.empty()) {
         const double start = record.temperature_c.at(turns.time_s[0]);
         for (std::size_t i = 0; i < n; ++i) {

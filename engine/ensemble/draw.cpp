@@ -21,7 +21,8 @@ double input_rate_deg_h(const scenario::Scenario& scenario, std::int64_t gyro) {
     return scenario::input_rate_deg_h(scenario.input, gyro / scenario.ensemble.gyros);
 }
 
-double input_rate_at_deg_h(const scenario::Scenario& /*scenario*/, const gyro::Setup& setup, double /*time_s*/) {
+double input_rate_at_deg_h(const scenario::Scenario& scenario, const gyro::Setup& setup, double time_s) {
+    if (scenario::has_profile(scenario.input)) return scenario::profile_rate_deg_h(scenario.input, time_s);
     return setup.input_rate_deg_h;
 }
 
