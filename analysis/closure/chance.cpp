@@ -4,8 +4,6 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
-#include "engine/core/units.hpp"
-
 namespace ringlock::closure {
 
 double chi2_tail(double x, int freedom) {
@@ -15,11 +13,15 @@ double chi2_tail(double x, int freedom) {
 
 double of_several(double p, double count) { return p >= 1.0 ? 1.0 : -std::expm1(count * std::log1p(-p)); }
 
-double davies_bound(double chi2, const std::vector<double>& roots) {
-    // The two-sided statistic wanders in its root; half of the variation is upwards, on either side of zero.
+double davies_places(double chi2, const std::vector<double>& roots) {
     double variation = 0.0;
     for (std::size_t i = 1; i < roots.size(); ++i) variation += std::abs(roots[i] - roots[i - 1]);
-    return std::min(1.0, chi2_tail(chi2, 1) + variation * std::exp(-0.5 * chi2) / std::sqrt(2.0 * units::pi));
+    // V exp(-u/2)/sqrt(2 pi) over sqrt(2/(pi u)) exp(-u/2), the tail of one degree of freedom.
+    return 1.0 + 0.5 * variation * std::sqrt(std::max(chi2, 0.0));
+}
+
+double davies_bound(double chi2, const std::vector<double>& roots) {
+    return std::min(1.0, chi2_tail(chi2, 1) * davies_places(chi2, roots));
 }
 
 }  // namespace ringlock::closure

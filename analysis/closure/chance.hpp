@@ -14,4 +14,7 @@ double of_several(double p, double count);
 /// its root varies over the search.
 double davies_bound(double chi2, const std::vector<double>& roots);
 
+/// The bound over the probability of one place: how many independent ones the search is worth.
+double davies_places(double chi2, const std::vector<double>& roots);
+
 }  // namespace ringlock::closure

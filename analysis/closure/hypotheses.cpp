@@ -146,7 +146,7 @@ std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Predi
     }
     candidate.chi2 = best * best;
     candidate.p_value = davies_bound(candidate.chi2, roots);
-    candidate.searched = candidate.p_value / std::max(chi2_tail(candidate.chi2, 1), 1e-300);
+    candidate.searched = davies_places(candidate.chi2, roots);
     return candidate;
 }
 

@@ -132,6 +132,22 @@ std::string experiment_for(const std::string& effect, const std::vector<std::str
     return "record for longer";
 }
 
+/// Effects that stood in for the one added last are no longer needed beside it.
+void drop_needless(const record::Record& record, const Rows& rows, double tests_of_effects,
+                   std::shared_ptr<Fitted>& now, std::vector<Step>& steps) {
+    for (std::size_t k = steps.size(); k-- > 0;) {
+        const effects::Effect* effect = effects::find(steps[k].effect);
+        if (told_by_other_columns(*effect)) continue;
+        TurnParameters without = now->fit->parameters();
+        std::erase_if(without.effects, [&](const ActiveEffect& active) { return active.effect == effect; });
+        const auto fitted = fit_record(record, without, rows);
+        const double chi2 = 2.0 * (now->fit->log_likelihood() - fitted->fit->log_likelihood());
+        if (chi2_tail(chi2, free_parameters(*effect)) * tests_of_effects < level_of_effects) continue;
+        now = fitted;
+        steps.erase(steps.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+}
+
 }  // namespace
 
 Closure close_turns(const record::Record& record) {
