@@ -38,6 +38,7 @@ void test_phase(const TurnFit& fit, std::vector<ResidualTest>& tests) {
     const std::size_t n = model.series().size();
     for (const bool kicks : {true, false}) {
         double least = 1.0;
+        double most = 0.0;
         int at = 0;
         for (int k = 1; k <= harmonics; ++k) {
             Columns columns(4, std::vector<double>(n));
@@ -53,14 +54,15 @@ void test_phase(const TurnFit& fit, std::vector<ResidualTest>& tests) {
             }
             const auto score = fit.score(columns);
             const double p = chi2_tail(score.chi2, score.rank);
-            if (p >= least) continue;
+            most = std::max(most, 0.5 * score.chi2 - score.rank - std::log(static_cast<double>(harmonics)));
+            if (at > 0 && p >= least) continue;
             least = p;
             at = k;
         }
         tests.push_back(
             {Where::phase,
              kicks ? "kicks at harmonics of the turn's phase" : "phase read at harmonics of the turn's phase",
-             of_several(least, harmonics), fmt::format("harmonic {}", at)});
+             of_several(least, harmonics), fmt::format("harmonic {}", at), most});
     }
 }
 
@@ -69,7 +71,8 @@ void test_rates(const TurnFit& fit, std::vector<ResidualTest>& tests) {
     const std::size_t n = series.size();
     const auto against = [&](Where where, std::string view, const Columns& columns) {
         const auto score = fit.score(columns);
-        if (score.rank > 0) tests.push_back({where, std::move(view), chi2_tail(score.chi2, score.rank), ""});
+        if (score.rank == 0) return;
+        tests.push_back({where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - score.rank});
     };
     if (!series.temperature_change_k.empty() && largest(series.temperature_change_k) > 0.0) {
         const auto& t = series.temperature_change_k;

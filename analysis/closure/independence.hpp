@@ -16,6 +16,7 @@ struct ResidualTest {
     std::string view;  ///< what the residual was held against
     double p_value = 1.0;
     std::string detail;  ///< the largest of what was seen
+    double merit = 0.0;  ///< of a regression: gain of the log-likelihood less its parameters and its search
 
     std::string description() const;
 };

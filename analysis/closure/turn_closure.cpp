@@ -132,6 +132,18 @@ std::string experiment_for(const std::string& effect, const std::vector<std::str
     return "record for longer";
 }
 
+/// Whether some view of the residual shows more than the best effect can explain: then that one is only what comes
+/// nearest to something that the library does not have.
+///
+/// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do.
+bool something_else(const TurnFit& fit, const effects::Effect& effect, double merit) {
+    const auto tests = test_residual(fit);
+    return std::any_of(tests.begin(), tests.end(), [&](const ResidualTest& test) {
+        const bool in_step = test.where == Where::phase && effect.adds_angle();
+        return test.merit > merit + (in_step ? -tie : tie);
+    });
+}
+
 /// Effects that stood in for the one added last are no longer needed beside it.
 void drop_needless(const record::Record& record, const Rows& rows, double tests_of_effects,
                    std::shared_ptr<Fitted>& now, std::vector<Step>& steps) {
@@ -223,6 +235,13 @@ Closure close_turns(const record::Record& record) {
         std::sort(contenders.begin(), contenders.end(),
                   [](const Contender& a, const Contender& b) { return a.merit > b.merit; });
         Contender& best = contenders.front();
+        // Views and candidates are compared by their scores, with the noise as it is.
+        if (!side && something_else(*now->fit, *best.candidate.effect, 0.5 * merit(best.candidate))) break;
+        // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
+        const double chi2 = 2.0 * (best.fitted->fit->log_likelihood() - now->fit->log_likelihood());
+        const double p_full =
+            of_several(chi2_tail(chi2, free_parameters(*best.candidate.effect)), best.candidate.searched);
+        if (!side && p_full * tests_of_effects >= level_of_effects) break;
         Step step;
         step.effect = std::string(best.candidate.effect->name());
         step.p_value = best.candidate.p_value;
@@ -234,6 +253,7 @@ Closure close_turns(const record::Record& record) {
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
         const Score before = heldout(*now->fit);
         now = best.fitted;
+        drop_needless(record, rows, tests_of_effects, now, closure.steps);
         const Score after = heldout(*now->fit);
         step.heldout_error_before = before.error;
         step.heldout_error_after = after.error;

@@ -139,11 +139,7 @@ void TurnFit::fit_deterministic(int iterations) {
     for (int pass = 0; pass < iterations; ++pass) {
         prediction_ = model_->predict(parameters_);
         const std::vector<Column> all = columns(prediction_);
-        rest_.resize(n);
-        for (std::size_t i = 0; i < n; ++i) {
-            rest_[i] = model_->phase_rad()[i] - prediction_.phase_rad[i];
-            for (std::size_t k = 0; k < nuisance_.size(); ++k) rest_[i] -= nuisance_[k] * all[k].series[i];
-        }
+        set_rest(prediction_, all);
         TurnParameters guess = parameters_;
         if (guess.injected_sd_rad == 0.0) {
             guess.injected_sd_rad = 1.0;
@@ -169,21 +165,48 @@ void TurnFit::fit_deterministic(int iterations) {
         add_priors(scale, normal, &right);
         Eigen::VectorXd step = normal.ldlt().solve(right);
         step = step.cwiseQuotient(scale);
-        std::size_t k = 0;
-        for (double& value : nuisance_) value += step(static_cast<Eigen::Index>(k++));
-        parameters_.bias_deg_h += step(static_cast<Eigen::Index>(k++));
-        parameters_.threshold_deg_h = std::max(0.0, parameters_.threshold_deg_h + step(static_cast<Eigen::Index>(k++)));
-        for (ActiveEffect& active : parameters_.effects) {
-            for (const effects::Parameter& parameter : active.effect->parameters()) {
-                if (!fitted_in_phase(*active.effect, parameter.role)) continue;
-                double& value = active.values.at(std::string(parameter.name));
-                value = std::clamp(value + step(static_cast<Eigen::Index>(k++)), parameter.min, parameter.max);
-            }
+        // Times and frequencies are far from linear: shorter steps where a whole one leads uphill.
+        const double squares = y.squaredNorm();
+        const TurnParameters from = parameters_;
+        const std::vector<double> nuisance_from = nuisance_;
+        for (double share = 1.0; share > 0.02; share *= 0.5) {
+            parameters_ = from;
+            nuisance_ = nuisance_from;
+            take(share * step);
+            if (parameters_.effects.empty() || squares_left(all, whitening) <= squares * (1.0 + 1e-9)) break;
         }
-        for (std::size_t j = 0; j < all.size(); ++j) {
-            for (std::size_t i = 0; i < n; ++i) rest_[i] -= step(static_cast<Eigen::Index>(j)) * all[j].series[i];
+        set_rest(model_->predict(parameters_), all);
+    }
+}
+
+void TurnFit::take(const Eigen::VectorXd& step) {
+    Eigen::Index k = 0;
+    for (double& value : nuisance_) value += step(k++);
+    parameters_.bias_deg_h += step(k++);
+    parameters_.threshold_deg_h = std::max(0.0, parameters_.threshold_deg_h + step(k++));
+    for (ActiveEffect& active : parameters_.effects) {
+        for (const effects::Parameter& parameter : active.effect->parameters()) {
+            if (!fitted_in_phase(*active.effect, parameter.role)) continue;
+            double& value = active.values.at(std::string(parameter.name));
+            value = std::clamp(value + step(k++), parameter.min, parameter.max);
         }
     }
+}
+
+void TurnFit::set_rest(const TurnModel::Prediction& prediction, const std::vector<Column>& columns) {
+    rest_.resize(model_->series().size());
+    for (std::size_t i = 0; i < rest_.size(); ++i) {
+        rest_[i] = model_->phase_rad()[i] - prediction.phase_rad[i];
+        for (std::size_t k = 0; k < nuisance_.size(); ++k) rest_[i] -= nuisance_[k] * columns[k].series[i];
+    }
+}
+
+double TurnFit::squares_left(const std::vector<Column>& columns, const Whitening& whitening) {
+    set_rest(model_->predict(parameters_), columns);
+    const auto white = whitening.apply(rest_);
+    double squares = 0.0;
+    for (std::size_t i = 0; i < white.size(); ++i) squares += rows_[i] ? white[i] * white[i] : 0.0;
+    return squares;
 }
 
 /// A gyro that is locked shows its bias and its threshold together only: beside so weak a belief that no other record
@@ -259,10 +282,7 @@ void TurnFit::finish() {
     const std::size_t n = model_->series().size();
     prediction_ = model_->predict(parameters_);
     const std::vector<Column> all = columns(prediction_);
-    for (std::size_t i = 0; i < n; ++i) {
-        rest_[i] = model_->phase_rad()[i] - prediction_.phase_rad[i];
-        for (std::size_t k = 0; k < nuisance_.size(); ++k) rest_[i] -= nuisance_[k] * all[k].series[i];
-    }
+    set_rest(prediction_, all);
     whitening_ = std::make_shared<Whitening>(prediction_.frame, model_->noise(parameters_));
     innovations_ = whitening_->apply(rest_);
     sd_rad_ = whitening_->sd_rad();

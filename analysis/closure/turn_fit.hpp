@@ -69,6 +69,9 @@ class TurnFit {
     };
     void fit_deterministic(int iterations);
     void fit_noise();
+    void take(const Eigen::VectorXd& step);
+    void set_rest(const TurnModel::Prediction& prediction, const std::vector<Column>& columns);
+    double squares_left(const std::vector<Column>& columns, const Whitening& whitening);
     std::vector<Column> columns(const TurnModel::Prediction& prediction) const;
     void finish();
     void add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, Eigen::VectorXd* right) const;

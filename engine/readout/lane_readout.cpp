@@ -178,14 +178,17 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
                 store(side_acceleration(0, hn::Neg(scale_before)), readings.accel_before_rad_s2[i]);
                 store(side_acceleration(1, scale_after), readings.accel_after_rad_s2[i]);
                 if (timed) {
-                    // Half-way between the nearest pulses on either side, in whole ticks.
-                    const V half = hn::Set(d, 0.5);
-                    V middle = half * (nearest_s[0] + nearest_s[1]);
+                    // Half-way between the nearest pulses on either side, in whole ticks; weighed as half cycles last,
+                    // with the root of the acceleration, where they differ (docs/readout.md).
+                    const V after_s = load(constants.duration_s[after_side]);
+                    const V before_s = load(constants.duration_s[1 - after_side]);
+                    const V weight = after_s / (after_s + before_s);
+                    V middle = sm::fma(d, weight, nearest_s[0] - nearest_s[1], nearest_s[1]);
                     if (electronics.clock_hz > 0.0) {
                         const V clock = hn::Set(d, electronics.clock_hz);
                         const V tick_before = hn::Floor(sm::fma(d, nearest_s[0], clock, tick_fraction));
                         const V tick_after = hn::Floor(sm::fma(d, nearest_s[1], clock, tick_fraction));
-                        middle = (hn::Floor(half * (tick_before + tick_after)) - tick_fraction) *
+                        middle = (hn::Floor(sm::fma(d, weight, tick_before - tick_after, tick_after)) - tick_fraction) *
                                  hn::Set(d, 1.0 / electronics.clock_hz);
                     }
                     store(middle, readings.zero_rate_s[i]);

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "engine/gyro/half_cycle.hpp"
-#include "engine/propagate/direct.hpp"
 #include "tests/closure/generator.hpp"
+#include "tests/support/direct.hpp"
 
 namespace {
 
@@ -30,7 +30,7 @@ void expect_same_path(const Truth& truth, const Trajectory& path, const char* wh
                                    truth.dither_second_harmonic.phase_rad};
         const gyro::Coupling coupling{path.b_rad_s[row], truth.detector_phase_offset_rad, truth.lockin_turn_asymmetry,
                                       truth.lockin_second_harmonic.ratio, truth.lockin_second_harmonic.phase_rad};
-        propagate::DirectIntegrator engine(coupling, 1e-11);
+        ringlock::test::DirectIntegrator engine(coupling, 1e-11);
         const double phase = first + path.plain_rad[row - 1] - path.plain_rad[0] + lockin;
         lockin += engine.lockin_gain_rad(std::remainder(phase, 2.0 * std::numbers::pi), half);
         worst = std::max(worst, std::abs(lockin - (path.lockin_rad[row] - path.lockin_rad[0])));

@@ -1,0 +1,193 @@
+// What the closed loop's fit is made of: exact kicks, the whitening filter, phases joined from count and quadrature.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <random>
+
+#include "analysis/closure/chance.hpp"
+#include "analysis/closure/turn_fit.hpp"
+#include "analysis/closure/turn_kicks.hpp"
+#include "analysis/closure/whitening.hpp"
+#include "engine/core/units.hpp"
+#include "engine/gyro/theory.hpp"
+#include "tests/closure/generator.hpp"
+
+namespace ringlock::test::closure {
+namespace {
+
+using namespace ringlock::closure;
+
+TEST(TurnKicks, AreTheSineToFirstOrder) {
+    gyro::Setup setup;
+    setup.dither_frequency_hz = 124.68;
+    setup.dither_peak_rate_deg_s = 109.1;
+    setup.input_rate_deg_h = 15.0;
+    const TurnKicks kicks(setup);
+    const double kappa = gyro::turn_kick_rad(setup);
+    for (const int direction : {1, -1}) {
+        for (double psi = 0.0; psi < units::two_pi; psi += 0.3) {
+            const TurnKicks::Kick kick = kicks.at(direction, psi);
+            const double first = kappa * std::sin(psi + 0.25 * direction * units::pi);
+            EXPECT_NEAR(kick.before_rad + kick.after_rad, first, 0.05 * kappa * kappa * kappa);
+            constexpr double h = 1e-5;
+            const double ahead = kicks.at(direction, psi + h).after_rad;
+            const double behind = kicks.at(direction, psi - h).after_rad;
+            EXPECT_NEAR(kick.after_slope, (ahead - behind) / (2.0 * h), 1e-8);
+        }
+    }
+}
+
+TEST(TurnModel, FollowsAnotherSimulatorsGyro) {
+    Truth truth;
+    truth.turns = 1500;
+    truth.input_rate_deg_h = 40.0;
+    std::vector<Truth> truths(3, truth);
+    truths[1].lockin_second_harmonic = {0.03, 0.7};
+    truths[2].lockin_turn_asymmetry = 0.05;
+    const auto records = generate(truths);
+    for (std::size_t k = 0; k < records.size(); ++k) {
+        const JoinedPhase joined = join(*records[k].turns, {}, false);
+        const TurnSeries series = prepare(records[k], joined);
+        const TurnModel model(series, joined.phase_rad);
+        TurnParameters p;
+        p.threshold_deg_h = truth.lockin_threshold_deg_h;
+        if (k == 1) {
+            p.effects.push_back({effects::find("lockin_second_harmonic"), {{"ratio", 0.03}, {"phase_rad", 0.7}}});
+        }
+        if (k == 2) p.effects.push_back({effects::find("lockin_turn_asymmetry"), {{"ratio", 0.05}}});
+        const auto prediction = model.predict(p);
+        // But for offset, amplitude and a rate.
+        Eigen::MatrixXd x(series.size(), 3);
+        Eigen::VectorXd y(series.size());
+        for (std::size_t i = 0; i < series.size(); ++i) {
+            const auto row = static_cast<Eigen::Index>(i);
+            x.row(row) << 1.0, prediction.frame.sign[i], series.time_s[i];
+            y(row) = joined.phase_rad[i] - prediction.phase_rad[i];
+        }
+        const Eigen::VectorXd c = x.colPivHouseholderQr().solve(y);
+        std::printf("case %zu: largest difference %.2g rad, rate %.2g rad/s\n", k, (y - x * c).cwiseAbs().maxCoeff(),
+                    c(2));
+        // Times of turns know the coupling's first harmonic only; and between the turns the two simulators let an
+        // asymmetric threshold change in ways of their own.
+        EXPECT_LT((y - x * c).cwiseAbs().maxCoeff(), k == 0 ? 2e-6 : 5e-5) << k;
+        EXPECT_LT(std::abs(c(2)), k == 0 ? 1e-5 : 1e-4) << "rad/s: " << k;
+    }
+}
+
+/// Covariance of the phases that TurnNoise describes, from its definition.
+Eigen::MatrixXd covariance(const TurnFrame& frame, const TurnNoise& noise) {
+    const auto n = static_cast<Eigen::Index>(frame.sign.size());
+    // Sources: w_i, v_i, steps of m, white rates.
+    Eigen::MatrixXd sources = Eigen::MatrixXd::Zero(n, 4 * n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+        sources(i, i) = std::sqrt(noise.injected_rad2);
+        const double v = std::sqrt(noise.readout_rad2);
+        sources(i, n + i) = (1.0 - frame.before_slope[static_cast<std::size_t>(i)]) * v;
+        for (Eigen::Index j = 0; j < i; ++j) {
+            sources(i, n + j) = -frame.kick_slope[static_cast<std::size_t>(j)] * v;
+            sources(i, 2 * n + j) = frame.sign[static_cast<std::size_t>(i)] * std::sqrt(noise.wander_rad2);
+            sources(i, 3 * n + j) = std::sqrt(noise.white_rad2_per_s * frame.interval_s);
+        }
+    }
+    Eigen::MatrixXd c = sources * sources.transpose();
+    const double dt = frame.interval_s;
+    for (Eigen::Index i = 0; i < n; ++i) {
+        for (Eigen::Index j = 0; j < n; ++j) {
+            const double s = dt * static_cast<double>(std::min(i, j));
+            const double t = dt * static_cast<double>(std::max(i, j));
+            c(i, j) += noise.walk_rad2_per_s3 * s * s * (3.0 * t - s) / 6.0;
+            for (const PhaseRateTerm& term : noise.rates) {
+                // Covariance of two integrals of an Ornstein-Uhlenbeck rate from 0 on.
+                const double T = term.time_s;
+                c(i, j) += term.variance_rad2_s2 * T * T *
+                           (2.0 * s / T - 1.0 + std::exp(-s / T) + std::exp(-t / T) - std::exp(-(t - s) / T));
+            }
+        }
+    }
+    return c;
+}
+
+TEST(Whitening, IsTheCholeskyFactorOfTheCovariance) {
+    constexpr std::size_t n = 40;
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> normal;
+    TurnFrame frame;
+    frame.interval_s = 0.004;
+    for (std::size_t i = 0; i < n; ++i) {
+        frame.sign.push_back(i % 2 == 0 ? -1.0 : 1.0);
+        frame.before_slope.push_back(0.07 * normal(random));
+        frame.kick_slope.push_back(0.15 * normal(random));
+    }
+    TurnNoise noise;
+    noise.injected_rad2 = 0.3;
+    noise.readout_rad2 = 0.2;
+    noise.wander_rad2 = 0.05;
+    noise.white_rad2_per_s = 3.0;
+    noise.walk_rad2_per_s3 = 900.0;
+    noise.rates = {{0.01, 80.0}, {0.5, 20.0}};
+    const Whitening whitening(frame, noise);
+    const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance(frame, noise));
+    std::vector<double> series(n);
+    for (double& value : series) value = normal(random);
+    const Eigen::VectorXd expected =
+        cholesky.matrixL().solve(Eigen::Map<const Eigen::VectorXd>(series.data(), static_cast<Eigen::Index>(n)));
+    const auto white = whitening.apply(series);
+    const Eigen::MatrixXd factor = cholesky.matrixL();
+    for (std::size_t i = 0; i < n; ++i) {
+        const auto row = static_cast<Eigen::Index>(i);
+        EXPECT_NEAR(whitening.sd_rad()[i], factor(row, row), 1e-9);
+        EXPECT_NEAR(white[i], expected(row), 1e-8);
+    }
+}
+
+TEST(JoinedPhase, CountAndQuadratureMayDifferByAQuarterAtItsEdge) {
+    record::Turns turns;
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> normal(0.0, 0.01);
+    std::vector<double> truth;
+    for (int i = 0; i < 4000; ++i) {
+        const double psi = 0.37 * i * (i % 2 == 0 ? 1.0 : -1.0) + (i % 2 == 0 ? 0.0 : 5000.0);
+        truth.push_back(psi);
+        turns.time_s.push_back(0.004 * i);
+        turns.direction.push_back(i % 2 == 0 ? 1 : -1);
+        turns.sine.push_back(2.0 * (std::sin(psi) + normal(random)));
+        turns.cosine.push_back(2.0 * (std::cos(psi) + normal(random)));
+        // The counter has noise of its own, and another zero.
+        const double quarter = std::floor((psi + normal(random)) / (0.5 * units::pi));
+        turns.quarter_count.push_back(static_cast<std::int64_t>(quarter) + 7);
+    }
+    turns.accel_before_rad_s2.assign(truth.size(), 0.0);
+    turns.accel_after_rad_s2.assign(truth.size(), 0.0);
+    const JoinedPhase joined = join(turns, {}, false);
+    EXPECT_TRUE(joined.miscounted.empty());
+    EXPECT_NEAR(joined.readout_sd_rad, 0.01, 0.0005);
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+        const double off = joined.phase_rad[i] - truth[i] - (joined.phase_rad[0] - truth[0]);
+        EXPECT_NEAR(off, 0.0, 0.1) << i;
+    }
+    // Three quarters lost, one after the other.
+    for (std::size_t i = 1000; i < truth.size(); ++i) {
+        turns.quarter_count[i] -= i < 2000 ? 1 : i < 3000 ? 2 : 3;
+    }
+    const JoinedPhase lost = join(turns, {}, true);
+    EXPECT_EQ(lost.miscounted.size(), 3U);
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+        const double off = lost.phase_rad[i] - truth[i] - (lost.phase_rad[0] - truth[0]);
+        EXPECT_NEAR(off, 0.0, 0.1) << i;
+    }
+}
+
+TEST(Chance, KnowsItsTables) {
+    EXPECT_NEAR(chi2_tail(3.841459, 1), 0.05, 1e-7);
+    EXPECT_NEAR(chi2_tail(18.30704, 10), 0.05, 1e-7);
+    EXPECT_EQ(chi2_tail(-1.0, 3), 1.0);
+    EXPECT_NEAR(of_several(1e-12, 1e6), 1e-6, 1e-11);
+    EXPECT_NEAR(of_several(0.3, 2.0), 0.51, 1e-12);
+    // A statistic that does not vary with the nuisance needs no correction.
+    EXPECT_NEAR(davies_bound(9.0, {3.0, 3.0, 3.0}), chi2_tail(9.0, 1), 1e-15);
+    EXPECT_GT(davies_bound(9.0, {-3.0, 3.0, -3.0}), 3.0 * chi2_tail(9.0, 1));
+}
+
+}  // namespace
+}  // namespace ringlock::test::closure

@@ -1,0 +1,201 @@
+// The closed loop on turn records that it reads blind.
+#include <gmock/gmock.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "analysis/closure/closure.hpp"
+#include "analysis/closure/report.hpp"
+#include "analysis/instrument/simulate.hpp"
+#include "engine/scenario/check.hpp"
+#include "engine/scenario/scenario.hpp"
+#include "tests/closure/generator.hpp"
+
+namespace ringlock::test::closure {
+namespace {
+
+using ringlock::closure::close_loop;
+using ringlock::closure::Closure;
+using ringlock::closure::Estimate;
+using ringlock::closure::Verdict;
+
+/// A gyro with nothing beyond the base model; of the fast map.
+scenario::Scenario gyro(double turns, std::uint64_t seed, double injected_rad) {
+    scenario::Scenario scenario;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    scenario.ensemble.gyros = 1;
+    scenario.ensemble.seed = seed;
+    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
+    scenario.ensemble.dither_amplitude_sd_relative = 0.0;
+    scenario.ensemble.duration_s = 0.5 * turns / scenario.dither.frequency_hz;
+    if (injected_rad > 0.0) {
+        scenario.noise_injection.turn_phase_rms_rad = injected_rad;
+    } else {
+        scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
+    }
+    return scenario;
+}
+
+void print(const char* name, const Closure& closure) {
+    std::printf("%s: %s, held-out error %.6g -> %.6g", name, std::string(name_of(closure.verdict)).c_str(),
+                closure.heldout_before, closure.heldout_after);
+    for (const auto& step : closure.steps) {
+        std::printf("; %s p %.2g", step.effect.c_str(), step.p_value);
+        for (const Estimate& e : step.parameters) std::printf(" %s %.5g +- %.2g", e.name.c_str(), e.value, e.sd);
+        for (const auto& other : step.confounded_with) std::printf(" ~%s", other.c_str());
+    }
+    if (closure.unexplained) std::printf("; %s", closure.unexplained->description().c_str());
+    std::printf("\n");
+}
+
+double deviation(const std::vector<Estimate>& estimates, const std::string& name, double truth) {
+    for (const Estimate& e : estimates) {
+        if (e.name == name) return std::abs(e.value - truth) / e.sd;
+    }
+    ADD_FAILURE() << "no estimate of " << name;
+    return 0.0;
+}
+
+TEST(TurnLoop, NothingIsMissingWhereNothingIs) {
+    int k = 0;
+    for (const double injected : {0.0, 3.0}) {
+        for (const bool restless : {false, true}) {
+            scenario::Scenario scenario = gyro(10000, 100 + static_cast<std::uint64_t>(++k), injected);
+            if (restless) {
+                scenario.dither.amplitude_wander_relative_rt_s = 1e-5;
+                scenario.dither.amplitude_drift_relative_per_h = 0.01;
+                scenario.input.profile_time_s = {0.0, 10.0, 11.0, 25.0, 26.0, 1000.0};
+                scenario.input.profile_rate_deg_h = {100.0, 100.0, -200.0, -200.0, 300.0, 300.0};
+            }
+            const Closure closure = close_loop(instrument::simulate_record(scenario));
+            print(restless ? "drifting amplitude, strong rates" : "plain", closure);
+            EXPECT_EQ(closure.verdict, Verdict::nothing_missing);
+            EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", 300.0), 4.0);
+            EXPECT_LT(deviation(closure.base, "bias_deg_h", 0.0), 4.0);
+            // The 3000 held-out turns scatter by 1.3 % themselves.
+            EXPECT_NEAR(closure.heldout_after / closure.noise_floor, 1.0, 0.06);
+        }
+    }
+}
+
+TEST(TurnLoop, ALockedGyroIsNoRiddle) {
+    scenario::Scenario scenario = gyro(6000, 111, 0.0);
+    scenario.input.rate_deg_h = scenario.input.sweep_stop_deg_h = 0.0;
+    const Closure closure = close_loop(instrument::simulate_record(scenario));
+    print("locked", closure);
+    EXPECT_EQ(closure.verdict, Verdict::nothing_missing);
+    EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("locked")));
+}
+
+struct Single {
+    const char* effect;
+    std::vector<std::pair<std::string, double>> values;
+    double injected_rad = 0.0;
+    double temperature_swing_k = 0.0;
+    bool profile = false;
+};
+
+class TurnLoopFinds : public testing::TestWithParam<Single> {};
+
+TEST_P(TurnLoopFinds, TheEffectThatIsMissing) {
+    const Single& single = GetParam();
+    scenario::Scenario scenario = gyro(16000, 120, single.injected_rad);
+    for (const auto& [name, value] : single.values) scenario.effects.at(single.effect).at(name) = value;
+    scenario.environment.temperature_swing_k = single.temperature_swing_k;
+    scenario.environment.temperature_period_s = 25.0;
+    scenario.record.temperature_interval_s = 0.1;  // between rows the temperature is taken for linear
+    if (single.profile) {
+        scenario.input.profile_time_s = {0.0, 20.0, 21.0, 40.0, 41.0, 1000.0};
+        scenario.input.profile_rate_deg_h = {300.0, 300.0, -300.0, -300.0, 600.0, 600.0};
+    }
+    ASSERT_TRUE(scenario::check(scenario).empty());
+    const Closure closure = close_loop(instrument::simulate_record(scenario));
+    print(single.effect, closure);
+    EXPECT_EQ(closure.verdict, Verdict::closed);
+    ASSERT_EQ(closure.steps.size(), 1U);
+    EXPECT_EQ(closure.steps[0].effect, single.effect);
+    EXPECT_THAT(closure.steps[0].confounded_with, testing::IsEmpty());
+    for (const auto& [name, value] : single.values) {
+        EXPECT_LT(deviation(closure.steps[0].parameters, name, value), 4.0) << name;
+    }
+    // As good as the noise lets it be: 4800 held-out turns scatter by 1 %.
+    EXPECT_NEAR(closure.heldout_after / closure.noise_floor, 1.0, 0.05);
+}
+
+INSTANTIATE_TEST_SUITE_P(Effects, TurnLoopFinds,
+                         testing::Values(Single{"base_vibration", {{"frequency_hz", 3.3}, {"rate_deg_h", 1.5}}, 3.0},
+                                         Single{"bias_ramp", {{"deg_h_per_h", 0.5}}},
+                                         Single{"bias_step", {{"step_deg_h", 0.01}, {"time_s", 25.0}}},
+                                         Single{"bias_temperature", {{"deg_h_per_k", 0.002}}, 0.0, 1.0},
+                                         Single{"detector_phase_offset", {{"phase_rad", 0.02}}},
+                                         Single{"dither_asymmetry", {{"ratio", 1e-3}}, 3.0},
+                                         Single{"dither_second_harmonic", {{"ratio", 1e-3}, {"phase_rad", 1.0}}, 3.0},
+                                         Single{"lockin_second_harmonic", {{"ratio", 0.02}, {"phase_rad", 2.0}}},
+                                         Single{"lockin_turn_asymmetry", {{"ratio", 0.01}}},
+                                         Single{"missed_counts", {{"probability_per_turn", 2e-3}}},
+                                         Single{"quantum_noise", {{"deg_rt_h", 2e-5}}},
+                                         Single{"rate_random_walk", {{"deg_h_rt_h", 0.05}}},
+                                         Single{"readout_ellipse", {{"gain", 0.01}, {"offset_sin", -0.008}}},
+                                         Single{"scale_factor_error", {{"relative", 2e-5}}, 0.0, 0.0, true}),
+                         [](const auto& single) { return std::string(single.param.effect); });
+
+TEST(TurnLoop, ReadsWhatAnotherSimulatorWrote) {
+    Truth plain;
+    plain.turns = 6000;
+    plain.readout_noise = 0.005;
+    plain.clock_hz = 1e8;
+    plain.input_rate_deg_h = 20.0;
+    plain.declared.emplace();
+    plain.declared->scale_factor_arcsec = plain.scale_factor_arcsec;
+    plain.declared->lockin_threshold_deg_h = 240.0;  // a fifth off
+    std::vector<Truth> truths(3, plain);
+    truths[1].lockin_second_harmonic = {0.03, -1.0};
+    truths[2].lockin_third_harmonic = {0.08, 0.5};
+    const auto records = generate(truths);
+    const Closure nothing = close_loop(records[0]);
+    print("plain", nothing);
+    EXPECT_EQ(nothing.verdict, Verdict::nothing_missing);
+    EXPECT_LT(deviation(nothing.base, "lockin_threshold_deg_h", 300.0), 4.0);
+    EXPECT_LT(deviation(nothing.base, "bias_deg_h", 20.0), 4.0);
+
+    const Closure second = close_loop(records[1]);
+    print("second harmonic", second);
+    EXPECT_EQ(second.verdict, Verdict::closed);
+    ASSERT_EQ(second.steps.size(), 1U);
+    EXPECT_EQ(second.steps[0].effect, "lockin_second_harmonic");
+    EXPECT_LT(deviation(second.steps[0].parameters, "ratio", 0.03), 4.0);
+    EXPECT_LT(deviation(second.steps[0].parameters, "phase_rad", -1.0), 4.0);
+
+    // The library has no third harmonic.
+    const Closure third = close_loop(records[2]);
+    print("third harmonic", third);
+    EXPECT_EQ(third.verdict, Verdict::unexplained);
+    EXPECT_TRUE(third.steps.empty());
+    ASSERT_TRUE(third.unexplained.has_value());
+    EXPECT_EQ(third.unexplained->where, ringlock::closure::Where::phase);
+}
+
+TEST(TurnLoop, ClosesBackIntoTheMonteCarlo) {
+    scenario::Scenario scenario = gyro(10000, 130, 3.0);
+    scenario.effects.at("detector_phase_offset").at("phase_rad") = 0.6;
+    const record::Record record = instrument::simulate_record(scenario);
+    const Closure closure = close_loop(record);
+    print("detector_phase_offset", closure);
+    const scenario::Scenario closed = ringlock::closure::closed_scenario(record, closure);
+    EXPECT_TRUE(scenario::check(closed).empty());
+    EXPECT_NEAR(closed.effects.at("detector_phase_offset").at("phase_rad"), 0.6, 0.1);
+    EXPECT_NEAR(closed.gyro.lockin_threshold_deg_h, 300.0, 15.0);
+    EXPECT_NEAR(closed.noise_injection.turn_phase_rms_rad, 3.0, 0.1);
+    EXPECT_NEAR(closed.input.rate_deg_h, 15.0, 0.01);
+    const nlohmann::json json = ringlock::closure::to_json(closure);
+    EXPECT_EQ(json.at("verdict"), "closed");
+    EXPECT_EQ(json.at("steps").at(0).at("effect"), "detector_phase_offset");
+    EXPECT_TRUE(json.at("steps").at(0).at("parameters").at("phase_rad").at("std").is_number());
+    EXPECT_EQ(json.at("heldout_error").at("unit"), "rad");
+    EXPECT_FALSE(json.at("unexplained").at("present"));
+}
+
+}  // namespace
+}  // namespace ringlock::test::closure
