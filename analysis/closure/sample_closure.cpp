@@ -28,9 +28,11 @@ constexpr std::size_t most_contenders = 5;
 /// What samples can tell of; the rest of the library needs turns.
 constexpr double effects_on_samples = 12.0;
 
+/// Contiguous blocks: of ten, five are fitted (1), two decide whether what was found there holds (2), three are only
+/// reported (0).
 Rows chosen_blocks(std::size_t size) {
     constexpr std::size_t blocks = 40;
-    constexpr std::uint8_t chooses[10] = {1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
+    constexpr std::uint8_t chooses[10] = {1, 1, 0, 1, 2, 0, 1, 2, 0, 1};
     Rows rows(size);
     for (std::size_t i = 0; i < size; ++i) rows[i] = chooses[i * blocks / size % 10];
     return rows;
@@ -88,6 +90,7 @@ Score heldout(const SampleFit& fit, const Rows& reported, double lattice) {
         score.error += e * e;
         count += 1.0;
     }
+    count = std::max(count, 1.0);
     score.error = std::sqrt(score.error / count);
     score.floor = std::sqrt(score.floor / count);
     return score;
@@ -128,10 +131,12 @@ class Loop {
 
     const record::Record& record_;
     SampleSeries series_;
-    Rows chosen_;    ///< count when something is chosen
-    Rows rows_;      ///< of them those that are not disturbed
+    Rows chosen_;    ///< by blocks: 1 fitted, 2 decides, 0 reported
+    Rows rows_;      ///< fitted and not disturbed
+    Rows decide_;    ///< decides and is not disturbed
     Rows reported_;
     Lattice lattice_;
+    std::vector<double> lines_hz_;  ///< in the model
     double used_step_ = 0.0;  ///< of the lattice in the model
 };
 
@@ -237,7 +242,8 @@ void Loop::screen_line(const SampleFit& now, std::vector<Candidate>& out) const 
         if (!rows_[i]) e[i] = 0.0;
     }
     const double duration_s = static_cast<double>(series_.size()) * series_.interval_s;
-    const FoundLine line = find_line(e, series_.rate_hz, true);
+    // What is left beside a line that is in the model is that line, not being what the model says.
+    const FoundLine line = find_line(e, series_.rate_hz, true, lines_hz_, 64.0 / duration_s);
     if (!(line.p_value < 0.01)) return;
     Candidate c{.model = now.model(), .p_value = line.p_value, .searched = line.searched, .parameters = 3};
     const bool drifts = line.chi2 - line.chi2_still > 25.0 && std::abs(line.drift_hz_per_s) * duration_s * duration_s > 1.0;
@@ -285,10 +291,11 @@ void Loop::screen_resampling(const SampleFit& now, std::vector<Candidate>& out) 
         for (const int sign : {-1, 1}) {
             const double from = m * rate + sign * cycle.frequency_hz;
             if (from < 0.3 * rate || from > 4.5 * rate || std::abs(from - rate) < 1e-9 * rate) continue;
-            for (int place = 0; place < 4; ++place) {
+            for (int place = 0; place < 8; ++place) {
                 SampleModel model = now.model();
                 model.noise.from_hz = from;
-                model.noise.from_phase = 0.25 * place;
+                model.noise.from_phase = 0.125 * place;
+                model.noise.blur_arcsec = 0.2 * now.sd(0);
                 ++tried;
                 const SampleFilter filter(model.noise, part, series_.interval_s);
                 const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
@@ -328,6 +335,12 @@ void Loop::screen_witnesses(const SampleFit& now, std::vector<Candidate>& out) c
         c.model.noise.resonance_hz = std::max(motion.centre_hz, 0.01);
         c.model.noise.resonance_width_hz = std::max(0.5 * motion.centre_hz, 0.01);
     }
+    // Once more with what is left as the noise.
+    const SampleFit first(series_, c.model, rows_);
+    const auto& watched = series_.witnesses[witness.index].second;
+    c.model = first.model();
+    const WitnessMotion more = fit_witness(first, watched);
+    for (std::size_t i = 0; i < c.model.motion.size(); ++i) c.model.motion[i] += more.increments[i];
     Estimate name{"case_motion", "witness", static_cast<double>(witness.name.back() - 'x'), 0.0, witness.name};
     c.told.push_back(std::move(name));
     const double pieces = std::max(2.0, static_cast<double>(series_.size()) / 1024.0);
@@ -436,12 +449,21 @@ Closure Loop::run() {
         closure.notes.push_back(fmt::format("the record declares no scale factor; {:g} arcsec per fringe assumed, with which all rates scale",
                                             series_.scale_factor_arcsec));
     }
-    rows_ = chosen_;
+    const auto set_rows = [&](const Rows& without) {
+        rows_.assign(chosen_.size(), 0);
+        decide_.assign(chosen_.size(), 0);
+        for (std::size_t i = 0; i < chosen_.size(); ++i) {
+            if (!without.empty() && without[i]) continue;
+            rows_[i] = chosen_[i] == 1 ? 1 : 0;
+            decide_[i] = chosen_[i] == 2 ? 1 : 0;
+        }
+    };
+    set_rows({});
     auto now = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
     closure.heldout_before = heldout(*now, reported_, 0.0).error;
     const Disturbed disturbed = find_disturbed(*now);
     if (disturbed.share > 0.0 && disturbed.share < 0.6) {
-        for (std::size_t i = 0; i < rows_.size(); ++i) rows_[i] = chosen_[i] && !disturbed.rows[i] ? 1 : 0;
+        set_rows(disturbed.rows);
         now = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
         closure.notes.push_back(fmt::format("{:.1f} % of the record is disturbed, up to {:.3g} times the usual variance, most at {:.6g} s; nothing is "
                                             "fitted to it, held-out errors have it",
@@ -469,8 +491,9 @@ Closure Loop::run() {
             if (contenders.size() >= most_contenders + 2) break;
             auto fit = std::make_shared<SampleFit>(series_, candidate.model, rows_);
             const double merit = fit->log_likelihood() - now->log_likelihood() - std::log(candidate.searched) - candidate.parameters;
-            // Whatever stands out, without a better likelihood it is not this effect.
-            if (merit < 0.0) continue;
+            // Whatever stands out: where the likelihood is not better, or the blocks that decide are foretold worse, it is
+            // not this effect.
+            if (merit < 0.0 || heldout(*fit, decide_, 0.0).log_score <= heldout(*now, decide_, 0.0).log_score) continue;
             contenders.push_back({std::move(candidate), std::move(fit), merit});
         }
         if (contenders.empty()) break;
@@ -490,6 +513,9 @@ Closure Loop::run() {
         step.heldout_error_before = before.error;
         step.heldout_error_after = after.error;
         step.heldout_log_score_gain = after.log_score - before.log_score;
+        if (step.effect == "dither_residue" || step.effect == "base_vibration") {
+            lines_hz_.push_back(best.candidate.told.front().value);
+        }
         closure.steps.push_back(std::move(step));
         taken.push_back(std::move(best.candidate));
     }

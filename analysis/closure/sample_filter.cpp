@@ -60,7 +60,7 @@ SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double in
         n_ += 2;
         p[r0][r0] = p[r1][r1] = p[0][0] + q_[r1][r1];
         // Interpolated readings have no error of their own; digits have.
-        floor = 1e-6 * (readout + q_[0][0]);
+        floor = noise.blur_arcsec * noise.blur_arcsec + 1e-8 * (readout + q_[0][0]);
     } else {
         h_[0] = 1.0;
         if (resonance >= 0) h_[resonance] = 1.0;
@@ -105,7 +105,7 @@ SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double in
         gain_.push_back(gain);
         sd_.push_back(std::sqrt(s));
         if (resampled_) continue;
-        same = std::abs(s - last) < 1e-9 * s ? same + 1 : 0;
+        same = std::abs(s - last) < 1e-8 * s ? same + 1 : 0;
         last = s;
         if (same > 50) break;
     }

@@ -19,6 +19,7 @@ struct SampleNoise {
     double resonance_arcsec = 0.0;     ///< rms of an angle that is a second-order autoregression
     double resonance_hz = 5.0, resonance_width_hz = 4.0;
     double from_hz = 0.0;              ///< taken at that rate and interpolated; 0: not
+    double blur_arcsec = 0.0;          ///< rms of what interpolated readings are off the straight line
     double from_phase = 0.0;           ///< source intervals from the sample before the record's start to that start
 };
 

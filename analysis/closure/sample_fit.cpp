@@ -75,7 +75,11 @@ std::vector<Free> knobs(SampleModel& model) {
         all.push_back({&model.noise.resonance_hz, true});
         all.push_back({&model.noise.resonance_width_hz, true});
     }
-    if (model.noise.from_hz > 0.0) all.push_back({&model.noise.from_phase, false});
+    if (model.noise.from_hz > 0.0) {
+        all.push_back({&model.noise.from_phase, false});
+        all.push_back({&model.from_shift, false});
+        all.push_back({&model.noise.blur_arcsec, true});
+    }
     return all;
 }
 
@@ -158,6 +162,14 @@ void SampleFit::fit_noise() {
         if (model.noise.resonance_hz > 0.5 * series_->rate_hz || model.noise.resonance_width_hz > series_->rate_hz) {
             model.noise.resonance_arcsec = 0.0;
         }
+        if (model.noise.from_hz > 0.0) {
+            // About the middle of the record, so that rate and place are told apart.
+            const double shift_hz = 0.1 * model.from_shift / duration_s;
+            model.noise.from_hz += shift_hz;
+            model.noise.from_phase -= 0.5 * shift_hz * duration_s;
+            model.noise.from_phase -= std::floor(model.noise.from_phase);
+            model.from_shift = 0.0;
+        }
         if (model.flicker) {
             model.noise.terms = flicker_terms(model.flicker_deg_h, 4.0 * series_->interval_s, duration_s);
         }
@@ -172,13 +184,15 @@ void SampleFit::fit_noise() {
         };
     };
     const std::size_t n = rest_.size();
-    const int evaluations = 40 * static_cast<int>(start.size());
-    const std::size_t part = std::max<std::size_t>(30000, n / 8);
+    const int evaluations = 30 * static_cast<int>(start.size());
+    const bool resampled = model_.noise.from_hz > 0.0;
+    const std::size_t part = resampled ? std::min<std::size_t>(n, 15000) : std::max<std::size_t>(30000, n / 8);
     if (n > 2 * part && !model_.walk && !model_.flicker) {
         start = smallest(on(part), start, 0.3, evaluations);
-        start = smallest(on(n), start, 0.05, 15 * static_cast<int>(start.size()));
+        start = smallest(on(n), start, 0.05, 12 * static_cast<int>(start.size()));
     } else {
         start = smallest(on(n), start, 0.3, evaluations);
+        start = smallest(on(n), start, 0.1, evaluations / 2);
     }
     model_ = trial(start);
     filter_ = std::make_shared<SampleFilter>(model_.noise, n, series_->interval_s);

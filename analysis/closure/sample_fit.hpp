@@ -17,15 +17,13 @@ struct SampleColumn {
     double sd = 0.0;
 };
 
-/// A standard deviation, or another constant of the noise, that the likelihood decides.
-enum class Knob { angle, rate, walk, flicker, resonance, resonance_hz, resonance_width_hz, from_phase };
-
 /// What a model of the samples consists of.
 struct SampleModel {
     SampleNoise noise;
     double flicker_deg_h = 0.0;            ///< B of the bias instability; makes the noise's terms
     std::vector<SampleColumn> columns;     ///< the mean rate first
     std::vector<double> motion;            ///< of the case, by its witness: taken off the increments; empty: none
+    double from_shift = 0.0;               ///< of from_hz, in tenths of a cycle over the record, while it is fitted
     bool resonance = false;
     bool walk = false;
     bool flicker = false;

@@ -265,6 +265,30 @@ FoundCycle find_cycle(const std::vector<double>& innovations, const Rows& rows, 
         double p = line.p_value;
         double hz = line.frequency_hz;
         // At half the rate there is one amplitude, not two.
+        // The place of the peak to a small part of a cycle over the record.
+        const auto power_at = [&](double f) {
+            const std::complex<double> turn = std::polar(1.0, units::two_pi * f / rate_hz);
+            std::complex<double> total = 0.0;
+            std::complex<double> phase = 1.0;
+            for (std::size_t i = 0; i < n; ++i) {
+                total += product[i] * phase;
+                phase *= turn;
+                if (i % 1024 == 0) phase /= std::abs(phase);
+            }
+            return std::norm(total);
+        };
+        if (p < 1e-3) {
+            double top = power_at(hz);
+            for (double d = 0.25 * rate_hz / static_cast<double>(n); d > 0.004 * rate_hz / static_cast<double>(n); d *= 0.5) {
+                for (const double f : {hz - d, hz + d}) {
+                    const double value = power_at(f);
+                    if (value > top) {
+                        top = value;
+                        hz = f;
+                    }
+                }
+            }
+        }
         double alternating = 0.0;
         double squares = 0.0;
         for (std::size_t i = 0; i < n; ++i) {

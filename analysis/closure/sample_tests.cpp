@@ -61,7 +61,7 @@ void test_spectrum(const SampleFit& fit, Tests& tests) {
     double worst_hz = 0.0;
     int bands = 0;
     // Doubling from below, then 32 of equal width.
-    double from = 6.0 / independent;
+    double from = 1.0 / independent;
     const double widest = static_cast<double>(power.size()) / 32.0;
     while (from < static_cast<double>(power.size()) - 1.0) {
         const double to = std::min(static_cast<double>(power.size()), std::min(2.0 * from, from + widest));
@@ -248,6 +248,37 @@ void test_lines(const SampleFit& fit, Tests& tests) {
     }
 }
 
+/// A rate that wanders moves by little at a time; jumps betray themselves by the size of what follows them (Harvey and
+/// Koopman, J. Business and Economic Statistics 10, 377, 1992).
+void test_jumps(const SampleFit& fit, Tests& tests) {
+    if (!fit.model().walk && !fit.model().flicker) return;
+    const std::size_t n = fit.innovations().size();
+    std::vector<double> step(n, 0.0);
+    const std::size_t middle = n / 2;
+    std::fill(step.begin() + static_cast<std::ptrdiff_t>(middle), step.end(), fit.series().interval_s);
+    const auto response = fit.filter().apply(step);
+    double all = 0.0;
+    for (std::size_t i = middle; i < n; ++i) all += response[i] * response[i];
+    std::size_t length = 0;
+    double part = 0.0;
+    while (part < 0.95 * all && middle + length < n) part += response[middle + length] * response[middle + length], ++length;
+    const std::size_t stride = std::max<std::size_t>(1, length / 8);
+    std::vector<double> sizes;
+    for (std::size_t a = 0; a + length <= n; a += stride) {
+        double sum = 0.0;
+        bool counts = true;
+        for (std::size_t i = 0; i < length; ++i) {
+            counts = counts && fit.rows()[a + i] != 0;
+            sum += response[middle + i] * fit.innovations()[a + i];
+        }
+        if (counts) sizes.push_back(sum * sum / part);
+    }
+    if (sizes.size() < 40) return;
+    const double most = *std::max_element(sizes.begin(), sizes.end());
+    tests.push_back({Where::time, "jumps of a rate that wanders", of_several(chi2_tail(most, 1), static_cast<double>(sizes.size())),
+                     fmt::format("{:.1f} standard errors", std::sqrt(most))});
+}
+
 void test_distribution(const SampleFit& fit, double lattice_arcsec, Tests& tests) {
     const auto& e = fit.innovations();
     const std::size_t n = e.size();
@@ -355,6 +386,7 @@ std::vector<ResidualTest> test_samples(const SampleFit& fit, double lattice_arcs
     test_size(fit, tests);
     test_rates(fit, tests);
     test_lines(fit, tests);
+    test_jumps(fit, tests);
     test_distribution(fit, lattice_arcsec, tests);
     if (!fit.series().witnesses.empty()) {
         const FoundWitness witness = find_witness(fit.innovations(), fit.rows(), fit.series());
