@@ -1,3 +1,5 @@
+#include "analysis/closure/closure.hpp"
+
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -6,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "analysis/closure/closure.hpp"
 #include "analysis/closure/report.hpp"
 #include "analysis/record/record.hpp"
 #include "app/command.hpp"
@@ -39,10 +40,12 @@ void add_closure(CLI::App& root) {
         std::string out;
         bool json = false;
     };
-    CLI::App* command = root.add_subcommand("closure", "Fit a measured record, trace what is left, add what is missing");
+    CLI::App* command =
+        root.add_subcommand("closure", "Fit a measured record, trace what is left, add what is missing");
     auto arguments = std::make_shared<Arguments>();
     command->add_option("RECORD", arguments->record, "rlg-record (.h5), or samples as text")->required();
-    command->add_option("--model", arguments->model, "scenario (.toml) of the instrument, for what the record leaves open");
+    command->add_option("--model", arguments->model,
+                        "scenario (.toml) of the instrument, for what the record leaves open");
     command->add_option("-o,--output", arguments->out, "folder for closed.toml, closure.h5 and closure.json");
     command->add_flag("--json", arguments->json, "one JSON object on standard output");
     command->callback([arguments] {

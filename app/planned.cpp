@@ -20,9 +20,10 @@ void add_planned(CLI::App& root) {
         command->allow_extras();
         const std::string text = name;
         command->callback([text] {
-            throw InputError(fmt::format(
-                "the command \"{}\" is not there yet; there are run, analyze, allan, validate, import, record and closure",
-                text));
+            throw InputError(
+                fmt::format("the command \"{}\" is not there yet; there are run, analyze, allan, validate, import, "
+                            "record and closure",
+                            text));
         });
     }
 }

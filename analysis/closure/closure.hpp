@@ -43,16 +43,16 @@ struct Closure {
     double heldout_before = 0.0;
     double heldout_after = 0.0;
     double noise_floor = 0.0;
-    std::vector<ResidualTest> tests;                ///< of the final residual
+    std::vector<ResidualTest> tests;  ///< of the final residual
     std::optional<ResidualTest> unexplained;
-    std::vector<std::string> notes;                 ///< what was assumed
-    double level = 0.0;                             ///< probability of any false alarm
-    double mean_input_rate_deg_h = 0.0;             ///< known input, of which the bias is free
+    std::vector<std::string> notes;      ///< what was assumed
+    double level = 0.0;                  ///< probability of any false alarm
+    double mean_input_rate_deg_h = 0.0;  ///< known input, of which the bias is free
     Residual residual;
 };
 
-/// Runs the loop on the record's turns, or on its samples where it has no turns. Throws InputError where the record does
-/// not suffice.
+/// Runs the loop on the record's turns, or on its samples where it has no turns. Throws InputError where the record
+/// does not suffice.
 Closure close_loop(const record::Record& record);
 
 /// The two of them.

@@ -70,7 +70,8 @@ std::optional<Candidate> sizes(const TurnFit& fit, const TurnModel::Prediction& 
     if (entries.empty()) return std::nullopt;
     for (const auto& column : columns) {
         // Nothing of it is left beside what the model has: this record cannot tell.
-        const double all = Eigen::Map<const Eigen::VectorXd>(column.data(), static_cast<Eigen::Index>(column.size())).norm();
+        const double all =
+            Eigen::Map<const Eigen::VectorXd>(column.data(), static_cast<Eigen::Index>(column.size())).norm();
         if (all == 0.0) return std::nullopt;
     }
     const TurnFit::Score score = fit.score(columns);

@@ -10,9 +10,9 @@ namespace ringlock::closure {
 struct Candidate {
     const effects::Effect* effect = nullptr;
     effects::Values values;
-    double chi2 = 0.0;     ///< twice the gain of the log-likelihood, noise as it is
-    double p_value = 1.0;  ///< of so much by chance, with the search over times and frequencies counted
-    double searched = 1.0; ///< independent places that the search went over
+    double chi2 = 0.0;      ///< twice the gain of the log-likelihood, noise as it is
+    double p_value = 1.0;   ///< of so much by chance, with the search over times and frequencies counted
+    double searched = 1.0;  ///< independent places that the search went over
 };
 
 /// The effects of the library that act on phases at the turns, can be told on this record and are not in the fit yet,

@@ -57,9 +57,10 @@ void test_phase(const TurnFit& fit, std::vector<ResidualTest>& tests) {
             least = p;
             at = k;
         }
-        tests.push_back({Where::phase,
-                         kicks ? "kicks at harmonics of the turn's phase" : "phase read at harmonics of the turn's phase",
-                         of_several(least, harmonics), fmt::format("harmonic {}", at)});
+        tests.push_back(
+            {Where::phase,
+             kicks ? "kicks at harmonics of the turn's phase" : "phase read at harmonics of the turn's phase",
+             of_several(least, harmonics), fmt::format("harmonic {}", at)});
     }
 }
 
@@ -129,16 +130,16 @@ void test_steps(const TurnFit& fit, std::vector<ResidualTest>& tests) {
         std::vector<double> ramp(time.size());
         for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - t);
         const auto score = fit.score({ramp});
-        const double root = score.rank > 0 && score.covariance(0, 0) > 0.0
-                                ? score.value(0) / std::sqrt(score.covariance(0, 0))
-                                : 0.0;
+        const double root =
+            score.rank > 0 && score.covariance(0, 0) > 0.0 ? score.value(0) / std::sqrt(score.covariance(0, 0)) : 0.0;
         roots.push_back(root);
         if (std::abs(root) > best) {
             best = std::abs(root);
             at = t;
         }
     }
-    tests.push_back({Where::time, "steps of the rate", davies_bound(best * best, roots), fmt::format("at {:.6g} s", at)});
+    tests.push_back(
+        {Where::time, "steps of the rate", davies_bound(best * best, roots), fmt::format("at {:.6g} s", at)});
 }
 
 void test_whiteness(const TurnFit& fit, std::vector<ResidualTest>& tests) {
@@ -165,9 +166,10 @@ void test_whiteness(const TurnFit& fit, std::vector<ResidualTest>& tests) {
         rising += root[k];
         alternating += k % 2 == 0 ? root[k] : -root[k];
     }
-    tests.push_back({std::abs(alternating) > std::abs(rising) ? Where::amplitude : Where::time,
-                     "correlation with the 24 turns before", chi2_tail(chi2, lags),
-                     fmt::format("first correlations {:.2f}, {:.2f}, {:.2f} standard errors", root[1], root[2], root[3])});
+    tests.push_back(
+        {std::abs(alternating) > std::abs(rising) ? Where::amplitude : Where::time,
+         "correlation with the 24 turns before", chi2_tail(chi2, lags),
+         fmt::format("first correlations {:.2f}, {:.2f}, {:.2f} standard errors", root[1], root[2], root[3])});
 
     std::size_t padded = 1;
     while (padded < 4 * n) padded *= 2;

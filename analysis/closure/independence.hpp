@@ -13,7 +13,7 @@ std::string_view name_of(Where where);
 /// One view of the residual and how probable it is by chance, its own searches counted.
 struct ResidualTest {
     Where where;
-    std::string view;   ///< what the residual was held against
+    std::string view;  ///< what the residual was held against
     double p_value = 1.0;
     std::string detail;  ///< the largest of what was seen
 

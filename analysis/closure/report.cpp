@@ -127,8 +127,9 @@ std::string to_text(const Closure& closure) {
         }
     }
     line("");
-    line(fmt::format("held-out one-step error: {:.6g} {} before, {:.6g} after; the fitted noise alone would leave {:.6g}",
-                     closure.heldout_before, closure.unit, closure.heldout_after, closure.noise_floor));
+    line(fmt::format(
+        "held-out one-step error: {:.6g} {} before, {:.6g} after; the fitted noise alone would leave {:.6g}",
+        closure.heldout_before, closure.unit, closure.heldout_after, closure.noise_floor));
     line("");
     line("residual held against:");
     for (const ResidualTest& test : closure.tests) {
@@ -194,9 +195,10 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
     std::error_code failed;
     std::filesystem::create_directories(folder, failed);
     if (failed || !std::filesystem::is_directory(folder)) {
-        throw InputError(fmt::format("{}: the folder for the closed loop's files cannot be made ({}); give another with "
-                                     "-o",
-                                     folder.string(), failed ? failed.message() : "a file of that name is there"));
+        throw InputError(
+            fmt::format("{}: the folder for the closed loop's files cannot be made ({}); give another with "
+                        "-o",
+                        folder.string(), failed ? failed.message() : "a file of that name is there"));
     }
     store::AtomicFile file(folder / "closure.h5");
     store::File& h5 = file.file();
@@ -240,8 +242,9 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
     scores.write("heldout_error", errors, {closure.unit, "rms one-step prediction error of the held-out part"});
     scores.write("heldout_log_score_gain", gains, {"1", "over the step before"});
     const scenario::Scenario closed = closed_scenario(record, closure);
-    std::string head = fmt::format("# What was found in {}: {}.\n# The device as fitted, with the effects that were added.\n",
-                                   source, name_of(closure.verdict));
+    std::string head =
+        fmt::format("# What was found in {}: {}.\n# The device as fitted, with the effects that were added.\n", source,
+                    name_of(closure.verdict));
     const std::string rendered = scenario::to_toml(closed);
     write_text(folder / "closure.json", to_json(closure).dump(2) + "\n");
     write_text(folder / "closed.toml", head + "\n" + rendered);

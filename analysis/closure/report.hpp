@@ -17,8 +17,8 @@ std::string to_text(const Closure& closure);
 /// The closed model as a scenario for `ringlock run`: the device as fitted, with the effects that were added.
 scenario::Scenario closed_scenario(const record::Record& record, const Closure& closure);
 
-/// Writes closure.json, closed.toml and closure.h5 into the folder, which is made where it is missing. Throws InputError
-/// where it cannot be.
+/// Writes closure.json, closed.toml and closure.h5 into the folder, which is made where it is missing. Throws
+/// InputError where it cannot be.
 void write_closure(const std::filesystem::path& folder, const std::string& source, const record::Record& record,
                    const Closure& closure);
 

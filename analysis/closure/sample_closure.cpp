@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <numbers>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/closure.hpp"
@@ -49,8 +50,9 @@ struct Candidate {
     double p_value = 1.0;
     double searched = 1.0;
     int parameters = 1;
-    std::vector<Estimate> told = {};               ///< parameters that are no columns and no knobs
-    std::vector<std::string> confounded = {};      ///< the same model by other names
+    bool wanders = false;                      ///< a line as a narrow resonance
+    std::vector<Estimate> told = {};           ///< parameters that are no columns and no knobs
+    std::vector<std::string> confounded = {};  ///< the same model by other names
 };
 
 struct Score {
@@ -126,24 +128,26 @@ class Loop {
     void screen_line(const SampleFit& now, std::vector<Candidate>& out) const;
     void screen_resampling(const SampleFit& now, std::vector<Candidate>& out) const;
     void screen_witnesses(const SampleFit& now, std::vector<Candidate>& out) const;
-    std::vector<Estimate> estimates_of(const std::string& effect, const SampleFit& fit, const Candidate& candidate) const;
+    std::vector<Estimate> estimates_of(const std::string& effect, const SampleFit& fit,
+                                       const Candidate& candidate) const;
     void take_lattice(Closure& closure, const SampleFit& now);
 
     const record::Record& record_;
     SampleSeries series_;
-    Rows chosen_;    ///< by blocks: 1 fitted, 2 decides, 0 reported
-    Rows rows_;      ///< fitted and not disturbed
-    Rows decide_;    ///< decides and is not disturbed
+    Rows chosen_;  ///< by blocks: 1 fitted, 2 decides, 0 reported
+    Rows rows_;    ///< fitted and not disturbed
+    Rows decide_;  ///< decides and is not disturbed
     Rows reported_;
     Lattice lattice_;
     std::vector<double> lines_hz_;  ///< in the model
-    double used_step_ = 0.0;  ///< of the lattice in the model
+    double used_step_ = 0.0;        ///< of the lattice in the model
 };
 
 void Loop::screen_rates(const SampleFit& now, std::vector<Candidate>& out) const {
     const std::size_t n = series_.size();
     const SampleModel& model = now.model();
-    const auto one = [&](const std::string& effect, const std::string& parameter, const std::function<double(std::size_t)>& rate) {
+    const auto one = [&](const std::string& effect, const std::string& parameter,
+                         const std::function<double(std::size_t)>& rate) {
         if (has(model, effect)) return;
         SampleColumn column = rate_column(series_, effect, parameter, rate);
         const auto score = now.score({*column.series});
@@ -152,13 +156,15 @@ void Loop::screen_rates(const SampleFit& now, std::vector<Candidate>& out) const
         c.model.columns.push_back(std::move(column));
         out.push_back(std::move(c));
     };
-    one("bias_ramp", "deg_h_per_h", [&](std::size_t i) { return (static_cast<double>(i) + 0.5) * series_.interval_s / 3600.0; });
+    one("bias_ramp", "deg_h_per_h",
+        [&](std::size_t i) { return (static_cast<double>(i) + 0.5) * series_.interval_s / 3600.0; });
     if (!series_.temperature_change_k.empty()) {
         one("bias_temperature", "deg_h_per_k", [&](std::size_t i) { return series_.temperature_change_k[i]; });
     }
     if (!series_.input_rate_deg_h.empty()) {
         const auto [low, high] = std::minmax_element(series_.input_rate_deg_h.begin(), series_.input_rate_deg_h.end());
-        if (*high > *low) one("scale_factor_error", "relative", [&](std::size_t i) { return series_.input_rate_deg_h[i]; });
+        if (*high > *low)
+            one("scale_factor_error", "relative", [&](std::size_t i) { return series_.input_rate_deg_h[i]; });
     }
     if (has(model, "bias_step")) return;
     // Steps: everywhere, coarsely, then about the best.
@@ -191,11 +197,14 @@ void Loop::screen_rates(const SampleFit& now, std::vector<Candidate>& out) const
             }
         }
     }
-    Candidate c{.effect = "bias_step", .model = model, .p_value = p, .searched = static_cast<double>(places), .parameters = 2};
+    Candidate c{
+        .effect = "bias_step", .model = model, .p_value = p, .searched = static_cast<double>(places), .parameters = 2};
     const double when = series_.time_s[at] - series_.interval_s;
-    c.model.columns.push_back(rate_column(series_, "bias_step", "step_deg_h", [&](std::size_t i) { return i >= at ? 1.0 : 0.0; }));
+    c.model.columns.push_back(
+        rate_column(series_, "bias_step", "step_deg_h", [&](std::size_t i) { return i >= at ? 1.0 : 0.0; }));
     // As well as the step's own size is known: its chi-squared falls by one.
-    c.told.push_back({"bias_step", "time_s", when, static_cast<double>(n) * series_.interval_s / std::max(4.0, best * best)});
+    c.told.push_back(
+        {"bias_step", "time_s", when, static_cast<double>(n) * series_.interval_s / std::max(4.0, best * best)});
     out.push_back(std::move(c));
 }
 
@@ -207,7 +216,8 @@ void Loop::screen_noises(const SampleFit& now, std::vector<Candidate>& out) cons
         out.push_back({.effect = effect, .model = fit.model(), .p_value = 0.5 * chi2_tail(chi2, 1)});
     };
     const double duration_s = static_cast<double>(series_.size()) * series_.interval_s;
-    const double known = now.model().noise.rate_arcsec_rt_s / std::sqrt(duration_s) + now.model().noise.angle_arcsec / duration_s;
+    const double known =
+        now.model().noise.rate_arcsec_rt_s / std::sqrt(duration_s) + now.model().noise.angle_arcsec / duration_s;
     // Only where sums over long stretches move more than the white noises let them.
     {
         std::vector<std::vector<double>> slow;
@@ -246,7 +256,8 @@ void Loop::screen_line(const SampleFit& now, std::vector<Candidate>& out) const 
     const FoundLine line = find_line(e, series_.rate_hz, true, lines_hz_, 64.0 / duration_s);
     if (!(line.p_value < 0.01)) return;
     Candidate c{.model = now.model(), .p_value = line.p_value, .searched = line.searched, .parameters = 3};
-    const bool drifts = line.chi2 - line.chi2_still > 25.0 && std::abs(line.drift_hz_per_s) * duration_s * duration_s > 1.0;
+    const bool drifts =
+        line.chi2 - line.chi2_still > 25.0 && std::abs(line.drift_hz_per_s) * duration_s * duration_s > 1.0;
     bool dither = drifts;
     bool declared = false;
     if (record_.declared.dither_frequency_hz) {
@@ -259,7 +270,30 @@ void Loop::screen_line(const SampleFit& now, std::vector<Candidate>& out) const 
     const bool fast = line.frequency_hz > 30.0;
     c.effect = dither || fast ? "dither_residue" : "base_vibration";
     if (!dither) c.confounded.emplace_back(fast ? "base_vibration" : "dither_residue");
-    const auto phase = line_phase(series_.size(), series_.rate_hz, line.frequency_hz, drifts ? line.drift_hz_per_s : 0.0);
+    if (line.scattered > 3.0 * line.chi2 + 100.0) {
+        // Its phase does not keep over the record: a narrow resonance. Slow ones are what a base does as well.
+        if (!fast && !declared) return;
+        c.effect = "dither_residue";
+        if (!declared) c.confounded = {"base_vibration"};
+        c.wanders = true;
+        double squares = 0.0;
+        double rows = 0.0;
+        for (std::size_t i = 0; i < e.size(); ++i) {
+            squares += e[i] * e[i];
+            rows += rows_[i];
+        }
+        // Power over the level is chi-squared of two a piece; the angle's increments have 2 sin of it.
+        const double sd = now.sd(0) * std::sqrt(squares / rows);
+        const double gain = 2.0 * std::sin(units::pi * line.scattered_hz / series_.rate_hz);
+        const double rms = sd * std::sqrt(line.scattered / rows) / std::max(gain, 1e-6);
+        c.told.push_back({c.effect, "frequency_hz", line.scattered_hz, 0.0});
+        c.model.noise.resonances.push_back({rms, line.scattered_hz, 64.0 / duration_s});
+        c.model.resonances.push_back(c.effect);
+        out.push_back(std::move(c));
+        return;
+    }
+    const auto phase =
+        line_phase(series_.size(), series_.rate_hz, line.frequency_hz, drifts ? line.drift_hz_per_s : 0.0);
     std::vector<double> cosine(phase.size());
     std::vector<double> sine(phase.size());
     for (std::size_t i = 0; i < phase.size(); ++i) {
@@ -270,7 +304,9 @@ void Loop::screen_line(const SampleFit& now, std::vector<Candidate>& out) const 
     c.told.push_back({c.effect, "frequency_hz", line.frequency_hz, sd_hz});
     if (c.effect == "dither_residue") {
         c.told.push_back({c.effect, "drift_hz_per_s", drifts ? line.drift_hz_per_s : 0.0,
-                          drifts ? std::sqrt(45.0 * 16.0) / (units::pi * duration_s * duration_s * std::sqrt(std::max(line.chi2, 1.0))) : 0.0});
+                          drifts ? std::sqrt(45.0 * 16.0) /
+                                       (units::pi * duration_s * duration_s * std::sqrt(std::max(line.chi2, 1.0)))
+                                 : 0.0});
     }
     c.model.columns.push_back({c.effect, "cosine", shared(std::move(cosine))});
     c.model.columns.push_back({c.effect, "sine", shared(std::move(sine))});
@@ -318,7 +354,11 @@ void Loop::screen_resampling(const SampleFit& now, std::vector<Candidate>& out) 
         }
     }
     if (tried == 0) return;
-    out.push_back({.effect = "resampling", .model = found, .p_value = cycle.p_value, .searched = cycle.searched, .parameters = 2});
+    out.push_back({.effect = "resampling",
+                   .model = found,
+                   .p_value = cycle.p_value,
+                   .searched = cycle.searched,
+                   .parameters = 2});
 }
 
 void Loop::screen_witnesses(const SampleFit& now, std::vector<Candidate>& out) const {
@@ -326,15 +366,18 @@ void Loop::screen_witnesses(const SampleFit& now, std::vector<Candidate>& out) c
     const FoundWitness witness = find_witness(now.innovations(), rows_, series_);
     if (!(witness.p_value < level_of_effects)) return;
     const WitnessMotion motion = fit_witness(now, series_.witnesses[witness.index].second);
-    Candidate c{.effect = "case_motion", .model = now.model(), .p_value = witness.p_value,
-                .searched = static_cast<double>(series_.witnesses.size()), .parameters = 2 * witness.lags + 1};
+    Candidate c{.effect = "case_motion",
+                .model = now.model(),
+                .p_value = witness.p_value,
+                .searched = static_cast<double>(series_.witnesses.size()),
+                .parameters = 2 * witness.lags + 1};
     c.model.motion = motion.increments;
-    c.model.resonance = motion.coherence < 0.999;
-    if (c.model.resonance) {
-        c.model.noise.resonance_arcsec = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
-        c.model.noise.resonance_hz = std::max(motion.centre_hz, 0.01);
-        c.model.noise.resonance_width_hz = std::max(0.5 * motion.centre_hz, 0.01);
-    }
+    // What the witness does not tell moves like what it tells; its own noise hides the edges of that.
+    const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
+    c.model.noise.resonances.push_back(
+        {untold, std::max(motion.centre_hz, 0.01), std::max(0.5 * motion.centre_hz, 0.01)});
+    c.model.noise.resonances.push_back({0.3 * untold, 1.0, 1.0});
+    c.model.resonances.insert(c.model.resonances.end(), 2, "case_motion");
     // Once more with what is left as the noise.
     const SampleFit first(series_, c.model, rows_);
     const auto& watched = series_.witnesses[witness.index].second;
@@ -350,7 +393,8 @@ void Loop::screen_witnesses(const SampleFit& now, std::vector<Candidate>& out) c
     out.push_back(std::move(c));
 }
 
-std::vector<Estimate> Loop::estimates_of(const std::string& effect, const SampleFit& fit, const Candidate& candidate) const {
+std::vector<Estimate> Loop::estimates_of(const std::string& effect, const SampleFit& fit,
+                                         const Candidate& candidate) const {
     std::vector<Estimate> all = candidate.told;
     const SampleModel& model = fit.model();
     const auto& columns = model.columns;
@@ -366,11 +410,14 @@ std::vector<Estimate> Loop::estimates_of(const std::string& effect, const Sample
                 // Increments are those of a rate integrated over each interval.
                 const double gain = std::abs(std::sin(units::pi * hz * series_.interval_s)) / (units::pi * hz);
                 all.push_back({effect, "rate_deg_h", amplitude / gain, columns[k].sd / gain});
-                const double middle_s = series_.time_s[0] - 0.5 * series_.interval_s + 0.5 * static_cast<double>(series_.size() - 1) * series_.interval_s;
+                const double middle_s = series_.time_s[0] - 0.5 * series_.interval_s +
+                                        0.5 * static_cast<double>(series_.size() - 1) * series_.interval_s;
                 // a cos + b sin = A sin(phase' + 2 pi f (t - middle))
                 const double turns = hz * middle_s;
-                const double start = std::atan2(columns[k - 1].value, columns[k].value) - units::two_pi * (turns - std::floor(turns));
-                all.push_back({effect, "phase_rad", std::remainder(start, units::two_pi), columns[k].sd / std::max(amplitude, 1e-300)});
+                const double start =
+                    std::atan2(columns[k - 1].value, columns[k].value) - units::two_pi * (turns - std::floor(turns));
+                all.push_back({effect, "phase_rad", std::remainder(start, units::two_pi),
+                               columns[k].sd / std::max(amplitude, 1e-300)});
             }
             break;
         }
@@ -380,15 +427,24 @@ std::vector<Estimate> Loop::estimates_of(const std::string& effect, const Sample
         }
     }
     const double count = static_cast<double>(series_.size());
-    if (effect == "rate_random_walk") all.push_back({effect, "deg_h_rt_h", 60.0 * std::sqrt(model.noise.walk_arcsec2_s3), 0.0});
+    if (effect == "rate_random_walk")
+        all.push_back({effect, "deg_h_rt_h", 60.0 * std::sqrt(model.noise.walk_arcsec2_s3), 0.0});
     if (effect == "bias_instability") all.push_back({effect, "deg_h", model.flicker_deg_h, 0.0});
     if (effect == "resampling") {
         const double seconds = count * series_.interval_s;
         all.push_back({effect, "from_hz", model.noise.from_hz, 1.0 / seconds});
     }
-    if (effect == "case_motion" && model.resonance) {
-        all.push_back({effect, "centre_hz", model.noise.resonance_hz, 0.0});
-        all.push_back({effect, "width_hz", model.noise.resonance_width_hz, 0.0});
+    for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+        if (model.resonances[k] != effect) continue;
+        const auto& resonance = model.noise.resonances[k];
+        if (effect == "case_motion") {
+            all.push_back({effect, "centre_hz", resonance.hz, 0.0});
+            all.push_back({effect, "width_hz", resonance.width_hz, 0.0});
+        } else {
+            all.push_back({effect, "amplitude_arcsec", std::numbers::sqrt2 * resonance.arcsec, 0.0});
+            all.push_back({effect, "wander_hz", resonance.width_hz, 0.0});
+        }
+        break;
     }
     return all;
 }
@@ -398,16 +454,19 @@ std::string experiment_for(const std::string& effect, const std::vector<std::str
     const auto named = [&](std::string_view name) {
         return effect == name || std::find(others.begin(), others.end(), name) != others.end();
     };
-    if (named("dither_residue")) return "declare the dither's frequency, or record with another dither frequency or sampling rate";
-    if (named("bias_temperature")) return "record with the temperature changed against time: held, then stepped up and down";
+    if (named("dither_residue"))
+        return "declare the dither's frequency, or record with another dither frequency or sampling rate";
+    if (named("bias_temperature"))
+        return "record with the temperature changed against time: held, then stepped up and down";
     if (named("scale_factor_error")) return "record at three input rates or more, of both signs";
     return "record for longer: their Allan deviations and their courses in time part with the averaging time";
 }
 
 void Loop::take_lattice(Closure& closure, const SampleFit& now) {
     if (series_.counted) {
-        closure.notes.push_back(fmt::format("counts are whole by their kind: steps of {:.6g} arcsec are no missing effect",
-                                            0.25 * series_.scale_factor_arcsec));
+        closure.notes.push_back(
+            fmt::format("counts are whole by their kind: steps of {:.6g} arcsec are no missing effect",
+                        0.25 * series_.scale_factor_arcsec));
         return;
     }
     lattice_ = find_lattice(series_.increment);
@@ -416,14 +475,16 @@ void Loop::take_lattice(Closure& closure, const SampleFit& now) {
     const double sd = now.sd(series_.size() / 2);
     // Steps add step^2/12 to the variance: less than a thousandth of it changes nothing that is told here.
     if (step * step / 12.0 < 1e-3 * sd * sd) {
-        closure.notes.push_back(fmt::format("values come in steps of {:.6g} arcsec, too fine to matter beside {:.3g} arcsec of noise", step, sd));
+        closure.notes.push_back(fmt::format(
+            "values come in steps of {:.6g} arcsec, too fine to matter beside {:.3g} arcsec of noise", step, sd));
         return;
     }
     const bool blurred = lattice_.step_arcsec > 1.5 * lattice_.printed_arcsec;
     if (blurred) {
-        closure.notes.push_back(fmt::format("values are written in steps of {:.6g} arcsec; beneath them is a coarser one, of which {:.0f} % "
-                                            "of the characteristic function is left",
-                                            lattice_.printed_arcsec, 100.0 * lattice_.strength));
+        closure.notes.push_back(fmt::format(
+            "values are written in steps of {:.6g} arcsec; beneath them is a coarser one, of which {:.0f} % "
+            "of the characteristic function is left",
+            lattice_.printed_arcsec, 100.0 * lattice_.strength));
     }
     Step taken;
     taken.effect = "count_quantization";
@@ -446,8 +507,9 @@ Closure Loop::run() {
     reported_.resize(chosen_.size());
     for (std::size_t i = 0; i < chosen_.size(); ++i) reported_[i] = chosen_[i] ? 0 : 1;
     if (series_.scale_factor_assumed) {
-        closure.notes.push_back(fmt::format("the record declares no scale factor; {:g} arcsec per fringe assumed, with which all rates scale",
-                                            series_.scale_factor_arcsec));
+        closure.notes.push_back(fmt::format(
+            "the record declares no scale factor; {:g} arcsec per fringe assumed, with which all rates scale",
+            series_.scale_factor_arcsec));
     }
     const auto set_rows = [&](const Rows& without) {
         rows_.assign(chosen_.size(), 0);
@@ -464,10 +526,14 @@ Closure Loop::run() {
     const Disturbed disturbed = find_disturbed(*now);
     if (disturbed.share > 0.0 && disturbed.share < 0.6) {
         set_rows(disturbed.rows);
+        const double with = closure.heldout_before;
+        for (std::size_t i = 0; i < reported_.size(); ++i) reported_[i] = reported_[i] && !disturbed.rows[i] ? 1 : 0;
         now = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
-        closure.notes.push_back(fmt::format("{:.1f} % of the record is disturbed, up to {:.3g} times the usual variance, most at {:.6g} s; nothing is "
-                                            "fitted to it, held-out errors have it",
-                                            100.0 * disturbed.share, disturbed.worst, disturbed.at_s));
+        closure.notes.push_back(fmt::format(
+            "{:.1f} % of the record is disturbed, up to {:.3g} times the usual variance, most at {:.6g} s; nothing is "
+            "fitted to it, held-out errors leave it out ({:.6g} arcsec before with it)",
+            100.0 * disturbed.share, disturbed.worst, disturbed.at_s, with));
+        closure.heldout_before = heldout(*now, reported_, 0.0).error;
     }
     take_lattice(closure, *now);
 
@@ -485,14 +551,16 @@ Closure Loop::run() {
             double merit;
         };
         std::vector<Contender> contenders;
-        std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
+        std::sort(candidates.begin(), candidates.end(),
+                  [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
         for (Candidate& candidate : candidates) {
             if (!(candidate.p_value * effects_on_samples < level_of_effects)) continue;
             if (contenders.size() >= most_contenders + 2) break;
             auto fit = std::make_shared<SampleFit>(series_, candidate.model, rows_);
-            const double merit = fit->log_likelihood() - now->log_likelihood() - std::log(candidate.searched) - candidate.parameters;
-            // Whatever stands out: where the likelihood is not better, or the blocks that decide are foretold worse, it is
-            // not this effect.
+            const double merit =
+                fit->log_likelihood() - now->log_likelihood() - std::log(candidate.searched) - candidate.parameters;
+            // Whatever stands out: where the likelihood is not better, or the blocks that decide are foretold worse, it
+            // is not this effect.
             if (merit < 0.0 || heldout(*fit, decide_, 0.0).log_score <= heldout(*now, decide_, 0.0).log_score) continue;
             contenders.push_back({std::move(candidate), std::move(fit), merit});
         }
@@ -515,6 +583,12 @@ Closure Loop::run() {
         step.heldout_log_score_gain = after.log_score - before.log_score;
         if (step.effect == "dither_residue" || step.effect == "base_vibration") {
             lines_hz_.push_back(best.candidate.told.front().value);
+            if (best.candidate.wanders) {
+                closure.notes.push_back(fmt::format(
+                    "the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "
+                    "samples before as a narrow resonance",
+                    lines_hz_.back()));
+            }
         }
         closure.steps.push_back(std::move(step));
         taken.push_back(std::move(best.candidate));
@@ -525,14 +599,16 @@ Closure Loop::run() {
     closure.noise_floor = last.floor;
     closure.tests = test_samples(*now, series_.counted ? 0.25 * series_.scale_factor_arcsec : lattice_.step_arcsec);
     const Disturbed still = find_disturbed(*now);
-    closure.tests.push_back({Where::time, fmt::format("stretches of {:.3g} s far larger than the others", still.length_s),
-                             still.share > 0.0 ? still.p_value : 1.0,
-                             still.share > 0.0 ? fmt::format("{:.1f} % of the record, most at {:.6g} s, {:.3g} times the usual variance",
-                                                             100.0 * still.share, still.at_s, still.worst)
-                                               : ""});
+    closure.tests.push_back(
+        {Where::time, fmt::format("stretches of {:.3g} s far larger than the others", still.length_s),
+         still.share > 0.0 ? still.p_value : 1.0,
+         still.share > 0.0 ? fmt::format("{:.1f} % of the record, most at {:.6g} s, {:.3g} times the usual variance",
+                                         100.0 * still.share, still.at_s, still.worst)
+                           : ""});
     const auto worst = std::min_element(closure.tests.begin(), closure.tests.end(),
                                         [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
-    if (of_several(worst->p_value, static_cast<double>(closure.tests.size())) < level_of_residual) closure.unexplained = *worst;
+    if (of_several(worst->p_value, static_cast<double>(closure.tests.size())) < level_of_residual)
+        closure.unexplained = *worst;
     closure.residual.time_s = series_.time_s;
     for (std::size_t i = 0; i < series_.size(); ++i) {
         closure.residual.innovation.push_back(now->innovations()[i] * now->sd(i));
@@ -557,7 +633,8 @@ Closure Loop::run() {
     closure.base.push_back({"", "white_rate_deg_rt_h", model.noise.rate_arcsec_rt_s * units::deg_rt_h_per_arcsec_rt_s,
                             final.rate_sd() * units::deg_rt_h_per_arcsec_rt_s});
     for (std::size_t k = 0; k < closure.steps.size(); ++k) {
-        if (closure.steps[k].parameters.empty()) closure.steps[k].parameters = estimates_of(closure.steps[k].effect, final, taken[k]);
+        if (closure.steps[k].parameters.empty())
+            closure.steps[k].parameters = estimates_of(closure.steps[k].effect, final, taken[k]);
     }
     closure.verdict = closure.unexplained     ? Verdict::unexplained
                       : closure.steps.empty() ? Verdict::nothing_missing

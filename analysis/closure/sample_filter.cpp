@@ -9,7 +9,7 @@ namespace ringlock::closure {
 SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double interval_s) {
     resampled_ = noise.from_hz > 0.0;
     const double dt = resampled_ ? 1.0 / noise.from_hz : interval_s;
-    // States: angle, rates, resonance (two), readings (two)
+    // States: angle, rates, resonances (two each), readings (two)
     n_ = 1;
     f_[0][0] = 1.0;
     q_[0][0] = noise.rate_arcsec_rt_s * noise.rate_arcsec_rt_s * dt;
@@ -30,16 +30,18 @@ SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double in
         p[n_][n_] = term.variance_arcsec2_s2;
         ++n_;
     }
-    int resonance = -1;
-    if (noise.resonance_arcsec > 0.0) {
-        resonance = n_;
-        const double r = std::exp(-units::pi * noise.resonance_width_hz * dt);
-        const double a = 2.0 * r * std::cos(units::two_pi * noise.resonance_hz * dt);
+    std::vector<int> resonances;
+    for (const auto& resonance : noise.resonances) {
+        if (!(resonance.arcsec > 0.0) || n_ + 4 > most) continue;
+        resonances.push_back(n_);
+        const double r = std::exp(-units::pi * resonance.width_hz * dt);
+        const double a = 2.0 * r * std::cos(units::two_pi * resonance.hz * dt);
         const double b = r * r;
-        const double v = noise.resonance_arcsec * noise.resonance_arcsec;
+        const double v = resonance.arcsec * resonance.arcsec;
         f_[n_][n_] = a;
         f_[n_][n_ + 1] = -b;
         f_[n_ + 1][n_] = 1.0;
+        // Variance over that of what drives it (Box and Jenkins, "Time Series Analysis", 1976, section 3.2.4)
         q_[n_][n_] = v * (1.0 - b) * ((1.0 + b) * (1.0 + b) - a * a) / (1.0 + b);
         p[n_][n_] = p[n_ + 1][n_ + 1] = v;
         p[n_][n_ + 1] = p[n_ + 1][n_] = v * a / (1.0 + b);
@@ -54,16 +56,24 @@ SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double in
         const int r1 = n_ + 1;
         f_[r0][r1] = 1.0;
         // r1 of the new tick = angle and resonance there + error; the noise of both is in q.
-        for (int j = 0; j < n_; ++j) f_[r1][j] = f_[0][j] + (resonance >= 0 ? f_[resonance][j] : 0.0);
-        for (int j = 0; j < n_; ++j) q_[r1][j] = q_[j][r1] = q_[0][j] + (resonance >= 0 ? q_[resonance][j] : 0.0);
-        q_[r1][r1] = q_[0][0] + (resonance >= 0 ? q_[resonance][resonance] : 0.0) + readout;
+        f_[r1] = f_[0];
+        for (int j = 0; j < n_; ++j) q_[r1][j] = q_[0][j];
+        for (const int resonance : resonances) {
+            for (int j = 0; j < n_; ++j) {
+                f_[r1][j] += f_[resonance][j];
+                q_[r1][j] += q_[resonance][j];
+            }
+        }
+        q_[r1][r1] = q_[0][0] + readout;
+        for (const int resonance : resonances) q_[r1][r1] += q_[resonance][resonance];
+        for (int j = 0; j < n_; ++j) q_[j][r1] = q_[r1][j];
         n_ += 2;
         p[r0][r0] = p[r1][r1] = p[0][0] + q_[r1][r1];
         // Interpolated readings have no error of their own; digits have.
         floor = noise.blur_arcsec * noise.blur_arcsec + 1e-8 * (readout + q_[0][0]);
     } else {
         h_[0] = 1.0;
-        if (resonance >= 0) h_[resonance] = 1.0;
+        for (const int resonance : resonances) h_[resonance] = 1.0;
     }
     for (int i = 0; i < n_; ++i) {
         for (int j = 0; j < n_; ++j) {

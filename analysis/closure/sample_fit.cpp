@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 
+#include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -57,23 +58,28 @@ std::vector<double> smallest(const std::function<double(const std::vector<double
             }
         }
     }
-    return std::min_element(corners.begin(), corners.end(), [](const auto& a, const auto& b) { return a.first < b.first; })
+    return std::min_element(corners.begin(), corners.end(),
+                            [](const auto& a, const auto& b) { return a.first < b.first; })
         ->second;
 }
 
 struct Free {
     double* value;
     bool logarithmic;
+    double scale = 1.0;  ///< of its steps
 };
 
 std::vector<Free> knobs(SampleModel& model) {
     std::vector<Free> all{{&model.noise.angle_arcsec, true}, {&model.noise.rate_arcsec_rt_s, true}};
     if (model.walk) all.push_back({&model.noise.walk_arcsec2_s3, true});
     if (model.flicker) all.push_back({&model.flicker_deg_h, true});
-    if (model.resonance) {
-        all.push_back({&model.noise.resonance_arcsec, true});
-        all.push_back({&model.noise.resonance_hz, true});
-        all.push_back({&model.noise.resonance_width_hz, true});
+    for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+        auto& resonance = model.noise.resonances[k];
+        all.push_back({&resonance.arcsec, true});
+        if (k > 0 && model.resonances[k] == model.resonances[k - 1]) continue;
+        // A wandering line is narrow: its frequency is known to its width.
+        all.push_back({&resonance.hz, true, std::min(1.0, resonance.width_hz / resonance.hz)});
+        all.push_back({&resonance.width_hz, true});
     }
     if (model.noise.from_hz > 0.0) {
         all.push_back({&model.noise.from_phase, false});
@@ -138,6 +144,7 @@ void SampleFit::take_off() {
 }
 
 double SampleFit::evaluate(const SampleModel& model, std::span<const double> rest) const {
+    check_interrupt();
     const SampleFilter filter(model.noise, rest.size(), series_->interval_s);
     const auto e = filter.apply(rest);
     double value = 0.0;
@@ -149,7 +156,8 @@ double SampleFit::evaluate(const SampleModel& model, std::span<const double> res
 
 void SampleFit::fit_noise() {
     const double duration_s = series_->interval_s * static_cast<double>(series_->size());
-    const double scale = std::hypot(model_.noise.angle_arcsec, model_.noise.rate_arcsec_rt_s * std::sqrt(series_->interval_s));
+    const double scale =
+        std::hypot(model_.noise.angle_arcsec, model_.noise.rate_arcsec_rt_s * std::sqrt(series_->interval_s));
     // What stands at zero begins small, so that it can grow.
     if (model_.noise.angle_arcsec < 1e-4 * scale) model_.noise.angle_arcsec = 1e-2 * scale;
     if (model_.noise.rate_arcsec_rt_s * std::sqrt(series_->interval_s) < 1e-4 * scale) {
@@ -158,9 +166,16 @@ void SampleFit::fit_noise() {
     const auto trial = [&](const std::vector<double>& x) {
         SampleModel model = model_;
         auto free = knobs(model);
-        for (std::size_t i = 0; i < free.size(); ++i) *free[i].value = free[i].logarithmic ? std::exp(x[i]) : x[i];
-        if (model.noise.resonance_hz > 0.5 * series_->rate_hz || model.noise.resonance_width_hz > series_->rate_hz) {
-            model.noise.resonance_arcsec = 0.0;
+        for (std::size_t i = 0; i < free.size(); ++i)
+            *free[i].value = free[i].logarithmic ? std::exp(x[i] * free[i].scale) : x[i];
+        for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+            auto& resonance = model.noise.resonances[k];
+            if (k > 0 && model.resonances[k] == model.resonances[k - 1]) {
+                resonance.hz = model.noise.resonances[k - 1].hz;
+                resonance.width_hz = 3.0 * model.noise.resonances[k - 1].width_hz;
+            }
+            if (resonance.hz > 0.5 * series_->rate_hz || resonance.width_hz > 3.0 * series_->rate_hz)
+                resonance.arcsec = 0.0;
         }
         if (model.noise.from_hz > 0.0) {
             // About the middle of the record, so that rate and place are told apart.
@@ -176,7 +191,8 @@ void SampleFit::fit_noise() {
         return model;
     };
     std::vector<double> start;
-    for (const Free& knob : knobs(model_)) start.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) : *knob.value);
+    for (const Free& knob : knobs(model_))
+        start.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
     // A long record's noise is found on a part, then on all of it.
     const auto on = [&](std::size_t n) {
         return [&, n](const std::vector<double>& x) {
@@ -186,13 +202,28 @@ void SampleFit::fit_noise() {
     const std::size_t n = rest_.size();
     const int evaluations = 30 * static_cast<int>(start.size());
     const bool resampled = model_.noise.from_hz > 0.0;
-    const std::size_t part = resampled ? std::min<std::size_t>(n, 15000) : std::max<std::size_t>(30000, n / 8);
-    if (n > 2 * part && !model_.walk && !model_.flicker) {
-        start = smallest(on(part), start, 0.3, evaluations);
-        start = smallest(on(n), start, 0.05, 12 * static_cast<int>(start.size()));
+    // What is dear is fitted to a part: a filter of n states takes n^3 operations a row while it settles, and where
+    // rows lie between the source's it never does.
+    const bool narrow = !model_.resonances.empty();
+    const std::size_t part = std::min<std::size_t>(n, resampled ? (narrow ? 6000 : 15000)
+                                                      : narrow  ? 20000
+                                                                : std::max<std::size_t>(30000, n / 8));
+    const bool dear = resampled || narrow;
+    // From where it stopped, until that gains nothing: the simplex may have fallen flat.
+    const auto again = [&](const std::function<double(const std::vector<double>&)>& f, double size, int times) {
+        double value = f(start);
+        for (int i = 0; i < times; ++i) {
+            start = smallest(f, start, size, evaluations);
+            const double now = f(start);
+            if (value - now < 0.5) break;
+            value = now;
+        }
+    };
+    if (n > part && (dear || (n > 2 * part && !model_.walk && !model_.flicker))) {
+        again(on(part), 0.3, dear ? 3 : 5);
+        if (!dear) again(on(n), 0.05, 1);
     } else {
-        start = smallest(on(n), start, 0.3, evaluations);
-        start = smallest(on(n), start, 0.1, evaluations / 2);
+        again(on(n), 0.3, 4);
     }
     model_ = trial(start);
     filter_ = std::make_shared<SampleFilter>(model_.noise, n, series_->interval_s);
@@ -223,7 +254,8 @@ void SampleFit::fit_columns() {
     Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt();
     const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * normal * scale.cwiseInverse().asDiagonal();
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(scaled);
-    const Eigen::VectorXd correction = scale.cwiseInverse().asDiagonal() * solver.solve(scale.cwiseInverse().asDiagonal() * right);
+    const Eigen::VectorXd correction =
+        scale.cwiseInverse().asDiagonal() * solver.solve(scale.cwiseInverse().asDiagonal() * right);
     const Eigen::MatrixXd covariance = solver.pseudoInverse();
     for (Eigen::Index a = 0; a < m; ++a) {
         auto& column = model_.columns[static_cast<std::size_t>(a)];

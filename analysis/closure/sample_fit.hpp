@@ -20,11 +20,13 @@ struct SampleColumn {
 /// What a model of the samples consists of.
 struct SampleModel {
     SampleNoise noise;
-    double flicker_deg_h = 0.0;            ///< B of the bias instability; makes the noise's terms
-    std::vector<SampleColumn> columns;     ///< the mean rate first
-    std::vector<double> motion;            ///< of the case, by its witness: taken off the increments; empty: none
-    double from_shift = 0.0;               ///< of from_hz, in tenths of a cycle over the record, while it is fitted
-    bool resonance = false;
+    double flicker_deg_h = 0.0;         ///< B of the bias instability; makes the noise's terms
+    std::vector<SampleColumn> columns;  ///< the mean rate first
+    std::vector<double> motion;         ///< of the case, by its witness: taken off the increments; empty: none
+    double from_shift = 0.0;            ///< of from_hz, in tenths of a cycle over the record, while it is fitted
+    /// Whose resonances the noise has, in their order. The second of one effect has the first's frequency and three
+    /// times its width.
+    std::vector<std::string> resonances;
     bool walk = false;
     bool flicker = false;
 };

@@ -41,7 +41,8 @@ std::vector<double> level_about(const std::vector<double>& power, std::size_t st
     std::vector<double> levels;
     for (std::size_t a = 0; a < n; a += stretch) {
         const std::size_t b = n - a < 2 * stretch ? n : a + stretch;
-        std::vector<double> part(power.begin() + static_cast<std::ptrdiff_t>(a), power.begin() + static_cast<std::ptrdiff_t>(b));
+        std::vector<double> part(power.begin() + static_cast<std::ptrdiff_t>(a),
+                                 power.begin() + static_cast<std::ptrdiff_t>(b));
         const auto middle = part.begin() + static_cast<std::ptrdiff_t>(part.size() / 2);
         std::nth_element(part.begin(), middle, part.end());
         centres.push_back(0.5 * static_cast<double>(a + b));
@@ -89,8 +90,8 @@ std::vector<double> line_phase(std::size_t size, double rate_hz, double frequenc
     return phase;
 }
 
-FoundLine find_line(const std::vector<double>& values, double rate_hz, bool drifting, const std::vector<double>& known_hz,
-                    double width_hz) {
+FoundLine find_line(const std::vector<double>& values, double rate_hz, bool drifting,
+                    const std::vector<double>& known_hz, double width_hz) {
     const std::size_t n = values.size();
     const auto rows = static_cast<double>(n);
     const double duration_s = rows / rate_hz;
@@ -103,7 +104,8 @@ FoundLine find_line(const std::vector<double>& values, double rate_hz, bool drif
     const std::size_t padded = power_of_two(2 * n);
     const auto power = periodogram(values, padded);
     const double per_bin = rows / static_cast<double>(padded);  // Fourier frequencies a bin
-    const auto level = level_about(power, static_cast<std::size_t>(std::min(300.0, std::max(40.0, rows / 100.0)) / per_bin));
+    const auto level =
+        level_about(power, static_cast<std::size_t>(std::min(300.0, std::max(40.0, rows / 100.0)) / per_bin));
     const double bin_hz = rate_hz / static_cast<double>(padded);
     // Below eight cycles a record a line is a drift.
     for (auto k = static_cast<std::size_t>(8.0 / per_bin); k + 4 < power.size(); ++k) {
@@ -118,6 +120,8 @@ FoundLine find_line(const std::vector<double>& values, double rate_hz, bool drif
     if (!drifting) return found;
     // Lines that drift: sums of power along straight tracks over pieces, each so short that the line stays in its bin.
     double coarse_p = 1.0;
+    double scattered = 0.0;
+    double scattered_hz = 0.0;
     double coarse_hz = 0.0;
     double coarse_drift = 0.0;
     for (const std::size_t pieces : {8U, 64U}) {
@@ -145,14 +149,15 @@ FoundLine find_line(const std::vector<double>& values, double rate_hz, bool drif
         for (auto& s : relative) {
             const double sum = std::accumulate(s.begin(), s.end(), 0.0);
             if (sum <= 0.0) continue;
-            const auto l = level_about(s, static_cast<std::size_t>(std::max(32.0, static_cast<double>(length) / 20.0) * bins));
+            const auto l =
+                level_about(s, static_cast<std::size_t>(std::max(32.0, static_cast<double>(length) / 20.0) * bins));
             for (std::size_t k = 0; k < s.size(); ++k) s[k] *= 2.0 / l[k];
         }
         const auto most = static_cast<int>(pieces);
         double best = 0.0;
         int best_slope = 0;
         std::size_t best_bin = 0;
-        const auto least = static_cast<std::ptrdiff_t>(8.0 * bins) ;
+        const auto least = static_cast<std::ptrdiff_t>(8.0 * bins);
         for (int slope = -most; slope <= most; ++slope) {
             std::vector<std::ptrdiff_t> shift(pieces);
             for (std::size_t p = 0; p < pieces; ++p) {
@@ -174,6 +179,10 @@ FoundLine find_line(const std::vector<double>& values, double rate_hz, bool drif
         const double count = 1.5 * 0.5 * static_cast<double>(length) * (2.0 * most + 1.0);
         searches += count;
         const double p = of_several(chi2_tail(best, static_cast<int>(2.0 * used)), count);
+        if (best - 2.0 * used > scattered && p < 1e-6) {
+            scattered = best - 2.0 * used;
+            scattered_hz = hz * static_cast<double>(best_bin);
+        }
         if (p < coarse_p) {
             coarse_p = p;
             coarse_hz = hz * static_cast<double>(best_bin);
@@ -186,7 +195,8 @@ FoundLine find_line(const std::vector<double>& values, double rate_hz, bool drif
         const std::size_t step = n / keep;
         const auto phase = line_phase(n, rate_hz, f0, d0);
         std::vector<Complex> low(power_of_two(8 * keep), 0.0);
-        for (std::size_t i = 0; i < n; ++i) low[std::min(i / step, low.size() - 1)] += values[i] * std::polar(1.0, -phase[i]);
+        for (std::size_t i = 0; i < n; ++i)
+            low[std::min(i / step, low.size() - 1)] += values[i] * std::polar(1.0, -phase[i]);
         const std::size_t slow = (n + step - 1) / step;
         const double unit = 2.0 / (duration_s * duration_s);
         const int most = static_cast<int>(std::ceil(0.5 * width_bins)) + 2;
@@ -196,11 +206,14 @@ FoundLine find_line(const std::vector<double>& values, double rate_hz, bool drif
             const double d = 0.25 * quarter * unit;
             std::vector<Complex> turned(low.size(), 0.0);
             for (std::size_t i = 0; i < slow; ++i) {
-                const double t = (static_cast<double>(i * step) + 0.5 * static_cast<double>(step - 1) - 0.5 * static_cast<double>(n - 1)) / rate_hz;
+                const double t = (static_cast<double>(i * step) + 0.5 * static_cast<double>(step - 1) -
+                                  0.5 * static_cast<double>(n - 1)) /
+                                 rate_hz;
                 turned[i] = low[i] * std::polar(1.0, -units::pi * d * t * t);
             }
             const auto out = transform(turned);
-            const auto reach = static_cast<std::ptrdiff_t>((width_bins + 2.0) * static_cast<double>(low.size()) / static_cast<double>(slow));
+            const auto reach = static_cast<std::ptrdiff_t>((width_bins + 2.0) * static_cast<double>(low.size()) /
+                                                           static_cast<double>(slow));
             const auto all = static_cast<std::ptrdiff_t>(low.size());
             for (std::ptrdiff_t k = -std::min(reach, all / 2 - 1); k <= std::min(reach, all / 2 - 1); ++k) {
                 const double chi2 = 2.0 * std::norm(out[static_cast<std::size_t>((k + all) % all)]) / lvl;
@@ -240,6 +253,8 @@ FoundLine find_line(const std::vector<double>& values, double rate_hz, bool drif
         }
     }
     found.searched = std::max(found.searched, searches);
+    found.scattered = scattered;
+    found.scattered_hz = scattered_hz;
     return found;
 }
 
@@ -279,7 +294,8 @@ FoundCycle find_cycle(const std::vector<double>& innovations, const Rows& rows, 
         };
         if (p < 1e-3) {
             double top = power_at(hz);
-            for (double d = 0.25 * rate_hz / static_cast<double>(n); d > 0.004 * rate_hz / static_cast<double>(n); d *= 0.5) {
+            for (double d = 0.25 * rate_hz / static_cast<double>(n); d > 0.004 * rate_hz / static_cast<double>(n);
+                 d *= 0.5) {
                 for (const double f : {hz - d, hz + d}) {
                     const double value = power_at(f);
                     if (value > top) {
@@ -325,7 +341,8 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
         const double mean = std::accumulate(raw.begin(), raw.end(), 0.0) / static_cast<double>(n);
         std::vector<double> r(order + 1, 0.0);
         for (int k = 0; k <= order; ++k) {
-            for (std::size_t i = static_cast<std::size_t>(k); i < n; ++i) r[static_cast<std::size_t>(k)] += (raw[i] - mean) * (raw[i - static_cast<std::size_t>(k)] - mean);
+            for (std::size_t i = static_cast<std::size_t>(k); i < n; ++i)
+                r[static_cast<std::size_t>(k)] += (raw[i] - mean) * (raw[i - static_cast<std::size_t>(k)] - mean);
         }
         if (r[0] <= 0.0) continue;
         r[0] *= 1.0 + 1e-6;
@@ -337,14 +354,17 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
             const double reflection = sum / error;
             auto next = a;
             next[static_cast<std::size_t>(k)] = reflection;
-            for (int j = 1; j < k; ++j) next[static_cast<std::size_t>(j)] = a[static_cast<std::size_t>(j)] - reflection * a[static_cast<std::size_t>(k - j)];
+            for (int j = 1; j < k; ++j)
+                next[static_cast<std::size_t>(j)] =
+                    a[static_cast<std::size_t>(j)] - reflection * a[static_cast<std::size_t>(k - j)];
             a = next;
             error *= 1.0 - reflection * reflection;
         }
         std::vector<double> white(n, 0.0);
         for (std::size_t i = order; i < n; ++i) {
             white[i] = raw[i] - mean;
-            for (int j = 1; j <= order; ++j) white[i] -= a[static_cast<std::size_t>(j)] * (raw[i - static_cast<std::size_t>(j)] - mean);
+            for (int j = 1; j <= order; ++j)
+                white[i] -= a[static_cast<std::size_t>(j)] * (raw[i - static_cast<std::size_t>(j)] - mean);
         }
         const auto correlation = [&](bool squares) {
             std::vector<Complex> x(padded, 0.0);
@@ -363,7 +383,8 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
         const auto products = correlation(false);
         const auto weights = correlation(true);
         const auto at = [&](std::ptrdiff_t lag) {
-            const auto k = static_cast<std::size_t>((lag + static_cast<std::ptrdiff_t>(padded)) % static_cast<std::ptrdiff_t>(padded));
+            const auto k = static_cast<std::size_t>((lag + static_cast<std::ptrdiff_t>(padded)) %
+                                                    static_cast<std::ptrdiff_t>(padded));
             return products[k].real() / std::sqrt(std::max(weights[k].real(), 1e-300));
         };
         double chi2 = 0.0;
@@ -424,7 +445,8 @@ WitnessMotion fit_witness(const SampleFit& fit, const std::vector<double>& witne
     };
     for (std::size_t i = static_cast<std::size_t>(lags); i + static_cast<std::size_t>(lags) < n; ++i) {
         if (!fit.rows()[i]) continue;
-        for (int l = 0; l < taps; ++l) block(filled, l) = white[i + static_cast<std::size_t>(lags) - static_cast<std::size_t>(l)];
+        for (int l = 0; l < taps; ++l)
+            block(filled, l) = white[i + static_cast<std::size_t>(lags) - static_cast<std::size_t>(l)];
         target(filled++) = e[i];
         if (filled == block.rows()) flush();
     }
@@ -437,7 +459,8 @@ WitnessMotion fit_witness(const SampleFit& fit, const std::vector<double>& witne
     for (std::size_t i = 0; i < n; ++i) {
         for (int l = 0; l < taps; ++l) {
             const auto j = static_cast<std::ptrdiff_t>(i) + lags - l;
-            if (j >= 0 && j < static_cast<std::ptrdiff_t>(n)) motion.increments[i] += response(l) * centred[static_cast<std::size_t>(j)];
+            if (j >= 0 && j < static_cast<std::ptrdiff_t>(n))
+                motion.increments[i] += response(l) * centred[static_cast<std::size_t>(j)];
         }
     }
     // Coherence of the increments with the motion, in bands: cross-spectra over pieces.
@@ -450,7 +473,8 @@ WitnessMotion fit_witness(const SampleFit& fit, const std::vector<double>& witne
         std::vector<Complex> x(length);
         std::vector<Complex> y(length);
         for (std::size_t i = 0; i < length; ++i) {
-            const double window = std::pow(std::sin(units::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(length)), 2);
+            const double window =
+                std::pow(std::sin(units::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(length)), 2);
             x[i] = window * (fit.rest()[a + i] + (fit.model().motion.empty() ? 0.0 : fit.model().motion[a + i]));
             y[i] = window * motion.increments[a + i];
         }

@@ -10,11 +10,13 @@ namespace ringlock::closure {
 struct FoundLine {
     double frequency_hz = 0.0;  ///< in the middle of the rows
     double drift_hz_per_s = 0.0;
-    double chi2 = 0.0;      ///< of its two amplitudes, the frequency as found
+    double chi2 = 0.0;        ///< of its two amplitudes, the frequency as found
     double chi2_still = 0.0;  ///< largest without drift, near by
-    double p_value = 1.0;   ///< its search counted
+    double p_value = 1.0;     ///< its search counted
     double searched = 1.0;
-    bool coherent = true;   ///< it keeps its phase over the rows
+    double scattered = 0.0;  ///< power over the level in pieces, chi-squared above what chance leaves there
+    double scattered_hz = 0.0;
+    bool coherent = true;  ///< it keeps its phase over the rows
 };
 
 /// The line that stands out most from the spectrum about it. `values` are zero where they do not count. Lines within
@@ -46,9 +48,9 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
 /// Response of the increments to the witness, lag by lag, fitted in the rows that count, and the motion by it.
 struct WitnessMotion {
     std::vector<double> increments;
-    double coherence = 0.0;  ///< magnitude-squared, where most of the motion is
-    double rms_arcsec = 0.0; ///< of the motion's angle that the witness tells
-    double centre_hz = 0.0;  ///< where most of it is
+    double coherence = 0.0;   ///< magnitude-squared, where most of the motion is
+    double rms_arcsec = 0.0;  ///< of the motion's angle that the witness tells
+    double centre_hz = 0.0;   ///< where most of it is
 };
 WitnessMotion fit_witness(const SampleFit& fit, const std::vector<double>& witness);
 

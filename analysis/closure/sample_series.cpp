@@ -45,18 +45,19 @@ SampleSeries prepare_samples(const record::Record& record) {
         series.counted = samples.kind == record::SampleKind::quarter_count;
         const scenario::Scenario standard;
         series.scale_factor_assumed = series.counted && !record.declared.scale_factor_arcsec;
-        series.scale_factor_arcsec =
-            record.declared.scale_factor_arcsec.value_or(standard.gyro.scale_factor_arcsec);
+        series.scale_factor_arcsec = record.declared.scale_factor_arcsec.value_or(standard.gyro.scale_factor_arcsec);
         first = 1;
         for (std::size_t k = 1; k < samples.size(); ++k) {
-            series.increment.push_back(series.counted ? 0.25 * series.scale_factor_arcsec *
-                                                            static_cast<double>(samples.counts[k] - samples.counts[k - 1])
-                                                      : samples.values[k] - samples.values[k - 1]);
+            series.increment.push_back(series.counted
+                                           ? 0.25 * series.scale_factor_arcsec *
+                                                 static_cast<double>(samples.counts[k] - samples.counts[k - 1])
+                                           : samples.values[k] - samples.values[k - 1]);
         }
     }
     const std::size_t n = series.increment.size();
     if (n < fewest) {
-        throw InputError(fmt::format("/samples: {} of them are too few for the closed loop; at least {} are needed", n, fewest));
+        throw InputError(
+            fmt::format("/samples: {} of them are too few for the closed loop; at least {} are needed", n, fewest));
     }
     if (!changes(series.increment)) throw InputError("/samples: they never change; there is nothing to fit");
     for (std::size_t i = 0; i < n; ++i) {
@@ -113,7 +114,9 @@ Lattice find_lattice(const std::vector<double>& increments) {
     if (levels.size() > n / 4 || levels.size() < 2) return lattice;
     double step = std::max(std::abs(levels.front()), range);
     for (const double x : levels) {
-        if (std::abs(x) > tolerance) step = common_divisor(std::max(step, std::abs(x)), std::min(step, std::abs(x)), 20.0 * tolerance + 1e-6 * range);
+        if (std::abs(x) > tolerance)
+            step = common_divisor(std::max(step, std::abs(x)), std::min(step, std::abs(x)),
+                                  20.0 * tolerance + 1e-6 * range);
     }
     // Best over the levels, each a whole multiple.
     double xy = 0.0;

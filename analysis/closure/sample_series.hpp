@@ -11,13 +11,13 @@ namespace ringlock::closure {
 struct SampleSeries {
     double rate_hz = 0.0;
     double interval_s = 0.0;
-    std::vector<double> time_s;     ///< at the end of each increment
-    std::vector<double> increment;  ///< [arcsec]
+    std::vector<double> time_s;                                          ///< at the end of each increment
+    std::vector<double> increment;                                       ///< [arcsec]
     std::vector<std::pair<std::string, std::vector<double>>> witnesses;  ///< accelerations that change
     std::vector<double> temperature_change_k;                            ///< empty where there is none
     std::vector<double> input_rate_deg_h;                                ///< empty where there is none
     bool counted = false;                                                ///< by kind whole counts
-    double scale_factor_arcsec = 0.0;  ///< of counts
+    double scale_factor_arcsec = 0.0;                                    ///< of counts
     bool scale_factor_assumed = false;
 
     std::size_t size() const { return increment.size(); }

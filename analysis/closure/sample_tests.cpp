@@ -34,8 +34,9 @@ void test_correlation(const SampleFit& fit, Tests& tests) {
         root[k] = sum / std::sqrt(weight);
         chi2 += root[k] * root[k];
     }
-    tests.push_back({Where::time, "correlation with the 24 samples before", chi2_tail(chi2, lags),
-                     fmt::format("first correlations {:.2f}, {:.2f}, {:.2f} standard errors", root[1], root[2], root[3])});
+    tests.push_back(
+        {Where::time, "correlation with the 24 samples before", chi2_tail(chi2, lags),
+         fmt::format("first correlations {:.2f}, {:.2f}, {:.2f} standard errors", root[1], root[2], root[3])});
 }
 
 void test_spectrum(const SampleFit& fit, Tests& tests) {
@@ -69,7 +70,8 @@ void test_spectrum(const SampleFit& fit, Tests& tests) {
         const auto b = static_cast<std::size_t>(to);
         from = to;
         if (b <= a + 1) continue;
-        const double ratio = std::accumulate(power.begin() + static_cast<std::ptrdiff_t>(a), power.begin() + static_cast<std::ptrdiff_t>(b), 0.0) /
+        const double ratio = std::accumulate(power.begin() + static_cast<std::ptrdiff_t>(a),
+                                             power.begin() + static_cast<std::ptrdiff_t>(b), 0.0) /
                              (static_cast<double>(b - a) * square);
         const double freedom = 2.0 * static_cast<double>(b - a) * independent;
         // Wilson and Hilferty: the cube root of chi-squared is nearly normal.
@@ -85,7 +87,8 @@ void test_spectrum(const SampleFit& fit, Tests& tests) {
     tests.push_back({Where::frequency, "spectrum in bands", chi2_tail(chi2, bands),
                      fmt::format("most at {:.4g} Hz, {:.3g} times the mean", worst_hz, worst_ratio)});
     const FoundLine line = find_line(e, fit.series().rate_hz, true);
-    tests.push_back({Where::frequency, "lines, still and drifting", line.p_value, fmt::format("at {:.6g} Hz", line.frequency_hz)});
+    tests.push_back(
+        {Where::frequency, "lines, still and drifting", line.p_value, fmt::format("at {:.6g} Hz", line.frequency_hz)});
 }
 
 void test_size(const SampleFit& fit, Tests& tests) {
@@ -144,7 +147,8 @@ void test_size(const SampleFit& fit, Tests& tests) {
             at = m;
         }
     }
-    tests.push_back({Where::time, "place in the record modulo 2 to 16", of_several(least, 30.0), fmt::format("modulo {}", at)});
+    tests.push_back(
+        {Where::time, "place in the record modulo 2 to 16", of_several(least, 30.0), fmt::format("modulo {}", at)});
     const FoundCycle cycle = find_cycle(e, rows, fit.series().rate_hz);
     tests.push_back({Where::time, "variance and covariance that repeat", cycle.p_value,
                      fmt::format("{:.6g} times a second", cycle.frequency_hz)});
@@ -188,7 +192,8 @@ void test_rates(const SampleFit& fit, Tests& tests) {
     for (int k = 1; k <= 6; ++k) {
         std::vector<double> rate(n);
         for (std::size_t i = 0; i < n; ++i) {
-            rate[i] = std::cos(k * std::acos(std::clamp(2.0 * static_cast<double>(i) / static_cast<double>(n - 1) - 1.0, -1.0, 1.0)));
+            rate[i] = std::cos(
+                k * std::acos(std::clamp(2.0 * static_cast<double>(i) / static_cast<double>(n - 1) - 1.0, -1.0, 1.0)));
         }
         powers.push_back(std::move(rate));
     }
@@ -208,7 +213,8 @@ void test_rates(const SampleFit& fit, Tests& tests) {
             at = series.time_s[n * k / places];
         }
     }
-    tests.push_back({Where::time, "steps of the rate", davies_bound(best * best, roots), fmt::format("at {:.6g} s", at)});
+    tests.push_back(
+        {Where::time, "steps of the rate", davies_bound(best * best, roots), fmt::format("at {:.6g} s", at)});
 }
 
 /// A line that is not what it was: its amplitudes in stretches.
@@ -261,21 +267,27 @@ void test_jumps(const SampleFit& fit, Tests& tests) {
     for (std::size_t i = middle; i < n; ++i) all += response[i] * response[i];
     std::size_t length = 0;
     double part = 0.0;
-    while (part < 0.95 * all && middle + length < n) part += response[middle + length] * response[middle + length], ++length;
-    const std::size_t stride = std::max<std::size_t>(1, length / 8);
+    while (part < 0.9 * all && middle + length < n) {
+        part += response[middle + length] * response[middle + length];
+        ++length;
+    }
+    const std::size_t stride = std::max<std::size_t>(1, length / 16);
     std::vector<double> sizes;
     for (std::size_t a = 0; a + length <= n; a += stride) {
         double sum = 0.0;
-        bool counts = true;
+        double weight = 0.0;
         for (std::size_t i = 0; i < length; ++i) {
-            counts = counts && fit.rows()[a + i] != 0;
-            sum += response[middle + i] * fit.innovations()[a + i];
+            if (!fit.rows()[a + i]) continue;
+            const double h = response[middle + i];
+            sum += h * fit.innovations()[a + i];
+            weight += h * h;
         }
-        if (counts) sizes.push_back(sum * sum / part);
+        if (weight > 0.3 * part) sizes.push_back(sum * sum / weight);
     }
     if (sizes.size() < 40) return;
     const double most = *std::max_element(sizes.begin(), sizes.end());
-    tests.push_back({Where::time, "jumps of a rate that wanders", of_several(chi2_tail(most, 1), static_cast<double>(sizes.size())),
+    tests.push_back({Where::time, "jumps of a rate that wanders",
+                     of_several(chi2_tail(most, 1), static_cast<double>(sizes.size())),
                      fmt::format("{:.1f} standard errors", std::sqrt(most))});
 }
 
@@ -309,7 +321,8 @@ void test_distribution(const SampleFit& fit, double lattice_arcsec, Tests& tests
         const double kurtosis = fourth / (second * second) - 3.0;
         // Anscombe and Glynn (Biometrika 70, 227, 1983)
         const double mean = -6.0 / (count + 1.0);
-        const double variance = 24.0 * count * (count - 2.0) * (count - 3.0) / ((count + 1.0) * (count + 1.0) * (count + 3.0) * (count + 5.0));
+        const double variance = 24.0 * count * (count - 2.0) * (count - 3.0) /
+                                ((count + 1.0) * (count + 1.0) * (count + 3.0) * (count + 5.0));
         const double x = (kurtosis - mean) / std::sqrt(variance);
         const double skew = 6.0 * (count * count - 5.0 * count + 2.0) / ((count + 7.0) * (count + 9.0)) *
                             std::sqrt(6.0 * (count + 3.0) * (count + 5.0) / (count * (count - 2.0) * (count - 3.0)));
@@ -334,9 +347,11 @@ void test_distribution(const SampleFit& fit, double lattice_arcsec, Tests& tests
         const double high = *std::max_element(x.begin(), x.end());
         const double low = *std::min_element(x.begin(), x.end());
         const double tolerance = 1e-9 * (high - low);
-        const auto ties = std::count_if(x.begin(), x.end(), [&](double v) { return v > high - tolerance || v < low + tolerance; });
+        const auto ties =
+            std::count_if(x.begin(), x.end(), [&](double v) { return v > high - tolerance || v < low + tolerance; });
         if (ties > 4) {
-            tests.push_back({Where::amplitude, "values at the end of their range", 0.0, fmt::format("{} of them", ties)});
+            tests.push_back(
+                {Where::amplitude, "values at the end of their range", 0.0, fmt::format("{} of them", ties)});
         }
     }
 }
@@ -350,7 +365,8 @@ Disturbed find_disturbed(const SampleFit& fit) {
     const std::size_t windows = n / length;
     std::vector<double> power(windows, 0.0);
     for (std::size_t w = 0; w < windows; ++w) {
-        for (std::size_t i = w * length; i < (w + 1) * length; ++i) power[w] += e[i] * e[i] / static_cast<double>(length);
+        for (std::size_t i = w * length; i < (w + 1) * length; ++i)
+            power[w] += e[i] * e[i] / static_cast<double>(length);
     }
     auto sorted = power;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(windows / 2);
@@ -362,7 +378,8 @@ Disturbed find_disturbed(const SampleFit& fit) {
     double count = 0.0;
     for (std::size_t w = 0; w < windows; ++w) {
         const double ratio = power[w] / usual;
-        const double p = of_several(chi2_tail(ratio * static_cast<double>(length), static_cast<int>(length)), static_cast<double>(windows));
+        const double p = of_several(chi2_tail(ratio * static_cast<double>(length), static_cast<int>(length)),
+                                    static_cast<double>(windows));
         if (ratio > disturbed.worst) {
             disturbed.worst = ratio;
             disturbed.at_s = fit.series().time_s[w * length];
@@ -391,7 +408,8 @@ std::vector<ResidualTest> test_samples(const SampleFit& fit, double lattice_arcs
     if (!fit.series().witnesses.empty()) {
         const FoundWitness witness = find_witness(fit.innovations(), fit.rows(), fit.series());
         if (witness.lags > 0 && !witness.name.empty()) {
-            tests.push_back({Where::frequency, "witnesses at lags up to a quarter of a second", witness.p_value, witness.name});
+            tests.push_back(
+                {Where::frequency, "witnesses at lags up to a quarter of a second", witness.p_value, witness.name});
         }
     }
     return tests;

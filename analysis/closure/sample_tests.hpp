@@ -10,8 +10,8 @@ namespace ringlock::closure {
 struct Disturbed {
     Rows rows;
     double share = 0.0;
-    double worst = 1.0;   ///< largest mean square over the usual one
-    double at_s = 0.0;    ///< where
+    double worst = 1.0;     ///< largest mean square over the usual one
+    double at_s = 0.0;      ///< where
     double length_s = 0.0;  ///< of a stretch
     double p_value = 1.0;   ///< of the worst, if the residual were normal
 };

@@ -12,8 +12,8 @@ namespace ringlock::closure {
 struct BlockMean {
     double value = 0.0;
     double sd = 0.0;
-    std::vector<double> of_stretch;       ///< means over stretches, all of the record
-    std::vector<std::uint8_t> counts;     ///< 1: the stretch is among the turns that count
+    std::vector<double> of_stretch;    ///< means over stretches, all of the record
+    std::vector<std::uint8_t> counts;  ///< 1: the stretch is among the turns that count
 };
 
 /// What times and accelerations of the turns say of the dither's shape (docs/closure.md):
@@ -30,9 +30,9 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit);
 
 /// How the radius of the quadrature circle follows its phase.
 struct RadiusFold {
-    gyro::Ellipse ellipse;              ///< the best one
-    Eigen::Matrix4d covariance;         ///< of gain, offset_sin, offset_cos, orthogonality_rad
-    double chi2 = 0.0;                  ///< of all four together
+    gyro::Ellipse ellipse;       ///< the best one
+    Eigen::Matrix4d covariance;  ///< of gain, offset_sin, offset_cos, orthogonality_rad
+    double chi2 = 0.0;           ///< of all four together
 };
 RadiusFold radius_fold(const record::Turns& turns, const Rows& rows);
 

@@ -104,8 +104,9 @@ void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
     const double late_s = fitted.fit->sd_rad().front() / (fitted.series.acceleration_rad_s2 * fitted.series.interval_s);
     base.push_back({"", "dither_frequency_hz", setup.dither_frequency_hz,
                     setup.dither_frequency_hz * std::numbers::sqrt2 * late_s / fitted.series.time_s.back()});
-    base.push_back({"", "dither_peak_rate_deg_s", setup.dither_peak_rate_deg_s,
-                    setup.dither_peak_rate_deg_s * fitted.fit->sd_rad().front() / (fitted.series.amplitude_rad * std::sqrt(n))});
+    base.push_back(
+        {"", "dither_peak_rate_deg_s", setup.dither_peak_rate_deg_s,
+         setup.dither_peak_rate_deg_s * fitted.fit->sd_rad().front() / (fitted.series.amplitude_rad * std::sqrt(n))});
 }
 
 /// What would tell two effects apart that this record cannot.
@@ -140,9 +141,10 @@ Closure close_turns(const record::Record& record) {
     const Rows rows = chosen_blocks(turns.size());
     auto now = fit_record(record, {}, rows);
     if (!now->series.scale_factor_declared) {
-        closure.notes.push_back(fmt::format("the record declares no scale factor; {:g} arcsec per fringe assumed, with "
-                                            "which all rates scale",
-                                            now->series.setup.scale_factor_arcsec));
+        closure.notes.push_back(
+            fmt::format("the record declares no scale factor; {:g} arcsec per fringe assumed, with "
+                        "which all rates scale",
+                        now->series.setup.scale_factor_arcsec));
     }
     closure.heldout_before = heldout(*now->fit).error;
     const auto tests_of_effects = static_cast<double>(effects::registry().size());
@@ -181,7 +183,9 @@ Closure close_turns(const record::Record& record) {
             TurnParameters start = now->fit->parameters();
             start.effects.push_back({candidate.effect, candidate.values});
             const std::string name(candidate.effect->name());
-            if (side && !contenders.empty() && (on_phase(name) || on_phase(std::string(contenders[0].candidate.effect->name())))) continue;
+            if (side && !contenders.empty() &&
+                (on_phase(name) || on_phase(std::string(contenders[0].candidate.effect->name()))))
+                continue;
             auto fitted = fit_record(record, start, rows);
             const double gain = side ? 0.5 * merit(candidate)
                                      : fitted->fit->log_likelihood() - now->fit->log_likelihood() -

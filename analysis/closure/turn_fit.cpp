@@ -13,7 +13,7 @@ namespace ringlock::closure {
 
 namespace {
 
-constexpr std::size_t drift_terms = 4;            // polynomials of the dither's amplitude
+constexpr std::size_t drift_terms = 4;        // polynomials of the dither's amplitude
 constexpr double least_radius_sd_rad = 1e-7;  // below: a radius that shows no noise tells nothing of the phase's
 
 /// Legendre polynomial of that degree at x.
@@ -116,7 +116,8 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
     };
     TurnParameters p = parameters_;
     all.push_back({"", "bias_deg_h", change(p, p.bias_deg_h, 1e-2)});
-    all.push_back({"", "lockin_threshold_deg_h", change(p, p.threshold_deg_h, 1e-3 * std::max(1.0, p.threshold_deg_h))});
+    all.push_back(
+        {"", "lockin_threshold_deg_h", change(p, p.threshold_deg_h, 1e-3 * std::max(1.0, p.threshold_deg_h))});
     for (ActiveEffect& active : p.effects) {
         for (const effects::Parameter& parameter : active.effect->parameters()) {
             if (!deterministic(parameter.role)) continue;
@@ -292,7 +293,8 @@ void TurnFit::finish() {
     };
     for (Eigen::Index i = 0; i < m; ++i) {
         for (Eigen::Index j = 0; j <= i; ++j) {
-            hessian(i, j) = hessian(j, i) = (at(i, h, j, h) - at(i, h, j, -h) - at(i, -h, j, h) + at(i, -h, j, -h)) / (4.0 * h * h);
+            hessian(i, j) = hessian(j, i) =
+                (at(i, h, j, h) - at(i, h, j, -h) - at(i, -h, j, h) + at(i, -h, j, -h)) / (4.0 * h * h);
         }
     }
     const Eigen::MatrixXd inverse = hessian.completeOrthogonalDecomposition().pseudoInverse();
@@ -300,8 +302,9 @@ void TurnFit::finish() {
         const Knob& knob = turned[static_cast<std::size_t>(i)];
         const double value = std::exp(centre[static_cast<std::size_t>(i)]);
         const double variance = inverse(i, i);
-        estimates_.push_back({knob.effect, knob.name, value,
-                              value * (variance > 0.0 ? std::sqrt(variance) : std::numeric_limits<double>::infinity())});
+        estimates_.push_back(
+            {knob.effect, knob.name, value,
+             value * (variance > 0.0 ? std::sqrt(variance) : std::numeric_limits<double>::infinity())});
     }
     // Orthonormal basis, for scores.
     Eigen::HouseholderQR<Eigen::MatrixXd> qr(x);
@@ -322,7 +325,8 @@ Eigen::VectorXd TurnFit::whitened(const std::vector<double>& series) const {
 
 Eigen::VectorXd TurnFit::residual() const {
     Eigen::VectorXd y(static_cast<Eigen::Index>(innovations_.size()));
-    for (std::size_t i = 0; i < innovations_.size(); ++i) y(static_cast<Eigen::Index>(i)) = rows_[i] ? innovations_[i] : 0.0;
+    for (std::size_t i = 0; i < innovations_.size(); ++i)
+        y(static_cast<Eigen::Index>(i)) = rows_[i] ? innovations_[i] : 0.0;
     return y;
 }
 
@@ -346,8 +350,8 @@ TurnFit::Spread TurnFit::spread(const ActiveEffect& effect, const std::string& p
         best = x;
     }
     if (best_gain <= 0.0) return {};
-    const auto [at, value] = boost::math::tools::brent_find_minima([&](double l) { return -gain(l); }, best - step,
-                                                                   best + step, 12);
+    const auto [at, value] =
+        boost::math::tools::brent_find_minima([&](double l) { return -gain(l); }, best - step, best + step, 12);
     return {std::exp(at), 2.0 * std::max(-value, best_gain)};
 }
 

@@ -23,8 +23,9 @@ struct Estimate {
 /// The model fitted to the turns that count, by maximum likelihood.
 ///
 /// The filter goes through all turns; the likelihood is that of the innovations of those that count, each given all
-/// phases before it. What follows deterministically is fitted by Gauss and Newton in the whitened phases, what is random by
-/// the likelihood of the rest (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter", 1989, 3.4).
+/// phases before it. What follows deterministically is fitted by Gauss and Newton in the whitened phases, what is
+/// random by the likelihood of the rest (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter",
+/// 1989, 3.4).
 class TurnFit {
    public:
     TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows);
@@ -77,7 +78,7 @@ class TurnFit {
     Rows rows_;
     std::vector<double> nuisance_;  ///< offset, amplitude and its drift
     TurnModel::Prediction prediction_;
-    std::vector<double> rest_;      ///< phases less all that is deterministic
+    std::vector<double> rest_;  ///< phases less all that is deterministic
     std::vector<Estimate> estimates_;
     std::vector<double> innovations_, sd_rad_;
     double log_likelihood_ = 0.0;

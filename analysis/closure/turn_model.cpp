@@ -30,8 +30,8 @@ std::vector<double> TurnModel::dither_swings(const std::vector<TurnKicks::Kick>&
     for (std::size_t i = 0; i + 1 < n; ++i) {
         // Were the lock-in left in it, kicks would depend on their own size.
         const double lockin = kicks[i].after_rad + kicks[i + 1].before_rad;
-        const double rotation = units::two_pi / series_.setup.scale_factor_arcsec * series_.interval_s *
-                                series_.input_rate_deg_h[i];
+        const double rotation =
+            units::two_pi / series_.setup.scale_factor_arcsec * series_.interval_s * series_.input_rate_deg_h[i];
         swing[i] = series_.direction[i] * (phase_rad_[i + 1] - phase_rad_[i] - lockin - rotation);
         const std::size_t side = series_.direction[i] > 0 ? 0 : 1;
         sums[side] += swing[i];
@@ -82,8 +82,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         // From the zero-rate point to the dither's own turn.
         const double rate_deg_h = parameters.bias_deg_h + series_.input_rate_deg_h[i];
         const double coupling = factor * device.coupling.b_rad_s * std::sin(psi + device.coupling.phase_rad);
-        const double turn_s =
-            series_.time_s[i] + direction * (c * rate_deg_h + coupling) / series_.acceleration_rad_s2;
+        const double turn_s = series_.time_s[i] + direction * (c * rate_deg_h + coupling) / series_.acceleration_rad_s2;
         prediction.turn_s[i] = turn_s;
         if (i == 0) last_s = turn_s;
         const double duration_s = turn_s - last_s;
@@ -92,8 +91,8 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
                                          duration_s,
                                          {last_change_k, change_k},
                                          {series_.input_rate_deg_h[before_i], series_.input_rate_deg_h[i]}};
-        angle_arcsec += duration_s * (parameters.bias_deg_h + 0.5 * (interval.input_rate_deg_h[0] +
-                                                                     interval.input_rate_deg_h[1]));
+        angle_arcsec +=
+            duration_s * (parameters.bias_deg_h + 0.5 * (interval.input_rate_deg_h[0] + interval.input_rate_deg_h[1]));
         for (const ActiveEffect& active : parameters.effects) {
             if (active.effect->adds_angle()) {
                 angle_arcsec += active.effect->added_angle_arcsec(active.values, interval);

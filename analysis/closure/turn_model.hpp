@@ -34,12 +34,13 @@ struct TurnParameters {
 class TurnModel {
    public:
     /// Both are kept by reference.
-    TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad) : series_(series), phase_rad_(phase_rad) {}
+    TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad)
+        : series_(series), phase_rad_(phase_rad) {}
 
     struct Prediction {
         std::vector<double> phase_rad;  ///< but for offset and dither
         TurnFrame frame;
-        std::vector<double> turn_s;     ///< when the dither turned, from when the phase did
+        std::vector<double> turn_s;  ///< when the dither turned, from when the phase did
     };
     Prediction predict(const TurnParameters& parameters) const;
     TurnNoise noise(const TurnParameters& parameters) const;

@@ -96,8 +96,8 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
     const record::Turns& turns = *record.turns;
     const std::size_t n = turns.size();
     if (n < fewest) {
-        throw InputError(fmt::format("/turns: {} turns are too few to fit and to predict; a closed loop needs at least {}",
-                                     n, fewest));
+        throw InputError(fmt::format(
+            "/turns: {} turns are too few to fit and to predict; a closed loop needs at least {}", n, fewest));
     }
     TurnSeries series;
     const record::Declared& declared = record.declared;
@@ -130,9 +130,10 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
     for (int side = 0; side < 2; ++side) swings_of[side] /= static_cast<double>(counts_of[side]);
     const double swings = 0.5 * (swings_of[0] + swings_of[1]);
     if (!(std::min(swings_of[0], swings_of[1]) > 100.0)) {
-        throw InputError(fmt::format("/turns: half cycles swing by {:.4g} rad of phase on average; minima (direction 1) "
-                                     "must be followed by maxima (-1) at least 100 rad above them",
-                                     swings));
+        throw InputError(
+            fmt::format("/turns: half cycles swing by {:.4g} rad of phase on average; minima (direction 1) "
+                        "must be followed by maxima (-1) at least 100 rad above them",
+                        swings));
     }
     for (std::size_t i = 0; i + 1 < n; ++i) series.swing[i] /= swings_of[turns.direction[i] > 0 ? 0 : 1];
     series.swing[n - 1] = 1.0;
@@ -140,8 +141,8 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
     setup.dither_frequency_hz = 0.5 / series.interval_s;
     const double w = units::pi / series.interval_s;
     // A = 2 pi Omega_D/(K w)
-    setup.dither_peak_rate_deg_s = series.amplitude_rad * w * setup.scale_factor_arcsec /
-                                   (units::two_pi * units::deg_h_per_deg_s);
+    setup.dither_peak_rate_deg_s =
+        series.amplitude_rad * w * setup.scale_factor_arcsec / (units::two_pi * units::deg_h_per_deg_s);
     series.acceleration_rad_s2 = series.amplitude_rad * w * w;
     if (!record.temperature_c.empty()) {
         const double start = record.temperature_c.at(turns.time_s[0]);

@@ -20,9 +20,9 @@ struct JoinedPhase {
 /// nearest to the middle of the quarter fringe that the counter names; an error of the counter, to within one quarter,
 /// does not matter at the boundaries.
 ///
-/// The counter's zero is its own: only how its difference from the quadrature changes is looked at. Where `count_again`,
-/// the quarters that the counter has lost or gained are given back, so that nothing is left of them in the phase;
-/// otherwise two of them and more become whole fringes.
+/// The counter's zero is its own: only how its difference from the quadrature changes is looked at. Where
+/// `count_again`, the quarters that the counter has lost or gained are given back, so that nothing is left of them in
+/// the phase; otherwise two of them and more become whole fringes.
 JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool count_again);
 
 /// A turn record prepared for the fit.
@@ -31,11 +31,11 @@ struct TurnSeries {
     bool scale_factor_declared = false;
     std::vector<double> time_s;  ///< of the zero-rate points, since the first
     std::vector<int> direction;
-    std::vector<double> swing;   ///< of the half cycle after each turn, over the mean one
+    std::vector<double> swing;  ///< of the half cycle after each turn, over the mean one
     double interval_s = 0.0;
     double amplitude_rad = 0.0;  ///< half the mean swing
     double acceleration_rad_s2 = 0.0;
-    double radius_sd_rad = 0.0;  ///< of the quadrature, over its mean
+    double radius_sd_rad = 0.0;                ///< of the quadrature, over its mean
     std::vector<double> temperature_change_k;  ///< since the first turn; empty where unknown
     std::vector<double> input_rate_deg_h;      ///< as referenced or declared, zero where neither
 

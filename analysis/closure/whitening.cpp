@@ -19,8 +19,8 @@ RateStep step_of(const PhaseRateTerm& term, double dt) {
     const double x = dt / term.time_s;
     const double e = std::expm1(-x);  // exp(-x) - 1
     // 2 x - 3 + 4 exp(-x) - exp(-2 x): x^3 2/3 - x^4/2 + ..., which the closed form loses.
-    const double angle = x < 0.02 ? x * x * x * (2.0 / 3.0 - x * (0.5 - x * (7.0 / 30.0 - x / 12.0)))
-                                  : 2.0 * x + 2.0 * e - e * e;
+    const double angle =
+        x < 0.02 ? x * x * x * (2.0 / 3.0 - x * (0.5 - x * (7.0 / 30.0 - x / 12.0))) : 2.0 * x + 2.0 * e - e * e;
     const double t = term.time_s;
     return {1.0 + e, -e * t, term.variance_rad2_s2 * t * t * angle, term.variance_rad2_s2 * t * e * e,
             term.variance_rad2_s2 * -std::expm1(-2.0 * x)};

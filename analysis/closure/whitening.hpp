@@ -6,7 +6,7 @@ namespace ringlock::closure {
 
 /// A stationary rate with an exponential autocorrelation, in optical phase.
 struct PhaseRateTerm {
-    double time_s;             ///< of correlation
+    double time_s;  ///< of correlation
     double variance_rad2_s2;
 };
 
@@ -18,21 +18,21 @@ struct PhaseRateTerm {
 ///
 /// w is the injected noise, v the readout's, m the wander of the dither's amplitude.
 struct TurnNoise {
-    double injected_rad2 = 0.0;             ///< variance of w
-    double readout_rad2 = 0.0;              ///< variance of v
-    double wander_rad2 = 0.0;               ///< variance that m gains from turn to turn
-    double wander_memory_turns = 1e12;      ///< over which m forgets itself
-    double white_rad2_per_s = 0.0;          ///< variance that white rate noise adds to a
-    double walk_rad2_per_s3 = 0.0;          ///< variance a second of a rate that walks [(rad/s)^2/s]
+    double injected_rad2 = 0.0;         ///< variance of w
+    double readout_rad2 = 0.0;          ///< variance of v
+    double wander_rad2 = 0.0;           ///< variance that m gains from turn to turn
+    double wander_memory_turns = 1e12;  ///< over which m forgets itself
+    double white_rad2_per_s = 0.0;      ///< variance that white rate noise adds to a
+    double walk_rad2_per_s3 = 0.0;      ///< variance a second of a rate that walks [(rad/s)^2/s]
     std::vector<PhaseRateTerm> rates;
 };
 
 /// The turns as the filter needs to know them.
 struct TurnFrame {
-    double interval_s = 0.0;                ///< mean time from turn to turn
-    std::vector<double> sign;               ///< -1 at minima, 1 at maxima
-    std::vector<double> before_slope;       ///< derivative of what the lock-in adds before the turn to its phase
-    std::vector<double> kick_slope;         ///< of all that it adds at the turn
+    double interval_s = 0.0;           ///< mean time from turn to turn
+    std::vector<double> sign;          ///< -1 at minima, 1 at maxima
+    std::vector<double> before_slope;  ///< derivative of what the lock-in adds before the turn to its phase
+    std::vector<double> kick_slope;    ///< of all that it adds at the turn
 };
 
 /// The Kalman filter that turns phases into innovations, independent and of unit variance where the noise is as said.
@@ -54,10 +54,10 @@ class Whitening {
    private:
     std::size_t states_;
     const TurnFrame& frame_;
-    double decay_ = 1.0;                    // of m
+    double decay_ = 1.0;  // of m
     std::vector<double> rate_decay_;
-    std::vector<double> rate_gain_s_;       // a gains this times the rate
-    std::vector<double> gains_;             // [turn][state]
+    std::vector<double> rate_gain_s_;  // a gains this times the rate
+    std::vector<double> gains_;        // [turn][state]
     std::vector<double> sd_;
 };
 

@@ -142,7 +142,8 @@ Stages sample_stages(const Scenario& s, std::int64_t gyro) {
         if (!effect->active(values)) continue;
         if (auto stage = effect->sample_stage(values, who)) stages.push_back(std::move(stage));
     }
-    std::stable_sort(stages.begin(), stages.end(), [](const auto& a, const auto& b) { return a->place() < b->place(); });
+    std::stable_sort(stages.begin(), stages.end(),
+                     [](const auto& a, const auto& b) { return a->place() < b->place(); });
     return stages;
 }
 
@@ -233,8 +234,9 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
         for (const auto& stage : stages) source_hz = stage->source_hz(source_hz);
         const double source_rows = std::ceil(s.ensemble.duration_s * source_hz - 1e-9) + (stages.empty() ? 0.0 : 1.0);
         if (!(source_rows <= static_cast<double>(most_rows))) {
-            throw InputError(fmt::format("key \"effects.resampling.from_hz\" = {:g}: {:.3g} samples; at most {} are allowed",
-                                         source_hz, source_rows, most_rows));
+            throw InputError(
+                fmt::format("key \"effects.resampling.from_hz\" = {:g}: {:.3g} samples; at most {} are allowed",
+                            source_hz, source_rows, most_rows));
         }
         Sampler sampler(source_hz, start_s);
         const auto wanted = static_cast<std::size_t>(std::floor(rows + 1e-9));

@@ -71,7 +71,8 @@ class CaseMotion final : public Effect {
         return "Rotation of the case that an accelerometer sees as well; in records of samples only.";
     }
     std::string_view equation() const override {
-        return "angle = a resonance driven by white noise, a second-order autoregression of that centre, width and rms; "
+        return "angle = a resonance driven by white noise, a second-order autoregression of that centre, width and "
+               "rms; "
                "the "
                "accelerometer, tilted, reads g (sqrt(C) angle + sqrt(1 - C) other), the other independent of the angle "
                "and like it: C is their coherence (Bendat and Piersol, \"Random Data\", 2010, section 6.1).";

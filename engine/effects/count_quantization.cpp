@@ -33,11 +33,14 @@ class Stage final : public SampleStage {
 class CountQuantization final : public Effect {
    public:
     std::string_view name() const override { return "count_quantization"; }
-    std::string_view summary() const override { return "Samples of the angle in whole steps; in records of samples only."; }
+    std::string_view summary() const override {
+        return "Samples of the angle in whole steps; in records of samples only.";
+    }
     std::string_view equation() const override {
         return "angle = floor(angle/step) step at the end of each sample. Where the angle moves by a step or more from "
                "sample to "
-               "sample the error is white and uniform, of variance step^2/12 (Widrow and Kollar, \"Quantization Noise\", "
+               "sample the error is white and uniform, of variance step^2/12 (Widrow and Kollar, \"Quantization "
+               "Noise\", "
                "2008, chapter 4).";
     }
     std::span<const Parameter> parameters() const override { return parameters_of; }

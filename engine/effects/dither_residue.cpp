@@ -46,7 +46,8 @@ class DitherResidue final : public Effect {
         return "Dither that was not stripped whole, at its frequency or its alias; in records of samples only.";
     }
     std::string_view equation() const override {
-        return "angle = A sin(2 pi (f t + d t^2/2)), t from the middle of the record: what an error of gain or delay of "
+        return "angle = A sin(2 pi (f t + d t^2/2)), t from the middle of the record: what an error of gain or delay "
+               "of "
                "the "
                "dither's pick-off leaves (Killpatrick, IEEE Spectrum 4(10), 44, 1967). In increments A becomes 2 A "
                "|sin(pi f/rate)|; above half the rate it shows at its alias.";

@@ -99,7 +99,8 @@ struct Sampled {
     double record_hz = 0.0;  ///< of the record that they end in
     double start_s = 0.0;    ///< where the first increment begins, since the start of the run
     std::vector<double> increment_arcsec = {};
-    std::map<std::string, std::vector<double>> witnesses = {};  ///< by their names in a record, as long as the increments
+    std::map<std::string, std::vector<double>> witnesses =
+        {};  ///< by their names in a record, as long as the increments
 };
 
 /// What happens to the samples of one gyro.
@@ -107,10 +108,10 @@ class SampleStage {
    public:
     /// Stages act in this order, whatever their names.
     enum class Place {
-        motion,     ///< the case rotates
-        output,     ///< something is added to the angle that is put out
-        resolution, ///< the angle becomes numbers
-        transport,  ///< the numbers become a record
+        motion,      ///< the case rotates
+        output,      ///< something is added to the angle that is put out
+        resolution,  ///< the angle becomes numbers
+        transport,   ///< the numbers become a record
     };
     virtual ~SampleStage() = default;
     virtual Place place() const = 0;

@@ -45,8 +45,6 @@ const Effect* find(std::string_view name) {
     return found == all.end() ? nullptr : *found;
 }
 
-std::span<const std::string_view> planned() {
-    return {};
-}
+std::span<const std::string_view> planned() { return {}; }
 
 }  // namespace ringlock::effects

@@ -30,8 +30,7 @@ class Stage final : public SampleStage {
         };
         std::vector<double> increments(rows);
         for (std::size_t k = 0; k < rows; ++k) {
-            increments[k] =
-                at(angle, static_cast<double>(k + 1) * ratio) - at(angle, static_cast<double>(k) * ratio);
+            increments[k] = at(angle, static_cast<double>(k + 1) * ratio) - at(angle, static_cast<double>(k) * ratio);
         }
         samples.increment_arcsec = std::move(increments);
         for (auto& [name, values] : samples.witnesses) {
@@ -56,9 +55,11 @@ class Resampling final : public Effect {
         return "Samples taken at another rate than the record's; in records of samples only.";
     }
     std::string_view equation() const override {
-        return "The angle at the ends of the record's samples is linear between those of samples taken at from_hz: white "
+        return "The angle at the ends of the record's samples is linear between those of samples taken at from_hz: "
+               "white "
                "rate "
-               "noise N^2 has over a record interval the variance (N^2/from) sum of (shares of source intervals)^2, which "
+               "noise N^2 has over a record interval the variance (N^2/from) sum of (shares of source intervals)^2, "
+               "which "
                "beats with the distance of the rates (docs/effects.md).";
     }
     std::span<const Parameter> parameters() const override { return parameters_of; }

@@ -153,8 +153,7 @@ class Branch {
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
             std::vector<gyro::Device> told = devices_;
             for (gyro::Device& device : told) device.coupling.b_rad_s = told_b_rad_s(scenario, device);
-            recovery_.emplace(told, electronics,
-                              amplitude_rms_rad(scenario, devices_, kind));
+            recovery_.emplace(told, electronics, amplitude_rms_rad(scenario, devices_, kind));
         }
     }
 
