@@ -146,13 +146,31 @@ class Loop {
 void Loop::screen_rates(const SampleFit& now, std::vector<Candidate>& out) const {
     const std::size_t n = series_.size();
     const SampleModel& model = now.model();
+    // Where the model has left something, slow sums move more than white innovations would let them: by that much less
+    // is a slow rate's chi-squared worth.
+    double spread = 0.0;
+    double sums = 0.0;
+    const std::size_t length = std::max<std::size_t>(16, n / 1000);
+    for (std::size_t a = 0; a + length <= n; a += length) {
+        double sum = 0.0;
+        double count = 0.0;
+        for (std::size_t i = a; i < a + length; ++i) {
+            if (!rows_[i]) continue;
+            sum += now.innovations()[i];
+            count += 1.0;
+        }
+        if (count < 0.5 * static_cast<double>(length)) continue;
+        spread += sum * sum / count;
+        sums += 1.0;
+    }
+    const double worth = sums > 20.0 ? std::min(1.0, sums / spread) : 1.0;
     const auto one = [&](const std::string& effect, const std::string& parameter,
                          const std::function<double(std::size_t)>& rate) {
         if (has(model, effect)) return;
         SampleColumn column = rate_column(series_, effect, parameter, rate);
         const auto score = now.score({*column.series});
         if (score.rank == 0) return;
-        Candidate c{.effect = effect, .model = model, .p_value = chi2_tail(score.chi2, 1)};
+        Candidate c{.effect = effect, .model = model, .p_value = chi2_tail(worth * score.chi2, 1)};
         c.model.columns.push_back(std::move(column));
         out.push_back(std::move(c));
     };
@@ -175,7 +193,7 @@ void Loop::screen_rates(const SampleFit& now, std::vector<Candidate>& out) const
         std::vector<double> step(n, 0.0);
         std::fill(step.begin() + static_cast<std::ptrdiff_t>(row), step.end(), series_.interval_s);
         const auto score = now.score({step});
-        return score.rank == 0 ? 0.0 : std::copysign(std::sqrt(score.chi2), score.value[0]);
+        return score.rank == 0 ? 0.0 : std::copysign(std::sqrt(worth * score.chi2), score.value[0]);
     };
     constexpr std::size_t places = 80;
     for (std::size_t k = 1; k < places; ++k) {
