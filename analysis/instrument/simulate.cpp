@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <vector>
 
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
 #include "engine/core/version.hpp"
+#include "engine/effects/effect.hpp"
 #include "engine/ensemble/block.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/schedule.hpp"
@@ -112,6 +115,8 @@ class Sampler {
         time_s_ = time_s;
         angle_ = angle_arcsec;
     }
+    /// Increments begun and ended so far.
+    std::size_t size() const { return samples_.values.size(); }
     record::Samples finish(std::size_t wanted) {
         samples_.values.resize(std::min(wanted, samples_.values.size()));
         return std::move(samples_);
@@ -125,6 +130,38 @@ class Sampler {
     std::int64_t next_ = 0;              // boundary between samples
     double last_ = 0.0;                  // angle at the boundary before
 };
+
+using Stages = std::vector<std::unique_ptr<effects::SampleStage>>;
+
+/// What effects do to the samples, in the order in which it happens.
+Stages sample_stages(const Scenario& s, std::int64_t gyro) {
+    Stages stages;
+    const random::Identity who{s.ensemble.seed, static_cast<std::uint64_t>(gyro)};
+    for (const auto& [name, values] : s.effects) {
+        const effects::Effect* effect = effects::find(name);
+        if (!effect->active(values)) continue;
+        if (auto stage = effect->sample_stage(values, who)) stages.push_back(std::move(stage));
+    }
+    std::stable_sort(stages.begin(), stages.end(),
+                     [](const auto& a, const auto& b) { return a->place() < b->place(); });
+    return stages;
+}
+
+/// Samples as taken made into those of a record.
+void apply(const Stages& stages, double record_hz, double start_s, std::size_t wanted, record::Samples& samples) {
+    effects::Sampled sampled;
+    sampled.rate_hz = samples.rate_hz;
+    sampled.record_hz = record_hz;
+    sampled.start_s = start_s;
+    sampled.increment_arcsec = std::move(samples.values);
+    for (const auto& stage : stages) stage->apply(sampled);
+    samples.rate_hz = record_hz;
+    samples.t0_s = start_s + 1.0 / record_hz;
+    samples.values = std::move(sampled.increment_arcsec);
+    samples.values.resize(std::min(wanted, samples.values.size()));
+    samples.witnesses = std::move(sampled.witnesses);
+    for (auto& [name, values] : samples.witnesses) values.resize(samples.values.size());
+}
 
 void add_turns(const ensemble::GyroBlock& block, std::int64_t first_turn, double clock_hz, record::Turns& turns) {
     const readout::LaneReadings& readings = block.hardware(0);
@@ -192,18 +229,31 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
     const double end_s = block.turn_time_s(settle_turns + turns - 1, 0);
     out.declared = declared(s, start_s, end_s);
     if (samples) {
-        Sampler sampler(s.record.rate_hz, start_s);
+        const Stages stages = sample_stages(s, gyro);
+        double source_hz = s.record.rate_hz;
+        for (const auto& stage : stages) source_hz = stage->source_hz(source_hz);
+        const double source_rows = std::ceil(s.ensemble.duration_s * source_hz - 1e-9) + (stages.empty() ? 0.0 : 1.0);
+        if (!(source_rows <= static_cast<double>(most_rows))) {
+            throw InputError(
+                fmt::format("key \"effects.resampling.from_hz\" = {:g}: {:.3g} samples; at most {} are allowed",
+                            source_hz, source_rows, most_rows));
+        }
+        Sampler sampler(source_hz, start_s);
         const auto wanted = static_cast<std::size_t>(std::floor(rows + 1e-9));
-        // A few turns more, for the end of the last sample to lie between two of them.
-        advance(settle_turns + turns + 4, [&](std::int64_t first, std::size_t n) {
+        const auto taken = stages.empty() ? wanted : static_cast<std::size_t>(source_rows);
+        const auto sample = [&](std::int64_t first, std::size_t n) {
             const readout::LaneAngles& angles = block.angles(0);
             for (std::size_t i = 0; i < n; ++i) {
                 const double fringes = angles.angle_whole[i][0] + angles.angle_fringes[i][0];
                 sampler.add(block.turn_time_s(first + static_cast<std::int64_t>(i), 0),
                             s.gyro.scale_factor_arcsec * fringes);
             }
-        });
-        out.samples = sampler.finish(wanted);
+        };
+        // A few turns more, for the end of the last sample to lie between two of them.
+        advance(settle_turns + turns + 4, sample);
+        while (!stages.empty() && sampler.size() < taken) advance(turn + 2, sample);
+        out.samples = sampler.finish(taken);
+        if (!stages.empty()) apply(stages, s.record.rate_hz, start_s, wanted, *out.samples);
     } else {
         const bool clocked = s.readout.model != scenario::ReadoutModel::ideal && s.readout.clock_hz > 0.0;
         out.turns.emplace();

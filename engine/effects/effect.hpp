@@ -23,6 +23,7 @@ enum class Role {
     frequency,  ///< to be searched
     deviation,  ///< standard deviation of a random process: its square enters variances proportionally
     probability,
+    sampled,  ///< of what happens to uniform samples, 0 for nothing: found from these alone
     setting,  ///< any other way
 };
 
@@ -92,6 +93,33 @@ class LaneRateProcess {
     virtual void add_angles(const LaneIntervals& intervals, std::span<simd::Lanes> angle_arcsec) = 0;
 };
 
+/// Angle increments on their way into a record of uniform samples, and the instruments that watch beside the gyro.
+struct Sampled {
+    double rate_hz = 0.0;    ///< of the increments
+    double record_hz = 0.0;  ///< of the record that they end in
+    double start_s = 0.0;    ///< where the first increment begins, since the start of the run
+    std::vector<double> increment_arcsec = {};
+    std::map<std::string, std::vector<double>> witnesses =
+        {};  ///< by their names in a record, as long as the increments
+};
+
+/// What happens to the samples of one gyro.
+class SampleStage {
+   public:
+    /// Stages act in this order, whatever their names.
+    enum class Place {
+        motion,      ///< the case rotates
+        output,      ///< something is added to the angle that is put out
+        resolution,  ///< the angle becomes numbers
+        transport,   ///< the numbers become a record
+    };
+    virtual ~SampleStage() = default;
+    virtual Place place() const = 0;
+    /// Rate at which samples are taken for a record of that rate.
+    virtual double source_hz(double record_hz) const { return record_hz; }
+    virtual void apply(Sampled& samples) const = 0;
+};
+
 /// An effect: what it is called, what it needs, what it does to a gyro.
 class Effect {
    public:
@@ -121,6 +149,10 @@ class Effect {
     /// effect has something faster.
     virtual std::unique_ptr<LaneRateProcess> lane_rate_process(const Values& values, const random::LaneIdentities& who,
                                                                std::size_t lanes) const;
+    /// What the effect does to uniform samples beside all that, or null.
+    virtual std::unique_ptr<SampleStage> sample_stage(const Values& /*values*/, const random::Identity& /*who*/) const {
+        return nullptr;
+    }
 };
 
 /// All effects this program can simulate, in the order of their names.

@@ -25,6 +25,8 @@ enum class Purpose : std::uint64_t {
     comparator_noise = 11,
     missed_counts = 12,
     amplitude_wander = 13,
+    case_motion = 14,
+    witness_motion = 15,
 };
 
 /// Who draws: the study's seed and the gyro's number.

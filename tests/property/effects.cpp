@@ -21,7 +21,9 @@ using test::GyroRecord;
 using test::RandomScenarios;
 using test::simulate;
 
-bool makes_it_act(Role role) { return role == Role::size || role == Role::deviation || role == Role::probability; }
+bool makes_it_act(Role role) {
+    return role == Role::size || role == Role::deviation || role == Role::probability || role == Role::sampled;
+}
 
 /// Half-way to the upper bound, which is not the default of any parameter.
 double inside(const Parameter& p) { return 0.5 * p.max; }

@@ -24,6 +24,8 @@ std::string_view name_of(Role role) {
             return "deviation";
         case Role::probability:
             return "probability";
+        case Role::sampled:
+            return "sampled";
         case Role::setting:
             return "setting";
     }

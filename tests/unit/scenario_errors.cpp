@@ -144,8 +144,6 @@ const BadCase bad_cases[] = {
      "key \"effects.quantum_noise\" = 0.0001: must be a table, not a float; write [effects.quantum_noise]"},
     {"UnknownEffect", "[effects.quantum_nose]",
      "s.toml:1:10: section [effects.quantum_nose]: unknown effect (did you mean \"quantum_noise\"?); effects are: "},
-    {"PlannedEffect", "[effects.case_motion]\ncoherence = 0.1",
-     "section [effects.case_motion]: known but not there yet; effects are: base_vibration, "},
     {"UnknownParameter", "[effects.bias_step]\nstep = 1",
      "key \"effects.bias_step.step\" = 1: unknown key (did you mean \"step_deg_h\"?); keys of [effects.bias_step]: "},
     {"EmptyArms", "[arms]\nnames = []",

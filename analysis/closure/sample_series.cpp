@@ -1,0 +1,192 @@
+#include "analysis/closure/sample_series.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+#include "analysis/closure/chance.hpp"
+#include "engine/core/error.hpp"
+#include "engine/core/units.hpp"
+#include "engine/scenario/scenario.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+bool changes(const std::vector<double>& values) {
+    return std::any_of(values.begin(), values.end(), [&](double v) { return v != values.front(); });
+}
+
+/// Greatest common divisor of numbers that are known to `tolerance`.
+double common_divisor(double a, double b, double tolerance) {
+    while (b > tolerance) {
+        const double rest = std::abs(a - std::round(a / b) * b);
+        a = b;
+        b = rest;
+    }
+    return a;
+}
+
+}  // namespace
+
+SampleSeries prepare_samples(const record::Record& record) {
+    constexpr std::size_t fewest = 1000;
+    if (!record.samples) throw InputError("the record has neither /turns nor /samples");
+    const record::Samples& samples = *record.samples;
+    SampleSeries series;
+    series.rate_hz = samples.rate_hz;
+    series.interval_s = 1.0 / samples.rate_hz;
+    std::size_t first = 0;
+    if (samples.kind == record::SampleKind::angle_increment_arcsec) {
+        series.increment = samples.values;
+    } else {
+        series.counted = samples.kind == record::SampleKind::quarter_count;
+        const scenario::Scenario standard;
+        series.scale_factor_assumed = series.counted && !record.declared.scale_factor_arcsec;
+        series.scale_factor_arcsec = record.declared.scale_factor_arcsec.value_or(standard.gyro.scale_factor_arcsec);
+        first = 1;
+        for (std::size_t k = 1; k < samples.size(); ++k) {
+            series.increment.push_back(series.counted
+                                           ? 0.25 * series.scale_factor_arcsec *
+                                                 static_cast<double>(samples.counts[k] - samples.counts[k - 1])
+                                           : samples.values[k] - samples.values[k - 1]);
+        }
+    }
+    const std::size_t n = series.increment.size();
+    if (n < fewest) {
+        throw InputError(
+            fmt::format("/samples: {} of them are too few for the closed loop; at least {} are needed", n, fewest));
+    }
+    if (!changes(series.increment)) throw InputError("/samples: they never change; there is nothing to fit");
+    for (std::size_t i = 0; i < n; ++i) {
+        series.time_s.push_back(samples.t0_s + static_cast<double>(i + first) * series.interval_s);
+    }
+    for (const auto& [name, values] : samples.witnesses) {
+        if (!changes(values)) continue;
+        std::vector<double> cut(values.begin() + static_cast<std::ptrdiff_t>(first), values.end());
+        if (name == "temperature_c") {
+            series.temperature_change_k = std::move(cut);
+        } else {
+            series.witnesses.emplace_back(name, std::move(cut));
+        }
+    }
+    if (series.temperature_change_k.empty() && !record.temperature_c.empty() && changes(record.temperature_c.value)) {
+        for (const double t : series.time_s) series.temperature_change_k.push_back(record.temperature_c.at(t));
+    }
+    if (!series.temperature_change_k.empty()) {
+        // A thermometer's noise is faster than any temperature: means over a 500th of the record.
+        auto& t = series.temperature_change_k;
+        const std::size_t half = std::max<std::size_t>(1, n / 1000);
+        std::vector<double> sums(n + 1, 0.0);
+        for (std::size_t i = 0; i < n; ++i) sums[i + 1] = sums[i] + t[i];
+        for (std::size_t i = 0; i < n; ++i) {
+            const std::size_t a = i > half ? i - half : 0;
+            const std::size_t b = std::min(n, i + half + 1);
+            t[i] = (sums[b] - sums[a]) / static_cast<double>(b - a);
+        }
+        const double start = t.front();
+        for (double& value : t) value -= start;
+    }
+    if (!record.input_rate_deg_h.empty()) {
+        for (const double t : series.time_s) {
+            series.input_rate_deg_h.push_back(record.input_rate_deg_h.at(t - 0.5 * series.interval_s));
+        }
+    }
+    return series;
+}
+
+Lattice find_lattice(const std::vector<double>& increments) {
+    Lattice lattice;
+    std::vector<double> sorted = increments;
+    std::sort(sorted.begin(), sorted.end());
+    const std::size_t n = sorted.size();
+    const double range = sorted.back() - sorted.front();
+    double total = 0.0;
+    for (const double x : increments) total += std::abs(x);
+    const double tolerance = 1e-9 * range + 1e-13 * total;
+    std::vector<double> levels{sorted.front()};
+    for (const double x : sorted) {
+        if (x - levels.back() > tolerance) levels.push_back(x);
+    }
+    // Without a lattice no two values of so many digits are the same.
+    if (levels.size() > n / 4 || levels.size() < 2) return lattice;
+    double step = std::max(std::abs(levels.front()), range);
+    for (const double x : levels) {
+        if (std::abs(x) > tolerance)
+            step = common_divisor(std::max(step, std::abs(x)), std::min(step, std::abs(x)),
+                                  20.0 * tolerance + 1e-6 * range);
+    }
+    // Best over the levels, each a whole multiple.
+    double xy = 0.0;
+    double yy = 0.0;
+    for (const double x : levels) {
+        const double m = std::round(x / step);
+        xy += x * m;
+        yy += m * m;
+    }
+    step = xy / yy;
+    for (const double x : levels) {
+        if (std::abs(x / step - std::round(x / step)) > 0.02) return lattice;
+    }
+    lattice.printed_arcsec = lattice.step_arcsec = step;
+    lattice.strength = 1.0;
+    lattice.p_value = 0.0;
+    // A coarser one that the digits of the record blur: its characteristic function stands out between the bulk's, near
+    // zero, and the digits' own, at 1/printed.
+    std::vector<std::pair<double, double>> weights;  // level, how often; those not zero
+    double count = 0.0;
+    double second = 0.0;
+    const auto most = static_cast<std::int64_t>(std::llround(std::max(-sorted.front(), sorted.back()) / step));
+    if (most > 200000) return lattice;
+    std::vector<double> often(static_cast<std::size_t>(2 * most + 1), 0.0);
+    for (const double x : sorted) often[static_cast<std::size_t>(std::llround(x / step) + most)] += 1.0;
+    for (std::int64_t m = -most; m <= most; ++m) {
+        const double w = often[static_cast<std::size_t>(m + most)];
+        if (m == 0 || w == 0.0) continue;
+        weights.emplace_back(static_cast<double>(m) * step, w);
+        count += w;
+    }
+    const double quartile = 0.5 * (sorted[n * 7 / 8] - sorted[n / 8]);  // 1.15 sigma
+    for (const auto& [x, w] : weights) second += std::min(x * x, 9.0 * quartile * quartile + 1e-300) * w / count;
+    const double sigma = std::sqrt(second);
+    const auto characteristic = [&](double u) {
+        std::complex<double> sum = 0.0;
+        for (const auto& [x, w] : weights) sum += w * std::polar(1.0, units::two_pi * u * x);
+        return std::abs(sum) / count;
+    };
+    const double lowest = 1.5 / sigma;
+    const double highest = 0.5 / step;
+    if (!(lowest < highest)) return lattice;
+    const double du = 0.02 / sigma;
+    const auto places = static_cast<std::size_t>((highest - lowest) / du) + 1;
+    double best = 0.0;
+    double at = 0.0;
+    for (std::size_t k = 0; k < places; ++k) {
+        const double u = lowest + static_cast<double>(k) * du;
+        const double c = characteristic(u);
+        if (c > best) {
+            best = c;
+            at = u;
+        }
+    }
+    for (double d = du; d > 1e-7 * at; d *= 0.5) {
+        for (const double u : {at - d, at + d}) {
+            const double c = characteristic(u);
+            if (c > best) {
+                best = c;
+                at = u;
+            }
+        }
+    }
+    const double p = of_several(std::exp(-count * best * best), static_cast<double>(places));
+    if (best > 0.3 && p < 1e-6 && at < highest) {
+        lattice.step_arcsec = 1.0 / at;
+        lattice.strength = best;
+        lattice.p_value = p;
+    }
+    return lattice;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,38 @@
+#pragma once
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/record/record.hpp"
+
+namespace ringlock::closure {
+
+/// A record of uniform samples as the loop wants it: increments, and what may go with them.
+struct SampleSeries {
+    double rate_hz = 0.0;
+    double interval_s = 0.0;
+    std::vector<double> time_s;                                          ///< at the end of each increment
+    std::vector<double> increment;                                       ///< [arcsec]
+    std::vector<std::pair<std::string, std::vector<double>>> witnesses;  ///< accelerations that change
+    std::vector<double> temperature_change_k;                            ///< empty where there is none
+    std::vector<double> input_rate_deg_h;                                ///< empty where there is none
+    bool counted = false;                                                ///< by kind whole counts
+    double scale_factor_arcsec = 0.0;                                    ///< of counts
+    bool scale_factor_assumed = false;
+
+    std::size_t size() const { return increment.size(); }
+};
+
+/// Throws InputError where the record has too few samples or none that change.
+SampleSeries prepare_samples(const record::Record& record);
+
+/// Steps that values come in.
+struct Lattice {
+    double printed_arcsec = 0.0;  ///< all values are whole multiples of it; 0: of none
+    double step_arcsec = 0.0;     ///< coarser one below, blurred by that; else the same
+    double strength = 0.0;        ///< of the coarser: length of the mean of exp(2 pi i value/step) over values not zero
+    double p_value = 1.0;
+};
+Lattice find_lattice(const std::vector<double>& increments);
+
+}  // namespace ringlock::closure

@@ -1,0 +1,25 @@
+#pragma once
+#include <vector>
+
+#include "analysis/closure/independence.hpp"
+#include "analysis/closure/sample_fit.hpp"
+
+namespace ringlock::closure {
+
+/// Stretches of the record whose residual is far larger than usual: 1 for each row in one.
+struct Disturbed {
+    Rows rows;
+    double share = 0.0;
+    double worst = 1.0;     ///< largest mean square over the usual one
+    double at_s = 0.0;      ///< where
+    double length_s = 0.0;  ///< of a stretch
+    double p_value = 1.0;   ///< of the worst, if the residual were normal
+};
+Disturbed find_disturbed(const SampleFit& fit);
+
+/// Holds the innovations that count against everything that the record has: time, frequency, the place in the record
+/// modulo small numbers, witnesses, temperature, input rate, their own size.
+/// \param lattice_arcsec  steps of the values, which are not normal then
+std::vector<ResidualTest> test_samples(const SampleFit& fit, double lattice_arcsec);
+
+}  // namespace ringlock::closure

@@ -1,0 +1,69 @@
+#include <array>
+#include <cmath>
+
+#include "engine/core/units.hpp"
+#include "engine/effects/effect.hpp"
+
+namespace ringlock::effects {
+namespace {
+
+constexpr std::array parameters_of = {
+    Parameter{"frequency_hz", 50.0, 1e-6, 1e5, Role::frequency, "frequency in the middle of the record"},
+    Parameter{"drift_hz_per_s", 0.0, -10.0, 10.0, Role::frequency, "change of the frequency"},
+    Parameter{"amplitude_arcsec", 0.0, 0.0, 1e5, Role::sampled, "amplitude of the angle"},
+};
+
+class Stage final : public SampleStage {
+   public:
+    explicit Stage(const Values& values)
+        : frequency_hz_(values.at("frequency_hz")),
+          drift_hz_per_s_(values.at("drift_hz_per_s")),
+          amplitude_arcsec_(values.at("amplitude_arcsec")) {}
+    Place place() const override { return Place::output; }
+    void apply(Sampled& samples) const override {
+        const double middle_s = 0.5 * static_cast<double>(samples.increment_arcsec.size()) / samples.rate_hz;
+        const auto angle = [&](std::size_t boundary) {
+            const double t = static_cast<double>(boundary) / samples.rate_hz - middle_s;
+            const double turns = frequency_hz_ * t + 0.5 * drift_hz_per_s_ * t * t;
+            return amplitude_arcsec_ * std::sin(units::two_pi * (turns - std::floor(turns)));
+        };
+        double before = angle(0);
+        for (std::size_t i = 0; i < samples.increment_arcsec.size(); ++i) {
+            const double now = angle(i + 1);
+            samples.increment_arcsec[i] += now - before;
+            before = now;
+        }
+    }
+
+   private:
+    double frequency_hz_, drift_hz_per_s_, amplitude_arcsec_;
+};
+
+class DitherResidue final : public Effect {
+   public:
+    std::string_view name() const override { return "dither_residue"; }
+    std::string_view summary() const override {
+        return "Dither that was not stripped whole, at its frequency or its alias; in records of samples only.";
+    }
+    std::string_view equation() const override {
+        return "angle = A sin(2 pi (f t + d t^2/2)), t from the middle of the record: what an error of gain or delay "
+               "of "
+               "the "
+               "dither's pick-off leaves (Killpatrick, IEEE Spectrum 4(10), 44, 1967). In increments A becomes 2 A "
+               "|sin(pi f/rate)|; above half the rate it shows at its alias.";
+    }
+    std::span<const Parameter> parameters() const override { return parameters_of; }
+    bool active(const Values& values) const override { return values.at("amplitude_arcsec") != 0.0; }
+    std::unique_ptr<SampleStage> sample_stage(const Values& values, const random::Identity& /*who*/) const override {
+        return std::make_unique<Stage>(values);
+    }
+};
+
+}  // namespace
+
+const Effect& dither_residue() {
+    static const DitherResidue effect;
+    return effect;
+}
+
+}  // namespace ringlock::effects
