@@ -136,11 +136,22 @@ std::string experiment_for(const std::string& effect, const std::vector<std::str
 /// nearest to something that the library does not have.
 ///
 /// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do.
-bool something_else(const TurnFit& fit, const effects::Effect& effect, double merit) {
+bool something_else(const TurnFit& fit, const effects::Effect& effect, double score, double full) {
     const auto tests = test_residual(fit);
     return std::any_of(tests.begin(), tests.end(), [&](const ResidualTest& test) {
         const bool in_step = test.where == Where::phase && effect.adds_angle();
-        return test.merit > merit + (in_step ? -tie : tie);
+        return test.merit > (in_step ? score - tie : std::max(score, full) + tie);
+    });
+}
+
+/// The view that says most of where structure lies: of those that fail, a regression that explains it before a test
+/// that only sees it.
+const ResidualTest& most_telling(const std::vector<ResidualTest>& tests, double threshold) {
+    return *std::min_element(tests.begin(), tests.end(), [&](const ResidualTest& a, const ResidualTest& b) {
+        const double merit_a = a.p_value < threshold ? a.merit : 0.0;
+        const double merit_b = b.p_value < threshold ? b.merit : 0.0;
+        if (merit_a > 0.0 || merit_b > 0.0) return merit_a > merit_b;
+        return a.p_value < b.p_value;
     });
 }
 
@@ -236,7 +247,7 @@ Closure close_turns(const record::Record& record) {
                   [](const Contender& a, const Contender& b) { return a.merit > b.merit; });
         Contender& best = contenders.front();
         // Views and candidates are compared by their scores, with the noise as it is.
-        if (!side && something_else(*now->fit, *best.candidate.effect, 0.5 * merit(best.candidate))) break;
+        if (!side && something_else(*now->fit, *best.candidate.effect, 0.5 * merit(best.candidate), best.merit)) break;
         // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
         const double chi2 = 2.0 * (best.fitted->fit->log_likelihood() - now->fit->log_likelihood());
         const double p_full =
@@ -265,11 +276,9 @@ Closure close_turns(const record::Record& record) {
     closure.heldout_after = last.error;
     closure.noise_floor = last.floor;
     closure.tests = test_residual(*now->fit);
-    const auto worst = std::min_element(closure.tests.begin(), closure.tests.end(),
-                                        [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
-    if (of_several(worst->p_value, static_cast<double>(closure.tests.size())) < level_of_residual) {
-        closure.unexplained = *worst;
-    }
+    const double threshold = level_of_residual / static_cast<double>(closure.tests.size());
+    const ResidualTest& worst = most_telling(closure.tests, threshold);
+    if (worst.p_value < threshold) closure.unexplained = worst;
     closure.residual.time_s = turns.time_s;
     for (std::size_t i = 0; i < turns.size(); ++i) {
         const double sd = now->fit->sd_rad()[i];

@@ -79,8 +79,6 @@ TEST_F(RunCommand, BadScenariosAreRefusedWithPlaceKeyValueAndWhatIsAllowed) {
                             says("bad.toml:2:9", "compensated_adaptive", "readout.model = \"instrument\""));
     expect_scenario_refused("[arms]\nnames = []\n", says("bad.toml:2:9", "arms.names", "empty"));
     expect_scenario_refused("[arms]\nnames = [\"ideal\", \"ideal\"]\n", says("bad.toml:2:19", "stands twice"));
-    expect_scenario_refused("[effects.case_motion]\ncoherence = 0.1\n",
-                            says("bad.toml:1:", "effects.case_motion", "not there yet"));
     expect_scenario_refused("[effects.gremlins]\nnumber = 3\n", says("bad.toml:1:", "gremlins", "unknown effect"));
     expect_scenario_refused("[input]\nrate_deg_h = 250000.0\n",
                             says("bad.toml:2:14", "input.rate_deg_h", "250000", "must stay below", "deg/h"));
@@ -165,7 +163,7 @@ TEST_F(RunCommand, WrongCommandLinesAreRefused) {
 }
 
 TEST_F(RunCommand, PlannedCommandsSayThatTheyAreNotThereYet) {
-    for (const char* command : {"merge", "replay", "closure", "report"}) {
+    for (const char* command : {"merge", "replay", "report"}) {
         expect_refused({command}, AllOf(HasSubstr(command), HasSubstr("not there yet")));
         expect_refused({command, "a.h5", "-o", "b.h5", "--json"},
                        AllOf(HasSubstr(command), HasSubstr("not there yet")));

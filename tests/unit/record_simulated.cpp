@@ -279,8 +279,7 @@ TEST(SimulatedRecord, RefusesWhatCannotBe) {
     EXPECT_THAT(test::message_of<InputError>([&] { simulate_record(s, 3); }), HasSubstr("0 to 2"));
     s.noise_injection.turn_phase_rms_rad = 2000.0;
     s.arms = {"uncompensated"};
-    EXPECT_THAT(test::message_of<InputError>([&] { simulate_record(s); }),
-                AllOf(HasSubstr("record.trajectory"), HasSubstr("turn_phase_rms_rad")));
+    EXPECT_THAT(test::message_of<InputError>([&] { simulate_record(s); }), HasSubstr("record.trajectory"));
     s = short_run();
     s.ensemble.duration_s = 1e9;
     EXPECT_THAT(test::message_of<InputError>([&] { simulate_record(s); }), HasSubstr("ensemble.duration_s"));
