@@ -8,6 +8,7 @@
 #include <unsupported/Eigen/FFT>
 
 #include "analysis/closure/chance.hpp"
+#include "analysis/closure/decision.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -212,22 +213,7 @@ void test_size(const TurnFit& fit, std::vector<ResidualTest>& tests) {
     }
     mean /= count;
     const double variance = std::max(fourth / count - mean * mean, 1e-12);
-    constexpr std::size_t stretches = 20;
-    double chi2 = 0.0;
-    int freedom = -1;
-    for (std::size_t s = 0; s < stretches; ++s) {
-        double sum = 0.0;
-        double k = 0.0;
-        for (std::size_t i = n * s / stretches; i < n * (s + 1) / stretches; ++i) {
-            if (!rows[i]) continue;
-            sum += e[i] * e[i] - mean;
-            k += 1.0;
-        }
-        if (k < 8.0) continue;
-        chi2 += sum * sum / (k * variance);
-        ++freedom;
-    }
-    tests.push_back({Where::time, "size of the residual in stretches of the record", chi2_tail(chi2, freedom), ""});
+    tests.push_back(size_over_time(e, rows, 20, 8.0));
     constexpr int columns = 8;
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(columns);

@@ -41,6 +41,11 @@ void write_text(const std::filesystem::path& path, const std::string& text) {
     target.commit();
 }
 
+std::string value_text(const Estimate& e) {
+    if (!std::isfinite(e.sd)) return fmt::format("  {:<26} {:>14.8g}    (no standard error)", e.name, e.value);
+    return fmt::format("  {:<26} {:>14.8g} +- {:.2g}", e.name, e.value, e.sd);
+}
+
 double value_of(const std::vector<Estimate>& estimates, std::string_view name, double otherwise) {
     for (const Estimate& estimate : estimates) {
         if (estimate.name == name && std::isfinite(estimate.value)) return estimate.value;
@@ -110,14 +115,13 @@ std::string to_text(const Closure& closure) {
     }
     line("");
     line("base model:");
-    for (const Estimate& e : closure.base) line(fmt::format("  {:<26} {:>14.8g} +- {:.2g}", e.name, e.value, e.sd));
+    for (const Estimate& e : closure.base) line(value_text(e));
     for (std::size_t k = 0; k < closure.steps.size(); ++k) {
         const Step& step = closure.steps[k];
         line("");
         line(fmt::format("step {}: {}   (by chance: p {})", k + 1, step.effect, probability(step.p_value)));
         for (const Estimate& e : step.parameters) {
-            line(e.text.empty() ? fmt::format("  {:<26} {:>14.8g} +- {:.2g}", e.name, e.value, e.sd)
-                                : fmt::format("  {:<26} {:>14}", e.name, e.text));
+            line(e.text.empty() ? value_text(e) : fmt::format("  {:<26} {:>14}", e.name, e.text));
         }
         line(fmt::format("  held-out error {:.6g} -> {:.6g} {}, log-score +{:.1f}", step.heldout_error_before,
                          step.heldout_error_after, closure.unit, step.heldout_log_score_gain));

@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <limits>
 #include <memory>
 #include <numbers>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/closure.hpp"
+#include "analysis/closure/decision.hpp"
 #include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_screen.hpp"
 #include "analysis/closure/sample_search.hpp"
 #include "analysis/closure/sample_series.hpp"
 #include "analysis/closure/sample_tests.hpp"
@@ -19,41 +21,13 @@ namespace ringlock::closure {
 
 namespace {
 
-/// As for turns: one family-wise level for everything that a record is asked.
-constexpr double level = 0.003;
-constexpr double level_of_effects = 0.002;
-constexpr double level_of_residual = level - level_of_effects;
-constexpr double tie = 4.0;
-constexpr std::size_t most_steps = 8;
-constexpr std::size_t most_contenders = 5;
 /// What samples can tell of; the rest of the library needs turns.
 constexpr double effects_on_samples = 12.0;
 
-/// Contiguous blocks: of ten, five are fitted (1), two decide whether what was found there holds (2), three are only
-/// reported (0).
-Rows chosen_blocks(std::size_t size) {
-    constexpr std::size_t blocks = 40;
-    constexpr std::uint8_t chooses[10] = {1, 1, 0, 1, 2, 0, 1, 2, 0, 1};
-    Rows rows(size);
-    for (std::size_t i = 0; i < size; ++i) rows[i] = chooses[i * blocks / size % 10];
-    return rows;
-}
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();  // a standard error that is not computed
 
-std::shared_ptr<const std::vector<double>> shared(std::vector<double> values) {
-    return std::make_shared<const std::vector<double>>(std::move(values));
-}
-
-/// A model that the loop may go on with.
-struct Candidate {
-    std::string effect = {};
-    SampleModel model = {};
-    double p_value = 1.0;
-    double searched = 1.0;
-    int parameters = 1;
-    bool wanders = false;                      ///< a line as a narrow resonance
-    std::vector<Estimate> told = {};           ///< parameters that are no columns and no knobs
-    std::vector<std::string> confounded = {};  ///< the same model by other names
-};
+/// Of ten blocks, five are fitted (1), two decide whether what was found there holds (2), three are only reported (0).
+constexpr BlockRoles roles{1, 1, 0, 1, 2, 0, 1, 2, 0, 1};
 
 struct Score {
     double error = 0.0;
@@ -98,38 +72,16 @@ Score heldout(const SampleFit& fit, const Rows& reported, double lattice) {
     return score;
 }
 
-SampleColumn rate_column(const SampleSeries& series, std::string effect, std::string name,
-                         const std::function<double(std::size_t)>& rate) {
-    std::vector<double> values(series.size());
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = rate(i) * series.interval_s;
-    return {std::move(effect), std::move(name), shared(std::move(values))};
-}
-
-bool has(const SampleModel& model, std::string_view effect) {
-    return std::any_of(model.columns.begin(), model.columns.end(), [&](const auto& c) { return c.effect == effect; });
-}
-
-/// Alias of a frequency at that rate.
-double alias(double hz, double rate_hz) {
-    const double turns = hz / rate_hz;
-    return std::abs(turns - std::round(turns)) * rate_hz;
-}
-
 class Loop {
    public:
     explicit Loop(const record::Record& record)
-        : record_(record), series_(prepare_samples(record)), chosen_(chosen_blocks(series_.size())) {}
+        : record_(record), series_(prepare_samples(record)), chosen_(by_blocks(series_.size(), roles)) {}
 
     Closure run();
 
    private:
-    void screen_rates(const SampleFit& now, std::vector<Candidate>& out) const;
-    void screen_noises(const SampleFit& now, std::vector<Candidate>& out) const;
-    void screen_line(const SampleFit& now, std::vector<Candidate>& out) const;
-    void screen_resampling(const SampleFit& now, std::vector<Candidate>& out) const;
-    void screen_witnesses(const SampleFit& now, std::vector<Candidate>& out) const;
     std::vector<Estimate> estimates_of(const std::string& effect, const SampleFit& fit,
-                                       const Candidate& candidate) const;
+                                       const SampleCandidate& candidate) const;
     void take_lattice(Closure& closure, const SampleFit& now);
 
     const record::Record& record_;
@@ -143,276 +95,8 @@ class Loop {
     double used_step_ = 0.0;        ///< of the lattice in the model
 };
 
-void Loop::screen_rates(const SampleFit& now, std::vector<Candidate>& out) const {
-    const std::size_t n = series_.size();
-    const SampleModel& model = now.model();
-    // Where the model has left something, slow sums move more than white innovations would let them: by that much less
-    // is a slow rate's chi-squared worth.
-    double spread = 0.0;
-    double sums = 0.0;
-    const std::size_t length = std::max<std::size_t>(16, n / 1000);
-    for (std::size_t a = 0; a + length <= n; a += length) {
-        double sum = 0.0;
-        double count = 0.0;
-        for (std::size_t i = a; i < a + length; ++i) {
-            if (!rows_[i]) continue;
-            sum += now.innovations()[i];
-            count += 1.0;
-        }
-        if (count < 0.5 * static_cast<double>(length)) continue;
-        spread += sum * sum / count;
-        sums += 1.0;
-    }
-    const double worth = sums > 20.0 ? std::min(1.0, sums / spread) : 1.0;
-    const auto one = [&](const std::string& effect, const std::string& parameter,
-                         const std::function<double(std::size_t)>& rate) {
-        if (has(model, effect)) return;
-        SampleColumn column = rate_column(series_, effect, parameter, rate);
-        const auto score = now.score({*column.series});
-        if (score.rank == 0) return;
-        Candidate c{.effect = effect, .model = model, .p_value = chi2_tail(worth * score.chi2, 1)};
-        c.model.columns.push_back(std::move(column));
-        out.push_back(std::move(c));
-    };
-    one("bias_ramp", "deg_h_per_h",
-        [&](std::size_t i) { return (static_cast<double>(i) + 0.5) * series_.interval_s / 3600.0; });
-    if (!series_.temperature_change_k.empty()) {
-        one("bias_temperature", "deg_h_per_k", [&](std::size_t i) { return series_.temperature_change_k[i]; });
-    }
-    if (!series_.input_rate_deg_h.empty()) {
-        const auto [low, high] = std::minmax_element(series_.input_rate_deg_h.begin(), series_.input_rate_deg_h.end());
-        if (*high > *low)
-            one("scale_factor_error", "relative", [&](std::size_t i) { return series_.input_rate_deg_h[i]; });
-    }
-    if (has(model, "bias_step")) return;
-    // Steps: everywhere, coarsely, then about the best.
-    std::vector<double> roots;
-    double best = 0.0;
-    std::size_t at = 0;
-    const auto root_at = [&](std::size_t row) {
-        std::vector<double> step(n, 0.0);
-        std::fill(step.begin() + static_cast<std::ptrdiff_t>(row), step.end(), series_.interval_s);
-        const auto score = now.score({step});
-        return score.rank == 0 ? 0.0 : std::copysign(std::sqrt(worth * score.chi2), score.value[0]);
-    };
-    constexpr std::size_t places = 80;
-    for (std::size_t k = 1; k < places; ++k) {
-        const double root = root_at(n * k / places);
-        roots.push_back(root);
-        if (std::abs(root) > best) {
-            best = std::abs(root);
-            at = n * k / places;
-        }
-    }
-    const double p = davies_bound(best * best, roots);
-    if (p > 0.01) return;
-    for (std::size_t d = n / places / 2; d > 0; d /= 2) {
-        for (const std::size_t row : {at > d ? at - d : at, std::min(n - 1, at + d)}) {
-            const double root = std::abs(root_at(row));
-            if (root > best) {
-                best = root;
-                at = row;
-            }
-        }
-    }
-    Candidate c{
-        .effect = "bias_step", .model = model, .p_value = p, .searched = static_cast<double>(places), .parameters = 2};
-    const double when = series_.time_s[at] - series_.interval_s;
-    c.model.columns.push_back(
-        rate_column(series_, "bias_step", "step_deg_h", [&](std::size_t i) { return i >= at ? 1.0 : 0.0; }));
-    // As well as the step's own size is known: its chi-squared falls by one.
-    c.told.push_back(
-        {"bias_step", "time_s", when, static_cast<double>(n) * series_.interval_s / std::max(4.0, best * best)});
-    out.push_back(std::move(c));
-}
-
-void Loop::screen_noises(const SampleFit& now, std::vector<Candidate>& out) const {
-    const auto one = [&](const std::string& effect, SampleModel model) {
-        const SampleFit fit(series_, std::move(model), rows_);
-        const double chi2 = std::max(0.0, 2.0 * (fit.log_likelihood() - now.log_likelihood()));
-        // A variance cannot be negative: half of the time there is no gain at all (Chernoff 1954).
-        out.push_back({.effect = effect, .model = fit.model(), .p_value = 0.5 * chi2_tail(chi2, 1)});
-    };
-    const double duration_s = static_cast<double>(series_.size()) * series_.interval_s;
-    const double known =
-        now.model().noise.rate_arcsec_rt_s / std::sqrt(duration_s) + now.model().noise.angle_arcsec / duration_s;
-    // Only where sums over long stretches move more than the white noises let them.
-    {
-        std::vector<std::vector<double>> slow;
-        for (int k = 1; k <= 12; ++k) {
-            std::vector<double> rate(series_.size());
-            for (std::size_t i = 0; i < rate.size(); ++i) {
-                rate[i] = std::cos(units::pi * k * (static_cast<double>(i) + 0.5) / static_cast<double>(rate.size()));
-            }
-            slow.push_back(std::move(rate));
-        }
-        const auto score = now.score(slow);
-        if (chi2_tail(score.chi2, score.rank) > 0.01) return;
-    }
-    if (!now.model().walk) {
-        SampleModel model = now.model();
-        model.walk = true;
-        model.noise.walk_arcsec2_s3 = 10.0 * known * known / duration_s;
-        one("rate_random_walk", model);
-    }
-    if (!now.model().flicker) {
-        SampleModel model = now.model();
-        model.flicker = true;
-        model.flicker_deg_h = 3.0 * known;
-        model.noise.terms = flicker_terms(model.flicker_deg_h, 4.0 * series_.interval_s, duration_s);
-        one("bias_instability", model);
-    }
-}
-
-void Loop::screen_line(const SampleFit& now, std::vector<Candidate>& out) const {
-    std::vector<double> e = now.innovations();
-    for (std::size_t i = 0; i < e.size(); ++i) {
-        if (!rows_[i]) e[i] = 0.0;
-    }
-    const double duration_s = static_cast<double>(series_.size()) * series_.interval_s;
-    // What is left beside a line that is in the model is that line, not being what the model says.
-    const FoundLine line = find_line(e, series_.rate_hz, true, lines_hz_, 64.0 / duration_s);
-    if (!(line.p_value < 0.01)) return;
-    Candidate c{.model = now.model(), .p_value = line.p_value, .searched = line.searched, .parameters = 3};
-    const bool drifts =
-        line.chi2 - line.chi2_still > 25.0 && std::abs(line.drift_hz_per_s) * duration_s * duration_s > 1.0;
-    bool dither = drifts;
-    bool declared = false;
-    if (record_.declared.dither_frequency_hz) {
-        for (int h = 1; h <= 3; ++h) {
-            const double hz = alias(h * *record_.declared.dither_frequency_hz, series_.rate_hz);
-            if (std::abs(line.frequency_hz - hz) < 0.005 * h * *record_.declared.dither_frequency_hz) declared = true;
-        }
-    }
-    dither = dither || declared;
-    const bool fast = line.frequency_hz > 30.0;
-    c.effect = dither || fast ? "dither_residue" : "base_vibration";
-    if (!dither) c.confounded.emplace_back(fast ? "base_vibration" : "dither_residue");
-    if (line.scattered > 3.0 * line.chi2 + 100.0) {
-        // Its phase does not keep over the record: a narrow resonance. Slow ones are what a base does as well.
-        if (!fast && !declared) return;
-        c.effect = "dither_residue";
-        if (!declared) c.confounded = {"base_vibration"};
-        c.wanders = true;
-        double squares = 0.0;
-        double rows = 0.0;
-        for (std::size_t i = 0; i < e.size(); ++i) {
-            squares += e[i] * e[i];
-            rows += rows_[i];
-        }
-        // Power over the level is chi-squared of two a piece; the angle's increments have 2 sin of it.
-        const double sd = now.sd(0) * std::sqrt(squares / rows);
-        const double gain = 2.0 * std::sin(units::pi * line.scattered_hz / series_.rate_hz);
-        const double rms = sd * std::sqrt(line.scattered / rows) / std::max(gain, 1e-6);
-        c.told.push_back({c.effect, "frequency_hz", line.scattered_hz, 0.0});
-        c.model.noise.resonances.push_back({rms, line.scattered_hz, 64.0 / duration_s});
-        c.model.resonances.push_back(c.effect);
-        out.push_back(std::move(c));
-        return;
-    }
-    const auto phase =
-        line_phase(series_.size(), series_.rate_hz, line.frequency_hz, drifts ? line.drift_hz_per_s : 0.0);
-    std::vector<double> cosine(phase.size());
-    std::vector<double> sine(phase.size());
-    for (std::size_t i = 0; i < phase.size(); ++i) {
-        cosine[i] = std::cos(phase[i]);
-        sine[i] = std::sin(phase[i]);
-    }
-    const double sd_hz = std::sqrt(6.0) / (units::pi * duration_s * std::sqrt(std::max(line.chi2, 1.0)));
-    c.told.push_back({c.effect, "frequency_hz", line.frequency_hz, sd_hz});
-    if (c.effect == "dither_residue") {
-        c.told.push_back({c.effect, "drift_hz_per_s", drifts ? line.drift_hz_per_s : 0.0,
-                          drifts ? std::sqrt(45.0 * 16.0) /
-                                       (units::pi * duration_s * duration_s * std::sqrt(std::max(line.chi2, 1.0)))
-                                 : 0.0});
-    }
-    c.model.columns.push_back({c.effect, "cosine", shared(std::move(cosine))});
-    c.model.columns.push_back({c.effect, "sine", shared(std::move(sine))});
-    out.push_back(std::move(c));
-}
-
-void Loop::screen_resampling(const SampleFit& now, std::vector<Candidate>& out) const {
-    if (now.model().noise.from_hz > 0.0) return;
-    const FoundCycle cycle = find_cycle(now.innovations(), rows_, series_.rate_hz);
-    if (!(cycle.p_value < level_of_effects)) return;
-    // Rates whose distance from a multiple of the record's is that frequency, by likelihood on a part of the record.
-    const double rate = series_.rate_hz;
-    const std::size_t part = std::min<std::size_t>(series_.size(), 20000);
-    double best = -1e300;
-    SampleModel found;
-    int tried = 0;
-    for (int m = 0; m <= 4; ++m) {
-        for (const int sign : {-1, 1}) {
-            const double from = m * rate + sign * cycle.frequency_hz;
-            if (from < 0.3 * rate || from > 4.5 * rate || std::abs(from - rate) < 1e-9 * rate) continue;
-            for (int place = 0; place < 8; ++place) {
-                SampleModel model = now.model();
-                model.noise.from_hz = from;
-                model.noise.from_phase = 0.125 * place;
-                model.noise.blur_arcsec = 0.2 * now.sd(0);
-                ++tried;
-                const SampleFilter filter(model.noise, part, series_.interval_s);
-                const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
-                // The scale free, all else as it is.
-                double squares = 0.0;
-                double logs = 0.0;
-                double count = 0.0;
-                for (std::size_t i = 0; i < part; ++i) {
-                    if (!rows_[i]) continue;
-                    squares += e[i] * e[i];
-                    logs += std::log(filter.sd(i));
-                    count += 1.0;
-                }
-                const double value = -0.5 * count * std::log(squares / count) - logs;
-                if (value > best) {
-                    best = value;
-                    found = model;
-                }
-            }
-        }
-    }
-    if (tried == 0) return;
-    out.push_back({.effect = "resampling",
-                   .model = found,
-                   .p_value = cycle.p_value,
-                   .searched = cycle.searched,
-                   .parameters = 2});
-}
-
-void Loop::screen_witnesses(const SampleFit& now, std::vector<Candidate>& out) const {
-    if (series_.witnesses.empty() || !now.model().motion.empty()) return;
-    const FoundWitness witness = find_witness(now.innovations(), rows_, series_);
-    if (!(witness.p_value < level_of_effects)) return;
-    const WitnessMotion motion = fit_witness(now, series_.witnesses[witness.index].second);
-    Candidate c{.effect = "case_motion",
-                .model = now.model(),
-                .p_value = witness.p_value,
-                .searched = static_cast<double>(series_.witnesses.size()),
-                .parameters = 2 * witness.lags + 1};
-    c.model.motion = motion.increments;
-    // What the witness does not tell moves like what it tells; its own noise hides the edges of that.
-    const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
-    c.model.noise.resonances.push_back(
-        {untold, std::max(motion.centre_hz, 0.01), std::max(0.5 * motion.centre_hz, 0.01)});
-    c.model.noise.resonances.push_back({0.3 * untold, 1.0, 1.0});
-    c.model.resonances.insert(c.model.resonances.end(), 2, "case_motion");
-    // Once more with what is left as the noise.
-    const SampleFit first(series_, c.model, rows_);
-    const auto& watched = series_.witnesses[witness.index].second;
-    c.model = first.model();
-    const WitnessMotion more = fit_witness(first, watched);
-    for (std::size_t i = 0; i < c.model.motion.size(); ++i) c.model.motion[i] += more.increments[i];
-    Estimate name{"case_motion", "witness", static_cast<double>(witness.name.back() - 'x'), 0.0, witness.name};
-    c.told.push_back(std::move(name));
-    const double pieces = std::max(2.0, static_cast<double>(series_.size()) / 1024.0);
-    c.told.push_back({"case_motion", "coherence", motion.coherence,
-                      (1.0 - motion.coherence) * std::sqrt(2.0 * motion.coherence / (3.0 * pieces))});
-    c.told.push_back({"case_motion", "rms_arcsec", motion.rms_arcsec, 0.0});
-    out.push_back(std::move(c));
-}
-
 std::vector<Estimate> Loop::estimates_of(const std::string& effect, const SampleFit& fit,
-                                         const Candidate& candidate) const {
+                                         const SampleCandidate& candidate) const {
     std::vector<Estimate> all = candidate.told;
     const SampleModel& model = fit.model();
     const auto& columns = model.columns;
@@ -446,8 +130,8 @@ std::vector<Estimate> Loop::estimates_of(const std::string& effect, const Sample
     }
     const double count = static_cast<double>(series_.size());
     if (effect == "rate_random_walk")
-        all.push_back({effect, "deg_h_rt_h", 60.0 * std::sqrt(model.noise.walk_arcsec2_s3), 0.0});
-    if (effect == "bias_instability") all.push_back({effect, "deg_h", model.flicker_deg_h, 0.0});
+        all.push_back({effect, "deg_h_rt_h", 60.0 * std::sqrt(model.noise.walk_arcsec2_s3), unknown});
+    if (effect == "bias_instability") all.push_back({effect, "deg_h", model.flicker_deg_h, unknown});
     if (effect == "resampling") {
         const double seconds = count * series_.interval_s;
         all.push_back({effect, "from_hz", model.noise.from_hz, 1.0 / seconds});
@@ -456,28 +140,15 @@ std::vector<Estimate> Loop::estimates_of(const std::string& effect, const Sample
         if (model.resonances[k] != effect) continue;
         const auto& resonance = model.noise.resonances[k];
         if (effect == "case_motion") {
-            all.push_back({effect, "centre_hz", resonance.hz, 0.0});
-            all.push_back({effect, "width_hz", resonance.width_hz, 0.0});
+            all.push_back({effect, "centre_hz", resonance.hz, unknown});
+            all.push_back({effect, "width_hz", resonance.width_hz, unknown});
         } else {
-            all.push_back({effect, "amplitude_arcsec", std::numbers::sqrt2 * resonance.arcsec, 0.0});
-            all.push_back({effect, "wander_hz", resonance.width_hz, 0.0});
+            all.push_back({effect, "amplitude_arcsec", std::numbers::sqrt2 * resonance.arcsec, unknown});
+            all.push_back({effect, "wander_hz", resonance.width_hz, unknown});
         }
         break;
     }
     return all;
-}
-
-/// What would tell two effects apart that this record cannot.
-std::string experiment_for(const std::string& effect, const std::vector<std::string>& others) {
-    const auto named = [&](std::string_view name) {
-        return effect == name || std::find(others.begin(), others.end(), name) != others.end();
-    };
-    if (named("dither_residue"))
-        return "declare the dither's frequency, or record with another dither frequency or sampling rate";
-    if (named("bias_temperature"))
-        return "record with the temperature changed against time: held, then stepped up and down";
-    if (named("scale_factor_error")) return "record at three input rates or more, of both signs";
-    return "record for longer: their Allan deviations and their courses in time part with the averaging time";
 }
 
 void Loop::take_lattice(Closure& closure, const SampleFit& now) {
@@ -555,23 +226,18 @@ Closure Loop::run() {
     }
     take_lattice(closure, *now);
 
-    std::vector<Candidate> taken(closure.steps.size());
+    std::vector<SampleCandidate> taken(closure.steps.size());
     while (closure.steps.size() < most_steps) {
-        std::vector<Candidate> candidates;
-        screen_line(*now, candidates);
-        screen_witnesses(*now, candidates);
-        screen_resampling(*now, candidates);
-        screen_rates(*now, candidates);
-        screen_noises(*now, candidates);
+        std::vector<SampleCandidate> candidates = screen_samples(*now, {record_.declared, series_, rows_, lines_hz_});
         struct Contender {
-            Candidate candidate;
+            SampleCandidate candidate;
             std::shared_ptr<SampleFit> fit;
             double merit;
         };
         std::vector<Contender> contenders;
         std::sort(candidates.begin(), candidates.end(),
                   [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
-        for (Candidate& candidate : candidates) {
+        for (SampleCandidate& candidate : candidates) {
             if (!(candidate.p_value * effects_on_samples < level_of_effects)) continue;
             if (contenders.size() >= most_contenders + 2) break;
             auto fit = std::make_shared<SampleFit>(series_, candidate.model, rows_);
@@ -654,9 +320,7 @@ Closure Loop::run() {
         if (closure.steps[k].parameters.empty())
             closure.steps[k].parameters = estimates_of(closure.steps[k].effect, final, taken[k]);
     }
-    closure.verdict = closure.unexplained     ? Verdict::unexplained
-                      : closure.steps.empty() ? Verdict::nothing_missing
-                                              : Verdict::closed;
+    closure.verdict = verdict_of(closure);
     return closure;
 }
 

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "analysis/closure/chance.hpp"
+#include "analysis/closure/decision.hpp"
 #include "analysis/closure/sample_search.hpp"
 
 namespace ringlock::closure {
@@ -106,22 +107,7 @@ void test_size(const SampleFit& fit, Tests& tests) {
     }
     mean /= count;
     const double variance = std::max(fourth / count - mean * mean, 1e-12);
-    constexpr std::size_t stretches = 40;
-    double chi2 = 0.0;
-    int freedom = -1;
-    for (std::size_t s = 0; s < stretches; ++s) {
-        double sum = 0.0;
-        double k = 0.0;
-        for (std::size_t i = n * s / stretches; i < n * (s + 1) / stretches; ++i) {
-            if (!rows[i]) continue;
-            sum += e[i] * e[i] - mean;
-            k += 1.0;
-        }
-        if (k < 20.0) continue;
-        chi2 += sum * sum / (k * variance);
-        ++freedom;
-    }
-    tests.push_back({Where::time, "size of the residual in stretches of the record", chi2_tail(chi2, freedom), ""});
+    tests.push_back(size_over_time(e, rows, 40, 20.0));
     // Patterns of the place in the record: mean and size for each remainder.
     double least = 1.0;
     std::size_t at = 0;

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <limits>
 #include <memory>
 #include <numbers>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/closure.hpp"
+#include "analysis/closure/decision.hpp"
 #include "analysis/closure/hypotheses.hpp"
 #include "analysis/closure/side_channels.hpp"
 #include "engine/core/error.hpp"
@@ -16,24 +17,8 @@ namespace ringlock::closure {
 
 namespace {
 
-/// One family-wise level for everything that a record is asked.
-constexpr double level = 0.003;
-constexpr double level_of_effects = 0.002;
-constexpr double level_of_residual = level - level_of_effects;
-/// Log-likelihoods that are closer tell nothing: a false model gains so much over the true one with a probability of
-/// exp(-4) at most.
-constexpr double tie = 4.0;
-constexpr std::size_t most_steps = 8;
-constexpr std::size_t most_contenders = 5;
-
-/// Contiguous blocks: of ten, three are only reported.
-Rows chosen_blocks(std::size_t turns) {
-    constexpr std::size_t blocks = 40;
-    constexpr std::uint8_t chooses[10] = {1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
-    Rows rows(turns);
-    for (std::size_t i = 0; i < turns; ++i) rows[i] = chooses[i * blocks / turns % 10];
-    return rows;
-}
+/// Of ten blocks, three are only reported.
+constexpr BlockRoles roles{1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
 
 /// A model of the record with all that it was fitted to.
 struct Fitted {
@@ -110,28 +95,6 @@ void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
          setup.dither_peak_rate_deg_s * fitted.fit->sd_rad().front() / (fitted.series.amplitude_rad * std::sqrt(n))});
 }
 
-/// What would tell two effects apart that this record cannot.
-std::string experiment_for(const std::string& effect, const std::vector<std::string>& others) {
-    const auto has = [&](std::string_view name) {
-        return effect == name || std::find(others.begin(), others.end(), name) != others.end();
-    };
-    if (has("bias_temperature") || has("lockin_temperature")) {
-        return "record with the temperature changed against time: held, then stepped up and down";
-    }
-    if (has("scale_factor_error")) return "record at three input rates or more, of both signs";
-    if (has("dither_asymmetry") && has("dither_second_harmonic")) {
-        return "record the accelerations on both sides of the turns";
-    }
-    if (has("detector_phase_offset") || has("lockin_second_harmonic") || has("lockin_turn_asymmetry")) {
-        return "record with more injected noise, so that all phases come at all turns, or for longer";
-    }
-    if (has("bias_step") || has("bias_ramp") || has("rate_random_walk") || has("bias_instability") ||
-        has("quantum_noise")) {
-        return "record for longer: their Allan deviations and their courses in time part with the averaging time";
-    }
-    return "record for longer";
-}
-
 /// Whether some view of the residual shows more than the best effect can explain: then that one is only what comes
 /// nearest to something that the library does not have.
 ///
@@ -178,7 +141,7 @@ Closure close_turns(const record::Record& record) {
     closure.unit = "rad";
     closure.level = level;
     const record::Turns& turns = *record.turns;
-    const Rows rows = chosen_blocks(turns.size());
+    const Rows rows = by_blocks(turns.size(), roles);
     auto now = fit_record(record, {}, rows);
     if (!now->series.scale_factor_declared) {
         closure.notes.push_back(
@@ -305,14 +268,13 @@ Closure close_turns(const record::Record& record) {
                 const std::string name(parameter.name);
                 const auto sd = candidate.sd.find(name);
                 step.parameters.push_back(
-                    {step.effect, name, candidate.values.at(name), sd == candidate.sd.end() ? 0.0 : sd->second});
+                    {step.effect, name, candidate.values.at(name),
+                     sd == candidate.sd.end() ? std::numeric_limits<double>::quiet_NaN() : sd->second});
             }
         }
     }
     add_dither(closure.base, *whole);
-    closure.verdict = closure.unexplained     ? Verdict::unexplained
-                      : closure.steps.empty() ? Verdict::nothing_missing
-                                              : Verdict::closed;
+    closure.verdict = verdict_of(closure);
     return closure;
 }
 

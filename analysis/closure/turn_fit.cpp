@@ -40,7 +40,6 @@ std::vector<Knob> knobs(TurnParameters& p) {
     std::vector<Knob> all{{"", "injected_noise_rad", &p.injected_sd_rad},
                           {"", "amplitude_wander_rad", &p.wander_sd_rad},
                           {"", "readout_noise_rad", &p.readout_sd_rad}};
-    if (p.wander_memory_turns < 1e11) all.push_back({"", "wander_memory_turns", &p.wander_memory_turns});
     for (ActiveEffect& active : p.effects) {
         for (const effects::Parameter& parameter : active.effect->parameters()) {
             if (parameter.role != effects::Role::deviation) continue;

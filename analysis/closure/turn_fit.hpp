@@ -29,6 +29,8 @@ struct Estimate {
 class TurnFit {
    public:
     TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows);
+    TurnFit(const TurnFit&) = delete;  // the filter refers to what the fit holds
+    TurnFit& operator=(const TurnFit&) = delete;
 
     const TurnModel& model() const { return *model_; }
     const TurnParameters& parameters() const { return parameters_; }

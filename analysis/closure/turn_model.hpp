@@ -23,7 +23,6 @@ struct TurnParameters {
     double threshold_deg_h = 0.0;
     double injected_sd_rad = 0.0;  ///< noise of the dither at the turns
     double wander_sd_rad = 0.0;    ///< what the dither's amplitude gains from turn to turn
-    double wander_memory_turns = 1e12;
     double readout_sd_rad = 0.0;
     std::vector<ActiveEffect> effects;
 

@@ -76,12 +76,8 @@ Whitening::Whitening(const TurnFrame& frame, const TurnNoise& noise) : frame_(fr
     const bool walks = noise.walk_rad2_per_s3 > 0.0;
     states_ = 2 + noise.rates.size() + (walks ? 1 : 0);
     const auto d = static_cast<Eigen::Index>(states_);
-    decay_ = 1.0 - 1.0 / noise.wander_memory_turns;
     System system{Eigen::MatrixXd::Identity(d, d), Eigen::MatrixXd::Zero(d, d), Eigen::MatrixXd::Zero(d, d)};
     auto& [t, q, p] = system;
-    t(1, 1) = decay_;
-    // Where m hardly forgets, where it begins is the mean amplitude, a parameter.
-    if (noise.wander_memory_turns < static_cast<double>(n)) p(1, 1) = noise.wander_rad2 / (1.0 - decay_ * decay_);
     q(1, 1) = noise.wander_rad2;
     q(0, 0) = noise.white_rad2_per_s * dt;
     Eigen::Index at = 2;
@@ -115,7 +111,7 @@ std::vector<double> Whitening::apply(std::span<const double> series) const {
         out[i] = innovation / sd_[i];
         const double* gain = gains_.data() + i * states_;
         state[0] += gain[0] * innovation;
-        state[1] = decay_ * state[1] + gain[1] * innovation;
+        state[1] += gain[1] * innovation;
         for (std::size_t s = 2; s < states_; ++s) {
             state[0] += rate_gain_s_[s - 2] * state[s];
             state[s] = rate_decay_[s - 2] * state[s] + gain[s] * innovation;

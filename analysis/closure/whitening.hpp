@@ -14,16 +14,15 @@ struct PhaseRateTerm {
 ///
 ///     psi_n = a_n + before_n(psi_n) + s m_n + w_n,            z_n = psi_n + v_n,
 ///     a_{n+1} = a_n + kick_n(psi_n) + (rates over the interval),
-///     m_{n+1} = (1 - 1/memory) m_n + ...:
+///     m_{n+1} = m_n + ...:
 ///
 /// w is the injected noise, v the readout's, m the wander of the dither's amplitude.
 struct TurnNoise {
-    double injected_rad2 = 0.0;         ///< variance of w
-    double readout_rad2 = 0.0;          ///< variance of v
-    double wander_rad2 = 0.0;           ///< variance that m gains from turn to turn
-    double wander_memory_turns = 1e12;  ///< over which m forgets itself
-    double white_rad2_per_s = 0.0;      ///< variance that white rate noise adds to a
-    double walk_rad2_per_s3 = 0.0;      ///< variance a second of a rate that walks [(rad/s)^2/s]
+    double injected_rad2 = 0.0;     ///< variance of w
+    double readout_rad2 = 0.0;      ///< variance of v
+    double wander_rad2 = 0.0;       ///< variance that m gains from turn to turn
+    double white_rad2_per_s = 0.0;  ///< variance that white rate noise adds to a
+    double walk_rad2_per_s3 = 0.0;  ///< variance a second of a rate that walks [(rad/s)^2/s]
     std::vector<PhaseRateTerm> rates;
 };
 
@@ -54,7 +53,6 @@ class Whitening {
    private:
     std::size_t states_;
     const TurnFrame& frame_;
-    double decay_ = 1.0;  // of m
     std::vector<double> rate_decay_;
     std::vector<double> rate_gain_s_;  // a gains this times the rate
     std::vector<double> gains_;        // [turn][state]

@@ -1,0 +1,77 @@
+#include "analysis/closure/decision.hpp"
+
+#include <algorithm>
+
+#include "analysis/closure/chance.hpp"
+
+namespace ringlock::closure {
+
+Rows by_blocks(std::size_t rows, const BlockRoles& roles) {
+    constexpr std::size_t blocks = 40;
+    Rows out(rows);
+    for (std::size_t i = 0; i < rows; ++i) out[i] = roles[i * blocks / rows % roles.size()];
+    return out;
+}
+
+std::string experiment_for(const std::string& effect, const std::vector<std::string>& others) {
+    const auto has = [&](std::string_view name) {
+        return effect == name || std::find(others.begin(), others.end(), name) != others.end();
+    };
+    if (has("dither_residue")) {
+        return "declare the dither's frequency, or record with another dither frequency or sampling rate";
+    }
+    if (has("bias_temperature") || has("lockin_temperature")) {
+        return "record with the temperature changed against time: held, then stepped up and down";
+    }
+    if (has("scale_factor_error")) return "record at three input rates or more, of both signs";
+    if (has("dither_asymmetry") && has("dither_second_harmonic")) {
+        return "record the accelerations on both sides of the turns";
+    }
+    if (has("detector_phase_offset") || has("lockin_second_harmonic") || has("lockin_turn_asymmetry")) {
+        return "record with more injected noise, so that all phases come at all turns, or for longer";
+    }
+    if (has("bias_step") || has("bias_ramp") || has("rate_random_walk") || has("bias_instability") ||
+        has("quantum_noise")) {
+        return "record for longer: their Allan deviations and their courses in time part with the averaging time";
+    }
+    return "record for longer";
+}
+
+Verdict verdict_of(const Closure& closure) {
+    if (closure.unexplained) return Verdict::unexplained;
+    return closure.steps.empty() ? Verdict::nothing_missing : Verdict::closed;
+}
+
+ResidualTest size_over_time(const std::vector<double>& innovations, const Rows& rows, std::size_t stretches,
+                            double fewest) {
+    const std::size_t n = innovations.size();
+    double mean = 0.0;
+    double fourth = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!rows[i]) continue;
+        const double square = innovations[i] * innovations[i];
+        mean += square;
+        fourth += square * square;
+        count += 1.0;
+    }
+    mean /= count;
+    const double variance = std::max(fourth / count - mean * mean, 1e-12);
+    double chi2 = 0.0;
+    int freedom = -1;
+    for (std::size_t s = 0; s < stretches; ++s) {
+        double sum = 0.0;
+        double k = 0.0;
+        for (std::size_t i = n * s / stretches; i < n * (s + 1) / stretches; ++i) {
+            if (!rows[i]) continue;
+            sum += innovations[i] * innovations[i] - mean;
+            k += 1.0;
+        }
+        if (k < fewest) continue;
+        chi2 += sum * sum / (k * variance);
+        ++freedom;
+    }
+    return {Where::time, "size of the residual in stretches of the record", chi2_tail(chi2, freedom), ""};
+}
+
+}  // namespace ringlock::closure

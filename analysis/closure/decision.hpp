@@ -1,0 +1,38 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "analysis/closure/closure.hpp"
+
+/// How the closed loop decides, on turns and on samples alike.
+namespace ringlock::closure {
+
+/// One family-wise level for everything that a record is asked.
+inline constexpr double level = 0.003;
+inline constexpr double level_of_effects = 0.002;
+inline constexpr double level_of_residual = level - level_of_effects;
+/// Log-likelihoods that are closer tell nothing: a false model gains so much over the true one with a probability of
+/// exp(-4) at most.
+inline constexpr double tie = 4.0;
+inline constexpr std::size_t most_steps = 8;
+inline constexpr std::size_t most_contenders = 5;
+
+/// What each of ten blocks in a row is for.
+using BlockRoles = std::array<std::uint8_t, 10>;
+
+/// The record cut into 40 contiguous blocks: the role of each row.
+Rows by_blocks(std::size_t rows, const BlockRoles& roles);
+
+/// What would tell two effects apart that this record cannot.
+std::string experiment_for(const std::string& effect, const std::vector<std::string>& others);
+
+Verdict verdict_of(const Closure& closure);
+
+/// Whether the residual is as large everywhere: its squares in stretches of the record, each of `fewest` rows at least.
+ResidualTest size_over_time(const std::vector<double>& innovations, const Rows& rows, std::size_t stretches,
+                            double fewest);
+
+}  // namespace ringlock::closure
