@@ -55,6 +55,10 @@ struct Closure {
 /// does not suffice.
 Closure close_loop(const record::Record& record);
 
+/// The model with these effects fitted to a record of turns, nothing searched: what a loop that knows what is in the
+/// record reaches. Effects start from the values given.
+Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
+
 /// The two of them.
 Closure close_turns(const record::Record& record);
 Closure close_samples(const record::Record& record);

@@ -1,5 +1,7 @@
 #include "analysis/closure/hypotheses.hpp"
 
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -29,6 +31,7 @@ const Parameter* first_of(const Effect& effect, Role role) {
 /// What the effect with these values adds to the phases.
 std::vector<double> added(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
                           const Values& values) {
+    if (effect.adds_angle()) return fit.model().added_rad(without, effect, values);
     TurnParameters p = fit.parameters();
     p.effects.push_back({&effect, values});
     std::vector<double> series = fit.model().predict(p).phase_rad;
@@ -126,24 +129,30 @@ std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Predi
         value = score.value(0);
         return value / std::sqrt(score.covariance(0, 0));
     };
-    std::vector<double> roots;
     double best = 0.0;
     Candidate candidate{&effect, values};
-    const auto consider = [&](double t) {
-        double value = 0.0;
-        const double root = score_at(t, value);
-        if (std::abs(root) > best) {
-            best = std::abs(root);
-            candidate.values.at(name_of(time)) = t;
-            candidate.values.at(name_of(size)) = value;
+    const auto consider = [&](const std::vector<double>& times) {
+        std::vector<double> roots(times.size());
+        std::vector<double> sizes(times.size());
+        oneapi::tbb::parallel_for(std::size_t{0}, times.size(),
+                                  [&](std::size_t k) { roots[k] = score_at(times[k], sizes[k]); });
+        for (std::size_t k = 0; k < times.size(); ++k) {
+            if (std::abs(roots[k]) <= best) continue;
+            best = std::abs(roots[k]);
+            candidate.values.at(name_of(time)) = times[k];
+            candidate.values.at(name_of(size)) = sizes[k];
         }
-        return root;
+        return roots;
     };
-    for (int k = 1; k < places; ++k) roots.push_back(consider(end * k / places));
+    std::vector<double> times;
+    for (int k = 1; k < places; ++k) times.push_back(end * k / places);
+    const std::vector<double> roots = consider(times);
     const double centre = candidate.values.at(name_of(time));
+    times.clear();
     for (int k = -7; k <= 7; ++k) {
-        if (k != 0) consider(centre + end / places * k / 8.0);
+        if (k != 0) times.push_back(centre + end / places * k / 8.0);
     }
+    consider(times);
     candidate.chi2 = best * best;
     candidate.p_value = davies_bound(candidate.chi2, roots);
     candidate.searched = davies_places(candidate.chi2, roots);
@@ -230,25 +239,29 @@ Values values_at_rest(const Effect& effect) {
 }
 
 std::vector<Candidate> screen(const TurnFit& fit) {
-    std::vector<Candidate> candidates;
     const TurnModel::Prediction without = fit.model().predict(fit.parameters());
-    for (const Effect* effect : effects::registry()) {
+    const auto registry = effects::registry();
+    std::vector<std::optional<Candidate>> found(registry.size());
+    oneapi::tbb::parallel_for(std::size_t{0}, registry.size(), [&](std::size_t k) {
+        const Effect* effect = registry[k];
         TurnParameters p = fit.parameters();
-        if (p.find(effect->name()) != nullptr || told_by_other_columns(*effect)) continue;
-        if (!fit.model().series().all_phases_come && of_the_coupling(*effect)) continue;
+        if (p.find(effect->name()) != nullptr || told_by_other_columns(*effect)) return;
+        if (!fit.model().series().all_phases_come && of_the_coupling(*effect)) return;
         const Values rest = values_at_rest(*effect);
-        std::optional<Candidate> candidate;
         if (first_of(*effect, Role::frequency) != nullptr) {
-            if (effect->adds_angle()) candidate = at_some_frequency(fit, without, *effect, rest);
+            if (effect->adds_angle()) found[k] = at_some_frequency(fit, without, *effect, rest);
         } else if (first_of(*effect, Role::time) != nullptr) {
-            if (effect->adds_angle()) candidate = at_some_time(fit, without, *effect, rest);
+            if (effect->adds_angle()) found[k] = at_some_time(fit, without, *effect, rest);
         } else if (first_of(*effect, Role::deviation) != nullptr) {
-            candidate = spread(fit, *effect, rest);
+            found[k] = spread(fit, *effect, rest);
         } else if (first_of(*effect, Role::size) != nullptr) {
-            candidate = sizes(fit, without, *effect, rest);
+            found[k] = sizes(fit, without, *effect, rest);
         } else if (first_of(*effect, Role::phase) != nullptr) {
-            candidate = coupling_phase(fit, *effect, rest);
+            found[k] = coupling_phase(fit, *effect, rest);
         }
+    });
+    std::vector<Candidate> candidates;
+    for (auto& candidate : found) {
         if (candidate) candidates.push_back(std::move(*candidate));
     }
     return candidates;

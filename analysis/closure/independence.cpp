@@ -1,6 +1,7 @@
 #include "analysis/closure/independence.hpp"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -126,22 +127,20 @@ void test_rates(const TurnFit& fit, std::vector<ResidualTest>& tests) {
 void test_steps(const TurnFit& fit, std::vector<ResidualTest>& tests) {
     constexpr int places = 80;
     const auto& time = fit.model().series().time_s;
-    std::vector<double> roots;
-    double best = 0.0;
-    double at = 0.0;
-    for (int k = 1; k < places; ++k) {
-        const double t = time.back() * k / places;
+    std::vector<double> roots(places - 1);
+    const auto time_of = [&](std::size_t k) { return time.back() * static_cast<double>(k + 1) / places; };
+    oneapi::tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t k) {
         std::vector<double> ramp(time.size());
-        for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - t);
+        for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - time_of(k));
         const auto score = fit.score({ramp});
-        const double root =
-            score.rank > 0 && score.covariance(0, 0) > 0.0 ? score.value(0) / std::sqrt(score.covariance(0, 0)) : 0.0;
-        roots.push_back(root);
-        if (std::abs(root) > best) {
-            best = std::abs(root);
-            at = t;
+        if (score.rank > 0 && score.covariance(0, 0) > 0.0) {
+            roots[k] = score.value(0) / std::sqrt(score.covariance(0, 0));
         }
-    }
+    });
+    const auto most = std::max_element(roots.begin(), roots.end(),
+                                       [](double a, double b) { return std::abs(a) < std::abs(b); });
+    const double best = std::abs(*most);
+    const double at = time_of(static_cast<std::size_t>(most - roots.begin()));
     tests.push_back(
         {Where::time, "steps of the rate", davies_bound(best * best, roots), fmt::format("at {:.6g} s", at)});
 }

@@ -134,6 +134,54 @@ void drop_needless(const record::Record& record, const Rows& rows, double tests_
     }
 }
 
+/// The figures of the final model: fitted to the whole record.
+void take_figures(const record::Turns& turns, const Fitted& whole, Closure& closure) {
+    for (const Estimate& estimate : whole.fit->estimates()) {
+        if (estimate.effect.empty()) {
+            closure.base.push_back(estimate);
+            continue;
+        }
+        for (Step& step : closure.steps) {
+            if (step.effect == estimate.effect) step.parameters.push_back(estimate);
+        }
+    }
+    for (const Candidate& candidate : screen_side_channels(turns, *whole.fit, whole.joined, true)) {
+        for (Step& step : closure.steps) {
+            if (step.effect != candidate.effect->name()) continue;
+            for (const effects::Parameter& parameter : candidate.effect->parameters()) {
+                const std::string name(parameter.name);
+                const auto sd = candidate.sd.find(name);
+                step.parameters.push_back(
+                    {step.effect, name, candidate.values.at(name),
+                     sd == candidate.sd.end() ? std::numeric_limits<double>::quiet_NaN() : sd->second});
+            }
+        }
+    }
+    add_dither(closure.base, whole);
+}
+
+/// What is left by a model fitted to all blocks but the reported ones.
+void take_residual(const record::Turns& turns, const Fitted& train, Closure& closure) {
+    const Score last = heldout(*train.fit);
+    closure.heldout_after = last.error;
+    closure.noise_floor = last.floor;
+    closure.residual.time_s = turns.time_s;
+    for (std::size_t i = 0; i < turns.size(); ++i) {
+        const double sd = train.fit->sd_rad()[i];
+        closure.residual.innovation.push_back(train.fit->innovations()[i] * sd);
+        closure.residual.sd.push_back(sd);
+        closure.residual.reported.push_back(train.fit->rows()[i] ? 0 : 1);
+        closure.mean_input_rate_deg_h += train.series.input_rate_deg_h[i] / static_cast<double>(turns.size());
+    }
+}
+
+void test_what_is_left(const TurnFit& fit, Closure& closure) {
+    closure.tests = test_residual(fit);
+    const double threshold = level_of_residual / static_cast<double>(closure.tests.size());
+    const ResidualTest& worst = most_telling(closure.tests, threshold);
+    if (worst.p_value < threshold) closure.unexplained = worst;
+}
+
 }  // namespace
 
 Closure close_turns(const record::Record& record) {
@@ -141,8 +189,11 @@ Closure close_turns(const record::Record& record) {
     closure.unit = "rad";
     closure.level = level;
     const record::Turns& turns = *record.turns;
+    // All that is decided is decided on the whole record; errors are those of blocks that the fit has not seen.
+    const Rows all(turns.size(), 1);
     const Rows rows = by_blocks(turns.size(), roles);
-    auto now = fit_record(record, {}, rows);
+    auto now = fit_record(record, {}, all);
+    auto train = fit_record(record, now->fit->parameters(), rows);
     if (!now->series.scale_factor_declared) {
         closure.notes.push_back(
             fmt::format("the record declares no scale factor; {:g} arcsec per fringe assumed, with "
@@ -154,7 +205,7 @@ Closure close_turns(const record::Record& record) {
             "turns come at a part of the fringe only, as in a locked gyro: what the coupling does cannot be "
             "told from the bias, and its effects are not looked for");
     }
-    closure.heldout_before = heldout(*now->fit).error;
+    closure.heldout_before = heldout(*train->fit).error;
     const auto tests_of_effects = static_cast<double>(effects::registry().size());
 
     while (closure.steps.size() < most_steps) {
@@ -196,7 +247,7 @@ Closure close_turns(const record::Record& record) {
                 continue;
             std::shared_ptr<Fitted> fitted;
             try {
-                fitted = fit_record(record, start, rows);
+                fitted = fit_record(record, start, all);
             } catch (const RunError&) {
                 continue;  // no motion of a gyro with such parameters can be followed
             }
@@ -216,6 +267,9 @@ Closure close_turns(const record::Record& record) {
         const double p_full =
             of_several(chi2_tail(chi2, free_parameters(*best.candidate.effect)), best.candidate.searched);
         if (!side && p_full * tests_of_effects >= level_of_effects) break;
+        const auto train_next = fit_record(record, best.fitted->fit->parameters(), rows);
+        const Score before = heldout(*train->fit);
+        if (!side && heldout(*train_next->fit).log_score < before.log_score - tie) break;
         Step step;
         step.effect = std::string(best.candidate.effect->name());
         step.p_value = best.candidate.p_value;
@@ -225,55 +279,39 @@ Closure close_turns(const record::Record& record) {
             }
         }
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
-        const Score before = heldout(*now->fit);
         now = best.fitted;
-        drop_needless(record, rows, tests_of_effects, now, closure.steps);
-        const Score after = heldout(*now->fit);
+        train = train_next;
+        const std::size_t kept = closure.steps.size();
+        drop_needless(record, all, tests_of_effects, now, closure.steps);
+        if (closure.steps.size() < kept) train = fit_record(record, now->fit->parameters(), rows);
+        const Score after = heldout(*train->fit);
         step.heldout_error_before = before.error;
         step.heldout_error_after = after.error;
         step.heldout_log_score_gain = after.log_score - before.log_score;
         closure.steps.push_back(std::move(step));
     }
 
-    const Score last = heldout(*now->fit);
-    closure.heldout_after = last.error;
-    closure.noise_floor = last.floor;
-    closure.tests = test_residual(*now->fit);
-    const double threshold = level_of_residual / static_cast<double>(closure.tests.size());
-    const ResidualTest& worst = most_telling(closure.tests, threshold);
-    if (worst.p_value < threshold) closure.unexplained = worst;
-    closure.residual.time_s = turns.time_s;
-    for (std::size_t i = 0; i < turns.size(); ++i) {
-        const double sd = now->fit->sd_rad()[i];
-        closure.residual.innovation.push_back(now->fit->innovations()[i] * sd);
-        closure.residual.sd.push_back(sd);
-        closure.residual.reported.push_back(rows[i] ? 0 : 1);
-        closure.mean_input_rate_deg_h += now->series.input_rate_deg_h[i] / static_cast<double>(turns.size());
-    }
-    // The figures that are kept: from the whole record.
-    const auto whole = fit_record(record, now->fit->parameters(), Rows(turns.size(), 1));
-    for (const Estimate& estimate : whole->fit->estimates()) {
-        if (estimate.effect.empty()) {
-            closure.base.push_back(estimate);
-            continue;
-        }
-        for (Step& step : closure.steps) {
-            if (step.effect == estimate.effect) step.parameters.push_back(estimate);
-        }
-    }
-    for (const Candidate& candidate : screen_side_channels(turns, *whole->fit, whole->joined, true)) {
-        for (Step& step : closure.steps) {
-            if (step.effect != candidate.effect->name()) continue;
-            for (const effects::Parameter& parameter : candidate.effect->parameters()) {
-                const std::string name(parameter.name);
-                const auto sd = candidate.sd.find(name);
-                step.parameters.push_back(
-                    {step.effect, name, candidate.values.at(name),
-                     sd == candidate.sd.end() ? std::numeric_limits<double>::quiet_NaN() : sd->second});
-            }
-        }
-    }
-    add_dither(closure.base, *whole);
+    take_residual(turns, *train, closure);
+    test_what_is_left(*now->fit, closure);
+    take_figures(turns, *now, closure);
+    closure.verdict = verdict_of(closure);
+    return closure;
+}
+
+Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>& effects) {
+    Closure closure;
+    closure.unit = "rad";
+    closure.level = level;
+    const record::Turns& turns = *record.turns;
+    TurnParameters start;
+    start.effects = effects;
+    const auto whole = fit_record(record, start, Rows(turns.size(), 1));
+    const auto train = fit_record(record, whole->fit->parameters(), by_blocks(turns.size(), roles));
+    for (const ActiveEffect& active : effects) closure.steps.emplace_back().effect = std::string(active.effect->name());
+    take_residual(turns, *train, closure);
+    closure.heldout_before = closure.heldout_after;
+    test_what_is_left(*whole->fit, closure);
+    take_figures(turns, *whole, closure);
     closure.verdict = verdict_of(closure);
     return closure;
 }

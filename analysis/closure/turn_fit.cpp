@@ -1,11 +1,13 @@
 #include "analysis/closure/turn_fit.hpp"
 
 #include <ceres/ceres.h>
+#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "engine/core/units.hpp"
 
@@ -66,15 +68,13 @@ class Objective final : public ceres::FirstOrderFunction {
         *cost = value_(x);
         if (gradient == nullptr) return std::isfinite(*cost);
         constexpr double step = 1e-3;
-        std::vector<double> at(x, x + size_);
-        for (std::size_t i = 0; i < size_; ++i) {
-            at[i] = x[i] + step;
-            const double ahead = value_(at.data());
-            at[i] = x[i] - step;
-            const double behind = value_(at.data());
-            at[i] = x[i];
-            gradient[i] = (ahead - behind) / (2.0 * step);
-        }
+        std::vector<double> values(2 * size_);
+        oneapi::tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t k) {
+            std::vector<double> at(x, x + size_);
+            at[k / 2] += k % 2 == 0 ? step : -step;
+            values[k] = value_(at.data());
+        });
+        for (std::size_t i = 0; i < size_; ++i) gradient[i] = (values[2 * i] - values[2 * i + 1]) / (2.0 * step);
         return std::isfinite(*cost);
     }
 
@@ -117,7 +117,10 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
         return series;
     };
     TurnParameters p = parameters_;
-    all.push_back({"", "bias_deg_h", change(p, p.bias_deg_h, 1e-2)});
+    std::vector<double> rotation(n);
+    const double c = units::two_pi / model_->series().setup.scale_factor_arcsec;
+    for (std::size_t i = 1; i < n; ++i) rotation[i] = rotation[i - 1] + c * prediction.intervals[i].duration_s;
+    all.push_back({"", "bias_deg_h", std::move(rotation)});
     all.push_back(
         {"", "lockin_threshold_deg_h", change(p, p.threshold_deg_h, 1e-3 * std::max(1.0, p.threshold_deg_h))});
     for (ActiveEffect& active : p.effects) {
@@ -127,7 +130,17 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
             double& value = active.values.at(name);
             double step = 1e-4 * std::max(std::abs(value), 1e-2);
             if (value + step > parameter.max) step = -step;
-            all.push_back({std::string(active.effect->name()), name, change(p, value, step)});
+            std::vector<double> series;
+            if (active.effect->adds_angle()) {
+                const auto here = model_->added_rad(prediction, *active.effect, active.values);
+                value += step;
+                series = model_->added_rad(prediction, *active.effect, active.values);
+                value -= step;
+                for (std::size_t i = 0; i < n; ++i) series[i] = (series[i] - here[i]) / step;
+            } else {
+                series = change(p, value, step);
+            }
+            all.push_back({std::string(active.effect->name()), name, std::move(series)});
         }
     }
     return all;
@@ -222,17 +235,13 @@ void TurnFit::add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, 
 }
 
 double TurnFit::objective(const TurnParameters& parameters, const std::vector<double>& rest) const {
-    const Whitening whitening(prediction_.frame, model_->noise(parameters));
-    const auto white = whitening.apply(rest);
+    double sum =
+        Whitening::minus_log_likelihood(prediction_.frame, model_->noise(parameters), rest, rows_);
     // The radius of the quadrature has the noise of the phase: as many degrees of freedom again.
-    double sum = 0.0;
     const double radius = model_->series().radius_sd_rad;
     if (radius > least_radius_sd_rad) {
         const double over = radius / std::max(parameters.readout_sd_rad, 1e-12);
-        sum += static_cast<double>(white.size()) * (0.5 * over * over + std::log(parameters.readout_sd_rad));
-    }
-    for (std::size_t i = 0; i < white.size(); ++i) {
-        if (rows_[i]) sum += 0.5 * white[i] * white[i] + std::log(whitening.sd_rad()[i]);
+        sum += static_cast<double>(rest.size()) * (0.5 * over * over + std::log(parameters.readout_sd_rad));
     }
     return sum;
 }
@@ -240,32 +249,30 @@ double TurnFit::objective(const TurnParameters& parameters, const std::vector<do
 void TurnFit::fit_noise() {
     TurnParameters trial = parameters_;
     if (trial.injected_sd_rad == 0.0) {
-        double best = std::numeric_limits<double>::infinity();
+        std::vector<std::pair<double, double>> grid;
         for (double injected = 1e-4; injected < 1e3; injected *= 4.0) {
-            for (double wander = 1e-7; wander < 1e2; wander *= 10.0) {
-                trial.injected_sd_rad = injected;
-                trial.wander_sd_rad = wander;
-                const double value = objective(trial, rest_);
-                if (value < best) {
-                    best = value;
-                    parameters_.injected_sd_rad = injected;
-                    parameters_.wander_sd_rad = wander;
-                }
-            }
+            for (double wander = 1e-7; wander < 1e2; wander *= 10.0) grid.emplace_back(injected, wander);
         }
+        std::vector<double> values(grid.size());
+        oneapi::tbb::parallel_for(std::size_t{0}, grid.size(), [&](std::size_t k) {
+            TurnParameters at = parameters_;
+            std::tie(at.injected_sd_rad, at.wander_sd_rad) = grid[k];
+            values[k] = objective(at, rest_);
+        });
+        const auto best = std::min_element(values.begin(), values.end()) - values.begin();
+        std::tie(parameters_.injected_sd_rad, parameters_.wander_sd_rad) = grid[static_cast<std::size_t>(best)];
         trial = parameters_;
     }
-    const std::vector<Knob> all = knobs(trial);
     constexpr double least = 1e-9;
     std::vector<double> x;
-    for (const Knob& knob : all) x.push_back(std::log(std::max(*knob.value, least)));
-    const auto set = [&](const double* at) {
-        for (std::size_t i = 0; i < all.size(); ++i) *all[i].value = std::exp(std::clamp(at[i], -25.0, 25.0));
+    for (const Knob& knob : knobs(trial)) x.push_back(std::log(std::max(*knob.value, least)));
+    const auto with = [&](const double* at) {
+        TurnParameters changed = trial;
+        for (const Knob& knob : knobs(changed)) *knob.value = std::exp(std::clamp(*at++, -25.0, 25.0));
+        return changed;
     };
-    ceres::GradientProblem problem(new Objective(x.size(), [&](const double* at) {
-        set(at);
-        return objective(trial, rest_);
-    }));
+    ceres::GradientProblem problem(
+        new Objective(x.size(), [&](const double* at) { return objective(with(at), rest_); }));
     ceres::GradientProblemSolver::Options options;
     options.logging_type = ceres::SILENT;
     options.max_num_iterations = 60;
@@ -273,8 +280,7 @@ void TurnFit::fit_noise() {
     options.gradient_tolerance = 1e-4;
     ceres::GradientProblemSolver::Summary summary;
     ceres::Solve(options, problem, x.data(), &summary);
-    set(x.data());
-    parameters_ = trial;
+    parameters_ = with(x.data());
 }
 
 void TurnFit::finish() {

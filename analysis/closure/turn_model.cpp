@@ -36,7 +36,7 @@ gyro::Setup TurnModel::setup(const TurnParameters& parameters) const {
     return setup;
 }
 
-std::vector<double> TurnModel::dither_swings(const std::vector<TurnKicks::Kick>& kicks) const {
+std::vector<double> TurnModel::dither_swings(const Kicks& kicks) const {
     const std::size_t n = series_.size();
     std::vector<double> swing(n, 1.0);
     double sums[2] = {};
@@ -93,23 +93,85 @@ std::vector<double> TurnModel::smooth(const std::vector<double>& turn_s) const {
     return smoothed;
 }
 
+std::shared_ptr<const TurnModel::Kicks> TurnModel::kicks(gyro::Setup setup) const {
+    constexpr std::size_t kept = 8;
+    setup.ellipse = {};
+    setup.missed_count_probability = 0.0;
+    {
+        const std::lock_guard lock(meeting_);
+        const auto found = std::find_if(met_.begin(), met_.end(), [&](const auto& met) { return met.first == setup; });
+        if (found != met_.end()) return found->second;
+    }
+    const TurnKicks of(setup);
+    Kicks kicks(series_.size());
+    for (std::size_t i = 0; i < kicks.size(); ++i) kicks[i] = of.at(series_.direction[i], phase_rad_[i]);
+    const auto shared = std::make_shared<const Kicks>(std::move(kicks));
+    const std::lock_guard lock(meeting_);
+    met_.emplace_front(setup, shared);
+    if (met_.size() > kept) met_.pop_back();
+    return shared;
+}
+
+TurnModel::Kicks TurnModel::kicks_of(const gyro::Setup& setup) const {
+    // Kicks are computed for few gyros: one deg/h changes them by a part in 1e8, and the threshold they follow but for
+    // their second order, 1e-2 of them, to less than 1e-5 in steps of a thousandth.
+    constexpr double matters_deg_h = 1.0;
+    constexpr double step = 1e-3;
+    const auto [lowest, highest] =
+        std::minmax_element(series_.input_rate_deg_h.begin(), series_.input_rate_deg_h.end());
+    const double middle_deg_h = 0.5 * (*lowest + *highest);
+    const double reach_deg_h = std::ceil(0.5 * (*highest - *lowest) / matters_deg_h) * matters_deg_h;
+    gyro::Setup near = setup;
+    near.input_rate_deg_h = std::round((setup.input_rate_deg_h + middle_deg_h) / matters_deg_h) * matters_deg_h;
+    if (setup.lockin_threshold_deg_h > 0.0) {
+        near.lockin_threshold_deg_h = std::exp(step * std::round(std::log(setup.lockin_threshold_deg_h) / step));
+    }
+    const double share =
+        setup.lockin_threshold_deg_h > 0.0 ? setup.lockin_threshold_deg_h / near.lockin_threshold_deg_h : 1.0;
+    Kicks out = *kicks(near);
+    if (reach_deg_h > matters_deg_h) {
+        gyro::Setup side = near;
+        side.input_rate_deg_h = near.input_rate_deg_h - reach_deg_h;
+        const auto low = kicks(side);
+        side.input_rate_deg_h = near.input_rate_deg_h + reach_deg_h;
+        const auto high = kicks(side);
+        for (std::size_t i = 0; i < out.size(); ++i) {
+            const double rate_deg_h = setup.input_rate_deg_h + series_.input_rate_deg_h[i];
+            const double x = (rate_deg_h - near.input_rate_deg_h) / reach_deg_h;
+            for (const auto part : {&TurnKicks::Kick::before_rad, &TurnKicks::Kick::after_rad,
+                                    &TurnKicks::Kick::before_slope, &TurnKicks::Kick::after_slope}) {
+                const double mid = out[i].*part;
+                const double a = (*low)[i].*part;
+                const double b = (*high)[i].*part;
+                out[i].*part += x * (0.5 * (b - a) + x * (0.5 * (b + a) - mid));
+            }
+        }
+    }
+    for (TurnKicks::Kick& kick : out) {
+        kick.before_rad *= share;
+        kick.after_rad *= share;
+        kick.before_slope *= share;
+        kick.after_slope *= share;
+    }
+    return out;
+}
+
+std::vector<double> TurnModel::added_rad(const Prediction& prediction, const effects::Effect& effect,
+                                         const effects::Values& values) const {
+    const double c = units::two_pi / series_.setup.scale_factor_arcsec;
+    std::vector<double> phase(series_.size());
+    double angle_arcsec = 0.0;
+    for (std::size_t i = 0; i < phase.size(); ++i) {
+        angle_arcsec += effect.added_angle_arcsec(values, prediction.intervals[i]);
+        phase[i] = c * angle_arcsec;
+    }
+    return phase;
+}
+
 TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const {
     const std::size_t n = series_.size();
     const gyro::Setup device_setup = setup(parameters);
     const gyro::Device device(device_setup);
-    // The rate changes how the phase leaves a turn: by parts in a million of itself, which long records show.
-    const auto [lowest, highest] =
-        std::minmax_element(series_.input_rate_deg_h.begin(), series_.input_rate_deg_h.end());
-    const double middle_deg_h = 0.5 * (*lowest + *highest);
-    const double reach_deg_h = 0.5 * (*highest - *lowest);
-    constexpr double matters_deg_h = 1.0;
-    std::vector<TurnKicks> kicks;
-    for (const double at : {0.0, -1.0, 1.0}) {
-        gyro::Setup there = device_setup;
-        there.input_rate_deg_h = parameters.bias_deg_h + middle_deg_h + at * reach_deg_h;
-        kicks.emplace_back(there);
-        if (reach_deg_h < matters_deg_h) break;
-    }
     Prediction prediction;
     TurnFrame& frame = prediction.frame;
     frame.interval_s = series_.interval_s;
@@ -118,23 +180,9 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     frame.kick_slope.resize(n);
     prediction.phase_rad.resize(n);
     prediction.turn_s.resize(n);
+    prediction.intervals.resize(n);
     const double c = device.phase_per_arcsec;
-    std::vector<TurnKicks::Kick> kick_of(n);
-    for (std::size_t i = 0; i < n; ++i) {
-        kick_of[i] = kicks.front().at(series_.direction[i], phase_rad_[i]);
-        if (kicks.size() == 1) continue;
-        const double x = (series_.input_rate_deg_h[i] - middle_deg_h) / reach_deg_h;
-        const TurnKicks::Kick low = kicks[1].at(series_.direction[i], phase_rad_[i]);
-        const TurnKicks::Kick high = kicks[2].at(series_.direction[i], phase_rad_[i]);
-        const auto bend = [&](double TurnKicks::Kick::*part) {
-            const double mid = kick_of[i].*part;
-            kick_of[i].*part += x * (0.5 * (high.*part - low.*part) + x * (0.5 * (high.*part + low.*part) - mid));
-        };
-        for (const auto part : {&TurnKicks::Kick::before_rad, &TurnKicks::Kick::after_rad,
-                                &TurnKicks::Kick::before_slope, &TurnKicks::Kick::after_slope}) {
-            bend(part);
-        }
-    }
+    const Kicks kick_of = kicks_of(device_setup);
     const std::vector<double> swing = dither_swings(kick_of);
     std::vector<double> factors(n, 1.0);
     for (std::size_t i = 0; i < n; ++i) {
@@ -157,7 +205,8 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         const double before = factors[i] / std::sqrt(swing[i > 0 ? i - 1 : i]);
         const double after = factors[i] / std::sqrt(swing[i]);
         const std::size_t last = i > 0 ? i - 1 : 0;
-        const effects::Interval interval{turn_s[last],
+        effects::Interval& interval = prediction.intervals[i];
+        interval = {turn_s[last],
                                          turn_s[i] - turn_s[last],
                                          {temperature_change_k(last), temperature_change_k(i)},
                                          {series_.input_rate_deg_h[last], series_.input_rate_deg_h[i]}};

@@ -1,7 +1,11 @@
 #pragma once
 #include <Eigen/Dense>
+#include <deque>
+#include <memory>
+#include <mutex>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/closure/turn_kicks.hpp"
@@ -43,9 +47,13 @@ class TurnModel {
     struct Prediction {
         std::vector<double> phase_rad;  ///< but for offset and dither
         TurnFrame frame;
-        std::vector<double> turn_s;  ///< when the dither turned, from when the phase did
+        std::vector<double> turn_s;                ///< when the dither turned, from when the phase did
+        std::vector<effects::Interval> intervals;  ///< that end at the turns, the first of no length
     };
     Prediction predict(const TurnParameters& parameters) const;
+    /// What a rate of its own adds to the predicted phases.
+    std::vector<double> added_rad(const Prediction& prediction, const effects::Effect& effect,
+                                  const effects::Values& values) const;
     TurnNoise noise(const TurnParameters& parameters) const;
     gyro::Setup setup(const TurnParameters& parameters) const;
 
@@ -53,14 +61,23 @@ class TurnModel {
     const std::vector<double>& phase_rad() const { return phase_rad_; }
 
    private:
+    using Kicks = std::vector<TurnKicks::Kick>;
+    /// Kicks of a gyro of that setup at the turns.
+    std::shared_ptr<const Kicks> kicks(gyro::Setup setup) const;
+    /// The same for one whose rate differs from turn to turn.
+    Kicks kicks_of(const gyro::Setup& setup) const;
+
     double temperature_change_k(std::size_t turn) const;
     /// Times of the dither's turns by a resonator that drifts slowly.
     std::vector<double> smooth(const std::vector<double>& turn_s) const;
     /// Swing of the dither after each turn over the mean one of its sign.
-    std::vector<double> dither_swings(const std::vector<TurnKicks::Kick>& kicks) const;
+    std::vector<double> dither_swings(const Kicks& kicks) const;
 
     const TurnSeries& series_;
     const std::vector<double>& phase_rad_;
+    /// Setups met last and their kicks, the latest first.
+    mutable std::deque<std::pair<gyro::Setup, std::shared_ptr<const Kicks>>> met_;
+    mutable std::mutex meeting_;
 };
 
 }  // namespace ringlock::closure

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -41,21 +42,33 @@ struct TurnFrame {
 /// 1970, section 7.3: correlated noises).
 class Whitening {
    public:
-    static constexpr int most_states = 14;
+    static constexpr std::size_t most_states = 14;
 
     Whitening(const TurnFrame& frame, const TurnNoise& noise);
+
+    /// Minus the log-likelihood of a series, but for a constant: sum over the turns that count (1, not 0) of half the
+    /// square of the innovation plus the logarithm of its standard deviation. In one pass that keeps nothing.
+    static double minus_log_likelihood(const TurnFrame& frame, const TurnNoise& noise, std::span<const double> series,
+                                       std::span<const std::uint8_t> counts);
 
     /// Innovations over their standard deviations. Linear in `series`: columns of a regression go the same way.
     std::vector<double> apply(std::span<const double> series) const;
     /// Standard deviation of each innovation [rad].
     const std::vector<double>& sd_rad() const { return sd_; }
 
+    /// States of the filter: a, m, then the rates. Each but a keeps to itself: x' = decay x, a' = a + gain_s x.
+    struct State {
+        double decay = 1.0;
+        double gain_s = 0.0;
+        double noise = 0.0;       ///< variance gained from turn to turn
+        double with_angle = 0.0;  ///< covariance of that with what a gains
+        double start = 0.0;       ///< variance at the first turn
+    };
+
    private:
-    std::size_t states_;
     const TurnFrame& frame_;
-    std::vector<double> rate_decay_;
-    std::vector<double> rate_gain_s_;  // a gains this times the rate
-    std::vector<double> gains_;        // [turn][state]
+    std::vector<State> states_;
+    std::vector<double> gains_;  // [turn][state]
     std::vector<double> sd_;
 };
 

@@ -10,6 +10,8 @@ struct Ellipse {
     double offset_sin = 0.0;
     double offset_cos = 0.0;
     double orthogonality_rad = 0.0;
+
+    bool operator==(const Ellipse&) const = default;
 };
 
 /// Constants of one gyro after its parameters are drawn and the effects have had their say.
@@ -29,6 +31,8 @@ struct Setup {
     double initial_phase_rad = 0.0;  ///< optical phase at the first turn
     Ellipse ellipse;
     double missed_count_probability = 0.0;  ///< of the counter, one pulse in a half cycle
+
+    bool operator==(const Setup&) const = default;
 };
 
 }  // namespace ringlock::gyro

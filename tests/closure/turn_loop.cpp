@@ -62,7 +62,6 @@ TEST(TurnLoop, NothingIsMissingWhereNothingIs) {
     int k = 0;
     for (const double injected : {0.0, 3.0}) {
         for (const bool restless : {false, true}) {
-            if (restless && injected == 0.0) continue;  // docs/closure.md, "What is open"
             scenario::Scenario scenario = gyro(10000, 100 + static_cast<std::uint64_t>(++k), injected);
             if (restless) {
                 scenario.dither.amplitude_wander_relative_rt_s = 1e-5;
