@@ -6,10 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <memory>
+#include <utility>
 #include <unsupported/Eigen/FFT>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/normality.hpp"
+#include "analysis/closure/two_levels.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -34,47 +38,63 @@ double largest(const std::vector<double>& values) {
     return most;
 }
 
-void test_phase(const TurnFit& fit, std::vector<ResidualTest>& tests) {
-    constexpr int harmonics = 6;
+/// Harmonic k of the phase at the turns: as kicks, or as errors of the reading.
+Columns harmonic(const TurnFit& fit, int k, bool kicks) {
     const auto& model = fit.model();
     const std::size_t n = model.series().size();
+    Columns columns(4, std::vector<double>(n));
+    double sums[4] = {};
+    for (std::size_t i = 0; i < n; ++i) {
+        const double angle = k * model.phase_rad()[i];
+        const double d = model.series().direction[i];
+        const double values[4] = {std::cos(angle), std::sin(angle), d * std::cos(angle), d * std::sin(angle)};
+        for (int c = 0; c < 4; ++c) {
+            columns[static_cast<std::size_t>(c)][i] = kicks ? sums[c] + 0.5 * values[c] : values[c];
+            sums[c] += values[c];
+        }
+    }
+    return columns;
+}
+
+void test_phase(const TurnFit& fit, std::vector<View>& views) {
+    constexpr int harmonics = 6;
+    // Phases that come in step move by little but their own noise: that is no test. It is a rival of rates all the same.
+    const bool all_come = fit.model().series().all_phases_come;
     for (const bool kicks : {true, false}) {
+        if (!kicks && !all_come) continue;
         double least = 1.0;
         double most = 0.0;
+        double cost = 0.0;
         int at = 0;
         for (int k = 1; k <= harmonics; ++k) {
-            Columns columns(4, std::vector<double>(n));
-            double sums[4] = {};
-            for (std::size_t i = 0; i < n; ++i) {
-                const double angle = k * model.phase_rad()[i];
-                const double d = model.series().direction[i];
-                const double values[4] = {std::cos(angle), std::sin(angle), d * std::cos(angle), d * std::sin(angle)};
-                for (int c = 0; c < 4; ++c) {
-                    columns[static_cast<std::size_t>(c)][i] = kicks ? sums[c] + 0.5 * values[c] : values[c];
-                    sums[c] += values[c];
-                }
-            }
-            const auto score = fit.score(columns);
+            const auto score = fit.score(harmonic(fit, k, kicks));
             const double p = chi2_tail(score.chi2, score.rank);
-            most = std::max(most, 0.5 * score.chi2 - score.rank - std::log(static_cast<double>(harmonics)));
             if (at > 0 && p >= least) continue;
             least = p;
             at = k;
+            cost = score.rank + std::log(static_cast<double>(harmonics));
+            most = 0.5 * score.chi2 - cost;
         }
-        tests.push_back(
-            {Where::phase,
-             kicks ? "kicks at harmonics of the turn's phase" : "phase read at harmonics of the turn's phase",
-             of_several(least, harmonics), fmt::format("harmonic {}", at), most});
+        views.push_back(
+            {{Where::phase,
+              kicks ? "kicks at harmonics of the turn's phase" : "phase read at harmonics of the turn's phase",
+              all_come ? of_several(least, harmonics) : 1.0, fmt::format("harmonic {}", at), most},
+             cost,
+             [&fit, at, kicks] { return harmonic(fit, at, kicks); }});
     }
 }
 
-void test_rates(const TurnFit& fit, std::vector<ResidualTest>& tests) {
+void test_rates(const TurnFit& fit, std::vector<View>& views) {
     const auto& series = fit.model().series();
     const std::size_t n = series.size();
-    const auto against = [&](Where where, std::string view, const Columns& columns) {
+    const auto against = [&](Where where, std::string view, Columns columns) {
         const auto score = fit.score(columns);
         if (score.rank == 0) return;
-        tests.push_back({where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - score.rank});
+        const double cost = score.rank;
+        views.push_back(
+            {{where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
+             cost,
+             [columns = std::make_shared<const Columns>(std::move(columns))] { return *columns; }});
     };
     if (!series.temperature_change_k.empty() && largest(series.temperature_change_k) > 0.0) {
         const auto& t = series.temperature_change_k;
@@ -95,22 +115,41 @@ void test_rates(const TurnFit& fit, std::vector<ResidualTest>& tests) {
         against(Where::rate, "rates that follow the input rate, its square and its cube",
                 {integral(fit, series.input_rate_deg_h), integral(fit, square), integral(fit, cube)});
     }
-    // The amplitude of the cycles before: what the residual itself has done to it stays out.
-    constexpr double memory = 1.0 / 200.0;
+    // The amplitude of the cycles before, what the residual itself has done to it staying out, as well as the noise lets
+    // it be known: the gain of the Kalman filter of a walk (Harvey 1989, section 4.1).
+    const TurnParameters& p = fit.parameters();
+    const double walk = p.wander_sd_rad * p.wander_sd_rad;
+    const double read = 0.5 * (p.readout_sd_rad * p.readout_sd_rad + p.injected_sd_rad * p.injected_sd_rad);
+    const double memory = std::clamp(2.0 * walk / (walk + std::sqrt(walk * walk + 4.0 * walk * read) + 1e-300),
+                                     1.0 / 200.0, 0.5);
     std::vector<double> amplitude(n);
-    std::vector<double> square(n);
     double mean = 1.0;
     for (std::size_t i = 0; i < n; ++i) {
         amplitude[i] = mean - 1.0;
         if (i > 0) mean += memory * (series.swing[i - 1] - mean);
     }
-    const double scale = std::max(largest(amplitude), 1e-12);
-    for (std::size_t i = 0; i < n; ++i) {
-        amplitude[i] /= scale;
-        square[i] = amplitude[i] * amplitude[i];
+    const auto angles = [&fit](std::vector<double> change) {
+        const double scale = std::max(largest(change), 1e-12);
+        std::vector<double> square(change.size());
+        for (std::size_t i = 0; i < change.size(); ++i) {
+            change[i] /= scale;
+            square[i] = change[i] * change[i];
+        }
+        return Columns{integral(fit, change), integral(fit, square)};
+    };
+    against(Where::amplitude, "rates that follow the dither's amplitude and its square", angles(amplitude));
+    if (!views.empty() && views.back().test.where == Where::amplitude) {
+        // What it explains, once it is known to explain something: with the cycles after as well.
+        views.back().columns = [&fit, &series, amplitude, angles, memory, n] {
+            std::vector<double> change = amplitude;
+            double after = 1.0;
+            for (std::size_t i = n; i-- > 0;) {
+                if (i + 1 < n) after += memory * (series.swing[i] - after);
+                change[i] = 0.5 * (change[i] + after - 1.0);
+            }
+            return angles(change);
+        };
     }
-    against(Where::amplitude, "rates that follow the dither's amplitude and its square",
-            {integral(fit, amplitude), integral(fit, square)});
     constexpr int degrees = 6;
     Columns powers;
     for (int k = 1; k <= degrees; ++k) {
@@ -124,28 +163,103 @@ void test_rates(const TurnFit& fit, std::vector<ResidualTest>& tests) {
     against(Where::time, "rates that are polynomials of time", powers);
 }
 
-void test_steps(const TurnFit& fit, std::vector<ResidualTest>& tests) {
+void test_steps(const TurnFit& fit, std::vector<View>& views) {
     constexpr int places = 80;
     const auto& time = fit.model().series().time_s;
     std::vector<double> roots(places - 1);
-    const auto time_of = [&](std::size_t k) { return time.back() * static_cast<double>(k + 1) / places; };
-    oneapi::tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t k) {
+    const auto ramp_of = [&time](std::size_t k) {
+        const double start = time.back() * static_cast<double>(k + 1) / places;
         std::vector<double> ramp(time.size());
-        for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - time_of(k));
-        const auto score = fit.score({ramp});
+        for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - start);
+        return ramp;
+    };
+    oneapi::tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t k) {
+        const auto score = fit.score({ramp_of(k)});
         if (score.rank > 0 && score.covariance(0, 0) > 0.0) {
             roots[k] = score.value(0) / std::sqrt(score.covariance(0, 0));
         }
     });
     const auto most = std::max_element(roots.begin(), roots.end(),
                                        [](double a, double b) { return std::abs(a) < std::abs(b); });
-    const double best = std::abs(*most);
-    const double at = time_of(static_cast<std::size_t>(most - roots.begin()));
-    tests.push_back(
-        {Where::time, "steps of the rate", davies_bound(best * best, roots), fmt::format("at {:.6g} s", at)});
+    const double chi2 = *most * *most;
+    const auto at = static_cast<std::size_t>(most - roots.begin());
+    const double cost = 2.0 + std::log(davies_places(chi2, roots));
+    views.push_back({{Where::time, "steps of the rate", davies_bound(chi2, roots),
+                      fmt::format("at {:.6g} s", time.back() * static_cast<double>(at + 1) / places),
+                      0.5 * chi2 - cost},
+                     cost,
+                     [ramp_of, at] { return Columns{ramp_of(at)}; }});
 }
 
-void test_whiteness(const TurnFit& fit, std::vector<ResidualTest>& tests) {
+/// The angle of a rate that is one where the shape of stretches is, zero elsewhere, with the jumps moved to where they
+/// explain most.
+std::vector<double> two_level_angle(const TurnFit& fit, const Eigen::VectorXd& shape) {
+    const auto& time = fit.model().series().time_s;
+    const double stretch_s = time.back() / static_cast<double>(shape.size());
+    std::vector<double> jumps;
+    for (Eigen::Index k = 1; k < shape.size(); ++k) {
+        if (shape(k) != shape(k - 1)) jumps.push_back(stretch_s * static_cast<double>(k));
+    }
+    const auto angle = [&] {
+        std::vector<double> sum(time.size(), 0.0);
+        std::size_t next = 0;
+        double on = shape(0);
+        for (std::size_t i = 1; i < time.size(); ++i) {
+            double from = time[i - 1];
+            sum[i] = sum[i - 1];
+            for (; next < jumps.size() && jumps[next] < time[i]; ++next) {
+                sum[i] += on * (std::max(jumps[next], from) - from);
+                from = std::max(jumps[next], from);
+                on = 1.0 - on;
+            }
+            sum[i] += on * (time[i] - from);
+        }
+        return sum;
+    };
+    double best = fit.score({angle()}).chi2;
+    for (double step_s = 0.5 * stretch_s; step_s > 0.02 * stretch_s; step_s *= 0.5) {
+        for (double& jump : jumps) {
+            for (const double to : {jump - step_s, jump + step_s}) {
+                const double from = std::exchange(jump, to);
+                const double chi2 = std::is_sorted(jumps.begin(), jumps.end()) ? fit.score({angle()}).chi2 : 0.0;
+                if (chi2 > best) {
+                    best = chi2;
+                } else {
+                    jump = from;
+                }
+            }
+        }
+    }
+    return angle();
+}
+
+/// Rates of stretches of the record, for a rate that jumps to and fro.
+void test_levels(const TurnFit& fit, std::vector<View>& views) {
+    constexpr std::size_t stretches = 40;
+    const auto& time = fit.model().series().time_s;
+    const auto n = static_cast<Eigen::Index>(time.size());
+    const auto ramp_of = [&time](std::size_t k) {
+        const double length = time.back() / static_cast<double>(stretches);
+        const double start = length * static_cast<double>(k);
+        std::vector<double> ramp(time.size());
+        for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::clamp(time[i] - start, 0.0, length);
+        return ramp;
+    };
+    Eigen::MatrixXd ramps(n, static_cast<Eigen::Index>(stretches));
+    oneapi::tbb::parallel_for(std::size_t{0}, stretches, [&](std::size_t k) {
+        ramps.col(static_cast<Eigen::Index>(k)) = fit.whitened(ramp_of(k));
+    });
+    const TwoLevels found = two_levels(ramps.transpose() * ramps, ramps.transpose() * fit.residual());
+    // Jumps do not wait for the end of a stretch.
+    constexpr double of_places = 2.0;
+    const double cost = found.cost + of_places * found.changes;
+    views.push_back({{Where::time, "a rate that jumps between two levels", found.p_value,
+                      fmt::format("{} jumps", found.changes), found.merit},
+                     cost,
+                     [&fit, found] { return Columns{two_level_angle(fit, found.shape)}; }});
+}
+
+void test_whiteness(const TurnFit& fit, std::vector<View>& views) {
     const auto& e = fit.innovations();
     const auto& rows = fit.rows();
     const std::size_t n = e.size();
@@ -169,35 +283,91 @@ void test_whiteness(const TurnFit& fit, std::vector<ResidualTest>& tests) {
         rising += root[k];
         alternating += k % 2 == 0 ? root[k] : -root[k];
     }
-    tests.push_back(
-        {std::abs(alternating) > std::abs(rising) ? Where::amplitude : Where::time,
-         "correlation with the 24 turns before", chi2_tail(chi2, lags),
-         fmt::format("first correlations {:.2f}, {:.2f}, {:.2f} standard errors", root[1], root[2], root[3])});
+    views.push_back(
+        {{std::abs(alternating) > std::abs(rising) ? Where::amplitude : Where::time,
+          "correlation with the 24 turns before", chi2_tail(chi2, lags),
+          fmt::format("first correlations {:.2f}, {:.2f}, {:.2f} standard errors", root[1], root[2], root[3])}});
 
-    std::size_t padded = 1;
-    while (padded < 4 * n) padded *= 2;
-    std::vector<double> in(padded, 0.0);
-    double power = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-        in[i] = rows[i] ? e[i] : 0.0;
-        power += in[i] * in[i];
-    }
-    std::vector<std::complex<double>> out;
-    Eigen::FFT<double> fft;
-    fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
-    fft.fwd(out, in);
-    std::size_t peak = 4;
-    for (std::size_t k = 4; k < padded / 2; ++k) {
-        if (std::norm(out[k]) > std::norm(out[peak])) peak = k;
-    }
-    const double chi2_line = 2.0 * std::norm(out[peak]) / power;
-    const double hz = static_cast<double>(peak) / (static_cast<double>(padded) * fit.model().series().interval_s);
-    // Between the Fourier frequencies there is more to find than at them.
-    tests.push_back({Where::frequency, "lines", of_several(chi2_tail(chi2_line, 2), 1.5 * static_cast<double>(n)),
-                     fmt::format("at {:.6g} Hz", hz)});
 }
 
-void test_size(const TurnFit& fit, std::vector<ResidualTest>& tests) {
+/// Lines, those that drift too.
+void test_lines(const TurnFit& fit, std::vector<View>& views) {
+    constexpr int drifts = 81;
+    constexpr double apart = 3.0;  // periods over the record; half of it away a line has lost a tenth of its power
+    const auto& e = fit.innovations();
+    const auto& rows = fit.rows();
+    const std::size_t n = e.size();
+    std::size_t padded = 1;
+    while (padded < 2 * n) padded *= 2;
+    double power = 0.0;
+    for (std::size_t i = 0; i < n; ++i) power += rows[i] ? e[i] * e[i] : 0.0;
+    struct Line {
+        double power = 0.0;
+        std::size_t bin = 0;
+    };
+    std::vector<Line> lines(drifts);
+    const auto drift_of = [](std::size_t k) { return apart * (static_cast<double>(k) - drifts / 2); };
+    oneapi::tbb::parallel_for(std::size_t{0}, lines.size(), [&](std::size_t k) {
+        const double drift = drift_of(k);
+        std::vector<std::complex<double>> in(padded);
+        for (std::size_t i = 0; i < n; ++i) {
+            if (!rows[i]) continue;
+            const double x = static_cast<double>(i) / static_cast<double>(n) - 0.5;
+            in[i] = std::polar(e[i], -units::pi * drift * x * x);
+        }
+        std::vector<std::complex<double>> out;
+        Eigen::FFT<double> fft;
+        fft.fwd(out, in);
+        for (std::size_t bin = 4; bin < padded / 2; ++bin) {
+            if (std::norm(out[bin]) > lines[k].power) lines[k] = {std::norm(out[bin]), bin};
+        }
+    });
+    // Between the Fourier frequencies there is more to find than at them.
+    const double places = 1.5 * static_cast<double>(n);
+    const double bin_hz = 1.0 / (static_cast<double>(padded) * fit.model().series().interval_s);
+    const auto report = [&](const char* view, const Line& line, double searched, double drift) {
+        const double chi2 = 2.0 * line.power / power;
+        const double duration_s = static_cast<double>(n) * fit.model().series().interval_s;
+        const double periods = static_cast<double>(line.bin) * bin_hz * duration_s;
+        const double cost = 2.0 + std::log(searched);
+        views.push_back({{Where::frequency, view, of_several(chi2_tail(chi2, 2), searched),
+                          fmt::format("at {:.6g} Hz{}", static_cast<double>(line.bin) * bin_hz,
+                                      drift != 0.0 ? fmt::format(", drifting by {:.2g} Hz", drift / duration_s) : ""),
+                          0.5 * chi2 - cost},
+                         cost,
+                         [n, periods, drift] {
+                             Columns columns(2, std::vector<double>(n));
+                             for (std::size_t i = 0; i < n; ++i) {
+                                 const double x = static_cast<double>(i) / static_cast<double>(n) - 0.5;
+                                 const double angle = units::two_pi * periods * x + units::pi * drift * x * x;
+                                 columns[0][i] = std::cos(angle);
+                                 columns[1][i] = std::sin(angle);
+                             }
+                             return columns;
+                         }});
+    };
+    report("lines", lines[drifts / 2], places, 0.0);
+    // A line that holds its frequency is not one that drifts by a little.
+    lines[drifts / 2] = {};
+    const auto best = std::max_element(lines.begin(), lines.end(),
+                                       [](const Line& a, const Line& b) { return a.power < b.power; });
+    report("lines that drift", *best, drifts * places, drift_of(static_cast<std::size_t>(best - lines.begin())));
+}
+
+/// Random rates are normal, what stands in for them need not be.
+void test_normality(const TurnFit& fit, std::vector<View>& views) {
+    if (const auto test = fourth_moments(fit.innovations(), fit.rows(), 1)) views.push_back({*test});
+    const TurnNoise noise = fit.model().noise(fit.parameters());
+    if (noise.rates.empty() && noise.walk_rad2_per_s3 == 0.0) return;
+    const auto& time = fit.model().series().time_s;
+    std::vector<double> ramp(time.size());
+    for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - time[time.size() / 2]);
+    if (const auto test = jumps_of_rate(fit.innovations(), fit.rows(), fit.whitened_alone(ramp))) {
+        views.push_back({*test});
+    }
+}
+
+void test_size(const TurnFit& fit, std::vector<View>& views) {
     const auto& e = fit.innovations();
     const auto& rows = fit.rows();
     const std::size_t n = e.size();
@@ -212,7 +382,7 @@ void test_size(const TurnFit& fit, std::vector<ResidualTest>& tests) {
     }
     mean /= count;
     const double variance = std::max(fourth / count - mean * mean, 1e-12);
-    tests.push_back(size_over_time(e, rows, 20, 8.0));
+    views.push_back({size_over_time(e, rows, 20, 8.0)});
     constexpr int columns = 8;
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(columns);
@@ -229,8 +399,8 @@ void test_size(const TurnFit& fit, std::vector<ResidualTest>& tests) {
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(normal);
     decomposition.setThreshold(1e-6);
     const double folded = right.dot(decomposition.solve(right)) / variance;
-    tests.push_back({Where::phase, "size of the residual over the turn's phase",
-                     chi2_tail(folded, static_cast<int>(decomposition.rank())), ""});
+    views.push_back({{Where::phase, "size of the residual over the turn's phase",
+                      chi2_tail(folded, static_cast<int>(decomposition.rank())), ""}});
 }
 
 }  // namespace
@@ -257,13 +427,22 @@ std::string ResidualTest::description() const {
     return fmt::format("{}{}{}, by chance p {:.2g}", view, detail.empty() ? "" : ", ", detail, p_value);
 }
 
+std::vector<View> view_residual(const TurnFit& fit) {
+    std::vector<View> views;
+    test_phase(fit, views);
+    test_rates(fit, views);
+    test_steps(fit, views);
+    test_levels(fit, views);
+    test_whiteness(fit, views);
+    test_lines(fit, views);
+    test_size(fit, views);
+    test_normality(fit, views);
+    return views;
+}
+
 std::vector<ResidualTest> test_residual(const TurnFit& fit) {
     std::vector<ResidualTest> tests;
-    if (fit.model().series().all_phases_come) test_phase(fit, tests);
-    test_rates(fit, tests);
-    test_steps(fit, tests);
-    test_whiteness(fit, tests);
-    test_size(fit, tests);
+    for (View& view : view_residual(fit)) tests.push_back(std::move(view.test));
     return tests;
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -21,8 +22,18 @@ struct ResidualTest {
     std::string description() const;
 };
 
+/// A test of the innovations and what it regresses them on.
+struct View {
+    ResidualTest test;
+    double cost = 0.0;  ///< of its parameters and its search, in the log-likelihood
+    std::function<std::vector<std::vector<double>>()> columns = {};  ///< series of phase; none where nothing regresses
+};
+
 /// Holds the innovations that count against everything that the record has: phase at the turns and its harmonics,
-/// direction, amplitude, temperature, input rate, time, frequency, the innovations before.
+/// direction, amplitude, temperature, input rate, time, frequency, the innovations before. The views refer to the fit.
+std::vector<View> view_residual(const TurnFit& fit);
+
+/// The tests alone.
 std::vector<ResidualTest> test_residual(const TurnFit& fit);
 
 }  // namespace ringlock::closure

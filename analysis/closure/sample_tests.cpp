@@ -8,6 +8,7 @@
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/normality.hpp"
 #include "analysis/closure/sample_search.hpp"
 
 namespace ringlock::closure {
@@ -240,93 +241,22 @@ void test_lines(const SampleFit& fit, Tests& tests) {
     }
 }
 
-/// A rate that wanders moves by little at a time; jumps betray themselves by the size of what follows them (Harvey and
-/// Koopman, J. Business and Economic Statistics 10, 377, 1992).
 void test_jumps(const SampleFit& fit, Tests& tests) {
     if (!fit.model().walk && !fit.model().flicker) return;
     const std::size_t n = fit.innovations().size();
     std::vector<double> step(n, 0.0);
-    const std::size_t middle = n / 2;
-    std::fill(step.begin() + static_cast<std::ptrdiff_t>(middle), step.end(), fit.series().interval_s);
-    const auto response = fit.filter().apply(step);
-    double all = 0.0;
-    for (std::size_t i = middle; i < n; ++i) all += response[i] * response[i];
-    std::size_t length = 0;
-    double part = 0.0;
-    while (part < 0.9 * all && middle + length < n) {
-        part += response[middle + length] * response[middle + length];
-        ++length;
+    std::fill(step.begin() + static_cast<std::ptrdiff_t>(n / 2), step.end(), fit.series().interval_s);
+    if (const auto test = jumps_of_rate(fit.innovations(), fit.rows(), fit.filter().apply(step))) {
+        tests.push_back(*test);
     }
-    const std::size_t stride = std::max<std::size_t>(1, length / 16);
-    std::vector<double> sizes;
-    for (std::size_t a = 0; a + length <= n; a += stride) {
-        double sum = 0.0;
-        double weight = 0.0;
-        for (std::size_t i = 0; i < length; ++i) {
-            if (!fit.rows()[a + i]) continue;
-            const double h = response[middle + i];
-            sum += h * fit.innovations()[a + i];
-            weight += h * h;
-        }
-        if (weight > 0.3 * part) sizes.push_back(sum * sum / weight);
-    }
-    if (sizes.size() < 40) return;
-    const double most = *std::max_element(sizes.begin(), sizes.end());
-    tests.push_back({Where::time, "jumps of a rate that wanders",
-                     of_several(chi2_tail(most, 1), static_cast<double>(sizes.size())),
-                     fmt::format("{:.1f} standard errors", std::sqrt(most))});
 }
 
 void test_distribution(const SampleFit& fit, double lattice_arcsec, Tests& tests) {
     const auto& e = fit.innovations();
     const std::size_t n = e.size();
-    // Fourth moments of sums over longer and longer stretches: what is normal stays so.
-    double least = 1.0;
-    std::size_t at = 0;
-    double tried = 0.0;
-    double excess = 0.0;
-    for (std::size_t m = 1; m * 400 < n; m *= 4) {
-        // Steps that are not small are no normal noise; sums of them are.
-        if (lattice_arcsec > 0.2 * fit.sd(n / 2) && m < 16) continue;
-        std::vector<double> sums;
-        for (std::size_t a = 0; a + m <= n; a += m) {
-            double sum = 0.0;
-            bool all = true;
-            for (std::size_t i = a; i < a + m && all; ++i) {
-                all = fit.rows()[i] != 0;
-                sum += e[i];
-            }
-            if (all) sums.push_back(sum);
-        }
-        if (sums.size() < 200) break;
-        const auto count = static_cast<double>(sums.size());
-        double second = 0.0;
-        double fourth = 0.0;
-        for (const double s : sums) second += s * s / count;
-        for (const double s : sums) fourth += s * s * s * s / count;
-        const double kurtosis = fourth / (second * second) - 3.0;
-        // Anscombe and Glynn (Biometrika 70, 227, 1983)
-        const double mean = -6.0 / (count + 1.0);
-        const double variance = 24.0 * count * (count - 2.0) * (count - 3.0) /
-                                ((count + 1.0) * (count + 1.0) * (count + 3.0) * (count + 5.0));
-        const double x = (kurtosis - mean) / std::sqrt(variance);
-        const double skew = 6.0 * (count * count - 5.0 * count + 2.0) / ((count + 7.0) * (count + 9.0)) *
-                            std::sqrt(6.0 * (count + 3.0) * (count + 5.0) / (count * (count - 2.0) * (count - 3.0)));
-        const double a = 6.0 + 8.0 / skew * (2.0 / skew + std::sqrt(1.0 + 4.0 / (skew * skew)));
-        const double inner = (1.0 - 2.0 / a) / (1.0 + x * std::sqrt(2.0 / (a - 4.0)));
-        const double z = ((1.0 - 2.0 / (9.0 * a)) - std::cbrt(inner)) / std::sqrt(2.0 / (9.0 * a));
-        const double p = chi2_tail(z * z, 1);
-        tried += 1.0;
-        if (p < least) {
-            least = p;
-            at = m;
-            excess = kurtosis;
-        }
-    }
-    if (tried > 0.0) {
-        tests.push_back({Where::amplitude, "fourth moment of sums of the residual", of_several(least, tried),
-                         fmt::format("excess {:.3g} of sums of {}", excess, at)});
-    }
+    // Steps that are not small are no normal noise; sums of them are.
+    const bool steps = lattice_arcsec > 0.2 * fit.sd(n / 2);
+    if (const auto test = fourth_moments(e, fit.rows(), steps ? 16 : 1)) tests.push_back(*test);
     if (lattice_arcsec == 0.0) {
         // No two values of so many digits are the same by chance, the largest least of all.
         const auto& x = fit.series().increment;

@@ -121,8 +121,9 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     }
     // Clocks that find the zero-rate point from pulses do not follow the lock-in's shift of it all the way.
     const double followed_s = free_of_phase(late, valid, fit);
-    // Beneath: what the approximations of turn times leave, and a twentieth of what they do not follow.
-    const double least_s = std::hypot(1e-9 * series.interval_s, 0.05 * followed_s);
+    // Beneath: what the approximations of turn times leave, 1e-7 of an asymmetry, and a twentieth of what they do not
+    // follow.
+    const double least_s = std::hypot(5e-8 * series.interval_s, 0.05 * followed_s);
     DitherShape shape{block_mean(late, valid, fit.rows(), least_s), {}, {}};
     std::vector<double> sides(n, 0.0);
     std::vector<double> minima(n, 0.0);

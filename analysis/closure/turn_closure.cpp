@@ -95,27 +95,61 @@ void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
          setup.dither_peak_rate_deg_s * fitted.fit->sd_rad().front() / (fitted.series.amplitude_rad * std::sqrt(n))});
 }
 
-/// Whether some view of the residual shows more than the best effect can explain: then that one is only what comes
-/// nearest to something that the library does not have.
+/// A random rate can follow whatever the library does not have, more or less.
+bool is_random_rate(const effects::Effect& effect) {
+    const auto parameters = effect.parameters();
+    return std::any_of(parameters.begin(), parameters.end(),
+                       [](const auto& p) { return p.role == effects::Role::deviation; });
+}
+
+/// Whether some view of the residual explains more than the best effect, the noise fitted anew beside either: then
+/// that one is only what comes nearest to something that the library does not have.
 ///
 /// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do.
-bool something_else(const TurnFit& fit, const effects::Effect& effect, double score, double full) {
-    const auto tests = test_residual(fit);
-    return std::any_of(tests.begin(), tests.end(), [&](const ResidualTest& test) {
-        const bool in_step = test.where == Where::phase && effect.adds_angle();
-        return test.merit > (in_step ? score - tie : std::max(score, full) + tie);
+bool something_else(const TurnFit& fit, const effects::Effect& effect, double merit) {
+    constexpr std::size_t looked_at = 4;
+    auto views = view_residual(fit);
+    std::erase_if(views, [](const View& view) { return !view.columns || view.test.merit < tie; });
+    std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
+    if (views.size() > looked_at) views.resize(looked_at);
+    return std::any_of(views.begin(), views.end(), [&](const View& view) {
+        if (getenv("DBG")) fmt::print(stderr, "  view {} {}: score {:.1f} refit {:.1f}; {} {:.1f}\n", view.test.view, view.test.detail, view.test.merit, fit.gain(view.columns()) - view.cost, effect.name(), merit);
+        const bool in_step = view.test.where == Where::phase && effect.adds_angle();
+        // A random rate can follow what jumps, nearly as well as the jumps themselves.
+        const bool jumps = view.test.where == Where::time && is_random_rate(effect);
+        return fit.gain(view.columns()) - view.cost > (in_step || jumps ? merit - tie : merit + tie);
     });
 }
 
-/// The view that says most of where structure lies: of those that fail, a regression that explains it before a test
-/// that only sees it.
-const ResidualTest& most_telling(const std::vector<ResidualTest>& tests, double threshold) {
-    return *std::min_element(tests.begin(), tests.end(), [&](const ResidualTest& a, const ResidualTest& b) {
-        const double merit_a = a.p_value < threshold ? a.merit : 0.0;
-        const double merit_b = b.p_value < threshold ? b.merit : 0.0;
-        if (merit_a > 0.0 || merit_b > 0.0) return merit_a > merit_b;
-        return a.p_value < b.p_value;
+/// Tests of what the model has left; where structure lies, if any passes the level.
+///
+/// Of the views that fail, the regression that explains most, the noise fitted anew beside it; where none does, the
+/// test that is least probable by chance.
+void test_what_is_left(const TurnFit& fit, Closure& closure) {
+    constexpr std::size_t looked_at = 4;
+    auto views = view_residual(fit);
+    closure.tests.clear();
+    for (const View& view : views) closure.tests.push_back(view.test);
+    const double threshold = level_of_residual / static_cast<double>(views.size());
+    closure.unexplained.reset();
+    const auto fails = [&](const View& view) { return view.test.p_value < threshold; };
+    if (std::none_of(views.begin(), views.end(), fails)) return;
+    const bool in_step = !fit.model().series().all_phases_come;
+    std::erase_if(views, [&](const View& view) {
+        return !fails(view) && !(in_step && view.test.where == Where::phase && view.test.merit > tie);
     });
+    std::sort(views.begin(), views.end(), [](const View& a, const View& b) {
+        return a.test.merit > b.test.merit || (a.test.merit == b.test.merit && a.test.p_value < b.test.p_value);
+    });
+    closure.unexplained = views.front().test;
+    if (!views.front().columns) return;
+    double most = 0.0;
+    for (std::size_t k = 0; k < std::min(looked_at, views.size()) && views[k].columns; ++k) {
+        const double merit = fit.gain(views[k].columns()) - views[k].cost;
+        if (merit <= most) continue;
+        most = merit;
+        closure.unexplained = views[k].test;
+    }
 }
 
 /// Effects that stood in for the one added last are no longer needed beside it.
@@ -175,13 +209,6 @@ void take_residual(const record::Turns& turns, const Fitted& train, Closure& clo
     }
 }
 
-void test_what_is_left(const TurnFit& fit, Closure& closure) {
-    closure.tests = test_residual(fit);
-    const double threshold = level_of_residual / static_cast<double>(closure.tests.size());
-    const ResidualTest& worst = most_telling(closure.tests, threshold);
-    if (worst.p_value < threshold) closure.unexplained = worst;
-}
-
 }  // namespace
 
 Closure close_turns(const record::Record& record) {
@@ -207,6 +234,12 @@ Closure close_turns(const record::Record& record) {
     }
     closure.heldout_before = heldout(*train->fit).error;
     const auto tests_of_effects = static_cast<double>(effects::registry().size());
+    // Before the first random rate.
+    struct Earlier {
+        std::shared_ptr<Fitted> now, train;
+        std::vector<Step> steps;
+    };
+    std::optional<Earlier> earlier;
 
     while (closure.steps.size() < most_steps) {
         auto candidates = screen_side_channels(turns, *now->fit, now->joined);
@@ -260,8 +293,7 @@ Closure close_turns(const record::Record& record) {
         std::sort(contenders.begin(), contenders.end(),
                   [](const Contender& a, const Contender& b) { return a.merit > b.merit; });
         Contender& best = contenders.front();
-        // Views and candidates are compared by their scores, with the noise as it is.
-        if (!side && something_else(*now->fit, *best.candidate.effect, 0.5 * merit(best.candidate), best.merit)) break;
+        if (!side && something_else(*now->fit, *best.candidate.effect, best.merit)) break;
         // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
         const double chi2 = 2.0 * (best.fitted->fit->log_likelihood() - now->fit->log_likelihood());
         const double p_full =
@@ -279,6 +311,7 @@ Closure close_turns(const record::Record& record) {
             }
         }
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
+        if (!earlier && is_random_rate(*best.candidate.effect)) earlier = {now, train, closure.steps};
         now = best.fitted;
         train = train_next;
         const std::size_t kept = closure.steps.size();
@@ -291,8 +324,15 @@ Closure close_turns(const record::Record& record) {
         closure.steps.push_back(std::move(step));
     }
 
-    take_residual(turns, *train, closure);
     test_what_is_left(*now->fit, closure);
+    if (earlier && closure.unexplained && closure.unexplained->where != Where::phase) {
+        // A rate is left that is none of the library's: the random one has only come nearest to it.
+        now = earlier->now;
+        train = earlier->train;
+        closure.steps = std::move(earlier->steps);
+        test_what_is_left(*now->fit, closure);
+    }
+    take_residual(turns, *train, closure);
     take_figures(turns, *now, closure);
     closure.verdict = verdict_of(closure);
     return closure;

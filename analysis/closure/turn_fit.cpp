@@ -160,15 +160,11 @@ void TurnFit::fit_deterministic(int iterations) {
         const Whitening whitening(prediction_.frame, model_->noise(guess));
         Eigen::MatrixXd x(n, all.size());
         Eigen::VectorXd y(n);
-        const auto put = [&](const std::vector<double>& series, auto&& column) {
-            const auto white = whitening.apply(series);
-            for (std::size_t i = 0; i < n; ++i) column(static_cast<Eigen::Index>(i)) = rows_[i] ? white[i] : 0.0;
-        };
-        put(rest_, y);
+        y = counted(whitening, rest_);
         Eigen::VectorXd scale(all.size());
         for (std::size_t k = 0; k < all.size(); ++k) {
             auto column = x.col(static_cast<Eigen::Index>(k));
-            put(all[k].series, column);
+            column = counted(whitening, all[k].series);
             scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
             column /= scale(static_cast<Eigen::Index>(k));
         }
@@ -263,16 +259,21 @@ void TurnFit::fit_noise() {
         std::tie(parameters_.injected_sd_rad, parameters_.wander_sd_rad) = grid[static_cast<std::size_t>(best)];
         trial = parameters_;
     }
+    parameters_ = with_noise_of(trial, rest_);
+}
+
+TurnParameters TurnFit::with_noise_of(const TurnParameters& start, const std::vector<double>& rest) const {
     constexpr double least = 1e-9;
+    TurnParameters trial = start;
     std::vector<double> x;
     for (const Knob& knob : knobs(trial)) x.push_back(std::log(std::max(*knob.value, least)));
     const auto with = [&](const double* at) {
-        TurnParameters changed = trial;
+        TurnParameters changed = start;
         for (const Knob& knob : knobs(changed)) *knob.value = std::exp(std::clamp(*at++, -25.0, 25.0));
         return changed;
     };
     ceres::GradientProblem problem(
-        new Objective(x.size(), [&](const double* at) { return objective(with(at), rest_); }));
+        new Objective(x.size(), [&](const double* at) { return objective(with(at), rest); }));
     ceres::GradientProblemSolver::Options options;
     options.logging_type = ceres::SILENT;
     options.max_num_iterations = 60;
@@ -280,27 +281,24 @@ void TurnFit::fit_noise() {
     options.gradient_tolerance = 1e-4;
     ceres::GradientProblemSolver::Summary summary;
     ceres::Solve(options, problem, x.data(), &summary);
-    parameters_ = with(x.data());
+    return with(x.data());
 }
 
 void TurnFit::finish() {
     const std::size_t n = model_->series().size();
     prediction_ = model_->predict(parameters_);
-    const std::vector<Column> all = columns(prediction_);
+    columns_ = columns(prediction_);
+    const std::vector<Column>& all = columns_;
     set_rest(prediction_, all);
     whitening_ = std::make_shared<Whitening>(prediction_.frame, model_->noise(parameters_));
     innovations_ = whitening_->apply(rest_);
     sd_rad_ = whitening_->sd_rad();
-    log_likelihood_ = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-        if (rows_[i]) log_likelihood_ -= 0.5 * innovations_[i] * innovations_[i] + std::log(sd_rad_[i]);
-    }
+    log_likelihood_ = -objective(parameters_, rest_);
     Eigen::MatrixXd x(n, all.size());
     Eigen::VectorXd scale(all.size());
     for (std::size_t k = 0; k < all.size(); ++k) {
-        const auto white = whitening_->apply(all[k].series);
         auto column = x.col(static_cast<Eigen::Index>(k));
-        for (std::size_t i = 0; i < n; ++i) column(static_cast<Eigen::Index>(i)) = rows_[i] ? white[i] : 0.0;
+        column = counted(*whitening_, all[k].series);
         scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
         column /= scale(static_cast<Eigen::Index>(k));
     }
@@ -356,10 +354,44 @@ void TurnFit::finish() {
     basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(x.rows(), x.cols());
 }
 
-Eigen::VectorXd TurnFit::whitened(const std::vector<double>& series) const {
-    const auto white = whitening_->apply(series);
+Eigen::VectorXd TurnFit::counted(const Whitening& whitening, const std::vector<double>& series) const {
+    const auto white = whitening.apply(series);
     Eigen::VectorXd column(static_cast<Eigen::Index>(white.size()));
     for (std::size_t i = 0; i < white.size(); ++i) column(static_cast<Eigen::Index>(i)) = rows_[i] ? white[i] : 0.0;
+    return column;
+}
+
+double TurnFit::gain(const std::vector<std::vector<double>>& series) const {
+    TurnParameters trial = parameters_;
+    std::vector<double> rest = rest_;
+    const std::size_t own = columns_.size();
+    const auto column_of = [&](std::size_t k) -> const std::vector<double>& {
+        return k < own ? columns_[k].series : series[k - own];
+    };
+    for (int pass = 0; pass < 2; ++pass) {
+        const Whitening whitening(prediction_.frame, model_->noise(trial));
+        Eigen::MatrixXd x(static_cast<Eigen::Index>(rest.size()), static_cast<Eigen::Index>(own + series.size()));
+        Eigen::VectorXd scale(x.cols());
+        for (Eigen::Index k = 0; k < x.cols(); ++k) {
+            x.col(k) = counted(whitening, column_of(static_cast<std::size_t>(k)));
+            scale(k) = std::max(x.col(k).norm(), 1e-300);
+            x.col(k) /= scale(k);
+        }
+        const Eigen::MatrixXd normal = x.transpose() * x;
+        const Eigen::VectorXd right = x.transpose() * counted(whitening, rest);
+        Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(normal);
+        const Eigen::VectorXd value = decomposition.solve(right).cwiseQuotient(scale);
+        for (Eigen::Index k = 0; k < x.cols(); ++k) {
+            const auto& column = column_of(static_cast<std::size_t>(k));
+            for (std::size_t i = 0; i < rest.size(); ++i) rest[i] -= value(k) * column[i];
+        }
+        trial = with_noise_of(trial, rest);
+    }
+    return objective(parameters_, rest_) - objective(trial, rest);
+}
+
+Eigen::VectorXd TurnFit::whitened(const std::vector<double>& series) const {
+    Eigen::VectorXd column = counted(*whitening_, series);
     const double all = column.norm();
     column -= basis_ * (basis_.transpose() * column);
     // What the model's own parameters can do as well leaves rounding only.

@@ -36,6 +36,7 @@ class TurnFit {
     const TurnParameters& parameters() const { return parameters_; }
     /// Base parameters and those of effects, with standard errors.
     const std::vector<Estimate>& estimates() const { return estimates_; }
+    /// Of the phases that count and of the radii of the quadrature.
     double log_likelihood() const { return log_likelihood_; }
     const Rows& rows() const { return rows_; }
 
@@ -52,9 +53,13 @@ class TurnFit {
         int rank = 0;
     };
     Score score(const std::vector<std::vector<double>>& series) const;
+    /// Gain of the log-likelihood by that regression with the noise fitted anew beside it.
+    double gain(const std::vector<std::vector<double>>& series) const;
     /// One series whitened and freed likewise, rows that do not count zero.
     Eigen::VectorXd whitened(const std::vector<double>& series) const;
     Eigen::VectorXd residual() const;
+    /// One series whitened, and no more.
+    std::vector<double> whitened_alone(const std::vector<double>& series) const { return whitening_->apply(series); }
 
     /// Twice the gain of the log-likelihood by a random effect, and its standard deviation (of the parameter of that
     /// role), all else as fitted.
@@ -71,6 +76,9 @@ class TurnFit {
     };
     void fit_deterministic(int iterations);
     void fit_noise();
+    TurnParameters with_noise_of(const TurnParameters& start, const std::vector<double>& rest) const;
+    /// The series whitened, rows that do not count zero.
+    Eigen::VectorXd counted(const Whitening& whitening, const std::vector<double>& series) const;
     void take(const Eigen::VectorXd& step);
     void set_rest(const TurnModel::Prediction& prediction, const std::vector<Column>& columns);
     double squares_left(const std::vector<Column>& columns, const Whitening& whitening);
@@ -85,6 +93,7 @@ class TurnFit {
     std::vector<double> nuisance_;  ///< offset, amplitude and its drift
     TurnModel::Prediction prediction_;
     std::vector<double> rest_;  ///< phases less all that is deterministic
+    std::vector<Column> columns_;
     std::vector<Estimate> estimates_;
     std::vector<double> innovations_, sd_rad_;
     double log_likelihood_ = 0.0;

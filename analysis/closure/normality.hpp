@@ -1,0 +1,21 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "analysis/closure/independence.hpp"
+
+/// Whether innovations are normal, as those of every model here are.
+namespace ringlock::closure {
+
+/// Fourth moments of sums of `shortest` innovations and of longer ones: what is normal stays so. None where there are
+/// too few.
+std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovations, const Rows& rows,
+                                           std::size_t shortest);
+
+/// A rate that wanders moves by little at a time; jumps betray themselves by the size of what follows them (Harvey and
+/// Koopman, J. Business and Economic Statistics 10, 377, 1992). `response`: what the filter makes of a step of the rate
+/// in the middle of the record.
+std::optional<ResidualTest> jumps_of_rate(const std::vector<double>& innovations, const Rows& rows,
+                                          const std::vector<double>& response);
+
+}  // namespace ringlock::closure

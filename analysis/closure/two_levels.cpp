@@ -1,0 +1,71 @@
+#include "analysis/closure/two_levels.hpp"
+
+#include <algorithm>
+#include <boost/math/special_functions/binomial.hpp>
+#include <cmath>
+#include <vector>
+
+#include "analysis/closure/chance.hpp"
+
+namespace ringlock::closure {
+
+TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right) {
+    const Eigen::Index n = right.size();
+    const double floor = 1e-9 * normal.diagonal().maxCoeff();
+    if (!(floor > 0.0)) return {};
+    const double place = std::log(static_cast<double>(n - 1));
+    constexpr double of_levels = 1.0;  // the mean of both belongs to the bias
+    std::vector<int> high(static_cast<std::size_t>(n), 0);
+    const auto level = [&](Eigen::Index k) { return high[static_cast<std::size_t>(k)]; };
+    Eigen::VectorXd shape = Eigen::VectorXd::Zero(n);
+    TwoLevels best;
+    while (true) {
+        const Eigen::VectorXd pull = normal * shape;
+        const double squares = shape.dot(pull);
+        const double product = shape.dot(right);
+        TwoLevels step = best;
+        Eigen::Index from = 0;
+        Eigen::Index to = 0;
+        for (Eigen::Index a = 0; a < n; ++a) {
+            double new_product = product;
+            double new_squares = squares;
+            Eigen::VectorXd cross = Eigen::VectorXd::Zero(n);  // normal times what has been turned over so far
+            for (Eigen::Index b = a; b < n; ++b) {
+                const double sign = 1.0 - 2.0 * level(b);
+                new_product += sign * right(b);
+                new_squares += sign * 2.0 * (pull(b) + cross(b)) + normal(b, b);
+                cross += sign * normal.col(b);
+                if (new_squares < floor) continue;
+                int changes = 0;
+                for (Eigen::Index k = 1; k < n; ++k) {
+                    const bool here = k >= a && k <= b;
+                    const bool before = k - 1 >= a && k - 1 <= b;
+                    changes += (level(k) ^ static_cast<int>(here)) != (level(k - 1) ^ static_cast<int>(before)) ? 1 : 0;
+                }
+                if (changes == 0) continue;
+                const double chi2 = new_product * new_product / new_squares;
+                const double cost = of_levels + changes * place;
+                const double merit = 0.5 * chi2 - cost;
+                if (merit <= step.merit) continue;
+                step = {chi2, changes, merit, cost};
+                from = a;
+                to = b;
+            }
+        }
+        if (step.merit <= best.merit) break;
+        best = step;
+        for (Eigen::Index k = from; k <= to; ++k) {
+            high[static_cast<std::size_t>(k)] ^= 1;
+            shape(k) = level(k);
+        }
+    }
+    if (best.changes == 0) return {};
+    const auto changes = static_cast<unsigned>(best.changes);
+    const double courses = boost::math::binomial_coefficient<double>(static_cast<unsigned>(n - 1), changes) *
+                           std::exp2(static_cast<double>(changes));
+    best.shape = shape;
+    best.p_value = of_several(chi2_tail(best.chi2, 1), courses);
+    return best;
+}
+
+}  // namespace ringlock::closure

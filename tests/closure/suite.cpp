@@ -1,0 +1,369 @@
+#include "tests/closure/suite.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <set>
+
+#include "analysis/instrument/simulate.hpp"
+#include "engine/core/units.hpp"
+#include "engine/effects/effect.hpp"
+#include "tests/closure/generator.hpp"
+#include "tests/closure/keys.hpp"
+
+namespace ringlock::test::closure {
+
+using ringlock::closure::ActiveEffect;
+using ringlock::closure::Closure;
+using ringlock::closure::Estimate;
+using ringlock::closure::fit_turns;
+using ringlock::closure::Verdict;
+using ringlock::closure::Where;
+
+const std::vector<Condition> conditions = {
+    {"quiet", 0.0, false}, {"injected", 3.0, false}, {"moving", 0.0, true}, {"moving, injected", 3.0, true}};
+
+const char* name_of(Kind kind) {
+    constexpr const char* names[] = {"null", "single", "pair", "foreign"};
+    return names[static_cast<std::size_t>(kind)];
+}
+
+const char* name_of(Judged judged) {
+    constexpr const char* names[] = {"right", "tie", "missed", "unexplained", "wrong"};
+    return names[static_cast<std::size_t>(judged)];
+}
+
+std::string Case::truth_text() const {
+    std::string text;
+    for (const Added& added : truth) text += (text.empty() ? "" : "+") + added.effect;
+    return text.empty() ? "nothing" : text;
+}
+
+namespace {
+
+constexpr double declared_threshold_deg_h = 300.0;
+constexpr double readout_noise = 0.005;
+constexpr double temperature_swing_k = 1.0;
+constexpr double temperature_interval_s = 0.1;  // between rows the temperature is taken for linear
+constexpr double walk_relative_rt_s = 1e-5;
+constexpr double drift_relative_per_h = 0.01;
+
+/// Truths of the gyro itself, by the seed.
+struct Device {
+    double threshold_deg_h, peak_rate_deg_s, rate_deg_h, duration_s;
+    std::vector<double> profile_time_s = {};
+    std::vector<double> profile_rate_deg_h = {};
+};
+
+Device device_of(const Case& of) {
+    std::mt19937_64 random(of.seed);
+    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    Device d{declared_threshold_deg_h * between(0.8, 1.2), 109.1 * between(0.9, 1.1), between(-100.0, 100.0), 0.0};
+    d.duration_s = 0.5 * static_cast<double>(of.turns) / Truth{}.dither_frequency_hz;
+    if (of.condition->moving) {
+        d.rate_deg_h = 0.0;
+        double time_s = 0.0;
+        double rate = between(-300.0, 300.0);
+        while (time_s < d.duration_s) {
+            const double next = between(-300.0, 300.0);
+            const double hold_s = between(0.1, 0.3) * d.duration_s;
+            for (const double t : {time_s, time_s + hold_s}) {
+                d.profile_time_s.push_back(t);
+                d.profile_rate_deg_h.push_back(rate);
+            }
+            time_s += hold_s + 1.0;
+            rate = next;
+        }
+    }
+    return d;
+}
+
+record::Record by_map(const Case& of, const Device& device) {
+    scenario::Scenario scenario;
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    scenario.ensemble.gyros = 1;
+    scenario.ensemble.seed = of.seed;
+    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
+    scenario.ensemble.dither_amplitude_sd_relative = 0.0;
+    scenario.ensemble.duration_s = device.duration_s;
+    scenario.gyro.lockin_threshold_deg_h = device.threshold_deg_h;
+    scenario.dither.peak_rate_deg_s = device.peak_rate_deg_s;
+    scenario.readout.detector_noise_relative = readout_noise;
+    scenario.input.rate_deg_h = scenario.input.sweep_stop_deg_h = device.rate_deg_h;
+    if (of.condition->injected_rad > 0.0) {
+        scenario.noise_injection.turn_phase_rms_rad = of.condition->injected_rad;
+    } else {
+        scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
+    }
+    if (of.condition->moving) {
+        scenario.dither.amplitude_wander_relative_rt_s = walk_relative_rt_s;
+        scenario.dither.amplitude_drift_relative_per_h = drift_relative_per_h;
+        scenario.input.profile_time_s = device.profile_time_s;
+        scenario.input.profile_rate_deg_h = device.profile_rate_deg_h;
+    }
+    scenario.environment.temperature_swing_k = temperature_swing_k;
+    scenario.environment.temperature_period_s = 0.4 * device.duration_s;
+    scenario.record.temperature_interval_s = temperature_interval_s;
+    for (const Added& added : of.truth) {
+        for (const auto& [name, value] : added.values) scenario.effects.at(added.effect).at(name) = value;
+    }
+    record::Record record = instrument::simulate_record(scenario);
+    record.declared.lockin_threshold_deg_h = declared_threshold_deg_h;
+    return record;
+}
+
+Truth truth_of(const Case& of, const Device& device) {
+    Truth truth;
+    truth.turns = of.turns;
+    truth.seed = of.seed;
+    truth.lockin_threshold_deg_h = device.threshold_deg_h;
+    truth.dither_peak_rate_deg_s = device.peak_rate_deg_s;
+    truth.readout_noise = readout_noise;
+    truth.injected_noise_rad = of.condition->injected_rad;
+    std::mt19937_64 random(of.seed + 1);
+    truth.initial_phase_rad = std::uniform_real_distribution<double>(0.0, units::two_pi)(random);
+    truth.input_rate_deg_h = device.rate_deg_h;
+    if (of.condition->moving) {
+        truth.wander.walk_per_turn = walk_relative_rt_s / std::sqrt(2.0 * truth.dither_frequency_hz);
+        truth.wander.drift_per_s = drift_relative_per_h / 3600.0;
+        truth.input_profile_deg_h = {device.profile_time_s, device.profile_rate_deg_h};
+    }
+    truth.temperature.swing_k = temperature_swing_k;
+    truth.temperature.period_s = 0.4 * device.duration_s;
+    truth.temperature.interval_s = temperature_interval_s;
+    for (const Added& added : of.truth) {
+        for (const auto& [name, value] : added.values) {
+            const std::string key = name.empty() ? added.effect : added.effect + "." + name;
+            set(truth, key, fmt::format("{:.17g}", value));
+        }
+    }
+    return truth;
+}
+
+/// The parameter that says how much there is of an effect.
+const effects::Parameter& size_of(const effects::Effect& effect) {
+    using effects::Role;
+    const effects::Parameter* phase = nullptr;
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        if (parameter.role == Role::size || parameter.role == Role::deviation || parameter.role == Role::probability) {
+            return parameter;
+        }
+        if (parameter.role == Role::phase) phase = &parameter;
+    }
+    return *phase;
+}
+
+double deviation_of(const Estimate& estimate, double truth) {
+    double off = estimate.value - truth;
+    if (estimate.name == "phase_rad") off = std::remainder(off, units::two_pi);
+    return off / estimate.sd;
+}
+
+}  // namespace
+
+std::vector<record::Record> make(std::span<const Case> cases) {
+    std::vector<record::Record> records(cases.size());
+    std::vector<Truth> truths;
+    std::vector<std::size_t> direct;
+    for (std::size_t k = 0; k < cases.size(); ++k) {
+        if (cases[k].direct) {
+            truths.push_back(truth_of(cases[k], device_of(cases[k])));
+            direct.push_back(k);
+        } else {
+            records[k] = by_map(cases[k], device_of(cases[k]));
+        }
+    }
+    auto generated = generate(truths);
+    for (std::size_t k = 0; k < direct.size(); ++k) {
+        records[direct[k]] = std::move(generated[k]);
+        records[direct[k]].declared.lockin_threshold_deg_h = declared_threshold_deg_h;
+    }
+    return records;
+}
+
+std::vector<std::string> effects_on_turns() {
+    std::vector<std::string> names;
+    for (const effects::Effect* effect : effects::registry()) {
+        const auto parameters = effect->parameters();
+        if (std::none_of(parameters.begin(), parameters.end(),
+                         [](const auto& p) { return p.role == effects::Role::sampled; })) {
+            names.emplace_back(effect->name());
+        }
+    }
+    return names;
+}
+
+Added draw(const std::string& name, double size, std::uint64_t seed, double duration_s) {
+    std::mt19937_64 random(seed ^ 0x5eed);
+    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    const effects::Effect& effect = *effects::find(name);
+    const effects::Parameter& main = size_of(effect);
+    Added added{name, {}};
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        using effects::Role;
+        double& value = added.values[std::string(parameter.name)];
+        value = parameter.default_value;
+        if (&parameter == &main) {
+            const bool either_sign = parameter.min < 0.0 && parameter.role == Role::size;
+            value = size * (either_sign && between(0.0, 1.0) < 0.5 ? -1.0 : 1.0);
+        } else if (parameter.role == Role::size) {
+            value = 0.0;
+        } else if (parameter.role == Role::phase) {
+            value = between(-units::pi, units::pi);
+        } else if (parameter.role == Role::time) {
+            value = between(0.2, 0.8) * duration_s;
+        } else if (parameter.role == Role::frequency) {
+            value = std::exp(between(std::log(0.5), std::log(100.0)));
+        }
+    }
+    return added;
+}
+
+double detection_limit(const std::string& name, const Condition& condition) {
+    const effects::Effect& effect = *effects::find(name);
+    const effects::Parameter& main = size_of(effect);
+    const std::string parameter(main.name);
+    // Random processes need some size for a start; others are known as well at any.
+    double size = main.role == effects::Role::deviation ? 1e-3 : 0.02 * std::min(1.0, main.max);
+    if (main.role == effects::Role::probability) size = 1e-3;
+    if (name == "rate_random_walk" || name == "bias_instability") size = 0.1;
+    if (name == "quantum_noise") size = 1e-4;
+    constexpr int rounds = 5;
+    constexpr std::uint64_t records = 3;
+    for (int round = 0; round < rounds; ++round) {
+        double sum = 0.0;
+        for (std::uint64_t k = 0; k < records; ++k) {
+            Case of{.kind = Kind::single, .truth = {}, .multiple = 1.0, .condition = &condition, .seed = 900 + k};
+            of.truth = {draw(name, size, of.seed, device_of(of).duration_s)};
+            const Closure known =
+                fit_turns(make({&of, 1}).front(), {ActiveEffect{&effect, {of.truth[0].values.begin(), of.truth[0].values.end()}}});
+            for (const Estimate& estimate : known.steps.at(0).parameters) {
+                if (estimate.name == parameter) {
+                    // Where the size itself is random, so is its error: for the same relative one.
+                    sum += estimate.sd / static_cast<double>(records);
+                }
+            }
+        }
+        const double next = std::min(4.0 * sum, 0.5 * main.max);
+        size = main.role == effects::Role::size || main.role == effects::Role::phase ? next : std::sqrt(size * next);
+    }
+    return size;
+}
+
+std::vector<Case> foreign_cases(std::size_t each) {
+    std::vector<Case> cases;
+    std::mt19937_64 random(77);
+    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    for (std::size_t k = 0; k < each; ++k) {
+        const auto add = [&](std::size_t condition, Where where, Added added) {
+            Case of;
+            of.kind = Kind::foreign;
+            of.condition = &conditions[condition];
+            of.direct = true;
+            of.seed = 50000 + cases.size();
+            of.where = where;
+            of.truth = {std::move(added)};
+            cases.push_back(std::move(of));
+        };
+        // From what shows itself well to what is evident: sizes are even in their logarithms.
+        const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
+        const bool injected = k % 2 == 1;
+        add(k % 2, Where::phase,
+            {"lockin_third_harmonic",
+             {{"ratio", injected ? even(0.1, 0.4) : even(0.02, 0.4)}, {"phase_rad", between(-3.0, 3.0)}}});
+        add(0, Where::time,
+            {"telegraph_bias", {{"step_deg_h", even(1e-3, 1e-1)}, {"dwell_s", between(4.0, 10.0)}}});
+        add(2, Where::rate, {"bias_per_rate_squared_h_deg", {{"", even(1e-8, 1e-6)}}});
+        add(2, Where::amplitude, {"bias_per_relative_amplitude_deg_h", {{"", even(100.0, 10000.0)}}});
+        add(k % 2, Where::frequency,
+            {"chirped_line",
+             {{"frequency_hz", between(2.0, 30.0)},
+              {"chirp_hz_per_s", even(1e-3, 2e-2) * (k % 3 == 0 ? -1.0 : 1.0)},
+              {"rate_deg_h", injected ? even(3.0, 30.0) : even(0.02, 1.0)},
+              {"phase_rad", between(-3.0, 3.0)}}});
+    }
+    return cases;
+}
+
+Outcome judge(const Case& of, const record::Record& record) {
+    Outcome outcome;
+    const auto start = std::chrono::steady_clock::now();
+    const Closure closure = ringlock::closure::close_turns(record);
+    outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    outcome.verdict = std::string(name_of(closure.verdict));
+    outcome.before = closure.heldout_before;
+    outcome.after = closure.heldout_after;
+    outcome.floor = closure.noise_floor;
+    outcome.oracle = std::numeric_limits<double>::quiet_NaN();
+    if (closure.unexplained) outcome.where = std::string(name_of(closure.unexplained->where));
+
+    const bool foreign = of.kind == Kind::foreign;
+    std::set<std::string> missing;
+    if (!foreign) {
+        for (const Added& added : of.truth) missing.insert(added.effect);
+    }
+    const std::set<std::string> true_effects = missing;
+    bool ties = false;
+    for (const auto& step : closure.steps) {
+        outcome.named += (outcome.named.empty() ? "" : "+") + step.effect;
+        for (const std::string& other : step.confounded_with) outcome.named += "~" + other;
+        if (true_effects.contains(step.effect)) {
+            missing.erase(step.effect);
+            ties = ties || !step.confounded_with.empty();
+            continue;
+        }
+        bool tied_to_truth = false;
+        for (const std::string& other : step.confounded_with) {
+            if (missing.erase(other) > 0) tied_to_truth = true;
+        }
+        ties = ties || tied_to_truth;
+        if (!tied_to_truth) outcome.false_name = true;
+    }
+    if (closure.verdict == Verdict::unexplained) {
+        outcome.judged =
+            foreign && closure.unexplained->where == of.where && !outcome.false_name ? Judged::right : Judged::unexplained;
+    } else if (outcome.false_name) {
+        outcome.judged = Judged::wrong;
+    } else if (foreign || !missing.empty()) {
+        outcome.judged = Judged::missed;
+    } else {
+        outcome.judged = ties ? Judged::tie : Judged::right;
+    }
+    if (foreign) return outcome;
+
+    std::vector<ActiveEffect> known;
+    for (const Added& added : of.truth) {
+        known.push_back({effects::find(added.effect), {added.values.begin(), added.values.end()}});
+    }
+    outcome.oracle = fit_turns(record, known).heldout_after;
+    if (outcome.judged != Judged::right) return outcome;
+    const Device device = device_of(of);
+    const std::map<std::string, double> base_truth = {
+        {"bias_deg_h", 0.0},
+        {"lockin_threshold_deg_h", device.threshold_deg_h},
+        {"injected_noise_rad", of.condition->injected_rad},
+        {"readout_noise_rad", readout_noise},
+        {"dither_frequency_hz", Truth{}.dither_frequency_hz},
+    };
+    for (const Estimate& estimate : closure.base) {
+        const auto truth = base_truth.find(estimate.name);
+        if (truth == base_truth.end() || (truth->second == 0.0 && estimate.name != "bias_deg_h")) continue;
+        outcome.deviations.push_back({estimate.name, deviation_of(estimate, truth->second)});
+    }
+    for (const auto& step : closure.steps) {
+        for (const Added& added : of.truth) {
+            if (added.effect != step.effect) continue;
+            for (const Estimate& estimate : step.parameters) {
+                outcome.deviations.push_back(
+                    {step.effect + "." + estimate.name, deviation_of(estimate, added.values.at(estimate.name))});
+            }
+        }
+    }
+    return outcome;
+}
+
+}  // namespace ringlock::test::closure

@@ -1,0 +1,91 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/closure/closure.hpp"
+#include "analysis/record/record.hpp"
+
+/// Records with known truth for the closed loop to read blind, and what its answers are worth.
+namespace ringlock::test::closure {
+
+/// What is in a record beside the base model: parameters by name, those of the library's effects as the library names
+/// them.
+struct Added {
+    std::string effect;
+    std::map<std::string, double> values;
+};
+
+/// The gyro and what it goes through.
+struct Condition {
+    const char* name;
+    double injected_rad;
+    bool moving;  ///< input rates of either sign, and a dither whose amplitude drifts and walks
+};
+extern const std::vector<Condition> conditions;
+
+enum class Kind { null, single, pair, foreign };
+const char* name_of(Kind kind);
+
+struct Case {
+    Kind kind = Kind::null;
+    std::vector<Added> truth;
+    double multiple = 0.0;  ///< of the detection limit; 0 for nulls and for what the library does not have
+    const Condition* condition = nullptr;
+    bool direct = false;  ///< by the generator's integration of the equation of motion, not by the turn map
+    std::uint64_t seed = 1;
+    std::size_t turns = 16000;
+    ringlock::closure::Where where = {};  ///< in which foreign effects show themselves
+
+    std::string truth_text() const;
+};
+
+/// The records of cases, those of the generator in one go. Threshold, amplitude and rate of the gyro differ from seed to
+/// seed; declared is the nominal threshold.
+std::vector<record::Record> make(std::span<const Case> cases);
+
+/// Where a random parameter of an effect stands in a case of that seed: frequencies, phases and times are drawn, the
+/// size is `size`.
+Added draw(const std::string& effect, double size, std::uint64_t seed, double duration_s);
+
+/// Effects of the library that turn records can show.
+std::vector<std::string> effects_on_turns();
+
+/// The size of an effect whose standard error, in the model that has it, is a quarter of it: by Fisher's information
+/// as the fit computes it, means over a few records.
+double detection_limit(const std::string& effect, const Condition& condition);
+
+/// Cases of effects that the library does not have.
+std::vector<Case> foreign_cases(std::size_t each);
+
+enum class Judged {
+    right,        ///< nothing missing in a null; all effects named, no other; unexplained with the right place
+    tie,          ///< ties hold all that is true
+    missed,       ///< not all of the truth is there, nothing false is
+    unexplained,  ///< and not outside the library, or with another place
+    wrong,        ///< an effect that is not there is named, without a tie that holds the truth
+};
+const char* name_of(Judged judged);
+
+struct Outcome {
+    Judged judged = Judged::wrong;
+    bool false_name = false;  ///< some step names what is not there and ties it to nothing that is
+    std::string verdict;
+    std::string named;  ///< "effect~tied+effect"
+    std::string where;
+    double before = 0.0, after = 0.0, floor = 0.0;
+    double oracle = 0.0;  ///< held-out error of the true model; NaN where the library does not have it
+    double seconds = 0.0;
+    struct Deviation {
+        std::string parameter;
+        double standard_errors;
+    };
+    std::vector<Deviation> deviations;  ///< of the estimates, where the truth has been named
+};
+
+Outcome judge(const Case& of, const record::Record& record);
+
+}  // namespace ringlock::test::closure
