@@ -113,7 +113,6 @@ bool something_else(const TurnFit& fit, const effects::Effect& effect, double me
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
     if (views.size() > looked_at) views.resize(looked_at);
     return std::any_of(views.begin(), views.end(), [&](const View& view) {
-        if (getenv("DBG")) fmt::print(stderr, "  view {} {}: score {:.1f} refit {:.1f}; {} {:.1f}\n", view.test.view, view.test.detail, view.test.merit, fit.gain(view.columns()) - view.cost, effect.name(), merit);
         const bool in_step = view.test.where == Where::phase && effect.adds_angle();
         // A random rate can follow what jumps, nearly as well as the jumps themselves.
         const bool jumps = view.test.where == Where::time && is_random_rate(effect);

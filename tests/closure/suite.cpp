@@ -232,8 +232,8 @@ double detection_limit(const std::string& name, const Condition& condition) {
     if (main.role == effects::Role::probability) size = 1e-3;
     if (name == "rate_random_walk" || name == "bias_instability") size = 0.1;
     if (name == "quantum_noise") size = 1e-4;
-    constexpr int rounds = 5;
-    constexpr std::uint64_t records = 3;
+    constexpr int rounds = 3;
+    constexpr std::uint64_t records = 2;
     for (int round = 0; round < rounds; ++round) {
         double sum = 0.0;
         for (std::uint64_t k = 0; k < records; ++k) {
