@@ -194,17 +194,17 @@ void take_figures(const record::Turns& turns, const Fitted& whole, Closure& clos
 }
 
 /// What is left by a model fitted to all blocks but the reported ones.
-void take_residual(const record::Turns& turns, const Fitted& train, Closure& closure) {
-    const Score last = heldout(*train.fit);
+void take_residual(const record::Turns& turns, const Fitted& fitted, Closure& closure) {
+    const Score last = heldout(*fitted.fit);
     closure.heldout_after = last.error;
     closure.noise_floor = last.floor;
     closure.residual.time_s = turns.time_s;
     for (std::size_t i = 0; i < turns.size(); ++i) {
-        const double sd = train.fit->sd_rad()[i];
-        closure.residual.innovation.push_back(train.fit->innovations()[i] * sd);
+        const double sd = fitted.fit->sd_rad()[i];
+        closure.residual.innovation.push_back(fitted.fit->innovations()[i] * sd);
         closure.residual.sd.push_back(sd);
-        closure.residual.reported.push_back(train.fit->rows()[i] ? 0 : 1);
-        closure.mean_input_rate_deg_h += train.series.input_rate_deg_h[i] / static_cast<double>(turns.size());
+        closure.residual.reported.push_back(fitted.fit->rows()[i] ? 0 : 1);
+        closure.mean_input_rate_deg_h += fitted.series.input_rate_deg_h[i] / static_cast<double>(turns.size());
     }
 }
 
@@ -215,11 +215,8 @@ Closure close_turns(const record::Record& record) {
     closure.unit = "rad";
     closure.level = level;
     const record::Turns& turns = *record.turns;
-    // All that is decided is decided on the whole record; errors are those of blocks that the fit has not seen.
-    const Rows all(turns.size(), 1);
     const Rows rows = by_blocks(turns.size(), roles);
-    auto now = fit_record(record, {}, all);
-    auto train = fit_record(record, now->fit->parameters(), rows);
+    auto now = fit_record(record, {}, rows);
     if (!now->series.scale_factor_declared) {
         closure.notes.push_back(
             fmt::format("the record declares no scale factor; {:g} arcsec per fringe assumed, with "
@@ -231,11 +228,11 @@ Closure close_turns(const record::Record& record) {
             "turns come at a part of the fringe only, as in a locked gyro: what the coupling does cannot be "
             "told from the bias, and its effects are not looked for");
     }
-    closure.heldout_before = heldout(*train->fit).error;
+    closure.heldout_before = heldout(*now->fit).error;
     const auto tests_of_effects = static_cast<double>(effects::registry().size());
     // Before the first random rate.
     struct Earlier {
-        std::shared_ptr<Fitted> now, train;
+        std::shared_ptr<Fitted> now;
         std::vector<Step> steps;
     };
     std::optional<Earlier> earlier;
@@ -279,7 +276,7 @@ Closure close_turns(const record::Record& record) {
                 continue;
             std::shared_ptr<Fitted> fitted;
             try {
-                fitted = fit_record(record, start, all);
+                fitted = fit_record(record, start, rows);
             } catch (const RunError&) {
                 continue;  // no motion of a gyro with such parameters can be followed
             }
@@ -298,9 +295,6 @@ Closure close_turns(const record::Record& record) {
         const double p_full =
             of_several(chi2_tail(chi2, free_parameters(*best.candidate.effect)), best.candidate.searched);
         if (!side && p_full * tests_of_effects >= level_of_effects) break;
-        const auto train_next = fit_record(record, best.fitted->fit->parameters(), rows);
-        const Score before = heldout(*train->fit);
-        if (!side && heldout(*train_next->fit).log_score < before.log_score - tie) break;
         Step step;
         step.effect = std::string(best.candidate.effect->name());
         step.p_value = best.candidate.p_value;
@@ -310,13 +304,11 @@ Closure close_turns(const record::Record& record) {
             }
         }
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
-        if (!earlier && is_random_rate(*best.candidate.effect)) earlier = {now, train, closure.steps};
+        if (!earlier && is_random_rate(*best.candidate.effect)) earlier = {now, closure.steps};
+        const Score before = heldout(*now->fit);
         now = best.fitted;
-        train = train_next;
-        const std::size_t kept = closure.steps.size();
-        drop_needless(record, all, tests_of_effects, now, closure.steps);
-        if (closure.steps.size() < kept) train = fit_record(record, now->fit->parameters(), rows);
-        const Score after = heldout(*train->fit);
+        drop_needless(record, rows, tests_of_effects, now, closure.steps);
+        const Score after = heldout(*now->fit);
         step.heldout_error_before = before.error;
         step.heldout_error_after = after.error;
         step.heldout_log_score_gain = after.log_score - before.log_score;
@@ -327,12 +319,11 @@ Closure close_turns(const record::Record& record) {
     if (earlier && closure.unexplained && closure.unexplained->where != Where::phase) {
         // A rate is left that is none of the library's: the random one has only come nearest to it.
         now = earlier->now;
-        train = earlier->train;
         closure.steps = std::move(earlier->steps);
         test_what_is_left(*now->fit, closure);
     }
-    take_residual(turns, *train, closure);
-    take_figures(turns, *now, closure);
+    take_residual(turns, *now, closure);
+    take_figures(turns, *fit_record(record, now->fit->parameters(), Rows(turns.size(), 1)), closure);
     closure.verdict = verdict_of(closure);
     return closure;
 }
