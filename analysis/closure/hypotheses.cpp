@@ -177,10 +177,15 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
     const double bin_hz = 1.0 / (static_cast<double>(padded) * fit.model().series().interval_s);
     // Slower than three periods in the record is drift; next to half the turns' rate it is the dither's amplitude.
     const auto lowest = static_cast<std::size_t>(3.0 * static_cast<double>(padded) / static_cast<double>(n)) + 1;
-    std::size_t peak = lowest;
+    // What else the model could do of a line the spectrum does not know: the highest peaks are looked at closely.
+    constexpr std::size_t looked_at = 8;
+    std::vector<std::size_t> peaks;
     for (std::size_t k = lowest; k < padded / 2 - lowest; ++k) {
-        if (std::norm(out[k]) > std::norm(out[peak])) peak = k;
+        if (std::norm(out[k]) >= std::norm(out[k - 1]) && std::norm(out[k]) > std::norm(out[k + 1])) peaks.push_back(k);
     }
+    std::sort(peaks.begin(), peaks.end(),
+              [&](std::size_t a, std::size_t b) { return std::norm(out[a]) > std::norm(out[b]); });
+    if (peaks.size() > looked_at) peaks.resize(looked_at);
     const auto score_at = [&](double f, Candidate& candidate) {
         std::vector<std::vector<double>> columns;
         for (const double turned : {0.0, 0.5 * units::pi}) {
@@ -198,8 +203,9 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
         candidate.values.at(name_of(phase)) = std::atan2(score.value(1), score.value(0));
     };
     Candidate candidate{&effect, values};
-    const double centre = static_cast<double>(peak) * bin_hz;
-    for (int k = -2; k <= 2; ++k) score_at(centre + 0.5 * k * bin_hz, candidate);
+    for (const std::size_t peak : peaks) score_at(static_cast<double>(peak) * bin_hz, candidate);
+    const double centre = candidate.values.at(name_of(frequency));
+    for (const double off : {-1.0, -0.5, 0.5, 1.0}) score_at(centre + off * bin_hz, candidate);
     // Between the Fourier frequencies there is more to find: half as many again (Quinn & Hannan 2001, section 3).
     candidate.searched = 0.75 * static_cast<double>(n) * 2.0;
     candidate.p_value = of_several(chi2_tail(candidate.chi2, 2), candidate.searched);

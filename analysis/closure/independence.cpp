@@ -256,7 +256,8 @@ void test_levels(const TurnFit& fit, std::vector<View>& views) {
     views.push_back({{Where::time, "a rate that jumps between two levels", found.p_value,
                       fmt::format("{} jumps", found.changes), found.merit},
                      cost,
-                     [&fit, found] { return Columns{two_level_angle(fit, found.shape)}; }});
+                     [&fit, found] { return Columns{two_level_angle(fit, found.shape)}; },
+                     true});
 }
 
 void test_whiteness(const TurnFit& fit, std::vector<View>& views) {

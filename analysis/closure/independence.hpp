@@ -27,6 +27,7 @@ struct View {
     ResidualTest test;
     double cost = 0.0;  ///< of its parameters and its search, in the log-likelihood
     std::function<std::vector<std::vector<double>>()> columns = {};  ///< series of phase; none where nothing regresses
+    bool jumps = false;  ///< random rates can follow it nearly as well as it can be said
 };
 
 /// Holds the innovations that count against everything that the record has: phase at the turns and its harmonics,

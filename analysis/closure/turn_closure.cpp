@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numbers>
+#include <numeric>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/closure.hpp"
@@ -82,14 +82,46 @@ int free_parameters(const effects::Effect& effect) {
     return count;
 }
 
+/// Frequency of the dither by its own turns: the slope of their times, its error from the scatter of means over
+/// stretches, whatever colour it has.
+Estimate dither_frequency(const TurnFit& fit) {
+    constexpr std::size_t stretches = 40;
+    const auto turn_s = fit.model().predict(fit.parameters()).turn_s;
+    const double interval_s = fit.model().series().interval_s;
+    std::vector<double> at;
+    std::vector<double> late_s;
+    for (std::size_t s = 0; s < stretches; ++s) {
+        // Whole cycles: minima and maxima may be late by different times.
+        const std::size_t begin = (turn_s.size() * s / stretches) & ~std::size_t{1};
+        const std::size_t end = (turn_s.size() * (s + 1) / stretches) & ~std::size_t{1};
+        double sum = 0.0;
+        for (std::size_t i = begin; i < end; ++i) sum += turn_s[i] - interval_s * static_cast<double>(i);
+        late_s.push_back(sum / static_cast<double>(end - begin));
+        at.push_back(0.5 * static_cast<double>(begin + end - 1));
+    }
+    const double mean = std::accumulate(at.begin(), at.end(), 0.0) / stretches;
+    const double mean_late_s = std::accumulate(late_s.begin(), late_s.end(), 0.0) / stretches;
+    double squares = 0.0;
+    double slope_s = 0.0;
+    for (std::size_t s = 0; s < stretches; ++s) {
+        squares += (at[s] - mean) * (at[s] - mean);
+        slope_s += (at[s] - mean) * late_s[s];
+    }
+    slope_s /= squares;
+    double scatter = 0.0;
+    for (std::size_t s = 0; s < stretches; ++s) {
+        const double off_s = late_s[s] - mean_late_s - slope_s * (at[s] - mean);
+        scatter += off_s * off_s / (stretches - 2);
+    }
+    const double turns_s = interval_s + slope_s;
+    return {"", "dither_frequency_hz", 0.5 / turns_s, 0.5 / (turns_s * turns_s) * std::sqrt(scatter / squares)};
+}
+
 /// Amplitude and frequency of the dither: means over the record.
 void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
     const gyro::Setup& setup = fitted.series.setup;
     const auto n = static_cast<double>(fitted.series.size());
-    // Ends of the record, each as uncertain as a turn is.
-    const double late_s = fitted.fit->sd_rad().front() / (fitted.series.acceleration_rad_s2 * fitted.series.interval_s);
-    base.push_back({"", "dither_frequency_hz", setup.dither_frequency_hz,
-                    setup.dither_frequency_hz * std::numbers::sqrt2 * late_s / fitted.series.time_s.back()});
+    base.push_back(dither_frequency(*fitted.fit));
     base.push_back(
         {"", "dither_peak_rate_deg_s", setup.dither_peak_rate_deg_s,
          setup.dither_peak_rate_deg_s * fitted.fit->sd_rad().front() / (fitted.series.amplitude_rad * std::sqrt(n))});
@@ -113,10 +145,15 @@ bool something_else(const TurnFit& fit, const effects::Effect& effect, double me
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
     if (views.size() > looked_at) views.resize(looked_at);
     return std::any_of(views.begin(), views.end(), [&](const View& view) {
+        if (getenv("DBG")) fmt::print(stderr, "  view {} {}: score {:.1f} refit {:.1f}; {} {:.1f}\n", view.test.view, view.test.detail, view.test.merit, fit.gain(view.columns()) - view.cost, effect.name(), merit);
         const bool in_step = view.test.where == Where::phase && effect.adds_angle();
         // A random rate can follow what jumps, nearly as well as the jumps themselves.
-        const bool jumps = view.test.where == Where::time && is_random_rate(effect);
-        return fit.gain(view.columns()) - view.cost > (in_step || jumps ? merit - tie : merit + tie);
+        const bool jumps = view.jumps && is_random_rate(effect);
+        // The likelihood of a process has its whole course integrated out: so must be the coefficients (Schwarz 1978).
+        const double integrated = is_random_rate(effect) ? 0.5 * std::log(static_cast<double>(fit.rows().size())) - 1.0 : 0.0;
+        const auto columns = view.columns();
+        return fit.gain(columns) - view.cost - integrated * static_cast<double>(columns.size()) >
+               (in_step || jumps ? merit - tie : merit + tie);
     });
 }
 
@@ -277,8 +314,15 @@ Closure close_turns(const record::Record& record) {
             std::shared_ptr<Fitted> fitted;
             try {
                 fitted = fit_record(record, start, rows);
+                if (is_random_rate(*candidate.effect)) {
+                    // Without the process the rest may have gone far astray: anew from the start, too.
+                    TurnParameters anew;
+                    anew.effects = start.effects;
+                    auto other = fit_record(record, anew, rows);
+                    if (other->fit->log_likelihood() > fitted->fit->log_likelihood()) fitted = std::move(other);
+                }
             } catch (const RunError&) {
-                continue;  // no motion of a gyro with such parameters can be followed
+                if (!fitted) continue;  // no motion of a gyro with such parameters can be followed
             }
             const double gain = side ? 0.5 * merit(candidate)
                                      : fitted->fit->log_likelihood() - now->fit->log_likelihood() -

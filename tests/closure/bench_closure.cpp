@@ -1,10 +1,10 @@
 // Hundreds of records with known truth, which the closed loop reads blind.
 //
-//   bench_closure FOLDER [--share S] [--only KIND] [--seed N]
+//   bench_closure FOLDER [--share S] [--only KIND] [--seed N] [--limits FILE]
 //
 // FOLDER gets records.csv (a row a record), deviations.csv (estimates less truth, in standard errors), limits.csv,
 // confusion.csv and the tables of the page: figures.md, confusion.md, calibration.md. A share S of 0.1 makes a tenth of the records; with a seed only
-// that record is made, and kept as record.h5. tools/closure puts the tables into the page.
+// that record is made, and kept as record.h5; detection limits can be taken from the limits.csv of another run. tools/closure puts the tables into the page.
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -47,6 +47,22 @@ std::map<std::pair<std::string, std::string>, double> limits_of(const std::vecto
     });
     std::map<std::pair<std::string, std::string>, double> limits;
     for (std::size_t k = 0; k < wanted.size(); ++k) limits[{wanted[k].first, wanted[k].second->name}] = sizes[k];
+    return limits;
+}
+
+/// As written before.
+std::map<std::pair<std::string, std::string>, double> limits_in(const std::string& path) {
+    std::ifstream file(path);
+    if (!file) throw ringlock::InputError(path + " cannot be read");
+    std::map<std::pair<std::string, std::string>, double> limits;
+    std::string line;
+    std::getline(file, line);
+    while (std::getline(file, line)) {
+        // Names of conditions have commas of their own.
+        const std::size_t first = line.find(',');
+        const std::size_t last = line.rfind(',');
+        limits[{line.substr(0, first), line.substr(first + 1, last - first - 1)}] = std::stod(line.substr(last + 1));
+    }
     return limits;
 }
 
@@ -192,12 +208,15 @@ int main(int argc, char** argv) {
     std::string only;
     std::string folder;
     std::string seed;
+    std::string known;
     for (int k = 1; k < argc; ++k) {
         const std::string_view argument = argv[k];
         if (argument == "--share" && k + 1 < argc) {
             share = std::stod(argv[++k]);
         } else if (argument == "--only" && k + 1 < argc) {
             only = argv[++k];
+        } else if (argument == "--limits" && k + 1 < argc) {
+            known = argv[++k];
         } else if (argument == "--seed" && k + 1 < argc) {
             seed = argv[++k];
         } else {
@@ -205,7 +224,7 @@ int main(int argc, char** argv) {
         }
     }
     if (folder.empty()) {
-        fmt::print(stderr, "usage: bench_closure FOLDER [--share S] [--only null|single|pair|foreign] [--seed N]\n");
+        fmt::print(stderr, "usage: bench_closure FOLDER [--share S] [--only null|single|pair|foreign] [--seed N] [--limits FILE]\n");
         return 2;
     }
     std::filesystem::create_directories(folder);
@@ -225,7 +244,7 @@ int main(int argc, char** argv) {
         }
     }
     if (wanted("single") || wanted("pair")) {
-        const auto limits = limits_of(effects);
+        const auto limits = known.empty() ? limits_of(effects) : limits_in(known);
         std::ofstream file(folder + "/limits.csv");
         file << "effect,condition,size\n";
         for (const auto& [key, size] : limits) fmt::print(file, "{},{},{:.4g}\n", key.first, key.second, size);
@@ -273,6 +292,9 @@ int main(int argc, char** argv) {
     oneapi::tbb::parallel_for(std::size_t{0}, (cases.size() + together - 1) / together, [&](std::size_t group) {
         const std::size_t first = group * together;
         const std::size_t count = std::min(together, cases.size() - first);
+        for (Case& of : std::span(cases).subspan(first, count)) {
+            if (of.kind == Kind::single || of.kind == Kind::pair) settle(of);
+        }
         const auto records = make(std::span(cases).subspan(first, count));
         for (std::size_t k = first; k < first + count; ++k) {
             if (!seed.empty()) ringlock::record::write_record(folder + "/record.h5", records[k - first]);
@@ -290,7 +312,7 @@ int main(int argc, char** argv) {
     std::ofstream deviations(folder + "/deviations.csv");
     rows << "kind,truth,multiple,condition,by,seed,values,judged,false_name,verdict,named,where,expected,before_rad,"
             "after_rad,floor_rad,oracle_rad,seconds\n";
-    deviations << "kind,truth,condition,seed,parameter,standard_errors\n";
+    deviations << "kind,truth,condition,seed,parameter,estimate,standard_error,standard_errors_off\n";
     for (std::size_t k = 0; k < cases.size(); ++k) {
         if (!outcomes[k]) continue;
         const Case& of = cases[k];
@@ -305,8 +327,8 @@ int main(int argc, char** argv) {
                    of.kind == Kind::foreign ? ringlock::closure::name_of(of.where) : "", o.before, o.after, o.floor,
                    o.oracle, o.seconds);
         for (const auto& d : o.deviations) {
-            fmt::print(deviations, "{},{},\"{}\",{},{},{:.4f}\n", name_of(of.kind), of.truth_text(), of.condition->name,
-                       of.seed, d.parameter, d.standard_errors);
+            fmt::print(deviations, "{},{},\"{}\",{},{},{:.9g},{:.3g},{:.4f}\n", name_of(of.kind), of.truth_text(),
+                       of.condition->name, of.seed, d.parameter, d.value, d.sd, d.standard_errors);
         }
     }
     std::ofstream figures(folder + "/figures.md");

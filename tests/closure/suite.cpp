@@ -208,7 +208,11 @@ Added draw(const std::string& name, double size, std::uint64_t seed, double dura
         double& value = added.values[std::string(parameter.name)];
         value = parameter.default_value;
         if (&parameter == &main) {
-            const bool either_sign = parameter.min < 0.0 && parameter.role == Role::size;
+            // A size with a phase has its sign in that.
+            const auto all = effect.parameters();
+            const bool turned =
+                std::any_of(all.begin(), all.end(), [](const auto& p) { return p.role == Role::phase; });
+            const bool either_sign = parameter.min < 0.0 && parameter.role == Role::size && !turned;
             value = size * (either_sign && between(0.0, 1.0) < 0.5 ? -1.0 : 1.0);
         } else if (parameter.role == Role::size) {
             value = 0.0;
@@ -232,7 +236,9 @@ double detection_limit(const std::string& name, const Condition& condition) {
     if (main.role == effects::Role::probability) size = 1e-3;
     if (name == "rate_random_walk" || name == "bias_instability") size = 0.1;
     if (name == "quantum_noise") size = 1e-4;
-    constexpr int rounds = 3;
+    // Their variance, of which the information hardly depends, goes with the root of size times error.
+    const bool random_process = main.role == effects::Role::deviation;
+    const int rounds = random_process ? 6 : 3;
     constexpr std::uint64_t records = 2;
     for (int round = 0; round < rounds; ++round) {
         double sum = 0.0;
@@ -243,15 +249,39 @@ double detection_limit(const std::string& name, const Condition& condition) {
                 fit_turns(make({&of, 1}).front(), {ActiveEffect{&effect, {of.truth[0].values.begin(), of.truth[0].values.end()}}});
             for (const Estimate& estimate : known.steps.at(0).parameters) {
                 if (estimate.name == parameter) {
-                    // Where the size itself is random, so is its error: for the same relative one.
                     sum += estimate.sd / static_cast<double>(records);
                 }
             }
         }
         const double next = std::min(4.0 * sum, 0.5 * main.max);
-        size = main.role == effects::Role::size || main.role == effects::Role::phase ? next : std::sqrt(size * next);
+        size = random_process ? std::sqrt(size * next) : next;
     }
     return size;
+}
+
+void settle(Case& of) {
+    Case at_limit = of;
+    at_limit.direct = false;
+    std::vector<ActiveEffect> known;
+    for (Added& added : at_limit.truth) {
+        const effects::Effect* effect = effects::find(added.effect);
+        added.values.at(std::string(size_of(*effect).name)) /= of.multiple;
+        known.push_back({effect, added.values});
+    }
+    const Closure closure = fit_turns(make({&at_limit, 1}).front(), known);
+    for (std::size_t k = 0; k < of.truth.size(); ++k) {
+        const effects::Parameter& main = size_of(*known[k].effect);
+        const std::string parameter(main.name);
+        const double size = at_limit.truth[k].values.at(parameter);
+        for (const Estimate& estimate : closure.steps.at(k).parameters) {
+            if (estimate.name != parameter || !(estimate.sd > 0.0) || !std::isfinite(estimate.sd)) continue;
+            const double limit =
+                main.role == effects::Role::deviation ? std::sqrt(size * 4.0 * estimate.sd) : 4.0 * estimate.sd;
+            // What a single record says of a random process is random itself.
+            const double factor = std::clamp(limit / std::abs(size), 0.2, 5.0);
+            of.truth[k].values.at(parameter) = std::clamp(of.multiple * factor * size, 0.5 * main.min, 0.5 * main.max);
+        }
+    }
 }
 
 std::vector<Case> foreign_cases(std::size_t each) {
@@ -352,14 +382,15 @@ Outcome judge(const Case& of, const record::Record& record) {
     for (const Estimate& estimate : closure.base) {
         const auto truth = base_truth.find(estimate.name);
         if (truth == base_truth.end() || (truth->second == 0.0 && estimate.name != "bias_deg_h")) continue;
-        outcome.deviations.push_back({estimate.name, deviation_of(estimate, truth->second)});
+        outcome.deviations.push_back(
+            {estimate.name, estimate.value, estimate.sd, deviation_of(estimate, truth->second)});
     }
     for (const auto& step : closure.steps) {
         for (const Added& added : of.truth) {
             if (added.effect != step.effect) continue;
             for (const Estimate& estimate : step.parameters) {
-                outcome.deviations.push_back(
-                    {step.effect + "." + estimate.name, deviation_of(estimate, added.values.at(estimate.name))});
+                outcome.deviations.push_back({step.effect + "." + estimate.name, estimate.value, estimate.sd,
+                                              deviation_of(estimate, added.values.at(estimate.name))});
             }
         }
     }

@@ -54,9 +54,12 @@ Added draw(const std::string& effect, double size, std::uint64_t seed, double du
 /// Effects of the library that turn records can show.
 std::vector<std::string> effects_on_turns();
 
-/// The size of an effect whose standard error, in the model that has it, is a quarter of it: by Fisher's information
-/// as the fit computes it, means over a few records.
+/// About the size of an effect whose standard error, in the model that has it, is a quarter of it: by Fisher's
+/// information as the fit computes it, means over a few records. From record to record it differs, see settle().
 double detection_limit(const std::string& effect, const Condition& condition);
+
+/// Sets the sizes of a case to `multiple` times their detection limits in this very record, from those in it.
+void settle(Case& of);
 
 /// Cases of effects that the library does not have.
 std::vector<Case> foreign_cases(std::size_t each);
@@ -81,7 +84,7 @@ struct Outcome {
     double seconds = 0.0;
     struct Deviation {
         std::string parameter;
-        double standard_errors;
+        double value, sd, standard_errors;
     };
     std::vector<Deviation> deviations;  ///< of the estimates, where the truth has been named
 };
