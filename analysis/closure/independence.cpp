@@ -80,7 +80,9 @@ void test_phase(const TurnFit& fit, std::vector<View>& views) {
               kicks ? "kicks at harmonics of the turn's phase" : "phase read at harmonics of the turn's phase",
               all_come ? of_several(least, harmonics) : 1.0, fmt::format("harmonic {}", at), most},
              cost,
-             [&fit, at, kicks] { return harmonic(fit, at, kicks); }});
+             [&fit, at, kicks] { return harmonic(fit, at, kicks); },
+             // Beyond, phases no longer follow from what is added to them: any noise could be had so.
+             0.3 / at});
     }
 }
 
@@ -257,6 +259,7 @@ void test_levels(const TurnFit& fit, std::vector<View>& views) {
                       fmt::format("{} jumps", found.changes), found.merit},
                      cost,
                      [&fit, found] { return Columns{two_level_angle(fit, found.shape)}; },
+                     std::numeric_limits<double>::infinity(),
                      true});
 }
 
@@ -426,6 +429,12 @@ std::string_view name_of(Where where) {
 
 std::string ResidualTest::description() const {
     return fmt::format("{}{}{}, by chance p {:.2g}", view, detail.empty() ? "" : ", ", detail, p_value);
+}
+
+double refitted_merit(const TurnFit& fit, const View& view) {
+    const TurnFit::Regression regression = fit.regress(view.columns());
+    if (regression.value.cwiseAbs().maxCoeff() > view.largest) return -std::numeric_limits<double>::infinity();
+    return regression.gain - view.cost;
 }
 
 std::vector<View> view_residual(const TurnFit& fit) {

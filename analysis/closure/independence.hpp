@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -27,8 +28,13 @@ struct View {
     ResidualTest test;
     double cost = 0.0;  ///< of its parameters and its search, in the log-likelihood
     std::function<std::vector<std::vector<double>>()> columns = {};  ///< series of phase; none where nothing regresses
+    double largest = std::numeric_limits<double>::infinity();  ///< coefficient that makes sense
     bool jumps = false;  ///< random rates can follow it nearly as well as it can be said
 };
+
+/// Gain of the log-likelihood by the regression, the noise fitted anew beside it, less the view's cost; minus infinity
+/// where its coefficients make no sense.
+double refitted_merit(const TurnFit& fit, const View& view);
 
 /// Holds the innovations that count against everything that the record has: phase at the turns and its harmonics,
 /// direction, amplitude, temperature, input rate, time, frequency, the innovations before. The views refer to the fit.

@@ -145,14 +145,13 @@ bool something_else(const TurnFit& fit, const effects::Effect& effect, double me
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
     if (views.size() > looked_at) views.resize(looked_at);
     return std::any_of(views.begin(), views.end(), [&](const View& view) {
-        if (getenv("DBG")) fmt::print(stderr, "  view {} {}: score {:.1f} refit {:.1f}; {} {:.1f}\n", view.test.view, view.test.detail, view.test.merit, fit.gain(view.columns()) - view.cost, effect.name(), merit);
         const bool in_step = view.test.where == Where::phase && effect.adds_angle();
         // A random rate can follow what jumps, nearly as well as the jumps themselves.
         const bool jumps = view.jumps && is_random_rate(effect);
         // The likelihood of a process has its whole course integrated out: so must be the coefficients (Schwarz 1978).
-        const double integrated = is_random_rate(effect) ? 0.5 * std::log(static_cast<double>(fit.rows().size())) - 1.0 : 0.0;
-        const auto columns = view.columns();
-        return fit.gain(columns) - view.cost - integrated * static_cast<double>(columns.size()) >
+        const double integrated =
+            is_random_rate(effect) ? 0.5 * std::log(static_cast<double>(fit.rows().size())) - 1.0 : 0.0;
+        return refitted_merit(fit, view) - integrated * static_cast<double>(view.columns().size()) >
                (in_step || jumps ? merit - tie : merit + tie);
     });
 }
@@ -181,7 +180,7 @@ void test_what_is_left(const TurnFit& fit, Closure& closure) {
     if (!views.front().columns) return;
     double most = 0.0;
     for (std::size_t k = 0; k < std::min(looked_at, views.size()) && views[k].columns; ++k) {
-        const double merit = fit.gain(views[k].columns()) - views[k].cost;
+        const double merit = refitted_merit(fit, views[k]);
         if (merit <= most) continue;
         most = merit;
         closure.unexplained = views[k].test;

@@ -157,7 +157,10 @@ void TurnFit::fit_deterministic(int iterations) {
             guess.injected_sd_rad = 1.0;
             guess.wander_sd_rad = 1e-3;
         }
-        const Whitening whitening(prediction_.frame, model_->noise(guess));
+        TurnNoise noise = model_->noise(guess);
+        // Nothing is known yet: a radian a turn, that what wanders does not drown the kicks.
+        if (parameters_.injected_sd_rad == 0.0) noise.white_rad2_per_s = 1.0 / model_->series().interval_s;
+        const Whitening whitening(prediction_.frame, noise);
         Eigen::MatrixXd x(n, all.size());
         Eigen::VectorXd y(n);
         y = counted(whitening, rest_);
@@ -361,7 +364,8 @@ Eigen::VectorXd TurnFit::counted(const Whitening& whitening, const std::vector<d
     return column;
 }
 
-double TurnFit::gain(const std::vector<std::vector<double>>& series) const {
+TurnFit::Regression TurnFit::regress(const std::vector<std::vector<double>>& series) const {
+    Regression regression{0.0, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(series.size()))};
     TurnParameters trial = parameters_;
     std::vector<double> rest = rest_;
     const std::size_t own = columns_.size();
@@ -385,9 +389,11 @@ double TurnFit::gain(const std::vector<std::vector<double>>& series) const {
             const auto& column = column_of(static_cast<std::size_t>(k));
             for (std::size_t i = 0; i < rest.size(); ++i) rest[i] -= value(k) * column[i];
         }
+        regression.value += value.tail(static_cast<Eigen::Index>(series.size()));
         trial = with_noise_of(trial, rest);
     }
-    return objective(parameters_, rest_) - objective(trial, rest);
+    regression.gain = objective(parameters_, rest_) - objective(trial, rest);
+    return regression;
 }
 
 Eigen::VectorXd TurnFit::whitened(const std::vector<double>& series) const {

@@ -53,8 +53,12 @@ class TurnFit {
         int rank = 0;
     };
     Score score(const std::vector<std::vector<double>>& series) const;
-    /// Gain of the log-likelihood by that regression with the noise fitted anew beside it.
-    double gain(const std::vector<std::vector<double>>& series) const;
+    /// That regression with the noise fitted anew beside it.
+    struct Regression {
+        double gain = 0.0;  ///< of the log-likelihood
+        Eigen::VectorXd value;
+    };
+    Regression regress(const std::vector<std::vector<double>>& series) const;
     /// One series whitened and freed likewise, rows that do not count zero.
     Eigen::VectorXd whitened(const std::vector<double>& series) const;
     Eigen::VectorXd residual() const;

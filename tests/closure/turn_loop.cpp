@@ -62,7 +62,7 @@ TEST(TurnLoop, NothingIsMissingWhereNothingIs) {
     int k = 0;
     for (const double injected : {0.0, 3.0}) {
         for (const bool restless : {false, true}) {
-            scenario::Scenario scenario = gyro(10000, 100 + static_cast<std::uint64_t>(++k), injected);
+            scenario::Scenario scenario = gyro(10000, 200 + static_cast<std::uint64_t>(++k), injected);
             if (restless) {
                 scenario.dither.amplitude_wander_relative_rt_s = 1e-5;
                 scenario.dither.amplitude_drift_relative_per_h = 0.01;
