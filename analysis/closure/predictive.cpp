@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,6 +21,7 @@
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
 #include "engine/gyro/setup.hpp"
+#include "engine/random/stream.hpp"
 
 namespace ringlock::closure {
 
@@ -29,7 +31,8 @@ constexpr std::int64_t most_turns = 4'000'000;
 constexpr int fewest_simulations = 9;
 // Seeds of nobody's study: the record itself may be of a simulation, whose chance must not come again.
 constexpr std::uint64_t first_seed = 0x7072656469637400;
-constexpr std::size_t fold_bins = 12;
+constexpr std::size_t fold_points = 12;
+constexpr Eigen::Index harmonics = 3;
 constexpr int bands = 30;
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
@@ -58,9 +61,7 @@ std::vector<PredictiveStatistic> blank(bool turns) {
     for (const char* kind : {"minima", "maxima"}) {
         if (!turns) break;
         all.push_back({.name = fmt::format("folded_{}", kind),
-                       .description = fmt::format("rotation from the turn before to the turn after, of {} by their "
-                                                  "phase, less the mean of all turns",
-                                                  kind),
+                       .description = fmt::format("what the angle gains across {} by the phase there, three harmonics", kind),
                        .x_name = "phase at the turn",
                        .x_unit = "rad",
                        .unit = "rad"});
@@ -133,46 +134,94 @@ class TurnSight {
             angle_arcsec[i] = arcsec_per_rad * joined.phase_rad[i] -
                               measured_.input_angle_arcsec(turns.time_s[i] - turns.time_s[0]);
         }
-        // A minimum with half of the maximum on either side: the dither is not in it, whatever its amplitude does.
-        std::vector<double> increment_arcsec;
-        std::optional<double> before;
+        // A turn with half of those on either side: the dither is not in it, whatever its amplitude does.
+        std::vector<double> steady_rad;
         for (std::size_t i = 1; i + 1 < n; ++i) {
-            if (turns.direction[i] < 0) continue;
-            const double angle = 0.25 * (angle_arcsec[i - 1] + 2.0 * angle_arcsec[i] + angle_arcsec[i + 1]);
-            if (before) increment_arcsec.push_back(angle - *before);
-            before = angle;
+            steady_rad.push_back(0.25 * (angle_arcsec[i - 1] + 2.0 * angle_arcsec[i] + angle_arcsec[i + 1]) /
+                                 arcsec_per_rad);
         }
-        // As many of every record, whichever kind of turn it begins with.
+        // The rates between minima: as many of every record, whichever kind of turn it begins with.
+        std::vector<double> increment_arcsec;
+        const std::size_t first = turns.direction[1] > 0 ? 0 : 1;
+        for (std::size_t k = first; k + 2 < steady_rad.size(); k += 2) {
+            increment_arcsec.push_back(arcsec_per_rad * (steady_rad[k + 2] - steady_rad[k]));
+        }
         increment_arcsec.resize(std::min(increment_arcsec.size(), (measured_.size() - 2) / 2 - 1));
         Curves curves;
         add_rate_curves(increment_arcsec, 2.0 * measured_.interval_s, curves);
-        fold(turns, joined.phase_rad, angle_arcsec, arcsec_per_rad, curves);
+        fold(turns, joined.phase_rad, steady_rad, curves);
         return curves;
     }
 
    private:
+    /// What the angle gains across a turn by direction and phase [rad], less the mean of that direction, three harmonics
+    /// of the phase. `steady_rad` is the angle at the turns with the dither off it, that of turn 1 first.
+    ///
+    /// Noise on the dither at every turn hides the kick of a turn, but not the sum of many kicks: the angle is fitted by
+    /// the sums so far of what may follow the phase. Stretches have a line of their own each, so that slow rates do not
+    /// matter.
     static void fold(const record::Turns& turns, const std::vector<double>& phase_rad,
-                     const std::vector<double>& angle_arcsec, double arcsec_per_rad, Curves& curves) {
-        std::array<std::array<double, fold_bins>, 2> sum{};
-        std::array<std::array<double, fold_bins>, 2> count{};
-        double mean = 0.0;
-        const std::size_t n = angle_arcsec.size();
-        for (std::size_t i = 1; i + 1 < n; ++i) {
+                     const std::vector<double>& steady_rad, Curves& curves) {
+        constexpr Eigen::Index each = 2 * harmonics;
+        constexpr Eigen::Index columns = 2 * each;
+        constexpr std::size_t stretch = 256;
+        using Row = Eigen::Matrix<double, columns, 1>;
+        const std::size_t n = steady_rad.size();
+        std::array<std::array<double, fold_points>, 2> seen{};
+        std::vector<Row> shape(n + 2, Row::Zero());
+        for (std::size_t i = 0; i < n + 2; ++i) {
+            const Eigen::Index first = turns.direction[i] > 0 ? 0 : each;
+            for (Eigen::Index h = 0; h < harmonics; ++h) {
+                shape[i](first + 2 * h) = std::cos(static_cast<double>(h + 1) * phase_rad[i]);
+                shape[i](first + 2 * h + 1) = std::sin(static_cast<double>(h + 1) * phase_rad[i]);
+            }
             const double fringes = phase_rad[i] / units::two_pi;
-            const auto bin =
-                static_cast<std::size_t>((fringes - std::floor(fringes)) * static_cast<double>(fold_bins)) % fold_bins;
-            const std::size_t kind = turns.direction[i] > 0 ? 0 : 1;
-            const double across = (angle_arcsec[i + 1] - angle_arcsec[i - 1]) / arcsec_per_rad;
-            sum[kind][bin] += across;
-            count[kind][bin] += 1.0;
-            mean += across / static_cast<double>(n - 2);
+            const double place = (fringes - std::floor(fringes)) * static_cast<double>(fold_points);
+            seen[first == 0 ? 0 : 1][static_cast<std::size_t>(place) % fold_points] += 1.0;
         }
-        for (std::size_t kind = 0; kind < 2; ++kind) {
+        // The last column is the angle.
+        using Products = Eigen::Matrix<double, columns + 1, columns + 1>;
+        Products products = Products::Zero();
+        Row sums = Row::Zero();
+        for (std::size_t begin = 0; begin < n; begin += stretch) {
+            const std::size_t rows = std::min(stretch, n - begin);
+            if (rows < 3) break;
+            Eigen::Matrix<double, Eigen::Dynamic, columns + 1> block(rows, columns + 1);
+            Eigen::VectorXd time(rows);
+            for (std::size_t r = 0; r < rows; ++r) {
+                const std::size_t k = begin + r;
+                // Half of a kick comes before its turn, half after it; weighted 1 : 2 : 1 as the angle is, an eighth of
+                // it is there one turn before, a half at the turn, seven eighths one turn later.
+                const Row row = sums - 0.125 * shape[k] + 0.5 * shape[k + 1] + 0.125 * shape[k + 2];
+                sums += shape[k + 1];
+                const auto at = static_cast<Eigen::Index>(r);
+                block.row(at) << row.transpose(), steady_rad[k];
+                time(at) = static_cast<double>(r) - 0.5 * static_cast<double>(rows - 1);
+            }
+            block.rowwise() -= block.colwise().mean().eval();
+            block -= time * (time.transpose() * block).eval() / time.squaredNorm();
+            products += block.transpose() * block;
+        }
+        const Eigen::Matrix<double, columns, columns> normal = products.topLeftCorner<columns, columns>();
+        const Row right = products.topRightCorner<columns, 1>();
+        const Row scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+        Eigen::Matrix<double, columns, columns> scaled = scale.asDiagonal() * normal * scale.asDiagonal();
+        // Of phases that come in step several shapes are one: something between them.
+        scaled.diagonal().array() += 1e-10;
+        const Row size = scale.asDiagonal() * scaled.ldlt().solve(scale.asDiagonal() * right);
+        for (std::size_t direction = 0; direction < 2; ++direction) {
             Curve& curve = curves.emplace_back();
-            for (std::size_t bin = 0; bin < fold_bins; ++bin) {
-                curve.x.push_back((static_cast<double>(bin) + 0.5) * units::two_pi / static_cast<double>(fold_bins));
-                // Fewer than four are no mean.
-                curve.y.push_back(count[kind][bin] < 4.0 ? nothing : sum[kind][bin] / count[kind][bin] - mean);
+            const Eigen::Index first = direction == 0 ? 0 : each;
+            for (std::size_t point = 0; point < fold_points; ++point) {
+                const double phase = (static_cast<double>(point) + 0.5) * units::two_pi / fold_points;
+                double kick = 0.0;
+                for (Eigen::Index h = 0; h < harmonics; ++h) {
+                    kick += size(first + 2 * h) * std::cos(static_cast<double>(h + 1) * phase) +
+                            size(first + 2 * h + 1) * std::sin(static_cast<double>(h + 1) * phase);
+                }
+                curve.x.push_back(phase);
+                // Phases that hardly come tell nothing.
+                curve.y.push_back(seen[direction][point] < 4.0 ? nothing : kick);
             }
         }
     }
@@ -226,8 +275,7 @@ record::Track temperature_change(const record::Record& record, const SampleSight
 }
 
 /// The closed scenario over the record's own length, input and temperature.
-scenario::Scenario replica(const record::Record& record, const Closure& closure, const SampleSight* samples,
-                           std::vector<std::string>& notes) {
+scenario::Scenario replica(const record::Record& record, const Closure& closure, const SampleSight* samples) {
     scenario::Scenario s = closed_scenario(record, closure);
     s.ensemble.gyros = 1;
     if (record.turns) {
@@ -253,10 +301,17 @@ scenario::Scenario replica(const record::Record& record, const Closure& closure,
         }
         if (by_temperature) of_temperature = 0.0;
     }
+    return s;
+}
+
+/// What the simulations leave out of the model.
+std::vector<std::string> left_out(const Closure& closure) {
+    std::vector<std::string> notes;
+    const scenario::EffectSettings known = scenario::default_effect_settings();
     for (const Step& step : closure.steps) {
-        const effects::Effect* effect = effects::find(step.effect);
+        const auto effect = known.find(step.effect);
         for (const Estimate& estimate : step.parameters) {
-            if (effect != nullptr && s.effects.at(step.effect).contains(estimate.name)) continue;
+            if (effect != known.end() && effect->second.contains(estimate.name)) continue;
             notes.push_back(fmt::format("{} of {} is no parameter of a scenario: it is not simulated", estimate.name,
                                         step.effect));
         }
@@ -264,7 +319,7 @@ scenario::Scenario replica(const record::Record& record, const Closure& closure,
             notes.emplace_back("the threshold follows a steady ramp of the temperature in the simulations");
         }
     }
-    return s;
+    return notes;
 }
 
 /// Ranks the first of the curves, the measured one, among them all.
@@ -314,12 +369,46 @@ void rank(const std::vector<std::vector<double>>& curves, PredictiveStatistic& s
     statistic.p_value_all = static_cast<double>(1 + as_large) / static_cast<double>(records);
 }
 
-std::vector<Curves> simulate(const scenario::Scenario& closed, int simulations, const TurnSight* turns,
-                             const SampleSight* samples) {
+/// The closed model with every parameter as uncertain as it is: drawn about its estimate, each by itself.
+///
+/// What is positive is drawn by its logarithm, with half of itself for a standard error at most: those of variances
+/// near zero mean nothing.
+Closure drawn(const Closure& closure, std::uint64_t seed) {
+    Closure out = closure;
+    random::NormalStream normal({seed, 0}, random::Purpose::fitted_parameters);
+    const auto positive = [](double value, double sd, double z) {
+        return value == 0.0 ? 0.0 : value * std::exp(z * std::min(sd / std::abs(value), 0.5));
+    };
+    for (Estimate& e : out.base) {
+        const double z = normal();
+        if (!std::isfinite(e.sd)) continue;
+        const bool of_either_sign = e.name == "bias_deg_h" || e.name == "mean_rate_deg_h";
+        e.value = of_either_sign ? e.value + z * e.sd : positive(e.value, e.sd, z);
+    }
+    for (Step& step : out.steps) {
+        const effects::Effect* effect = effects::find(step.effect);
+        for (Estimate& e : step.parameters) {
+            const double z = normal();
+            if (effect == nullptr || !std::isfinite(e.sd)) continue;
+            for (const effects::Parameter& parameter : effect->parameters()) {
+                if (parameter.name != e.name || parameter.role == effects::Role::setting) continue;
+                const bool spread =
+                    parameter.role == effects::Role::deviation || parameter.role == effects::Role::probability;
+                e.value = std::clamp(spread ? positive(e.value, e.sd, z) : e.value + z * e.sd, parameter.min,
+                                     parameter.max);
+            }
+        }
+    }
+    return out;
+}
+
+std::vector<Curves> simulate(const record::Record& record, const Closure& closure, int simulations,
+                             const TurnSight* turns, const SampleSight* samples) {
     std::vector<Curves> all(static_cast<std::size_t>(simulations));
     tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t k) {
-        scenario::Scenario mine = closed;
-        mine.ensemble.seed = first_seed + k;
+        const std::uint64_t seed = first_seed + k;
+        scenario::Scenario mine = replica(record, drawn(closure, seed), samples);
+        mine.ensemble.seed = seed;
         record::Record simulated = instrument::simulate_record(mine);
         all[k] = turns != nullptr ? turns->look(*simulated.turns) : samples->look(std::move(simulated.samples->values));
     });
@@ -343,11 +432,12 @@ Predictive check_predictive(const record::Record& record, const Closure& closure
         }
         const TurnSight* turn_sight = turns ? &*turns : nullptr;
         const SampleSight* sample_sight = samples ? &*samples : nullptr;
-        const scenario::Scenario closed = replica(record, closure, sample_sight, out.notes);
+        const scenario::Scenario closed = replica(record, closure, sample_sight);
+        out.notes = left_out(closure);
         const double each = std::max(1.0, 2.0 * closed.ensemble.duration_s * closed.dither.frequency_hz);
         const int affordable = static_cast<int>(std::min(1e6, static_cast<double>(most_turns) / each));
         const int wanted = std::clamp(affordable, std::min(fewest_simulations, simulations), simulations);
-        const std::vector<Curves> simulated = simulate(closed, wanted, turn_sight, sample_sight);
+        const std::vector<Curves> simulated = simulate(record, closure, wanted, turn_sight, sample_sight);
         all.insert(all.end(), simulated.begin(), simulated.end());
         out.simulations = wanted;
         out.turns = std::llround(each) * wanted;

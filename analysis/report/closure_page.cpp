@@ -85,9 +85,9 @@ std::vector<Picture> pictures(const std::string& source, const Closure& closure,
     logarithmic("spectrum", "spectrum.svg", "Spectrum of the rate", "root of the power density [deg/h/√Hz]");
     Picture folded{.file = "folded.svg",
                    .caption = "What the gyro gains across a turn, by the phase at which it turns: the kick of lock-in.",
-                   .figure = {.title = fmt::format("Rotation across the turns of {}, by their phase", source),
+                   .figure = {.title = fmt::format("What {} gains across its turns, by their phase", source),
                               .x_label = "phase at the turn [rad]",
-                              .y_label = "rotation less its mean [mrad of phase]"}};
+                              .y_label = "gain less its mean [mrad of phase]"}};
     for (const auto& [name, what] : {std::pair{"folded_minima", ", minima"}, std::pair{"folded_maxima", ", maxima"}}) {
         const PredictiveStatistic* statistic = find(predictive, name);
         if (statistic == nullptr) continue;

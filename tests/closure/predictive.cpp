@@ -135,6 +135,7 @@ TEST_F(Predictively, WhatTheModelLacksShows) {
     without = closure;
     base(without, "lockin_threshold_deg_h") = 0.0;
     const Predictive free = check_predictive(record, without);
+    print(free);
     EXPECT_EQ(statistic(free, "folded_minima").p_value_all, 0.025);
     EXPECT_EQ(statistic(free, "folded_maxima").p_value_all, 0.025);
 }
