@@ -125,6 +125,11 @@ class TurnSight {
         measured_ = prepare(record, join(*record.turns, ellipse_, count_again_));
     }
 
+    /// The dither's, from the mean swing.
+    double peak_rate_deg_s(const record::Record& record) const {
+        return prepare(record, join(*record.turns, ellipse_, count_again_)).setup.dither_peak_rate_deg_s;
+    }
+
     Curves look(const record::Turns& turns) const {
         const JoinedPhase joined = join(turns, ellipse_, count_again_);
         const std::size_t n = std::min(turns.size(), measured_.size());
@@ -402,6 +407,31 @@ Closure drawn(const Closure& closure, std::uint64_t seed) {
     return out;
 }
 
+/// The peak rate of the dither [deg/s] with which simulations swing as the record does.
+///
+/// The swing that was measured has the mean of the kicks in it. Over a half cycle of thousands of radians that is
+/// nothing; but without noise on the dither the phases of minima and maxima go together, and there it is a shift of the
+/// one against the other.
+double swinging_deg_s(const record::Record& record, Closure closure, const TurnSight& sight, int simulations) {
+    const auto peak = std::find_if(closure.base.begin(), closure.base.end(),
+                                   [](const Estimate& e) { return e.name == "dither_peak_rate_deg_s"; });
+    if (peak == closure.base.end()) return nothing;
+    const double measured = sight.peak_rate_deg_s(record);
+    for (int pass = 0; pass < 2; ++pass) {
+        std::vector<double> swung(static_cast<std::size_t>(simulations));
+        scenario::Scenario mine = replica(record, closure, nullptr);
+        tbb::parallel_for(std::size_t{0}, swung.size(), [&](std::size_t k) {
+            scenario::Scenario one = mine;
+            one.ensemble.seed = first_seed + most_simulations + k;
+            swung[k] = sight.peak_rate_deg_s(instrument::simulate_record(one));
+        });
+        double mean = 0.0;
+        for (const double swing : swung) mean += swing / static_cast<double>(simulations);
+        peak->value *= measured / mean;
+    }
+    return peak->value;
+}
+
 std::vector<Curves> simulate(const record::Record& record, const Closure& closure, int simulations,
                              const TurnSight* turns, const SampleSight* samples) {
     std::vector<Curves> all(static_cast<std::size_t>(simulations));
@@ -437,7 +467,15 @@ Predictive check_predictive(const record::Record& record, const Closure& closure
         const double each = std::max(1.0, 2.0 * closed.ensemble.duration_s * closed.dither.frequency_hz);
         const int affordable = static_cast<int>(std::min(1e6, static_cast<double>(most_turns) / each));
         const int wanted = std::clamp(affordable, std::min(fewest_simulations, simulations), simulations);
-        const std::vector<Curves> simulated = simulate(record, closure, wanted, turn_sight, sample_sight);
+        Closure swinging = closure;
+        if (turns && closed.record.trajectory == scenario::RecordTrajectory::uncompensated) {
+            const double peak_deg_s =
+                swinging_deg_s(record, closure, *turns, std::clamp(affordable / 20, 1, 4));
+            for (Estimate& e : swinging.base) {
+                if (e.name == "dither_peak_rate_deg_s") e.value = peak_deg_s;
+            }
+        }
+        const std::vector<Curves> simulated = simulate(record, swinging, wanted, turn_sight, sample_sight);
         all.insert(all.end(), simulated.begin(), simulated.end());
         out.simulations = wanted;
         out.turns = std::llround(each) * wanted;
