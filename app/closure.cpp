@@ -47,7 +47,8 @@ void add_closure(CLI::App& root) {
     command->add_option("RECORD", arguments->record, "rlg-record (.h5), or samples as text")->required();
     command->add_option("--model", arguments->model,
                         "scenario (.toml) of the instrument, for what the record leaves open");
-    command->add_option("-o,--output", arguments->out, "folder for report.md with its figures, closed.toml, closure.h5 and closure.json");
+    command->add_option("-o,--output", arguments->out,
+                        "folder for report.md with its figures, closed.toml, closure.h5 and closure.json");
     command->add_flag("--json", arguments->json, "one JSON object on standard output");
     command->callback([arguments] {
         record::Record record = record::read_record(arguments->record);

@@ -61,8 +61,7 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
     scenario.input.rate_deg_h = value_of(closure.base, "mean_rate_deg_h", 0.0);
     scenario.effects.at("quantum_noise").at("deg_rt_h") =
         std::max(0.0, value_of(closure.base, "white_rate_deg_rt_h", 0.0));
-    const double scale_factor_arcsec =
-        record.declared.scale_factor_arcsec.value_or(scenario.gyro.scale_factor_arcsec);
+    const double scale_factor_arcsec = record.declared.scale_factor_arcsec.value_or(scenario.gyro.scale_factor_arcsec);
     if (samples.kind == record::SampleKind::quarter_count) {
         scenario.effects.at("count_quantization").at("step_arcsec") = 0.25 * scale_factor_arcsec;
     }

@@ -52,19 +52,21 @@ std::vector<PredictiveStatistic> blank(bool turns) {
                    .x_unit = "s",
                    .unit = "deg/h",
                    .positive = true});
-    all.push_back({.name = "spectrum",
-                   .description = "root of the one-sided power density of the output rate less the known input, in bands",
-                   .x_name = "frequency",
-                   .x_unit = "Hz",
-                   .unit = "deg/h/sqrt(Hz)",
-                   .positive = true});
+    all.push_back(
+        {.name = "spectrum",
+         .description = "root of the one-sided power density of the output rate less the known input, in bands",
+         .x_name = "frequency",
+         .x_unit = "Hz",
+         .unit = "deg/h/sqrt(Hz)",
+         .positive = true});
     for (const char* kind : {"minima", "maxima"}) {
         if (!turns) break;
-        all.push_back({.name = fmt::format("folded_{}", kind),
-                       .description = fmt::format("what the angle gains across {} by the phase there, three harmonics", kind),
-                       .x_name = "phase at the turn",
-                       .x_unit = "rad",
-                       .unit = "rad"});
+        all.push_back(
+            {.name = fmt::format("folded_{}", kind),
+             .description = fmt::format("what the angle gains across {} by the phase there, three harmonics", kind),
+             .x_name = "phase at the turn",
+             .x_unit = "rad",
+             .unit = "rad"});
     }
     return all;
 }
@@ -74,8 +76,7 @@ std::vector<PredictiveStatistic> blank(bool turns) {
 /// 1 arcsec/s is 1 deg/h.
 void add_rate_curves(const std::vector<double>& increment_arcsec, double interval_s, Curves& curves) {
     const auto phase = allan::centred_phase(increment_arcsec, allan::Kind::increment, interval_s);
-    const auto largest =
-        allan::largest_factor(allan::Estimator::oadev, static_cast<std::int64_t>(phase.size()));
+    const auto largest = allan::largest_factor(allan::Estimator::oadev, static_cast<std::int64_t>(phase.size()));
     Curve& deviation = curves.emplace_back();
     for (const allan::Point& point :
          allan::deviation(allan::Estimator::oadev, phase, interval_s, allan::octave_factors(largest))) {
@@ -136,8 +137,8 @@ class TurnSight {
         const double arcsec_per_rad = measured_.setup.scale_factor_arcsec / units::two_pi;
         std::vector<double> angle_arcsec(n);
         for (std::size_t i = 0; i < n; ++i) {
-            angle_arcsec[i] = arcsec_per_rad * joined.phase_rad[i] -
-                              measured_.input_angle_arcsec(turns.time_s[i] - turns.time_s[0]);
+            angle_arcsec[i] =
+                arcsec_per_rad * joined.phase_rad[i] - measured_.input_angle_arcsec(turns.time_s[i] - turns.time_s[0]);
         }
         // A turn with half of those on either side: the dither is not in it, whatever its amplitude does.
         std::vector<double> steady_rad;
@@ -159,12 +160,12 @@ class TurnSight {
     }
 
    private:
-    /// What the angle gains across a turn by direction and phase [rad], less the mean of that direction, three harmonics
-    /// of the phase. `steady_rad` is the angle at the turns with the dither off it, that of turn 1 first.
+    /// What the angle gains across a turn by direction and phase [rad], less the mean of that direction, three
+    /// harmonics of the phase. `steady_rad` is the angle at the turns with the dither off it, that of turn 1 first.
     ///
-    /// Noise on the dither at every turn hides the kick of a turn, but not the sum of many kicks: the angle is fitted by
-    /// the sums so far of what may follow the phase. Stretches have a line of their own each, so that slow rates do not
-    /// matter.
+    /// Noise on the dither at every turn hides the kick of a turn, but not the sum of many kicks: the angle is fitted
+    /// by the sums so far of what may follow the phase. Stretches have a line of their own each, so that slow rates do
+    /// not matter.
     static void fold(const record::Turns& turns, const std::vector<double>& phase_rad,
                      const std::vector<double>& steady_rad, Curves& curves) {
         constexpr Eigen::Index each = 2 * harmonics;
@@ -317,8 +318,8 @@ std::vector<std::string> left_out(const Closure& closure) {
         const auto effect = known.find(step.effect);
         for (const Estimate& estimate : step.parameters) {
             if (effect != known.end() && effect->second.contains(estimate.name)) continue;
-            notes.push_back(fmt::format("{} of {} is no parameter of a scenario: it is not simulated", estimate.name,
-                                        step.effect));
+            notes.push_back(
+                fmt::format("{} of {} is no parameter of a scenario: it is not simulated", estimate.name, step.effect));
         }
         if (step.effect == "lockin_temperature") {
             notes.emplace_back("the threshold follows a steady ramp of the temperature in the simulations");
@@ -399,8 +400,8 @@ Closure drawn(const Closure& closure, std::uint64_t seed) {
                 if (parameter.name != e.name || parameter.role == effects::Role::setting) continue;
                 const bool spread =
                     parameter.role == effects::Role::deviation || parameter.role == effects::Role::probability;
-                e.value = std::clamp(spread ? positive(e.value, e.sd, z) : e.value + z * e.sd, parameter.min,
-                                     parameter.max);
+                e.value =
+                    std::clamp(spread ? positive(e.value, e.sd, z) : e.value + z * e.sd, parameter.min, parameter.max);
             }
         }
     }
@@ -469,8 +470,7 @@ Predictive check_predictive(const record::Record& record, const Closure& closure
         const int wanted = std::clamp(affordable, std::min(fewest_simulations, simulations), simulations);
         Closure swinging = closure;
         if (turns && closed.record.trajectory == scenario::RecordTrajectory::uncompensated) {
-            const double peak_deg_s =
-                swinging_deg_s(record, closure, *turns, std::clamp(affordable / 20, 1, 4));
+            const double peak_deg_s = swinging_deg_s(record, closure, *turns, std::clamp(affordable / 20, 1, 4));
             for (Estimate& e : swinging.base) {
                 if (e.name == "dither_peak_rate_deg_s") e.value = peak_deg_s;
             }

@@ -13,15 +13,15 @@ struct PredictiveStatistic {
     std::string name;         ///< allan_deviation, spectrum, folded_minima, folded_maxima
     std::string description;  ///< one line
     std::string x_name, x_unit;
-    std::string unit;           ///< of what follows but for probabilities
-    bool positive = false;      ///< compared by its logarithm
+    std::string unit;       ///< of what follows but for probabilities
+    bool positive = false;  ///< compared by its logarithm
     std::vector<double> x = {};
     std::vector<double> measured = {};
     std::vector<double> lowest = {}, highest = {};  ///< of the simulations
     std::vector<double> p_value = {};               ///< of each point by itself, both sides
     double p_value_all = 1.0;                       ///< of the largest deviation over the points
-    double largest = 0.0;  ///< that deviation, in standard deviations of the simulations
-    std::size_t at = 0;    ///< point where it is
+    double largest = 0.0;                           ///< that deviation, in standard deviations of the simulations
+    std::size_t at = 0;                             ///< point where it is
 };
 
 struct Predictive {

@@ -100,11 +100,13 @@ std::vector<Picture> pictures(const std::string& source, const Closure& closure,
     if (!folded.figure.curves.empty()) all.push_back(std::move(folded));
 
     Picture steps{.file = "steps.svg",
-                  .caption = "Held-out one-step error of the base model and after each effect; dashed: what the noise "
-                             "of the last model alone would leave.",
+                  .caption =
+                      "Held-out one-step error of the base model and after each effect; dashed: what the noise "
+                      "of the last model alone would leave.",
                   .figure = {.title = fmt::format("Held-out error of {}, step by step", source),
                              .x_label = "effects in the model",
-                             .y_label = fmt::format("rms one-step error [{}]", closure.unit)}};
+                             .y_label = fmt::format("rms one-step error [{}]", closure.unit),
+                             .log_y = true}};
     Curve error{.label = "held-out error", .x = {0.0}, .y = {closure.heldout_before}, .style = Curve::Style::line};
     steps.figure.curves.push_back({.label = "0: base model", .x = {0.0}, .y = {closure.heldout_before}});
     for (std::size_t k = 0; k < closure.steps.size(); ++k) {
@@ -160,15 +162,17 @@ void add_predictive(const Predictive& predictive, std::string& page) {
     page += "## Does the closed model make such records?\n\n";
     if (predictive.simulations > 0) {
         page += fmt::format(
-            "The scenario `closed.toml` was simulated {} times over the length and the input of this record, and every "
-            "simulation looked at\nas the record was. p is the rank of the record's largest deviation from the "
-            "simulations among their own largest: {:.2g} at least,\nwhere no simulation is as far out as the "
-            "record.\n\n",
+            "The device of `closed.toml` was simulated {} times over the length and the input of this record, with "
+            "parameters "
+            "drawn about their\nestimates by their standard errors, and every simulation looked at as the record was. "
+            "p "
+            "is the rank of the record's largest deviation\nfrom the simulations among their own largest: {:.2g} where "
+            "no "
+            "simulation is as far out as the record, and not less.\n\n",
             predictive.simulations, 1.0 / (predictive.simulations + 1.0));
         page += "| statistic | points | p | largest deviation |\n|---|---|---|---|\n";
         for (const PredictiveStatistic& s : predictive.statistics) {
-            const std::string where =
-                s.x.empty() ? "" : fmt::format(" at {:.4g} {}", s.x[s.at], s.x_unit);
+            const std::string where = s.x.empty() ? "" : fmt::format(" at {:.4g} {}", s.x[s.at], s.x_unit);
             page += fmt::format("| {} | {} | {:.2g} | {:.2g} standard deviations{} |\n", cell(s.description),
                                 s.x.size(), s.p_value_all, s.largest, where);
         }
@@ -190,7 +194,9 @@ void write_closure_page(const std::filesystem::path& folder, const std::string& 
         closure.heldout_before, closure.unit, closure.heldout_after, closure.unit, closure.noise_floor, closure.unit,
         closure.level);
     add_steps(closure, page);
-    page += "## The base model\n\nFitted with all effects above; ± one standard error.\n\n| parameter | value |\n|---|---|\n";
+    page +=
+        "## The base model\n\nFitted with all effects above; ± one standard error.\n\n| parameter | value "
+        "|\n|---|---|\n";
     for (const Estimate& e : closure.base) page += fmt::format("| `{}` | {} |\n", e.name, cell(value_text(e)));
     page += "\n";
     add_predictive(predictive, page);

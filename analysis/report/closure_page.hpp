@@ -13,7 +13,7 @@ namespace ringlock::report {
 /// does without them.
 ///
 /// Throws InputError where the page cannot be written there, RunError where the disk refuses.
-void write_closure_page(const std::filesystem::path& folder, const std::string& source,
-                        const closure::Closure& closure, const closure::Predictive& predictive);
+void write_closure_page(const std::filesystem::path& folder, const std::string& source, const closure::Closure& closure,
+                        const closure::Predictive& predictive);
 
 }  // namespace ringlock::report

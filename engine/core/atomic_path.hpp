@@ -34,7 +34,8 @@ class AtomicPath {
     bool committed_ = false;
 };
 
-/// Writes a text file, whole or not at all. Throws InputError where it cannot be there, RunError where the disk refuses.
+/// Writes a text file, whole or not at all. Throws InputError where it cannot be there, RunError where the disk
+/// refuses.
 void write_text(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace ringlock
