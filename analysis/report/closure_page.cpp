@@ -151,6 +151,11 @@ void add_steps(const Closure& closure, std::string& page) {
                             closure::probability(step.p_value));
     }
     page += "\n";
+    if (closure.steps.front().heldout_error_before < closure.heldout_before) {
+        page +=
+            "Effects that only stood in for one of these were dropped again: the first row does not begin at the base "
+            "model.\n\n";
+    }
     for (const Step& step : closure.steps) {
         if (step.confounded_with.empty()) continue;
         page += fmt::format("This record cannot tell `{}` from `{}`. What would: {}.\n\n", step.effect,
