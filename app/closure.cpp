@@ -10,6 +10,7 @@
 
 #include "analysis/closure/report.hpp"
 #include "analysis/record/record.hpp"
+#include "analysis/report/closure_page.hpp"
 #include "app/command.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
@@ -46,7 +47,8 @@ void add_closure(CLI::App& root) {
     command->add_option("RECORD", arguments->record, "rlg-record (.h5), or samples as text")->required();
     command->add_option("--model", arguments->model,
                         "scenario (.toml) of the instrument, for what the record leaves open");
-    command->add_option("-o,--output", arguments->out, "folder for closed.toml, closure.h5 and closure.json");
+    command->add_option("-o,--output", arguments->out,
+                        "folder for report.md with its figures, closed.toml, closure.h5 and closure.json");
     command->add_flag("--json", arguments->json, "one JSON object on standard output");
     command->callback([arguments] {
         record::Record record = record::read_record(arguments->record);
@@ -58,11 +60,17 @@ void add_closure(CLI::App& root) {
         } catch (const InputError& error) {
             throw InputError(fmt::format("{}: {}", arguments->record, error.what()));
         }
+        nlohmann::json json = closure::to_json(closure);
+        std::string text = closure::to_text(closure);
         if (!arguments->out.empty()) {
             const std::string name = std::filesystem::path(arguments->record).filename().string();
-            closure::write_closure(arguments->out, name, record, closure);
+            const closure::Predictive predictive = closure::check_predictive(record, closure);
+            closure::write_closure(arguments->out, name, record, closure, predictive);
+            report::write_closure_page(arguments->out, name, closure, predictive);
+            json["predictive"] = closure::to_json(predictive);
+            text += "\n" + closure::to_text(predictive);
         }
-        put(arguments->json ? closure::to_json(closure).dump() + "\n" : closure::to_text(closure));
+        put(arguments->json ? json.dump() + "\n" : text);
     });
 }
 

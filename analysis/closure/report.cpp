@@ -4,12 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
-#include "engine/core/units.hpp"
 #include "engine/scenario/render.hpp"
 #include "engine/store/atomic_file.hpp"
 
@@ -30,27 +28,9 @@ json estimates_json(const std::vector<Estimate>& estimates) {
     return object;
 }
 
-std::string probability(double p) { return p < 1e-99 ? "< 1e-99" : fmt::format("{:.2g}", p); }
-
-void write_text(const std::filesystem::path& path, const std::string& text) {
-    AtomicPath target(path);
-    std::ofstream file(target.partial(), std::ios::binary);
-    file << text;
-    file.close();
-    if (!file) throw RunError(fmt::format("{}: cannot be written; is the disk full?", path.string()));
-    target.commit();
-}
-
 std::string value_text(const Estimate& e) {
     if (!std::isfinite(e.sd)) return fmt::format("  {:<26} {:>14.8g}    (no standard error)", e.name, e.value);
     return fmt::format("  {:<26} {:>14.8g} +- {:.2g}", e.name, e.value, e.sd);
-}
-
-double value_of(const std::vector<Estimate>& estimates, std::string_view name, double otherwise) {
-    for (const Estimate& estimate : estimates) {
-        if (estimate.name == name && std::isfinite(estimate.value)) return estimate.value;
-    }
-    return otherwise;
 }
 
 }  // namespace
@@ -98,21 +78,25 @@ nlohmann::json to_json(const Closure& closure) {
     return object;
 }
 
+std::string probability(double p) { return p < 1e-99 ? "< 1e-99" : fmt::format("{:.2g}", p); }
+
+std::string verdict_sentence(const Closure& closure) {
+    switch (closure.verdict) {
+        case Verdict::nothing_missing:
+            return "nothing missing: what the base model leaves of this record is chance";
+        case Verdict::closed:
+            return "closed: with the effects below, what is left of this record is chance";
+        case Verdict::unexplained:
+            break;
+    }
+    return fmt::format("unexplained: structure is left that no effect of the library takes away, in {}: {}",
+                       name_of(closure.unexplained->where), closure.unexplained->description());
+}
+
 std::string to_text(const Closure& closure) {
     std::string text;
     const auto line = [&](const std::string& s) { text += s + "\n"; };
-    switch (closure.verdict) {
-        case Verdict::nothing_missing:
-            line("nothing missing: what the base model leaves of this record is chance");
-            break;
-        case Verdict::closed:
-            line("closed: with the effects below, what is left of this record is chance");
-            break;
-        case Verdict::unexplained:
-            line(fmt::format("unexplained: structure is left that no effect of the library takes away, in {}: {}",
-                             name_of(closure.unexplained->where), closure.unexplained->description()));
-            break;
-    }
+    line(verdict_sentence(closure));
     line("");
     line("base model:");
     for (const Estimate& e : closure.base) line(value_text(e));
@@ -143,59 +127,56 @@ std::string to_text(const Closure& closure) {
     return text;
 }
 
-scenario::Scenario closed_scenario(const record::Record& record, const Closure& closure) {
-    scenario::Scenario scenario;
-    const scenario::Scenario standard;
-    for (auto& [effect, values] : scenario.effects) {
-        const effects::Effect* known = effects::find(effect);
-        for (const effects::Parameter& parameter : known->parameters()) {
-            // The standard device has quantum noise; this one has what was found.
-            if (parameter.role == effects::Role::deviation) values.at(std::string(parameter.name)) = 0.0;
+nlohmann::json to_json(const Predictive& predictive) {
+    json statistics = json::array();
+    for (const PredictiveStatistic& statistic : predictive.statistics) {
+        json one = {{"name", statistic.name},
+                    {"points", statistic.x.size()},
+                    {"p_value", number(statistic.p_value_all)},
+                    {"largest_deviation", number(statistic.largest)}};
+        if (!statistic.x.empty()) {
+            one["at"] = {{"what", statistic.x_name}, {"value", number(statistic.x[statistic.at])}};
+            one["at"]["unit"] = statistic.x_unit;
         }
+        statistics.push_back(std::move(one));
     }
-    scenario.gyro.scale_factor_arcsec = record.declared.scale_factor_arcsec.value_or(standard.gyro.scale_factor_arcsec);
-    scenario.gyro.lockin_threshold_deg_h =
-        value_of(closure.base, "lockin_threshold_deg_h", standard.gyro.lockin_threshold_deg_h);
-    scenario.dither.frequency_hz = value_of(closure.base, "dither_frequency_hz", standard.dither.frequency_hz);
-    scenario.dither.peak_rate_deg_s = value_of(closure.base, "dither_peak_rate_deg_s", standard.dither.peak_rate_deg_s);
-    const double input = closure.mean_input_rate_deg_h;
-    scenario.input.rate_deg_h = value_of(closure.base, "bias_deg_h", 0.0) + input;
-    scenario.input.sweep_stop_deg_h = scenario.input.rate_deg_h;
-    scenario.readout.detector_noise_relative =
-        std::clamp(value_of(closure.base, "readout_noise_rad", standard.readout.detector_noise_relative), 0.0, 0.1);
-    const double injected = value_of(closure.base, "injected_noise_rad", 0.0);
-    // Below a hundredth of a radian nothing is randomised: a dither without noise.
-    const bool noisy = injected > 0.01;
-    if (noisy) scenario.noise_injection.turn_phase_rms_rad = injected;
-    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
-    scenario.ensemble.dither_amplitude_sd_relative = 0.0;
-    if (record.turns) {
-        scenario.ensemble.duration_s = std::max(10.0, record.turns->time_s.back() - record.turns->time_s.front());
-    }
-    scenario.ensemble.gyros = 8;
-    scenario.output.sample_interval_s =
-        std::max(1.5 / scenario.dither.frequency_hz, std::min(1.0, scenario.ensemble.duration_s / 300.0));
-    if (!record.temperature_c.empty() && record.temperature_c.time_s.size() > 1) {
-        const auto& t = record.temperature_c;
-        const double span_h = (t.time_s.back() - t.time_s.front()) / 3600.0;
-        scenario.environment.temperature_ramp_k_per_h = (t.value.back() - t.value.front()) / span_h;
-    }
-    for (const Step& step : closure.steps) {
-        const auto found = scenario.effects.find(step.effect);
-        if (found == scenario.effects.end()) continue;
-        for (const Estimate& estimate : step.parameters) {
-            const auto value = found->second.find(estimate.name);
-            if (value != found->second.end()) value->second = estimate.value;
-        }
-    }
-    scenario.arms = noisy ? std::vector<std::string>{"ideal", "noise_injected", "noise_injected+compensated",
-                                                     "noise_injected+compensated_exact"}
-                          : std::vector<std::string>{"ideal", "uncompensated", "compensated", "compensated_exact"};
-    return scenario;
+    return {{"simulations", predictive.simulations}, {"statistics", statistics}, {"notes", predictive.notes}};
 }
 
+std::string to_text(const Predictive& predictive) {
+    std::string text;
+    if (predictive.simulations > 0) {
+        text += fmt::format("among {} simulations of this model:\n", predictive.simulations);
+    }
+    for (const PredictiveStatistic& statistic : predictive.statistics) {
+        text += fmt::format("  {:<74} p {:.2g}\n", statistic.description, statistic.p_value_all);
+    }
+    for (const std::string& note : predictive.notes) text += "note: " + note + "\n";
+    return text;
+}
+
+namespace {
+
+void write_predictive(store::File& h5, const Predictive& predictive) {
+    store::Group all = h5.create_group("predictive");
+    all.set_attribute("simulations", predictive.simulations);
+    for (const PredictiveStatistic& statistic : predictive.statistics) {
+        store::Group group = all.create_group(statistic.name);
+        group.set_attribute("description", std::string_view(statistic.description));
+        group.set_attribute("p_value", statistic.p_value_all);
+        group.set_attribute("largest_deviation", statistic.largest);
+        group.write("x", statistic.x, {statistic.x_unit, statistic.x_name});
+        group.write("measured", statistic.measured, {statistic.unit, "of the record"});
+        group.write("lowest", statistic.lowest, {statistic.unit, "of the simulations of the closed model"});
+        group.write("highest", statistic.highest, {statistic.unit, "of the simulations of the closed model"});
+        group.write("p_value", statistic.p_value, {"1", "of the point by itself, both sides"});
+    }
+}
+
+}  // namespace
+
 void write_closure(const std::filesystem::path& folder, const std::string& source, const record::Record& record,
-                   const Closure& closure) {
+                   const Closure& closure, const Predictive& predictive) {
     std::error_code failed;
     std::filesystem::create_directories(folder, failed);
     if (failed || !std::filesystem::is_directory(folder)) {
@@ -245,12 +226,15 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
     scores.write("step", steps, {"", "base model, then each effect added"});
     scores.write("heldout_error", errors, {closure.unit, "rms one-step prediction error of the held-out part"});
     scores.write("heldout_log_score_gain", gains, {"1", "over the step before"});
+    write_predictive(h5, predictive);
+    json object = to_json(closure);
+    object["predictive"] = to_json(predictive);
     const scenario::Scenario closed = closed_scenario(record, closure);
     std::string head =
         fmt::format("# What was found in {}: {}.\n# The device as fitted, with the effects that were added.\n", source,
                     name_of(closure.verdict));
     const std::string rendered = scenario::to_toml(closed);
-    write_text(folder / "closure.json", to_json(closure).dump(2) + "\n");
+    write_text(folder / "closure.json", object.dump(2) + "\n");
     write_text(folder / "closed.toml", head + "\n" + rendered);
     file.commit();
 }

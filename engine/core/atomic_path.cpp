@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <fstream>
 #include <system_error>
 
 #include "engine/core/error.hpp"
@@ -87,6 +88,15 @@ void AtomicPath::commit() {
     remove_on_kill_.reset();
     // The new name is in force already; some file systems cannot sync a directory, and nothing is lost without it.
     sync(target_.parent_path(), O_RDONLY | O_DIRECTORY);
+}
+
+void write_text(const fs::path& path, std::string_view text) {
+    AtomicPath target(path);
+    std::ofstream file(target.partial(), std::ios::binary);
+    file << text;
+    file.close();
+    if (!file) throw RunError(fmt::format("{}: cannot be written; is the disk full?", path.string()));
+    target.commit();
 }
 
 }  // namespace ringlock

@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <optional>
+#include <string_view>
 
 #include "engine/core/interrupt.hpp"
 
@@ -32,5 +33,9 @@ class AtomicPath {
     std::optional<RemoveOnKill> remove_on_kill_;
     bool committed_ = false;
 };
+
+/// Writes a text file, whole or not at all. Throws InputError where it cannot be there, RunError where the disk
+/// refuses.
+void write_text(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace ringlock

@@ -27,6 +27,7 @@ enum class Purpose : std::uint64_t {
     amplitude_wander = 13,
     case_motion = 14,
     witness_motion = 15,
+    fitted_parameters = 16,
 };
 
 /// Who draws: the study's seed and the gyro's number.

@@ -1,0 +1,41 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "analysis/closure/closure.hpp"
+
+/// Whether the closed model, simulated, makes records like the one that was measured.
+namespace ringlock::closure {
+
+/// A statistic of the measured record, point by point, among the same of the simulated ones.
+struct PredictiveStatistic {
+    std::string name;         ///< allan_deviation, spectrum, folded_minima, folded_maxima
+    std::string description;  ///< one line
+    std::string x_name, x_unit;
+    std::string unit;       ///< of what follows but for probabilities
+    bool positive = false;  ///< compared by its logarithm
+    std::vector<double> x = {};
+    std::vector<double> measured = {};
+    std::vector<double> lowest = {}, highest = {};  ///< of the simulations
+    std::vector<double> p_value = {};               ///< of each point by itself, both sides
+    double p_value_all = 1.0;                       ///< of the largest deviation over the points
+    double largest = 0.0;                           ///< that deviation, in standard deviations of the simulations
+    std::size_t at = 0;                             ///< point where it is
+};
+
+struct Predictive {
+    int simulations = 0;
+    std::int64_t turns = 0;  ///< simulated, of all of them
+    std::vector<PredictiveStatistic> statistics = {};
+    std::vector<std::string> notes = {};  ///< what was left out, and why
+};
+
+/// Simulations at most; the lowest and the highest of 39 hold 95 % of what one more would show.
+inline constexpr int most_simulations = 39;
+
+/// Simulates the closed model as often as about four million turns last, 9 to `simulations` times, with the record's
+/// own input and length, and compares. What cannot be simulated is a note, and no error. Throws Interrupted.
+Predictive check_predictive(const record::Record& record, const Closure& closure, int simulations = most_simulations);
+
+}  // namespace ringlock::closure

@@ -1,0 +1,238 @@
+#include "analysis/report/closure_page.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "analysis/closure/report.hpp"
+#include "analysis/report/plot.hpp"
+#include "engine/core/atomic_path.hpp"
+#include "engine/core/error.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::report {
+
+namespace {
+
+using closure::Closure;
+using closure::Estimate;
+using closure::Predictive;
+using closure::PredictiveStatistic;
+using closure::Step;
+
+/// What a cell of a table may hold.
+std::string cell(std::string_view text) {
+    std::string out;
+    for (const char c : text) out += c == '|' ? std::string("\\|") : std::string(1, c == '\n' ? ' ' : c);
+    return out;
+}
+
+std::string value_text(const Estimate& e) {
+    if (!e.text.empty()) return e.text;
+    if (!std::isfinite(e.value)) return "not known";
+    if (!std::isfinite(e.sd)) return fmt::format("{:.6g}", e.value);
+    return fmt::format("{:.6g} ± {:.2g}", e.value, e.sd);
+}
+
+const PredictiveStatistic* find(const Predictive& predictive, std::string_view name) {
+    for (const PredictiveStatistic& statistic : predictive.statistics) {
+        if (statistic.name == name && !statistic.x.empty()) return &statistic;
+    }
+    return nullptr;
+}
+
+/// A figure of the page: its file, what it says, and what is drawn.
+struct Picture {
+    std::string file;
+    std::string caption;
+    Figure figure;
+};
+
+/// Measured values over the lowest and the highest of the simulations.
+void add_band(const PredictiveStatistic& statistic, const std::string& what, int simulations, Figure& figure) {
+    using Style = Curve::Style;
+    figure.curves.push_back({.label = "measured" + what, .x = statistic.x, .y = statistic.measured});
+    figure.curves.push_back({.label = fmt::format("lowest of {} simulations{}", simulations, what),
+                             .x = statistic.x,
+                             .y = statistic.lowest,
+                             .style = Style::line});
+    figure.curves.push_back({.label = fmt::format("highest of {} simulations{}", simulations, what),
+                             .x = statistic.x,
+                             .y = statistic.highest,
+                             .style = Style::line});
+}
+
+std::vector<Picture> pictures(const std::string& source, const Closure& closure, const Predictive& predictive) {
+    std::vector<Picture> all;
+    const auto logarithmic = [&](const char* name, const char* file, const char* title, const char* y_label) {
+        const PredictiveStatistic* statistic = find(predictive, name);
+        if (statistic == nullptr) return;
+        Picture picture;
+        picture.file = file;
+        picture.caption = fmt::format("{}: the record over the band of the simulations.", title);
+        picture.figure = {.title = fmt::format("{} of {}", title, source),
+                          .x_label = fmt::format("{} [{}]", statistic->x_name, statistic->x_unit),
+                          .y_label = y_label,
+                          .log_x = true,
+                          .log_y = true};
+        add_band(*statistic, "", predictive.simulations, picture.figure);
+        all.push_back(std::move(picture));
+    };
+    logarithmic("allan_deviation", "allan.svg", "Allan deviation", "Allan deviation [deg/h]");
+    logarithmic("spectrum", "spectrum.svg", "Spectrum of the rate", "root of the power density [deg/h/√Hz]");
+    Picture folded{.file = "folded.svg",
+                   .caption = "What the gyro gains across a turn, by the phase at which it turns: the kick of lock-in.",
+                   .figure = {.title = fmt::format("What {} gains across its turns, by their phase", source),
+                              .x_label = "phase at the turn [rad]",
+                              .y_label = "gain less its mean [mrad of phase]"}};
+    for (const auto& [name, what] : {std::pair{"folded_minima", ", minima"}, std::pair{"folded_maxima", ", maxima"}}) {
+        const PredictiveStatistic* statistic = find(predictive, name);
+        if (statistic == nullptr) continue;
+        PredictiveStatistic in_mrad = *statistic;
+        for (auto* values : {&in_mrad.measured, &in_mrad.lowest, &in_mrad.highest}) {
+            for (double& value : *values) value *= 1e3;
+        }
+        add_band(in_mrad, what, predictive.simulations, folded.figure);
+    }
+    if (!folded.figure.curves.empty()) all.push_back(std::move(folded));
+
+    Picture steps{.file = "steps.svg",
+                  .caption =
+                      "Held-out one-step error of the base model and after each effect; dashed: what the noise "
+                      "of the last model alone would leave.",
+                  .figure = {.title = fmt::format("Held-out error of {}, step by step", source),
+                             .x_label = "effects in the model",
+                             .y_label = fmt::format("rms one-step error [{}]", closure.unit),
+                             .log_y = true}};
+    Curve error{.label = "held-out error", .x = {0.0}, .y = {closure.heldout_before}, .style = Curve::Style::line};
+    steps.figure.curves.push_back({.label = "0: base model", .x = {0.0}, .y = {closure.heldout_before}});
+    for (std::size_t k = 0; k < closure.steps.size(); ++k) {
+        const auto number = static_cast<double>(k + 1);
+        const double after = closure.steps[k].heldout_error_after;
+        error.x.push_back(number);
+        error.y.push_back(after);
+        steps.figure.curves.push_back(
+            {.label = fmt::format("{}: {}", k + 1, closure.steps[k].effect), .x = {number}, .y = {after}});
+    }
+    const double last = std::max<double>(1.0, static_cast<double>(closure.steps.size()));
+    if (error.x.size() > 1) steps.figure.curves.push_back(std::move(error));
+    steps.figure.curves.push_back({.label = "noise floor",
+                                   .x = {0.0, last},
+                                   .y = {closure.noise_floor, closure.noise_floor},
+                                   .style = Curve::Style::dashed});
+    all.push_back(std::move(steps));
+    return all;
+}
+
+void add_steps(const Closure& closure, std::string& page) {
+    page += "## What was added\n\n";
+    if (closure.steps.empty()) {
+        page += "No effect of the library: the record asks for none, or none is what is missing.\n\n";
+        return;
+    }
+    page += fmt::format(
+        "One row for each effect that the record asks for, in the order in which they were added. The held-out error "
+        "is the rms error\nof one-step predictions [{}] in parts of the record that nothing was fitted to; p is the "
+        "probability that chance alone looks like\nthe effect, all that was searched counted.\n\n",
+        closure.unit);
+    page += "| step | effect | parameters | held-out error before | after | log-score gained | p |\n";
+    page += "|---|---|---|---|---|---|---|\n";
+    for (std::size_t k = 0; k < closure.steps.size(); ++k) {
+        const Step& step = closure.steps[k];
+        std::string parameters;
+        for (const Estimate& e : step.parameters) {
+            parameters += fmt::format("{}`{}` {}", parameters.empty() ? "" : "; ", e.name, cell(value_text(e)));
+        }
+        page += fmt::format("| {} | `{}` | {} | {:.6g} | {:.6g} | {:.1f} | {} |\n", k + 1, step.effect, parameters,
+                            step.heldout_error_before, step.heldout_error_after, step.heldout_log_score_gain,
+                            closure::probability(step.p_value));
+    }
+    page += "\n";
+    if (closure.steps.front().heldout_error_before < closure.heldout_before) {
+        page +=
+            "Effects that only stood in for one of these were dropped again: the first row does not begin at the base "
+            "model.\n\n";
+    }
+    for (const Step& step : closure.steps) {
+        if (step.confounded_with.empty()) continue;
+        page += fmt::format("This record cannot tell `{}` from `{}`. What would: {}.\n\n", step.effect,
+                            fmt::join(step.confounded_with, "`, `"), step.experiment);
+    }
+}
+
+void add_predictive(const Predictive& predictive, std::string& page) {
+    page += "## Does the closed model make such records?\n\n";
+    if (predictive.simulations > 0) {
+        page += fmt::format(
+            "The device of `closed.toml` was simulated {} times over the length and the input of this record, with "
+            "parameters "
+            "drawn about their\nestimates by their standard errors, and every simulation looked at as the record was. "
+            "p "
+            "is the rank of the record's largest deviation\nfrom the simulations among their own largest: {:.2g} where "
+            "no "
+            "simulation is as far out as the record, and not less.\n\n",
+            predictive.simulations, 1.0 / (predictive.simulations + 1.0));
+        page += "| statistic | points | p | largest deviation |\n|---|---|---|---|\n";
+        for (const PredictiveStatistic& s : predictive.statistics) {
+            const std::string where = s.x.empty() ? "" : fmt::format(" at {:.4g} {}", s.x[s.at], s.x_unit);
+            page += fmt::format("| {} | {} | {:.2g} | {:.2g} standard deviations{} |\n", cell(s.description),
+                                s.x.size(), s.p_value_all, s.largest, where);
+        }
+        page += "\n";
+    }
+    for (const std::string& note : predictive.notes) page += fmt::format("- {}\n", cell(note));
+    if (!predictive.notes.empty()) page += "\n";
+}
+
+}  // namespace
+
+void write_closure_page(const std::filesystem::path& folder, const std::string& source, const Closure& closure,
+                        const Predictive& predictive) {
+    std::string page = fmt::format("# What was found in {}\n\n**{}.**\n\n", source, closure::verdict_sentence(closure));
+    page += fmt::format(
+        "A gyro without anything beyond its base equation foretells the next reading to {:.6g} {} rms, the model found "
+        "here to {:.6g} {};\nits noise alone would leave {:.6g} {}. A record with nothing to find gets another verdict "
+        "than that with a probability of {:.2g}.\n\n",
+        closure.heldout_before, closure.unit, closure.heldout_after, closure.unit, closure.noise_floor, closure.unit,
+        closure.level);
+    add_steps(closure, page);
+    page +=
+        "## The base model\n\nFitted with all effects above; ± one standard error.\n\n| parameter | value "
+        "|\n|---|---|\n";
+    for (const Estimate& e : closure.base) page += fmt::format("| `{}` | {} |\n", e.name, cell(value_text(e)));
+    page += "\n";
+    add_predictive(predictive, page);
+
+    std::string problem;
+    for (const Picture& picture : pictures(source, closure, predictive)) {
+        try {
+            write_svg(folder / picture.file, picture.figure);
+            page += fmt::format("![{}]({})\n\n{}\n\n", picture.figure.title, picture.file, picture.caption);
+        } catch (const RunError& error) {
+            problem = error.what();
+        }
+    }
+    if (!problem.empty()) page += fmt::format("Figures are missing: {}\n\n", problem);
+
+    page += "## What is left of the record\n\n";
+    page += "The residual of the last model held against all that the record has; each p counts its own searches.\n\n";
+    page += "| where | held against | p | most |\n|---|---|---|---|\n";
+    for (const closure::ResidualTest& test : closure.tests) {
+        page += fmt::format("| {} | {} | {} | {} |\n", closure::name_of(test.where), cell(test.view),
+                            closure::probability(test.p_value), cell(test.detail));
+    }
+    page += "\n";
+    if (!closure.notes.empty()) page += "## Notes\n\n";
+    for (const std::string& note : closure.notes) page += fmt::format("- {}\n", cell(note));
+    if (!closure.notes.empty()) page += "\n";
+    page +=
+        "## The files\n\n- `closed.toml`: the device as fitted, for `ringlock run` and `ringlock record`\n- "
+        "`closure.h5`: parameters, one-step predictions, scores, the predictive check point by point\n- "
+        "`closure.json`: this page for programs\n";
+    write_text(folder / "report.md", page);
+}
+
+}  // namespace ringlock::report
