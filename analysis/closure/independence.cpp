@@ -237,7 +237,7 @@ std::vector<double> two_level_angle(const TurnFit& fit, const Eigen::VectorXd& s
 
 /// Rates of stretches of the record, for a rate that jumps to and fro.
 void test_levels(const TurnFit& fit, std::vector<View>& views) {
-    constexpr std::size_t stretches = 40;
+    constexpr std::size_t stretches = 120;
     const auto& time = fit.model().series().time_s;
     const auto n = static_cast<Eigen::Index>(time.size());
     const auto ramp_of = [&time](std::size_t k) {

@@ -148,9 +148,10 @@ bool something_else(const TurnFit& fit, const effects::Effect& effect, double me
         const bool in_step = view.test.where == Where::phase && effect.adds_angle();
         // A random rate can follow what jumps, nearly as well as the jumps themselves.
         const bool jumps = view.jumps && is_random_rate(effect);
-        // The likelihood of a process has its whole course integrated out: so must be the coefficients (Schwarz 1978).
-        const double integrated =
-            is_random_rate(effect) ? 0.5 * std::log(static_cast<double>(fit.rows().size())) - 1.0 : 0.0;
+        // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
+        // course in time (Schwarz 1978).
+        const bool courses = is_random_rate(effect) && view.test.where == Where::time;
+        const double integrated = courses ? 0.5 * std::log(static_cast<double>(fit.rows().size())) - 1.0 : 0.0;
         return refitted_merit(fit, view) - integrated * static_cast<double>(view.columns().size()) >
                (in_step || jumps ? merit - tie : merit + tie);
     });

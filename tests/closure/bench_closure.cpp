@@ -257,7 +257,7 @@ int main(int argc, char** argv) {
             return shows(effect, condition) && std::isfinite(limits.at({effect, condition.name}));
         };
         for (const double multiple : {1.0, 2.0}) {
-            for (std::size_t k = 0; wanted("single") && k < scaled(12); ++k) {
+            for (std::size_t k = 0; wanted("single") && k < scaled(6); ++k) {
                 for (const std::string& effect : effects) {
                     const Condition* condition = &conditions[(k + turn++) % conditions.size()];
                     while (!shown(effect, *condition)) condition = &conditions[turn++ % conditions.size()];
@@ -269,7 +269,7 @@ int main(int argc, char** argv) {
         }
         for (std::size_t a = 0, k = 0; wanted("pair") && a < effects.size(); ++a) {
             for (std::size_t b = a + 1; b < effects.size(); ++b, ++k) {
-                if (share < 1.0 && k % static_cast<std::size_t>(std::round(1.0 / share)) != 0) continue;
+                if (k % static_cast<std::size_t>(std::round(2.0 / share)) != 0) continue;
                 const Condition& condition = conditions[k % conditions.size()];
                 if (!shown(effects[a], condition) || !shown(effects[b], condition)) continue;
                 Case of{.kind = Kind::pair, .truth = {}, .multiple = 2.0, .condition = &condition};
@@ -280,7 +280,7 @@ int main(int argc, char** argv) {
         }
     }
     if (wanted("foreign")) {
-        for (Case& of : foreign_cases(scaled(20))) cases.push_back(std::move(of));
+        for (Case& of : foreign_cases(scaled(12))) cases.push_back(std::move(of));
     }
 
     std::erase_if(cases, [&](const Case& of) { return !seed.empty() && std::to_string(of.seed) != seed; });
