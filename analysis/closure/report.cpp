@@ -107,7 +107,7 @@ std::string to_text(const Closure& closure) {
         for (const Estimate& e : step.parameters) {
             line(e.text.empty() ? value_text(e) : fmt::format("  {:<26} {:>14}", e.name, e.text));
         }
-        line(fmt::format("  held-out error {:.6g} -> {:.6g} {}, log-score +{:.1f}", step.heldout_error_before,
+        line(fmt::format("  held-out error {:.6g} -> {:.6g} {}, log-score {:+.1f}", step.heldout_error_before,
                          step.heldout_error_after, closure.unit, step.heldout_log_score_gain));
         if (!step.confounded_with.empty()) {
             line(fmt::format("  this record cannot tell it from: {}", fmt::join(step.confounded_with, ", ")));

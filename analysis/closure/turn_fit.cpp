@@ -9,6 +9,7 @@
 #include <limits>
 #include <tuple>
 
+#include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -180,11 +181,22 @@ void TurnFit::fit_deterministic(int iterations) {
         const double squares = y.squaredNorm();
         const TurnParameters from = parameters_;
         const std::vector<double> nuisance_from = nuisance_;
+        bool possible = false;
         for (double share = 1.0; share > 0.02; share *= 0.5) {
             parameters_ = from;
             nuisance_ = nuisance_from;
             take(share * step);
-            if (parameters_.effects.empty() || squares_left(all, whitening) <= squares * (1.0 + 1e-9)) break;
+            try {
+                const double left = squares_left(all, whitening);
+                possible = true;
+                if (parameters_.effects.empty() || left <= squares * (1.0 + 1e-9)) break;
+            } catch (const RunError&) {
+                possible = false;  // no motion of a gyro with such parameters can be followed
+            }
+        }
+        if (!possible) {
+            parameters_ = from;
+            nuisance_ = nuisance_from;
         }
         set_rest(model_->predict(parameters_), all);
     }

@@ -1,0 +1,115 @@
+// A small part of the bench of the closed loop (bench_closure.cpp), and what it stands on.
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "analysis/closure/two_levels.hpp"
+#include "tests/closure/suite.hpp"
+
+namespace ringlock::test::closure {
+namespace {
+
+constexpr std::size_t turns = 8000;
+constexpr double duration_s = 32.0;
+
+std::vector<Outcome> judged(const std::vector<Case>& cases) {
+    const auto records = make(cases);
+    std::vector<Outcome> outcomes;
+    for (std::size_t k = 0; k < cases.size(); ++k) outcomes.push_back(judge(cases[k], records[k]));
+    return outcomes;
+}
+
+TEST(ClosureSuite, NamesNothingInRecordsWithoutAnything) {
+    std::vector<Case> cases;
+    for (const Condition& condition : conditions) {
+        cases.push_back({.truth = {}, .condition = &condition, .seed = 300 + cases.size(), .turns = turns});
+    }
+    cases[1].direct = true;
+    for (const Outcome& outcome : judged(cases)) {
+        EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named;
+        EXPECT_NEAR(outcome.after / outcome.oracle, 1.0, 1e-3);
+        EXPECT_FALSE(outcome.deviations.empty());
+    }
+}
+
+TEST(ClosureSuite, NamesWhatIsFourTimesItsLimit) {
+    std::vector<Case> cases;
+    const auto add = [&](const char* effect, double size, std::size_t condition) {
+        Case of{.kind = Kind::single, .truth = {}, .multiple = 4.0, .condition = &conditions[condition]};
+        of.seed = 320 + cases.size();
+        of.turns = turns;
+        of.truth = {draw(effect, 4.0 * size, of.seed, duration_s)};
+        settle(of);
+        cases.push_back(std::move(of));
+    };
+    add("bias_step", 3e-4, 0);
+    add("lockin_turn_asymmetry", 0.05, 1);
+    add("scale_factor_error", 3e-6, 2);
+    add("missed_counts", 2e-3, 3);
+    cases[0].direct = true;
+    for (const Outcome& outcome : judged(cases)) {
+        EXPECT_TRUE(outcome.judged == Judged::right || outcome.judged == Judged::tie)
+            << outcome.verdict << " " << outcome.named;
+        EXPECT_NEAR(outcome.after / outcome.oracle, 1.0, 0.02);
+    }
+}
+
+TEST(ClosureSuite, SizesComeFromTheRecordsInformation) {
+    // Information goes with the number of turns, and for a ramp with the fourth power of the time beside it.
+    const auto limit = [](std::size_t count) {
+        Case of{.kind = Kind::single, .truth = {}, .multiple = 1.0, .condition = &conditions[0], .seed = 340};
+        of.turns = count;
+        of.truth = {draw("lockin_turn_asymmetry", 2e-3, of.seed, duration_s)};
+        settle(of);
+        return std::abs(of.truth[0].values.at("ratio"));
+    };
+    EXPECT_NEAR(limit(4000) / limit(16000), 2.0, 0.4);
+}
+
+TEST(ClosureSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
+    std::vector<Case> cases;
+    for (Case& of : foreign_cases(1)) {
+        of.turns = turns;
+        cases.push_back(std::move(of));
+    }
+    for (const Outcome& outcome : judged(cases)) {
+        EXPECT_FALSE(outcome.false_name) << outcome.verdict << " " << outcome.named;
+        EXPECT_TRUE(std::isnan(outcome.oracle));
+    }
+}
+
+TEST(TwoLevels, FindsTheCourseAndCountsItsJumps) {
+    // Rates of 60 stretches, each known to within one, that jump three times by eight.
+    const Eigen::Index n = 60;
+    Eigen::VectorXd rate(n);
+    std::uint64_t state = 1;
+    for (Eigen::Index k = 0; k < n; ++k) {
+        double noise = -6.0;  // twelve uniform numbers
+        for (int j = 0; j < 12; ++j) {
+            state = state * 6364136223846793005U + 1442695040888963407U;
+            noise += static_cast<double>(state >> 11) * 0x1.0p-53;
+        }
+        rate(k) = noise + (k >= 10 && k < 25 ? 8.0 : 0.0) + (k >= 44 ? 8.0 : 0.0);
+    }
+    Eigen::MatrixXd free = Eigen::MatrixXd::Identity(n, n);
+    free.array() -= 1.0 / static_cast<double>(n);
+    const auto found = ringlock::closure::two_levels(free, free * rate);
+    EXPECT_EQ(found.changes, 3);
+    EXPECT_LT(found.p_value, 1e-30);
+    for (Eigen::Index k = 1; k < n; ++k) {
+        EXPECT_EQ(found.shape(k) != found.shape(k - 1), k == 10 || k == 25 || k == 44) << k;
+    }
+}
+
+TEST(TwoLevels, SeesNoJumpsInNoise) {
+    const Eigen::Index n = 60;
+    const Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(n, n);
+    Eigen::VectorXd noise(n);
+    for (Eigen::Index k = 0; k < n; ++k) noise(k) = std::sin(7.0 * static_cast<double>(k * k));
+    const auto found = ringlock::closure::two_levels(normal, noise);
+    EXPECT_EQ(found.changes, 0);
+    EXPECT_EQ(found.p_value, 1.0);
+}
+
+}  // namespace
+}  // namespace ringlock::test::closure
