@@ -42,13 +42,11 @@ Verdict verdict_of(const Closure& closure) {
     return closure.steps.empty() ? Verdict::nothing_missing : Verdict::closed;
 }
 
-ResidualTest size_over_time(const std::vector<double>& innovations, const Rows& rows, std::size_t stretches,
-                            double fewest) {
-    const std::size_t n = innovations.size();
+Squares squares_of(const std::vector<double>& innovations, const Rows& rows) {
     double mean = 0.0;
     double fourth = 0.0;
     double count = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t i = 0; i < innovations.size(); ++i) {
         if (!rows[i]) continue;
         const double square = innovations[i] * innovations[i];
         mean += square;
@@ -56,7 +54,13 @@ ResidualTest size_over_time(const std::vector<double>& innovations, const Rows& 
         count += 1.0;
     }
     mean /= count;
-    const double variance = std::max(fourth / count - mean * mean, 1e-12);
+    return {mean, std::max(fourth / count - mean * mean, 1e-12)};
+}
+
+ResidualTest size_over_time(const std::vector<double>& innovations, const Rows& rows, std::size_t stretches,
+                            double fewest) {
+    const std::size_t n = innovations.size();
+    const auto [mean, variance] = squares_of(innovations, rows);
     double chi2 = 0.0;
     int freedom = -1;
     for (std::size_t s = 0; s < stretches; ++s) {

@@ -31,6 +31,12 @@ std::string experiment_for(const std::string& effect, const std::vector<std::str
 
 Verdict verdict_of(const Closure& closure);
 
+/// Mean and variance of the squares of the innovations that count.
+struct Squares {
+    double mean, variance;
+};
+Squares squares_of(const std::vector<double>& innovations, const Rows& rows);
+
 /// Whether the residual is as large everywhere: its squares in stretches of the record, each of `fewest` rows at least.
 ResidualTest size_over_time(const std::vector<double>& innovations, const Rows& rows, std::size_t stretches,
                             double fewest);

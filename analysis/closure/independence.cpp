@@ -375,17 +375,7 @@ void test_size(const TurnFit& fit, std::vector<View>& views) {
     const auto& e = fit.innovations();
     const auto& rows = fit.rows();
     const std::size_t n = e.size();
-    double mean = 0.0;
-    double fourth = 0.0;
-    double count = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-        if (!rows[i]) continue;
-        mean += e[i] * e[i];
-        fourth += e[i] * e[i] * e[i] * e[i];
-        count += 1.0;
-    }
-    mean /= count;
-    const double variance = std::max(fourth / count - mean * mean, 1e-12);
+    const auto [mean, variance] = squares_of(e, rows);
     views.push_back({size_over_time(e, rows, 20, 8.0)});
     constexpr int columns = 8;
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);

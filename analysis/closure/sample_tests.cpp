@@ -97,17 +97,7 @@ void test_size(const SampleFit& fit, Tests& tests) {
     const auto& e = fit.innovations();
     const Rows& rows = fit.rows();
     const std::size_t n = e.size();
-    double mean = 0.0;
-    double fourth = 0.0;
-    double count = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-        if (!rows[i]) continue;
-        mean += e[i] * e[i];
-        fourth += e[i] * e[i] * e[i] * e[i];
-        count += 1.0;
-    }
-    mean /= count;
-    const double variance = std::max(fourth / count - mean * mean, 1e-12);
+    const auto [mean, variance] = squares_of(e, rows);
     tests.push_back(size_over_time(e, rows, 40, 20.0));
     // Patterns of the place in the record: mean and size for each remainder.
     double least = 1.0;
