@@ -1,6 +1,10 @@
 #include "analysis/closure/decision.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "analysis/closure/chance.hpp"
 
@@ -40,6 +44,29 @@ std::string experiment_for(const std::string& effect, const std::vector<std::str
 Verdict verdict_of(const Closure& closure) {
     if (closure.unexplained) return Verdict::unexplained;
     return closure.steps.empty() ? Verdict::nothing_missing : Verdict::closed;
+}
+
+Correlations correlations_of(const std::vector<double>& innovations, const Rows& rows) {
+    Correlations found;
+    for (std::size_t k = 1; k < found.root.size(); ++k) {
+        double sum = 0.0;
+        double weight = 0.0;
+        for (std::size_t i = k; i < innovations.size(); ++i) {
+            if (!rows[i] || !rows[i - k]) continue;
+            const double product = innovations[i] * innovations[i - k];
+            sum += product;
+            weight += product * product;
+        }
+        if (weight > 0.0) found.root[k] = sum / std::sqrt(weight);
+    }
+    return found;
+}
+
+ResidualTest Correlations::test(Where where, std::string view) const {
+    double chi2 = 0.0;
+    for (const double r : root) chi2 += r * r;
+    return {where, std::move(view), chi2_tail(chi2, static_cast<int>(root.size()) - 1),
+            fmt::format("first correlations {:.2f}, {:.2f}, {:.2f} standard errors", root[1], root[2], root[3])};
 }
 
 Squares squares_of(const std::vector<double>& innovations, const Rows& rows) {

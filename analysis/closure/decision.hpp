@@ -31,6 +31,14 @@ std::string experiment_for(const std::string& effect, const std::vector<std::str
 
 Verdict verdict_of(const Closure& closure);
 
+/// Correlations of the innovations that count with those before, in standard errors by their own scatter.
+struct Correlations {
+    std::array<double, 25> root{};  ///< [lag]; none at 0
+
+    ResidualTest test(Where where, std::string view) const;
+};
+Correlations correlations_of(const std::vector<double>& innovations, const Rows& rows);
+
 /// Mean and variance of the squares of the innovations that count.
 struct Squares {
     double mean, variance;

@@ -264,34 +264,15 @@ void test_levels(const TurnFit& fit, std::vector<View>& views) {
 }
 
 void test_whiteness(const TurnFit& fit, std::vector<View>& views) {
-    const auto& e = fit.innovations();
-    const auto& rows = fit.rows();
-    const std::size_t n = e.size();
-    constexpr std::size_t lags = 24;
-    double chi2 = 0.0;
+    const Correlations found = correlations_of(fit.innovations(), fit.rows());
     double rising = 0.0;       // sum of correlations: slow changes
     double alternating = 0.0;  // with alternating signs: changes of the dither's amplitude
-    std::vector<double> root(lags + 1);
-    for (std::size_t k = 1; k <= lags; ++k) {
-        double sum = 0.0;
-        double weight = 0.0;
-        for (std::size_t i = k; i < n; ++i) {
-            if (!rows[i] || !rows[i - k]) continue;
-            const double product = e[i] * e[i - k];
-            sum += product;
-            weight += product * product;
-        }
-        if (weight == 0.0) continue;
-        root[k] = sum / std::sqrt(weight);
-        chi2 += root[k] * root[k];
-        rising += root[k];
-        alternating += k % 2 == 0 ? root[k] : -root[k];
+    for (std::size_t k = 1; k < found.root.size(); ++k) {
+        rising += found.root[k];
+        alternating += k % 2 == 0 ? found.root[k] : -found.root[k];
     }
-    views.push_back(
-        {{std::abs(alternating) > std::abs(rising) ? Where::amplitude : Where::time,
-          "correlation with the 24 turns before", chi2_tail(chi2, lags),
-          fmt::format("first correlations {:.2f}, {:.2f}, {:.2f} standard errors", root[1], root[2], root[3])}});
-
+    const Where where = std::abs(alternating) > std::abs(rising) ? Where::amplitude : Where::time;
+    views.push_back({found.test(where, "correlation with the 24 turns before")});
 }
 
 /// Lines, those that drift too.
@@ -421,10 +402,10 @@ std::string ResidualTest::description() const {
     return fmt::format("{}{}{}, by chance p {:.2g}", view, detail.empty() ? "" : ", ", detail, p_value);
 }
 
-double refitted_merit(const TurnFit& fit, const View& view) {
+double refitted_merit(const TurnFit& fit, const View& view, double of_a_coefficient) {
     const TurnFit::Regression regression = fit.regress(view.columns());
     if (regression.value.cwiseAbs().maxCoeff() > view.largest) return -std::numeric_limits<double>::infinity();
-    return regression.gain - view.cost;
+    return regression.gain - view.cost - of_a_coefficient * static_cast<double>(regression.value.size());
 }
 
 std::vector<View> view_residual(const TurnFit& fit) {
@@ -438,12 +419,6 @@ std::vector<View> view_residual(const TurnFit& fit) {
     test_size(fit, views);
     test_normality(fit, views);
     return views;
-}
-
-std::vector<ResidualTest> test_residual(const TurnFit& fit) {
-    std::vector<ResidualTest> tests;
-    for (View& view : view_residual(fit)) tests.push_back(std::move(view.test));
-    return tests;
 }
 
 }  // namespace ringlock::closure

@@ -32,15 +32,12 @@ struct View {
     bool jumps = false;  ///< random rates can follow it nearly as well as it can be said
 };
 
-/// Gain of the log-likelihood by the regression, the noise fitted anew beside it, less the view's cost; minus infinity
-/// where its coefficients make no sense.
-double refitted_merit(const TurnFit& fit, const View& view);
+/// Gain of the log-likelihood by the regression, the noise fitted anew beside it, less the view's cost and so much for
+/// each coefficient; minus infinity where these make no sense.
+double refitted_merit(const TurnFit& fit, const View& view, double of_a_coefficient = 0.0);
 
 /// Holds the innovations that count against everything that the record has: phase at the turns and its harmonics,
 /// direction, amplitude, temperature, input rate, time, frequency, the innovations before. The views refer to the fit.
 std::vector<View> view_residual(const TurnFit& fit);
-
-/// The tests alone.
-std::vector<ResidualTest> test_residual(const TurnFit& fit);
 
 }  // namespace ringlock::closure

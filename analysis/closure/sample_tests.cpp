@@ -18,27 +18,8 @@ namespace {
 using Tests = std::vector<ResidualTest>;
 
 void test_correlation(const SampleFit& fit, Tests& tests) {
-    constexpr std::size_t lags = 24;
-    const auto& e = fit.innovations();
-    const Rows& rows = fit.rows();
-    double chi2 = 0.0;
-    double root[lags + 1] = {};
-    for (std::size_t k = 1; k <= lags; ++k) {
-        double sum = 0.0;
-        double weight = 0.0;
-        for (std::size_t i = k; i < e.size(); ++i) {
-            if (!rows[i] || !rows[i - k]) continue;
-            const double product = e[i] * e[i - k];
-            sum += product;
-            weight += product * product;
-        }
-        if (weight == 0.0) continue;
-        root[k] = sum / std::sqrt(weight);
-        chi2 += root[k] * root[k];
-    }
-    tests.push_back(
-        {Where::time, "correlation with the 24 samples before", chi2_tail(chi2, lags),
-         fmt::format("first correlations {:.2f}, {:.2f}, {:.2f} standard errors", root[1], root[2], root[3])});
+    tests.push_back(correlations_of(fit.innovations(), fit.rows())
+                        .test(Where::time, "correlation with the 24 samples before"));
 }
 
 void test_spectrum(const SampleFit& fit, Tests& tests) {

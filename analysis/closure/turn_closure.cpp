@@ -152,8 +152,7 @@ bool something_else(const TurnFit& fit, const effects::Effect& effect, double me
         // course in time (Schwarz 1978).
         const bool courses = is_random_rate(effect) && view.test.where == Where::time;
         const double integrated = courses ? 0.5 * std::log(static_cast<double>(fit.rows().size())) - 1.0 : 0.0;
-        return refitted_merit(fit, view) - integrated * static_cast<double>(view.columns().size()) >
-               (in_step || jumps ? merit - tie : merit + tie);
+        return refitted_merit(fit, view, integrated) > (in_step || jumps ? merit - tie : merit + tie);
     });
 }
 
@@ -360,7 +359,9 @@ Closure close_turns(const record::Record& record) {
     }
 
     test_what_is_left(*now->fit, closure);
-    if (earlier && closure.unexplained && closure.unexplained->where != Where::phase) {
+    const bool random = std::any_of(closure.steps.begin(), closure.steps.end(),
+                                    [](const Step& step) { return is_random_rate(*effects::find(step.effect)); });
+    if (random && closure.unexplained && closure.unexplained->where != Where::phase) {
         // A rate is left that is none of the library's: the random one has only come nearest to it.
         now = earlier->now;
         closure.steps = std::move(earlier->steps);

@@ -113,8 +113,8 @@ std::shared_ptr<const TurnModel::Kicks> TurnModel::kicks(gyro::Setup setup) cons
 }
 
 TurnModel::Kicks TurnModel::kicks_of(const gyro::Setup& setup) const {
-    // Kicks are computed for few gyros: one deg/h changes them by a part in 1e8, and the threshold they follow but for
-    // their second order, 1e-2 of them, to less than 1e-5 in steps of a thousandth.
+    // Kicks are computed for few gyros: so near to the one asked for that half a kick is right to 1e-5 rad, far below
+    // what a reading of the phase tells (test TurnKicks.OfNearbyGyrosDoForEachOther).
     constexpr double matters_deg_h = 1.0;
     constexpr double step = 1e-3;
     const auto [lowest, highest] =

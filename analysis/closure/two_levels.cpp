@@ -36,12 +36,10 @@ TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right
                 new_squares += sign * 2.0 * (pull(b) + cross(b)) + normal(b, b);
                 cross += sign * normal.col(b);
                 if (new_squares < floor) continue;
-                int changes = 0;
-                for (Eigen::Index k = 1; k < n; ++k) {
-                    const bool here = k >= a && k <= b;
-                    const bool before = k - 1 >= a && k - 1 <= b;
-                    changes += (level(k) ^ static_cast<int>(here)) != (level(k - 1) ^ static_cast<int>(before)) ? 1 : 0;
-                }
+                // A jump at either end of the range comes where there was none, and goes where there was one.
+                int changes = best.changes;
+                if (a > 0) changes += level(a) == level(a - 1) ? 1 : -1;
+                if (b + 1 < n) changes += level(b) == level(b + 1) ? 1 : -1;
                 if (changes == 0) continue;
                 const double chi2 = new_product * new_product / new_squares;
                 const double cost = of_levels + changes * place;

@@ -14,6 +14,7 @@
 #include <boost/math/distributions/binomial.hpp>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -109,7 +110,7 @@ void write_figures(std::ostream& out, const std::vector<Case>& cases, const Outc
     row("... ties that hold the truth", count(kind(Kind::single, 2.0), is(Judged::tie)));
     row("pairs, each at twice its limit, both named", count(kind(Kind::pair, 2.0), is(Judged::right)));
     row("... ties that hold the truth", count(kind(Kind::pair, 2.0), is(Judged::tie)));
-    row("... one of them", count(kind(Kind::pair, 2.0), is(Judged::missed)));
+    row("... not both of them", count(kind(Kind::pair, 2.0), is(Judged::missed)));
     row("effects outside the library, `unexplained` with the right place",
         count(kind(Kind::foreign, 0.0), is(Judged::right)));
     const auto all = [](const Case&) { return true; };
@@ -212,7 +213,7 @@ int main(int argc, char** argv) {
     for (int k = 1; k < argc; ++k) {
         const std::string_view argument = argv[k];
         if (argument == "--share" && k + 1 < argc) {
-            share = std::stod(argv[++k]);
+            share = std::strtod(argv[++k], nullptr);
         } else if (argument == "--only" && k + 1 < argc) {
             only = argv[++k];
         } else if (argument == "--limits" && k + 1 < argc) {
@@ -223,7 +224,7 @@ int main(int argc, char** argv) {
             folder = argument;
         }
     }
-    if (folder.empty()) {
+    if (folder.empty() || !(share > 0.0 && share <= 1.0)) {
         fmt::print(stderr, "usage: bench_closure FOLDER [--share S] [--only null|single|pair|foreign] [--seed N] [--limits FILE]\n");
         return 2;
     }
@@ -293,7 +294,11 @@ int main(int argc, char** argv) {
         const std::size_t first = group * together;
         const std::size_t count = std::min(together, cases.size() - first);
         for (Case& of : std::span(cases).subspan(first, count)) {
-            if (of.kind == Kind::single || of.kind == Kind::pair) settle(of);
+            try {
+                if (of.kind == Kind::single || of.kind == Kind::pair) settle(of);
+            } catch (const std::exception& error) {
+                fmt::print(stderr, "limits of record {} ({}): {}\n", of.seed, of.truth_text(), error.what());
+            }
         }
         const auto records = make(std::span(cases).subspan(first, count));
         for (std::size_t k = first; k < first + count; ++k) {

@@ -38,6 +38,38 @@ TEST(TurnKicks, AreTheSineToFirstOrder) {
     }
 }
 
+TEST(TurnKicks, OfNearbyGyrosDoForEachOther) {
+    // By as much as the model of a record rounds rates and thresholds.
+    gyro::Setup setup;
+    setup.dither_frequency_hz = 124.68;
+    setup.dither_peak_rate_deg_s = 109.1;
+    for (const double rate_deg_h : {0.0, 300.0}) {
+        setup.input_rate_deg_h = rate_deg_h;
+        const TurnKicks kicks(setup);
+        gyro::Setup near = setup;
+        near.input_rate_deg_h += 0.5;
+        const TurnKicks turned(near);
+        near = setup;
+        near.lockin_threshold_deg_h *= std::exp(5e-4);
+        const TurnKicks stronger(near);
+        double by_rate = 0.0;
+        double by_threshold = 0.0;
+        for (double psi = 0.0; psi < units::two_pi; psi += 0.1) {
+            for (const int direction : {1, -1}) {
+                const TurnKicks::Kick kick = kicks.at(direction, psi);
+                const TurnKicks::Kick other = stronger.at(direction, psi);
+                by_rate = std::max(by_rate, std::abs(turned.at(direction, psi).after_rad - kick.after_rad));
+                by_threshold =
+                    std::max(by_threshold, std::abs(std::exp(-5e-4) * other.after_rad - kick.after_rad));
+            }
+        }
+        std::printf("at %g deg/h: 0.5 deg/h change half a kick by %.2g rad, 5e-4 of the threshold by %.2g rad\n",
+                    rate_deg_h, by_rate, by_threshold);
+        EXPECT_LT(by_rate, 1e-5);
+        EXPECT_LT(by_threshold, 1e-5);
+    }
+}
+
 TEST(TurnModel, FollowsAnotherSimulatorsGyro) {
     Truth truth;
     truth.turns = 1500;

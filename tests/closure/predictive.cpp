@@ -20,6 +20,7 @@
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/scenario.hpp"
 #include "engine/store/hdf5.hpp"
+#include "tests/closure/plain_gyro.hpp"
 
 namespace ringlock::test::closure {
 namespace {
@@ -30,18 +31,6 @@ using ringlock::closure::Closure;
 using ringlock::closure::Predictive;
 using ringlock::closure::PredictiveStatistic;
 using testing::HasSubstr;
-
-/// A gyro with nothing beyond the base model.
-scenario::Scenario gyro(double turns, std::uint64_t seed) {
-    scenario::Scenario scenario;
-    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
-    scenario.ensemble.gyros = 1;
-    scenario.ensemble.seed = seed;
-    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
-    scenario.ensemble.dither_amplitude_sd_relative = 0.0;
-    scenario.ensemble.duration_s = 0.5 * turns / scenario.dither.frequency_hz;
-    return scenario;
-}
 
 void print(const Predictive& predictive) {
     for (const PredictiveStatistic& s : predictive.statistics) {
@@ -80,7 +69,7 @@ class Predictively : public testing::Test {
 };
 
 TEST_F(Predictively, ARightModelMakesSuchRecords) {
-    const record::Record record = instrument::simulate_record(gyro(4000, 7));
+    const record::Record record = instrument::simulate_record(plain_gyro(4000, 7));
     const Closure closure = close_loop(record);
     const Predictive predictive = check_predictive(record, closure);
     print(predictive);
@@ -124,7 +113,7 @@ TEST_F(Predictively, ARightModelMakesSuchRecords) {
 
 TEST_F(Predictively, WhatTheModelLacksShows) {
     // Without lock-in nothing follows the phase; without the step long sums are steadier than they were.
-    scenario::Scenario scenario = gyro(4000, 8);
+    scenario::Scenario scenario = plain_gyro(4000, 8);
     scenario.effects.at("bias_step") = {{"step_deg_h", 2.0}, {"time_s", 8.0}};
     const record::Record record = instrument::simulate_record(scenario);
     Closure closure = close_loop(record);
@@ -144,7 +133,7 @@ TEST_F(Predictively, WhatTheModelLacksShows) {
 }
 
 TEST_F(Predictively, InputAndTemperatureAreThoseOfTheRecord) {
-    scenario::Scenario scenario = gyro(6000, 10);
+    scenario::Scenario scenario = plain_gyro(6000, 10);
     scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
     scenario.input.profile_time_s = {0.0, 8.0, 8.5, 15.0, 15.5, 1000.0};
     scenario.input.profile_rate_deg_h = {300.0, 300.0, -300.0, -300.0, 600.0, 600.0};
@@ -188,7 +177,7 @@ TEST_F(Predictively, SamplesBeginAtATimeOfTheirOwn) {
 }
 
 TEST_F(Predictively, SamplesTooAndTheirWhiteNoises) {
-    scenario::Scenario scenario = gyro(250, 9);
+    scenario::Scenario scenario = plain_gyro(250, 9);
     scenario.gyro.lockin_threshold_deg_h = 0.0;
     scenario.gyro.scale_factor_arcsec = 20.0;
     scenario.dither.frequency_hz = 100.0;
@@ -214,7 +203,7 @@ TEST_F(Predictively, SamplesTooAndTheirWhiteNoises) {
 }
 
 TEST_F(Predictively, WhatCannotBeSimulatedIsANote) {
-    const record::Record record = instrument::simulate_record(gyro(4000, 7));
+    const record::Record record = instrument::simulate_record(plain_gyro(4000, 7));
     Closure closure = close_loop(record);
     base(closure, "bias_deg_h") = 1e6;  // the dither does not reverse it
     const Predictive predictive = check_predictive(record, closure);
@@ -230,7 +219,7 @@ TEST(LongPredictively, PIsAsRareAsItSays) {
     for (const bool injected : {true, false}) {
         std::map<std::string, int> rare;
         for (std::uint64_t seed = 200; seed < 260; ++seed) {
-            scenario::Scenario scenario = gyro(4000, seed);
+            scenario::Scenario scenario = plain_gyro(4000, seed);
             if (!injected) scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
             const record::Record record = instrument::simulate_record(scenario);
             const Predictive predictive = check_predictive(record, ringlock::closure::fit_turns(record, {}));

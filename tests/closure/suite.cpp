@@ -14,6 +14,7 @@
 #include "engine/effects/effect.hpp"
 #include "tests/closure/generator.hpp"
 #include "tests/closure/keys.hpp"
+#include "tests/closure/plain_gyro.hpp"
 
 namespace ringlock::test::closure {
 
@@ -83,22 +84,12 @@ Device device_of(const Case& of) {
 }
 
 record::Record by_map(const Case& of, const Device& device) {
-    scenario::Scenario scenario;
-    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
-    scenario.ensemble.gyros = 1;
-    scenario.ensemble.seed = of.seed;
-    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
-    scenario.ensemble.dither_amplitude_sd_relative = 0.0;
-    scenario.ensemble.duration_s = device.duration_s;
+    scenario::Scenario scenario = plain_gyro(static_cast<double>(of.turns), of.seed);
+    inject(scenario, of.condition->injected_rad);
     scenario.gyro.lockin_threshold_deg_h = device.threshold_deg_h;
     scenario.dither.peak_rate_deg_s = device.peak_rate_deg_s;
     scenario.readout.detector_noise_relative = readout_noise;
     scenario.input.rate_deg_h = scenario.input.sweep_stop_deg_h = device.rate_deg_h;
-    if (of.condition->injected_rad > 0.0) {
-        scenario.noise_injection.turn_phase_rms_rad = of.condition->injected_rad;
-    } else {
-        scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
-    }
     if (of.condition->moving) {
         scenario.dither.amplitude_wander_relative_rt_s = walk_relative_rt_s;
         scenario.dither.amplitude_drift_relative_per_h = drift_relative_per_h;

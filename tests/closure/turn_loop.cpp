@@ -12,6 +12,7 @@
 #include "engine/scenario/check.hpp"
 #include "engine/scenario/scenario.hpp"
 #include "tests/closure/generator.hpp"
+#include "tests/closure/plain_gyro.hpp"
 
 namespace ringlock::test::closure {
 namespace {
@@ -21,20 +22,9 @@ using ringlock::closure::Closure;
 using ringlock::closure::Estimate;
 using ringlock::closure::Verdict;
 
-/// A gyro with nothing beyond the base model; of the fast map.
 scenario::Scenario gyro(double turns, std::uint64_t seed, double injected_rad) {
-    scenario::Scenario scenario;
-    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
-    scenario.ensemble.gyros = 1;
-    scenario.ensemble.seed = seed;
-    scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
-    scenario.ensemble.dither_amplitude_sd_relative = 0.0;
-    scenario.ensemble.duration_s = 0.5 * turns / scenario.dither.frequency_hz;
-    if (injected_rad > 0.0) {
-        scenario.noise_injection.turn_phase_rms_rad = injected_rad;
-    } else {
-        scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
-    }
+    scenario::Scenario scenario = plain_gyro(turns, seed);
+    inject(scenario, injected_rad);
     return scenario;
 }
 
