@@ -59,6 +59,10 @@ Closure close_loop(const record::Record& record);
 /// record reaches. Effects start from the values given.
 Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
 
+/// Standard errors of the parameters of effects at the values given, those of the true model: by Fisher's information
+/// in the whole record of turns.
+std::vector<Estimate> information_on_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
+
 /// The two of them.
 Closure close_turns(const record::Record& record);
 Closure close_samples(const record::Record& record);

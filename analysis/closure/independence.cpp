@@ -7,8 +7,8 @@
 #include <cmath>
 #include <complex>
 #include <memory>
-#include <utility>
 #include <unsupported/Eigen/FFT>
+#include <utility>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
@@ -58,7 +58,8 @@ Columns harmonic(const TurnFit& fit, int k, bool kicks) {
 
 void test_phase(const TurnFit& fit, std::vector<View>& views) {
     constexpr int harmonics = 6;
-    // Phases that come in step move by little but their own noise: that is no test. It is a rival of rates all the same.
+    // Phases that come in step move by little but their own noise: that is no test. It is a rival of rates all the
+    // same.
     const bool all_come = fit.model().series().all_phases_come;
     for (const bool kicks : {true, false}) {
         if (!kicks && !all_come) continue;
@@ -93,10 +94,9 @@ void test_rates(const TurnFit& fit, std::vector<View>& views) {
         const auto score = fit.score(columns);
         if (score.rank == 0) return;
         const double cost = score.rank;
-        views.push_back(
-            {{where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
-             cost,
-             [columns = std::make_shared<const Columns>(std::move(columns))] { return *columns; }});
+        views.push_back({{where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
+                         cost,
+                         [columns = std::make_shared<const Columns>(std::move(columns))] { return *columns; }});
     };
     if (!series.temperature_change_k.empty() && largest(series.temperature_change_k) > 0.0) {
         const auto& t = series.temperature_change_k;
@@ -117,13 +117,13 @@ void test_rates(const TurnFit& fit, std::vector<View>& views) {
         against(Where::rate, "rates that follow the input rate, its square and its cube",
                 {integral(fit, series.input_rate_deg_h), integral(fit, square), integral(fit, cube)});
     }
-    // The amplitude of the cycles before, what the residual itself has done to it staying out, as well as the noise lets
-    // it be known: the gain of the Kalman filter of a walk (Harvey 1989, section 4.1).
+    // The amplitude of the cycles before, what the residual itself has done to it staying out, as well as the noise
+    // lets it be known: the gain of the Kalman filter of a walk (Harvey 1989, section 4.1).
     const TurnParameters& p = fit.parameters();
     const double walk = p.wander_sd_rad * p.wander_sd_rad;
     const double read = 0.5 * (p.readout_sd_rad * p.readout_sd_rad + p.injected_sd_rad * p.injected_sd_rad);
-    const double memory = std::clamp(2.0 * walk / (walk + std::sqrt(walk * walk + 4.0 * walk * read) + 1e-300),
-                                     1.0 / 200.0, 0.5);
+    const double memory =
+        std::clamp(2.0 * walk / (walk + std::sqrt(walk * walk + 4.0 * walk * read) + 1e-300), 1.0 / 200.0, 0.5);
     std::vector<double> amplitude(n);
     double mean = 1.0;
     for (std::size_t i = 0; i < n; ++i) {
@@ -181,16 +181,16 @@ void test_steps(const TurnFit& fit, std::vector<View>& views) {
             roots[k] = score.value(0) / std::sqrt(score.covariance(0, 0));
         }
     });
-    const auto most = std::max_element(roots.begin(), roots.end(),
-                                       [](double a, double b) { return std::abs(a) < std::abs(b); });
+    const auto most =
+        std::max_element(roots.begin(), roots.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
     const double chi2 = *most * *most;
     const auto at = static_cast<std::size_t>(most - roots.begin());
     const double cost = 2.0 + std::log(davies_places(chi2, roots));
-    views.push_back({{Where::time, "steps of the rate", davies_bound(chi2, roots),
-                      fmt::format("at {:.6g} s", time.back() * static_cast<double>(at + 1) / places),
-                      0.5 * chi2 - cost},
-                     cost,
-                     [ramp_of, at] { return Columns{ramp_of(at)}; }});
+    views.push_back(
+        {{Where::time, "steps of the rate", davies_bound(chi2, roots),
+          fmt::format("at {:.6g} s", time.back() * static_cast<double>(at + 1) / places), 0.5 * chi2 - cost},
+         cost,
+         [ramp_of, at] { return Columns{ramp_of(at)}; }});
 }
 
 /// The angle of a rate that is one where the shape of stretches is, zero elsewhere, with the jumps moved to where they
@@ -334,8 +334,8 @@ void test_lines(const TurnFit& fit, std::vector<View>& views) {
     report("lines", lines[drifts / 2], places, 0.0);
     // A line that holds its frequency is not one that drifts by a little.
     lines[drifts / 2] = {};
-    const auto best = std::max_element(lines.begin(), lines.end(),
-                                       [](const Line& a, const Line& b) { return a.power < b.power; });
+    const auto best =
+        std::max_element(lines.begin(), lines.end(), [](const Line& a, const Line& b) { return a.power < b.power; });
     report("lines that drift", *best, drifts * places, drift_of(static_cast<std::size_t>(best - lines.begin())));
 }
 

@@ -28,7 +28,7 @@ struct View {
     ResidualTest test;
     double cost = 0.0;  ///< of its parameters and its search, in the log-likelihood
     std::function<std::vector<std::vector<double>>()> columns = {};  ///< series of phase; none where nothing regresses
-    double largest = std::numeric_limits<double>::infinity();  ///< coefficient that makes sense
+    double largest = std::numeric_limits<double>::infinity();        ///< coefficient that makes sense
     bool jumps = false;  ///< random rates can follow it nearly as well as it can be said
 };
 

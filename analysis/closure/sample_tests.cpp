@@ -18,8 +18,8 @@ namespace {
 using Tests = std::vector<ResidualTest>;
 
 void test_correlation(const SampleFit& fit, Tests& tests) {
-    tests.push_back(correlations_of(fit.innovations(), fit.rows())
-                        .test(Where::time, "correlation with the 24 samples before"));
+    tests.push_back(
+        correlations_of(fit.innovations(), fit.rows()).test(Where::time, "correlation with the 24 samples before"));
 }
 
 void test_spectrum(const SampleFit& fit, Tests& tests) {

@@ -6,11 +6,10 @@
 #include <memory>
 #include <numeric>
 
-#include "analysis/closure/chance.hpp"
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decision.hpp"
-#include "analysis/closure/hypotheses.hpp"
 #include "analysis/closure/side_channels.hpp"
+#include "analysis/closure/turn_contest.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::closure {
@@ -19,36 +18,6 @@ namespace {
 
 /// Of ten blocks, three are only reported.
 constexpr BlockRoles roles{1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
-
-/// A model of the record with all that it was fitted to.
-struct Fitted {
-    JoinedPhase joined;
-    TurnSeries series;
-    std::unique_ptr<TurnModel> model;
-    std::unique_ptr<TurnFit> fit;
-};
-
-bool on_phase(const std::string& effect) { return effect == "readout_ellipse" || effect == "missed_counts"; }
-
-std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParameters& start, const Rows& rows) {
-    auto fitted = std::make_shared<Fitted>();
-    gyro::Setup setup;
-    bool count_again = false;
-    for (const ActiveEffect& active : start.effects) {
-        if (active.effect->name() == "readout_ellipse") active.effect->configure(active.values, setup);
-        if (active.effect->name() == "missed_counts") count_again = true;
-    }
-    fitted->joined = join(*record.turns, setup.ellipse, count_again);
-    fitted->series = prepare(record, fitted->joined);
-    fitted->model = std::make_unique<TurnModel>(fitted->series, fitted->joined.phase_rad);
-    TurnParameters parameters = start;
-    if (parameters.readout_sd_rad == 0.0) {
-        parameters.readout_sd_rad = std::max(fitted->joined.readout_sd_rad, 1e-6);
-        parameters.threshold_deg_h = fitted->series.setup.lockin_threshold_deg_h;
-    }
-    fitted->fit = std::make_unique<TurnFit>(*fitted->model, parameters, rows);
-    return fitted;
-}
 
 struct Score {
     double error = 0.0;
@@ -72,14 +41,6 @@ Score heldout(const TurnFit& fit) {
     score.error = std::sqrt(score.error / count);
     score.floor = std::sqrt(score.floor / count);
     return score;
-}
-
-int free_parameters(const effects::Effect& effect) {
-    int count = 0;
-    for (const effects::Parameter& parameter : effect.parameters()) {
-        if (parameter.role != effects::Role::setting) ++count;
-    }
-    return count;
 }
 
 /// Frequency of the dither by its own turns: the slope of their times, its error from the scatter of means over
@@ -125,13 +86,6 @@ void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
     base.push_back(
         {"", "dither_peak_rate_deg_s", setup.dither_peak_rate_deg_s,
          setup.dither_peak_rate_deg_s * fitted.fit->sd_rad().front() / (fitted.series.amplitude_rad * std::sqrt(n))});
-}
-
-/// A random rate can follow whatever the library does not have, more or less.
-bool is_random_rate(const effects::Effect& effect) {
-    const auto parameters = effect.parameters();
-    return std::any_of(parameters.begin(), parameters.end(),
-                       [](const auto& p) { return p.role == effects::Role::deviation; });
 }
 
 /// Whether some view of the residual explains more than the best effect, the noise fitted anew beside either: then
@@ -188,16 +142,15 @@ void test_what_is_left(const TurnFit& fit, Closure& closure) {
 }
 
 /// Effects that stood in for the one added last are no longer needed beside it.
-void drop_needless(const record::Record& record, const Rows& rows, double tests_of_effects,
-                   std::shared_ptr<Fitted>& now, std::vector<Step>& steps) {
+void drop_needless(const record::Record& record, const Rows& rows, std::shared_ptr<Fitted>& now,
+                   std::vector<Step>& steps) {
     for (std::size_t k = steps.size(); k-- > 0;) {
         const effects::Effect* effect = effects::find(steps[k].effect);
         if (told_by_other_columns(*effect)) continue;
         TurnParameters without = now->fit->parameters();
         std::erase_if(without.effects, [&](const ActiveEffect& active) { return active.effect == effect; });
         const auto fitted = fit_record(record, without, rows);
-        const double chi2 = 2.0 * (now->fit->log_likelihood() - fitted->fit->log_likelihood());
-        if (chi2_tail(chi2, free_parameters(*effect)) * tests_of_effects < level_of_effects) continue;
+        if (passes(p_of_gain(now->fit->log_likelihood() - fitted->fit->log_likelihood(), *effect))) continue;
         now = fitted;
         steps.erase(steps.begin() + static_cast<std::ptrdiff_t>(k));
     }
@@ -265,7 +218,6 @@ Closure close_turns(const record::Record& record) {
             "told from the bias, and its effects are not looked for");
     }
     closure.heldout_before = heldout(*now->fit).error;
-    const auto tests_of_effects = static_cast<double>(effects::registry().size());
     // Before the first random rate.
     struct Earlier {
         std::shared_ptr<Fitted> now;
@@ -273,84 +225,22 @@ Closure close_turns(const record::Record& record) {
     };
     std::optional<Earlier> earlier;
 
-    while (closure.steps.size() < most_steps) {
-        auto candidates = screen_side_channels(turns, *now->fit, now->joined);
-        std::vector<Candidate> passing;
-        const auto take_passing = [&] {
-            for (Candidate& candidate : candidates) {
-                if (candidate.p_value * tests_of_effects < level_of_effects) passing.push_back(std::move(candidate));
-            }
-            candidates.clear();
-        };
-        take_passing();
-        const bool side = !passing.empty();
-        if (!side) {
-            candidates = screen(*now->fit);
-            take_passing();
-        }
-        if (passing.empty()) break;
-        const auto merit = [](const Candidate& c) {
-            return c.chi2 - 2.0 * std::log(c.searched) - 2.0 * free_parameters(*c.effect);
-        };
-        std::sort(passing.begin(), passing.end(),
-                  [&](const Candidate& a, const Candidate& b) { return merit(a) > merit(b); });
-        if (passing.size() > most_contenders) passing.resize(most_contenders);
-
-        // In full: all parameters of the model with it.
-        struct Contender {
-            Candidate candidate;
-            std::shared_ptr<Fitted> fitted;
-            double merit;
-        };
-        std::vector<Contender> contenders;
-        for (Candidate& candidate : passing) {
-            TurnParameters start = now->fit->parameters();
-            start.effects.push_back({candidate.effect, candidate.values});
-            const std::string name(candidate.effect->name());
-            if (side && !contenders.empty() &&
-                (on_phase(name) || on_phase(std::string(contenders[0].candidate.effect->name()))))
-                continue;
-            std::shared_ptr<Fitted> fitted;
-            try {
-                fitted = fit_record(record, start, rows);
-                if (is_random_rate(*candidate.effect)) {
-                    // Without the process the rest may have gone far astray: anew from the start, too.
-                    TurnParameters anew;
-                    anew.effects = start.effects;
-                    auto other = fit_record(record, anew, rows);
-                    if (other->fit->log_likelihood() > fitted->fit->log_likelihood()) fitted = std::move(other);
-                }
-            } catch (const RunError&) {
-                if (!fitted) continue;  // no motion of a gyro with such parameters can be followed
-            }
-            const double gain = side ? 0.5 * merit(candidate)
-                                     : fitted->fit->log_likelihood() - now->fit->log_likelihood() -
-                                           std::log(candidate.searched) - free_parameters(*candidate.effect);
-            contenders.push_back({std::move(candidate), fitted, gain});
-        }
-        if (contenders.empty()) break;
-        std::sort(contenders.begin(), contenders.end(),
-                  [](const Contender& a, const Contender& b) { return a.merit > b.merit; });
-        Contender& best = contenders.front();
-        if (!side && something_else(*now->fit, *best.candidate.effect, best.merit)) break;
-        // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
-        const double chi2 = 2.0 * (best.fitted->fit->log_likelihood() - now->fit->log_likelihood());
-        const double p_full =
-            of_several(chi2_tail(chi2, free_parameters(*best.candidate.effect)), best.candidate.searched);
-        if (!side && p_full * tests_of_effects >= level_of_effects) break;
+    // What stood in for another is dropped again, so that there may be more rounds than steps.
+    for (std::size_t round = 0; round < 2 * most_steps && closure.steps.size() < most_steps; ++round) {
+        const Contest contest = hold_contest(record, *now, rows, most_contenders);
+        const Choice choice = choose(record, contest, rows);
+        if (choice.chosen == nullptr) break;
+        const Contender& best = *choice.chosen;
+        if (!contest.side && something_else(*now->fit, *best.candidate.effect, choice.merit)) break;
         Step step;
         step.effect = std::string(best.candidate.effect->name());
-        step.p_value = best.candidate.p_value;
-        for (std::size_t k = 1; k < contenders.size(); ++k) {
-            if (best.merit - contenders[k].merit < tie) {
-                step.confounded_with.emplace_back(contenders[k].candidate.effect->name());
-            }
-        }
+        step.p_value = best.p_value;
+        step.confounded_with = choice.confounded_with;
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
         if (!earlier && is_random_rate(*best.candidate.effect)) earlier = {now, closure.steps};
         const Score before = heldout(*now->fit);
         now = best.fitted;
-        drop_needless(record, rows, tests_of_effects, now, closure.steps);
+        drop_needless(record, rows, now, closure.steps);
         const Score after = heldout(*now->fit);
         step.heldout_error_before = before.error;
         step.heldout_error_after = after.error;
@@ -389,6 +279,20 @@ Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>&
     take_figures(turns, *whole, closure);
     closure.verdict = verdict_of(closure);
     return closure;
+}
+
+std::vector<Estimate> information_on_turns(const record::Record& record, const std::vector<ActiveEffect>& effects) {
+    TurnParameters start;
+    start.effects = effects;
+    const auto fitted = fit_record(record, start, Rows(record.turns->size(), 1), TurnFit::Effects::held);
+    Closure closure;
+    for (const ActiveEffect& active : effects) closure.steps.emplace_back().effect = std::string(active.effect->name());
+    take_figures(*record.turns, *fitted, closure);
+    std::vector<Estimate> estimates;
+    for (Step& step : closure.steps) {
+        for (Estimate& estimate : step.parameters) estimates.push_back(std::move(estimate));
+    }
+    return estimates;
 }
 
 }  // namespace ringlock::closure

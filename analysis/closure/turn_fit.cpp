@@ -17,6 +17,7 @@ namespace ringlock::closure {
 namespace {
 
 constexpr std::size_t drift_terms = 4;        // polynomials of the dither's amplitude
+constexpr std::size_t base_columns = 2;       // bias and threshold, after the nuisances
 constexpr double least_radius_sd_rad = 1e-7;  // below: a radius that shows no noise tells nothing of the phase's
 
 /// Legendre polynomial of that degree at x.
@@ -33,16 +34,19 @@ double legendre(std::size_t degree, double x) {
     return now;
 }
 
+double square(double value) { return value * value; }
+
 /// A standard deviation of the model that the likelihood decides.
 struct Knob {
     std::string effect, name;
     double* value;
 };
 
-std::vector<Knob> knobs(TurnParameters& p) {
+std::vector<Knob> knobs(TurnParameters& p, bool of_effects = true) {
     std::vector<Knob> all{{"", "injected_noise_rad", &p.injected_sd_rad},
                           {"", "amplitude_wander_rad", &p.wander_sd_rad},
                           {"", "readout_noise_rad", &p.readout_sd_rad}};
+    if (!of_effects) return all;
     for (ActiveEffect& active : p.effects) {
         for (const effects::Parameter& parameter : active.effect->parameters()) {
             if (parameter.role != effects::Role::deviation) continue;
@@ -60,14 +64,20 @@ bool fitted_in_phase(const effects::Effect& effect, effects::Role role) {
            !told_by_other_columns(effect);
 }
 
-/// Minus the log-likelihood by the logarithms of the knobs.
+// Of a knob's logarithm: nothing is so small or so large.
+constexpr double smallest = -25.0;
+constexpr double largest = 12.0;
+
+/// Minus the log-likelihood by the logarithms of the knobs, rising beyond their bounds. Says where it cannot be had:
+/// Ceres ends the program where a value has no finite gradient.
 class Objective final : public ceres::FirstOrderFunction {
    public:
     Objective(std::size_t size, std::function<double(const double*)> value) : size_(size), value_(std::move(value)) {}
     int NumParameters() const override { return static_cast<int>(size_); }
     bool Evaluate(const double* x, double* cost, double* gradient) const override {
         *cost = value_(x);
-        if (gradient == nullptr) return std::isfinite(*cost);
+        if (!std::isfinite(*cost)) return false;
+        if (gradient == nullptr) return true;
         constexpr double step = 1e-3;
         std::vector<double> values(2 * size_);
         oneapi::tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t k) {
@@ -76,7 +86,7 @@ class Objective final : public ceres::FirstOrderFunction {
             values[k] = value_(at.data());
         });
         for (std::size_t i = 0; i < size_; ++i) gradient[i] = (values[2 * i] - values[2 * i + 1]) / (2.0 * step);
-        return std::isfinite(*cost);
+        return std::all_of(gradient, gradient + size_, [](double g) { return std::isfinite(g); });
     }
 
    private:
@@ -86,15 +96,58 @@ class Objective final : public ceres::FirstOrderFunction {
 
 }  // namespace
 
-TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows)
-    : model_(&model), parameters_(start), rows_(std::move(rows)), nuisance_(2 + drift_terms, 0.0) {
+TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows, Effects effects)
+    : model_(&model), parameters_(start), rows_(std::move(rows)), effects_(effects), nuisance_(2 + drift_terms, 0.0) {
     if (parameters_.bias_deg_h == 0.0) parameters_.bias_deg_h = model.series().mean_rate_deg_h;
-    fit_deterministic(4);
+    fit_deterministic();
     fit_noise();
-    fit_deterministic(2);
-    fit_noise();
-    fit_deterministic(1);
+    climb();
+    try_other_noise();
     finish();
+}
+
+void TurnFit::climb() {
+    constexpr int most = 6;
+    constexpr double gained = 0.01;
+    for (int round = 0; round < most; ++round) {
+        const double before = objective(parameters_, rest_);
+        fit_deterministic();
+        fit_noise();
+        if (before - objective(parameters_, rest_) < gained) break;
+    }
+}
+
+/// The likelihood can have two summits: a small noise, or none at all, where what it does to the phases is foretold by
+/// their course. Of the one that is not stood on.
+void TurnFit::try_other_noise() {
+    constexpr double none = 1e-9;
+    const double readout = parameters_.readout_sd_rad;
+    const std::size_t count = knobs(parameters_, effects_ == Effects::fitted).size();
+    for (std::size_t k = 0; k < count; ++k) {
+        const Knob knob = knobs(parameters_)[k];
+        if (knob.name == "readout_noise_rad") continue;
+        const bool of_effect = !knob.effect.empty();
+        // What is larger than the readout's noise shows itself, and effects come with a size.
+        if (*knob.value > 10.0 * none && (of_effect || *knob.value < readout)) try_noise(k, none);
+        if (!of_effect && *knobs(parameters_)[k].value < 1e-4 * readout) {
+            try_noise(k, readout * (knob.name == "injected_noise_rad" ? 0.05 : 1e-3));
+        }
+    }
+}
+
+void TurnFit::try_noise(std::size_t knob, double value) {
+    const TurnParameters from = parameters_;
+    const std::vector<double> nuisance_from = nuisance_;
+    const std::vector<double> rest_from = rest_;
+    const TurnModel::Prediction prediction_from = prediction_;
+    const double before = objective(parameters_, rest_);
+    *knobs(parameters_)[knob].value = value;
+    climb();
+    if (objective(parameters_, rest_) < before) return;
+    parameters_ = from;
+    nuisance_ = nuisance_from;
+    rest_ = rest_from;
+    prediction_ = prediction_from;
 }
 
 std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& prediction) const {
@@ -147,11 +200,18 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
     return all;
 }
 
-void TurnFit::fit_deterministic(int iterations) {
+std::size_t TurnFit::solved(const std::vector<Column>& all) const {
+    return effects_ == Effects::held ? nuisance_.size() + base_columns : all.size();
+}
+
+void TurnFit::fit_deterministic() {
+    constexpr int most = 4;
+    constexpr double gained = 1e-3;  // of chi-squared, by another step
     const std::size_t n = model_->series().size();
-    for (int pass = 0; pass < iterations; ++pass) {
+    for (int pass = 0; pass < most; ++pass) {
         prediction_ = model_->predict(parameters_);
-        const std::vector<Column> all = columns(prediction_);
+        std::vector<Column> all = columns(prediction_);
+        all.resize(solved(all));
         set_rest(prediction_, all);
         TurnParameters guess = parameters_;
         if (guess.injected_sd_rad == 0.0) {
@@ -176,30 +236,51 @@ void TurnFit::fit_deterministic(int iterations) {
         Eigen::VectorXd right = x.transpose() * y;
         add_priors(scale, normal, &right);
         Eigen::VectorXd step = normal.ldlt().solve(right);
+        const bool arrived = right.dot(step) < gained;
         step = step.cwiseQuotient(scale);
-        // Times and frequencies are far from linear: shorter steps where a whole one leads uphill.
+        // Times and frequencies are far from linear: shorter steps where a whole one goes far or leads uphill.
         const double squares = y.squaredNorm();
         const TurnParameters from = parameters_;
         const std::vector<double> nuisance_from = nuisance_;
         bool possible = false;
-        for (double share = 1.0; share > 0.02; share *= 0.5) {
+        for (double share = longest_share(step); share > 1e-3; share *= 0.5) {
             parameters_ = from;
             nuisance_ = nuisance_from;
             take(share * step);
             try {
                 const double left = squares_left(all, whitening);
-                possible = true;
-                if (parameters_.effects.empty() || left <= squares * (1.0 + 1e-9)) break;
+                possible = parameters_.effects.empty() || left <= squares * (1.0 + 1e-9);
             } catch (const RunError&) {
                 possible = false;  // no motion of a gyro with such parameters can be followed
             }
+            if (possible) break;
         }
         if (!possible) {
             parameters_ = from;
             nuisance_ = nuisance_from;
         }
         set_rest(model_->predict(parameters_), all);
+        if (arrived || !possible) break;
     }
+}
+
+/// How much of a step can be taken for times to move by a part of the record only, and frequencies by a part of a
+/// period over it.
+double TurnFit::longest_share(const Eigen::VectorXd& step) const {
+    constexpr double part = 0.1;
+    const double duration_s = model_->series().time_s.back();
+    double share = 1.0;
+    if (effects_ == Effects::held) return share;
+    auto k = static_cast<Eigen::Index>(nuisance_.size() + base_columns);
+    for (const ActiveEffect& active : parameters_.effects) {
+        for (const effects::Parameter& parameter : active.effect->parameters()) {
+            if (!fitted_in_phase(*active.effect, parameter.role)) continue;
+            const double moved = std::abs(step(k++));
+            if (parameter.role == effects::Role::time) share = std::min(share, part * duration_s / moved);
+            if (parameter.role == effects::Role::frequency) share = std::min(share, part / duration_s / moved);
+        }
+    }
+    return share;
 }
 
 void TurnFit::take(const Eigen::VectorXd& step) {
@@ -207,6 +288,7 @@ void TurnFit::take(const Eigen::VectorXd& step) {
     for (double& value : nuisance_) value += step(k++);
     parameters_.bias_deg_h += step(k++);
     parameters_.threshold_deg_h = std::max(0.0, parameters_.threshold_deg_h + step(k++));
+    if (effects_ == Effects::held) return;
     for (ActiveEffect& active : parameters_.effects) {
         for (const effects::Parameter& parameter : active.effect->parameters()) {
             if (!fitted_in_phase(*active.effect, parameter.role)) continue;
@@ -246,8 +328,7 @@ void TurnFit::add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, 
 }
 
 double TurnFit::objective(const TurnParameters& parameters, const std::vector<double>& rest) const {
-    double sum =
-        Whitening::minus_log_likelihood(prediction_.frame, model_->noise(parameters), rest, rows_);
+    double sum = Whitening::minus_log_likelihood(prediction_.frame, model_->noise(parameters), rest, rows_);
     // The radius of the quadrature has the noise of the phase: as many degrees of freedom again.
     const double radius = model_->series().radius_sd_rad;
     if (radius > least_radius_sd_rad) {
@@ -281,14 +362,20 @@ TurnParameters TurnFit::with_noise_of(const TurnParameters& start, const std::ve
     constexpr double least = 1e-9;
     TurnParameters trial = start;
     std::vector<double> x;
-    for (const Knob& knob : knobs(trial)) x.push_back(std::log(std::max(*knob.value, least)));
+    const bool of_effects = effects_ == Effects::fitted;
+    for (const Knob& knob : knobs(trial, of_effects)) x.push_back(std::log(std::max(*knob.value, least)));
     const auto with = [&](const double* at) {
         TurnParameters changed = start;
-        for (const Knob& knob : knobs(changed)) *knob.value = std::exp(std::clamp(*at++, -25.0, 25.0));
+        for (const Knob& knob : knobs(changed, of_effects))
+            *knob.value = std::exp(std::clamp(*at++, smallest, largest));
         return changed;
     };
-    ceres::GradientProblem problem(
-        new Objective(x.size(), [&](const double* at) { return objective(with(at), rest); }));
+    const auto value = [&](const double* at) {
+        double beyond = 0.0;
+        for (std::size_t k = 0; k < x.size(); ++k) beyond += square(at[k] - std::clamp(at[k], smallest, largest));
+        return objective(with(at), rest) + beyond;
+    };
+    ceres::GradientProblem problem(new Objective(x.size(), value));
     ceres::GradientProblemSolver::Options options;
     options.logging_type = ceres::SILENT;
     options.max_num_iterations = 60;
@@ -309,64 +396,116 @@ void TurnFit::finish() {
     innovations_ = whitening_->apply(rest_);
     sd_rad_ = whitening_->sd_rad();
     log_likelihood_ = -objective(parameters_, rest_);
-    Eigen::MatrixXd x(n, all.size());
-    Eigen::VectorXd scale(all.size());
-    for (std::size_t k = 0; k < all.size(); ++k) {
-        auto column = x.col(static_cast<Eigen::Index>(k));
-        column = counted(*whitening_, all[k].series);
-        scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
-        column /= scale(static_cast<Eigen::Index>(k));
+    // Orthonormal basis, for scores.
+    Eigen::VectorXd scale;
+    Eigen::HouseholderQR<Eigen::MatrixXd> qr(whitened_columns(scale));
+    basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(n), scale.size());
+}
+
+Eigen::MatrixXd TurnFit::whitened_columns(Eigen::VectorXd& scale) const {
+    const auto count = static_cast<Eigen::Index>(columns_.size());
+    Eigen::MatrixXd x(static_cast<Eigen::Index>(rest_.size()), count);
+    scale.resize(count);
+    for (Eigen::Index k = 0; k < count; ++k) {
+        x.col(k) = counted(*whitening_, columns_[static_cast<std::size_t>(k)].series);
+        scale(k) = std::max(x.col(k).norm(), 1e-300);
+        x.col(k) /= scale(k);
     }
+    return x;
+}
+
+std::vector<Estimate> TurnFit::estimates() const {
+    Eigen::VectorXd scale;
+    const Eigen::MatrixXd x = whitened_columns(scale);
     Eigen::MatrixXd normal = x.transpose() * x;
     add_priors(scale, normal, nullptr);
     const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(x.cols(), x.cols()));
-    estimates_.clear();
-    for (std::size_t k = nuisance_.size(); k < all.size(); ++k) {
-        Estimate estimate{all[k].effect, all[k].name, 0.0, 0.0};
+    TurnParameters found = parameters_;
+    std::vector<Estimate> estimates;
+    for (std::size_t k = nuisance_.size(); k < columns_.size(); ++k) {
+        Estimate estimate{columns_[k].effect, columns_[k].name, 0.0, 0.0};
         const auto index = static_cast<Eigen::Index>(k);
         estimate.sd = std::sqrt(std::max(covariance(index, index), 0.0)) / scale(index);
         if (estimate.effect.empty()) {
             estimate.value = estimate.name == "bias_deg_h" ? parameters_.bias_deg_h : parameters_.threshold_deg_h;
         } else {
-            estimate.value = parameters_.find(estimate.effect)->values.at(estimate.name);
+            estimate.value = found.find(estimate.effect)->values.at(estimate.name);
         }
-        estimates_.push_back(estimate);
+        estimates.push_back(std::move(estimate));
     }
-    // Curvature of the likelihood in the logarithms of the standard deviations.
+    add_noise_estimates(estimates);
+    return estimates;
+}
+
+/// By Fisher's information on the variances, from the innovations' derivatives (Harvey 1989, 3.4): logarithms know
+/// nothing of a variance that is next to zero, which others may be confounded with all the same.
+void TurnFit::add_noise_estimates(std::vector<Estimate>& estimates) const {
+    constexpr double seen = 0.1;  // of a standard error: as long as steps must be
     TurnParameters trial = parameters_;
     const std::vector<Knob> turned = knobs(trial);
-    const auto m = static_cast<Eigen::Index>(turned.size());
-    std::vector<double> centre;
-    for (const Knob& knob : turned) centre.push_back(std::log(std::max(*knob.value, 1e-12)));
-    Eigen::MatrixXd hessian(m, m);
-    constexpr double h = 0.02;
-    const auto at = [&](Eigen::Index i, double di, Eigen::Index j, double dj) {
-        for (std::size_t k = 0; k < turned.size(); ++k) {
-            double value = centre[k];
-            if (static_cast<Eigen::Index>(k) == i) value += di;
-            if (static_cast<Eigen::Index>(k) == j) value += dj;
-            *turned[k].value = std::exp(value);
-        }
-        return objective(trial, rest_);
+    const std::size_t n = rest_.size();
+    struct Derivative {
+        double variance;
+        std::vector<double> innovation, size;  // over the innovation's standard deviation; relative, of its square
     };
-    for (Eigen::Index i = 0; i < m; ++i) {
+    const auto derivative = [&](const Knob& knob, double step) {
+        Derivative d{square(*knob.value), std::vector<double>(n, 0.0), std::vector<double>(n, 0.0)};
+        const double value = *knob.value;
+        *knob.value = std::sqrt(d.variance + step);
+        const Whitening moved(prediction_.frame, model_->noise(trial));
+        *knob.value = value;
+        const auto white = moved.apply(rest_);
+        for (std::size_t i = 0; i < n; ++i) {
+            if (!rows_[i]) continue;
+            const double ratio = moved.sd_rad()[i] / sd_rad_[i];
+            d.innovation[i] = (white[i] * ratio - innovations_[i]) / step;
+            d.size[i] = (square(ratio) - 1.0) / step;
+        }
+        return d;
+    };
+    const auto information = [&](const Derivative& a, const Derivative& b) {
+        double sum = 0.0;
+        for (std::size_t i = 0; i < n; ++i) sum += 0.5 * a.size[i] * b.size[i] + a.innovation[i] * b.innovation[i];
+        return sum;
+    };
+    std::vector<Derivative> derivatives;
+    for (const Knob& knob : turned) {
+        double step = std::max(1e-2 * square(*knob.value), 1e-20);
+        Derivative d = derivative(knob, step);
+        for (int i = 0; i < 40 && !(square(step) * information(d, d) > square(seen)); ++i) {
+            step *= 10.0;
+            d = derivative(knob, step);
+        }
+        derivatives.push_back(std::move(d));
+    }
+    const auto size = static_cast<Eigen::Index>(turned.size());
+    Eigen::MatrixXd matrix(size, size);
+    for (Eigen::Index i = 0; i < size; ++i) {
         for (Eigen::Index j = 0; j <= i; ++j) {
-            hessian(i, j) = hessian(j, i) =
-                (at(i, h, j, h) - at(i, h, j, -h) - at(i, -h, j, h) + at(i, -h, j, -h)) / (4.0 * h * h);
+            matrix(i, j) = matrix(j, i) =
+                information(derivatives[static_cast<std::size_t>(i)], derivatives[static_cast<std::size_t>(j)]);
+        }
+        // The radius of the quadrature tells of the readout's noise as much again.
+        if (turned[static_cast<std::size_t>(i)].name == "readout_noise_rad" &&
+            model_->series().radius_sd_rad > least_radius_sd_rad) {
+            matrix(i, i) += 0.5 * static_cast<double>(n) / square(derivatives[static_cast<std::size_t>(i)].variance);
         }
     }
-    const Eigen::MatrixXd inverse = hessian.completeOrthogonalDecomposition().pseudoInverse();
-    for (Eigen::Index i = 0; i < m; ++i) {
-        const Knob& knob = turned[static_cast<std::size_t>(i)];
-        const double value = std::exp(centre[static_cast<std::size_t>(i)]);
-        const double variance = inverse(i, i);
-        estimates_.push_back(
-            {knob.effect, knob.name, value,
-             value * (variance > 0.0 ? std::sqrt(variance) : std::numeric_limits<double>::infinity())});
+    const Eigen::VectorXd scale = matrix.diagonal().cwiseMax(1e-300).cwiseSqrt();
+    const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * matrix * scale.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd inverse = scaled.completeOrthogonalDecomposition().pseudoInverse();
+    for (std::size_t k = 0; k < turned.size(); ++k) {
+        const auto index = static_cast<Eigen::Index>(k);
+        const double variance = derivatives[k].variance;
+        const double value = std::sqrt(variance);
+        double sd = std::numeric_limits<double>::infinity();
+        if (inverse(index, index) > 0.0) {
+            const double of_variance = std::sqrt(inverse(index, index)) / scale(index);
+            // Of a deviation that may be zero: how large it may be.
+            sd = of_variance < variance ? 0.5 * of_variance / value : std::sqrt(variance + of_variance) - value;
+        }
+        estimates.push_back({turned[k].effect, turned[k].name, value, sd});
     }
-    // Orthonormal basis, for scores.
-    Eigen::HouseholderQR<Eigen::MatrixXd> qr(x);
-    basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(x.rows(), x.cols());
 }
 
 Eigen::VectorXd TurnFit::counted(const Whitening& whitening, const std::vector<double>& series) const {

@@ -28,14 +28,17 @@ struct Estimate {
 /// 1989, 3.4).
 class TurnFit {
    public:
-    TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows);
+    /// What is done with the parameters of effects: held, they stay as given, and the rest is fitted beside them, so
+    /// that standard errors are what Fisher's information says at these values.
+    enum class Effects { fitted, held };
+    TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows, Effects effects = Effects::fitted);
     TurnFit(const TurnFit&) = delete;  // the filter refers to what the fit holds
     TurnFit& operator=(const TurnFit&) = delete;
 
     const TurnModel& model() const { return *model_; }
     const TurnParameters& parameters() const { return parameters_; }
     /// Base parameters and those of effects, with standard errors.
-    const std::vector<Estimate>& estimates() const { return estimates_; }
+    std::vector<Estimate> estimates() const;
     /// Of the phases that count and of the radii of the quadrature.
     double log_likelihood() const { return log_likelihood_; }
     const Rows& rows() const { return rows_; }
@@ -78,27 +81,36 @@ class TurnFit {
         std::string effect, name;
         std::vector<double> series;
     };
-    void fit_deterministic(int iterations);
+    void fit_deterministic();
+    void climb();
     void fit_noise();
+    void try_other_noise();
+    void try_noise(std::size_t knob, double value);
     TurnParameters with_noise_of(const TurnParameters& start, const std::vector<double>& rest) const;
     /// The series whitened, rows that do not count zero.
     Eigen::VectorXd counted(const Whitening& whitening, const std::vector<double>& series) const;
+    double longest_share(const Eigen::VectorXd& step) const;
     void take(const Eigen::VectorXd& step);
     void set_rest(const TurnModel::Prediction& prediction, const std::vector<Column>& columns);
     double squares_left(const std::vector<Column>& columns, const Whitening& whitening);
     std::vector<Column> columns(const TurnModel::Prediction& prediction) const;
     void finish();
+    Eigen::MatrixXd whitened_columns(Eigen::VectorXd& scale) const;  ///< of norm one, scale times as long
+    void add_noise_estimates(std::vector<Estimate>& estimates) const;
     void add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, Eigen::VectorXd* right) const;
     double objective(const TurnParameters& parameters, const std::vector<double>& rest) const;
+
+    /// How many of the columns, which those of effects come last of, are solved for.
+    std::size_t solved(const std::vector<Column>& all) const;
 
     const TurnModel* model_;
     TurnParameters parameters_;
     Rows rows_;
+    Effects effects_;
     std::vector<double> nuisance_;  ///< offset, amplitude and its drift
     TurnModel::Prediction prediction_;
     std::vector<double> rest_;  ///< phases less all that is deterministic
     std::vector<Column> columns_;
-    std::vector<Estimate> estimates_;
     std::vector<double> innovations_, sd_rad_;
     double log_likelihood_ = 0.0;
     Eigen::MatrixXd basis_;  ///< orthonormal, of the model's own whitened columns in the rows that count

@@ -207,9 +207,9 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         const std::size_t last = i > 0 ? i - 1 : 0;
         effects::Interval& interval = prediction.intervals[i];
         interval = {turn_s[last],
-                                         turn_s[i] - turn_s[last],
-                                         {temperature_change_k(last), temperature_change_k(i)},
-                                         {series_.input_rate_deg_h[last], series_.input_rate_deg_h[i]}};
+                    turn_s[i] - turn_s[last],
+                    {temperature_change_k(last), temperature_change_k(i)},
+                    {series_.input_rate_deg_h[last], series_.input_rate_deg_h[i]}};
         angle_arcsec += interval.duration_s * parameters.bias_deg_h +
                         (series_.input_angle_arcsec(turn_s[i]) - series_.input_angle_arcsec(turn_s[last]));
         for (const ActiveEffect& active : parameters.effects) {

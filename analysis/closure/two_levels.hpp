@@ -7,9 +7,9 @@ namespace ringlock::closure {
 struct TwoLevels {
     double chi2 = 0.0;  ///< that the jumps explain
     int changes = 0;
-    double merit = 0.0;    ///< gain of the log-likelihood less the cost
-    double cost = 0.0;     ///< of levels and places
-    double p_value = 1.0;  ///< by chance, all courses of as many changes counted
+    double merit = 0.0;          ///< gain of the log-likelihood less the cost
+    double cost = 0.0;           ///< of levels and places
+    double p_value = 1.0;        ///< by chance, all courses of as many changes counted
     Eigen::VectorXd shape = {};  ///< 1 in the stretches of one level, 0 in those of the other
 };
 

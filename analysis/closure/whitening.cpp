@@ -63,8 +63,8 @@ void run(const TurnFrame& frame, const TurnNoise& noise, const std::vector<State
         const double kick = frame.kick_slope[i];
         Row gain;
         for (std::size_t s = 0; s < D; ++s) gain[s] = p[0][s] + sign * p[1][s];
-        const double f = std::max(
-            gain[0] + sign * gain[1] + noise.injected_rad2 + through * through * noise.readout_rad2, 1e-30);
+        const double f =
+            std::max(gain[0] + sign * gain[1] + noise.injected_rad2 + through * through * noise.readout_rad2, 1e-30);
         for (std::size_t s = 2; s < D; ++s) {
             gain[0] += gain_s[s] * gain[s];
             gain[s] *= decay[s];

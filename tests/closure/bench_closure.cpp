@@ -1,10 +1,10 @@
 // Hundreds of records with known truth, which the closed loop reads blind.
 //
-//   bench_closure FOLDER [--share S] [--only KIND] [--seed N] [--limits FILE]
+//   bench_closure FOLDER [--share S] [--only KIND] [--seed N]
 //
-// FOLDER gets records.csv (a row a record), deviations.csv (estimates less truth, in standard errors), limits.csv,
-// confusion.csv and the tables of the page: figures.md, confusion.md, calibration.md. A share S of 0.1 makes a tenth of the records; with a seed only
-// that record is made, and kept as record.h5; detection limits can be taken from the limits.csv of another run. tools/closure puts the tables into the page.
+// FOLDER gets records.csv (a row a record), deviations.csv (estimates less truth, in standard errors), confusion.csv
+// and the tables of the page: figures.md, confusion.md, calibration.md. A share S of 0.1 makes a tenth of the records;
+// with a seed only that record is made, and kept as record.h5. tools/closure puts the tables into the page.
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -31,41 +31,6 @@
 namespace {
 
 using namespace ringlock::test::closure;
-
-std::map<std::pair<std::string, std::string>, double> limits_of(const std::vector<std::string>& effects) {
-    std::vector<std::pair<std::string, const Condition*>> wanted;
-    for (const std::string& effect : effects) {
-        for (const Condition& condition : conditions) wanted.emplace_back(effect, &condition);
-    }
-    std::vector<double> sizes(wanted.size());
-    oneapi::tbb::parallel_for(std::size_t{0}, wanted.size(), [&](std::size_t k) {
-        try {
-            sizes[k] = detection_limit(wanted[k].first, *wanted[k].second);
-        } catch (const ringlock::RunError& error) {
-            fmt::print(stderr, "{}, {}: {}\n", wanted[k].first, wanted[k].second->name, error.what());
-            sizes[k] = std::nan("");
-        }
-    });
-    std::map<std::pair<std::string, std::string>, double> limits;
-    for (std::size_t k = 0; k < wanted.size(); ++k) limits[{wanted[k].first, wanted[k].second->name}] = sizes[k];
-    return limits;
-}
-
-/// As written before.
-std::map<std::pair<std::string, std::string>, double> limits_in(const std::string& path) {
-    std::ifstream file(path);
-    if (!file) throw ringlock::InputError(path + " cannot be read");
-    std::map<std::pair<std::string, std::string>, double> limits;
-    std::string line;
-    std::getline(file, line);
-    while (std::getline(file, line)) {
-        // Names of conditions have commas of their own.
-        const std::size_t first = line.find(',');
-        const std::size_t last = line.rfind(',');
-        limits[{line.substr(0, first), line.substr(first + 1, last - first - 1)}] = std::stod(line.substr(last + 1));
-    }
-    return limits;
-}
 
 using Outcomes = std::vector<std::optional<Outcome>>;
 using Binomial = boost::math::binomial_distribution<>;
@@ -162,8 +127,8 @@ void write_confusion(std::ostream& out, std::ostream& matrix, const std::vector<
         for (const auto& [records, answer] : sorted) {
             text += fmt::format("{}{} {}", text.empty() ? "" : "; ", records, answer);
         }
-        fmt::print(out, "| {} | {} | {} |\n", truth.first,
-                   truth.second > 0.0 ? fmt::format("{:g}", truth.second) : "-", text);
+        fmt::print(out, "| {} | {} | {} |\n", truth.first, truth.second > 0.0 ? fmt::format("{:g}", truth.second) : "-",
+                   text);
     }
 }
 
@@ -209,15 +174,12 @@ int main(int argc, char** argv) {
     std::string only;
     std::string folder;
     std::string seed;
-    std::string known;
     for (int k = 1; k < argc; ++k) {
         const std::string_view argument = argv[k];
         if (argument == "--share" && k + 1 < argc) {
             share = std::strtod(argv[++k], nullptr);
         } else if (argument == "--only" && k + 1 < argc) {
             only = argv[++k];
-        } else if (argument == "--limits" && k + 1 < argc) {
-            known = argv[++k];
         } else if (argument == "--seed" && k + 1 < argc) {
             seed = argv[++k];
         } else {
@@ -225,7 +187,7 @@ int main(int argc, char** argv) {
         }
     }
     if (folder.empty() || !(share > 0.0 && share <= 1.0)) {
-        fmt::print(stderr, "usage: bench_closure FOLDER [--share S] [--only null|single|pair|foreign] [--seed N] [--limits FILE]\n");
+        fmt::print(stderr, "usage: bench_closure FOLDER [--share S] [--only null|single|pair|foreign] [--seed N]\n");
         return 2;
     }
     std::filesystem::create_directories(folder);
@@ -245,23 +207,16 @@ int main(int argc, char** argv) {
         }
     }
     if (wanted("single") || wanted("pair")) {
-        const auto limits = known.empty() ? limits_of(effects) : limits_in(known);
-        std::ofstream file(folder + "/limits.csv");
-        file << "effect,condition,size\n";
-        for (const auto& [key, size] : limits) fmt::print(file, "{},{},{:.4g}\n", key.first, key.second, size);
         std::size_t turn = 0;
         const auto pick = [&](const std::string& effect, double multiple, Case& of) {
-            of.truth.push_back(draw(effect, multiple * limits.at({effect, of.condition->name}), 7 * cases.size() + turn,
+            of.truth.push_back(draw(effect, multiple * start_size(effect), 7 * cases.size() + turn,
                                     static_cast<double>(of.turns) / (2.0 * 124.68)));
-        };
-        const auto shown = [&](const std::string& effect, const Condition& condition) {
-            return shows(effect, condition) && std::isfinite(limits.at({effect, condition.name}));
         };
         for (const double multiple : {1.0, 2.0}) {
             for (std::size_t k = 0; wanted("single") && k < scaled(6); ++k) {
                 for (const std::string& effect : effects) {
                     const Condition* condition = &conditions[(k + turn++) % conditions.size()];
-                    while (!shown(effect, *condition)) condition = &conditions[turn++ % conditions.size()];
+                    while (!shows(effect, *condition)) condition = &conditions[turn++ % conditions.size()];
                     Case of{.kind = Kind::single, .truth = {}, .multiple = multiple, .condition = condition};
                     pick(effect, multiple, of);
                     add(std::move(of));
@@ -272,7 +227,7 @@ int main(int argc, char** argv) {
             for (std::size_t b = a + 1; b < effects.size(); ++b, ++k) {
                 if (k % static_cast<std::size_t>(std::round(2.0 / share)) != 0) continue;
                 const Condition& condition = conditions[k % conditions.size()];
-                if (!shown(effects[a], condition) || !shown(effects[b], condition)) continue;
+                if (!shows(effects[a], condition) || !shows(effects[b], condition)) continue;
                 Case of{.kind = Kind::pair, .truth = {}, .multiple = 2.0, .condition = &condition};
                 pick(effects[a], 2.0, of);
                 pick(effects[b], 2.0, of);
@@ -293,15 +248,21 @@ int main(int argc, char** argv) {
     oneapi::tbb::parallel_for(std::size_t{0}, (cases.size() + together - 1) / together, [&](std::size_t group) {
         const std::size_t first = group * together;
         const std::size_t count = std::min(together, cases.size() - first);
-        for (Case& of : std::span(cases).subspan(first, count)) {
+        std::vector<char> settled(count, 1);
+        oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t k) {
+            Case& of = cases[first + k];
+            if (of.kind != Kind::single && of.kind != Kind::pair) return;
             try {
-                if (of.kind == Kind::single || of.kind == Kind::pair) settle(of);
+                settled[k] = settle(of) ? 1 : 0;
+                if (!settled[k]) fmt::print(stderr, "record {} cannot show {}\n", of.seed, of.truth_text());
             } catch (const std::exception& error) {
+                settled[k] = 0;
                 fmt::print(stderr, "limits of record {} ({}): {}\n", of.seed, of.truth_text(), error.what());
             }
-        }
+        });
         const auto records = make(std::span(cases).subspan(first, count));
         for (std::size_t k = first; k < first + count; ++k) {
+            if (!settled[k - first]) continue;
             if (!seed.empty()) ringlock::record::write_record(folder + "/record.h5", records[k - first]);
             try {
                 outcomes[k] = judge(cases[k], records[k - first]);

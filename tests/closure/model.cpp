@@ -59,8 +59,7 @@ TEST(TurnKicks, OfNearbyGyrosDoForEachOther) {
                 const TurnKicks::Kick kick = kicks.at(direction, psi);
                 const TurnKicks::Kick other = stronger.at(direction, psi);
                 by_rate = std::max(by_rate, std::abs(turned.at(direction, psi).after_rad - kick.after_rad));
-                by_threshold =
-                    std::max(by_threshold, std::abs(std::exp(-5e-4) * other.after_rad - kick.after_rad));
+                by_threshold = std::max(by_threshold, std::abs(std::exp(-5e-4) * other.after_rad - kick.after_rad));
             }
         }
         std::printf("at %g deg/h: 0.5 deg/h change half a kick by %.2g rad, 5e-4 of the threshold by %.2g rad\n",

@@ -84,7 +84,7 @@ Device device_of(const Case& of) {
 }
 
 record::Record by_map(const Case& of, const Device& device) {
-    scenario::Scenario scenario = plain_gyro(static_cast<double>(of.turns), of.seed);
+    scenario::Scenario scenario = plain_gyro(static_cast<double>(of.turns), of.seed + (of.noise << 32));
     inject(scenario, of.condition->injected_rad);
     scenario.gyro.lockin_threshold_deg_h = device.threshold_deg_h;
     scenario.dither.peak_rate_deg_s = device.peak_rate_deg_s;
@@ -218,61 +218,65 @@ Added draw(const std::string& name, double size, std::uint64_t seed, double dura
     return added;
 }
 
-double detection_limit(const std::string& name, const Condition& condition) {
-    const effects::Effect& effect = *effects::find(name);
-    const effects::Parameter& main = size_of(effect);
-    const std::string parameter(main.name);
-    // Random processes need some size for a start; others are known as well at any.
-    double size = main.role == effects::Role::deviation ? 1e-3 : 0.02 * std::min(1.0, main.max);
-    if (main.role == effects::Role::probability) size = 1e-3;
-    if (name == "rate_random_walk" || name == "bias_instability") size = 0.1;
-    if (name == "quantum_noise") size = 1e-4;
-    // Their variance, of which the information hardly depends, goes with the root of size times error.
-    const bool random_process = main.role == effects::Role::deviation;
-    const int rounds = random_process ? 6 : 3;
-    constexpr std::uint64_t records = 2;
-    for (int round = 0; round < rounds; ++round) {
-        double sum = 0.0;
+double start_size(const std::string& name) {
+    using effects::Role;
+    const effects::Parameter& main = size_of(*effects::find(name));
+    if (main.role == Role::deviation) return name == "quantum_noise" ? 1e-4 : 1e-2;
+    return main.role == Role::probability ? 1e-3 : 0.02 * std::min(1.0, main.max);
+}
+
+bool settle(Case& of) {
+    constexpr int most_rounds = 8;
+    // What one record tells of a random process is random itself.
+    const bool random_process = std::any_of(of.truth.begin(), of.truth.end(), [](const Added& added) {
+        return size_of(*effects::find(added.effect)).role == effects::Role::deviation;
+    });
+    const std::uint64_t records = random_process ? 4 : 2;
+    bool within = true;
+    for (int round = 0; round < most_rounds; ++round) {
+        Case at_limit = of;
+        at_limit.direct = false;
+        std::vector<ActiveEffect> known;
+        for (Added& added : at_limit.truth) {
+            const effects::Effect* effect = effects::find(added.effect);
+            added.values.at(std::string(size_of(*effect).name)) /= of.multiple;
+            known.push_back({effect, added.values});
+        }
+        std::vector<double> information(known.size(), 0.0);
         for (std::uint64_t k = 0; k < records; ++k) {
-            Case of{.kind = Kind::single, .truth = {}, .multiple = 1.0, .condition = &condition, .seed = 900 + k};
-            of.truth = {draw(name, size, of.seed, device_of(of).duration_s)};
-            const Closure known =
-                fit_turns(make({&of, 1}).front(), {ActiveEffect{&effect, {of.truth[0].values.begin(), of.truth[0].values.end()}}});
-            for (const Estimate& estimate : known.steps.at(0).parameters) {
-                if (estimate.name == parameter) {
-                    sum += estimate.sd / static_cast<double>(records);
+            Case another = at_limit;
+            another.noise = k;
+            for (const Estimate& estimate :
+                 ringlock::closure::information_on_turns(make({&another, 1}).front(), known)) {
+                for (std::size_t e = 0; e < known.size(); ++e) {
+                    if (known[e].effect->name() != estimate.effect) continue;
+                    if (size_of(*known[e].effect).name != estimate.name || !(estimate.sd > 0.0)) continue;
+                    information[e] += 1.0 / (estimate.sd * estimate.sd) / static_cast<double>(records);
                 }
             }
         }
-        const double next = std::min(4.0 * sum, 0.5 * main.max);
-        size = random_process ? std::sqrt(size * next) : next;
-    }
-    return size;
-}
-
-void settle(Case& of) {
-    Case at_limit = of;
-    at_limit.direct = false;
-    std::vector<ActiveEffect> known;
-    for (Added& added : at_limit.truth) {
-        const effects::Effect* effect = effects::find(added.effect);
-        added.values.at(std::string(size_of(*effect).name)) /= of.multiple;
-        known.push_back({effect, added.values});
-    }
-    const Closure closure = fit_turns(make({&at_limit, 1}).front(), known);
-    for (std::size_t k = 0; k < of.truth.size(); ++k) {
-        const effects::Parameter& main = size_of(*known[k].effect);
-        const std::string parameter(main.name);
-        const double size = at_limit.truth[k].values.at(parameter);
-        for (const Estimate& estimate : closure.steps.at(k).parameters) {
-            if (estimate.name != parameter || !(estimate.sd > 0.0) || !std::isfinite(estimate.sd)) continue;
-            const double limit =
-                main.role == effects::Role::deviation ? std::sqrt(size * 4.0 * estimate.sd) : 4.0 * estimate.sd;
-            // What a single record says of a random process is random itself.
-            const double factor = std::clamp(limit / std::abs(size), 0.2, 5.0);
-            of.truth[k].values.at(parameter) = std::clamp(of.multiple * factor * size, 0.5 * main.min, 0.5 * main.max);
+        double most = 1.0;
+        within = true;
+        for (std::size_t e = 0; e < known.size(); ++e) {
+            const effects::Parameter& main = size_of(*known[e].effect);
+            const std::string parameter(main.name);
+            const double size = known[e].values.at(parameter);
+            const double sd = 1.0 / std::sqrt(information[e]);
+            // Of a random process the variance is told, of which the information hardly depends: its deviation times
+            // the error of that stays.
+            const bool random = main.role == effects::Role::deviation;
+            const double limit = random ? std::sqrt(std::abs(size) * 4.0 * sd) : 4.0 * sd;
+            const double factor = std::clamp(limit / std::abs(size), 1e-3, 1e3);
+            most = std::max({most, factor, 1.0 / factor});
+            double& settled = of.truth[e].values.at(parameter);
+            const double least = 0.5 * main.min;
+            const double largest = 0.5 * main.max;
+            within = within && of.multiple * factor * size > least && of.multiple * factor * size < largest;
+            settled = std::clamp(of.multiple * factor * size, least, largest);
         }
+        if (most < 1.05) break;
     }
+    return within;
 }
 
 std::vector<Case> foreign_cases(std::size_t each) {
@@ -296,8 +300,7 @@ std::vector<Case> foreign_cases(std::size_t each) {
         add(k % 2, Where::phase,
             {"lockin_third_harmonic",
              {{"ratio", injected ? even(0.1, 0.4) : even(0.02, 0.4)}, {"phase_rad", between(-3.0, 3.0)}}});
-        add(0, Where::time,
-            {"telegraph_bias", {{"step_deg_h", even(1e-3, 1e-1)}, {"dwell_s", between(4.0, 10.0)}}});
+        add(0, Where::time, {"telegraph_bias", {{"step_deg_h", even(1e-3, 1e-1)}, {"dwell_s", between(4.0, 10.0)}}});
         add(2, Where::rate, {"bias_per_rate_squared_h_deg", {{"", even(1e-8, 1e-6)}}});
         add(2, Where::amplitude, {"bias_per_relative_amplitude_deg_h", {{"", even(100.0, 10000.0)}}});
         add(k % 2, Where::frequency,
@@ -345,8 +348,8 @@ Outcome judge(const Case& of, const record::Record& record) {
         if (!tied_to_truth) outcome.false_name = true;
     }
     if (closure.verdict == Verdict::unexplained) {
-        outcome.judged =
-            foreign && closure.unexplained->where == of.where && !outcome.false_name ? Judged::right : Judged::unexplained;
+        outcome.judged = foreign && closure.unexplained->where == of.where && !outcome.false_name ? Judged::right
+                                                                                                  : Judged::unexplained;
     } else if (outcome.false_name) {
         outcome.judged = Judged::wrong;
     } else if (foreign || !missing.empty()) {

@@ -37,14 +37,15 @@ struct Case {
     const Condition* condition = nullptr;
     bool direct = false;  ///< by the generator's integration of the equation of motion, not by the turn map
     std::uint64_t seed = 1;
+    std::uint64_t noise = 0;  ///< another draw of all that is random in the same gyro; of the turn map only
     std::size_t turns = 16000;
     ringlock::closure::Where where = {};  ///< in which foreign effects show themselves
 
     std::string truth_text() const;
 };
 
-/// The records of cases, those of the generator in one go. Threshold, amplitude and rate of the gyro differ from seed to
-/// seed; declared is the nominal threshold.
+/// The records of cases, those of the generator in one go. Threshold, amplitude and rate of the gyro differ from seed
+/// to seed; declared is the nominal threshold.
 std::vector<record::Record> make(std::span<const Case> cases);
 
 /// Where a random parameter of an effect stands in a case of that seed: frequencies, phases and times are drawn, the
@@ -54,12 +55,13 @@ Added draw(const std::string& effect, double size, std::uint64_t seed, double du
 /// Effects of the library that turn records can show.
 std::vector<std::string> effects_on_turns();
 
-/// About the size of an effect whose standard error, in the model that has it, is a quarter of it: by Fisher's
-/// information as the fit computes it, means over a few records. From record to record it differs, see settle().
-double detection_limit(const std::string& effect, const Condition& condition);
+/// A size of an effect to start from, about where limits are.
+double start_size(const std::string& effect);
 
-/// Sets the sizes of a case to `multiple` times their detection limits in this very record, from those in it.
-void settle(Case& of);
+/// Sets the sizes of a case to `multiple` times their detection limits in such a record, where the standard error is a
+/// quarter of the size: by Fisher's information in the true model, at the truth. Other parameters stay as drawn; sizes
+/// are only a start. False where the record would not show one of them within the effect's bounds.
+bool settle(Case& of);
 
 /// Cases of effects that the library does not have.
 std::vector<Case> foreign_cases(std::size_t each);

@@ -1,0 +1,61 @@
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "analysis/closure/hypotheses.hpp"
+#include "analysis/closure/turn_fit.hpp"
+#include "analysis/closure/turn_series.hpp"
+#include "analysis/record/record.hpp"
+
+/// Which effect of the library a record of turns supports most: the second half of what screening begins.
+namespace ringlock::closure {
+
+/// A model of the record with all that it was fitted to.
+struct Fitted {
+    JoinedPhase joined;
+    TurnSeries series;
+    std::unique_ptr<TurnModel> model;
+    std::unique_ptr<TurnFit> fit;
+};
+
+/// The model with these effects fitted to the rows that count; from the record's declared device where `start` has no
+/// noise yet.
+std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParameters& start, const Rows& rows,
+                                   TurnFit::Effects effects = TurnFit::Effects::fitted);
+
+/// Random rates can follow whatever the library does not have, more or less.
+bool is_random_rate(const effects::Effect& effect);
+
+/// Probability of so large a gain of the log-likelihood by chance, for one place of a search.
+double p_of_gain(double gain, const effects::Effect& effect);
+/// Whether that is rare enough for one of all effects of the library.
+bool passes(double p_value);
+
+/// An effect fitted in full.
+struct Contender {
+    Candidate candidate;
+    std::shared_ptr<Fitted> fitted;
+    double merit = 0.0;    ///< gain of the log-likelihood less its parameters and its search
+    double p_value = 1.0;  ///< of such a gain by chance, its search counted
+};
+
+/// Those that might explain something, no more than so many, the likeliest first.
+struct Contest {
+    std::vector<Contender> contenders;
+    bool side = false;  ///< told by other columns than the phase
+};
+Contest hold_contest(const record::Record& record, const Fitted& now, const Rows& rows, std::size_t most);
+
+/// What to add, if anything.
+struct Choice {
+    const Contender* chosen = nullptr;
+    double merit = 0.0;  ///< of all that it stands for
+    std::vector<std::string> confounded_with;
+};
+
+/// The likeliest where it passes. A random rate can follow two others at once: these are tried together before it is
+/// taken. Where they explain as much they are tied to it, where they explain more the first of them is chosen.
+Choice choose(const record::Record& record, const Contest& contest, const Rows& rows);
+
+}  // namespace ringlock::closure
