@@ -132,20 +132,23 @@ std::vector<std::vector<double>> values_of(const std::vector<HalfKick>& kicks, c
 double to_zero_rate(const gyro::Device& device, int direction, bool late, double psi_rad) {
     const gyro::HalfCycle half = device.half_cycle(late ? direction : -direction, device.dither_amplitude_rad);
     const double scale_s = 1.0 / std::sqrt(half.end_acceleration_rad_s2(late ? 0 : 1));
-    // The series is good for so long; high input rates put the point farther away.
-    const double most_s = 0.5 * scale_s;
-    constexpr int most_steps = 200;
+    // High input rates put the point farther away than one series reaches.
+    constexpr double tolerance_rad = 1e-15;
+    constexpr int most_steps = 10000;
     double time_s = late ? 0.0 : half.duration_s;
     double gain_rad = 0.0;
     for (int step = 0; step < most_steps; ++step) {
         const gyro::PhaseSeries<16> series(half, device.coupling, time_s, psi_rad + gain_rad, scale_s);
-        double t = 0.0;
-        for (int i = 0; i < 8; ++i) {
+        const double most_s = std::min(0.5 * scale_s, series.step_s(tolerance_rad));
+        double t = -direction * series.rate_rad_s(0.0) * scale_s * scale_s;
+        const bool far = std::abs(t) > most_s;
+        t = std::clamp(t, -most_s, most_s);
+        for (int i = 0; i < 8 && !far; ++i) {
             t = std::clamp(t - series.rate_rad_s(t) / series.acceleration_rad_s2(t), -most_s, most_s);
         }
         gain_rad += series.gain_rad(t);
         time_s += t;
-        if (std::abs(t) < most_s) return gain_rad;
+        if (!far && std::abs(t) < most_s) return gain_rad;
     }
     throw RunError(fmt::format("an input of {:.4g} rad/s leaves the phase without a turn", device.input_rate_rad_s));
 }

@@ -139,7 +139,9 @@ TEST(TurnKicks, AddUpToTheEquationOfMotion) {
 
 TEST(TurnKicks, AreInterpolatedBetweenRates) {
     for (const std::string& with : kinds) {
-        for (const double reach_deg_h : {0.0, 5.0, 100.0, 300.0, 1000.0, 5000.0}) {
+        for (const double reach_deg_h : {0.0, 5.0, 100.0, 300.0, 1000.0, 5000.0, 50000.0}) {
+            // Its kink wanders with the rate.
+            if (with == "an asymmetric dither" && reach_deg_h > 5000.0) continue;
             gyro::Setup setup = kicked(with);
             const KicksOverRates kicks(setup, 40.0 - reach_deg_h, 40.0 + reach_deg_h);
             double worst_rad = 0.0;
