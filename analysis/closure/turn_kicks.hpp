@@ -1,7 +1,7 @@
 #pragma once
 #include <array>
 #include <complex>
-#include <span>
+#include <cstddef>
 #include <vector>
 
 #include "engine/gyro/setup.hpp"
@@ -17,6 +17,8 @@ namespace ringlock::closure {
 /// to amplitudes nearby.
 class TurnKicks {
    public:
+    /// None, as of a gyro without lock-in.
+    TurnKicks() = default;
     /// Throws RunError where half cycles of the setup have too few fringes.
     explicit TurnKicks(const gyro::Setup& setup);
 
@@ -25,12 +27,38 @@ class TurnKicks {
         double before_slope, after_slope;  ///< derivatives to the phase
     };
     /// `direction`: +1 at a minimum, -1 at a maximum.
-    Kick at(int direction, double phase_rad) const;
+    Kick at(int direction, double phase_rad) const { return at(direction, std::polar(1.0, phase_rad)); }
+    /// The same from exp(i phase).
+    Kick at(int direction, std::complex<double> turned) const;
 
    private:
+    friend class KicksOverRates;
     static constexpr std::size_t harmonics = 12;
     using Series = std::array<std::complex<double>, harmonics + 1>;  ///< value = Re sum_k c_k exp(i k psi)
-    std::array<std::array<Series, 2>, 2> series_{};                  ///< [minimum, maximum][before, after]
+    using Sides = std::array<Series, 2>;                             ///< before, after
+
+    void add(double weight, const TurnKicks& other);
+    void count_terms();
+    /// Of the phase, where the dither turns.
+    double turn_rate_rad_s(int direction, std::complex<double> turned) const;
+    Kick at(int direction, std::complex<double> turned, bool late) const;
+
+    std::array<std::array<Sides, 2>, 2> series_{};  ///< [minimum, maximum][zero rate before the dither's turn, after]
+    std::array<std::array<std::complex<double>, 3>, 2> turn_rate_{};  ///< Fourier series, likewise
+    bool kinked_ = false;                                             ///< the two differ
+    std::size_t terms_ = 0;                                           ///< harmonics that matter
+};
+
+/// Kicks of a gyro whose input rate changes: between these rates by polynomials through a few that are exact.
+class KicksOverRates {
+   public:
+    KicksOverRates(const gyro::Setup& setup, double lowest_deg_h, double highest_deg_h);
+    /// At this rate, in place of the setup's.
+    TurnKicks::Kick at(int direction, std::complex<double> turned, double rate_deg_h) const;
+
+   private:
+    double middle_deg_h_, reach_deg_h_;
+    std::vector<TurnKicks> by_power_;  ///< of the rate, scaled to [-1, 1]
 };
 
 }  // namespace ringlock::closure

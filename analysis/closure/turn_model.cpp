@@ -102,58 +102,18 @@ std::shared_ptr<const TurnModel::Kicks> TurnModel::kicks(gyro::Setup setup) cons
         const auto found = std::find_if(met_.begin(), met_.end(), [&](const auto& met) { return met.first == setup; });
         if (found != met_.end()) return found->second;
     }
-    const TurnKicks of(setup);
+    const auto [lowest, highest] =
+        std::minmax_element(series_.input_rate_deg_h.begin(), series_.input_rate_deg_h.end());
+    const KicksOverRates of(setup, setup.input_rate_deg_h + *lowest, setup.input_rate_deg_h + *highest);
     Kicks kicks(series_.size());
-    for (std::size_t i = 0; i < kicks.size(); ++i) kicks[i] = of.at(series_.direction[i], phase_rad_[i]);
+    for (std::size_t i = 0; i < kicks.size(); ++i) {
+        kicks[i] = of.at(series_.direction[i], turned_[i], setup.input_rate_deg_h + series_.input_rate_deg_h[i]);
+    }
     const auto shared = std::make_shared<const Kicks>(std::move(kicks));
     const std::lock_guard lock(meeting_);
     met_.emplace_front(setup, shared);
     if (met_.size() > kept) met_.pop_back();
     return shared;
-}
-
-TurnModel::Kicks TurnModel::kicks_of(const gyro::Setup& setup) const {
-    // Kicks are computed for few gyros: so near to the one asked for that half a kick is right to 1e-5 rad, far below
-    // what a reading of the phase tells (test TurnKicks.OfNearbyGyrosDoForEachOther).
-    constexpr double matters_deg_h = 1.0;
-    constexpr double step = 1e-3;
-    const auto [lowest, highest] =
-        std::minmax_element(series_.input_rate_deg_h.begin(), series_.input_rate_deg_h.end());
-    const double middle_deg_h = 0.5 * (*lowest + *highest);
-    const double reach_deg_h = std::ceil(0.5 * (*highest - *lowest) / matters_deg_h) * matters_deg_h;
-    gyro::Setup near = setup;
-    near.input_rate_deg_h = std::round((setup.input_rate_deg_h + middle_deg_h) / matters_deg_h) * matters_deg_h;
-    if (setup.lockin_threshold_deg_h > 0.0) {
-        near.lockin_threshold_deg_h = std::exp(step * std::round(std::log(setup.lockin_threshold_deg_h) / step));
-    }
-    const double share =
-        setup.lockin_threshold_deg_h > 0.0 ? setup.lockin_threshold_deg_h / near.lockin_threshold_deg_h : 1.0;
-    Kicks out = *kicks(near);
-    if (reach_deg_h > matters_deg_h) {
-        gyro::Setup side = near;
-        side.input_rate_deg_h = near.input_rate_deg_h - reach_deg_h;
-        const auto low = kicks(side);
-        side.input_rate_deg_h = near.input_rate_deg_h + reach_deg_h;
-        const auto high = kicks(side);
-        for (std::size_t i = 0; i < out.size(); ++i) {
-            const double rate_deg_h = setup.input_rate_deg_h + series_.input_rate_deg_h[i];
-            const double x = (rate_deg_h - near.input_rate_deg_h) / reach_deg_h;
-            for (const auto part : {&TurnKicks::Kick::before_rad, &TurnKicks::Kick::after_rad,
-                                    &TurnKicks::Kick::before_slope, &TurnKicks::Kick::after_slope}) {
-                const double mid = out[i].*part;
-                const double a = (*low)[i].*part;
-                const double b = (*high)[i].*part;
-                out[i].*part += x * (0.5 * (b - a) + x * (0.5 * (b + a) - mid));
-            }
-        }
-    }
-    for (TurnKicks::Kick& kick : out) {
-        kick.before_rad *= share;
-        kick.after_rad *= share;
-        kick.before_slope *= share;
-        kick.after_slope *= share;
-    }
-    return out;
 }
 
 std::vector<double> TurnModel::added_rad(const Prediction& prediction, const effects::Effect& effect,
@@ -182,7 +142,8 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     prediction.turn_s.resize(n);
     prediction.intervals.resize(n);
     const double c = device.phase_per_arcsec;
-    const Kicks kick_of = kicks_of(device_setup);
+    const std::shared_ptr<const Kicks> shared_kicks = kicks(device_setup);
+    const Kicks& kick_of = *shared_kicks;
     const std::vector<double> swing = dither_swings(kick_of);
     std::vector<double> factors(n, 1.0);
     for (std::size_t i = 0; i < n; ++i) {

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Dense>
+#include <complex>
 #include <deque>
 #include <memory>
 #include <mutex>
@@ -41,8 +42,9 @@ bool told_by_other_columns(const effects::Effect& effect);
 class TurnModel {
    public:
     /// Both are kept by reference.
-    TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad)
-        : series_(series), phase_rad_(phase_rad) {}
+    TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad) : series_(series), phase_rad_(phase_rad) {
+        for (const double psi : phase_rad) turned_.push_back(std::polar(1.0, psi));
+    }
 
     struct Prediction {
         std::vector<double> phase_rad;  ///< but for offset and dither
@@ -62,10 +64,8 @@ class TurnModel {
 
    private:
     using Kicks = std::vector<TurnKicks::Kick>;
-    /// Kicks of a gyro of that setup at the turns.
+    /// Kicks at the turns of a gyro of that setup, whose rate is that and the input's.
     std::shared_ptr<const Kicks> kicks(gyro::Setup setup) const;
-    /// The same for one whose rate differs from turn to turn.
-    Kicks kicks_of(const gyro::Setup& setup) const;
 
     double temperature_change_k(std::size_t turn) const;
     /// Times of the dither's turns by a resonator that drifts slowly.
@@ -75,6 +75,7 @@ class TurnModel {
 
     const TurnSeries& series_;
     const std::vector<double>& phase_rad_;
+    std::vector<std::complex<double>> turned_;  ///< exp(i phase)
     /// Setups met last and their kicks, the latest first.
     mutable std::deque<std::pair<gyro::Setup, std::shared_ptr<const Kicks>>> met_;
     mutable std::mutex meeting_;

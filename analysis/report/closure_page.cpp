@@ -53,16 +53,13 @@ struct Picture {
 
 /// Measured values over the lowest and the highest of the simulations.
 void add_band(const PredictiveStatistic& statistic, const std::string& what, int simulations, Figure& figure) {
-    using Style = Curve::Style;
     figure.curves.push_back({.label = "measured" + what, .x = statistic.x, .y = statistic.measured});
-    figure.curves.push_back({.label = fmt::format("lowest of {} simulations{}", simulations, what),
+    figure.curves.push_back({.label = fmt::format("{} simulations, lowest to highest{}", simulations, what),
                              .x = statistic.x,
                              .y = statistic.lowest,
-                             .style = Style::line});
-    figure.curves.push_back({.label = fmt::format("highest of {} simulations{}", simulations, what),
-                             .x = statistic.x,
-                             .y = statistic.highest,
-                             .style = Style::line});
+                             .lo = statistic.lowest,
+                             .hi = statistic.highest,
+                             .style = Curve::Style::band});
 }
 
 std::vector<Picture> pictures(const std::string& source, const Closure& closure, const Predictive& predictive) {
@@ -72,7 +69,11 @@ std::vector<Picture> pictures(const std::string& source, const Closure& closure,
         if (statistic == nullptr) return;
         Picture picture;
         picture.file = file;
-        picture.caption = fmt::format("{}: the record over the band of the simulations.", title);
+        picture.caption = fmt::format(
+            "{}: circles are the record, the band is what simulations of the closed model show. Circles outside of it "
+            "are what the\nmodel lacks. Stretches that were left out as disturbed are in the circles, not in the "
+            "model.",
+            title);
         picture.figure = {.title = fmt::format("{} of {}", title, source),
                           .x_label = fmt::format("{} [{}]", statistic->x_name, statistic->x_unit),
                           .y_label = y_label,
@@ -83,11 +84,14 @@ std::vector<Picture> pictures(const std::string& source, const Closure& closure,
     };
     logarithmic("allan_deviation", "allan.svg", "Allan deviation", "Allan deviation [deg/h]");
     logarithmic("spectrum", "spectrum.svg", "Spectrum of the rate", "root of the power density [deg/h/√Hz]");
-    Picture folded{.file = "folded.svg",
-                   .caption = "What the gyro gains across a turn, by the phase at which it turns: the kick of lock-in.",
-                   .figure = {.title = fmt::format("What {} gains across its turns, by their phase", source),
-                              .x_label = "phase at the turn [rad]",
-                              .y_label = "gain less its mean [mrad of phase]"}};
+    Picture folded{
+        .file = "folded.svg",
+        .caption =
+            "What the gyro gains across a turn, by the phase at which it turns: the kick of lock-in. Markers "
+            "are the record, bands\nwhat simulations of the closed model show.",
+        .figure = {.title = fmt::format("What {} gains across its turns, by their phase", source),
+                   .x_label = "phase at the turn [rad]",
+                   .y_label = "gain less its mean [mrad of phase]"}};
     for (const auto& [name, what] : {std::pair{"folded_minima", ", minima"}, std::pair{"folded_maxima", ", maxima"}}) {
         const PredictiveStatistic* statistic = find(predictive, name);
         if (statistic == nullptr) continue;
@@ -102,11 +106,13 @@ std::vector<Picture> pictures(const std::string& source, const Closure& closure,
     Picture steps{.file = "steps.svg",
                   .caption =
                       "Held-out one-step error of the base model and after each effect; dashed: what the noise "
-                      "of the last model alone would leave.",
+                      "of the last model alone\nwould leave. An effect that shows otherwise than in the next reading, "
+                      "as in which values come at all, leaves the error where it was.",
                   .figure = {.title = fmt::format("Held-out error of {}, step by step", source),
                              .x_label = "effects in the model",
                              .y_label = fmt::format("rms one-step error [{}]", closure.unit),
-                             .log_y = true}};
+                             .log_y = true,
+                             .whole_x = true}};
     Curve error{.label = "held-out error", .x = {0.0}, .y = {closure.heldout_before}, .style = Curve::Style::line};
     steps.figure.curves.push_back({.label = "0: base model", .x = {0.0}, .y = {closure.heldout_before}});
     for (std::size_t k = 0; k < closure.steps.size(); ++k) {
@@ -178,8 +184,8 @@ void add_predictive(const Predictive& predictive, std::string& page) {
         page += "| statistic | points | p | largest deviation |\n|---|---|---|---|\n";
         for (const PredictiveStatistic& s : predictive.statistics) {
             const std::string where = s.x.empty() ? "" : fmt::format(" at {:.4g} {}", s.x[s.at], s.x_unit);
-            page += fmt::format("| {} | {} | {:.2g} | {:.2g} standard deviations{} |\n", cell(s.description),
-                                s.x.size(), s.p_value_all, s.largest, where);
+            page += fmt::format("| {} | {} | {:.2g} | {:.{}f} standard deviations{} |\n", cell(s.description),
+                                s.x.size(), s.p_value_all, s.largest, s.largest < 10.0 ? 1 : 0, where);
         }
         page += "\n";
     }

@@ -173,7 +173,8 @@ class Axis {
 
 void check(const Curve& curve) {
     const std::size_t n = curve.x.size();
-    if (curve.y.size() != n || curve.lo.size() != curve.hi.size() || (!curve.lo.empty() && curve.lo.size() != n)) {
+    const bool bars = !curve.lo.empty() || curve.style == Curve::Style::band;
+    if (curve.y.size() != n || curve.lo.size() != curve.hi.size() || (bars && curve.lo.size() != n)) {
         throw std::invalid_argument(fmt::format("curve \"{}\" has {} x, {} y, {} lo and {} hi", curve.label, n,
                                                 curve.y.size(), curve.lo.size(), curve.hi.size()));
     }
@@ -184,11 +185,12 @@ struct Plotted {
     std::string plots;  ///< elements of the plot command
 };
 
-/// `rank` counts the curves of the same kind (dashed or not), `above` the solid lines still to come.
+/// `rank` counts the curves of the same kind (dashed, bands, others), `above` the solid lines still to come.
 Plotted plotted(const Curve& curve, std::size_t index, std::size_t rank, std::size_t above, const Axis& x,
                 const Axis& y) {
     const bool bars = !curve.lo.empty();
     const bool dashed = curve.style == Curve::Style::dashed;
+    const bool band = curve.style == Curve::Style::band;
     std::string rows;
     bool any = false;
     for (std::size_t i = 0; i < curve.x.size(); ++i) {
@@ -212,13 +214,24 @@ Plotted plotted(const Curve& curve, std::size_t index, std::size_t rank, std::si
 
     Plotted out;
     if (any) out.data = fmt::format("{} << END\n{}END\n", block, rows);
-    if (any && bars) {
+    if (any && bars && !band) {
         // Not yerrorbars, which clear the ground under the marker and with it the curves drawn before.
         out.plots = fmt::format("{} using 1:3:(0):($4-$3) with vectors nohead linewidth 1.5 linecolor '{}' notitle, ",
                                 block, colour);
     }
     const std::string what = any ? block + " using 1:2" : "NaN";
-    if (curve.style == Curve::Style::points) {
+    if (band) {
+        // Its edges are drawn too: a narrow band would not be seen.
+        for (const int edge : {3, 4}) {
+            if (any) {
+                out.plots +=
+                    fmt::format("{} using 1:{} with lines linewidth 1.2 linecolor '{}' notitle, ", block, edge, colour);
+            }
+        }
+        out.plots +=
+            fmt::format("{} with filledcurves fillstyle transparent solid 0.3 noborder linecolor '{}' title {}",
+                        any ? block + " using 1:3:4" : "NaN", colour, title);
+    } else if (curve.style == Curve::Style::points) {
         const Marker marker = markers[rank % markers.size()];
         out.plots += fmt::format("{} with points pointtype {} pointsize {} linewidth 2 linecolor '{}' title {}", what,
                                  marker.type, marker.size, colour, title);
@@ -243,7 +256,10 @@ std::string script(const Figure& figure) {
             if (!x.shows(curve.x[i]) || !y.shows(curve.y[i])) continue;
             x.include(curve.x[i]);
             y.include(curve.y[i]);
-            if (!curve.lo.empty()) {
+            if (curve.style == Curve::Style::band) {
+                if (y.shows(curve.lo[i])) y.include(curve.lo[i]);
+                if (y.shows(curve.hi[i])) y.include(curve.hi[i]);
+            } else if (!curve.lo.empty()) {
                 y.include_bar(curve.lo[i]);
                 y.include_bar(curve.hi[i]);
             }
@@ -255,16 +271,20 @@ std::string script(const Figure& figure) {
     std::vector<const Curve*> order;
     for (const Curve& curve : figure.curves) order.push_back(&curve);
     std::stable_partition(order.begin(), order.end(), [](const Curve* c) { return c->style != Curve::Style::dashed; });
+    std::stable_partition(order.begin(), order.end(), [](const Curve* c) { return c->style == Curve::Style::band; });
 
     std::string data;
     std::string plots;
     std::size_t solid = 0;
     std::size_t dashed = 0;
+    std::size_t bands = 0;
     std::size_t lines = static_cast<std::size_t>(
         std::count_if(order.begin(), order.end(), [](const Curve* c) { return c->style == Curve::Style::line; }));
     for (std::size_t i = 0; i < order.size(); ++i) {
         if (order[i]->style == Curve::Style::line) --lines;
-        const std::size_t rank = order[i]->style == Curve::Style::dashed ? dashed++ : solid++;
+        const std::size_t rank = order[i]->style == Curve::Style::dashed ? dashed++
+                                 : order[i]->style == Curve::Style::band ? bands++
+                                                                         : solid++;
         const Plotted curve = plotted(*order[i], i, rank, lines, x, y);
         data += curve.data;
         plots += (i == 0 ? "" : ", ") + curve.plots;
@@ -287,7 +307,8 @@ std::string script(const Figure& figure) {
                "set grid xtics ytics linetype 1 linewidth 0.8 linecolor '#DDDDDD'\n",
                width_px, height, literal_lines(figure.title, 80), literal(figure.x_label), literal(figure.y_label),
                columns) +
-           x.settings("x") + y.settings("y") + data + "plot " + plots + "\n";
+           x.settings("x") + (figure.whole_x ? "set xtics 1\nunset mxtics\n" : "") + y.settings("y") + data + "plot " +
+           plots + "\n";
 }
 
 }  // namespace

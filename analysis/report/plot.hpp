@@ -8,8 +8,9 @@ namespace ringlock::report {
 /// One curve of a figure. Labels and titles are UTF-8 and are shown as they are.
 struct Curve {
     /// points: markers with error bars; line, dashed: straight lines between the points (dashed: drawn above all
-    /// others, for theory).
-    enum class Style { points, line, dashed };
+    /// others, for theory); band: what lies between lo and hi, filled, below all others. Bands have the colours of the
+    /// first curves.
+    enum class Style { points, line, dashed, band };
 
     std::string label;
     std::vector<double> x = {};
@@ -27,6 +28,7 @@ struct Figure {
     bool log_x = false;
     bool log_y = false;
     std::vector<Curve> curves = {};
+    bool whole_x = false;  ///< ticks at whole numbers only
 };
 
 /// Draws a figure with gnuplot as SVG 900 wide and 620 high (higher when the legend is long).

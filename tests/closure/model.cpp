@@ -4,13 +4,16 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <random>
+#include <string>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/turn_fit.hpp"
 #include "analysis/closure/turn_kicks.hpp"
 #include "analysis/closure/whitening.hpp"
 #include "engine/core/units.hpp"
+#include "engine/gyro/device.hpp"
 #include "engine/gyro/theory.hpp"
+#include "engine/propagate/direct_lanes.hpp"
 #include "tests/closure/generator.hpp"
 
 namespace ringlock::test::closure {
@@ -38,34 +41,126 @@ TEST(TurnKicks, AreTheSineToFirstOrder) {
     }
 }
 
-TEST(TurnKicks, OfNearbyGyrosDoForEachOther) {
-    // By as much as the model of a record rounds rates and thresholds.
+/// The device of Gao and Deng, with what changes its kicks. A dither with a second harmonic whose half cycles differ in
+/// length has jumps of its rate at the turns, between which there is no zero-rate point: not both.
+gyro::Setup kicked(const std::string& with) {
     gyro::Setup setup;
     setup.dither_frequency_hz = 124.68;
     setup.dither_peak_rate_deg_s = 109.1;
-    for (const double rate_deg_h : {0.0, 300.0}) {
-        setup.input_rate_deg_h = rate_deg_h;
-        const TurnKicks kicks(setup);
-        gyro::Setup near = setup;
-        near.input_rate_deg_h += 0.5;
-        const TurnKicks turned(near);
-        near = setup;
-        near.lockin_threshold_deg_h *= std::exp(5e-4);
-        const TurnKicks stronger(near);
-        double by_rate = 0.0;
-        double by_threshold = 0.0;
-        for (double psi = 0.0; psi < units::two_pi; psi += 0.1) {
-            for (const int direction : {1, -1}) {
-                const TurnKicks::Kick kick = kicks.at(direction, psi);
-                const TurnKicks::Kick other = stronger.at(direction, psi);
-                by_rate = std::max(by_rate, std::abs(turned.at(direction, psi).after_rad - kick.after_rad));
-                by_threshold = std::max(by_threshold, std::abs(std::exp(-5e-4) * other.after_rad - kick.after_rad));
-            }
+    setup.input_rate_deg_h = 40.0;
+    if (with == "nothing") return setup;
+    setup.coupling_phase_rad = 0.3;
+    setup.lockin_turn_asymmetry = 0.1;
+    if (with == "an asymmetric dither") {
+        setup.dither_asymmetry_ratio = 0.01;
+    } else {
+        setup.dither_harmonic_ratio = 0.01;
+        setup.dither_harmonic_phase_rad = 1.0;
+    }
+    return setup;
+}
+const std::vector<std::string> kinds{"nothing", "an asymmetric dither", "a dither with a second harmonic"};
+
+/// Phase that the lock-in adds from a turn of the dither to the next, by the equation of motion through every fringe.
+double integrated_rad(const gyro::Device& device, int direction, double psi_rad) {
+    const propagate::Stretch stretch{device.half_cycle(direction, device.dither_amplitude_rad), device.coupling,
+                                     psi_rad / units::two_pi,
+                                     direction > 0 ? device.positive_duration_s : device.negative_duration_s};
+    propagate::StretchResult result;
+    propagate::integrate({&stretch, 1}, 1e-11, {&result, 1});
+    return result.lockin_rad;
+}
+
+/// Phase at the zero-rate point less that at the dither's turn, by Runge and Kutta's steps of fourth order. There are
+/// two half cycles about a turn; the phase stands still in the one that its rate at the turn leads to.
+double gained_rad(const gyro::Device& device, int direction, double psi_rad) {
+    gyro::HalfCycle half = device.half_cycle(direction, device.dither_amplitude_rad);
+    const gyro::Coupling& coupling = device.coupling;
+    const auto rate = [&](double time_s, double psi) {
+        const double b = coupling.b_rad_s * (1.0 + coupling.turn_asymmetry * half.sign *
+                                                       std::cos(half.angular_frequency_rad_s() * time_s));
+        return half.drive_rate_rad_s(time_s) +
+               b * (std::sin(psi + coupling.phase_rad) +
+                    coupling.second_ratio * std::sin(2.0 * psi + coupling.second_phase_rad));
+    };
+    double time_s = 0.0;
+    if (direction * rate(0.0, psi_rad) > 0.0) {
+        half = device.half_cycle(-direction, device.dither_amplitude_rad);
+        time_s = half.duration_s;
+    }
+    double psi = psi_rad;
+    // Newton's steps in time, each in small ones of the equation; the last are short.
+    constexpr int small = 200;
+    for (int i = 0; i < 6; ++i) {
+        const double h = 1e-9;
+        const double now = rate(time_s, psi);
+        const double t = -now * h / (rate(time_s + h, psi + h * now) - now) / small;
+        for (int j = 0; j < small; ++j) {
+            const double k1 = rate(time_s, psi);
+            const double k2 = rate(time_s + 0.5 * t, psi + 0.5 * t * k1);
+            const double k3 = rate(time_s + 0.5 * t, psi + 0.5 * t * k2);
+            const double k4 = rate(time_s + t, psi + t * k3);
+            psi += t * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0;
+            time_s += t;
         }
-        std::printf("at %g deg/h: 0.5 deg/h change half a kick by %.2g rad, 5e-4 of the threshold by %.2g rad\n",
-                    rate_deg_h, by_rate, by_threshold);
-        EXPECT_LT(by_rate, 1e-5);
-        EXPECT_LT(by_threshold, 1e-5);
+    }
+    return psi - psi_rad;
+}
+
+TEST(TurnKicks, AddUpToTheEquationOfMotion) {
+    for (const double second : {0.0, 0.3}) {
+        for (const std::string& with : kinds) {
+            gyro::Setup setup = kicked(with);
+            setup.lockin_second_ratio = second;
+            setup.lockin_second_phase_rad = 0.5;
+            const gyro::Device device(setup);
+            const TurnKicks kicks(setup);
+            double worst_rad = 0.0;
+            for (const int direction : {1, -1}) {
+                for (double psi = 0.0; psi < units::two_pi; psi += 0.3) {
+                    // From turn to turn: less the ways from the dither's turns to the zero-rate points.
+                    const double lockin = integrated_rad(device, direction, psi);
+                    const gyro::HalfCycle half = device.half_cycle(direction, device.dither_amplitude_rad);
+                    const double next = std::remainder(psi + half.plain_phase_total_rad() + lockin, units::two_pi);
+                    const double start_gain = gained_rad(device, direction, psi);
+                    const double end_gain = gained_rad(device, -direction, next);
+                    const double kick = kicks.at(direction, psi + start_gain).after_rad + start_gain +
+                                        kicks.at(-direction, next + end_gain).before_rad - end_gain;
+                    worst_rad = std::max(worst_rad, std::abs(kick - lockin));
+                }
+            }
+            std::printf("second harmonic %g, with %s: largest error of a half cycle %.2g rad\n", second, with.c_str(),
+                        worst_rad);
+            // Rounding of two thousand fringes.
+            EXPECT_LT(worst_rad, 1e-10);
+        }
+    }
+}
+
+TEST(TurnKicks, AreInterpolatedBetweenRates) {
+    for (const std::string& with : kinds) {
+        for (const double reach_deg_h : {0.0, 5.0, 100.0, 300.0, 1000.0, 5000.0, 50000.0}) {
+            // Its kink wanders with the rate.
+            if (with == "an asymmetric dither" && reach_deg_h > 5000.0) continue;
+            gyro::Setup setup = kicked(with);
+            const KicksOverRates kicks(setup, 40.0 - reach_deg_h, 40.0 + reach_deg_h);
+            double worst_rad = 0.0;
+            for (const double share : {-0.95, -0.5, 0.1, 0.35, 0.8}) {
+                setup.input_rate_deg_h = 40.0 + share * reach_deg_h;
+                const TurnKicks exact(setup);
+                for (const int direction : {1, -1}) {
+                    for (double psi = 0.0; psi < units::two_pi; psi += 0.1) {
+                        const TurnKicks::Kick one = exact.at(direction, psi);
+                        const TurnKicks::Kick other = kicks.at(direction, std::polar(1.0, psi), setup.input_rate_deg_h);
+                        worst_rad = std::max({worst_rad, std::abs(one.before_rad - other.before_rad),
+                                              std::abs(one.after_rad - other.after_rad)});
+                    }
+                }
+            }
+            std::printf("rates within %g deg/h, with %s: largest error of half a kick %.2g rad\n", reach_deg_h,
+                        with.c_str(), worst_rad);
+            EXPECT_LT(worst_rad, 1e-8) << reach_deg_h;
+        }
     }
 }
 

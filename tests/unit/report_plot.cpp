@@ -169,6 +169,32 @@ TEST_F(ReportPlot, BarsEndAtTheAxes) {
     EXPECT_THAT(svg, Not(HasSubstr("inf")));
 }
 
+TEST_F(ReportPlot, FillsABandBelowTheCurves) {
+    NEEDS_GNUPLOT();
+    Figure figure = allan_figure();
+    Curve band{.label = "simulations", .x = {1.0, 10.0, 100.0}, .y = {0.05, 0.02, 0.01}, .lo = {0.05, 0.02, 0.01}};
+    band.hi = {0.2, 0.1, inf};
+    band.style = Curve::Style::band;
+    figure.curves.push_back(band);
+    const std::string svg = draw(figure);
+    const auto fill = svg.find("fill-opacity");
+    ASSERT_NE(fill, std::string::npos);
+    EXPECT_LT(fill, svg.find("stroke-dasharray"));
+    EXPECT_THAT(svg, HasSubstr("simulations"));
+    EXPECT_THAT(svg, Not(HasSubstr("inf")));
+    figure.curves.back().lo.clear();
+    figure.curves.back().hi.clear();
+    EXPECT_THROW(draw(figure), std::invalid_argument);
+}
+
+TEST_F(ReportPlot, CountsHaveTicksAtWholeNumbers) {
+    NEEDS_GNUPLOT();
+    Figure figure{"", "", "", false, false, {{.label = "a", .x = {0.0, 1.0, 2.0}, .y = {1.0, 2.0, 3.0}}}};
+    EXPECT_THAT(draw(figure), HasSubstr(">0.5<"));
+    figure.whole_x = true;
+    EXPECT_THAT(draw(figure), Not(HasSubstr(">0.5<")));
+}
+
 TEST_F(ReportPlot, ACurveWithoutPointsSaysSoInTheLegend) {
     NEEDS_GNUPLOT();
     Figure figure = allan_figure();
