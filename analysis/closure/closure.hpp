@@ -59,6 +59,9 @@ Closure close_loop(const record::Record& record);
 /// record reaches. Effects start from the values given.
 Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
 
+/// The same of samples.
+Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects);
+
 /// The two of them.
 Closure close_turns(const record::Record& record);
 Closure close_samples(const record::Record& record);

@@ -133,6 +133,7 @@ Lattice find_lattice(const std::vector<double>& increments) {
     lattice.printed_arcsec = lattice.step_arcsec = step;
     lattice.strength = 1.0;
     lattice.p_value = 0.0;
+    lattice.step_sd_arcsec = 1e-9 * step;  // by the digits of the values
     // A coarser one that the digits of the record blur: its characteristic function stands out between the bulk's, near
     // zero, and the digits' own, at 1/printed.
     std::vector<std::pair<double, double>> weights;  // level, how often; those not zero
@@ -185,6 +186,11 @@ Lattice find_lattice(const std::vector<double>& increments) {
         lattice.step_arcsec = 1.0 / at;
         lattice.strength = best;
         lattice.p_value = p;
+        // A frequency from phases 2 pi u x with noise of which exp(i noise) has the mean c, cos(2 noise) c^4 where it
+        // is normal: variance (1 - c^4)/(2 c^2 N (2 pi sigma)^2) of u = 1/step.
+        const double c2 = best * best;
+        const double u_sd = std::sqrt((1.0 - c2 * c2) / (2.0 * c2 * count)) / (units::two_pi * sigma);
+        lattice.step_sd_arcsec = u_sd / (at * at);
     }
     return lattice;
 }

@@ -32,6 +32,7 @@ struct Lattice {
     double step_arcsec = 0.0;     ///< coarser one below, blurred by that; else the same
     double strength = 0.0;        ///< of the coarser: length of the mean of exp(2 pi i value/step) over values not zero
     double p_value = 1.0;
+    double step_sd_arcsec = 0.0;  ///< standard error of the step
 };
 Lattice find_lattice(const std::vector<double>& increments);
 
