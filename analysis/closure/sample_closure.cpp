@@ -400,6 +400,7 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
         } else if (effect == "resampling") {
             model.noise.from_hz = active.values.at("from_hz");
             model.noise.blur_arcsec = 1e-3 * now_.fit->sd(0);
+            model.noise.digits_arcsec = 1e-4 * now_.fit->sd(0);
             noise = SampleFit::Noise::free;
         } else if (effect == "rate_random_walk") {
             model.walk = true;

@@ -164,7 +164,7 @@ void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estim
     if (seen) {
         // The same resonance beside what the witness tells: the share of its power that is still needed.
         SampleModel beside = whole.model();
-        beside.motion = fit_witness(whole, witness).increments;
+        beside.motion = told.increments;
         const SampleFit first(series, beside, fit.rows(), SampleFit::Noise::near);
         const double untold = first.model().noise.resonances.front().arcsec;
         const double untold_sd = first.noise_errors().noise.resonances.front().arcsec;

@@ -84,8 +84,9 @@ void SampleFilter::set_up(const SampleNoise& noise, double interval_s) {
         for (int j = 0; j < n_; ++j) q_[j][r1] = q_[r1][j];
         n_ += 2;
         p[r0][r0] = p[r1][r1] = p[0][0] + q_[r1][r1];
-        // Interpolated readings have no error of their own; digits have.
-        floor_ = noise.blur_arcsec * noise.blur_arcsec + 1e-8 * (readout + q_[0][0]);
+        // Interpolated readings have no error of their own; digits have. They do not go with the noise: rows that are
+        // settled by others would count for a smaller one.
+        floor_ = noise.blur_arcsec * noise.blur_arcsec + noise.digits_arcsec * noise.digits_arcsec;
         ratio_ = interval_s * noise.from_hz;
         first_place_ = noise.from_phase;
     } else {

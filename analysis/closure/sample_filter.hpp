@@ -21,9 +21,10 @@ struct SampleNoise {
         double arcsec, hz, width_hz;
     };
     std::vector<Resonance> resonances = {};
-    double from_hz = 0.0;      ///< taken at that rate and interpolated; 0: not
-    double blur_arcsec = 0.0;  ///< rms of what interpolated readings are off the straight line
-    double from_phase = 0.0;   ///< source intervals from the sample before the record's start to that start
+    double from_hz = 0.0;        ///< taken at that rate and interpolated; 0: not
+    double blur_arcsec = 0.0;    ///< rms of what interpolated readings are off the straight line
+    double digits_arcsec = 0.0;  ///< the least of it: what the values are written to
+    double from_phase = 0.0;     ///< source intervals from the sample before the record's start to that start
 };
 
 /// The Kalman filter that makes innovations of increments: independent and of unit variance where the noise is as said.

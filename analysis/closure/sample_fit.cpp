@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numeric>
 
 #include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
@@ -109,14 +110,15 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
     if (model_.columns.empty()) {
         model_.columns.push_back(
             {"", "mean_rate_deg_h", std::make_shared<std::vector<double>>(series.size(), series.interval_s)});
+        take_off();
         double mean = 0.0;
-        for (const double x : series.increment) mean += x / static_cast<double>(series.size());
+        for (const double x : rest_) mean += x / static_cast<double>(series.size());
         model_.columns[0].value = mean * series.rate_hz;
         double white = 0.0;
         double next = 0.0;
         for (std::size_t i = 1; i < series.size(); ++i) {
-            const double a = series.increment[i - 1] - mean;
-            const double b = series.increment[i] - mean;
+            const double a = rest_[i - 1] - mean;
+            const double b = rest_[i] - mean;
             white += b * b / static_cast<double>(series.size());
             next += a * b / static_cast<double>(series.size());
         }
@@ -136,6 +138,12 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
 
 void SampleFit::take_off() {
     rest_ = series_->increment;
+    if (!series_->input_rate_deg_h.empty()) {
+        // What is known of the input but for its mean, which belongs to the mean rate.
+        const auto& input = series_->input_rate_deg_h;
+        const double mean = std::accumulate(input.begin(), input.end(), 0.0) / static_cast<double>(input.size());
+        for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= (input[i] - mean) * series_->interval_s;
+    }
     if (!model_.motion.empty()) {
         for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= model_.motion[i];
     }

@@ -211,6 +211,7 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
                 model.noise.from_hz = from;
                 model.noise.from_phase = 0.125 * place;
                 model.noise.blur_arcsec = 0.2 * now.sd(0);
+                model.noise.digits_arcsec = 1e-4 * now.sd(0);
                 ++tried;
                 const SampleFilter filter(model.noise, part, in.series.interval_s);
                 const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
