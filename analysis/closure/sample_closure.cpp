@@ -102,8 +102,11 @@ class Loop {
     double lattice_step() const { return series_.counted ? 0.25 * series_.scale_factor_arcsec : lattice_.step_arcsec; }
     void begin(Closure& closure);
     void take_lattice(Closure& closure);
-    std::vector<Contender> contenders() const;
-    bool something_else(const std::string& effect, double merit) const;
+    std::vector<Contender> contenders(const State& state, int step) const;
+    double rival_merit(const std::string& effect, double merit_of_effect) const;
+    std::optional<Contender> of_several_effects(std::vector<Contender> all, double least) const;
+    void take(Contender best, const std::vector<Contender>& all, Closure& closure);
+    void take_back_lines(Closure& closure);
     void drop_needless();
     void test_what_is_left(Closure& closure) const;
     void finish(Closure& closure);
@@ -132,6 +135,12 @@ void Loop::begin(Closure& closure) {
         closure.notes.push_back(fmt::format(
             "the record declares no scale factor; {:g} arcsec per fringe assumed, with which all rates scale",
             series_.scale_factor_arcsec));
+    }
+    if (series_.input_late_s > 0.0) {
+        closure.notes.push_back(
+            fmt::format("the known input goes with the samples {:.3g} s later: their times are not those "
+                        "of the ends of their intervals",
+                        series_.input_late_s));
     }
     now_.fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
     closure.heldout_before = heldout(*now_.fit, reported_, 0.0).error;
@@ -191,18 +200,18 @@ void Loop::take_lattice(Closure& closure) {
 }
 
 /// What the screening lets pass, each fitted in full; the likeliest first.
-std::vector<Loop::Contender> Loop::contenders() const {
-    auto candidates = screen_samples(*now_.fit, {record_.declared, series_, rows_, now_.lines_hz, next_step_});
+std::vector<Loop::Contender> Loop::contenders(const State& state, int step) const {
+    auto candidates = screen_samples(*state.fit, {record_.declared, series_, rows_, state.lines_hz, step});
     std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
     std::vector<Contender> all;
     for (SampleCandidate& candidate : candidates) {
         if (!(candidate.p_value * effects_on_samples < level_of_effects)) continue;
         if (all.size() >= most_contenders + 2) break;
         auto fit = std::make_shared<SampleFit>(series_, candidate.model, rows_, candidate.noise);
-        const double gain = fit->log_likelihood() - now_.fit->log_likelihood();
+        const double gain = fit->log_likelihood() - state.fit->log_likelihood();
         const double merit = gain - std::log(candidate.searched) - candidate.parameters;
         // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
-        const double p_full = of_several(chi2_tail(2.0 * gain, candidate.parameters), candidate.searched);
+        const double p_full = of_several(chi2_tail(2.0 * gain, candidate.freedom), candidate.searched);
         if (merit < 0.0 || p_full * effects_on_samples >= level_of_effects) continue;
         all.push_back({std::move(candidate), std::move(fit), merit});
     }
@@ -210,24 +219,64 @@ std::vector<Loop::Contender> Loop::contenders() const {
     return all;
 }
 
-/// Whether some view of the residual explains more than the best effect, the noise fitted anew beside either: then
-/// that one is only what comes nearest to something that the library does not have.
-bool Loop::something_else(const std::string& effect, double merit) const {
+/// The most that a view of the residual explains, the noise fitted anew beside it: where it is more than the best
+/// effect does, that one is only what comes nearest to something that the library does not have. What a view must have
+/// more than an effect to be taken for the truth is off it.
+double Loop::rival_merit(const std::string& effect, double merit_of_effect) const {
     constexpr std::size_t looked_at = 4;
     auto views = view_samples(*now_.fit, lattice_step());
-    std::erase_if(views, [](const View& view) { return !view.columns || view.test.merit < tie; });
+    std::erase_if(views, [](const View& view) { return view.test.merit < tie; });
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
-    if (views.size() > looked_at) views.resize(looked_at);
+    if (views.size() > looked_at) {
+        // Jumps are looked at in any case: a random rate can follow them, and no other view says what they are.
+        const auto jumps = std::find_if(views.begin() + looked_at, views.end(), [](const View& v) { return v.jumps; });
+        if (jumps != views.end()) std::swap(views[looked_at - 1], *jumps);
+        views.resize(looked_at);
+    }
     const bool random = is_random_rate(effect);
-    return std::any_of(views.begin(), views.end(), [&](const View& view) {
+    double most = 0.0;
+    for (const View& view : views) {
         // What follows jumps, or another column of the record, a random rate can follow nearly as well.
         const bool followed = random && (view.jumps || view.test.where != Where::time);
         // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
         // course in time (Schwarz 1978).
         const bool course = random && view.test.where == Where::time && !view.jumps;
         const double integrated = course ? 0.5 * std::log(static_cast<double>(series_.size())) - 1.0 : 0.0;
-        return refitted_merit(*now_.fit, view, integrated) > (followed ? merit - tie : merit + tie);
-    });
+        const double merit = view.columns ? refitted_merit(*now_.fit, view, integrated) : view.test.merit;
+        // The course of jumps is searched stretch by stretch and loses a part of what they explain.
+        const double lost = random && view.jumps ? std::max(tie, 0.1 * merit_of_effect) : tie;
+        most = std::max(most, merit + (followed ? lost : -tie));
+    }
+    return most;
+}
+
+/// One effect at a time may explain less than a random rate, or a view, where several of the library together explain
+/// more: the first of the best such set, none of them a random rate, each found after the one before.
+std::optional<Loop::Contender> Loop::of_several_effects(std::vector<Contender> all, double least) const {
+    constexpr std::size_t starts = 4;
+    constexpr int most_of_them = 3;
+    const auto no_random = [](std::vector<Contender>& some) {
+        std::erase_if(some, [](const Contender& c) { return is_random_rate(c.candidate.effect); });
+    };
+    no_random(all);
+    if (all.size() > starts) all.resize(starts);
+    std::optional<Contender> best;
+    for (const Contender& first : all) {
+        double merit = first.merit;
+        State state = now_;
+        state.fit = first.fit;
+        for (int k = 1; k < most_of_them; ++k) {
+            auto more = contenders(state, next_step_ + k);
+            no_random(more);
+            if (more.empty()) break;
+            merit += more.front().merit;
+            state.fit = more.front().fit;
+        }
+        if (merit <= least) continue;
+        least = merit;
+        best = first;
+    }
+    return best;
 }
 
 /// Effects that stood in for the one added last are no longer needed beside it.
@@ -279,8 +328,8 @@ void Loop::test_what_is_left(Closure& closure) const {
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
     double most = 0.0;
     for (std::size_t k = 0; k < std::min(looked_at, views.size()); ++k) {
-        if (!views[k].columns) continue;
-        const double merit = refitted_merit(*now_.fit, views[k]);
+        if (!views[k].columns && !(views[k].test.merit > 0.0)) continue;
+        const double merit = views[k].columns ? refitted_merit(*now_.fit, views[k]) : views[k].test.merit;
         if (merit <= most) continue;
         most = merit;
         closure.unexplained = views[k].test;
@@ -322,41 +371,21 @@ Closure Loop::run() {
     take_lattice(closure);
     std::optional<State> earlier;  // before the first random rate
     while (now_.steps.size() < most_steps) {
-        auto all = contenders();
+        auto all = contenders(now_, next_step_);
         if (all.empty()) break;
-        Contender& best = all.front();
-        const std::string effect = best.candidate.effect;
-        if (something_else(effect, best.merit)) break;
-        Step step;
-        step.effect = effect;
-        step.p_value = best.candidate.p_value;
-        step.confounded_with = best.candidate.confounded;
-        for (std::size_t k = 1; k < all.size(); ++k) {
-            const std::string& other = all[k].candidate.effect;
-            if (best.merit - all[k].merit < tie && other != effect) step.confounded_with.push_back(other);
-        }
-        if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
-        if (!earlier && is_random_rate(effect)) earlier = now_;
-        const Score before = heldout(*now_.fit, reported_, used_step_);
-        now_.fit = best.fit;
-        drop_needless();
-        const Score after = heldout(*now_.fit, reported_, used_step_);
-        step.heldout_error_before = before.error;
-        step.heldout_error_after = after.error;
-        step.heldout_log_score_gain = after.log_score - before.log_score;
-        if (is_line(effect)) {
-            const SampleModel& model = now_.fit->model();
-            now_.lines_hz.push_back(best.candidate.wanders ? model.noise.resonances.back().hz
-                                                           : model.columns[model.columns.size() - 2].hz);
-            if (best.candidate.wanders) {
-                closure.notes.push_back(fmt::format(
-                    "the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "
-                    "samples before as a narrow resonance",
-                    now_.lines_hz.back()));
+        Contender best = all.front();
+        const double rival = rival_merit(best.candidate.effect, best.merit);
+        const bool random = is_random_rate(best.candidate.effect);
+        if (random || rival > best.merit) {
+            const auto first = of_several_effects(all, std::max(rival, random ? best.merit : 0.0));
+            if (first) {
+                best = *first;
+            } else if (rival > best.merit) {
+                break;
             }
         }
-        now_.steps.push_back(std::move(step));
-        now_.told.push_back({effect, next_step_++, best.candidate.witness, best.candidate.strong});
+        if (!earlier && is_random_rate(best.candidate.effect)) earlier = now_;
+        take(std::move(best), all, closure);
     }
     test_what_is_left(closure);
     if (earlier && closure.unexplained) {
@@ -364,8 +393,66 @@ Closure Loop::run() {
         now_ = std::move(*earlier);
         test_what_is_left(closure);
     }
+    take_back_lines(closure);
     finish(closure);
     return closure;
+}
+
+/// Adds an effect to the model.
+void Loop::take(Contender best, const std::vector<Contender>& all, Closure& closure) {
+    const std::string effect = best.candidate.effect;
+    Step step;
+    step.effect = effect;
+    step.p_value = best.candidate.p_value;
+    step.confounded_with = best.candidate.confounded;
+    for (const Contender& other : all) {
+        const std::string& name = other.candidate.effect;
+        const bool named =
+            std::find(step.confounded_with.begin(), step.confounded_with.end(), name) != step.confounded_with.end();
+        if (std::abs(best.merit - other.merit) < tie && name != effect && !named) step.confounded_with.push_back(name);
+    }
+    if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
+    const Score before = heldout(*now_.fit, reported_, used_step_);
+    now_.fit = best.fit;
+    drop_needless();
+    const Score after = heldout(*now_.fit, reported_, used_step_);
+    step.heldout_error_before = before.error;
+    step.heldout_error_after = after.error;
+    step.heldout_log_score_gain = after.log_score - before.log_score;
+    if (is_line(effect)) {
+        const SampleModel& model = now_.fit->model();
+        now_.lines_hz.push_back(best.candidate.wanders ? model.noise.resonances.back().hz
+                                                       : model.columns[model.columns.size() - 2].hz);
+        if (best.candidate.wanders) {
+            closure.notes.push_back(
+                fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "
+                            "samples before as a narrow resonance",
+                            now_.lines_hz.back()));
+        }
+    }
+    now_.steps.push_back(std::move(step));
+    now_.told.push_back({effect, next_step_++, best.candidate.witness, best.candidate.strong});
+}
+
+/// A line of the library keeps its amplitude, and its frequency but for an even drift. One that does not, as its own
+/// amplitudes in time or lines beside it show, is none and is not named.
+void Loop::take_back_lines(Closure& closure) {
+    if (!closure.unexplained) return;
+    const UnsteadyLine line = unsteady_line(*now_.fit);
+    const bool fails = of_several(line.p_value, static_cast<double>(closure.tests.size())) < level_of_residual;
+    if (!fails && !line.beside) return;
+    for (std::size_t k = 0; k < now_.told.size(); ++k) {
+        if (now_.told[k].step != line.step) continue;
+        const std::string at = fmt::format("at {:.6g} Hz", line.hz);
+        closure.unexplained = ResidualTest{line.beside ? Where::frequency : Where::amplitude,
+                                           "a line that does not keep its amplitude or its frequency",
+                                           fails ? line.p_value : closure.unexplained->p_value, at};
+        closure.notes.push_back(
+            fmt::format("the line {} is in the model, so that the rest can be told, and is not named", at));
+        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
+        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+        return;
+    }
 }
 
 /// Whatever is known to be there, at the values given or near them.
@@ -400,7 +487,7 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
         } else if (effect == "resampling") {
             model.noise.from_hz = active.values.at("from_hz");
             model.noise.blur_arcsec = 1e-3 * now_.fit->sd(0);
-            model.noise.digits_arcsec = 1e-4 * now_.fit->sd(0);
+            model.noise.digits_arcsec = 1e-6 * now_.fit->sd(0);
             noise = SampleFit::Noise::free;
         } else if (effect == "rate_random_walk") {
             model.walk = true;

@@ -35,7 +35,7 @@ Unaliased unaliased(double hz, double rate_hz, const record::Declared& declared)
     if (!declared.dither_frequency_hz) return {hz, 1.0};
     for (int h = 1; h <= 3; ++h) {
         const double of_dither = h * *declared.dither_frequency_hz;
-        if (std::abs(alias(of_dither, rate_hz) - hz) >= 0.005 * of_dither) continue;
+        if (std::abs(alias(of_dither, rate_hz) - hz) >= declared_to * of_dither) continue;
         const double whole = std::round(of_dither / rate_hz) * rate_hz;
         return of_dither >= whole ? Unaliased{whole + hz, 1.0} : Unaliased{whole - hz, -1.0};
     }

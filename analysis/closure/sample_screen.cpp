@@ -148,7 +148,8 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
     // What is left beside a line that is in the model is that line, not being what the model says.
     const FoundLine line = find_line(e, in.series.rate_hz, true, in.lines_hz, 64.0 / duration_s);
     if (!(line.p_value < 0.01)) return;
-    SampleCandidate c{.model = now.model(), .p_value = line.p_value, .searched = line.searched, .parameters = 3};
+    SampleCandidate c{
+        .model = now.model(), .p_value = line.p_value, .searched = line.searched, .parameters = 2, .freedom = 2};
     const SampleLine still = refine_line(now, {.hz = line.frequency_hz, .drift_hz_per_s = 0.0, .drifts = false});
     const SampleLine moving =
         refine_line(now, {.hz = line.frequency_hz, .drift_hz_per_s = line.drift_hz_per_s, .drifts = true});
@@ -159,7 +160,7 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
     if (in.declared.dither_frequency_hz) {
         for (int h = 1; h <= 3; ++h) {
             const double hz = alias(h * *in.declared.dither_frequency_hz, in.series.rate_hz);
-            if (std::abs(line.frequency_hz - hz) < 0.005 * h * *in.declared.dither_frequency_hz) declared = true;
+            if (std::abs(line.frequency_hz - hz) < declared_to * h * *in.declared.dither_frequency_hz) declared = true;
         }
     }
     dither = dither || declared;
@@ -172,6 +173,7 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
         c.effect = "dither_residue";
         if (!declared) c.confounded = {"base_vibration"};
         c.wanders = true;
+        c.parameters = c.freedom = 3;
         double squares = 0.0;
         double rows = 0.0;
         for (std::size_t i = 0; i < e.size(); ++i) {
@@ -199,20 +201,22 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
     // Rates whose distance from a multiple of the record's is that frequency, by likelihood on a part of the record.
     const double rate = in.series.rate_hz;
     const std::size_t part = std::min<std::size_t>(in.series.size(), 20000);
-    double best = -1e300;
-    SampleModel found;
-    int tried = 0;
+    struct Found {
+        double value;
+        SampleModel model;
+    };
+    std::vector<Found> found;
     for (int m = 0; m <= 4; ++m) {
         for (const int sign : {-1, 1}) {
             const double from = m * rate + sign * cycle.frequency_hz;
             if (from < 0.3 * rate || from > 4.5 * rate || std::abs(from - rate) < 1e-9 * rate) continue;
+            Found best{-1e300, {}};
             for (int place = 0; place < 8; ++place) {
                 SampleModel model = now.model();
                 model.noise.from_hz = from;
                 model.noise.from_phase = 0.125 * place;
                 model.noise.blur_arcsec = 0.2 * now.sd(0);
-                model.noise.digits_arcsec = 1e-4 * now.sd(0);
-                ++tried;
+                model.noise.digits_arcsec = 1e-6 * now.sd(0);
                 const SampleFilter filter(model.noise, part, in.series.interval_s);
                 const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
                 // The scale free, all else as it is.
@@ -226,20 +230,23 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
                     count += 1.0;
                 }
                 const double value = -0.5 * count * std::log(squares / count) - logs;
-                if (value > best) {
-                    best = value;
-                    found = model;
-                }
+                if (value > best.value) best = {value, model};
             }
+            found.push_back(std::move(best));
         }
     }
-    if (tried == 0) return;
-    out.push_back({.effect = "resampling",
-                   .model = found,
-                   .p_value = cycle.p_value,
-                   .searched = cycle.searched,
-                   .parameters = 2,
-                   .noise = SampleFit::Noise::free});
+    // What interpolation does to the share of the noises is not in these: the best few are fitted in full.
+    std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.value > b.value; });
+    constexpr std::size_t looked_at = 3;
+    for (std::size_t k = 0; k < std::min(looked_at, found.size()); ++k) {
+        out.push_back({.effect = "resampling",
+                       .model = found[k].model,
+                       .p_value = cycle.p_value,
+                       .searched = cycle.searched,
+                       .parameters = 2,
+                       .freedom = 2,
+                       .noise = SampleFit::Noise::free});
+    }
 }
 
 /// A motion that is the witness's and turned by a quarter of a cycle, slow drifts left out: two numbers tell of weak
@@ -258,8 +265,12 @@ void screen_weak_motion(const SampleFit& now, const SampleContext& in, std::vect
     const auto count = static_cast<double>(in.series.witnesses.size());
     const double p = rank > 0 ? of_several(chi2_tail(best, rank), 2.0 * count) : 1.0;
     if (!(p < level_of_effects)) return;
-    SampleCandidate c{
-        .effect = "case_motion", .model = now.model(), .p_value = p, .searched = 2.0 * count, .parameters = rank};
+    SampleCandidate c{.effect = "case_motion",
+                      .model = now.model(),
+                      .p_value = p,
+                      .searched = 2.0 * count,
+                      .parameters = rank,
+                      .freedom = rank};
     add_motion(c.model, in.series, at, in.step);
     c.witness = at;
     out.push_back(std::move(c));
@@ -275,7 +286,8 @@ void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector
                       .model = now.model(),
                       .p_value = witness.p_value,
                       .searched = static_cast<double>(in.series.witnesses.size()),
-                      .parameters = 2 * witness.lags + 1};
+                      .parameters = 2 * witness.lags + 1,
+                      .freedom = 2 * witness.lags + 1};
     c.model.motion = motion.increments;
     // What the witness does not tell moves like what it tells; its own noise hides the edges of that.
     const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));

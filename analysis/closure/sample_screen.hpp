@@ -16,6 +16,7 @@ struct SampleCandidate {
     double p_value = 1.0;
     double searched = 1.0;
     int parameters = 1;
+    int freedom = 1;          ///< of its chi-squared, beside what the search counts
     bool wanders = false;     ///< a line as a narrow resonance
     bool strong = false;      ///< motion that is told at many lags
     std::size_t witness = 0;  ///< in the series, of a motion
@@ -40,6 +41,8 @@ void add_line(SampleModel& model, const SampleSeries& series, const SampleLine& 
 /// What a motion in proportion to a witness adds to the increments, and the same a quarter of a cycle later.
 std::vector<std::vector<double>> motion_columns(const std::vector<double>& witness);
 void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witness, int step);
+/// Of itself, a declared frequency of the dither may be off: more, with its harmonics, would be half of all lines.
+inline constexpr double declared_to = 0.002;
 /// Where a frequency shows in samples of that rate.
 double alias(double hz, double rate_hz);
 

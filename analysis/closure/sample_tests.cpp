@@ -304,42 +304,39 @@ void test_levels(const SampleFit& fit, Views& views) {
                      true});
 }
 
-/// A line that is not what it was: its amplitudes in stretches.
-void test_lines(const SampleFit& fit, Views& views) {
+/// A line that is not what it was: its amplitudes in stretches. By chance, of the cosine in that column.
+double line_over_time(const SampleFit& fit, std::size_t cosine) {
     constexpr std::size_t stretches = 20;
     const std::size_t n = fit.innovations().size();
-    double least = 1.0;
-    double lines = 0.0;
     const auto& columns = fit.model().columns;
-    for (std::size_t c = 0; c + 1 < columns.size(); ++c) {
-        if (columns[c].name != "cosine" || columns[c + 1].name != "sine") continue;
-        lines += 1.0;
-        const auto x = fit.filter().apply(*columns[c].series);
-        const auto y = fit.filter().apply(*columns[c + 1].series);
-        double chi2 = 0.0;
-        int freedom = -2;
-        for (std::size_t s = 0; s < stretches; ++s) {
-            double xx = 0.0, xy = 0.0, yy = 0.0, xe = 0.0, ye = 0.0;
-            for (std::size_t i = n * s / stretches; i < n * (s + 1) / stretches; ++i) {
-                if (!fit.rows()[i]) continue;
-                const double e = fit.innovations()[i];
-                xx += x[i] * x[i];
-                xy += x[i] * y[i];
-                yy += y[i] * y[i];
-                xe += x[i] * e;
-                ye += y[i] * e;
-            }
-            const double det = xx * yy - xy * xy;
-            if (!(det > 1e-6 * xx * yy)) continue;
-            chi2 += (yy * xe * xe - 2.0 * xy * xe * ye + xx * ye * ye) / det;
-            freedom += 2;
+    const auto x = fit.filter().apply(*columns[cosine].series);
+    const auto y = fit.filter().apply(*columns[cosine + 1].series);
+    double chi2 = 0.0;
+    int freedom = -2;
+    for (std::size_t s = 0; s < stretches; ++s) {
+        double xx = 0.0, xy = 0.0, yy = 0.0, xe = 0.0, ye = 0.0;
+        for (std::size_t i = n * s / stretches; i < n * (s + 1) / stretches; ++i) {
+            if (!fit.rows()[i]) continue;
+            const double e = fit.innovations()[i];
+            xx += x[i] * x[i];
+            xy += x[i] * y[i];
+            yy += y[i] * y[i];
+            xe += x[i] * e;
+            ye += y[i] * e;
         }
-        if (freedom > 0) least = std::min(least, chi2_tail(chi2, freedom));
+        const double det = xx * yy - xy * xy;
+        if (!(det > 1e-6 * xx * yy)) continue;
+        chi2 += (yy * xe * xe - 2.0 * xy * xe * ye + xx * ye * ye) / det;
+        freedom += 2;
     }
-    if (lines > 0.0) {
-        views.push_back(
-            {{Where::amplitude, "amplitude and phase of the lines over time", of_several(least, lines), ""}});
-    }
+    return freedom > 0 ? chi2_tail(chi2, freedom) : 1.0;
+}
+
+void test_lines(const SampleFit& fit, Views& views) {
+    const auto& columns = fit.model().columns;
+    const auto lines = std::count_if(columns.begin(), columns.end(), [](const auto& c) { return c.name == "cosine"; });
+    if (lines == 0) return;
+    views.push_back({{Where::amplitude, "amplitude and phase of the lines over time", unsteady_line(fit).p_value, ""}});
 }
 
 void test_jumps(const SampleFit& fit, Views& views) {
@@ -420,6 +417,30 @@ Disturbed find_disturbed(const SampleFit& fit) {
     for (const auto row : disturbed.rows) count += row;
     disturbed.share = count / static_cast<double>(n);
     return disturbed;
+}
+
+UnsteadyLine unsteady_line(const SampleFit& fit) {
+    UnsteadyLine least;
+    double lines = 0.0;
+    const auto& columns = fit.model().columns;
+    for (std::size_t c = 0; c + 1 < columns.size(); ++c) {
+        if (columns[c].name != "cosine") continue;
+        lines += 1.0;
+        const double p = line_over_time(fit, c);
+        if (least.step >= 0 && p >= least.p_value) continue;
+        least = {columns[c].step, columns[c].hz, p, false};
+    }
+    least.p_value = of_several(least.p_value, std::max(lines, 1.0));
+    if (least.step < 0) return least;
+    std::vector<double> e(fit.innovations().size(), 0.0);
+    for (std::size_t i = 0; i < e.size(); ++i) {
+        if (fit.telling()[i]) e[i] = fit.innovations()[i];
+    }
+    const FoundLine line = find_line(e, fit.series().rate_hz, true);
+    constexpr double near_hz = 1.0;
+    const double hz = line.coherent ? line.frequency_hz : line.scattered_hz;
+    least.beside = line.p_value < level_of_residual && std::abs(hz - least.hz) < near_hz;
+    return least;
 }
 
 double refitted_merit(const SampleFit& fit, const View& view, double of_a_coefficient) {

@@ -172,7 +172,7 @@ Added draw_on_samples(const std::string& effect, const SampleCase& of) {
     if (effect == "count_quantization") return {effect, {{"step_arcsec", 0.5 * condition.white_angle_arcsec}}};
     if (effect == "dither_residue") {
         const bool declared = condition.dither_hz > 0.0;
-        const double hz = declared ? condition.dither_hz + between(-1.0, 1.0) : between(5.0, 45.0);
+        const double hz = declared ? condition.dither_hz + between(-0.8, 0.8) : between(5.0, 45.0);
         const bool drifts = between(0.0, 1.0) < 0.5;
         const double cycles =
             sign * even(5.0, 50.0);  // that the drift makes over the record, half of them to the middle

@@ -177,6 +177,7 @@ record::Record generate_samples(const SampleTruth& truth) {
     record::Samples samples;
     samples.rate_hz = truth.rate_hz;
     samples.kind = truth.kind;
+    samples.t0_s = 1.0 / truth.rate_hz;  // a sample belongs to the end of its interval
     for (std::size_t k = 0; k < truth.size; ++k) {
         switch (truth.kind) {
             case record::SampleKind::angle_increment_arcsec:
