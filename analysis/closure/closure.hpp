@@ -59,7 +59,7 @@ Closure close_loop(const record::Record& record);
 /// record reaches. Effects start from the values given.
 Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
 
-/// The same of samples.
+/// The same of samples; the residual is not tested.
 Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects);
 
 /// The two of them.

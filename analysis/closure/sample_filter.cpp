@@ -64,7 +64,7 @@ void SampleFilter::set_up(const SampleNoise& noise, double interval_s) {
     }
     const double readout = noise.angle_arcsec * noise.angle_arcsec;
     // The record begins at angle zero as it was read.
-    p[0][0] = readout + q_[0][0];
+    p[0][0] = readout;
     floor_ = readout;
     if (resampled_) {
         const int r0 = n_;

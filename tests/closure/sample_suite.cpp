@@ -129,7 +129,7 @@ std::vector<ActiveEffect> known(const std::vector<Added>& truth) {
 double limit_of_motion(const SampleCase& of, std::size_t effect) {
     SampleCase at = of;
     double rms = 0.3 * of.condition->white_angle_arcsec;
-    for (int round = 0; round < 3; ++round) {
+    for (int round = 0; round < 2; ++round) {
         at.truth[effect].values.at("rms_arcsec") = rms;
         const record::Record record = make(at);
         const auto series = ringlock::closure::prepare_samples(record);
@@ -213,7 +213,7 @@ Added draw_on_samples(const std::string& effect, const SampleCase& of) {
 
 void settle(SampleCase& of) {
     SampleCase at = of;
-    for (int round = 0; round < 5; ++round) {
+    for (int round = 0; round < 4; ++round) {
         double moved = 0.0;
         const Closure closure = ringlock::closure::fit_samples(make(at), known(at.truth));
         for (std::size_t k = 0; k < at.truth.size(); ++k) {
@@ -232,13 +232,13 @@ void settle(SampleCase& of) {
                     if (e.name != size_of(effect) || !(e.sd > 0.0) || !std::isfinite(e.sd)) continue;
                     // Of a variance the information hardly depends: its root goes with the root of size times error.
                     const double limit = is_random(effect) ? std::sqrt(std::abs(size) * 4.0 * e.sd) : 4.0 * e.sd;
-                    size = std::copysign(limit, size) * 1.0;
+                    size = std::copysign(limit, size);
                     size = before * std::clamp(size / before, 0.2, 5.0);
                 }
             }
             moved = std::max(moved, std::abs(std::log(size / before)));
         }
-        if (moved < 0.03) break;
+        if (moved < 0.1) break;
     }
     for (std::size_t k = 0; k < of.truth.size(); ++k) {
         if (!has_size(of.truth[k].effect)) continue;
