@@ -377,7 +377,7 @@ Closure Loop::run() {
         const double rival = rival_merit(best.candidate.effect, best.merit);
         const bool random = is_random_rate(best.candidate.effect);
         if (random || rival > best.merit) {
-            const auto first = of_several_effects(all, std::max(rival, random ? best.merit : 0.0));
+            const auto first = of_several_effects(all, std::max(rival, random ? best.merit + tie : 0.0));
             if (first) {
                 best = *first;
             } else if (rival > best.merit) {
@@ -409,7 +409,8 @@ void Loop::take(Contender best, const std::vector<Contender>& all, Closure& clos
         const std::string& name = other.candidate.effect;
         const bool named =
             std::find(step.confounded_with.begin(), step.confounded_with.end(), name) != step.confounded_with.end();
-        if (std::abs(best.merit - other.merit) < tie && name != effect && !named) step.confounded_with.push_back(name);
+        // One that explains more by itself is as good, even where another and a second together explain more.
+        if (best.merit - other.merit < tie && name != effect && !named) step.confounded_with.push_back(name);
     }
     if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
     const Score before = heldout(*now_.fit, reported_, used_step_);
@@ -431,7 +432,13 @@ void Loop::take(Contender best, const std::vector<Contender>& all, Closure& clos
         }
     }
     now_.steps.push_back(std::move(step));
-    now_.told.push_back({effect, next_step_++, best.candidate.witness, best.candidate.strong});
+    SampleStep told{effect, next_step_++, best.candidate.witness, best.candidate.strong};
+    for (const Contender& other : all) {
+        const double hz = other.fit->model().noise.from_hz;
+        if (effect != "resampling" || other.candidate.effect != effect || best.merit - other.merit >= tie) continue;
+        if (std::abs(hz - best.fit->model().noise.from_hz) > 1e-3 * series_.rate_hz) told.other_hz.push_back(hz);
+    }
+    now_.told.push_back(std::move(told));
 }
 
 /// A line of the library keeps its amplitude, and its frequency but for an even drift. One that does not, as its own

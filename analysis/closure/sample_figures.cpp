@@ -158,13 +158,21 @@ void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estim
     const SampleFit whole(series, with, fit.rows(), SampleFit::Noise::free);
     const auto& motion = whole.model().noise.resonances.front();
     const SampleNoise::Resonance error = whole.noise_errors().noise.resonances.front();
-    const bool seen = whole.log_likelihood() - bare.log_likelihood() > 8.0;
+    const bool seen = whole.log_likelihood() - bare.log_likelihood() > 20.0;
     double coherence = unknown;
     double coherence_sd = unknown;
     if (seen) {
         // The same resonance beside what the witness tells: the share of its power that is still needed.
         SampleModel beside = whole.model();
         beside.motion = told.increments;
+        if (!step.strong) {
+            // Weak motion is told by two numbers; a response of many lags would be mostly noise.
+            beside.motion.assign(series.size(), 0.0);
+            for (const SampleColumn& column : fit.model().columns) {
+                if (column.effect != "case_motion") continue;
+                for (std::size_t i = 0; i < series.size(); ++i) beside.motion[i] += column.value * (*column.series)[i];
+            }
+        }
         const SampleFit first(series, beside, fit.rows(), SampleFit::Noise::near);
         const double untold = first.model().noise.resonances.front().arcsec;
         const double untold_sd = first.noise_errors().noise.resonances.front().arcsec;
@@ -221,7 +229,15 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<SampleStep>& st
             all.push_back({effect, "deg_h_rt_h", 60.0 * root, 60.0 * 0.5 * sd / std::max(root, 1e-300)});
         }
         if (effect == "bias_instability") all.push_back({effect, "deg_h", model.flicker_deg_h, errors.flicker_deg_h});
-        if (effect == "resampling") all.push_back({effect, "from_hz", model.noise.from_hz, errors.noise.from_hz});
+        if (effect == "resampling") {
+            all.push_back(
+                {effect, "from_hz", model.noise.from_hz, step.other_hz.empty() ? errors.noise.from_hz : unknown});
+            for (const double hz : step.other_hz) {
+                figures.notes.push_back(fmt::format(
+                    "a source of {:.6g} Hz explains the record as well as {:.6g} Hz: from_hz has no standard error", hz,
+                    model.noise.from_hz));
+            }
+        }
         for (std::size_t k = 0; k < model.resonances.size(); ++k) {
             if (model.resonance_steps[k] != step.step) continue;
             // A line that wanders

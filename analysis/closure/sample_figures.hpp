@@ -13,9 +13,10 @@ namespace ringlock::closure {
 /// An effect in a model.
 struct SampleStep {
     std::string effect;
-    int step = 0;             ///< as in its columns and resonances
-    std::size_t witness = 0;  ///< of a motion, in the series
-    bool strong = false;      ///< motion that is told at many lags
+    int step = 0;                       ///< as in its columns and resonances
+    std::size_t witness = 0;            ///< of a motion, in the series
+    bool strong = false;                ///< motion that is told at many lags
+    std::vector<double> other_hz = {};  ///< rates that explain a resampled record as well
 };
 
 struct SampleFigures {

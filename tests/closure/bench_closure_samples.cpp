@@ -30,7 +30,7 @@ std::vector<SampleCase> all_cases(double share, const std::string& only) {
     const std::vector<std::string> effects = effects_on_samples();
     std::vector<SampleCase> cases;
     std::size_t turn = 0;
-    std::uint64_t seed = 2000;
+    std::uint64_t seed = 20000;
     const auto add = [&](Kind kind, double multiple, const std::vector<std::string>& in) {
         SampleCase of{.kind = kind, .truth = {}, .multiple = multiple, .condition = nullptr, .seed = seed++};
         for (std::size_t tried = 0; tried < sample_conditions.size() && of.condition == nullptr; ++tried) {

@@ -51,8 +51,8 @@ TEST(ClosureSampleSuite, NamesWhatIsFourTimesItsLimit) {
 TEST(ClosureSampleSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
     for (const SampleCase& of : foreign_sample_cases(1)) {
         const Outcome outcome = judged(of);
-        EXPECT_EQ(outcome.judged, Judged::right) << of.truth_text() << ": " << outcome.verdict << " " << outcome.named
-                                                 << " " << outcome.where;
+        EXPECT_EQ(outcome.judged, Judged::right)
+            << of.truth_text() << ": " << outcome.verdict << " " << outcome.named << " " << outcome.where;
         EXPECT_TRUE(std::isnan(outcome.oracle));
     }
 }
