@@ -75,6 +75,11 @@ Score heldout(const SampleFit& fit, const Rows& reported, double lattice) {
 /// A random rate can follow whatever the library does not have, more or less.
 bool is_random_rate(const std::string& effect) { return effect == "rate_random_walk" || effect == "bias_instability"; }
 
+/// Of the line that was added last.
+double line_hz(const SampleModel& model, bool wanders) {
+    return wanders ? model.noise.resonances.back().hz : model.columns[model.columns.size() - 2].hz;
+}
+
 bool is_line(const std::string& effect) { return effect == "dither_residue" || effect == "base_vibration"; }
 
 class Loop {
@@ -102,7 +107,7 @@ class Loop {
     double lattice_step() const { return series_.counted ? 0.25 * series_.scale_factor_arcsec : lattice_.step_arcsec; }
     void begin(Closure& closure);
     void take_lattice(Closure& closure);
-    std::vector<Contender> contenders(const State& state, int step) const;
+    std::vector<Contender> contenders(const State& state, int step, bool plain = false) const;
     double rival_merit(const std::string& effect, double merit_of_effect) const;
     std::optional<Contender> of_several_effects(std::vector<Contender> all, double least) const;
     void take(Contender best, const std::vector<Contender>& all, Closure& closure);
@@ -200,8 +205,8 @@ void Loop::take_lattice(Closure& closure) {
 }
 
 /// What the screening lets pass, each fitted in full; the likeliest first.
-std::vector<Loop::Contender> Loop::contenders(const State& state, int step) const {
-    auto candidates = screen_samples(*state.fit, {record_.declared, series_, rows_, state.lines_hz, step});
+std::vector<Loop::Contender> Loop::contenders(const State& state, int step, bool plain) const {
+    auto candidates = screen_samples(*state.fit, {record_.declared, series_, rows_, state.lines_hz, step, plain});
     std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
     std::vector<Contender> all;
     for (SampleCandidate& candidate : candidates) {
@@ -255,22 +260,24 @@ double Loop::rival_merit(const std::string& effect, double merit_of_effect) cons
 std::optional<Loop::Contender> Loop::of_several_effects(std::vector<Contender> all, double least) const {
     constexpr std::size_t starts = 4;
     constexpr int most_of_them = 3;
-    const auto no_random = [](std::vector<Contender>& some) {
-        std::erase_if(some, [](const Contender& c) { return is_random_rate(c.candidate.effect); });
-    };
-    no_random(all);
+    std::erase_if(all, [](const Contender& c) { return is_random_rate(c.candidate.effect); });
     if (all.size() > starts) all.resize(starts);
     std::optional<Contender> best;
     for (const Contender& first : all) {
         double merit = first.merit;
         State state = now_;
         state.fit = first.fit;
+        if (is_line(first.candidate.effect)) {
+            state.lines_hz.push_back(line_hz(first.fit->model(), first.candidate.wanders));
+        }
         for (int k = 1; k < most_of_them; ++k) {
-            auto more = contenders(state, next_step_ + k);
-            no_random(more);
+            const auto more = contenders(state, next_step_ + k, true);
             if (more.empty()) break;
             merit += more.front().merit;
             state.fit = more.front().fit;
+            if (is_line(more.front().candidate.effect)) {
+                state.lines_hz.push_back(line_hz(state.fit->model(), more.front().candidate.wanders));
+            }
         }
         if (merit <= least) continue;
         least = merit;
@@ -421,9 +428,7 @@ void Loop::take(Contender best, const std::vector<Contender>& all, Closure& clos
     step.heldout_error_after = after.error;
     step.heldout_log_score_gain = after.log_score - before.log_score;
     if (is_line(effect)) {
-        const SampleModel& model = now_.fit->model();
-        now_.lines_hz.push_back(best.candidate.wanders ? model.noise.resonances.back().hz
-                                                       : model.columns[model.columns.size() - 2].hz);
+        now_.lines_hz.push_back(line_hz(now_.fit->model(), best.candidate.wanders));
         if (best.candidate.wanders) {
             closure.notes.push_back(
                 fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "

@@ -191,7 +191,7 @@ void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estim
     all.push_back({"case_motion", "coherence", seen ? coherence : told.coherence, coherence_sd});
     all.push_back({"case_motion", "rms_arcsec", seen ? motion.arcsec : told.rms_arcsec, seen ? error.arcsec : unknown});
     all.push_back({"case_motion", "centre_hz", seen ? motion.hz : centre, seen ? error.hz : unknown});
-    all.push_back({"case_motion", "width_hz", seen ? motion.width_hz : unknown, seen ? error.width_hz : unknown});
+    all.push_back({"case_motion", "width_hz", seen ? motion.width_hz : 0.5 * centre, seen ? error.width_hz : unknown});
 }
 
 }  // namespace
