@@ -115,7 +115,7 @@ TEST(SampleFilter, LikelihoodIsThatOfTheCovariance) {
     noise.angle_arcsec = 0.3;
     noise.rate_arcsec_rt_s = 0.8;
     noise.terms = {{0.5, 0.4}, {5.0, 0.2}};
-    constexpr int n = 150;
+    constexpr int n = 60;
     constexpr double dt = 0.1;
     // Angles at the ends, less that at the start: variance of white rates, of Markov rates held over an interval as the
     // filter has them, and of the reading errors.
