@@ -63,6 +63,9 @@ Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>&
 /// in the whole record of turns.
 std::vector<Estimate> information_on_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
 
+/// The same of samples; the residual is not tested.
+Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects);
+
 /// The two of them.
 Closure close_turns(const record::Record& record);
 Closure close_samples(const record::Record& record);

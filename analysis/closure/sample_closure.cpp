@@ -2,14 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
-#include <numbers>
+#include <optional>
+#include <utility>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/sample_figures.hpp"
 #include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_screen.hpp"
 #include "analysis/closure/sample_search.hpp"
 #include "analysis/closure/sample_series.hpp"
@@ -24,10 +26,8 @@ namespace {
 /// What samples can tell of; the rest of the library needs turns.
 constexpr double effects_on_samples = 12.0;
 
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();  // a standard error that is not computed
-
-/// Of ten blocks, five are fitted (1), two decide whether what was found there holds (2), three are only reported (0).
-constexpr BlockRoles roles{1, 1, 0, 1, 2, 0, 1, 2, 0, 1};
+/// Of ten blocks, three are only reported.
+constexpr BlockRoles roles{1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
 
 struct Score {
     double error = 0.0;
@@ -40,7 +40,7 @@ Score heldout(const SampleFit& fit, const Rows& reported, double lattice) {
     Score score;
     double count = 0.0;
     for (std::size_t i = 0; i < reported.size(); ++i) {
-        if (!reported[i]) continue;
+        if (!reported[i] || fit.filter().settled(i)) continue;
         const double sd = fit.sd(i);
         double e = fit.innovations()[i] * sd;
         score.log_score -= 0.5 * e * e / (sd * sd) + std::log(sd) + 0.5 * std::log(units::two_pi);
@@ -72,86 +72,100 @@ Score heldout(const SampleFit& fit, const Rows& reported, double lattice) {
     return score;
 }
 
+/// A random rate can follow whatever the library does not have, more or less.
+bool is_random_rate(const std::string& effect) { return effect == "rate_random_walk" || effect == "bias_instability"; }
+
+/// Of the line that was added last.
+double line_hz(const SampleModel& model, bool wanders) {
+    return wanders ? model.noise.resonances.back().hz : model.columns[model.columns.size() - 2].hz;
+}
+
+bool is_line(const std::string& effect) { return effect == "dither_residue" || effect == "base_vibration"; }
+
 class Loop {
    public:
     explicit Loop(const record::Record& record)
         : record_(record), series_(prepare_samples(record)), chosen_(by_blocks(series_.size(), roles)) {}
 
     Closure run();
+    Closure fit(const std::vector<ActiveEffect>& effects);
 
    private:
-    std::vector<Estimate> estimates_of(const std::string& effect, const SampleFit& fit,
-                                       const SampleCandidate& candidate) const;
-    void take_lattice(Closure& closure, const SampleFit& now);
+    /// The model as it has grown, with what was added.
+    struct State {
+        std::shared_ptr<SampleFit> fit;
+        std::vector<Step> steps;
+        std::vector<SampleStep> told;  ///< as many
+        std::vector<double> lines_hz;
+    };
+    struct Contender {
+        SampleCandidate candidate;
+        std::shared_ptr<SampleFit> fit;
+        double merit;
+    };
+
+    double lattice_step() const { return series_.counted ? 0.25 * series_.scale_factor_arcsec : lattice_.step_arcsec; }
+    void begin(Closure& closure);
+    void take_lattice(Closure& closure);
+    std::vector<Contender> contenders(const State& state, int step, bool plain = false) const;
+    double rival_merit(const std::string& effect, double merit_of_effect) const;
+    std::optional<Contender> of_several_effects(std::vector<Contender> all, double least) const;
+    void take(Contender best, const std::vector<Contender>& all, Closure& closure);
+    void take_back_lines(Closure& closure);
+    void drop_needless();
+    void test_what_is_left(Closure& closure) const;
+    void finish(Closure& closure);
 
     const record::Record& record_;
     SampleSeries series_;
-    Rows chosen_;  ///< by blocks: 1 fitted, 2 decides, 0 reported
-    Rows rows_;    ///< fitted and not disturbed
-    Rows decide_;  ///< decides and is not disturbed
+    Rows chosen_;
+    Rows rows_;  ///< chosen and not disturbed
     Rows reported_;
+    Rows whole_;
+    Disturbed disturbed_;
     Lattice lattice_;
-    std::vector<double> lines_hz_;  ///< in the model
-    double used_step_ = 0.0;        ///< of the lattice in the model
+    double used_step_ = 0.0;  ///< of the lattice in the model
+    State now_;
+    int next_step_ = 0;
 };
 
-std::vector<Estimate> Loop::estimates_of(const std::string& effect, const SampleFit& fit,
-                                         const SampleCandidate& candidate) const {
-    std::vector<Estimate> all = candidate.told;
-    const SampleModel& model = fit.model();
-    const auto& columns = model.columns;
-    for (std::size_t k = columns.size(); k-- > 1;) {
-        if (columns[k].effect != effect) continue;
-        if (columns[k].name == "sine") {
-            const double amplitude = std::hypot(columns[k].value, columns[k - 1].value);
-            const double hz = candidate.told.front().value;
-            if (effect == "dither_residue") {
-                const double gain = std::max(1e-9, 2.0 * std::abs(std::sin(units::pi * hz * series_.interval_s)));
-                all.push_back({effect, "amplitude_arcsec", amplitude / gain, columns[k].sd / gain});
-            } else {
-                // Increments are those of a rate integrated over each interval.
-                const double gain = std::abs(std::sin(units::pi * hz * series_.interval_s)) / (units::pi * hz);
-                all.push_back({effect, "rate_deg_h", amplitude / gain, columns[k].sd / gain});
-                const double middle_s = series_.time_s[0] - 0.5 * series_.interval_s +
-                                        0.5 * static_cast<double>(series_.size() - 1) * series_.interval_s;
-                // a cos + b sin = A sin(phase' + 2 pi f (t - middle))
-                const double turns = hz * middle_s;
-                const double start =
-                    std::atan2(columns[k - 1].value, columns[k].value) - units::two_pi * (turns - std::floor(turns));
-                all.push_back({effect, "phase_rad", std::remainder(start, units::two_pi),
-                               columns[k].sd / std::max(amplitude, 1e-300)});
-            }
-            break;
-        }
-        if (columns[k].name != "cosine") {
-            all.push_back({effect, columns[k].name, columns[k].value, columns[k].sd});
-            break;
-        }
+void Loop::begin(Closure& closure) {
+    closure.unit = "arcsec";
+    closure.level = level;
+    rows_ = chosen_;
+    reported_.resize(chosen_.size());
+    for (std::size_t i = 0; i < chosen_.size(); ++i) reported_[i] = chosen_[i] ? 0 : 1;
+    whole_.assign(chosen_.size(), 1);
+    if (series_.scale_factor_assumed) {
+        closure.notes.push_back(fmt::format(
+            "the record declares no scale factor; {:g} arcsec per fringe assumed, with which all rates scale",
+            series_.scale_factor_arcsec));
     }
-    const double count = static_cast<double>(series_.size());
-    if (effect == "rate_random_walk")
-        all.push_back({effect, "deg_h_rt_h", 60.0 * std::sqrt(model.noise.walk_arcsec2_s3), unknown});
-    if (effect == "bias_instability") all.push_back({effect, "deg_h", model.flicker_deg_h, unknown});
-    if (effect == "resampling") {
-        const double seconds = count * series_.interval_s;
-        all.push_back({effect, "from_hz", model.noise.from_hz, 1.0 / seconds});
+    if (series_.input_late_s > 0.0) {
+        closure.notes.push_back(
+            fmt::format("the known input goes with the samples {:.3g} s later: their times are not those "
+                        "of the ends of their intervals",
+                        series_.input_late_s));
     }
-    for (std::size_t k = 0; k < model.resonances.size(); ++k) {
-        if (model.resonances[k] != effect) continue;
-        const auto& resonance = model.noise.resonances[k];
-        if (effect == "case_motion") {
-            all.push_back({effect, "centre_hz", resonance.hz, unknown});
-            all.push_back({effect, "width_hz", resonance.width_hz, unknown});
-        } else {
-            all.push_back({effect, "amplitude_arcsec", std::numbers::sqrt2 * resonance.arcsec, unknown});
-            all.push_back({effect, "wander_hz", resonance.width_hz, unknown});
+    now_.fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
+    closure.heldout_before = heldout(*now_.fit, reported_, 0.0).error;
+    disturbed_ = find_disturbed(*now_.fit);
+    if (disturbed_.share > 0.0 && disturbed_.share < 0.6) {
+        const double with = closure.heldout_before;
+        for (std::size_t i = 0; i < rows_.size(); ++i) {
+            if (!disturbed_.rows[i]) continue;
+            rows_[i] = reported_[i] = whole_[i] = 0;
         }
-        break;
+        now_.fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
+        closure.notes.push_back(fmt::format(
+            "{:.1f} % of the record is disturbed, up to {:.3g} times the usual variance, most at {:.6g} s; nothing is "
+            "fitted to it, held-out errors leave it out ({:.6g} arcsec before with it)",
+            100.0 * disturbed_.share, disturbed_.worst, disturbed_.at_s, with));
+        closure.heldout_before = heldout(*now_.fit, reported_, 0.0).error;
     }
-    return all;
 }
 
-void Loop::take_lattice(Closure& closure, const SampleFit& now) {
+void Loop::take_lattice(Closure& closure) {
     if (series_.counted) {
         closure.notes.push_back(
             fmt::format("counts are whole by their kind: steps of {:.6g} arcsec are no missing effect",
@@ -161,7 +175,7 @@ void Loop::take_lattice(Closure& closure, const SampleFit& now) {
     lattice_ = find_lattice(series_.increment);
     if (lattice_.step_arcsec == 0.0) return;
     const double step = lattice_.step_arcsec;
-    const double sd = now.sd(series_.size() / 2);
+    const double sd = now_.fit->sd(series_.size() / 2);
     // Steps add step^2/12 to the variance: less than a thousandth of it changes nothing that is told here.
     if (step * step / 12.0 < 1e-3 * sd * sd) {
         closure.notes.push_back(fmt::format(
@@ -178,125 +192,166 @@ void Loop::take_lattice(Closure& closure, const SampleFit& now) {
     Step taken;
     taken.effect = "count_quantization";
     taken.p_value = lattice_.p_value;
-    const Score before = heldout(now, reported_, 0.0);
+    const Score before = heldout(*now_.fit, reported_, 0.0);
     // Blurred steps are not where the values are: the digits are.
     used_step_ = blurred ? lattice_.printed_arcsec : step;
-    const Score after = heldout(now, reported_, used_step_);
+    const Score after = heldout(*now_.fit, reported_, used_step_);
     taken.heldout_error_before = before.error;
     taken.heldout_error_after = after.error;
     taken.heldout_log_score_gain = after.log_score - before.log_score;
-    taken.parameters.push_back({"count_quantization", "step_arcsec", step, blurred ? step * 1e-3 : step * 1e-9});
-    closure.steps.push_back(std::move(taken));
+    taken.parameters.push_back({"count_quantization", "step_arcsec", step, lattice_.step_sd_arcsec});
+    now_.steps.push_back(std::move(taken));
+    now_.told.push_back({"count_quantization", next_step_++});
 }
 
-Closure Loop::run() {
-    Closure closure;
-    closure.unit = "arcsec";
-    closure.level = level;
-    reported_.resize(chosen_.size());
-    for (std::size_t i = 0; i < chosen_.size(); ++i) reported_[i] = chosen_[i] ? 0 : 1;
-    if (series_.scale_factor_assumed) {
-        closure.notes.push_back(fmt::format(
-            "the record declares no scale factor; {:g} arcsec per fringe assumed, with which all rates scale",
-            series_.scale_factor_arcsec));
+/// What the screening lets pass, each fitted in full; the likeliest first.
+std::vector<Loop::Contender> Loop::contenders(const State& state, int step, bool plain) const {
+    auto candidates = screen_samples(*state.fit, {record_.declared, series_, rows_, state.lines_hz, step, plain});
+    std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
+    std::vector<Contender> all;
+    for (SampleCandidate& candidate : candidates) {
+        if (!(candidate.p_value * effects_on_samples < level_of_effects)) continue;
+        if (all.size() >= most_contenders + 2) break;
+        auto fit = std::make_shared<SampleFit>(series_, candidate.model, rows_, candidate.noise);
+        const double gain = fit->log_likelihood() - state.fit->log_likelihood();
+        const double merit = gain - std::log(candidate.searched) - candidate.parameters;
+        // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
+        const double p_full = of_several(chi2_tail(2.0 * gain, candidate.freedom), candidate.searched);
+        if (merit < 0.0 || p_full * effects_on_samples >= level_of_effects) continue;
+        all.push_back({std::move(candidate), std::move(fit), merit});
     }
-    const auto set_rows = [&](const Rows& without) {
-        rows_.assign(chosen_.size(), 0);
-        decide_.assign(chosen_.size(), 0);
-        for (std::size_t i = 0; i < chosen_.size(); ++i) {
-            if (!without.empty() && without[i]) continue;
-            rows_[i] = chosen_[i] == 1 ? 1 : 0;
-            decide_[i] = chosen_[i] == 2 ? 1 : 0;
-        }
-    };
-    set_rows({});
-    auto now = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
-    closure.heldout_before = heldout(*now, reported_, 0.0).error;
-    const Disturbed disturbed = find_disturbed(*now);
-    if (disturbed.share > 0.0 && disturbed.share < 0.6) {
-        set_rows(disturbed.rows);
-        const double with = closure.heldout_before;
-        for (std::size_t i = 0; i < reported_.size(); ++i) reported_[i] = reported_[i] && !disturbed.rows[i] ? 1 : 0;
-        now = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
-        closure.notes.push_back(fmt::format(
-            "{:.1f} % of the record is disturbed, up to {:.3g} times the usual variance, most at {:.6g} s; nothing is "
-            "fitted to it, held-out errors leave it out ({:.6g} arcsec before with it)",
-            100.0 * disturbed.share, disturbed.worst, disturbed.at_s, with));
-        closure.heldout_before = heldout(*now, reported_, 0.0).error;
-    }
-    take_lattice(closure, *now);
+    std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.merit > b.merit; });
+    return all;
+}
 
-    std::vector<SampleCandidate> taken(closure.steps.size());
-    while (closure.steps.size() < most_steps) {
-        std::vector<SampleCandidate> candidates = screen_samples(*now, {record_.declared, series_, rows_, lines_hz_});
-        struct Contender {
-            SampleCandidate candidate;
-            std::shared_ptr<SampleFit> fit;
-            double merit;
-        };
-        std::vector<Contender> contenders;
-        std::sort(candidates.begin(), candidates.end(),
-                  [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
-        for (SampleCandidate& candidate : candidates) {
-            if (!(candidate.p_value * effects_on_samples < level_of_effects)) continue;
-            if (contenders.size() >= most_contenders + 2) break;
-            auto fit = std::make_shared<SampleFit>(series_, candidate.model, rows_);
-            const double merit =
-                fit->log_likelihood() - now->log_likelihood() - std::log(candidate.searched) - candidate.parameters;
-            // Whatever stands out: where the likelihood is not better, or the blocks that decide are foretold worse, it
-            // is not this effect.
-            if (merit < 0.0 || heldout(*fit, decide_, 0.0).log_score <= heldout(*now, decide_, 0.0).log_score) continue;
-            contenders.push_back({std::move(candidate), std::move(fit), merit});
+/// The most that a view of the residual explains, the noise fitted anew beside it: where it is more than the best
+/// effect does, that one is only what comes nearest to something that the library does not have. What a view must have
+/// more than an effect to be taken for the truth is off it.
+double Loop::rival_merit(const std::string& effect, double merit_of_effect) const {
+    constexpr std::size_t looked_at = 4;
+    auto views = view_samples(*now_.fit, lattice_step());
+    std::erase_if(views, [](const View& view) { return view.test.merit < tie; });
+    std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
+    if (views.size() > looked_at) {
+        // Jumps are looked at in any case: a random rate can follow them, and no other view says what they are.
+        const auto jumps = std::find_if(views.begin() + looked_at, views.end(), [](const View& v) { return v.jumps; });
+        if (jumps != views.end()) std::swap(views[looked_at - 1], *jumps);
+        views.resize(looked_at);
+    }
+    const bool random = is_random_rate(effect);
+    double most = 0.0;
+    for (const View& view : views) {
+        // What follows jumps, or another column of the record, a random rate can follow nearly as well.
+        const bool followed = random && (view.jumps || view.test.where != Where::time);
+        // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
+        // course in time (Schwarz 1978).
+        const bool course = random && view.test.where == Where::time && !view.jumps;
+        const double integrated = course ? 0.5 * std::log(static_cast<double>(series_.size())) - 1.0 : 0.0;
+        const double merit = view.columns ? refitted_merit(*now_.fit, view, integrated) : view.test.merit;
+        // The course of jumps is searched stretch by stretch and loses a part of what they explain.
+        const double lost = random && view.jumps ? std::max(tie, 0.1 * merit_of_effect) : tie;
+        most = std::max(most, merit + (followed ? lost : -tie));
+    }
+    return most;
+}
+
+/// One effect at a time may explain less than a random rate, or a view, where several of the library together explain
+/// more: the first of the best such set, none of them a random rate, each found after the one before.
+std::optional<Loop::Contender> Loop::of_several_effects(std::vector<Contender> all, double least) const {
+    constexpr std::size_t starts = 4;
+    constexpr int most_of_them = 3;
+    std::erase_if(all, [](const Contender& c) { return is_random_rate(c.candidate.effect); });
+    if (all.size() > starts) all.resize(starts);
+    std::optional<Contender> best;
+    for (const Contender& first : all) {
+        double merit = first.merit;
+        State state = now_;
+        state.fit = first.fit;
+        if (is_line(first.candidate.effect)) {
+            state.lines_hz.push_back(line_hz(first.fit->model(), first.candidate.wanders));
         }
-        if (contenders.empty()) break;
-        std::sort(contenders.begin(), contenders.end(), [](const auto& a, const auto& b) { return a.merit > b.merit; });
-        Contender& best = contenders.front();
-        Step step;
-        step.effect = best.candidate.effect;
-        step.p_value = best.candidate.p_value;
-        step.confounded_with = best.candidate.confounded;
-        for (std::size_t k = 1; k < contenders.size(); ++k) {
-            if (best.merit - contenders[k].merit < tie) step.confounded_with.push_back(contenders[k].candidate.effect);
-        }
-        if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
-        const Score before = heldout(*now, reported_, used_step_);
-        now = best.fit;
-        const Score after = heldout(*now, reported_, used_step_);
-        step.heldout_error_before = before.error;
-        step.heldout_error_after = after.error;
-        step.heldout_log_score_gain = after.log_score - before.log_score;
-        if (step.effect == "dither_residue" || step.effect == "base_vibration") {
-            lines_hz_.push_back(best.candidate.told.front().value);
-            if (best.candidate.wanders) {
-                closure.notes.push_back(fmt::format(
-                    "the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "
-                    "samples before as a narrow resonance",
-                    lines_hz_.back()));
+        for (int k = 1; k < most_of_them; ++k) {
+            const auto more = contenders(state, next_step_ + k, true);
+            if (more.empty()) break;
+            merit += more.front().merit;
+            state.fit = more.front().fit;
+            if (is_line(more.front().candidate.effect)) {
+                state.lines_hz.push_back(line_hz(state.fit->model(), more.front().candidate.wanders));
             }
         }
-        closure.steps.push_back(std::move(step));
-        taken.push_back(std::move(best.candidate));
+        if (merit <= least) continue;
+        least = merit;
+        best = first;
     }
+    return best;
+}
 
-    const Score last = heldout(*now, reported_, used_step_);
+/// Effects that stood in for the one added last are no longer needed beside it.
+void Loop::drop_needless() {
+    for (std::size_t k = now_.steps.size(); k-- > 0;) {
+        const std::string effect = now_.steps[k].effect;
+        SampleModel without = now_.fit->model();
+        if (effect == "rate_random_walk") {
+            without.walk = false;
+            without.noise.walk_arcsec2_s3 = 0.0;
+        } else if (effect == "bias_instability") {
+            without.flicker = false;
+            without.noise.terms.clear();
+        } else if (effect.starts_with("bias_") || effect == "scale_factor_error") {
+            std::erase_if(without.columns, [&](const SampleColumn& c) { return c.effect == effect; });
+        } else {
+            continue;
+        }
+        auto fitted = std::make_shared<SampleFit>(series_, std::move(without), rows_, SampleFit::Noise::near);
+        const double chi2 = 2.0 * (now_.fit->log_likelihood() - fitted->log_likelihood());
+        const int parameters = effect == "bias_step" ? 2 : 1;
+        if (chi2_tail(chi2, parameters) * effects_on_samples < level_of_effects) continue;
+        now_.fit = std::move(fitted);
+        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
+        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+}
+
+/// Tests of what the model has left; where structure lies, if any passes the level: by the regression that explains
+/// most, the noise fitted anew beside it; where none does, by the test that is least probable by chance.
+void Loop::test_what_is_left(Closure& closure) const {
+    constexpr std::size_t looked_at = 4;
+    auto views = view_samples(*now_.fit, lattice_step());
+    const Disturbed still = find_disturbed(*now_.fit);
+    views.push_back(
+        {{Where::time, fmt::format("stretches of {:.3g} s far larger than the others", still.length_s),
+          still.share > 0.0 ? still.p_value : 1.0,
+          still.share > 0.0 ? fmt::format("{:.1f} % of the record, most at {:.6g} s, {:.3g} times the usual variance",
+                                          100.0 * still.share, still.at_s, still.worst)
+                            : ""}});
+    closure.tests.clear();
+    for (const View& view : views) closure.tests.push_back(view.test);
+    closure.unexplained.reset();
+    const auto count = static_cast<double>(views.size());
+    std::erase_if(views, [&](const View& view) { return of_several(view.test.p_value, count) >= level_of_residual; });
+    if (views.empty()) return;
+    std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.p_value < b.test.p_value; });
+    closure.unexplained = views.front().test;
+    std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
+    double most = 0.0;
+    for (std::size_t k = 0; k < std::min(looked_at, views.size()); ++k) {
+        if (!views[k].columns && !(views[k].test.merit > 0.0)) continue;
+        const double merit = views[k].columns ? refitted_merit(*now_.fit, views[k]) : views[k].test.merit;
+        if (merit <= most) continue;
+        most = merit;
+        closure.unexplained = views[k].test;
+    }
+}
+
+/// What is reported: errors of the blocks held out, parameters of a last fit to the whole record.
+void Loop::finish(Closure& closure) {
+    const Score last = heldout(*now_.fit, reported_, used_step_);
     closure.heldout_after = last.error;
     closure.noise_floor = last.floor;
-    closure.tests = test_samples(*now, series_.counted ? 0.25 * series_.scale_factor_arcsec : lattice_.step_arcsec);
-    const Disturbed still = find_disturbed(*now);
-    closure.tests.push_back(
-        {Where::time, fmt::format("stretches of {:.3g} s far larger than the others", still.length_s),
-         still.share > 0.0 ? still.p_value : 1.0,
-         still.share > 0.0 ? fmt::format("{:.1f} % of the record, most at {:.6g} s, {:.3g} times the usual variance",
-                                         100.0 * still.share, still.at_s, still.worst)
-                           : ""});
-    const auto worst = std::min_element(closure.tests.begin(), closure.tests.end(),
-                                        [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
-    if (of_several(worst->p_value, static_cast<double>(closure.tests.size())) < level_of_residual)
-        closure.unexplained = *worst;
     closure.residual.time_s = series_.time_s;
     for (std::size_t i = 0; i < series_.size(); ++i) {
-        closure.residual.innovation.push_back(now->innovations()[i] * now->sd(i));
-        closure.residual.sd.push_back(now->sd(i));
+        closure.residual.innovation.push_back(now_.fit->innovations()[i] * now_.fit->sd(i));
+        closure.residual.sd.push_back(now_.fit->sd(i));
     }
     closure.residual.reported = reported_;
     double input = record_.declared.input_rate_deg_h.value_or(0.0);
@@ -305,27 +360,184 @@ Closure Loop::run() {
         for (const double x : series_.input_rate_deg_h) input += x / static_cast<double>(series_.size());
     }
     closure.mean_input_rate_deg_h = input;
-    // The figures that are kept: from the whole record but what is disturbed.
-    Rows whole(series_.size(), 1);
-    if (disturbed.share > 0.0 && disturbed.share < 0.6) {
-        for (std::size_t i = 0; i < whole.size(); ++i) whole[i] = disturbed.rows[i] ? 0 : 1;
-    }
-    const SampleFit final(series_, now->model(), whole);
-    const SampleModel& model = final.model();
-    closure.base.push_back({"", "mean_rate_deg_h", model.columns[0].value, model.columns[0].sd});
-    closure.base.push_back({"", "white_angle_arcsec", model.noise.angle_arcsec, final.angle_sd()});
-    closure.base.push_back({"", "white_rate_deg_rt_h", model.noise.rate_arcsec_rt_s * units::deg_rt_h_per_arcsec_rt_s,
-                            final.rate_sd() * units::deg_rt_h_per_arcsec_rt_s});
+    const SampleFit whole =
+        refine_lines(series_, SampleFit(series_, now_.fit->model(), whole_, SampleFit::Noise::near), whole_);
+    SampleFigures figures = figures_of(whole, now_.told, record_.declared);
+    closure.base = std::move(figures.base);
+    closure.steps = std::move(now_.steps);
     for (std::size_t k = 0; k < closure.steps.size(); ++k) {
-        if (closure.steps[k].parameters.empty())
-            closure.steps[k].parameters = estimates_of(closure.steps[k].effect, final, taken[k]);
+        if (closure.steps[k].parameters.empty()) closure.steps[k].parameters = std::move(figures.steps[k]);
     }
+    for (std::string& note : figures.notes) closure.notes.push_back(std::move(note));
     closure.verdict = verdict_of(closure);
+}
+
+Closure Loop::run() {
+    Closure closure;
+    begin(closure);
+    take_lattice(closure);
+    std::optional<State> earlier;  // before the first random rate
+    while (now_.steps.size() < most_steps) {
+        auto all = contenders(now_, next_step_);
+        if (all.empty()) break;
+        Contender best = all.front();
+        const double rival = rival_merit(best.candidate.effect, best.merit);
+        const bool random = is_random_rate(best.candidate.effect);
+        if (random || rival > best.merit) {
+            const auto first = of_several_effects(all, std::max(rival, random ? best.merit + tie : 0.0));
+            if (first) {
+                best = *first;
+            } else if (rival > best.merit) {
+                break;
+            }
+        }
+        if (!earlier && is_random_rate(best.candidate.effect)) earlier = now_;
+        take(std::move(best), all, closure);
+    }
+    test_what_is_left(closure);
+    if (earlier && closure.unexplained) {
+        // A rate is left that is none of the library's: the random one has only come nearest to it.
+        now_ = std::move(*earlier);
+        test_what_is_left(closure);
+    }
+    take_back_lines(closure);
+    finish(closure);
+    return closure;
+}
+
+/// Adds an effect to the model.
+void Loop::take(Contender best, const std::vector<Contender>& all, Closure& closure) {
+    const std::string effect = best.candidate.effect;
+    Step step;
+    step.effect = effect;
+    step.p_value = best.candidate.p_value;
+    step.confounded_with = best.candidate.confounded;
+    for (const Contender& other : all) {
+        const std::string& name = other.candidate.effect;
+        const bool named =
+            std::find(step.confounded_with.begin(), step.confounded_with.end(), name) != step.confounded_with.end();
+        // One that explains more by itself is as good, even where another and a second together explain more.
+        if (best.merit - other.merit < tie && name != effect && !named) step.confounded_with.push_back(name);
+    }
+    if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
+    const Score before = heldout(*now_.fit, reported_, used_step_);
+    now_.fit = best.fit;
+    drop_needless();
+    const Score after = heldout(*now_.fit, reported_, used_step_);
+    step.heldout_error_before = before.error;
+    step.heldout_error_after = after.error;
+    step.heldout_log_score_gain = after.log_score - before.log_score;
+    if (is_line(effect)) {
+        now_.lines_hz.push_back(line_hz(now_.fit->model(), best.candidate.wanders));
+        if (best.candidate.wanders) {
+            closure.notes.push_back(
+                fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "
+                            "samples before as a narrow resonance",
+                            now_.lines_hz.back()));
+        }
+    }
+    now_.steps.push_back(std::move(step));
+    SampleStep told{effect, next_step_++, best.candidate.witness, best.candidate.strong};
+    for (const Contender& other : all) {
+        const double hz = other.fit->model().noise.from_hz;
+        if (effect != "resampling" || other.candidate.effect != effect || best.merit - other.merit >= tie) continue;
+        if (std::abs(hz - best.fit->model().noise.from_hz) > 1e-3 * series_.rate_hz) told.other_hz.push_back(hz);
+    }
+    now_.told.push_back(std::move(told));
+}
+
+/// A line of the library keeps its amplitude, and its frequency but for an even drift. One that does not, as its own
+/// amplitudes in time or lines beside it show, is none and is not named.
+void Loop::take_back_lines(Closure& closure) {
+    if (!closure.unexplained) return;
+    const UnsteadyLine line = unsteady_line(*now_.fit);
+    const bool fails = of_several(line.p_value, static_cast<double>(closure.tests.size())) < level_of_residual;
+    if (!fails && !line.beside) return;
+    for (std::size_t k = 0; k < now_.told.size(); ++k) {
+        if (now_.told[k].step != line.step) continue;
+        const std::string at = fmt::format("at {:.6g} Hz", line.hz);
+        closure.unexplained = ResidualTest{line.beside ? Where::frequency : Where::amplitude,
+                                           "a line that does not keep its amplitude or its frequency",
+                                           fails ? line.p_value : closure.unexplained->p_value, at};
+        closure.notes.push_back(
+            fmt::format("the line {} is in the model, so that the rest can be told, and is not named", at));
+        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
+        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+        return;
+    }
+}
+
+/// Whatever is known to be there, at the values given or near them; what is left is not looked at.
+Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
+    Closure closure;
+    begin(closure);
+    SampleModel model = now_.fit->model();
+    const double duration_s = static_cast<double>(series_.size()) * series_.interval_s;
+    SampleFit::Noise noise = SampleFit::Noise::near;
+    for (const ActiveEffect& active : effects) {
+        const std::string effect(active.effect->name());
+        const int k = next_step_++;
+        SampleStep told{effect, k};
+        if (effect == "count_quantization") {
+            lattice_ = find_lattice(series_.increment);
+            used_step_ = lattice_.printed_arcsec;
+        } else if (is_line(effect)) {
+            SampleLine line{alias(active.values.at("frequency_hz"), series_.rate_hz)};
+            if (effect == "dither_residue") {
+                const double hz = active.values.at("frequency_hz");
+                const bool folded = hz < std::round(hz / series_.rate_hz) * series_.rate_hz;
+                line.drift_hz_per_s = (folded ? -1.0 : 1.0) * active.values.at("drift_hz_per_s");
+                line.drifts = line.drift_hz_per_s != 0.0;
+            }
+            add_line(model, series_, line, effect, k);
+        } else if (effect == "case_motion") {
+            const std::string name = std::string("accel_") + "xyz"[std::lround(active.values.at("witness"))];
+            for (std::size_t w = 0; w < series_.witnesses.size(); ++w) {
+                if (series_.witnesses[w].first == name) told.witness = w;
+            }
+            if (!series_.witnesses.empty()) add_motion(model, series_, told.witness, k);
+        } else if (effect == "resampling") {
+            model.noise.from_hz = active.values.at("from_hz");
+            model.noise.blur_arcsec = 1e-3 * now_.fit->sd(0);
+            model.noise.digits_arcsec = 1e-6 * now_.fit->sd(0);
+            noise = SampleFit::Noise::free;
+        } else if (effect == "rate_random_walk") {
+            model.walk = true;
+            model.noise.walk_arcsec2_s3 = std::pow(active.values.at("deg_h_rt_h") / 60.0, 2);
+        } else if (effect == "bias_instability") {
+            model.flicker = true;
+            model.flicker_deg_h = active.values.at("deg_h");
+            model.noise.terms = flicker_terms(model.flicker_deg_h, 4.0 * series_.interval_s, duration_s);
+        } else if (effect == "bias_step") {
+            const double rows = (active.values.at("time_s") - series_.time_s[0] + series_.interval_s) * series_.rate_hz;
+            model.columns.push_back(step_column(
+                series_, static_cast<std::size_t>(std::clamp(rows, 1.0, static_cast<double>(series_.size() - 2)))));
+            model.columns.back().step = k;
+        } else {
+            for (SampleColumn& column : rate_columns(series_)) {
+                if (column.effect != effect) continue;
+                column.step = k;
+                model.columns.push_back(std::move(column));
+            }
+        }
+        now_.steps.emplace_back().effect = effect;
+        now_.told.push_back(told);
+        if (effect == "count_quantization") {
+            now_.steps.back().parameters.push_back(
+                {effect, "step_arcsec", lattice_.step_arcsec, lattice_.step_sd_arcsec});
+        }
+    }
+    now_.fit = std::make_shared<SampleFit>(series_, std::move(model), rows_, noise);
+    finish(closure);
     return closure;
 }
 
 }  // namespace
 
 Closure close_samples(const record::Record& record) { return Loop(record).run(); }
+
+Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects) {
+    return Loop(record).fit(effects);
+}
 
 }  // namespace ringlock::closure

@@ -1,19 +1,34 @@
 #include "analysis/closure/sample_filter.hpp"
 
 #include <cmath>
+#include <type_traits>
+#include <utility>
 
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
 
-SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double interval_s) {
+namespace {
+
+/// Calls `with` with the number of states as a constant.
+template <int D = 1, class With>
+void for_states(int states, With&& with) {
+    if constexpr (D <= SampleFilter::most) {
+        if (states == D) return with(std::integral_constant<int, D>{});
+        for_states<D + 1>(states, with);
+    }
+}
+
+}  // namespace
+
+void SampleFilter::set_up(const SampleNoise& noise, double interval_s) {
     resampled_ = noise.from_hz > 0.0;
     const double dt = resampled_ ? 1.0 / noise.from_hz : interval_s;
     // States: angle, rates, resonances (two each), readings (two)
     n_ = 1;
     f_[0][0] = 1.0;
     q_[0][0] = noise.rate_arcsec_rt_s * noise.rate_arcsec_rt_s * dt;
-    Matrix p{};
+    Matrix& p = start_;
     if (noise.walk_arcsec2_s3 > 0.0) {
         f_[0][n_] = dt;
         f_[n_][n_] = 1.0;
@@ -49,8 +64,8 @@ SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double in
     }
     const double readout = noise.angle_arcsec * noise.angle_arcsec;
     // The record begins at angle zero as it was read.
-    p[0][0] = readout + q_[0][0];
-    double floor = readout;
+    p[0][0] = readout;
+    floor_ = readout;
     if (resampled_) {
         const int r0 = n_;
         const int r1 = n_ + 1;
@@ -69,103 +84,221 @@ SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double in
         for (int j = 0; j < n_; ++j) q_[j][r1] = q_[r1][j];
         n_ += 2;
         p[r0][r0] = p[r1][r1] = p[0][0] + q_[r1][r1];
-        // Interpolated readings have no error of their own; digits have.
-        floor = noise.blur_arcsec * noise.blur_arcsec + 1e-8 * (readout + q_[0][0]);
+        // Interpolated readings have no error of their own; digits have. They do not go with the noise: rows that are
+        // settled by others would count for a smaller one.
+        floor_ = noise.blur_arcsec * noise.blur_arcsec + noise.digits_arcsec * noise.digits_arcsec;
+        ratio_ = interval_s * noise.from_hz;
+        first_place_ = noise.from_phase;
     } else {
         h_[0] = 1.0;
         for (const int resonance : resonances) h_[resonance] = 1.0;
     }
     for (int i = 0; i < n_; ++i) {
+        auto& terms = nonzero_[i];
         for (int j = 0; j < n_; ++j) {
-            if (f_[i][j] != 0.0) nonzero_[i].push_back(j);
-        }
-    }
-    double place = noise.from_phase;
-    const double ratio = resampled_ ? interval_s * noise.from_hz : 0.0;
-    if (resampled_) {
-        ticks_.resize(rows);
-        share_.resize(rows);
-    }
-    double last = -1.0;
-    int same = 0;
-    for (std::size_t k = 0; k < rows; ++k) {
-        if (resampled_) {
-            place += ratio;
-            const double whole = std::floor(place);
-            place -= whole;
-            ticks_[k] = static_cast<std::uint8_t>(std::min(whole, 250.0));
-            share_[k] = place;
-            for (int i = 0; i < ticks_[k]; ++i) step(p);
-            h_[n_ - 2] = 1.0 - place;
-            h_[n_ - 1] = place;
-        } else {
-            step(p);
-        }
-        Vector ph{};
-        double s = floor;
-        for (int i = 0; i < n_; ++i) {
-            for (int j = 0; j < n_; ++j) ph[i] += p[i][j] * h_[j];
-        }
-        for (int i = 0; i < n_; ++i) s += h_[i] * ph[i];
-        Vector gain{};
-        for (int i = 0; i < n_; ++i) gain[i] = ph[i] / s;
-        for (int i = 0; i < n_; ++i) {
-            for (int j = 0; j < n_; ++j) p[i][j] -= gain[i] * ph[j];
-        }
-        gain_.push_back(gain);
-        sd_.push_back(std::sqrt(s));
-        if (resampled_) continue;
-        same = std::abs(s - last) < 1e-8 * s ? same + 1 : 0;
-        last = s;
-        if (same > 50) break;
-    }
-}
-
-void SampleFilter::step(Matrix& p) const {
-    Matrix fp{};
-    for (int i = 0; i < n_; ++i) {
-        for (const int l : nonzero_[i]) {
-            for (int j = 0; j < n_; ++j) fp[i][j] += f_[i][l] * p[l][j];
-        }
-    }
-    for (int i = 0; i < n_; ++i) {
-        for (int j = 0; j < n_; ++j) {
-            double sum = q_[i][j];
-            for (const int l : nonzero_[j]) sum += fp[i][l] * f_[j][l];
-            p[i][j] = sum;
+            if (f_[i][j] != 0.0) terms.at[terms.count++] = j;
         }
     }
 }
 
-void SampleFilter::advance(Vector& x) const {
-    Vector next{};
-    for (int i = 0; i < n_; ++i) {
-        for (const int l : nonzero_[i]) next[i] += f_[i][l] * x[l];
+template <int D>
+void SampleFilter::advance(const SampleFilter& filter, std::array<double, D>& x) {
+    std::array<double, D> next{};
+    for (int i = 0; i < D; ++i) {
+        const Terms& terms = filter.nonzero_[i];
+        for (int k = 0; k < terms.count; ++k) next[i] += filter.f_[i][terms.at[k]] * x[terms.at[k]];
     }
     x = next;
 }
 
+/// Covariances and gains, row after row: row(ticks, share, variance, gain) says whether to go on.
+template <int D, class Row>
+void SampleFilter::run(std::size_t rows, Row&& row) const {
+    using Line = std::array<double, D>;
+    std::array<Line, D> p;
+    std::array<Line, D> q;
+    Line h;
+    for (int i = 0; i < D; ++i) {
+        for (int j = 0; j < D; ++j) {
+            p[i][j] = start_[i][j];
+            q[i][j] = q_[i][j];
+        }
+        h[i] = h_[i];
+    }
+    // P <- F (F P)' + Q, P being symmetric
+    const auto step = [&] {
+        std::array<Line, D> turned;
+        for (int i = 0; i < D; ++i) {
+            Line fp{};
+            const Terms& terms = nonzero_[i];
+            for (int k = 0; k < terms.count; ++k) {
+                const int l = terms.at[k];
+                const double f = f_[i][l];
+                for (int j = 0; j < D; ++j) fp[j] += f * p[l][j];
+            }
+            for (int j = 0; j < D; ++j) turned[j][i] = fp[j];
+        }
+        for (int i = 0; i < D; ++i) {
+            Line sum = q[i];
+            const Terms& terms = nonzero_[i];
+            for (int k = 0; k < terms.count; ++k) {
+                const int l = terms.at[k];
+                const double f = f_[i][l];
+                for (int j = 0; j < D; ++j) sum[j] += f * turned[l][j];
+            }
+            p[i] = sum;
+        }
+    };
+    double place = first_place_;
+    for (std::size_t r = 0; r < rows; ++r) {
+        int ticks = 1;
+        if (resampled_) {
+            place += ratio_;
+            const double whole = std::floor(place);
+            place -= whole;
+            ticks = static_cast<int>(std::min(whole, 250.0));
+            if constexpr (D >= 2) {
+                h[D - 2] = 1.0 - place;
+                h[D - 1] = place;
+            }
+        }
+        for (int i = 0; i < ticks; ++i) step();
+        Line ph{};
+        for (int j = 0; j < D; ++j) {
+            if (h[j] == 0.0) continue;
+            for (int i = 0; i < D; ++i) ph[i] += p[j][i] * h[j];
+        }
+        double s = floor_;
+        for (int i = 0; i < D; ++i) s += h[i] * ph[i];
+        Line gain;
+        for (int i = 0; i < D; ++i) gain[i] = ph[i] / s;
+        for (int i = 0; i < D; ++i) {
+            for (int j = 0; j < D; ++j) p[i][j] -= gain[i] * ph[j];
+        }
+        if (!row(ticks, place, s, gain)) return;
+    }
+}
+
+namespace {
+
+/// Whether gains have stopped changing: each, since those of slow rates settle long after the variance has.
+template <int D>
+class Settling {
+   public:
+    bool operator()(const std::array<double, D>& gain) {
+        bool same = true;
+        for (int i = 0; i < D; ++i) {
+            if (std::abs(gain[i] - last_[i]) > 1e-9 * std::abs(gain[i])) same = false;
+        }
+        last_ = gain;
+        count_ = same ? count_ + 1 : 0;
+        return count_ > 50;
+    }
+
+   private:
+    std::array<double, D> last_{};
+    int count_ = 0;
+};
+
+}  // namespace
+
+SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double interval_s) {
+    set_up(noise, interval_s);
+    for_states(n_, [&](auto d) {
+        constexpr int D = decltype(d)::value;
+        Settling<D> settled;
+        run<D>(rows, [&](int ticks, double share, double variance, const std::array<double, D>& gain) {
+            gain_.insert(gain_.end(), gain.begin(), gain.end());
+            sd_.push_back(std::sqrt(variance));
+            largest_sd_ = std::max(largest_sd_, sd_.back());
+            if (resampled_) {
+                ticks_.push_back(static_cast<std::uint8_t>(ticks));
+                share_.push_back(share);
+                return true;
+            }
+            return !settled(gain);
+        });
+    });
+}
+
 std::vector<double> SampleFilter::apply(std::span<const double> increments) const {
     std::vector<double> out(increments.size());
-    Vector x{};
-    Vector h = h_;
-    double before = 0.0;  // what of the angle has been read is taken off the states, so that nothing grows
-    for (std::size_t k = 0; k < increments.size(); ++k) {
-        const std::size_t g = std::min(k, gain_.size() - 1);
-        if (resampled_) {
-            for (int i = 0; i < ticks_[k]; ++i) advance(x);
-            h[n_ - 2] = 1.0 - share_[k];
-            h[n_ - 1] = share_[k];
-        } else {
-            advance(x);
+    for_states(n_, [&](auto d) {
+        constexpr int D = decltype(d)::value;
+        std::array<double, D> x{};
+        std::array<double, D> h;
+        for (int i = 0; i < D; ++i) h[i] = h_[i];
+        double before = 0.0;
+        const std::size_t rows = sd_.size();
+        for (std::size_t k = 0; k < increments.size(); ++k) {
+            const std::size_t g = std::min(k, rows - 1);
+            const int ticks = resampled_ ? ticks_[k] : 1;
+            for (int i = 0; i < ticks; ++i) advance<D>(*this, x);
+            if constexpr (D >= 2) {
+                if (resampled_) {
+                    h[D - 2] = 1.0 - share_[k];
+                    h[D - 1] = share_[k];
+                }
+            }
+            before += increments[k];
+            double e = before;
+            for (int i = 0; i < D; ++i) e -= h[i] * x[i];
+            const double* gain = gain_.data() + g * D;
+            for (int i = 0; i < D; ++i) x[i] += gain[i] * e;
+            out[k] = e / sd_[g];
         }
-        before += increments[k];
-        double e = before;
-        for (int i = 0; i < n_; ++i) e -= h[i] * x[i];
-        for (int i = 0; i < n_; ++i) x[i] += gain_[g][i] * e;
-        out[k] = e / sd_[g];
-    }
+    });
     return out;
+}
+
+double SampleFilter::minus_log_likelihood(const SampleNoise& noise, double interval_s,
+                                          std::span<const double> increments, std::span<const std::uint8_t> rows) {
+    SampleFilter filter;
+    filter.set_up(noise, interval_s);
+    double sum = 0.0;
+    double product = 1.0;  // of variances, whose logarithms cost more than all the rest
+    for_states(filter.n_, [&](auto d) {
+        constexpr int D = decltype(d)::value;
+        std::array<double, D> x{};
+        std::array<double, D> h;
+        for (int i = 0; i < D; ++i) h[i] = filter.h_[i];
+        double before = 0.0;
+        std::size_t k = 0;
+        std::array<double, D> kept{};
+        double variance_kept = 1.0;
+        const auto take = [&](int ticks, double share, double variance, const std::array<double, D>& gain) {
+            for (int i = 0; i < ticks; ++i) advance<D>(filter, x);
+            if constexpr (D >= 2) {
+                if (filter.resampled_) {
+                    h[D - 2] = 1.0 - share;
+                    h[D - 1] = share;
+                }
+            }
+            before += increments[k];
+            double e = before;
+            for (int i = 0; i < D; ++i) e -= h[i] * x[i];
+            for (int i = 0; i < D; ++i) x[i] += gain[i] * e;
+            if (rows[k]) {
+                sum += 0.5 * e * e / variance;
+                product *= variance;
+                if (!(product > 1e-200 && product < 1e200)) {
+                    sum += 0.5 * std::log(product);
+                    product = 1.0;
+                }
+            }
+            ++k;
+        };
+        Settling<D> settled;
+        filter.run<D>(increments.size(),
+                      [&](int ticks, double share, double variance, const std::array<double, D>& gain) {
+                          take(ticks, share, variance, gain);
+                          kept = gain;
+                          variance_kept = variance;
+                          return filter.resampled_ || !settled(gain);
+                      });
+        while (k < increments.size()) take(1, 0.0, variance_kept, kept);
+    });
+    return sum + 0.5 * std::log(product);
 }
 
 }  // namespace ringlock::closure

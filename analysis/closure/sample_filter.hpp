@@ -21,9 +21,10 @@ struct SampleNoise {
         double arcsec, hz, width_hz;
     };
     std::vector<Resonance> resonances = {};
-    double from_hz = 0.0;      ///< taken at that rate and interpolated; 0: not
-    double blur_arcsec = 0.0;  ///< rms of what interpolated readings are off the straight line
-    double from_phase = 0.0;   ///< source intervals from the sample before the record's start to that start
+    double from_hz = 0.0;        ///< taken at that rate and interpolated; 0: not
+    double blur_arcsec = 0.0;    ///< rms of what interpolated readings are off the straight line
+    double digits_arcsec = 0.0;  ///< the least of it: what the values are written to
+    double from_phase = 0.0;     ///< source intervals from the sample before the record's start to that start
 };
 
 /// The Kalman filter that makes innovations of increments: independent and of unit variance where the noise is as said.
@@ -36,23 +37,41 @@ class SampleFilter {
     /// Innovations over their standard deviations. Linear in the increments.
     std::vector<double> apply(std::span<const double> increments) const;
     double sd(std::size_t row) const { return sd_[std::min(row, sd_.size() - 1)]; }
+    /// Rows that those before them settle but for their digits: where a record has more samples than it was made of.
+    bool settled(std::size_t row) const { return resampled_ && sd(row) < 0.03 * largest_sd_; }
+    /// Minus the log-likelihood of the rows that count, but for a constant, in one pass that keeps nothing.
+    static double minus_log_likelihood(const SampleNoise& noise, double interval_s, std::span<const double> increments,
+                                       std::span<const std::uint8_t> rows);
+
+    static constexpr int most = 16;
 
    private:
-    static constexpr int most = 16;
     using Vector = std::array<double, most>;
     using Matrix = std::array<Vector, most>;
-    void step(Matrix& p) const;
-    void advance(Vector& x) const;
+    struct Terms {
+        int count = 0;
+        std::array<int, most> at{};
+    };
+    SampleFilter() = default;
+    void set_up(const SampleNoise& noise, double interval_s);
+    template <int D, class Row>
+    void run(std::size_t rows, Row&& row) const;
+    template <int D>
+    static void advance(const SampleFilter& filter, std::array<double, D>& x);
 
     int n_ = 0;
     bool resampled_ = false;
-    Matrix f_{}, q_{};  ///< one interval of the source
+    double floor_ = 0.0;  ///< variance of the measurement itself
+    double ratio_ = 0.0;  ///< resampled: source intervals a row
+    double first_place_ = 0.0;
+    Matrix f_{}, q_{}, start_{};  ///< one interval of the source
     Vector h_{};
-    std::vector<Vector> gain_;  ///< until they stay the same
+    std::array<Terms, most> nonzero_{};
+    std::vector<double> gain_;  ///< until they stay the same
     std::vector<double> sd_;
+    double largest_sd_ = 0.0;
     std::vector<std::uint8_t> ticks_;  ///< resampled: source samples passed before each row
     std::vector<double> share_;
-    std::vector<int> nonzero_[most];
 };
 
 }  // namespace ringlock::closure

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numeric>
 
 #include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
@@ -92,29 +93,32 @@ std::vector<Free> knobs(SampleModel& model) {
 }  // namespace
 
 std::vector<SampleNoise::Term> flicker_terms(double deg_h, double shortest_s, double longest_s) {
-    // As the effect simulates it, B^2/(2 pi f) by Markov rates, two a decade of time: each of the variance
-    // (B^2/pi) ln(ratio) ... the integral of the density over the band that it stands for, doubled for both signs.
+    // B^2/(2 pi f) by Markov rates: each of the variance (B^2/pi) ln(ratio), the integral of the density over the band
+    // that it stands for, doubled for both signs. The slowest is as good as constant over the record.
+    constexpr int most = 8;
+    const double last_s = std::sqrt(10.0) * longest_s;
+    const double ratio = std::max(std::sqrt(10.0), std::pow(last_s / shortest_s, 1.0 / (most - 1)));
     std::vector<SampleNoise::Term> terms;
-    const double ratio = std::sqrt(10.0);
-    for (double t = shortest_s; t < longest_s * ratio && terms.size() < 10; t *= ratio) {
+    for (double t = shortest_s; t < 1.001 * last_s && terms.size() < most; t *= ratio) {
         terms.push_back({t, deg_h * deg_h / units::pi * std::log(ratio)});
     }
     return terms;
 }
 
-SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& rows, bool free_noise)
-    : series_(&series), rows_(&rows), model_(std::move(model)) {
+SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& rows, Noise noise)
+    : series_(&series), rows_(&rows), model_(std::move(model)), searched_(noise == Noise::near) {
     if (model_.columns.empty()) {
         model_.columns.push_back(
             {"", "mean_rate_deg_h", std::make_shared<std::vector<double>>(series.size(), series.interval_s)});
+        take_off();
         double mean = 0.0;
-        for (const double x : series.increment) mean += x / static_cast<double>(series.size());
+        for (const double x : rest_) mean += x / static_cast<double>(series.size());
         model_.columns[0].value = mean * series.rate_hz;
         double white = 0.0;
         double next = 0.0;
         for (std::size_t i = 1; i < series.size(); ++i) {
-            const double a = series.increment[i - 1] - mean;
-            const double b = series.increment[i] - mean;
+            const double a = rest_[i - 1] - mean;
+            const double b = rest_[i] - mean;
             white += b * b / static_cast<double>(series.size());
             next += a * b / static_cast<double>(series.size());
         }
@@ -124,7 +128,7 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
     }
     filter_ = std::make_shared<SampleFilter>(model_.noise, series.size(), series.interval_s);
     take_off();
-    if (free_noise) {
+    if (noise != Noise::held) {
         fit_columns();
         fit_noise();
     }
@@ -134,6 +138,12 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
 
 void SampleFit::take_off() {
     rest_ = series_->increment;
+    if (!series_->input_rate_deg_h.empty()) {
+        // What is known of the input but for its mean, which belongs to the mean rate.
+        const auto& input = series_->input_rate_deg_h;
+        const double mean = std::accumulate(input.begin(), input.end(), 0.0) / static_cast<double>(input.size());
+        for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= (input[i] - mean) * series_->interval_s;
+    }
     if (!model_.motion.empty()) {
         for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= model_.motion[i];
     }
@@ -145,17 +155,127 @@ void SampleFit::take_off() {
 
 double SampleFit::evaluate(const SampleModel& model, std::span<const double> rest) const {
     check_interrupt();
-    const SampleFilter filter(model.noise, rest.size(), series_->interval_s);
-    const auto e = filter.apply(rest);
-    double value = 0.0;
-    for (std::size_t i = 0; i < e.size(); ++i) {
-        if ((*rows_)[i]) value += 0.5 * e[i] * e[i] + std::log(filter.sd(i));
-    }
+    const double value = SampleFilter::minus_log_likelihood(model.noise, series_->interval_s, rest, *rows_);
     return std::isfinite(value) ? value : 1e300;
 }
 
-void SampleFit::fit_noise() {
+/// The model with its knobs at these places.
+SampleModel SampleFit::at(const std::vector<double>& x) const {
     const double duration_s = series_->interval_s * static_cast<double>(series_->size());
+    SampleModel model = model_;
+    auto free = knobs(model);
+    for (std::size_t i = 0; i < free.size(); ++i)
+        *free[i].value = free[i].logarithmic ? std::exp(x[i] * free[i].scale) : x[i];
+    for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+        auto& resonance = model.noise.resonances[k];
+        if (k > 0 && model.resonances[k] == model.resonances[k - 1]) {
+            resonance.hz = model.noise.resonances[k - 1].hz;
+            resonance.width_hz = 3.0 * model.noise.resonances[k - 1].width_hz;
+        }
+        if (resonance.hz > 0.5 * series_->rate_hz || resonance.width_hz > 3.0 * series_->rate_hz)
+            resonance.arcsec = 0.0;
+    }
+    if (model.noise.from_hz > 0.0) {
+        // About the middle of the record, so that rate and place are told apart.
+        const double shift_hz = 0.1 * model.from_shift / duration_s;
+        model.noise.from_hz += shift_hz;
+        model.noise.from_phase -= 0.5 * shift_hz * duration_s;
+        model.noise.from_phase -= std::floor(model.noise.from_phase);
+        model.from_shift = 0.0;
+    }
+    if (model.flicker) model.noise.terms = flicker_terms(model.flicker_deg_h, 4.0 * series_->interval_s, duration_s);
+    return model;
+}
+
+/// Of the likelihood, with Fisher's information: sum over the rows of (dS/S)(dS/S)'/2 + (dr)(dr)'/S, r the innovations
+/// and S their variances (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter", 1989, section
+/// 3.4.5).
+SampleFit::Slope SampleFit::slope(const std::vector<double>& x) const {
+    constexpr double step = 1e-4;
+    const std::size_t n = rest_.size();
+    const auto m = static_cast<Eigen::Index>(x.size());
+    check_interrupt();
+    const SampleFilter filter(at(x).noise, n, series_->interval_s);
+    const auto e = filter.apply(rest_);
+    Slope slope;
+    slope.gradient = Eigen::VectorXd::Zero(m);
+    slope.information = Eigen::MatrixXd::Zero(m, m);
+    for (std::size_t i = 0; i < n; ++i) {
+        if ((*rows_)[i]) slope.value += 0.5 * e[i] * e[i] + std::log(filter.sd(i));
+    }
+    // d log(sd) and d(innovation) of each knob
+    std::vector<std::vector<float>> log_sd(x.size(), std::vector<float>(n, 0.0F));
+    std::vector<std::vector<float>> moved(x.size(), std::vector<float>(n, 0.0F));
+    for (std::size_t j = 0; j < x.size(); ++j) {
+        auto beside = x;
+        beside[j] += step;
+        const SampleFilter other(at(beside).noise, n, series_->interval_s);
+        const auto f = other.apply(rest_);
+        double gradient = 0.0;
+        for (std::size_t i = 0; i < n; ++i) {
+            if (!(*rows_)[i]) continue;
+            const double of_log = std::log(other.sd(i) / filter.sd(i)) / step;
+            const double of_e = (f[i] - e[i]) / step;
+            gradient += e[i] * of_e + of_log;
+            log_sd[j][i] = static_cast<float>(of_log);
+            moved[j][i] = static_cast<float>(of_e + e[i] * of_log);
+        }
+        slope.gradient(static_cast<Eigen::Index>(j)) = gradient;
+    }
+    for (Eigen::Index a = 0; a < m; ++a) {
+        for (Eigen::Index b = 0; b <= a; ++b) {
+            const auto& la = log_sd[static_cast<std::size_t>(a)];
+            const auto& lb = log_sd[static_cast<std::size_t>(b)];
+            const auto& ma = moved[static_cast<std::size_t>(a)];
+            const auto& mb = moved[static_cast<std::size_t>(b)];
+            double sum = 0.0;
+            for (std::size_t i = 0; i < n; ++i) {
+                sum += 2.0 * static_cast<double>(la[i]) * static_cast<double>(lb[i]) +
+                       static_cast<double>(ma[i]) * static_cast<double>(mb[i]);
+            }
+            slope.information(a, b) = slope.information(b, a) = sum;
+        }
+    }
+    return slope;
+}
+
+/// Fisher's scoring, damped (Levenberg and Marquardt): steps by the information where the likelihood rises.
+void SampleFit::score_noise(std::vector<double>& x) const {
+    constexpr int most_rounds = 25;
+    constexpr double longest = 1.5;
+    constexpr double enough = 2e-3;  // of the log-likelihood
+    double damping = 1e-3;
+    Slope now = slope(x);
+    for (int round = 0; round < most_rounds && damping < 1e7; ++round) {
+        bool better = false;
+        double gained = 0.0;
+        while (!better && damping < 1e7) {
+            Eigen::MatrixXd damped = now.information;
+            damped.diagonal() *= 1.0 + damping;
+            damped.diagonal().array() += 1e-6;
+            Eigen::VectorXd step = damped.ldlt().solve(-now.gradient);
+            if (!step.allFinite()) break;
+            const double most = step.cwiseAbs().maxCoeff();
+            if (most > longest) step *= longest / most;
+            if (-now.gradient.dot(step) < enough) return;
+            auto next = x;
+            for (std::size_t i = 0; i < x.size(); ++i) next[i] += step(static_cast<Eigen::Index>(i));
+            const double value = evaluate(at(next), rest_);
+            if (value < now.value) {
+                better = true;
+                gained = now.value - value;
+                x = next;
+                damping = std::max(1e-6, 0.1 * damping);
+            } else {
+                damping *= 10.0;
+            }
+        }
+        if (!better || gained < enough) return;
+        now = slope(x);
+    }
+}
+
+void SampleFit::fit_noise() {
     const double scale =
         std::hypot(model_.noise.angle_arcsec, model_.noise.rate_arcsec_rt_s * std::sqrt(series_->interval_s));
     // What stands at zero begins small, so that it can grow.
@@ -163,70 +283,60 @@ void SampleFit::fit_noise() {
     if (model_.noise.rate_arcsec_rt_s * std::sqrt(series_->interval_s) < 1e-4 * scale) {
         model_.noise.rate_arcsec_rt_s = 1e-2 * scale / std::sqrt(series_->interval_s);
     }
-    const auto trial = [&](const std::vector<double>& x) {
-        SampleModel model = model_;
-        auto free = knobs(model);
-        for (std::size_t i = 0; i < free.size(); ++i)
-            *free[i].value = free[i].logarithmic ? std::exp(x[i] * free[i].scale) : x[i];
-        for (std::size_t k = 0; k < model.resonances.size(); ++k) {
-            auto& resonance = model.noise.resonances[k];
-            if (k > 0 && model.resonances[k] == model.resonances[k - 1]) {
-                resonance.hz = model.noise.resonances[k - 1].hz;
-                resonance.width_hz = 3.0 * model.noise.resonances[k - 1].width_hz;
-            }
-            if (resonance.hz > 0.5 * series_->rate_hz || resonance.width_hz > 3.0 * series_->rate_hz)
-                resonance.arcsec = 0.0;
-        }
-        if (model.noise.from_hz > 0.0) {
-            // About the middle of the record, so that rate and place are told apart.
-            const double shift_hz = 0.1 * model.from_shift / duration_s;
-            model.noise.from_hz += shift_hz;
-            model.noise.from_phase -= 0.5 * shift_hz * duration_s;
-            model.noise.from_phase -= std::floor(model.noise.from_phase);
-            model.from_shift = 0.0;
-        }
-        if (model.flicker) {
-            model.noise.terms = flicker_terms(model.flicker_deg_h, 4.0 * series_->interval_s, duration_s);
-        }
-        return model;
-    };
     std::vector<double> start;
     for (const Free& knob : knobs(model_))
         start.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
-    // A long record's noise is found on a part, then on all of it.
-    const auto on = [&](std::size_t n) {
-        return [&, n](const std::vector<double>& x) {
-            return evaluate(trial(x), std::span<const double>(rest_.data(), n));
-        };
-    };
     const std::size_t n = rest_.size();
-    const int evaluations = 30 * static_cast<int>(start.size());
     const bool resampled = model_.noise.from_hz > 0.0;
-    // What is dear is fitted to a part: a filter of n states takes n^3 operations a row while it settles, and where
-    // rows lie between the source's it never does.
     const bool narrow = !model_.resonances.empty();
-    const std::size_t part = std::min<std::size_t>(n, resampled ? (narrow ? 6000 : 15000)
-                                                      : narrow  ? 20000
-                                                                : std::max<std::size_t>(30000, n / 8));
-    const bool dear = resampled || narrow;
-    // From where it stopped, until that gains nothing: the simplex may have fallen flat.
-    const auto again = [&](const std::function<double(const std::vector<double>&)>& f, double size, int times) {
-        double value = f(start);
-        for (int i = 0; i < times; ++i) {
-            start = smallest(f, start, size, evaluations);
-            const double now = f(start);
+    if (!searched_ && (resampled || narrow)) {
+        // The likelihood may have several tops: by a simplex on a part of the record first, from where it stopped until
+        // that gains nothing, for it may have fallen flat.
+        const std::size_t part = std::min<std::size_t>(n, resampled ? 15000 : 20000);
+        const int evaluations = 30 * static_cast<int>(start.size());
+        const auto on_part = [&](const std::vector<double>& x) {
+            return evaluate(at(x), std::span<const double>(rest_.data(), part));
+        };
+        double value = on_part(start);
+        for (int i = 0; i < 3; ++i) {
+            start = smallest(on_part, start, 0.3, evaluations);
+            const double now = on_part(start);
             if (value - now < 0.5) break;
             value = now;
         }
-    };
-    if (n > part && (dear || (n > 2 * part && !model_.walk && !model_.flicker))) {
-        again(on(part), 0.3, dear ? 3 : 5);
-        if (!dear) again(on(n), 0.05, 1);
-    } else {
-        again(on(n), 0.3, 4);
     }
-    model_ = trial(start);
+    score_noise(start);
+    model_ = at(start);
     filter_ = std::make_shared<SampleFilter>(model_.noise, n, series_->interval_s);
+}
+
+SampleModel SampleFit::noise_errors() const {
+    SampleModel errors = model_;
+    SampleModel values = model_;
+    std::vector<double> x;
+    const auto own = knobs(values);
+    for (const Free& knob : own)
+        x.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
+    const Eigen::MatrixXd information = slope(x).information;
+    Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-12).cwiseSqrt();
+    Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * information * scale.cwiseInverse().asDiagonal();
+    // What the record does not tell at all must not spoil what it tells.
+    scaled.diagonal().array() += 1e-9;
+    const Eigen::MatrixXd covariance = scaled.ldlt().solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
+    const auto slots = knobs(errors);
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+        const auto k = static_cast<Eigen::Index>(i);
+        double sd = std::sqrt(std::max(0.0, covariance(k, k))) / scale(k);
+        if (own[i].logarithmic) {
+            sd *= own[i].scale * *own[i].value;
+            // Near zero it is the square that the record knows, to 2 value sd.
+            if (sd > *own[i].value) sd = std::sqrt(2.0 * *own[i].value * sd);
+        }
+        *slots[i].value = sd;
+    }
+    const double duration_s = series_->interval_s * static_cast<double>(series_->size());
+    if (model_.noise.from_hz > 0.0) errors.noise.from_hz = 0.1 * errors.from_shift / duration_s;
+    return errors;
 }
 
 void SampleFit::fit_columns() {
@@ -262,48 +372,35 @@ void SampleFit::fit_columns() {
         column.value += correction(a);
         column.sd = std::sqrt(std::max(0.0, covariance(a, a))) / scale(a);
     }
+    covariance_ = scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
     take_off();
 }
 
 void SampleFit::finish() {
     innovations_ = filter_->apply(rest_);
     log_likelihood_ = 0.0;
-    double count = 0.0;
+    telling_ = *rows_;
+    for (std::size_t i = 0; i < telling_.size(); ++i) {
+        if (filter_->settled(i)) telling_[i] = 0;
+    }
     for (std::size_t i = 0; i < innovations_.size(); ++i) {
-        if (!(*rows_)[i]) continue;
-        log_likelihood_ -= 0.5 * innovations_[i] * innovations_[i] + std::log(sd(i));
-        count += 1.0;
+        if ((*rows_)[i]) log_likelihood_ -= 0.5 * innovations_[i] * innovations_[i] + std::log(sd(i));
     }
-    // Of a spectrum rate + angle (2 sin)^2 by frequencies: Fisher's information of both variances (Whittle 1953).
-    const double r = model_.noise.rate_arcsec_rt_s * model_.noise.rate_arcsec_rt_s * series_->interval_s;
-    const double a = model_.noise.angle_arcsec * model_.noise.angle_arcsec;
-    double rr = 0.0;
-    double ra = 0.0;
-    double aa = 0.0;
-    constexpr int places = 2000;
-    for (int k = 0; k < places; ++k) {
-        const double g = 4.0 * std::pow(std::sin(0.5 * units::pi * (k + 0.5) / places), 2);
-        const double w = 0.5 * count / places / std::pow(r + a * g, 2);
-        rr += w;
-        ra += w * g;
-        aa += w * g * g;
-    }
-    const double det = rr * aa - ra * ra;
-    rate_sd_ = det > 0.0 ? 0.5 * std::sqrt(aa / det) / std::max(r, 1e-300) * model_.noise.rate_arcsec_rt_s : 0.0;
-    angle_sd_ = det > 0.0 ? 0.5 * std::sqrt(rr / det) / std::max(a, 1e-300) * model_.noise.angle_arcsec : 0.0;
 }
 
-SampleFit::Score SampleFit::score(const std::vector<std::vector<double>>& series) const {
-    std::vector<std::vector<double>> all = whitened_;
-    const std::size_t own = all.size();
-    for (const auto& s : series) all.push_back(filter_->apply(s));
+Eigen::MatrixXd SampleFit::normal_with(const std::vector<std::vector<double>>& series, Eigen::VectorXd& right) const {
+    std::vector<std::vector<double>> more;
+    for (const auto& s : series) more.push_back(filter_->apply(s));
+    std::vector<const std::vector<double>*> all;
+    for (const auto& w : whitened_) all.push_back(&w);
+    for (const auto& w : more) all.push_back(&w);
     const auto m = static_cast<Eigen::Index>(all.size());
     Eigen::MatrixXd normal(m, m);
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(m);
+    right = Eigen::VectorXd::Zero(m);
     for (Eigen::Index a = 0; a < m; ++a) {
-        const auto& wa = all[static_cast<std::size_t>(a)];
+        const auto& wa = *all[static_cast<std::size_t>(a)];
         for (Eigen::Index b = 0; b <= a; ++b) {
-            const auto& wb = all[static_cast<std::size_t>(b)];
+            const auto& wb = *all[static_cast<std::size_t>(b)];
             double sum = 0.0;
             for (std::size_t i = 0; i < wa.size(); ++i) {
                 if ((*rows_)[i]) sum += wa[i] * wb[i];
@@ -314,6 +411,23 @@ SampleFit::Score SampleFit::score(const std::vector<std::vector<double>>& series
             if ((*rows_)[i]) right(a) += wa[i] * innovations_[i];
         }
     }
+    return normal;
+}
+
+Eigen::MatrixXd SampleFit::joint_covariance(const std::vector<std::vector<double>>& series) const {
+    Eigen::VectorXd right;
+    const Eigen::MatrixXd normal = normal_with(series, right);
+    const Eigen::VectorXd over = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    const Eigen::MatrixXd scaled = over.asDiagonal() * normal * over.asDiagonal();
+    const Eigen::MatrixXd inverse = Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(scaled).pseudoInverse();
+    return over.asDiagonal() * inverse * over.asDiagonal();
+}
+
+SampleFit::Score SampleFit::score(const std::vector<std::vector<double>>& series) const {
+    const std::size_t own = whitened_.size();
+    Eigen::VectorXd right;
+    const Eigen::MatrixXd normal = normal_with(series, right);
+    const Eigen::Index m = normal.rows();
     const auto k = static_cast<Eigen::Index>(own);
     const Eigen::MatrixXd base = normal.topLeftCorner(k, k);
     const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt();
@@ -332,6 +446,7 @@ SampleFit::Score SampleFit::score(const std::vector<std::vector<double>>& series
     score.chi2 = std::max(0.0, scaled.dot(solution));
     score.rank = freed.diagonal().maxCoeff() > 1e-8 ? static_cast<int>(rest.rank()) : 0;
     for (Eigen::Index i = 0; i < m - k; ++i) score.value.push_back(solution(i) / s(i));
+    score.covariance = s.cwiseInverse().asDiagonal() * rest.pseudoInverse() * s.cwiseInverse().asDiagonal();
     return score;
 }
 

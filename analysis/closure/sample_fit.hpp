@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Dense>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +16,10 @@ struct SampleColumn {
     std::shared_ptr<const std::vector<double>> series;
     double value = 0.0;
     double sd = 0.0;
+    int step = -1;  ///< of the loop that added it
+    /// Of a line's cosine, which its sine follows: frequency in the middle of the record.
+    double hz = 0.0, drift_hz_per_s = 0.0;
+    bool drifts = false;
 };
 
 /// What a model of the samples consists of.
@@ -27,6 +32,7 @@ struct SampleModel {
     /// Whose resonances the noise has, in their order. The second of one effect has the first's frequency and three
     /// times its width.
     std::vector<std::string> resonances;
+    std::vector<int> resonance_steps;  ///< of the loop that added each
     bool walk = false;
     bool flicker = false;
 };
@@ -35,11 +41,17 @@ struct SampleModel {
 /// squares of what the filter makes of them.
 class SampleFit {
    public:
-    SampleFit(const SampleSeries& series, SampleModel model, const Rows& rows, bool free_noise = true);
+    /// Noise as it is, from near where it will be, or from anywhere.
+    enum class Noise { held, near, free };
+    SampleFit(const SampleSeries& series, SampleModel model, const Rows& rows, Noise noise = Noise::free);
 
     const SampleSeries& series() const { return *series_; }
     const SampleModel& model() const { return model_; }
     const Rows& rows() const { return *rows_; }
+    /// Those of them that are not settled by the rows before them.
+    const Rows& telling() const { return telling_; }
+    /// What the filter makes of the columns.
+    const std::vector<std::vector<double>>& whitened() const { return whitened_; }
     /// Over their standard deviations, all rows.
     const std::vector<double>& innovations() const { return innovations_; }
     double sd(std::size_t row) const { return filter_->sd(row); }
@@ -47,21 +59,35 @@ class SampleFit {
     const SampleFilter& filter() const { return *filter_; }
     /// Increments less all that is deterministic.
     const std::vector<double>& rest() const { return rest_; }
-    /// Standard errors of the white noises, in their units.
-    double angle_sd() const { return angle_sd_; }
-    double rate_sd() const { return rate_sd_; }
+    /// Standard errors of the noise, by Fisher's information of the rows that count: a model that holds them in the
+    /// places of what they belong to. Columns are known independently of the noise and have theirs.
+    SampleModel noise_errors() const;
+    /// Of the columns, one with another.
+    const Eigen::MatrixXd& covariance() const { return covariance_; }
 
     struct Score {
         std::vector<double> value;
+        Eigen::MatrixXd covariance;
         double chi2 = 0.0;
         int rank = 0;
     };
     /// Regression of the innovations that count on series of increments, freed of what the columns could take of them.
     Score score(const std::vector<std::vector<double>>& series) const;
+    /// Of the columns and these behind them, all fitted together.
+    Eigen::MatrixXd joint_covariance(const std::vector<std::vector<double>>& series) const;
 
    private:
+    struct Slope {
+        double value = 0.0;  ///< minus the log-likelihood
+        Eigen::VectorXd gradient;
+        Eigen::MatrixXd information;
+    };
+    Eigen::MatrixXd normal_with(const std::vector<std::vector<double>>& series, Eigen::VectorXd& right) const;
     void take_off();
     double evaluate(const SampleModel& model, std::span<const double> rest) const;
+    SampleModel at(const std::vector<double>& knobs) const;
+    Slope slope(const std::vector<double>& knobs) const;
+    void score_noise(std::vector<double>& knobs) const;
     void fit_noise();
     void fit_columns();
     void finish();
@@ -69,15 +95,18 @@ class SampleFit {
     const SampleSeries* series_;
     const Rows* rows_;
     SampleModel model_;
+    bool searched_ = false;
     std::vector<double> rest_;
     std::shared_ptr<SampleFilter> filter_;
     std::vector<double> innovations_;
     std::vector<std::vector<double>> whitened_;  ///< columns
     double log_likelihood_ = 0.0;
-    double angle_sd_ = 0.0, rate_sd_ = 0.0;
+    Eigen::MatrixXd covariance_;
+    Rows telling_;
 };
 
-/// Gauss-Markov rates that make the flicker of that bias instability between `shortest_s` and `longest_s`.
+/// Gauss-Markov rates that make the flicker of that bias instability between `shortest_s` and `longest_s`: two a
+/// decade, or fewer where that would be more than eight; one a decade is within 3 % of flat.
 std::vector<SampleNoise::Term> flicker_terms(double deg_h, double shortest_s, double longest_s);
 
 }  // namespace ringlock::closure

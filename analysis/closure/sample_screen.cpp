@@ -8,6 +8,7 @@
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_search.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
@@ -15,8 +16,6 @@
 namespace ringlock::closure {
 
 namespace {
-
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();  // a standard error that is not computed
 
 std::shared_ptr<const std::vector<double>> shared(std::vector<double> values) {
     return std::make_shared<const std::vector<double>>(std::move(values));
@@ -31,12 +30,6 @@ SampleColumn rate_column(const SampleSeries& series, std::string effect, std::st
 
 bool has(const SampleModel& model, std::string_view effect) {
     return std::any_of(model.columns.begin(), model.columns.end(), [&](const auto& c) { return c.effect == effect; });
-}
-
-/// Alias of a frequency at that rate.
-double alias(double hz, double rate_hz) {
-    const double turns = hz / rate_hz;
-    return std::abs(turns - std::round(turns)) * rate_hz;
 }
 
 void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
@@ -60,27 +53,16 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
         sums += 1.0;
     }
     const double worth = sums > 20.0 ? std::min(1.0, sums / spread) : 1.0;
-    const auto one = [&](const std::string& effect, const std::string& parameter,
-                         const std::function<double(std::size_t)>& rate) {
-        if (has(model, effect)) return;
-        SampleColumn column = rate_column(in.series, effect, parameter, rate);
+    const auto one = [&](SampleColumn column) {
+        if (has(model, column.effect)) return;
         const auto score = now.score({*column.series});
         if (score.rank == 0) return;
-        SampleCandidate c{.effect = effect, .model = model, .p_value = chi2_tail(worth * score.chi2, 1)};
+        SampleCandidate c{.effect = column.effect, .model = model, .p_value = chi2_tail(worth * score.chi2, 1)};
+        column.step = in.step;
         c.model.columns.push_back(std::move(column));
         out.push_back(std::move(c));
     };
-    one("bias_ramp", "deg_h_per_h",
-        [&](std::size_t i) { return (static_cast<double>(i) + 0.5) * in.series.interval_s / 3600.0; });
-    if (!in.series.temperature_change_k.empty()) {
-        one("bias_temperature", "deg_h_per_k", [&](std::size_t i) { return in.series.temperature_change_k[i]; });
-    }
-    if (!in.series.input_rate_deg_h.empty()) {
-        const auto [low, high] =
-            std::minmax_element(in.series.input_rate_deg_h.begin(), in.series.input_rate_deg_h.end());
-        if (*high > *low)
-            one("scale_factor_error", "relative", [&](std::size_t i) { return in.series.input_rate_deg_h[i]; });
-    }
+    for (SampleColumn& column : rate_columns(in.series)) one(std::move(column));
     if (has(model, "bias_step")) return;
     // Steps: everywhere, coarsely, then about the best.
     std::vector<double> roots;
@@ -114,18 +96,14 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     }
     SampleCandidate c{
         .effect = "bias_step", .model = model, .p_value = p, .searched = static_cast<double>(places), .parameters = 2};
-    const double when = in.series.time_s[at] - in.series.interval_s;
-    c.model.columns.push_back(
-        rate_column(in.series, "bias_step", "step_deg_h", [&](std::size_t i) { return i >= at ? 1.0 : 0.0; }));
-    // As well as the step's own size is known: its chi-squared falls by one.
-    c.told.push_back(
-        {"bias_step", "time_s", when, static_cast<double>(n) * in.series.interval_s / std::max(4.0, best * best)});
+    c.model.columns.push_back(step_column(in.series, at));
+    c.model.columns.back().step = in.step;
     out.push_back(std::move(c));
 }
 
 void screen_noises(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
     const auto one = [&](const std::string& effect, SampleModel model) {
-        const SampleFit fit(in.series, std::move(model), in.rows);
+        const SampleFit fit(in.series, std::move(model), in.rows, SampleFit::Noise::near);
         const double chi2 = std::max(0.0, 2.0 * (fit.log_likelihood() - now.log_likelihood()));
         // A variance cannot be negative: half of the time there is no gain at all (Chernoff 1954).
         out.push_back({.effect = effect, .model = fit.model(), .p_value = 0.5 * chi2_tail(chi2, 1)});
@@ -144,7 +122,7 @@ void screen_noises(const SampleFit& now, const SampleContext& in, std::vector<Sa
             slow.push_back(std::move(rate));
         }
         const auto score = now.score(slow);
-        if (chi2_tail(score.chi2, score.rank) > 0.01) return;
+        if (chi2_tail(score.chi2, score.rank) > 0.05) return;
     }
     if (!now.model().walk) {
         SampleModel model = now.model();
@@ -170,27 +148,32 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
     // What is left beside a line that is in the model is that line, not being what the model says.
     const FoundLine line = find_line(e, in.series.rate_hz, true, in.lines_hz, 64.0 / duration_s);
     if (!(line.p_value < 0.01)) return;
-    SampleCandidate c{.model = now.model(), .p_value = line.p_value, .searched = line.searched, .parameters = 3};
-    const bool drifts =
-        line.chi2 - line.chi2_still > 25.0 && std::abs(line.drift_hz_per_s) * duration_s * duration_s > 1.0;
+    SampleCandidate c{
+        .model = now.model(), .p_value = line.p_value, .searched = line.searched, .parameters = 2, .freedom = 2};
+    const SampleLine still = refine_line(now, {.hz = line.frequency_hz, .drift_hz_per_s = 0.0, .drifts = false});
+    const SampleLine moving =
+        refine_line(now, {.hz = line.frequency_hz, .drift_hz_per_s = line.drift_hz_per_s, .drifts = true});
+    const bool drifts = moving.chi2 - std::max(line.chi2_still, still.chi2) > 25.0 &&
+                        std::abs(moving.drift_hz_per_s) * duration_s * duration_s > 1.0;
     bool dither = drifts;
     bool declared = false;
     if (in.declared.dither_frequency_hz) {
         for (int h = 1; h <= 3; ++h) {
             const double hz = alias(h * *in.declared.dither_frequency_hz, in.series.rate_hz);
-            if (std::abs(line.frequency_hz - hz) < 0.005 * h * *in.declared.dither_frequency_hz) declared = true;
+            if (std::abs(line.frequency_hz - hz) < declared_to * h * *in.declared.dither_frequency_hz) declared = true;
         }
     }
     dither = dither || declared;
     const bool fast = line.frequency_hz > 30.0;
     c.effect = dither || fast ? "dither_residue" : "base_vibration";
     if (!dither) c.confounded.emplace_back(fast ? "base_vibration" : "dither_residue");
-    if (line.scattered > 3.0 * line.chi2 + 100.0) {
+    if (line.scattered > 1.5 * std::max(still.chi2, moving.chi2) + 60.0) {
         // Its phase does not keep over the record: a narrow resonance. Slow ones are what a base does as well.
         if (!fast && !declared) return;
         c.effect = "dither_residue";
         if (!declared) c.confounded = {"base_vibration"};
         c.wanders = true;
+        c.parameters = c.freedom = 3;
         double squares = 0.0;
         double rows = 0.0;
         for (std::size_t i = 0; i < e.size(); ++i) {
@@ -201,30 +184,13 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
         const double sd = now.sd(0) * std::sqrt(squares / rows);
         const double gain = 2.0 * std::sin(units::pi * line.scattered_hz / in.series.rate_hz);
         const double rms = sd * std::sqrt(line.scattered / rows) / std::max(gain, 1e-6);
-        c.told.push_back({c.effect, "frequency_hz", line.scattered_hz, unknown});
         c.model.noise.resonances.push_back({rms, line.scattered_hz, 64.0 / duration_s});
         c.model.resonances.push_back(c.effect);
+        c.model.resonance_steps.push_back(in.step);
         out.push_back(std::move(c));
         return;
     }
-    const auto phase =
-        line_phase(in.series.size(), in.series.rate_hz, line.frequency_hz, drifts ? line.drift_hz_per_s : 0.0);
-    std::vector<double> cosine(phase.size());
-    std::vector<double> sine(phase.size());
-    for (std::size_t i = 0; i < phase.size(); ++i) {
-        cosine[i] = std::cos(phase[i]);
-        sine[i] = std::sin(phase[i]);
-    }
-    const double sd_hz = std::sqrt(6.0) / (units::pi * duration_s * std::sqrt(std::max(line.chi2, 1.0)));
-    c.told.push_back({c.effect, "frequency_hz", line.frequency_hz, sd_hz});
-    if (c.effect == "dither_residue") {
-        c.told.push_back({c.effect, "drift_hz_per_s", drifts ? line.drift_hz_per_s : 0.0,
-                          drifts ? std::sqrt(45.0 * 16.0) /
-                                       (units::pi * duration_s * duration_s * std::sqrt(std::max(line.chi2, 1.0)))
-                                 : 0.0});
-    }
-    c.model.columns.push_back({c.effect, "cosine", shared(std::move(cosine))});
-    c.model.columns.push_back({c.effect, "sine", shared(std::move(sine))});
+    add_line(c.model, in.series, drifts ? moving : SampleLine{still.hz, 0.0, false}, c.effect, in.step);
     out.push_back(std::move(c));
 }
 
@@ -235,19 +201,22 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
     // Rates whose distance from a multiple of the record's is that frequency, by likelihood on a part of the record.
     const double rate = in.series.rate_hz;
     const std::size_t part = std::min<std::size_t>(in.series.size(), 20000);
-    double best = -1e300;
-    SampleModel found;
-    int tried = 0;
+    struct Found {
+        double value;
+        SampleModel model;
+    };
+    std::vector<Found> found;
     for (int m = 0; m <= 4; ++m) {
         for (const int sign : {-1, 1}) {
             const double from = m * rate + sign * cycle.frequency_hz;
             if (from < 0.3 * rate || from > 4.5 * rate || std::abs(from - rate) < 1e-9 * rate) continue;
+            Found best{-1e300, {}};
             for (int place = 0; place < 8; ++place) {
                 SampleModel model = now.model();
                 model.noise.from_hz = from;
                 model.noise.from_phase = 0.125 * place;
                 model.noise.blur_arcsec = 0.2 * now.sd(0);
-                ++tried;
+                model.noise.digits_arcsec = 1e-6 * now.sd(0);
                 const SampleFilter filter(model.noise, part, in.series.interval_s);
                 const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
                 // The scale free, all else as it is.
@@ -261,23 +230,55 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
                     count += 1.0;
                 }
                 const double value = -0.5 * count * std::log(squares / count) - logs;
-                if (value > best) {
-                    best = value;
-                    found = model;
-                }
+                if (value > best.value) best = {value, model};
             }
+            found.push_back(std::move(best));
         }
     }
-    if (tried == 0) return;
-    out.push_back({.effect = "resampling",
-                   .model = found,
-                   .p_value = cycle.p_value,
-                   .searched = cycle.searched,
-                   .parameters = 2});
+    // What interpolation does to the share of the noises is not in these: the best few are fitted in full.
+    std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.value > b.value; });
+    constexpr std::size_t looked_at = 3;
+    for (std::size_t k = 0; k < std::min(looked_at, found.size()); ++k) {
+        out.push_back({.effect = "resampling",
+                       .model = found[k].model,
+                       .p_value = cycle.p_value,
+                       .searched = cycle.searched,
+                       .parameters = 2,
+                       .freedom = 2,
+                       .noise = SampleFit::Noise::free});
+    }
+}
+
+/// A motion that is the witness's and turned by a quarter of a cycle, slow drifts left out: two numbers tell of weak
+/// motion what a response of many lags cannot.
+void screen_weak_motion(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
+    double best = 0.0;
+    std::size_t at = 0;
+    int rank = 0;
+    for (std::size_t w = 0; w < in.series.witnesses.size(); ++w) {
+        const auto score = now.score(motion_columns(in.series.witnesses[w].second));
+        if (score.chi2 <= best) continue;
+        best = score.chi2;
+        rank = score.rank;
+        at = w;
+    }
+    const auto count = static_cast<double>(in.series.witnesses.size());
+    const double p = rank > 0 ? of_several(chi2_tail(best, rank), 2.0 * count) : 1.0;
+    if (!(p < level_of_effects)) return;
+    SampleCandidate c{.effect = "case_motion",
+                      .model = now.model(),
+                      .p_value = p,
+                      .searched = 2.0 * count,
+                      .parameters = rank,
+                      .freedom = rank};
+    add_motion(c.model, in.series, at, in.step);
+    c.witness = at;
+    out.push_back(std::move(c));
 }
 
 void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
-    if (in.series.witnesses.empty() || !now.model().motion.empty()) return;
+    if (in.series.witnesses.empty() || !now.model().motion.empty() || has(now.model(), "case_motion")) return;
+    screen_weak_motion(now, in, out);
     const FoundWitness witness = find_witness(now.innovations(), in.rows, in.series);
     if (!(witness.p_value < level_of_effects)) return;
     const WitnessMotion motion = fit_witness(now, in.series.witnesses[witness.index].second);
@@ -285,7 +286,8 @@ void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector
                       .model = now.model(),
                       .p_value = witness.p_value,
                       .searched = static_cast<double>(in.series.witnesses.size()),
-                      .parameters = 2 * witness.lags + 1};
+                      .parameters = 2 * witness.lags + 1,
+                      .freedom = 2 * witness.lags + 1};
     c.model.motion = motion.increments;
     // What the witness does not tell moves like what it tells; its own noise hides the edges of that.
     const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
@@ -293,29 +295,87 @@ void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector
         {untold, std::max(motion.centre_hz, 0.01), std::max(0.5 * motion.centre_hz, 0.01)});
     c.model.noise.resonances.push_back({0.3 * untold, 1.0, 1.0});
     c.model.resonances.insert(c.model.resonances.end(), 2, "case_motion");
+    c.model.resonance_steps.insert(c.model.resonance_steps.end(), 2, in.step);
     // Once more with what is left as the noise.
     const SampleFit first(in.series, c.model, in.rows);
     const auto& watched = in.series.witnesses[witness.index].second;
     c.model = first.model();
     const WitnessMotion more = fit_witness(first, watched);
     for (std::size_t i = 0; i < c.model.motion.size(); ++i) c.model.motion[i] += more.increments[i];
-    Estimate name{"case_motion", "witness", static_cast<double>(witness.name.back() - 'x'), 0.0, witness.name};
-    c.told.push_back(std::move(name));
-    const double pieces = std::max(2.0, static_cast<double>(in.series.size()) / 1024.0);
-    c.told.push_back({"case_motion", "coherence", motion.coherence,
-                      (1.0 - motion.coherence) * std::sqrt(2.0 * motion.coherence / (3.0 * pieces))});
-    c.told.push_back({"case_motion", "rms_arcsec", motion.rms_arcsec, unknown});
+    c.witness = witness.index;
+    c.strong = true;
     out.push_back(std::move(c));
 }
 
 }  // namespace
 
+double alias(double hz, double rate_hz) {
+    const double turns = hz / rate_hz;
+    return std::abs(turns - std::round(turns)) * rate_hz;
+}
+
+std::vector<SampleColumn> rate_columns(const SampleSeries& series) {
+    std::vector<SampleColumn> columns;
+    columns.push_back(rate_column(series, "bias_ramp", "deg_h_per_h", [&](std::size_t i) {
+        return (static_cast<double>(i) + 0.5) * series.interval_s / 3600.0;
+    }));
+    if (!series.temperature_change_k.empty()) {
+        columns.push_back(rate_column(series, "bias_temperature", "deg_h_per_k",
+                                      [&](std::size_t i) { return series.temperature_change_k[i]; }));
+    }
+    if (!series.input_rate_deg_h.empty()) {
+        const auto [low, high] = std::minmax_element(series.input_rate_deg_h.begin(), series.input_rate_deg_h.end());
+        if (*high > *low) {
+            columns.push_back(rate_column(series, "scale_factor_error", "relative",
+                                          [&](std::size_t i) { return series.input_rate_deg_h[i]; }));
+        }
+    }
+    return columns;
+}
+
+SampleColumn step_column(const SampleSeries& series, std::size_t row) {
+    return rate_column(series, "bias_step", "step_deg_h", [&](std::size_t i) { return i >= row ? 1.0 : 0.0; });
+}
+
+void add_line(SampleModel& model, const SampleSeries& series, const SampleLine& line, const std::string& effect,
+              int step) {
+    auto columns = line_columns(series.size(), series.rate_hz, line.hz, line.drift_hz_per_s);
+    SampleColumn cosine{effect, "cosine", shared(std::move(columns[0]))};
+    cosine.step = step;
+    cosine.hz = line.hz;
+    cosine.drift_hz_per_s = line.drift_hz_per_s;
+    cosine.drifts = line.drifts;
+    SampleColumn sine{effect, "sine", shared(std::move(columns[1]))};
+    sine.step = step;
+    model.columns.push_back(std::move(cosine));
+    model.columns.push_back(std::move(sine));
+}
+
+std::vector<std::vector<double>> motion_columns(const std::vector<double>& witness) {
+    const std::size_t n = witness.size();
+    std::vector<std::vector<double>> columns(2, std::vector<double>(n, 0.0));
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+        columns[0][i] = 0.5 * (witness[i + 1] - witness[i - 1]);
+        columns[1][i] = witness[i + 1] - 2.0 * witness[i] + witness[i - 1];
+    }
+    return columns;
+}
+
+void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witness, int step) {
+    auto columns = motion_columns(series.witnesses[witness].second);
+    for (std::size_t c = 0; c < 2; ++c) {
+        model.columns.push_back({"case_motion", c == 0 ? "in_phase" : "quadrature", shared(std::move(columns[c]))});
+        model.columns.back().step = step;
+    }
+}
+
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in) {
     std::vector<SampleCandidate> out;
     screen_line(now, in, out);
+    screen_rates(now, in, out);
+    if (in.plain) return out;
     screen_witnesses(now, in, out);
     screen_resampling(now, in, out);
-    screen_rates(now, in, out);
     screen_noises(now, in, out);
     return out;
 }

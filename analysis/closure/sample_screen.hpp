@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_series.hpp"
 #include "analysis/record/record.hpp"
 
@@ -15,8 +16,11 @@ struct SampleCandidate {
     double p_value = 1.0;
     double searched = 1.0;
     int parameters = 1;
-    bool wanders = false;                      ///< a line as a narrow resonance
-    std::vector<Estimate> told = {};           ///< parameters that are no columns and no knobs
+    int freedom = 1;          ///< of its chi-squared, beside what the search counts
+    bool wanders = false;     ///< a line as a narrow resonance
+    bool strong = false;      ///< motion that is told at many lags
+    std::size_t witness = 0;  ///< in the series, of a motion
+    SampleFit::Noise noise = SampleFit::Noise::near;
     std::vector<std::string> confounded = {};  ///< the same model by other names
 };
 
@@ -26,7 +30,22 @@ struct SampleContext {
     const SampleSeries& series;
     const Rows& rows;                     ///< fitted
     const std::vector<double>& lines_hz;  ///< that are in the model
+    int step = 0;                         ///< that a candidate would be
+    bool plain = false;                   ///< rates without chance and lines only
 };
+
+/// Rates in proportion to one number that the record can tell of: time, temperature, input rate.
+std::vector<SampleColumn> rate_columns(const SampleSeries& series);
+SampleColumn step_column(const SampleSeries& series, std::size_t row);
+void add_line(SampleModel& model, const SampleSeries& series, const SampleLine& line, const std::string& effect,
+              int step);
+/// What a motion in proportion to a witness adds to the increments, and the same a quarter of a cycle later.
+std::vector<std::vector<double>> motion_columns(const std::vector<double>& witness);
+void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witness, int step);
+/// Of itself, a declared frequency of the dither may be off: more, with its harmonics, would be half of all lines.
+inline constexpr double declared_to = 0.002;
+/// Where a frequency shows in samples of that rate.
+double alias(double hz, double rate_hz);
 
 /// The effects that samples can tell of and that the fit does not have yet, held against what it has left.
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in);

@@ -29,6 +29,31 @@ double common_divisor(double a, double b, double tolerance) {
     return a;
 }
 
+/// The known input in the middle of each interval. A sample belongs to its end; where the increments say by far that
+/// the other instrument's clock means the start, or the middle, they are believed.
+void take_input(const record::Record& record, SampleSeries& series) {
+    constexpr double by_far = 30.0;  // of chi-squared
+    const std::size_t n = series.size();
+    double least = 0.0;
+    for (const double late : {-0.5, 0.0, 0.5}) {
+        std::vector<double> input;
+        for (const double t : series.time_s) input.push_back(record.input_rate_deg_h.at(t + late * series.interval_s));
+        double sum = 0.0;
+        double squares = 0.0;
+        for (std::size_t i = 0; i < n; ++i) {
+            const double left = series.increment[i] - input[i] * series.interval_s;
+            sum += left;
+            squares += left * left;
+        }
+        squares -= sum * sum / static_cast<double>(n);
+        const bool first = series.input_rate_deg_h.empty();
+        if (!first && !(squares < least * (1.0 - by_far / static_cast<double>(n)))) continue;
+        least = squares;
+        series.input_rate_deg_h = std::move(input);
+        series.input_late_s = (late + 0.5) * series.interval_s;
+    }
+}
+
 }  // namespace
 
 SampleSeries prepare_samples(const record::Record& record) {
@@ -89,11 +114,7 @@ SampleSeries prepare_samples(const record::Record& record) {
         const double start = t.front();
         for (double& value : t) value -= start;
     }
-    if (!record.input_rate_deg_h.empty()) {
-        for (const double t : series.time_s) {
-            series.input_rate_deg_h.push_back(record.input_rate_deg_h.at(t - 0.5 * series.interval_s));
-        }
-    }
+    if (!record.input_rate_deg_h.empty()) take_input(record, series);
     return series;
 }
 
@@ -133,6 +154,7 @@ Lattice find_lattice(const std::vector<double>& increments) {
     lattice.printed_arcsec = lattice.step_arcsec = step;
     lattice.strength = 1.0;
     lattice.p_value = 0.0;
+    lattice.step_sd_arcsec = 1e-9 * step;  // by the digits of the values
     // A coarser one that the digits of the record blur: its characteristic function stands out between the bulk's, near
     // zero, and the digits' own, at 1/printed.
     std::vector<std::pair<double, double>> weights;  // level, how often; those not zero
@@ -185,6 +207,11 @@ Lattice find_lattice(const std::vector<double>& increments) {
         lattice.step_arcsec = 1.0 / at;
         lattice.strength = best;
         lattice.p_value = p;
+        // A frequency from phases 2 pi u x with noise of which exp(i noise) has the mean c, cos(2 noise) c^4 where it
+        // is normal: variance (1 - c^4)/(2 c^2 N (2 pi sigma)^2) of u = 1/step.
+        const double c2 = best * best;
+        const double u_sd = std::sqrt((1.0 - c2 * c2) / (2.0 * c2 * count)) / (units::two_pi * sigma);
+        lattice.step_sd_arcsec = u_sd / (at * at);
     }
     return lattice;
 }

@@ -16,8 +16,9 @@ struct SampleSeries {
     std::vector<std::pair<std::string, std::vector<double>>> witnesses;  ///< accelerations that change
     std::vector<double> temperature_change_k;                            ///< empty where there is none
     std::vector<double> input_rate_deg_h;                                ///< empty where there is none
-    bool counted = false;                                                ///< by kind whole counts
-    double scale_factor_arcsec = 0.0;                                    ///< of counts
+    double input_late_s = 0.0;         ///< by which the known input's clock was found to be early
+    bool counted = false;              ///< by kind whole counts
+    double scale_factor_arcsec = 0.0;  ///< of counts
     bool scale_factor_assumed = false;
 
     std::size_t size() const { return increment.size(); }
@@ -32,6 +33,7 @@ struct Lattice {
     double step_arcsec = 0.0;     ///< coarser one below, blurred by that; else the same
     double strength = 0.0;        ///< of the coarser: length of the mean of exp(2 pi i value/step) over values not zero
     double p_value = 1.0;
+    double step_sd_arcsec = 0.0;  ///< standard error of the step
 };
 Lattice find_lattice(const std::vector<double>& increments);
 

@@ -4,30 +4,35 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <numeric>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
 #include "analysis/closure/normality.hpp"
+#include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_search.hpp"
+#include "analysis/closure/two_levels.hpp"
 
 namespace ringlock::closure {
 
 namespace {
 
-using Tests = std::vector<ResidualTest>;
+using Views = std::vector<View>;
+using Columns = std::vector<std::vector<double>>;
 
-void test_correlation(const SampleFit& fit, Tests& tests) {
-    tests.push_back(
-        correlations_of(fit.innovations(), fit.rows()).test(Where::time, "correlation with the 24 samples before"));
+void test_correlation(const SampleFit& fit, Views& views) {
+    views.push_back({correlations_of(fit.innovations(), fit.telling())
+                         .test(Where::time, "correlation with the 24 samples before")});
 }
 
-void test_spectrum(const SampleFit& fit, Tests& tests) {
+void test_spectrum(const SampleFit& fit, Views& views) {
     const std::size_t n = fit.innovations().size();
     std::vector<double> e(n, 0.0);
     double count = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
-        if (!fit.rows()[i]) continue;
+        if (!fit.telling()[i]) continue;
         e[i] = fit.innovations()[i];
         count += 1.0;
     }
@@ -67,19 +72,68 @@ void test_spectrum(const SampleFit& fit, Tests& tests) {
             worst_hz = 0.5 * static_cast<double>(a + b) * fit.series().rate_hz / static_cast<double>(padded);
         }
     }
-    tests.push_back({Where::frequency, "spectrum in bands", chi2_tail(chi2, bands),
-                     fmt::format("most at {:.4g} Hz, {:.3g} times the mean", worst_hz, worst_ratio)});
+    views.push_back({{Where::frequency, "spectrum in bands", chi2_tail(chi2, bands),
+                      fmt::format("most at {:.4g} Hz, {:.3g} times the mean", worst_hz, worst_ratio)}});
     const FoundLine line = find_line(e, fit.series().rate_hz, true);
-    tests.push_back(
-        {Where::frequency, "lines, still and drifting", line.p_value, fmt::format("at {:.6g} Hz", line.frequency_hz)});
+    const double cost = 3.0 + std::log(line.searched);
+    // A line whose power is scattered explains as much as follows it from stretch to stretch.
+    const double gain = 0.5 * std::max(line.chi2, line.scattered);
+    const bool coherent = line.chi2 >= line.scattered;
+    double p = line.p_value;
+    if (coherent && p < 0.01) {
+        // The level about a line is itself a random number: what the regression says counts as well.
+        const SampleLine refined =
+            refine_line(fit, {line.frequency_hz, line.drift_hz_per_s, line.drift_hz_per_s != 0.0});
+        p = std::max(p, of_several(chi2_tail(refined.chi2, 2), line.searched));
+    }
+    View view{{Where::frequency, "lines, still and drifting", p,
+               fmt::format("at {:.6g} Hz", coherent ? line.frequency_hz : line.scattered_hz), gain - cost},
+              cost};
+    if (coherent) {
+        view.columns = [n, rate_hz = fit.series().rate_hz, line] {
+            return line_columns(n, rate_hz, line.frequency_hz, line.drift_hz_per_s);
+        };
+    }
+    views.push_back(std::move(view));
 }
 
-void test_size(const SampleFit& fit, Tests& tests) {
+/// Gain of the log-likelihood by a variance that goes up and down at that frequency, by itself: its logarithm is
+/// a cos + b sin, fitted by Newton's method. What resampling does to the variance it does to the correlations too.
+double gain_of_variance(const SampleFit& fit, double hz) {
     const auto& e = fit.innovations();
-    const Rows& rows = fit.rows();
+    const auto phase = line_phase(e.size(), fit.series().rate_hz, hz, 0.0);
+    double a = 0.0;
+    double b = 0.0;
+    double mean = 0.0;
+    double gain = 0.0;
+    for (int round = 0; round < 8; ++round) {
+        Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();
+        Eigen::Vector3d slope = Eigen::Vector3d::Zero();
+        gain = 0.0;
+        for (std::size_t i = 0; i < e.size(); ++i) {
+            if (!fit.telling()[i]) continue;
+            const Eigen::Vector3d x(1.0, std::cos(phase[i]), std::sin(phase[i]));
+            const double log_variance = mean * x(0) + a * x(1) + b * x(2);
+            const double ratio = e[i] * e[i] * std::exp(-log_variance);
+            gain += 0.5 * (e[i] * e[i] - ratio - log_variance);
+            slope += 0.5 * (ratio - 1.0) * x;
+            curvature += 0.5 * x * x.transpose();
+        }
+        const Eigen::Vector3d step = curvature.ldlt().solve(slope);
+        mean += step(0);
+        a += step(1);
+        b += step(2);
+        if (step.norm() < 1e-5) break;
+    }
+    return gain;
+}
+
+void test_size(const SampleFit& fit, Views& views) {
+    const auto& e = fit.innovations();
+    const Rows& rows = fit.telling();
     const std::size_t n = e.size();
     const auto [mean, variance] = squares_of(e, rows);
-    tests.push_back(size_over_time(e, rows, 40, 20.0));
+    views.push_back({size_over_time(e, rows, 40, 20.0)});
     // Patterns of the place in the record: mean and size for each remainder.
     double least = 1.0;
     std::size_t at = 0;
@@ -96,6 +150,7 @@ void test_size(const SampleFit& fit, Tests& tests) {
             k[i % m] += 1.0;
         }
         for (std::size_t j = 0; j < m; ++j) {
+            if (k[j] < 20.0) continue;
             means += sum[j] * sum[j] / (k[j] * mean);
             sizes += squares[j] * squares[j] / (k[j] * variance);
         }
@@ -105,19 +160,25 @@ void test_size(const SampleFit& fit, Tests& tests) {
             at = m;
         }
     }
-    tests.push_back(
-        {Where::time, "place in the record modulo 2 to 16", of_several(least, 30.0), fmt::format("modulo {}", at)});
+    views.push_back(
+        {{Where::time, "place in the record modulo 2 to 16", of_several(least, 30.0), fmt::format("modulo {}", at)}});
     const FoundCycle cycle = find_cycle(e, rows, fit.series().rate_hz);
-    tests.push_back({Where::time, "variance and covariance that repeat", cycle.p_value,
-                     fmt::format("{:.6g} times a second", cycle.frequency_hz)});
+    const double cost = 2.0 + std::log(cycle.searched);
+    views.push_back(
+        {{Where::time, "variance and covariance that repeat", cycle.p_value,
+          fmt::format("{:.6g} times a second", cycle.frequency_hz), gain_of_variance(fit, cycle.frequency_hz) - cost}});
 }
 
-void test_rates(const SampleFit& fit, Tests& tests) {
+void test_rates(const SampleFit& fit, Views& views) {
     const SampleSeries& series = fit.series();
     const std::size_t n = series.size();
-    const auto against = [&](Where where, std::string view, const std::vector<std::vector<double>>& columns) {
+    const auto against = [&](Where where, std::string view, Columns columns) {
         const auto score = fit.score(columns);
-        if (score.rank > 0) tests.push_back({where, std::move(view), chi2_tail(score.chi2, score.rank), ""});
+        if (score.rank == 0) return;
+        const double cost = score.rank;
+        views.push_back({{where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
+                         cost,
+                         [columns = std::make_shared<const Columns>(std::move(columns))] { return *columns; }});
     };
     if (!series.temperature_change_k.empty()) {
         const auto& t = series.temperature_change_k;
@@ -155,79 +216,185 @@ void test_rates(const SampleFit& fit, Tests& tests) {
         }
         powers.push_back(std::move(rate));
     }
-    against(Where::time, "rates that are polynomials of time", powers);
+    against(Where::time, "rates that are polynomials of time", std::move(powers));
     std::vector<double> roots;
     double best = 0.0;
-    double at = 0.0;
+    std::size_t at = 0;
     constexpr std::size_t places = 40;
-    for (std::size_t k = 1; k < places; ++k) {
+    const auto step_at = [n](std::size_t row) {
         std::vector<double> step(n, 0.0);
-        std::fill(step.begin() + static_cast<std::ptrdiff_t>(n * k / places), step.end(), 1.0);
-        const auto score = fit.score({step});
+        std::fill(step.begin() + static_cast<std::ptrdiff_t>(row), step.end(), 1.0);
+        return step;
+    };
+    for (std::size_t k = 1; k < places; ++k) {
+        const auto score = fit.score({step_at(n * k / places)});
         const double root = score.rank > 0 ? std::copysign(std::sqrt(score.chi2), score.value[0]) : 0.0;
         roots.push_back(root);
         if (std::abs(root) > best) {
             best = std::abs(root);
-            at = series.time_s[n * k / places];
+            at = n * k / places;
         }
     }
-    tests.push_back(
-        {Where::time, "steps of the rate", davies_bound(best * best, roots), fmt::format("at {:.6g} s", at)});
+    const double cost = 2.0 + std::log(davies_places(best * best, roots));
+    views.push_back({{Where::time, "steps of the rate", davies_bound(best * best, roots),
+                      fmt::format("at {:.6g} s", series.time_s[at]), 0.5 * best * best - cost},
+                     cost,
+                     [step_at, at] { return Columns{step_at(at)}; }});
 }
 
-/// A line that is not what it was: its amplitudes in stretches.
-void test_lines(const SampleFit& fit, Tests& tests) {
+/// A rate of one where the shape of stretches is, of zero elsewhere, with the jumps moved to where they explain most.
+std::vector<double> two_level_rate(const SampleFit& fit, const Eigen::VectorXd& shape) {
+    const std::size_t n = fit.series().size();
+    const auto stretches = static_cast<std::size_t>(shape.size());
+    std::vector<std::size_t> jumps;
+    for (Eigen::Index k = 1; k < shape.size(); ++k) {
+        if (shape(k) != shape(k - 1)) jumps.push_back(n * static_cast<std::size_t>(k) / stretches);
+    }
+    const auto rate = [&] {
+        std::vector<double> out(n);
+        std::size_t next = 0;
+        double on = shape(0);
+        for (std::size_t i = 0; i < n; ++i) {
+            for (; next < jumps.size() && jumps[next] <= i; ++next) on = 1.0 - on;
+            out[i] = on;
+        }
+        return out;
+    };
+    double best = fit.score({rate()}).chi2;
+    const std::size_t length = std::max<std::size_t>(1, n / stretches);
+    for (std::size_t step = length / 2; step > length / 50; step /= 2) {
+        for (std::size_t& jump : jumps) {
+            for (const bool later : {false, true}) {
+                const std::size_t from = jump;
+                jump = later ? std::min(n, jump + step) : jump - std::min(jump, step);
+                const double chi2 = std::is_sorted(jumps.begin(), jumps.end()) ? fit.score({rate()}).chi2 : 0.0;
+                if (chi2 > best) {
+                    best = chi2;
+                } else {
+                    jump = from;
+                }
+            }
+        }
+    }
+    return rate();
+}
+
+/// Rates of stretches of the record, for a rate that jumps to and fro.
+void test_levels(const SampleFit& fit, Views& views) {
+    constexpr std::size_t stretches = 120;
+    const std::size_t n = fit.series().size();
+    // The filter forgets: of each stretch's series only what is not negligible.
+    struct Response {
+        std::size_t from = 0;
+        std::vector<float> values;
+    };
+    std::vector<Response> responses(stretches);
+    const auto& own = fit.whitened();
+    const auto m = static_cast<Eigen::Index>(own.size());
+    const auto k = static_cast<Eigen::Index>(stretches);
+    Eigen::MatrixXd cross(m, k);
+    Eigen::VectorXd right(k);
+    for (std::size_t s = 0; s < stretches; ++s) {
+        std::vector<double> column(n, 0.0);
+        std::fill(column.begin() + static_cast<std::ptrdiff_t>(n * s / stretches),
+                  column.begin() + static_cast<std::ptrdiff_t>(n * (s + 1) / stretches), fit.series().interval_s);
+        column = fit.filter().apply(column);
+        double most = 0.0;
+        for (const double x : column) most = std::max(most, std::abs(x));
+        std::size_t last = n;
+        while (last > 0 && std::abs(column[last - 1]) < 1e-5 * most) --last;
+        responses[s].from = n * s / stretches;
+        double sum = 0.0;
+        for (std::size_t i = responses[s].from; i < last; ++i) {
+            if (!fit.rows()[i]) column[i] = 0.0;
+            responses[s].values.push_back(static_cast<float>(column[i]));
+            sum += column[i] * fit.innovations()[i];
+        }
+        right(static_cast<Eigen::Index>(s)) = sum;
+        for (Eigen::Index c = 0; c < m; ++c) {
+            double product = 0.0;
+            const auto& w = own[static_cast<std::size_t>(c)];
+            for (std::size_t i = responses[s].from; i < last; ++i) product += column[i] * w[i];
+            cross(c, static_cast<Eigen::Index>(s)) = product;
+        }
+    }
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(k, k);
+    for (std::size_t a = 0; a < stretches; ++a) {
+        for (std::size_t b = a; b < stretches; ++b) {
+            const Response& x = responses[a];
+            const Response& y = responses[b];
+            const std::size_t last = std::min(x.from + x.values.size(), y.from + y.values.size());
+            double sum = 0.0;
+            for (std::size_t i = y.from; i < last; ++i)
+                sum += static_cast<double>(x.values[i - x.from]) * static_cast<double>(y.values[i - y.from]);
+            normal(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) = sum;
+            normal(static_cast<Eigen::Index>(b), static_cast<Eigen::Index>(a)) = sum;
+        }
+    }
+    normal -= cross.transpose() * fit.covariance() * cross;
+    const TwoLevels found = two_levels(normal, right);
+    // Jumps do not wait for the end of a stretch.
+    constexpr double of_places = 2.0;
+    const double cost = found.cost + of_places * found.changes;
+    views.push_back({{Where::time, "a rate that jumps between two levels", found.p_value,
+                      fmt::format("{} jumps", found.changes), found.merit},
+                     cost,
+                     [&fit, found] { return Columns{two_level_rate(fit, found.shape)}; },
+                     std::numeric_limits<double>::infinity(),
+                     true});
+}
+
+/// A line that is not what it was: its amplitudes in stretches. By chance, of the cosine in that column.
+double line_over_time(const SampleFit& fit, std::size_t cosine) {
     constexpr std::size_t stretches = 20;
     const std::size_t n = fit.innovations().size();
-    double least = 1.0;
-    double lines = 0.0;
     const auto& columns = fit.model().columns;
-    for (std::size_t c = 0; c + 1 < columns.size(); ++c) {
-        if (columns[c].name != "cosine" || columns[c + 1].name != "sine") continue;
-        lines += 1.0;
-        const auto x = fit.filter().apply(*columns[c].series);
-        const auto y = fit.filter().apply(*columns[c + 1].series);
-        double chi2 = 0.0;
-        int freedom = -2;
-        for (std::size_t s = 0; s < stretches; ++s) {
-            double xx = 0.0, xy = 0.0, yy = 0.0, xe = 0.0, ye = 0.0;
-            for (std::size_t i = n * s / stretches; i < n * (s + 1) / stretches; ++i) {
-                if (!fit.rows()[i]) continue;
-                const double e = fit.innovations()[i];
-                xx += x[i] * x[i];
-                xy += x[i] * y[i];
-                yy += y[i] * y[i];
-                xe += x[i] * e;
-                ye += y[i] * e;
-            }
-            const double det = xx * yy - xy * xy;
-            if (!(det > 1e-6 * xx * yy)) continue;
-            chi2 += (yy * xe * xe - 2.0 * xy * xe * ye + xx * ye * ye) / det;
-            freedom += 2;
+    const auto x = fit.filter().apply(*columns[cosine].series);
+    const auto y = fit.filter().apply(*columns[cosine + 1].series);
+    double chi2 = 0.0;
+    int freedom = -2;
+    for (std::size_t s = 0; s < stretches; ++s) {
+        double xx = 0.0, xy = 0.0, yy = 0.0, xe = 0.0, ye = 0.0;
+        for (std::size_t i = n * s / stretches; i < n * (s + 1) / stretches; ++i) {
+            if (!fit.rows()[i]) continue;
+            const double e = fit.innovations()[i];
+            xx += x[i] * x[i];
+            xy += x[i] * y[i];
+            yy += y[i] * y[i];
+            xe += x[i] * e;
+            ye += y[i] * e;
         }
-        if (freedom > 0) least = std::min(least, chi2_tail(chi2, freedom));
+        const double det = xx * yy - xy * xy;
+        if (!(det > 1e-6 * xx * yy)) continue;
+        chi2 += (yy * xe * xe - 2.0 * xy * xe * ye + xx * ye * ye) / det;
+        freedom += 2;
     }
-    if (lines > 0.0) {
-        tests.push_back({Where::amplitude, "amplitude and phase of the lines over time", of_several(least, lines), ""});
-    }
+    return freedom > 0 ? chi2_tail(chi2, freedom) : 1.0;
 }
 
-void test_jumps(const SampleFit& fit, Tests& tests) {
+void test_lines(const SampleFit& fit, Views& views) {
+    const auto& columns = fit.model().columns;
+    const auto lines = std::count_if(columns.begin(), columns.end(), [](const auto& c) { return c.name == "cosine"; });
+    if (lines == 0) return;
+    views.push_back({{Where::amplitude, "amplitude and phase of the lines over time", unsteady_line(fit).p_value, ""}});
+}
+
+void test_jumps(const SampleFit& fit, Views& views) {
     if (!fit.model().walk && !fit.model().flicker) return;
     const std::size_t n = fit.innovations().size();
     std::vector<double> step(n, 0.0);
     std::fill(step.begin() + static_cast<std::ptrdiff_t>(n / 2), step.end(), fit.series().interval_s);
     if (const auto test = jumps_of_rate(fit.innovations(), fit.rows(), fit.filter().apply(step))) {
-        tests.push_back(*test);
+        views.push_back({*test});
     }
 }
 
-void test_distribution(const SampleFit& fit, double lattice_arcsec, Tests& tests) {
+void test_distribution(const SampleFit& fit, double lattice_arcsec, Views& views) {
     const auto& e = fit.innovations();
     const std::size_t n = e.size();
     // Steps that are not small are no normal noise; sums of them are.
     const bool steps = lattice_arcsec > 0.2 * fit.sd(n / 2);
-    if (const auto test = fourth_moments(e, fit.rows(), steps ? 16 : 1)) tests.push_back(*test);
+    if (const auto test = fourth_moments(e, fit.telling(), steps ? 16 : 1)) views.push_back({*test});
     if (lattice_arcsec == 0.0) {
         // No two values of so many digits are the same by chance, the largest least of all.
         const auto& x = fit.series().increment;
@@ -237,8 +404,8 @@ void test_distribution(const SampleFit& fit, double lattice_arcsec, Tests& tests
         const auto ties =
             std::count_if(x.begin(), x.end(), [&](double v) { return v > high - tolerance || v < low + tolerance; });
         if (ties > 4) {
-            tests.push_back(
-                {Where::amplitude, "values at the end of their range", 0.0, fmt::format("{} of them", ties)});
+            views.push_back(
+                {{Where::amplitude, "values at the end of their range", 0.0, fmt::format("{} of them", ties)}});
         }
     }
 }
@@ -252,8 +419,17 @@ Disturbed find_disturbed(const SampleFit& fit) {
     const std::size_t windows = n / length;
     std::vector<double> power(windows, 0.0);
     for (std::size_t w = 0; w < windows; ++w) {
-        for (std::size_t i = w * length; i < (w + 1) * length; ++i)
-            power[w] += e[i] * e[i] / static_cast<double>(length);
+        // About their mean: a rate that is another than elsewhere disturbs nothing.
+        double sum = 0.0;
+        double squares = 0.0;
+        double count = 0.0;
+        for (std::size_t i = w * length; i < (w + 1) * length; ++i) {
+            if (fit.filter().settled(i)) continue;
+            sum += e[i];
+            squares += e[i] * e[i];
+            count += 1.0;
+        }
+        if (count > 1.0) power[w] = (squares - sum * sum / count) / (count - 1.0);
     }
     auto sorted = power;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(windows / 2);
@@ -283,23 +459,59 @@ Disturbed find_disturbed(const SampleFit& fit) {
     return disturbed;
 }
 
-std::vector<ResidualTest> test_samples(const SampleFit& fit, double lattice_arcsec) {
-    Tests tests;
-    test_correlation(fit, tests);
-    test_spectrum(fit, tests);
-    test_size(fit, tests);
-    test_rates(fit, tests);
-    test_lines(fit, tests);
-    test_jumps(fit, tests);
-    test_distribution(fit, lattice_arcsec, tests);
+UnsteadyLine unsteady_line(const SampleFit& fit) {
+    UnsteadyLine least;
+    double lines = 0.0;
+    const auto& columns = fit.model().columns;
+    for (std::size_t c = 0; c + 1 < columns.size(); ++c) {
+        if (columns[c].name != "cosine") continue;
+        lines += 1.0;
+        const double p = line_over_time(fit, c);
+        if (least.step >= 0 && p >= least.p_value) continue;
+        least = {columns[c].step, columns[c].hz, p, false};
+    }
+    least.p_value = of_several(least.p_value, std::max(lines, 1.0));
+    if (least.step < 0) return least;
+    std::vector<double> e(fit.innovations().size(), 0.0);
+    for (std::size_t i = 0; i < e.size(); ++i) {
+        if (fit.telling()[i]) e[i] = fit.innovations()[i];
+    }
+    const FoundLine line = find_line(e, fit.series().rate_hz, true);
+    constexpr double near_hz = 1.0;
+    const double hz = line.coherent ? line.frequency_hz : line.scattered_hz;
+    least.beside = line.p_value < level_of_residual && std::abs(hz - least.hz) < near_hz;
+    return least;
+}
+
+double refitted_merit(const SampleFit& fit, const View& view, double of_a_coefficient) {
+    SampleModel model = fit.model();
+    const auto columns = view.columns();
+    for (const auto& column : columns) {
+        model.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(column)});
+    }
+    const SampleFit with(fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near);
+    return with.log_likelihood() - fit.log_likelihood() - view.cost -
+           of_a_coefficient * static_cast<double>(columns.size());
+}
+
+std::vector<View> view_samples(const SampleFit& fit, double lattice_arcsec) {
+    Views views;
+    test_correlation(fit, views);
+    test_spectrum(fit, views);
+    test_size(fit, views);
+    test_rates(fit, views);
+    test_levels(fit, views);
+    test_lines(fit, views);
+    test_jumps(fit, views);
+    test_distribution(fit, lattice_arcsec, views);
     if (!fit.series().witnesses.empty()) {
-        const FoundWitness witness = find_witness(fit.innovations(), fit.rows(), fit.series());
+        const FoundWitness witness = find_witness(fit.innovations(), fit.telling(), fit.series());
         if (witness.lags > 0 && !witness.name.empty()) {
-            tests.push_back(
-                {Where::frequency, "witnesses at lags up to a quarter of a second", witness.p_value, witness.name});
+            views.push_back(
+                {{Where::frequency, "witnesses at lags up to a quarter of a second", witness.p_value, witness.name}});
         }
     }
-    return tests;
+    return views;
 }
 
 }  // namespace ringlock::closure

@@ -18,8 +18,21 @@ struct Disturbed {
 Disturbed find_disturbed(const SampleFit& fit);
 
 /// Holds the innovations that count against everything that the record has: time, frequency, the place in the record
-/// modulo small numbers, witnesses, temperature, input rate, their own size.
+/// modulo small numbers, witnesses, temperature, input rate, their own size. The views refer to the fit.
 /// \param lattice_arcsec  steps of the values, which are not normal then
-std::vector<ResidualTest> test_samples(const SampleFit& fit, double lattice_arcsec);
+std::vector<View> view_samples(const SampleFit& fit, double lattice_arcsec);
+
+/// The line of the model that keeps amplitude and phase least.
+struct UnsteadyLine {
+    int step = -1;  ///< of the loop that added it; -1: there is none
+    double hz = 0.0;
+    double p_value = 1.0;
+    bool beside = false;  ///< there are other lines within a hertz of it
+};
+UnsteadyLine unsteady_line(const SampleFit& fit);
+
+/// Gain of the log-likelihood by the view's regression, the noise fitted anew beside it, less its cost and so much for
+/// each coefficient.
+double refitted_merit(const SampleFit& fit, const View& view, double of_a_coefficient = 0.0);
 
 }  // namespace ringlock::closure

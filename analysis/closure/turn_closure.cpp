@@ -218,10 +218,11 @@ Closure close_turns(const record::Record& record) {
             "told from the bias, and its effects are not looked for");
     }
     closure.heldout_before = heldout(*now->fit).error;
-    // Before the first random rate.
+    // Before the first effect that was taken on the strength of a random rate.
     struct Earlier {
         std::shared_ptr<Fitted> now;
         std::vector<Step> steps;
+        std::string effect;
     };
     std::optional<Earlier> earlier;
 
@@ -237,7 +238,7 @@ Closure close_turns(const record::Record& record) {
         step.p_value = best.p_value;
         step.confounded_with = choice.confounded_with;
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
-        if (!earlier && is_random_rate(*best.candidate.effect)) earlier = {now, closure.steps};
+        if (!earlier && choice.on_random) earlier = {now, closure.steps, step.effect};
         const Score before = heldout(*now->fit);
         now = best.fitted;
         drop_needless(record, rows, now, closure.steps);
@@ -249,9 +250,10 @@ Closure close_turns(const record::Record& record) {
     }
 
     test_what_is_left(*now->fit, closure);
-    const bool random = std::any_of(closure.steps.begin(), closure.steps.end(),
-                                    [](const Step& step) { return is_random_rate(*effects::find(step.effect)); });
-    if (random && closure.unexplained && closure.unexplained->where != Where::phase) {
+    const bool on_random = earlier && std::any_of(closure.steps.begin(), closure.steps.end(), [&](const Step& step) {
+                               return step.effect == earlier->effect || is_random_rate(*effects::find(step.effect));
+                           });
+    if (on_random && closure.unexplained && closure.unexplained->where != Where::phase) {
         // A rate is left that is none of the library's: the random one has only come nearest to it.
         now = earlier->now;
         closure.steps = std::move(earlier->steps);

@@ -142,6 +142,7 @@ Choice choose(const record::Record& record, const Contest& contest, const Rows& 
     const Contender& likeliest = contenders.front();
     choice.chosen = &likeliest;
     choice.merit = likeliest.merit;
+    choice.on_random = is_random_rate(*likeliest.candidate.effect);
     const auto add_name = [&](std::string_view name) {
         auto& names = choice.confounded_with;
         if (std::find(names.begin(), names.end(), name) == names.end()) names.emplace_back(name);
@@ -150,7 +151,7 @@ Choice choose(const record::Record& record, const Contest& contest, const Rows& 
         if (&contender == choice.chosen || choice.merit - contender.merit >= tie) return;
         add_name(contender.candidate.effect->name());
     };
-    if (contest.side || !is_random_rate(*likeliest.candidate.effect)) {
+    if (contest.side || !choice.on_random) {
         for (const Contender& contender : contenders) add_tied(contender);
         return choice;
     }
@@ -189,6 +190,7 @@ Choice choose(const record::Record& record, const Contest& contest, const Rows& 
     // What else could stand beside the second, and what could stand for both.
     choice.chosen = best->first;
     choice.merit = best->merit;
+    choice.on_random = is_random_rate(*effects::find(best->second));
     for (const Contender& contender : contenders) add_tied(contender);
     for (const Pair& pair : pairs) {
         if (pair.first == choice.chosen || pair.second != best->second || choice.merit - pair.merit >= tie) continue;

@@ -50,7 +50,8 @@ Contest hold_contest(const record::Record& record, const Fitted& now, const Rows
 /// What to add, if anything.
 struct Choice {
     const Contender* chosen = nullptr;
-    double merit = 0.0;  ///< of all that it stands for
+    double merit = 0.0;      ///< of all that it stands for
+    bool on_random = false;  ///< it is a random rate, or was chosen with one beside it
     std::vector<std::string> confounded_with;
 };
 

@@ -530,7 +530,10 @@ TEST(ClosureKeys, SetWhatTheyName) {
     }
     for (const std::string& key : sample_keys()) {
         SampleTruth truth;
-        const char* value = key == "kind" ? "angle_arcsec" : key == "resampling.of" ? "rate" : "1";
+        const char* value = key == "kind"                  ? "angle_arcsec"
+                            : key == "resampling.of"       ? "rate"
+                            : key == "input_profile_deg_h" ? "0:1,2:3"
+                                                           : "1";
         EXPECT_NO_THROW(set(truth, key, value)) << key;
     }
     Truth truth;

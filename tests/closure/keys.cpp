@@ -82,6 +82,15 @@ constexpr Key<SampleTruth> sample_numbers[] = {
     RINGLOCK_KEY(SampleTruth, "jumping_line.rate_after_deg_h", jumping_line.rate_after_deg_h),
     RINGLOCK_KEY(SampleTruth, "jumping_line.time_s", jumping_line.time_s),
     RINGLOCK_KEY(SampleTruth, "saturation_arcsec", saturation_arcsec),
+    RINGLOCK_KEY(SampleTruth, "scale_factor_error.relative", scale_factor_error),
+    RINGLOCK_KEY(SampleTruth, "swinging_line.frequency_hz", swinging_line.frequency_hz),
+    RINGLOCK_KEY(SampleTruth, "swinging_line.rate_deg_h", swinging_line.rate_deg_h),
+    RINGLOCK_KEY(SampleTruth, "swinging_line.deviation_hz", swinging_line.deviation_hz),
+    RINGLOCK_KEY(SampleTruth, "swinging_line.period_s", swinging_line.period_s),
+    RINGLOCK_KEY(SampleTruth, "noise_modulation.depth", noise_modulation.depth),
+    RINGLOCK_KEY(SampleTruth, "noise_modulation.period_s", noise_modulation.period_s),
+    RINGLOCK_KEY(SampleTruth, "bias_per_rate_squared_h_deg", bias_per_rate_squared_h_deg),
+    RINGLOCK_KEY(SampleTruth, "bias_per_temperature_slope_deg_h_s_per_k", bias_per_temperature_slope_deg_h_s_per_k),
 };
 
 /// What both kinds of truth have.
@@ -201,7 +210,8 @@ std::vector<std::string> turn_keys() {
 }
 
 std::vector<std::string> sample_keys() {
-    std::vector<std::string> names = {"size", "seed", "kind", "resampling.of", "case_motion.witness", "accelerometers"};
+    std::vector<std::string> names = {
+        "size", "seed", "kind", "resampling.of", "case_motion.witness", "accelerometers", "input_profile_deg_h"};
     add_names<SampleTruth>(names, sample_numbers);
     return names;
 }
@@ -236,6 +246,8 @@ void set(SampleTruth& truth, std::string_view key, std::string_view value) {
         truth.resampling.of_rate = value == "rate";
     } else if (key == "case_motion.witness") {
         truth.case_motion.witness = value;
+    } else if (key == "input_profile_deg_h") {
+        truth.input_profile_deg_h = track(key, value);
     } else if (key == "accelerometers") {
         if (value != "0" && value != "1") refuse(key, value, "0 or 1");
         truth.accelerometers = value == "1";

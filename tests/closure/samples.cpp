@@ -53,6 +53,9 @@ void check(const SampleTruth& truth) {
     if (!(truth.case_motion.coherence >= 0.0 && truth.case_motion.coherence <= 1.0)) {
         throw InputError("truth: case_motion.coherence must lie between 0 and 1");
     }
+    if (!(std::abs(truth.noise_modulation.depth) <= 1.0)) {
+        throw InputError("truth: noise_modulation.depth must lie between -1 and 1");
+    }
     const std::string& witness = truth.case_motion.witness;
     if (witness != "accel_x" && witness != "accel_y" && witness != "accel_z") {
         throw InputError("truth: case_motion.witness must be accel_x, accel_y or accel_z, not " + witness);
@@ -78,6 +81,30 @@ record::Record generate_samples(const SampleTruth& truth) {
         rate[i] += truth.mean_rate_deg_h;
         rate[i] += truth.bias_temperature_deg_h_per_k * truth.temperature.mean_change_k(from, to);
         for (const RateLine& line : truth.lines) rate[i] += mean_of(line, from, to);
+        if (!truth.input_profile_deg_h.empty()) {
+            // Simpson's rule: exact between the rows of the profile
+            const record::Track& profile = truth.input_profile_deg_h;
+            const double middle = 0.5 * (from + to);
+            const auto mean = [&](auto&& of) {
+                return (of(profile.at(from)) + 4.0 * of(profile.at(middle)) + of(profile.at(to))) / 6.0;
+            };
+            rate[i] += (1.0 + truth.scale_factor_error) * mean([](double x) { return x; });
+            rate[i] += truth.bias_per_rate_squared_h_deg * mean([](double x) { return x * x; });
+        }
+        if (truth.bias_per_temperature_slope_deg_h_s_per_k != 0.0) {
+            rate[i] += truth.bias_per_temperature_slope_deg_h_s_per_k *
+                       (truth.temperature.change_k(to) - truth.temperature.change_k(from)) / (to - from);
+        }
+        if (truth.swinging_line.rate_deg_h != 0.0) {
+            const SwingingLine& line = truth.swinging_line;
+            // Simpson's rule for a part of a cycle
+            const auto at = [&](double t) {
+                const double swing = line.deviation_hz * line.period_s / two_pi * std::sin(two_pi * t / line.period_s);
+                const double turns = line.frequency_hz * t + swing;
+                return line.rate_deg_h * std::sin(two_pi * (turns - std::floor(turns)));
+            };
+            rate[i] += (at(from) + 4.0 * at(0.5 * (from + to)) + at(to)) / 6.0;
+        }
         const JumpingLine& jump = truth.jumping_line;
         const bool jumped = 0.5 * (from + to) >= jump.time_s;
         rate[i] += mean_of({jump.frequency_hz, jumped ? jump.rate_after_deg_h : jump.rate_before_deg_h, 0.0}, from, to);
@@ -97,7 +124,9 @@ record::Record generate_samples(const SampleTruth& truth) {
     double rotated = 0.0;
     for (std::size_t i = 0; i <= intervals; ++i) {
         if (i > 0) rotated += rate[i - 1] / source_hz;
-        angle[i] = rotated + case_angle[i] + truth.white_angle_arcsec * white.normal();
+        const NoiseModulation& modulation = truth.noise_modulation;
+        const double power = 1.0 + modulation.depth * std::sin(two_pi * time_s[i] / modulation.period_s);
+        angle[i] = rotated + case_angle[i] + truth.white_angle_arcsec * std::sqrt(power) * white.normal();
         if (residue.amplitude_arcsec != 0.0) {
             const double since_middle = time_s[i] - 0.5 * end_s;
             const double turns =
@@ -148,6 +177,7 @@ record::Record generate_samples(const SampleTruth& truth) {
     record::Samples samples;
     samples.rate_hz = truth.rate_hz;
     samples.kind = truth.kind;
+    samples.t0_s = 1.0 / truth.rate_hz;  // a sample belongs to the end of its interval
     for (std::size_t k = 0; k < truth.size; ++k) {
         switch (truth.kind) {
             case record::SampleKind::angle_increment_arcsec:
@@ -199,6 +229,7 @@ record::Record generate_samples(const SampleTruth& truth) {
         }
     }
     record.samples = std::move(samples);
+    record.input_rate_deg_h = truth.input_profile_deg_h;
     return record;
 }
 

@@ -56,6 +56,20 @@ struct JumpingLine {
     double time_s = 0.0;
 };
 
+/// A line in the rate whose frequency swings to and fro by `deviation_hz`; not in the library.
+struct SwingingLine {
+    double frequency_hz = 10.0;
+    double rate_deg_h = 0.0;
+    double deviation_hz = 0.1;
+    double period_s = 60.0;
+};
+
+/// White noise of the angle whose variance goes up and down by so much of itself; not in the library.
+struct NoiseModulation {
+    double depth = 0.0;
+    double period_s = 60.0;
+};
+
 struct SampleTruth {
     double rate_hz = 100.0;
     std::size_t size = 100000;
@@ -64,9 +78,11 @@ struct SampleTruth {
     double scale_factor_arcsec = 0.5;  ///< a count is a quarter of it
 
     double mean_rate_deg_h = 0.0;
-    double white_angle_arcsec = 0.0;  ///< rms on each reading of the angle; increments have its difference
-    RateTruth rates;                  ///< the white rate noise is `quantum_noise_deg_rt_h`
-    Temperature temperature;          ///< not constant: a witness
+    record::Track input_profile_deg_h;  ///< beside it, linear between its rows; known: the record has it as a reference
+    double scale_factor_error = 0.0;    ///< of the profile
+    double white_angle_arcsec = 0.0;    ///< rms on each reading of the angle; increments have its difference
+    RateTruth rates;                    ///< the white rate noise is `quantum_noise_deg_rt_h`
+    Temperature temperature;            ///< not constant: a witness
     double bias_temperature_deg_h_per_k = 0.0;
     std::vector<RateLine> lines;  ///< beside rates.base_vibration
 
@@ -81,6 +97,10 @@ struct SampleTruth {
 
     // Effects that the library does not have, beside those of `rates`
     JumpingLine jumping_line;
+    SwingingLine swinging_line;
+    NoiseModulation noise_modulation;
+    double bias_per_rate_squared_h_deg = 0.0;  ///< of the profile: deg/h per (deg/h)^2
+    double bias_per_temperature_slope_deg_h_s_per_k = 0.0;
     double saturation_arcsec = 0.0;  ///< increments of the source are clipped here; 0: never
 
     std::optional<record::Declared> declared;  ///< not given: K where counts are put out

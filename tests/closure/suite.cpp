@@ -313,22 +313,10 @@ std::vector<Case> foreign_cases(std::size_t each) {
     return cases;
 }
 
-Outcome judge(const Case& of, const record::Record& record) {
-    Outcome outcome;
-    const auto start = std::chrono::steady_clock::now();
-    const Closure closure = ringlock::closure::close_turns(record);
-    outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    outcome.verdict = std::string(name_of(closure.verdict));
-    outcome.before = closure.heldout_before;
-    outcome.after = closure.heldout_after;
-    outcome.floor = closure.noise_floor;
-    outcome.oracle = std::numeric_limits<double>::quiet_NaN();
-    if (closure.unexplained) outcome.where = std::string(name_of(closure.unexplained->where));
-
-    const bool foreign = of.kind == Kind::foreign;
+void compare(const Closure& closure, bool foreign, Where where, const std::vector<Added>& truth, Outcome& outcome) {
     std::set<std::string> missing;
     if (!foreign) {
-        for (const Added& added : of.truth) missing.insert(added.effect);
+        for (const Added& added : truth) missing.insert(added.effect);
     }
     const std::set<std::string> true_effects = missing;
     bool ties = false;
@@ -348,8 +336,8 @@ Outcome judge(const Case& of, const record::Record& record) {
         if (!tied_to_truth) outcome.false_name = true;
     }
     if (closure.verdict == Verdict::unexplained) {
-        outcome.judged = foreign && closure.unexplained->where == of.where && !outcome.false_name ? Judged::right
-                                                                                                  : Judged::unexplained;
+        outcome.judged =
+            foreign && closure.unexplained->where == where && !outcome.false_name ? Judged::right : Judged::unexplained;
     } else if (outcome.false_name) {
         outcome.judged = Judged::wrong;
     } else if (foreign || !missing.empty()) {
@@ -357,6 +345,22 @@ Outcome judge(const Case& of, const record::Record& record) {
     } else {
         outcome.judged = ties ? Judged::tie : Judged::right;
     }
+}
+
+Outcome judge(const Case& of, const record::Record& record) {
+    Outcome outcome;
+    const auto start = std::chrono::steady_clock::now();
+    const Closure closure = ringlock::closure::close_turns(record);
+    outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    outcome.verdict = std::string(name_of(closure.verdict));
+    outcome.before = closure.heldout_before;
+    outcome.after = closure.heldout_after;
+    outcome.floor = closure.noise_floor;
+    outcome.oracle = std::numeric_limits<double>::quiet_NaN();
+    if (closure.unexplained) outcome.where = std::string(name_of(closure.unexplained->where));
+
+    const bool foreign = of.kind == Kind::foreign;
+    compare(closure, foreign, of.where, of.truth, outcome);
     if (foreign) return outcome;
 
     std::vector<ActiveEffect> known;

@@ -91,6 +91,10 @@ struct Outcome {
     std::vector<Deviation> deviations;  ///< of the estimates, where the truth has been named
 };
 
+/// An answer held against the truth: what was named, and what that is judged.
+void compare(const ringlock::closure::Closure& closure, bool foreign, ringlock::closure::Where where,
+             const std::vector<Added>& truth, Outcome& outcome);
+
 Outcome judge(const Case& of, const record::Record& record);
 
 }  // namespace ringlock::test::closure

@@ -1,0 +1,257 @@
+#include "analysis/closure/sample_figures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <utility>
+
+#include "analysis/closure/sample_lines.hpp"
+#include "analysis/closure/sample_screen.hpp"
+#include "analysis/closure/sample_search.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+/// Time of the middle of the record, on its clock.
+double middle_of(const SampleSeries& series) {
+    return series.time_s[0] - 0.5 * series.interval_s +
+           0.5 * static_cast<double>(series.size() - 1) * series.interval_s;
+}
+
+/// Frequency at which a declared dither, or a harmonic of it, shows as this line; the line's own where there is none.
+struct Unaliased {
+    double hz;
+    double drift_sign;
+};
+Unaliased unaliased(double hz, double rate_hz, const record::Declared& declared) {
+    if (!declared.dither_frequency_hz) return {hz, 1.0};
+    for (int h = 1; h <= 3; ++h) {
+        const double of_dither = h * *declared.dither_frequency_hz;
+        if (std::abs(alias(of_dither, rate_hz) - hz) >= declared_to * of_dither) continue;
+        const double whole = std::round(of_dither / rate_hz) * rate_hz;
+        return of_dither >= whole ? Unaliased{whole + hz, 1.0} : Unaliased{whole - hz, -1.0};
+    }
+    return {hz, 1.0};
+}
+
+void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared& declared, std::vector<Estimate>& all) {
+    const SampleSeries& series = fit.series();
+    const auto& columns = fit.model().columns;
+    const SampleColumn& column = columns[cosine];
+    const std::string& effect = column.effect;
+    const SampleLine line{column.hz, column.drift_hz_per_s, column.drifts};
+    const double a = column.value;
+    const double b = columns[cosine + 1].value;
+    const auto slopes = line_slopes(series.size(), series.rate_hz, line, a, b);
+    const Eigen::MatrixXd joint = fit.joint_covariance(slopes);
+    const auto of_a = static_cast<Eigen::Index>(cosine);
+    const auto of_hz = static_cast<Eigen::Index>(columns.size());
+    const double amplitude = std::max(std::hypot(a, b), 1e-300);
+    // Of the amplitude and of the phase in the middle, by a, b
+    const Eigen::Vector2d along(a / amplitude, b / amplitude);
+    const double amplitude_sd = std::sqrt(std::max(0.0, along.dot(joint.block<2, 2>(of_a, of_a) * along)));
+    const Unaliased real = unaliased(line.hz, series.rate_hz, declared);
+    const double hz = effect == "dither_residue" ? real.hz : line.hz;
+    all.push_back({effect, "frequency_hz", hz, std::sqrt(std::max(0.0, joint(of_hz, of_hz)))});
+    if (effect == "dither_residue") {
+        const double drift = line.drifts ? real.drift_sign * line.drift_hz_per_s : 0.0;
+        // Where none is needed it is held at zero; the error says what of it would not show.
+        double sd = 0.0;
+        if (line.drifts) {
+            sd = std::sqrt(std::max(0.0, joint(of_hz + 1, of_hz + 1)));
+        } else {
+            SampleLine drifting = line;
+            drifting.drifts = true;
+            const auto more = fit.joint_covariance(line_slopes(series.size(), series.rate_hz, drifting, a, b));
+            sd = std::sqrt(std::max(0.0, more(of_hz + 1, of_hz + 1)));
+        }
+        all.push_back({effect, "drift_hz_per_s", drift, sd});
+        const double gain = std::max(1e-9, 2.0 * std::abs(std::sin(units::pi * line.hz * series.interval_s)));
+        all.push_back({effect, "amplitude_arcsec", amplitude / gain, amplitude_sd / gain});
+        return;
+    }
+    // Increments are those of a rate integrated over each interval.
+    const double gain = std::abs(std::sin(units::pi * line.hz * series.interval_s)) / (units::pi * line.hz);
+    all.push_back({effect, "rate_deg_h", amplitude / gain, amplitude_sd / gain});
+    // a cos + b sin = A sin(phase + 2 pi f (t + middle)), t from the middle
+    const double middle_s = middle_of(series);
+    const double turns = line.hz * middle_s;
+    const double phase = std::atan2(a, b) - units::two_pi * (turns - std::floor(turns));
+    Eigen::VectorXd by = Eigen::VectorXd::Zero(joint.rows());
+    by(of_a) = b / (amplitude * amplitude);
+    by(of_a + 1) = -a / (amplitude * amplitude);
+    by(of_hz) = -units::two_pi * middle_s;
+    all.push_back(
+        {effect, "phase_rad", std::remainder(phase, units::two_pi), std::sqrt(std::max(0.0, by.dot(joint * by)))});
+}
+
+/// Mean and standard deviation of the time of a step under its likelihood, which is no parabola.
+Estimate time_of_step(const SampleFit& fit, std::size_t at) {
+    const SampleSeries& series = fit.series();
+    const std::size_t n = series.size();
+    const SampleColumn& column = fit.model().columns[at];
+    std::size_t row = 0;
+    while (row + 1 < n && (*column.series)[row] == 0.0) ++row;
+    SampleModel model = fit.model();
+    model.columns.erase(model.columns.begin() + static_cast<std::ptrdiff_t>(at));
+    const SampleFit without(series, std::move(model), fit.rows(), SampleFit::Noise::held);
+    const auto chi2_at = [&](std::size_t place) { return without.score({*step_column(series, place).series}).chi2; };
+    const double top = chi2_at(row);
+    // So far to either side that the likelihood is gone, then evenly
+    std::size_t reach = 1;
+    while (reach < n / 4) {
+        const std::size_t before = row > reach ? row - reach : 1;
+        const std::size_t after = std::min(n - 2, row + reach);
+        if (top - chi2_at(before) > 25.0 && top - chi2_at(after) > 25.0) break;
+        reach *= 2;
+    }
+    const std::size_t step = std::max<std::size_t>(1, reach / 40);
+    double sum = 0.0;
+    double first = 0.0;
+    double second = 0.0;
+    for (std::size_t k = row > reach ? row - reach : 1; k <= std::min(n - 2, row + reach); k += step) {
+        const double weight = std::exp(0.5 * (chi2_at(k) - top));
+        const double time = series.time_s[k] - series.interval_s - series.time_s[row];
+        sum += weight;
+        first += weight * time;
+        second += weight * time * time;
+    }
+    const double mean = first / sum;
+    // Within a row nothing tells.
+    const double within = series.interval_s * static_cast<double>(step);
+    return {"bias_step", "time_s", series.time_s[row] + mean,
+            std::sqrt(std::max(0.0, second / sum - mean * mean) + within * within / 12.0)};
+}
+
+/// The motion's angle as a resonance of its own, whatever the witness tells of it; and what that leaves of it.
+void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estimate>& all,
+                 std::vector<std::string>& notes) {
+    const SampleSeries& series = fit.series();
+    const auto& [name, witness] = series.witnesses[step.witness];
+    all.push_back({"case_motion", "witness", static_cast<double>(name.back() - 'x'), 0.0, name});
+    SampleModel without = fit.model();
+    std::erase_if(without.columns, [](const SampleColumn& c) { return c.effect == "case_motion"; });
+    without.motion.clear();
+    for (std::size_t k = without.resonances.size(); k-- > 0;) {
+        if (without.resonances[k] != "case_motion") continue;
+        const auto at = static_cast<std::ptrdiff_t>(k);
+        without.resonances.erase(without.resonances.begin() + at);
+        without.resonance_steps.erase(without.resonance_steps.begin() + at);
+        without.noise.resonances.erase(without.noise.resonances.begin() + at);
+    }
+    const SampleFit bare(series, without, fit.rows(), SampleFit::Noise::near);
+    const WitnessMotion told = fit_witness(bare, witness);
+    SampleModel with = bare.model();
+    with.resonances.insert(with.resonances.begin(), "case_motion");
+    with.resonance_steps.insert(with.resonance_steps.begin(), step.step);
+    const double centre = std::max(told.centre_hz, 0.01);
+    with.noise.resonances.insert(with.noise.resonances.begin(),
+                                 {std::max(told.rms_arcsec, 1e-6), centre, 0.5 * centre});
+    const SampleFit whole(series, with, fit.rows(), SampleFit::Noise::free);
+    const auto& motion = whole.model().noise.resonances.front();
+    const SampleNoise::Resonance error = whole.noise_errors().noise.resonances.front();
+    const bool seen = whole.log_likelihood() - bare.log_likelihood() > 20.0;
+    double coherence = unknown;
+    double coherence_sd = unknown;
+    if (seen) {
+        // The same resonance beside what the witness tells: the share of its power that is still needed.
+        SampleModel beside = whole.model();
+        beside.motion = told.increments;
+        if (!step.strong) {
+            // Weak motion is told by two numbers; a response of many lags would be mostly noise.
+            beside.motion.assign(series.size(), 0.0);
+            for (const SampleColumn& column : fit.model().columns) {
+                if (column.effect != "case_motion") continue;
+                for (std::size_t i = 0; i < series.size(); ++i) beside.motion[i] += column.value * (*column.series)[i];
+            }
+        }
+        const SampleFit first(series, beside, fit.rows(), SampleFit::Noise::near);
+        const double untold = first.model().noise.resonances.front().arcsec;
+        const double untold_sd = first.noise_errors().noise.resonances.front().arcsec;
+        const double left = std::min(1.0, std::pow(untold / motion.arcsec, 2));
+        coherence = 1.0 - left;
+        const double relative = untold_sd / std::max(untold, 1e-12);
+        // Of n independent spectra: (1 - c) sqrt(2 c/n) (Bendat and Piersol 2010, table 9.6); of their power's
+        // logarithm the standard error is 1/sqrt(n).
+        coherence_sd = relative < 0.25 ? left * std::sqrt(8.0 * coherence) * relative
+                                       : 2.0 * untold * untold_sd / (motion.arcsec * motion.arcsec);
+    } else {
+        notes.push_back(
+            "the motion is known by its witness alone: its own spectrum does not stand out from the noise, "
+            "so that coherence, rms, centre and width have no standard error");
+    }
+    all.push_back({"case_motion", "coherence", seen ? coherence : told.coherence, coherence_sd});
+    all.push_back({"case_motion", "rms_arcsec", seen ? motion.arcsec : told.rms_arcsec, seen ? error.arcsec : unknown});
+    all.push_back({"case_motion", "centre_hz", seen ? motion.hz : centre, seen ? error.hz : unknown});
+    all.push_back({"case_motion", "width_hz", seen ? motion.width_hz : 0.5 * centre, seen ? error.width_hz : unknown});
+}
+
+}  // namespace
+
+SampleFigures figures_of(const SampleFit& fit, const std::vector<SampleStep>& steps, const record::Declared& declared) {
+    const SampleModel& model = fit.model();
+    const SampleModel errors = fit.noise_errors();
+    SampleFigures figures;
+    const double to_deg = units::deg_rt_h_per_arcsec_rt_s;
+    figures.base.push_back({"", "mean_rate_deg_h", model.columns[0].value, model.columns[0].sd});
+    figures.base.push_back({"", "white_angle_arcsec", model.noise.angle_arcsec, errors.noise.angle_arcsec});
+    figures.base.push_back(
+        {"", "white_rate_deg_rt_h", model.noise.rate_arcsec_rt_s * to_deg, errors.noise.rate_arcsec_rt_s * to_deg});
+    for (const SampleStep& step : steps) {
+        auto& all = figures.steps.emplace_back();
+        const std::string& effect = step.effect;
+        if (effect == "case_motion") {
+            take_motion(fit, step, all, figures.notes);
+            continue;
+        }
+        for (std::size_t k = 0; k < model.columns.size(); ++k) {
+            const SampleColumn& column = model.columns[k];
+            if (column.step != step.step || column.effect != effect || column.name == "sine") continue;
+            if (column.name == "cosine") {
+                take_line(fit, k, declared, all);
+                continue;
+            }
+            all.push_back({effect, column.name, column.value, column.sd});
+            if (effect == "bias_step") all.push_back(time_of_step(fit, k));
+        }
+        if (effect == "rate_random_walk") {
+            // The walk goes by its variance; of a root the relative error is half.
+            const double root = std::sqrt(model.noise.walk_arcsec2_s3);
+            const double sd = errors.noise.walk_arcsec2_s3;
+            all.push_back({effect, "deg_h_rt_h", 60.0 * root, 60.0 * 0.5 * sd / std::max(root, 1e-300)});
+        }
+        if (effect == "bias_instability") all.push_back({effect, "deg_h", model.flicker_deg_h, errors.flicker_deg_h});
+        if (effect == "resampling") {
+            all.push_back(
+                {effect, "from_hz", model.noise.from_hz, step.other_hz.empty() ? errors.noise.from_hz : unknown});
+            for (const double hz : step.other_hz) {
+                figures.notes.push_back(fmt::format(
+                    "a source of {:.6g} Hz explains the record as well as {:.6g} Hz: from_hz has no standard error", hz,
+                    model.noise.from_hz));
+            }
+        }
+        for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+            if (model.resonance_steps[k] != step.step) continue;
+            // A line that wanders
+            const auto& line = model.noise.resonances[k];
+            const auto& sd = errors.noise.resonances[k];
+            const Unaliased real = unaliased(line.hz, fit.series().rate_hz, declared);
+            all.push_back({effect, "frequency_hz", real.hz, sd.hz});
+            all.push_back(
+                {effect, "amplitude_arcsec", std::numbers::sqrt2 * line.arcsec, std::numbers::sqrt2 * sd.arcsec});
+            all.push_back({effect, "wander_hz", line.width_hz, sd.width_hz});
+            break;
+        }
+    }
+    return figures;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,146 @@
+#include "tests/closure/bench_tables.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ostream.h>
+
+#include <algorithm>
+#include <boost/math/distributions/binomial.hpp>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace ringlock::test::closure {
+
+namespace {
+
+using Binomial = boost::math::binomial_distribution<>;
+
+/// "k of n, share (95 % interval)", Clopper and Pearson.
+std::string share_of(std::size_t count, std::size_t of) {
+    if (of == 0) return "none";
+    const auto n = static_cast<double>(of);
+    const auto k = static_cast<double>(count);
+    const double lo = Binomial::find_lower_bound_on_p(n, k, 0.025);
+    const double hi = Binomial::find_upper_bound_on_p(n, k, 0.025);
+    return fmt::format("{} of {}, {:.1f} % ({:.1f} .. {:.1f})", count, of, 100.0 * k / n, 100.0 * lo, 100.0 * hi);
+}
+
+double quantile(std::vector<double> values, double at) {
+    if (values.empty()) return std::nan("");
+    std::sort(values.begin(), values.end());
+    return values[static_cast<std::size_t>(at * static_cast<double>(values.size() - 1))];
+}
+
+}  // namespace
+
+void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const Outcomes& outcomes,
+                   const char* record_length) {
+    const auto count = [&](auto&& which, auto&& what) {
+        std::pair<std::size_t, std::size_t> found{0, 0};
+        for (std::size_t k = 0; k < truths.size(); ++k) {
+            if (!outcomes[k] || !which(truths[k])) continue;
+            ++found.second;
+            if (what(*outcomes[k])) ++found.first;
+        }
+        return share_of(found.first, found.second);
+    };
+    const auto kind = [](Kind wanted, double multiple) {
+        return [=](const TableRow& of) { return of.kind == wanted && (multiple == 0.0 || of.multiple == multiple); };
+    };
+    const auto is = [](Judged judged) { return [=](const Outcome& o) { return o.judged == judged; }; };
+    fmt::print(out, "| figure | reached (95 % interval) |\n|---|---|\n");
+    const auto row = [&](const char* name, const std::string& text) { fmt::print(out, "| {} | {} |\n", name, text); };
+    row("nulls called `nothing_missing`", count(kind(Kind::null, 0.0), is(Judged::right)));
+    row("single effects at their detection limit, named right", count(kind(Kind::single, 1.0), is(Judged::right)));
+    row("... ties that hold the truth", count(kind(Kind::single, 1.0), is(Judged::tie)));
+    row("... not seen", count(kind(Kind::single, 1.0), is(Judged::missed)));
+    row("single effects at twice their limit, named right", count(kind(Kind::single, 2.0), is(Judged::right)));
+    row("... ties that hold the truth", count(kind(Kind::single, 2.0), is(Judged::tie)));
+    row("pairs, each at twice its limit, both named", count(kind(Kind::pair, 2.0), is(Judged::right)));
+    row("... ties that hold the truth", count(kind(Kind::pair, 2.0), is(Judged::tie)));
+    row("... not both of them", count(kind(Kind::pair, 2.0), is(Judged::missed)));
+    row("effects outside the library, `unexplained` with the right place",
+        count(kind(Kind::foreign, 0.0), is(Judged::right)));
+    const auto all = [](const TableRow&) { return true; };
+    row("a wrong name with confidence, over all records", count(all, is(Judged::wrong)));
+    row("... or in the steps of an `unexplained` one", count(all, [](const Outcome& o) { return o.false_name; }));
+    std::vector<double> ratios;
+    std::vector<double> seconds;
+    std::size_t within = 0;
+    std::size_t estimates = 0;
+    for (const auto& o : outcomes) {
+        if (!o) continue;
+        seconds.push_back(o->seconds);
+        if (std::isfinite(o->oracle)) ratios.push_back(o->after / o->oracle);
+        for (const auto& d : o->deviations) {
+            if (!std::isfinite(d.standard_errors)) continue;
+            ++estimates;
+            if (std::abs(d.standard_errors) <= 2.0) ++within;
+        }
+    }
+    row("held-out error after closing over the oracle's: median, 99 % of records, worst",
+        fmt::format("{:.4f}, {:.4f}, {:.4f}", quantile(ratios, 0.5), quantile(ratios, 0.99), quantile(ratios, 1.0)));
+    row("estimates within two standard errors", share_of(within, estimates));
+    row(fmt::format("time of a record of {}, one of two cores busy with another: median, worst", record_length).c_str(),
+        fmt::format("{:.1f} s, {:.1f} s", quantile(seconds, 0.5), quantile(seconds, 1.0)));
+}
+
+void write_confusion(std::ostream& out, std::ostream& matrix, const std::vector<TableRow>& truths,
+                     const Outcomes& outcomes) {
+    std::map<std::pair<std::string, double>, std::map<std::string, int>> taken;
+    for (std::size_t k = 0; k < truths.size(); ++k) {
+        if (!outcomes[k] || truths[k].kind == Kind::pair) continue;
+        const Outcome& o = *outcomes[k];
+        std::string answer = o.verdict == "unexplained" ? "unexplained, " + o.where : o.named;
+        if (o.verdict == "unexplained" && !o.named.empty()) answer += ", after " + o.named;
+        if (answer.empty()) answer = "nothing_missing";
+        ++taken[{truths[k].truth, truths[k].multiple}][answer];
+    }
+    fmt::print(out, "| in the record | size over its limit | taken for |\n|---|---|---|\n");
+    matrix << "truth,multiple,answer,records\n";
+    for (const auto& [truth, answers] : taken) {
+        std::vector<std::pair<int, std::string>> sorted;
+        for (const auto& [answer, records] : answers) {
+            sorted.emplace_back(records, answer);
+            fmt::print(matrix, "{},{},\"{}\",{}\n", truth.first, truth.second, answer, records);
+        }
+        std::sort(sorted.rbegin(), sorted.rend());
+        std::string text;
+        for (const auto& [records, answer] : sorted) {
+            text += fmt::format("{}{} {}", text.empty() ? "" : "; ", records, answer);
+        }
+        fmt::print(out, "| {} | {} | {} |\n", truth.first, truth.second > 0.0 ? fmt::format("{:g}", truth.second) : "-",
+                   text);
+    }
+}
+
+void write_calibration(std::ostream& out, const Outcomes& outcomes) {
+    std::map<std::string, std::vector<double>> by_parameter;
+    for (const auto& o : outcomes) {
+        if (!o) continue;
+        for (const auto& d : o->deviations) by_parameter[d.parameter].push_back(d.standard_errors);
+    }
+    fmt::print(out, "| parameter | estimates | mean | rms | within one | within two | without a standard error |\n");
+    fmt::print(out, "|---|---|---|---|---|---|---|\n");
+    for (const auto& [parameter, all] : by_parameter) {
+        std::vector<double> known;
+        for (const double z : all) {
+            if (std::isfinite(z)) known.push_back(z);
+        }
+        double sum = 0.0;
+        double squares = 0.0;
+        int one = 0;
+        int two = 0;
+        for (const double z : known) {
+            sum += z;
+            squares += z * z;
+            one += std::abs(z) <= 1.0 ? 1 : 0;
+            two += std::abs(z) <= 2.0 ? 1 : 0;
+        }
+        const auto n = static_cast<double>(std::max<std::size_t>(known.size(), 1));
+        fmt::print(out, "| {} | {} | {:.2f} | {:.2f} | {:.0f} % | {:.0f} % | {} |\n", parameter, known.size(), sum / n,
+                   std::sqrt(squares / n), 100.0 * one / n, 100.0 * two / n, all.size() - known.size());
+    }
+}
+
+}  // namespace ringlock::test::closure

@@ -1,0 +1,157 @@
+// A small part of the bench of the closed loop on samples (bench_closure_samples.cpp), and what it stands on.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "analysis/closure/closure.hpp"
+#include "analysis/closure/sample_filter.hpp"
+#include "analysis/closure/sample_fit.hpp"
+#include "tests/closure/sample_suite.hpp"
+
+namespace ringlock::test::closure {
+namespace {
+
+Outcome judged(const SampleCase& of) { return judge(of, make(of)); }
+
+TEST(ClosureSampleSuite, NamesNothingInRecordsWithoutAnything) {
+    std::uint64_t seed = 400;
+    for (const SampleCondition& condition : sample_conditions) {
+        SampleCase of{.truth = {}, .condition = &condition, .seed = seed++};
+        of.size = 12000;
+        const Outcome outcome = judged(of);
+        EXPECT_EQ(outcome.judged, Judged::right) << condition.name << ": " << outcome.verdict << " " << outcome.where;
+        EXPECT_NEAR(outcome.after / outcome.oracle, 1.0, 1e-4);
+        EXPECT_FALSE(outcome.deviations.empty());
+    }
+}
+
+TEST(ClosureSampleSuite, NamesWhatIsFourTimesItsLimit) {
+    std::uint64_t seed = 420;
+    const auto named = [&](const char* effect, std::size_t condition) {
+        SampleCase of{.kind = Kind::single, .truth = {}, .multiple = 4.0, .condition = &sample_conditions[condition]};
+        of.seed = seed++;
+        of.size = 12000;
+        of.truth = {draw_on_samples(effect, of)};
+        settle(of);
+        const Outcome outcome = judged(of);
+        EXPECT_TRUE(outcome.judged == Judged::right || outcome.judged == Judged::tie)
+            << effect << ": " << outcome.verdict << " " << outcome.named;
+    };
+    named("bias_step", 0);
+    named("dither_residue", 1);
+    named("case_motion", 2);
+    named("bias_temperature", 3);
+    named("scale_factor_error", 4);
+}
+
+TEST(ClosureSampleSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
+    for (SampleCase& of : foreign_sample_cases(1)) {
+        of.size = 10000;
+        const Outcome outcome = judged(of);
+        EXPECT_FALSE(outcome.false_name) << of.truth_text() << ": " << outcome.verdict << " " << outcome.named;
+        EXPECT_TRUE(std::isnan(outcome.oracle));
+    }
+}
+
+// A bias of two states, 3 deg/h apart, was called bias_instability.
+TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
+    SampleTruth truth;
+    truth.size = 16000;
+    truth.seed = 5;
+    truth.white_angle_arcsec = 0.3;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.rates.telegraph_bias = {3.0, 20.0};
+    const auto found = ringlock::closure::close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
+    EXPECT_TRUE(found.steps.empty());
+    ASSERT_TRUE(found.unexplained);
+    EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::time);
+}
+
+// Resampled from below, a third of the samples follow from the others: their rounding was taken for innovations.
+TEST(ClosureSampleSuite, ClosesWhatWasTakenAtALowerRate) {
+    for (const double from_hz : {61.8, 83.1}) {
+        SampleTruth truth;
+        truth.size = 10000;
+        truth.seed = 5;
+        truth.white_angle_arcsec = 0.3;
+        truth.rates.quantum_noise_deg_rt_h = 0.01;
+        truth.resampling.from_hz = from_hz;
+        const auto found = ringlock::closure::close_samples(generate_samples(truth));
+        EXPECT_EQ(found.verdict, ringlock::closure::Verdict::closed);
+        ASSERT_EQ(found.steps.size(), 1U);
+        EXPECT_EQ(found.steps[0].effect, "resampling");
+        EXPECT_NEAR(found.steps[0].parameters[0].value, from_hz, 1e-6);
+        // The noise is that of the samples as they were taken: four standard errors
+        EXPECT_NEAR(found.base[1].value, 0.3, 4.0 * found.base[1].sd);
+    }
+}
+
+// A gyro that moves by rates that are known has nothing missing, and a scale factor's error is one of them alone.
+TEST(ClosureSampleSuite, KnownInputIsNoStructure) {
+    SampleTruth truth;
+    truth.size = 20000;
+    truth.white_angle_arcsec = 0.2;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.input_profile_deg_h = {{0.0, 60.0, 62.0, 130.0, 133.0, 210.0}, {200.0, 200.0, -300.0, -300.0, 50.0, 50.0}};
+    EXPECT_EQ(ringlock::closure::close_samples(generate_samples(truth)).verdict,
+              ringlock::closure::Verdict::nothing_missing);
+    truth.scale_factor_error = 0.01;
+    const auto found = ringlock::closure::close_samples(generate_samples(truth));
+    ASSERT_EQ(found.steps.size(), 1U);
+    EXPECT_EQ(found.steps[0].effect, "scale_factor_error");
+    const auto& relative = found.steps[0].parameters.at(0);
+    EXPECT_NEAR(relative.value, 0.01, 4.0 * relative.sd);
+}
+
+// The filter's likelihood is that of the increments' covariance matrix: here by its Cholesky factor.
+TEST(SampleFilter, LikelihoodIsThatOfTheCovariance) {
+    using ringlock::closure::SampleFilter;
+    ringlock::closure::SampleNoise noise;
+    noise.angle_arcsec = 0.3;
+    noise.rate_arcsec_rt_s = 0.8;
+    noise.terms = {{0.5, 0.4}, {5.0, 0.2}};
+    constexpr int n = 60;
+    constexpr double dt = 0.1;
+    // Angles at the ends, less that at the start: variance of white rates, of Markov rates held over an interval as the
+    // filter has them, and of the reading errors.
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
+    for (int i = 0; i < n; ++i) {
+        for (int j = 0; j < n; ++j) {
+            covariance(i, j) = 0.64 * dt * (std::min(i, j) + 1) + 0.09 * (i == j ? 2.0 : 1.0);
+            for (const auto& term : noise.terms) {
+                const double gain = term.time_s * -std::expm1(-dt / term.time_s);
+                for (int a = 0; a <= i; ++a) {
+                    for (int b = 0; b <= j; ++b) {
+                        covariance(i, j) +=
+                            gain * gain * term.variance_arcsec2_s2 * std::exp(-std::abs(a - b) * dt / term.time_s);
+                    }
+                }
+            }
+        }
+    }
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> normal;
+    std::vector<double> increments(n);
+    Eigen::VectorXd angle(n);
+    double sum = 0.0;
+    for (int i = 0; i < n; ++i) angle(i) = sum += increments[static_cast<std::size_t>(i)] = normal(random);
+    const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
+    const Eigen::VectorXd white = factor.matrixL().solve(angle);
+    double expected = 0.5 * white.squaredNorm();
+    for (int i = 0; i < n; ++i) expected += std::log(factor.matrixL()(i, i));
+    const std::vector<std::uint8_t> rows(n, 1);
+    EXPECT_NEAR(SampleFilter::minus_log_likelihood(noise, dt, increments, rows), expected, 1e-6 * std::abs(expected));
+    const SampleFilter filter(noise, n, dt);
+    const auto e = filter.apply(increments);
+    double applied = 0.0;
+    for (std::size_t i = 0; i < e.size(); ++i) applied += 0.5 * e[i] * e[i] + std::log(filter.sd(i));
+    EXPECT_NEAR(applied, expected, 1e-6 * std::abs(expected));
+}
+
+}  // namespace
+}  // namespace ringlock::test::closure
