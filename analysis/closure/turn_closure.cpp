@@ -91,7 +91,8 @@ void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
 /// Whether some view of the residual explains more than the best effect, the noise fitted anew beside either: then
 /// that one is only what comes nearest to something that the library does not have.
 ///
-/// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do.
+/// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do. Injected
+/// noise of a radian leaves nothing of that.
 bool something_else(const TurnFit& fit, const effects::Effect& effect, double merit) {
     constexpr std::size_t looked_at = 4;
     auto views = view_residual(fit);
@@ -99,7 +100,8 @@ bool something_else(const TurnFit& fit, const effects::Effect& effect, double me
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
     if (views.size() > looked_at) views.resize(looked_at);
     return std::any_of(views.begin(), views.end(), [&](const View& view) {
-        const bool in_step = view.test.where == Where::phase && effect.adds_angle();
+        const bool in_step =
+            view.test.where == Where::phase && effect.adds_angle() && fit.parameters().injected_sd_rad < 1.0;
         // A random rate can follow what jumps, nearly as well as the jumps themselves.
         const bool jumps = view.jumps && is_random_rate(effect);
         // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
