@@ -91,8 +91,8 @@ void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
 /// Whether some view of the residual explains more than the best effect, the noise fitted anew beside either: then
 /// that one is only what comes nearest to something that the library does not have.
 ///
-/// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do. Injected
-/// noise of a radian leaves nothing of that.
+/// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do.
+/// Injected noise of a radian leaves nothing of that.
 bool something_else(const TurnFit& fit, const effects::Effect& effect, double merit) {
     constexpr std::size_t looked_at = 4;
     auto views = view_residual(fit);

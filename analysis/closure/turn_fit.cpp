@@ -118,16 +118,17 @@ void TurnFit::climb() {
 }
 
 /// The likelihood can have two summits: a small noise, or none at all, where what it does to the phases is foretold by
-/// their course. Of the one that is not stood on.
+/// their course. Of the one that is not stood on. What is larger than the readout's noise shows itself, and behind it
+/// there is no course.
 void TurnFit::try_other_noise() {
     constexpr double none = 1e-9;
     const double readout = parameters_.readout_sd_rad;
+    if (parameters_.injected_sd_rad > readout) return;
     const std::size_t count = knobs(parameters_, effects_ == Effects::fitted).size();
     for (std::size_t k = 0; k < count; ++k) {
         const Knob knob = knobs(parameters_)[k];
         if (knob.name == "readout_noise_rad") continue;
         const bool of_effect = !knob.effect.empty();
-        // What is larger than the readout's noise shows itself, and effects come with a size.
         if (*knob.value > 10.0 * none && (of_effect || *knob.value < readout)) try_noise(k, none);
         if (!of_effect && *knobs(parameters_)[k].value < 1e-4 * readout) {
             try_noise(k, readout * (knob.name == "injected_noise_rad" ? 0.05 : 1e-3));

@@ -1,8 +1,10 @@
 // A small part of the bench of the closed loop (bench_closure.cpp), and what it stands on.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "analysis/closure/turn_contest.hpp"
 #include "analysis/closure/two_levels.hpp"
 #include "tests/closure/suite.hpp"
 
@@ -77,6 +79,37 @@ TEST(ClosureSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
         EXPECT_FALSE(outcome.false_name) << outcome.verdict << " " << outcome.named;
         EXPECT_TRUE(std::isnan(outcome.oracle));
     }
+}
+
+TEST(ClosureSuite, TwoRatesAreNotOneRandomRate) {
+    // A random rate follows a ramp and a temperature at once, better than either of them does.
+    Case of{.kind = Kind::pair, .truth = {}, .multiple = 4.0, .condition = &conditions[2], .seed = 350, .turns = turns};
+    of.truth = {draw("bias_ramp", 4.0 * start_size("bias_ramp"), of.seed, duration_s),
+                draw("bias_temperature", 4.0 * start_size("bias_temperature"), of.seed, duration_s)};
+    ASSERT_TRUE(settle(of));
+    const Outcome outcome = judged({of}).front();
+    EXPECT_TRUE(outcome.judged == Judged::right || outcome.judged == Judged::tie)
+        << outcome.verdict << " " << outcome.named;
+}
+
+TEST(ClosureSuite, OneSummitOfTheLikelihoodWhateverTheStart) {
+    // Without injected noise there are two: a little of it, or none.
+    Case of{.truth = {}, .condition = &conditions[0], .seed = 360, .turns = turns};
+    const record::Record record = make({&of, 1}).front();
+    std::vector<double> found;
+    for (const double injected_rad : {0.0, 1e-8, 1e-4, 1e-2}) {
+        ringlock::closure::TurnParameters start;
+        if (injected_rad > 0.0) {
+            start.injected_sd_rad = injected_rad;
+            start.wander_sd_rad = 1e-6;
+            start.readout_sd_rad = 0.005;
+            start.threshold_deg_h = record.declared.lockin_threshold_deg_h.value();
+        }
+        const auto fitted = ringlock::closure::fit_record(record, start, ringlock::closure::Rows(turns, 1));
+        found.push_back(fitted->fit->log_likelihood());
+    }
+    const double highest = *std::max_element(found.begin(), found.end());
+    for (const double other : found) EXPECT_NEAR(other, highest, 0.5);
 }
 
 TEST(TwoLevels, FindsTheCourseAndCountsItsJumps) {
