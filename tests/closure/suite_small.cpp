@@ -93,23 +93,27 @@ TEST(ClosureSuite, TwoRatesAreNotOneRandomRate) {
 }
 
 TEST(ClosureSuite, OneSummitOfTheLikelihoodWhateverTheStart) {
-    // Without injected noise there are two: a little of it, or none.
-    Case of{.truth = {}, .condition = &conditions[0], .seed = 360, .turns = turns};
-    const record::Record record = make({&of, 1}).front();
-    std::vector<double> found;
-    for (const double injected_rad : {0.0, 1e-8, 1e-4, 1e-2}) {
-        ringlock::closure::TurnParameters start;
-        if (injected_rad > 0.0) {
-            start.injected_sd_rad = injected_rad;
-            start.wander_sd_rad = 1e-6;
-            start.readout_sd_rad = 0.005;
-            start.threshold_deg_h = record.declared.lockin_threshold_deg_h.value();
+    // Without injected noise there are two: a little of it, or none. Records in which a climb alone stays on the lower
+    // one, by 5 and 21.
+    for (const std::uint64_t seed : {363U, 368U}) {
+        Case of{.truth = {}, .condition = &conditions[0], .seed = seed, .turns = turns};
+        of.truth = {{"quantum_noise", {{"deg_rt_h", 4e-7}}}};
+        const record::Record record = make({&of, 1}).front();
+        std::vector<double> found;
+        for (const double injected_rad : {0.0, 1e-8, 1e-4, 1e-2}) {
+            ringlock::closure::TurnParameters start;
+            if (injected_rad > 0.0) {
+                start.injected_sd_rad = injected_rad;
+                start.wander_sd_rad = 1e-6;
+                start.readout_sd_rad = 0.005;
+                start.threshold_deg_h = 300.0;
+            }
+            const auto fitted = ringlock::closure::fit_record(record, start, ringlock::closure::Rows(turns, 1));
+            found.push_back(fitted->fit->log_likelihood());
         }
-        const auto fitted = ringlock::closure::fit_record(record, start, ringlock::closure::Rows(turns, 1));
-        found.push_back(fitted->fit->log_likelihood());
+        const double highest = *std::max_element(found.begin(), found.end());
+        for (const double other : found) EXPECT_NEAR(other, highest, 0.1) << seed;
     }
-    const double highest = *std::max_element(found.begin(), found.end());
-    for (const double other : found) EXPECT_NEAR(other, highest, 0.5);
 }
 
 TEST(TwoLevels, FindsTheCourseAndCountsItsJumps) {
