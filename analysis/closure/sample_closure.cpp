@@ -105,6 +105,7 @@ class Loop {
     };
 
     double lattice_step() const { return series_.counted ? 0.25 * series_.scale_factor_arcsec : lattice_.step_arcsec; }
+    std::vector<double> chosen_increments() const;
     void begin(Closure& closure);
     void take_lattice(Closure& closure);
     std::vector<Contender> contenders(const State& state, int step, bool plain = false) const;
@@ -165,6 +166,15 @@ void Loop::begin(Closure& closure) {
     }
 }
 
+/// Values that nothing is held out of: steps are chosen like any other effect.
+std::vector<double> Loop::chosen_increments() const {
+    std::vector<double> values;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+        if (rows_[i]) values.push_back(series_.increment[i]);
+    }
+    return values;
+}
+
 void Loop::take_lattice(Closure& closure) {
     if (series_.counted) {
         closure.notes.push_back(
@@ -172,7 +182,7 @@ void Loop::take_lattice(Closure& closure) {
                         0.25 * series_.scale_factor_arcsec));
         return;
     }
-    lattice_ = find_lattice(series_.increment);
+    lattice_ = find_lattice(chosen_increments());
     if (lattice_.step_arcsec == 0.0) return;
     const double step = lattice_.step_arcsec;
     const double sd = now_.fit->sd(series_.size() / 2);
@@ -479,7 +489,7 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
         const int k = next_step_++;
         SampleStep told{effect, k};
         if (effect == "count_quantization") {
-            lattice_ = find_lattice(series_.increment);
+            lattice_ = find_lattice(chosen_increments());
             used_step_ = lattice_.printed_arcsec;
         } else if (is_line(effect)) {
             SampleLine line{alias(active.values.at("frequency_hz"), series_.rate_hz)};
