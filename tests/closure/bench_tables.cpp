@@ -6,7 +6,11 @@
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <map>
+#include <string_view>
 #include <utility>
 
 namespace ringlock::test::closure {
@@ -31,8 +35,7 @@ double quantile(std::vector<double> values, double at) {
     return values[static_cast<std::size_t>(at * static_cast<double>(values.size() - 1))];
 }
 
-}  // namespace
-
+/// How often what came out.
 void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const Outcomes& outcomes,
                    const char* record_length) {
     const auto count = [&](auto&& which, auto&& what) {
@@ -85,6 +88,7 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
         fmt::format("{:.1f} s, {:.1f} s", quantile(seconds, 0.5), quantile(seconds, 1.0)));
 }
 
+/// What each truth has been taken for.
 void write_confusion(std::ostream& out, std::ostream& matrix, const std::vector<TableRow>& truths,
                      const Outcomes& outcomes) {
     std::map<std::pair<std::string, double>, std::map<std::string, int>> taken;
@@ -114,6 +118,7 @@ void write_confusion(std::ostream& out, std::ostream& matrix, const std::vector<
     }
 }
 
+/// How far estimates are from the truth, in their standard errors.
 void write_calibration(std::ostream& out, const Outcomes& outcomes) {
     std::map<std::string, std::vector<double>> by_parameter;
     for (const auto& o : outcomes) {
@@ -141,6 +146,76 @@ void write_calibration(std::ostream& out, const Outcomes& outcomes) {
         fmt::print(out, "| {} | {} | {:.2f} | {:.2f} | {:.0f} % | {:.0f} % | {} |\n", parameter, known.size(), sum / n,
                    std::sqrt(squares / n), 100.0 * one / n, 100.0 * two / n, all.size() - known.size());
     }
+}
+
+}  // namespace
+
+std::size_t Command::scaled(double count) const { return static_cast<std::size_t>(std::ceil(share * count)); }
+
+Command command_of(int argc, char** argv, const char* program) {
+    Command command;
+    bool wrong = false;
+    for (int k = 1; k < argc; ++k) {
+        const std::string_view argument = argv[k];
+        const bool followed = k + 1 < argc;
+        if (argument == "--share" && followed) {
+            command.share = std::strtod(argv[++k], nullptr);
+        } else if (argument == "--only" && followed) {
+            command.only = argv[++k];
+        } else if (argument == "--seed" && followed) {
+            command.seed = argv[++k];
+        } else {
+            wrong = wrong || argument.starts_with("-") || !command.folder.empty();
+            command.folder = argument;
+        }
+    }
+    const bool known = command.wants(Kind::null) || command.wants(Kind::single) || command.wants(Kind::pair) ||
+                       command.wants(Kind::foreign);
+    if (wrong || command.folder.empty() || !known || !(command.share > 0.0 && command.share <= 1.0)) {
+        fmt::print(stderr, "usage: {} FOLDER [--share S] [--only null|single|pair|foreign] [--seed N]\n", program);
+        std::exit(2);
+    }
+    std::filesystem::create_directories(command.folder);
+    return command;
+}
+
+std::string values_of(const std::vector<Added>& truth) {
+    std::string values;
+    for (const Added& added : truth) {
+        for (const auto& [name, value] : added.values) values += fmt::format("{}={:.5g};", name, value);
+    }
+    return values;
+}
+
+void write_tables(const std::string& folder, const std::vector<TableRow>& truths, const Outcomes& outcomes,
+                  const char* unit, const char* record_length) {
+    std::ofstream rows(folder + "/records.csv");
+    std::ofstream deviations(folder + "/deviations.csv");
+    fmt::print(rows,
+               "kind,truth,multiple,condition,by,seed,values,judged,false_name,verdict,named,where,expected,"
+               "before_{0},after_{0},floor_{0},oracle_{0},seconds\n",
+               unit);
+    fmt::print(deviations, "kind,truth,condition,seed,parameter,estimate,standard_error,standard_errors_off\n");
+    for (std::size_t k = 0; k < truths.size(); ++k) {
+        if (!outcomes[k]) continue;
+        const TableRow& of = truths[k];
+        const Outcome& o = *outcomes[k];
+        fmt::print(rows, "{},{},{},\"{}\",{},{},{},{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.2f}\n",
+                   name_of(of.kind), of.truth, of.multiple, of.condition, of.by, of.seed, of.values, name_of(o.judged),
+                   o.false_name ? 1 : 0, o.verdict, o.named, o.where, of.expected, o.before, o.after, o.floor, o.oracle,
+                   o.seconds);
+        for (const auto& d : o.deviations) {
+            fmt::print(deviations, "{},{},\"{}\",{},{},{:.9g},{:.3g},{:.4f}\n", name_of(of.kind), of.truth,
+                       of.condition, of.seed, d.parameter, d.value, d.sd, d.standard_errors);
+        }
+    }
+    std::ofstream figures(folder + "/figures.md");
+    std::ofstream confusion(folder + "/confusion.md");
+    std::ofstream matrix(folder + "/confusion.csv");
+    std::ofstream calibration(folder + "/calibration.md");
+    write_figures(figures, truths, outcomes, record_length);
+    write_confusion(confusion, matrix, truths, outcomes);
+    write_calibration(calibration, outcomes);
 }
 
 }  // namespace ringlock::test::closure

@@ -314,6 +314,12 @@ std::vector<Case> foreign_cases(std::size_t each) {
 }
 
 void compare(const Closure& closure, bool foreign, Where where, const std::vector<Added>& truth, Outcome& outcome) {
+    outcome.verdict = std::string(name_of(closure.verdict));
+    outcome.before = closure.heldout_before;
+    outcome.after = closure.heldout_after;
+    outcome.floor = closure.noise_floor;
+    outcome.oracle = std::numeric_limits<double>::quiet_NaN();
+    if (closure.unexplained) outcome.where = std::string(name_of(closure.unexplained->where));
     std::set<std::string> missing;
     if (!foreign) {
         for (const Added& added : truth) missing.insert(added.effect);
@@ -352,13 +358,6 @@ Outcome judge(const Case& of, const record::Record& record) {
     const auto start = std::chrono::steady_clock::now();
     const Closure closure = ringlock::closure::close_turns(record);
     outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    outcome.verdict = std::string(name_of(closure.verdict));
-    outcome.before = closure.heldout_before;
-    outcome.after = closure.heldout_after;
-    outcome.floor = closure.noise_floor;
-    outcome.oracle = std::numeric_limits<double>::quiet_NaN();
-    if (closure.unexplained) outcome.where = std::string(name_of(closure.unexplained->where));
-
     const bool foreign = of.kind == Kind::foreign;
     compare(closure, foreign, of.where, of.truth, outcome);
     if (foreign) return outcome;

@@ -91,7 +91,7 @@ struct Outcome {
     std::vector<Deviation> deviations;  ///< of the estimates, where the truth has been named
 };
 
-/// An answer held against the truth: what was named, and what that is judged.
+/// An answer held against the truth: what was said, and what that is judged. The oracle's error is left to be found.
 void compare(const ringlock::closure::Closure& closure, bool foreign, ringlock::closure::Where where,
              const std::vector<Added>& truth, Outcome& outcome);
 
