@@ -69,17 +69,19 @@ TEST(ClosureSuite, SizesComeFromTheRecordsInformation) {
     EXPECT_NEAR(limit(4000) / limit(16000), 2.0, 0.4);
 }
 
-TEST(ClosureSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
-    std::vector<Case> cases;
-    for (Case& of : foreign_cases(1)) {
-        of.turns = turns;
-        cases.push_back(std::move(of));
-    }
-    for (const Outcome& outcome : judged(cases)) {
-        EXPECT_FALSE(outcome.false_name) << outcome.verdict << " " << outcome.named;
-        EXPECT_TRUE(std::isnan(outcome.oracle));
-    }
+class OutsideTheLibrary : public testing::TestWithParam<std::size_t> {};
+
+TEST_P(OutsideTheLibrary, NothingHasItsName) {
+    const std::vector<Case> all = foreign_cases(1);
+    ASSERT_LT(GetParam(), all.size());
+    Case of = all[GetParam()];
+    of.turns = turns;
+    const Outcome outcome = judged({of}).front();
+    EXPECT_FALSE(outcome.false_name) << of.truth_text() << ": " << outcome.verdict << " " << outcome.named;
+    EXPECT_TRUE(std::isnan(outcome.oracle));
 }
+
+INSTANTIATE_TEST_SUITE_P(Kinds, OutsideTheLibrary, testing::Range(std::size_t{0}, std::size_t{5}));
 
 TEST(ClosureSuite, TwoRatesAreNotOneRandomRate) {
     // A random rate follows a ramp and a temperature at once, better than either of them does.
