@@ -59,14 +59,14 @@ Closure close_loop(const record::Record& record);
 /// record reaches. Effects start from the values given.
 Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
 
+/// The same for a record of samples; the residual is not tested.
+Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects);
+
 /// Standard errors of the parameters of effects at the values given, those of the true model: by Fisher's information
 /// in the whole record of turns.
 std::vector<Estimate> information_on_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
 
-/// The same of samples; the residual is not tested.
-Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects);
-
-/// The two of them.
+/// The two loops.
 Closure close_turns(const record::Record& record);
 Closure close_samples(const record::Record& record);
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
@@ -26,6 +25,9 @@ int free_parameters(const effects::Effect& effect) {
     }
     return count;
 }
+
+/// Level of each of them, with all of the library tried.
+double level_of_one_effect() { return level_of_effects / static_cast<double>(effects::registry().size()); }
 
 double merit_of(double gain, const Candidate& candidate) {
     return gain - std::log(candidate.searched) - free_parameters(*candidate.effect);
@@ -93,13 +95,13 @@ bool is_random_rate(const effects::Effect& effect) {
 
 double p_of_gain(double gain, const effects::Effect& effect) { return chi2_tail(2.0 * gain, free_parameters(effect)); }
 
-bool passes(double p_value) { return p_value * static_cast<double>(effects::registry().size()) < level_of_effects; }
+bool passes(double p_value) { return p_value < level_of_one_effect(); }
 
 Contest hold_contest(const record::Record& record, const Fitted& now, const Rows& rows, std::size_t most) {
     constexpr double worth_looking = 0.1;
-    const double passing = level_of_effects / static_cast<double>(effects::registry().size());
     Contest contest;
-    auto candidates = worth_a_fit(screen_side_channels(*record.turns, *now.fit, now.joined), passing, most);
+    auto candidates =
+        worth_a_fit(screen_side_channels(*record.turns, *now.fit, now.joined), level_of_one_effect(), most);
     contest.side = !candidates.empty();
     if (contest.side) {
         // What changes the phases that were read stands alone.
