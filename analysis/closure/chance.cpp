@@ -13,6 +13,12 @@ double chi2_tail(double x, int freedom) {
 
 double of_several(double p, double count) { return p >= 1.0 ? 1.0 : -std::expm1(count * std::log1p(-p)); }
 
+double cost_of_amplitudes(double gain, int amplitudes) {
+    if (amplitudes == 0) return 0.0;
+    const double k = amplitudes;
+    return 2.0 * gain > k ? 0.5 * k * (1.0 + std::log(2.0 * gain / k)) : std::max(gain, 0.0);
+}
+
 double davies_places(double chi2, const std::vector<double>& roots) {
     double variation = 0.0;
     for (std::size_t i = 1; i < roots.size(); ++i) variation += std::abs(roots[i] - roots[i - 1]);

@@ -14,6 +14,11 @@ double of_several(double p, double count);
 /// its root varies over the search.
 double davies_bound(double chi2, const std::vector<double>& roots);
 
+/// What of a gain of the log-likelihood goes when the amplitudes that make it are integrated out, as the course of a
+/// random process is in its own likelihood: normal about zero with their own covariance times a factor, the factor
+/// being the likeliest (George and Foster, Biometrika 87, 2000, 731: the marginal likelihood of one model).
+double cost_of_amplitudes(double gain, int amplitudes);
+
 /// The bound over the probability of one place: how many independent ones the search is worth.
 double davies_places(double chi2, const std::vector<double>& roots);
 

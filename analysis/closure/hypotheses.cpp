@@ -28,19 +28,17 @@ const Parameter* first_of(const Effect& effect, Role role) {
     return nullptr;
 }
 
-/// What the effect with these values adds to the phases.
-std::vector<double> added(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
-                          const Values& values) {
-    if (effect.adds_angle()) return fit.model().added_rad(without, effect, values);
+/// What the effect with these values adds to the phases, over `per`.
+Regressor added(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect, const Values& values,
+                double per = 1.0) {
+    if (effect.adds_angle()) {
+        std::vector<double> series = fit.model().added_rad(without, effect, values);
+        for (double& value : series) value /= per;
+        return series;
+    }
     TurnParameters p = fit.parameters();
     p.effects.push_back({&effect, values});
-    std::vector<double> series = fit.model().predict(p).phase_rad;
-    for (std::size_t i = 0; i < series.size(); ++i) series[i] -= without.phase_rad[i];
-    return series;
-}
-
-void scale(std::vector<double>& series, double factor) {
-    for (double& value : series) value *= factor;
+    return difference(fit.model().predict(p), without, per);
 }
 
 /// Step of a size by which the phases' change is taken: small against the bounds, large against rounding.
@@ -49,7 +47,7 @@ double step_of(const Parameter& size) { return 1e-3 * std::min(1.0, size.max); }
 /// Sizes, each by itself or with the phase after it as two amplitudes.
 std::optional<Candidate> sizes(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
                                Values values) {
-    std::vector<std::vector<double>> columns;
+    std::vector<Regressor> columns;
     struct Entry {
         const Parameter* size;
         const Parameter* phase;
@@ -66,15 +64,15 @@ std::optional<Candidate> sizes(const TurnFit& fit, const TurnModel::Prediction& 
             Values at = values;
             at.at(name_of(size)) = step;
             if (turned) at.at(name_of(parameters[k + 1])) = part == 0 ? 0.0 : 0.5 * units::pi;
-            columns.push_back(added(fit, without, effect, at));
-            scale(columns.back(), 1.0 / step);
+            columns.push_back(added(fit, without, effect, at, step));
         }
     }
     if (entries.empty()) return std::nullopt;
     for (const auto& column : columns) {
         // Nothing of it is left beside what the model has: this record cannot tell.
         const double all =
-            Eigen::Map<const Eigen::VectorXd>(column.data(), static_cast<Eigen::Index>(column.size())).norm();
+            Eigen::Map<const Eigen::VectorXd>(column.series.data(), static_cast<Eigen::Index>(column.series.size()))
+                .norm();
         if (all == 0.0) return std::nullopt;
     }
     const TurnFit::Score score = fit.score(columns);
@@ -102,12 +100,9 @@ std::optional<Candidate> coupling_phase(const TurnFit& fit, const Effect& effect
     p.threshold_deg_h = std::max(found, fit.model().series().setup.lockin_threshold_deg_h);
     values.at(name) = 0.5 * units::pi;
     p.effects.push_back({&effect, values});
-    std::vector<double> column = fit.model().predict(p).phase_rad;
     TurnParameters bare = fit.parameters();
     bare.threshold_deg_h = 0.0;
-    const auto nothing = fit.model().predict(bare).phase_rad;
-    for (std::size_t i = 0; i < column.size(); ++i) column[i] -= nothing[i];
-    const TurnFit::Score score = fit.score({column});
+    const TurnFit::Score score = fit.score({difference(fit.model().predict(p), fit.model().predict(bare), 1.0)});
     if (score.rank < 1) return std::nullopt;
     Candidate candidate{&effect, values, score.chi2, chi2_tail(score.chi2, 1), 1.0};
     candidate.values.at(name) = std::atan2(score.value(0) * p.threshold_deg_h, found);
@@ -165,7 +160,7 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
     const Parameter& phase = *first_of(effect, Role::phase);
     const Parameter& frequency = *first_of(effect, Role::frequency);
     const Eigen::VectorXd residual = fit.residual();
-    const auto n = static_cast<std::size_t>(residual.size());
+    const std::size_t n = fit.rows().size();
     std::size_t padded = 1;
     while (padded < 4 * n) padded *= 2;
     std::vector<double> in(padded, 0.0);
@@ -187,7 +182,7 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
               [&](std::size_t a, std::size_t b) { return std::norm(out[a]) > std::norm(out[b]); });
     if (peaks.size() > looked_at) peaks.resize(looked_at);
     const auto score_at = [&](double f, Candidate& candidate) {
-        std::vector<std::vector<double>> columns;
+        std::vector<Regressor> columns;
         for (const double turned : {0.0, 0.5 * units::pi}) {
             Values at = values;
             at.at(name_of(size)) = 1.0;
@@ -220,18 +215,6 @@ std::optional<Candidate> spread(const TurnFit& fit, const Effect& effect, Values
     return Candidate{&effect, std::move(values), found.chi2, 0.5 * chi2_tail(found.chi2, 1), 1.0};
 }
 
-/// Effects that change what the lock-in does.
-bool of_the_coupling(const Effect& effect) {
-    const gyro::Setup plain;
-    gyro::Setup setup;
-    Values values = values_at_rest(effect);
-    for (auto& [name, value] : values) value = 1e-3;
-    effect.configure(values, setup);
-    return setup.coupling_phase_rad != plain.coupling_phase_rad ||
-           setup.lockin_second_ratio != plain.lockin_second_ratio ||
-           setup.lockin_turn_asymmetry != plain.lockin_turn_asymmetry || effect.threshold_factor(values, 1.0) != 1.0;
-}
-
 }  // namespace
 
 Values values_at_rest(const Effect& effect) {
@@ -252,7 +235,6 @@ std::vector<Candidate> screen(const TurnFit& fit) {
         const Effect* effect = registry[k];
         TurnParameters p = fit.parameters();
         if (p.find(effect->name()) != nullptr || told_by_other_columns(*effect)) return;
-        if (!fit.model().series().all_phases_come && of_the_coupling(*effect)) return;
         const Values rest = values_at_rest(*effect);
         if (first_of(*effect, Role::frequency) != nullptr) {
             if (effect->adds_angle()) found[k] = at_some_frequency(fit, without, *effect, rest);

@@ -20,7 +20,7 @@ namespace ringlock::closure {
 
 namespace {
 
-using Columns = std::vector<std::vector<double>>;
+using Columns = std::vector<Regressor>;
 
 /// Running sum of a rate [1/s], as an angle: what a rate in proportion to it adds to the phase.
 std::vector<double> integral(const TurnFit& fit, const std::vector<double>& rate) {
@@ -42,14 +42,18 @@ double largest(const std::vector<double>& values) {
 Columns harmonic(const TurnFit& fit, int k, bool kicks) {
     const auto& model = fit.model();
     const std::size_t n = model.series().size();
-    Columns columns(4, std::vector<double>(n));
+    Columns columns(4, Regressor(std::vector<double>(n), std::vector<double>(n), std::vector<double>(n)));
+    const double share = kicks ? 0.5 : 1.0;  // half a kick comes before the turn
     double sums[4] = {};
     for (std::size_t i = 0; i < n; ++i) {
         const double angle = k * model.phase_rad()[i];
         const double d = model.series().direction[i];
         const double values[4] = {std::cos(angle), std::sin(angle), d * std::cos(angle), d * std::sin(angle)};
-        for (int c = 0; c < 4; ++c) {
-            columns[static_cast<std::size_t>(c)][i] = kicks ? sums[c] + 0.5 * values[c] : values[c];
+        const double slopes[4] = {-k * values[1], k * values[0], -k * values[3], k * values[2]};
+        for (std::size_t c = 0; c < 4; ++c) {
+            columns[c].series[i] = (kicks ? sums[c] : 0.0) + share * values[c];
+            columns[c].slope[i] = share * slopes[c];
+            columns[c].kick[i] = kicks ? slopes[c] : 0.0;
             sums[c] += values[c];
         }
     }
@@ -58,11 +62,7 @@ Columns harmonic(const TurnFit& fit, int k, bool kicks) {
 
 void test_phase(const TurnFit& fit, std::vector<View>& views) {
     constexpr int harmonics = 6;
-    // Phases that come in step move by little but their own noise: that is no test. It is a rival of rates all the
-    // same.
-    const bool all_come = fit.model().series().all_phases_come;
     for (const bool kicks : {true, false}) {
-        if (!kicks && !all_come) continue;
         double least = 1.0;
         double most = 0.0;
         double cost = 0.0;
@@ -79,7 +79,7 @@ void test_phase(const TurnFit& fit, std::vector<View>& views) {
         views.push_back(
             {{Where::phase,
               kicks ? "kicks at harmonics of the turn's phase" : "phase read at harmonics of the turn's phase",
-              all_come ? of_several(least, harmonics) : 1.0, fmt::format("harmonic {}", at), most},
+              of_several(least, harmonics), fmt::format("harmonic {}", at), most},
              cost,
              [&fit, at, kicks] { return harmonic(fit, at, kicks); },
              // Beyond, phases no longer follow from what is added to them: any noise could be had so.
@@ -239,7 +239,6 @@ std::vector<double> two_level_angle(const TurnFit& fit, const Eigen::VectorXd& s
 void test_levels(const TurnFit& fit, std::vector<View>& views) {
     constexpr std::size_t stretches = 120;
     const auto& time = fit.model().series().time_s;
-    const auto n = static_cast<Eigen::Index>(time.size());
     const auto ramp_of = [&time](std::size_t k) {
         const double length = time.back() / static_cast<double>(stretches);
         const double start = length * static_cast<double>(k);
@@ -247,11 +246,12 @@ void test_levels(const TurnFit& fit, std::vector<View>& views) {
         for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::clamp(time[i] - start, 0.0, length);
         return ramp;
     };
-    Eigen::MatrixXd ramps(n, static_cast<Eigen::Index>(stretches));
+    const Eigen::VectorXd residual = fit.residual();
+    Eigen::MatrixXd ramps(residual.size(), static_cast<Eigen::Index>(stretches));
     oneapi::tbb::parallel_for(std::size_t{0}, stretches, [&](std::size_t k) {
         ramps.col(static_cast<Eigen::Index>(k)) = fit.whitened(ramp_of(k));
     });
-    const TwoLevels found = two_levels(ramps.transpose() * ramps, ramps.transpose() * fit.residual());
+    const TwoLevels found = two_levels(ramps.transpose() * ramps, ramps.transpose() * residual);
     // Jumps do not wait for the end of a stretch.
     constexpr double of_places = 2.0;
     const double cost = found.cost + of_places * found.changes;
@@ -325,8 +325,8 @@ void test_lines(const TurnFit& fit, std::vector<View>& views) {
                              for (std::size_t i = 0; i < n; ++i) {
                                  const double x = static_cast<double>(i) / static_cast<double>(n) - 0.5;
                                  const double angle = units::two_pi * periods * x + units::pi * drift * x * x;
-                                 columns[0][i] = std::cos(angle);
-                                 columns[1][i] = std::sin(angle);
+                                 columns[0].series[i] = std::cos(angle);
+                                 columns[1].series[i] = std::sin(angle);
                              }
                              return columns;
                          }});
@@ -402,10 +402,12 @@ std::string ResidualTest::description() const {
     return fmt::format("{}{}{}, by chance p {:.2g}", view, detail.empty() ? "" : ", ", detail, p_value);
 }
 
-double refitted_merit(const TurnFit& fit, const View& view, double of_a_coefficient) {
+double refitted_merit(const TurnFit& fit, const View& view) {
     const TurnFit::Regression regression = fit.regress(view.columns());
     if (regression.value.cwiseAbs().maxCoeff() > view.largest) return -std::numeric_limits<double>::infinity();
-    return regression.gain - view.cost - of_a_coefficient * static_cast<double>(regression.value.size());
+    // The view has taken off one for each of them.
+    const auto amplitudes = static_cast<int>(regression.value.size());
+    return regression.gain - (view.cost - amplitudes) - cost_of_amplitudes(regression.gain, amplitudes);
 }
 
 std::vector<View> view_residual(const TurnFit& fit) {

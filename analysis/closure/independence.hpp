@@ -26,15 +26,15 @@ struct ResidualTest {
 /// A test of the innovations and what it regresses them on.
 struct View {
     ResidualTest test;
-    double cost = 0.0;  ///< of its parameters and its search, in the log-likelihood
-    std::function<std::vector<std::vector<double>>()> columns = {};  ///< series of phase; none where nothing regresses
-    double largest = std::numeric_limits<double>::infinity();        ///< coefficient that makes sense
+    double cost = 0.0;                                     ///< of its parameters and its search, in the log-likelihood
+    std::function<std::vector<Regressor>()> columns = {};  ///< none where nothing regresses
+    double largest = std::numeric_limits<double>::infinity();  ///< coefficient that makes sense
     bool jumps = false;  ///< random rates can follow it nearly as well as it can be said
 };
 
-/// Gain of the log-likelihood by the regression, the noise fitted anew beside it, less the view's cost and so much for
-/// each coefficient; minus infinity where these make no sense.
-double refitted_merit(const TurnFit& fit, const View& view, double of_a_coefficient = 0.0);
+/// Gain of the log-likelihood by the regression, the noise fitted anew beside it and its coefficients integrated out,
+/// less its search; minus infinity where coefficients make no sense.
+double refitted_merit(const TurnFit& fit, const View& view);
 
 /// Holds the innovations that count against everything that the record has: phase at the turns and its harmonics,
 /// direction, amplitude, temperature, input rate, time, frequency, the innovations before. The views refer to the fit.

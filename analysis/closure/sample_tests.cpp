@@ -22,6 +22,8 @@ namespace {
 using Views = std::vector<View>;
 using Columns = std::vector<std::vector<double>>;
 
+std::vector<Regressor> regressors(const Columns& columns) { return {columns.begin(), columns.end()}; }
+
 void test_correlation(const SampleFit& fit, Views& views) {
     views.push_back({correlations_of(fit.innovations(), fit.telling())
                          .test(Where::time, "correlation with the 24 samples before")});
@@ -91,7 +93,7 @@ void test_spectrum(const SampleFit& fit, Views& views) {
               cost};
     if (coherent) {
         view.columns = [n, rate_hz = fit.series().rate_hz, line] {
-            return line_columns(n, rate_hz, line.frequency_hz, line.drift_hz_per_s);
+            return regressors(line_columns(n, rate_hz, line.frequency_hz, line.drift_hz_per_s));
         };
     }
     views.push_back(std::move(view));
@@ -176,9 +178,10 @@ void test_rates(const SampleFit& fit, Views& views) {
         const auto score = fit.score(columns);
         if (score.rank == 0) return;
         const double cost = score.rank;
-        views.push_back({{where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
-                         cost,
-                         [columns = std::make_shared<const Columns>(std::move(columns))] { return *columns; }});
+        views.push_back(
+            {{where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
+             cost,
+             [columns = std::make_shared<const Columns>(std::move(columns))] { return regressors(*columns); }});
     };
     if (!series.temperature_change_k.empty()) {
         const auto& t = series.temperature_change_k;
@@ -239,7 +242,7 @@ void test_rates(const SampleFit& fit, Views& views) {
     views.push_back({{Where::time, "steps of the rate", davies_bound(best * best, roots),
                       fmt::format("at {:.6g} s", series.time_s[at]), 0.5 * best * best - cost},
                      cost,
-                     [step_at, at] { return Columns{step_at(at)}; }});
+                     [step_at, at] { return regressors({step_at(at)}); }});
 }
 
 /// A rate of one where the shape of stretches is, of zero elsewhere, with the jumps moved to where they explain most.
@@ -339,7 +342,7 @@ void test_levels(const SampleFit& fit, Views& views) {
     views.push_back({{Where::time, "a rate that jumps between two levels", found.p_value,
                       fmt::format("{} jumps", found.changes), found.merit},
                      cost,
-                     [&fit, found] { return Columns{two_level_rate(fit, found.shape)}; },
+                     [&fit, found] { return regressors({two_level_rate(fit, found.shape)}); },
                      std::numeric_limits<double>::infinity(),
                      true});
 }
@@ -487,7 +490,7 @@ double refitted_merit(const SampleFit& fit, const View& view, double of_a_coeffi
     SampleModel model = fit.model();
     const auto columns = view.columns();
     for (const auto& column : columns) {
-        model.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(column)});
+        model.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(column.series)});
     }
     const SampleFit with(fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near);
     return with.log_likelihood() - fit.log_likelihood() - view.cost -

@@ -44,7 +44,7 @@ Score heldout(const TurnFit& fit) {
 }
 
 /// Frequency of the dither by its own turns: the slope of their times, its error from the scatter of means over
-/// stretches, whatever colour it has.
+/// stretches and its correlation (Newey and West, Econometrica 55, 1987, 703), as an input that moves leaves some.
 Estimate dither_frequency(const TurnFit& fit) {
     constexpr std::size_t stretches = 40;
     const auto turn_s = fit.model().predict(fit.parameters()).turn_s;
@@ -69,13 +69,22 @@ Estimate dither_frequency(const TurnFit& fit) {
         slope_s += (at[s] - mean) * late_s[s];
     }
     slope_s /= squares;
+    constexpr std::size_t memory = 10;
     double scatter = 0.0;
+    std::vector<double> pull;
     for (std::size_t s = 0; s < stretches; ++s) {
         const double off_s = late_s[s] - mean_late_s - slope_s * (at[s] - mean);
         scatter += off_s * off_s / (stretches - 2);
+        pull.push_back(off_s * (at[s] - mean));
     }
+    double variance = 0.0;
+    for (std::size_t lag = 0; lag < memory; ++lag) {
+        const double weight = (lag == 0 ? 1.0 : 2.0) * (1.0 - static_cast<double>(lag) / memory);
+        for (std::size_t s = lag; s < stretches; ++s) variance += weight * pull[s] * pull[s - lag];
+    }
+    variance = std::max(scatter / squares, variance / (squares * squares));
     const double turns_s = interval_s + slope_s;
-    return {"", "dither_frequency_hz", 0.5 / turns_s, 0.5 / (turns_s * turns_s) * std::sqrt(scatter / squares)};
+    return {"", "dither_frequency_hz", 0.5 / turns_s, 0.5 / (turns_s * turns_s) * std::sqrt(variance)};
 }
 
 /// Amplitude and frequency of the dither: means over the record.
@@ -91,24 +100,25 @@ void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
 /// Whether some view of the residual explains more than the best effect, the noise fitted anew beside either: then
 /// that one is only what comes nearest to something that the library does not have.
 ///
-/// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do.
-/// Injected noise of a radian leaves nothing of that.
-bool something_else(const TurnFit& fit, const effects::Effect& effect, double merit) {
+/// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do, who
+/// are kicks of first order only. Injected noise of a radian leaves nothing of that.
+bool something_else(const TurnFit& fit, const Choice& choice) {
     constexpr std::size_t looked_at = 4;
+    constexpr double first_order = 0.02;
     auto views = view_residual(fit);
     std::erase_if(views, [](const View& view) { return !view.columns || view.test.merit < tie; });
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
     if (views.size() > looked_at) views.resize(looked_at);
     return std::any_of(views.begin(), views.end(), [&](const View& view) {
-        const bool in_step =
-            view.test.where == Where::phase && effect.adds_angle() && fit.parameters().injected_sd_rad < 1.0;
-        // A random rate can follow what jumps, nearly as well as the jumps themselves.
-        const bool jumps = view.jumps && is_random_rate(effect);
-        // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
-        // course in time (Schwarz 1978).
-        const bool courses = is_random_rate(effect) && view.test.where == Where::time;
-        const double integrated = courses ? 0.5 * std::log(static_cast<double>(fit.rows().size())) - 1.0 : 0.0;
-        return refitted_merit(fit, view, integrated) > (in_step || jumps ? merit - tie : merit + tie);
+        const double merit = refitted_merit(fit, view);
+        return std::all_of(choice.held.begin(), choice.held.end(), [&](const Held& held) {
+            const bool in_step =
+                view.test.where == Where::phase && held.effect->adds_angle() && fit.parameters().injected_sd_rad < 1.0;
+            if (in_step) return merit > std::min(held.merit - tie, (1.0 - first_order) * held.merit);
+            // A random rate can follow what jumps, nearly as well as the jumps themselves.
+            const bool jumps = view.jumps && is_random_rate(*held.effect);
+            return merit > (jumps ? held.merit - tie : held.merit + tie);
+        });
     });
 }
 
@@ -125,10 +135,7 @@ void test_what_is_left(const TurnFit& fit, Closure& closure) {
     closure.unexplained.reset();
     const auto fails = [&](const View& view) { return view.test.p_value < threshold; };
     if (std::none_of(views.begin(), views.end(), fails)) return;
-    const bool in_step = !fit.model().series().all_phases_come;
-    std::erase_if(views, [&](const View& view) {
-        return !fails(view) && !(in_step && view.test.where == Where::phase && view.test.merit > tie);
-    });
+    std::erase_if(views, [&](const View& view) { return !fails(view); });
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) {
         return a.test.merit > b.test.merit || (a.test.merit == b.test.merit && a.test.p_value < b.test.p_value);
     });
@@ -216,8 +223,8 @@ Closure close_turns(const record::Record& record) {
     }
     if (!now->series.all_phases_come) {
         closure.notes.push_back(
-            "turns come at a part of the fringe only, as in a locked gyro: what the coupling does cannot be "
-            "told from the bias, and its effects are not looked for");
+            "turns come at a part of the fringe only, as in a locked gyro: bias and threshold are told together, and "
+            "the dither's shape is not looked for");
     }
     closure.heldout_before = heldout(*now->fit).error;
     // Before the first effect that was taken on the strength of a random rate.
@@ -234,7 +241,7 @@ Closure close_turns(const record::Record& record) {
         const Choice choice = choose(record, contest, rows);
         if (choice.chosen == nullptr) break;
         const Contender& best = *choice.chosen;
-        if (!contest.side && something_else(*now->fit, *best.candidate.effect, choice.merit)) break;
+        if (!contest.side && something_else(*now->fit, choice)) break;
         Step step;
         step.effect = std::string(best.candidate.effect->name());
         step.p_value = best.p_value;

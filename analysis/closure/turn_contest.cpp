@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
+#include <utility>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
@@ -18,29 +20,38 @@ bool on_phase(const effects::Effect& effect) {
     return effect.name() == "readout_ellipse" || effect.name() == "missed_counts";
 }
 
+int count_of(const effects::Effect& effect, std::initializer_list<effects::Role> roles) {
+    const auto parameters = effect.parameters();
+    return static_cast<int>(std::count_if(parameters.begin(), parameters.end(), [&](const auto& parameter) {
+        return std::find(roles.begin(), roles.end(), parameter.role) != roles.end();
+    }));
+}
+
 int free_parameters(const effects::Effect& effect) {
-    int count = 0;
-    for (const effects::Parameter& parameter : effect.parameters()) {
-        if (parameter.role != effects::Role::setting) ++count;
-    }
-    return count;
+    using effects::Role;
+    return count_of(effect, {Role::size, Role::phase, Role::time, Role::frequency, Role::deviation, Role::probability});
 }
 
 /// Level of each of them, with all of the library tried.
 double level_of_one_effect() { return level_of_effects / static_cast<double>(effects::registry().size()); }
 
+/// The gain less the search, the amplitudes integrated out: so has the likelihood of a random rate its course.
 double merit_of(double gain, const Candidate& candidate) {
-    return gain - std::log(candidate.searched) - free_parameters(*candidate.effect);
+    using effects::Role;
+    const int places = count_of(*candidate.effect, {Role::time, Role::frequency});
+    const int amplitudes = count_of(*candidate.effect, {Role::size, Role::phase});
+    return gain - std::log(candidate.searched) - places - cost_of_amplitudes(gain, amplitudes);
 }
 
-/// Those worth a full fit, the likeliest first. Scores are of the noise as it is, which may have swallowed what an
-/// effect does: they only say where to look.
+/// Those worth a full fit, the likeliest first; random rates beside so many others. Scores are of the noise as it is,
+/// which may have swallowed what an effect does: they only say where to look.
 std::vector<Candidate> worth_a_fit(std::vector<Candidate> candidates, double largest_p, std::size_t most) {
     std::erase_if(candidates, [&](const Candidate& c) { return !(c.p_value < largest_p); });
     std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
         return merit_of(0.5 * a.chi2, a) > merit_of(0.5 * b.chi2, b);
     });
-    if (candidates.size() > most) candidates.resize(most);
+    std::size_t taken = 0;
+    std::erase_if(candidates, [&](const Candidate& c) { return !is_random_rate(*c.effect) && ++taken > most; });
     return candidates;
 }
 
@@ -49,19 +60,39 @@ std::shared_ptr<Fitted> fit_with(const record::Record& record, const Fitted& now
                                  const Rows& rows) {
     TurnParameters start = now.fit->parameters();
     start.effects.push_back({candidate.effect, candidate.values});
-    std::shared_ptr<Fitted> fitted;
-    try {
-        fitted = fit_record(record, start, rows);
-        if (is_random_rate(*candidate.effect)) {
-            // Without the process the rest may have gone far astray: anew from the start, too.
-            TurnParameters anew;
-            anew.effects = start.effects;
-            auto other = fit_record(record, anew, rows);
-            if (other->fit->log_likelihood() > fitted->fit->log_likelihood()) fitted = std::move(other);
+    std::shared_ptr<Fitted> best;
+    const auto fit_from = [&](const TurnParameters& from) {
+        try {
+            auto fitted = fit_record(record, from, rows);
+            if (!best || fitted->fit->log_likelihood() > best->fit->log_likelihood()) best = std::move(fitted);
+        } catch (const RunError&) {
         }
-    } catch (const RunError&) {
+    };
+    fit_from(start);
+    if (is_random_rate(*candidate.effect)) {
+        // Without the process the rest may have gone far astray: anew from the start, too.
+        TurnParameters anew;
+        anew.effects = start.effects;
+        fit_from(anew);
     }
-    return fitted;
+    // The score says how large it would be were all linear: too far away, maybe.
+    const int shorter = told_by_other_columns(*candidate.effect) ? 0 : 4;
+    for (int k = 0; k < shorter && !(best && best->fit->log_likelihood() >= now.fit->log_likelihood()); ++k) {
+        for (const effects::Parameter& parameter : candidate.effect->parameters()) {
+            if (parameter.role != effects::Role::size) continue;
+            start.effects.back().values.at(std::string(parameter.name)) *= 0.1;
+        }
+        fit_from(start);
+    }
+    return best;
+}
+
+double gain_of(const Fitted& fitted, const Fitted& without) {
+    return fitted.fit->log_likelihood() - without.fit->log_likelihood();
+}
+
+double p_of(const Fitted& fitted, const Fitted& without, const Candidate& candidate) {
+    return of_several(p_of_gain(gain_of(fitted, without), *candidate.effect), candidate.searched);
 }
 
 }  // namespace
@@ -97,7 +128,7 @@ double p_of_gain(double gain, const effects::Effect& effect) { return chi2_tail(
 
 bool passes(double p_value) { return p_value < level_of_one_effect(); }
 
-Contest hold_contest(const record::Record& record, const Fitted& now, const Rows& rows, std::size_t most) {
+Contest hold_contest(const record::Record& record, const Fitted& now, const Rows& rows, std::size_t most, Among among) {
     constexpr double worth_looking = 0.1;
     Contest contest;
     auto candidates =
@@ -112,7 +143,11 @@ Contest hold_contest(const record::Record& record, const Fitted& now, const Rows
             }
         }
     } else {
-        candidates = worth_a_fit(screen(*now.fit), worth_looking, most);
+        candidates = screen(*now.fit);
+        if (among == Among::not_random) {
+            std::erase_if(candidates, [](const Candidate& c) { return is_random_rate(*c.effect); });
+        }
+        candidates = worth_a_fit(std::move(candidates), worth_looking, most);
     }
     std::vector<Contender> contenders(candidates.size());
     oneapi::tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t k) {
@@ -121,11 +156,8 @@ Contest hold_contest(const record::Record& record, const Fitted& now, const Rows
         contender.candidate = std::move(candidates[k]);
         if (!contender.fitted) return;
         const Candidate& candidate = contender.candidate;
-        const double gain =
-            contest.side ? 0.5 * candidate.chi2 : contender.fitted->fit->log_likelihood() - now.fit->log_likelihood();
-        contender.merit = merit_of(gain, candidate);
-        contender.p_value =
-            contest.side ? candidate.p_value : of_several(p_of_gain(gain, *candidate.effect), candidate.searched);
+        contender.merit = merit_of(contest.side ? 0.5 * candidate.chi2 : gain_of(*contender.fitted, now), candidate);
+        contender.p_value = contest.side ? candidate.p_value : p_of(*contender.fitted, now, candidate);
     });
     std::erase_if(contenders, [](const Contender& contender) { return !contender.fitted; });
     std::sort(contenders.begin(), contenders.end(),
@@ -134,69 +166,93 @@ Contest hold_contest(const record::Record& record, const Fitted& now, const Rows
     return contest;
 }
 
-Choice choose(const record::Record& record, const Contest& contest, const Rows& rows) {
+namespace {
+
+/// What may explain a record: an effect, or one with another that is added next.
+struct Account {
+    const Contender* first;
+    const effects::Effect* second = nullptr;
+    double merit = 0.0;
+
+    bool has(const effects::Effect* effect) const { return first->candidate.effect == effect || second == effect; }
+};
+
+/// The likeliest of either kind with what explains most beside it, and random rates by twos.
+std::vector<Account> pairs(const record::Record& record, const std::vector<Contender>& contenders, const Rows& rows) {
     constexpr std::size_t tried_first = 3;
     constexpr std::size_t tried_second = 2;
     const double second_choice = std::log(static_cast<double>(effects::registry().size()));
+    std::vector<Account> accounts;
+    std::vector<const Contender*> random;
+    std::size_t tried = 0;
+    for (const Contender& contender : contenders) {
+        if (is_random_rate(*contender.candidate.effect)) {
+            random.push_back(&contender);
+            if (random.size() > 1) continue;
+        } else if (++tried > tried_first) {
+            continue;
+        }
+        const Contest beside = hold_contest(record, *contender.fitted, rows, tried_second, Among::not_random);
+        for (const Contender& other : beside.contenders) {
+            if (beside.side || !passes(other.p_value)) continue;
+            accounts.push_back({&contender, other.candidate.effect, contender.merit + other.merit - second_choice});
+        }
+    }
+    for (std::size_t a = 0; a < random.size(); ++a) {
+        for (std::size_t b = a + 1; b < random.size(); ++b) {
+            const Fitted& alone = *random[a]->fitted;
+            TurnParameters start = alone.fit->parameters();
+            start.effects.push_back(*random[b]->fitted->fit->parameters().find(random[b]->candidate.effect->name()));
+            const auto both = fit_record(record, start, rows);
+            const Candidate& second = random[b]->candidate;
+            if (!passes(p_of(*both, alone, second))) continue;
+            accounts.push_back(
+                {random[a], second.effect, random[a]->merit + merit_of(gain_of(*both, alone), second) - second_choice});
+        }
+    }
+    return accounts;
+}
+
+}  // namespace
+
+Choice choose(const record::Record& record, const Contest& contest, const Rows& rows) {
     Choice choice;
     const auto& contenders = contest.contenders;
     if (contenders.empty() || !passes(contenders.front().p_value)) return choice;
-    const Contender& likeliest = contenders.front();
-    choice.chosen = &likeliest;
-    choice.merit = likeliest.merit;
-    choice.on_random = is_random_rate(*likeliest.candidate.effect);
-    const auto add_name = [&](std::string_view name) {
-        auto& names = choice.confounded_with;
-        if (std::find(names.begin(), names.end(), name) == names.end()) names.emplace_back(name);
-    };
-    const auto add_tied = [&](const Contender& contender) {
-        if (&contender == choice.chosen || choice.merit - contender.merit >= tie) return;
-        add_name(contender.candidate.effect->name());
-    };
-    if (contest.side || !choice.on_random) {
-        for (const Contender& contender : contenders) add_tied(contender);
-        return choice;
+    std::vector<Account> accounts;
+    for (const Contender& contender : contenders) accounts.push_back({&contender, nullptr, contender.merit});
+    if (!contest.side && is_random_rate(*contenders.front().candidate.effect)) {
+        for (const Account& pair : pairs(record, contenders, rows)) accounts.push_back(pair);
     }
+    std::stable_sort(accounts.begin(), accounts.end(),
+                     [](const Account& a, const Account& b) { return a.merit > b.merit; });
+    const Account& best = accounts.front();
+    std::erase_if(accounts, [&, least = best.merit - tie](const Account& a) { return !(a.merit > least); });
 
-    // Pairs: those that are not random, each with what explains most beside it.
-    struct Pair {
-        const Contender* first;
-        std::string second;
-        double merit;
+    // Of a pair, what more of those as likely have in them.
+    choice.chosen = accounts.front().first;
+    const effects::Effect* partner = accounts.front().second;
+    const auto in_how_many = [&](const effects::Effect* effect) {
+        return std::count_if(accounts.begin(), accounts.end(), [&](const Account& a) { return a.has(effect); });
     };
-    std::vector<Pair> pairs;
-    std::size_t tried = 0;
-    for (const Contender& contender : contenders) {
-        if (is_random_rate(*contender.candidate.effect) || tried == tried_first) continue;
-        ++tried;
-        const Contest beside = hold_contest(record, *contender.fitted, rows, tried_second);
-        for (const Contender& other : beside.contenders) {
-            if (beside.side || !passes(other.p_value)) continue;
-            if (other.candidate.effect == likeliest.candidate.effect) continue;
-            pairs.push_back({&contender, std::string(other.candidate.effect->name()),
-                             contender.merit + other.merit - second_choice});
+    if (partner != nullptr && in_how_many(partner) > in_how_many(choice.chosen->candidate.effect)) {
+        const auto other = std::find_if(contenders.begin(), contenders.end(),
+                                        [&](const Contender& c) { return c.candidate.effect == partner; });
+        if (other != contenders.end()) partner = std::exchange(choice.chosen, &*other)->candidate.effect;
+    }
+    const effects::Effect* chosen = choice.chosen->candidate.effect;
+    choice.held.push_back({chosen, accounts.front().merit});
+    choice.on_random = is_random_rate(*chosen) || (partner != nullptr && is_random_rate(*partner));
+    for (const Account& account : accounts) {
+        if (account.has(chosen)) continue;
+        for (const effects::Effect* effect : {account.first->candidate.effect, account.second}) {
+            if (effect == nullptr || effect == partner) continue;
+            const auto known = std::find_if(choice.held.begin(), choice.held.end(),
+                                            [&](const Held& held) { return held.effect == effect; });
+            if (known != choice.held.end()) continue;
+            choice.held.push_back({effect, account.merit});
+            choice.confounded_with.emplace_back(effect->name());
         }
-    }
-    const auto best =
-        std::max_element(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.merit < b.merit; });
-    if (best == pairs.end() || best->merit < likeliest.merit - tie) {
-        for (const Contender& contender : contenders) add_tied(contender);
-        return choice;
-    }
-    if (best->merit < likeliest.merit + tie) {
-        for (const Contender& contender : contenders) add_tied(contender);
-        add_name(best->first->candidate.effect->name());
-        add_name(best->second);
-        return choice;
-    }
-    // What else could stand beside the second, and what could stand for both.
-    choice.chosen = best->first;
-    choice.merit = best->merit;
-    choice.on_random = is_random_rate(*effects::find(best->second));
-    for (const Contender& contender : contenders) add_tied(contender);
-    for (const Pair& pair : pairs) {
-        if (pair.first == choice.chosen || pair.second != best->second || choice.merit - pair.merit >= tie) continue;
-        add_name(pair.first->candidate.effect->name());
     }
     return choice;
 }

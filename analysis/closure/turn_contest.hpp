@@ -36,27 +36,35 @@ bool passes(double p_value);
 struct Contender {
     Candidate candidate;
     std::shared_ptr<Fitted> fitted;
-    double merit = 0.0;    ///< gain of the log-likelihood less its parameters and its search
+    double merit = 0.0;    ///< gain of the log-likelihood, its amplitudes integrated out, less its search
     double p_value = 1.0;  ///< of such a gain by chance, its search counted
 };
 
-/// Those that might explain something, no more than so many, the likeliest first.
+/// Those that might explain something, no more than so many beside random rates, the likeliest first.
 struct Contest {
     std::vector<Contender> contenders;
     bool side = false;  ///< told by other columns than the phase
 };
-Contest hold_contest(const record::Record& record, const Fitted& now, const Rows& rows, std::size_t most);
+enum class Among { all, not_random };
+Contest hold_contest(const record::Record& record, const Fitted& now, const Rows& rows, std::size_t most,
+                     Among among = Among::all);
+
+/// An effect with the merit of what it is part of: itself or a pair.
+struct Held {
+    const effects::Effect* effect = nullptr;
+    double merit = 0.0;
+};
 
 /// What to add, if anything.
 struct Choice {
     const Contender* chosen = nullptr;
-    double merit = 0.0;      ///< of all that it stands for
+    std::vector<Held> held;  ///< it and all that explain about as much
     bool on_random = false;  ///< it is a random rate, or was chosen with one beside it
     std::vector<std::string> confounded_with;
 };
 
-/// The likeliest where it passes. A random rate can follow two others at once: these are tried together before it is
-/// taken. Where they explain as much they are tied to it, where they explain more the first of them is chosen.
+/// The likeliest where it passes, with all that are as likely tied to it. A random rate can follow two others at once:
+/// where one is the likeliest, pairs are tried before anything is taken.
 Choice choose(const record::Record& record, const Contest& contest, const Rows& rows);
 
 }  // namespace ringlock::closure

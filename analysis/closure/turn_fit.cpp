@@ -36,9 +36,26 @@ bool fitted_in_phase(const effects::Effect& effect, effects::Role role) {
 
 }  // namespace
 
+void Regressor::take(double value, std::vector<double>& rest, TurnFrame& frame) const {
+    for (std::size_t i = 0; i < series.size(); ++i) rest[i] -= value * series[i];
+    for (std::size_t i = 0; i < slope.size(); ++i) frame.before_slope[i] += value * slope[i];
+    for (std::size_t i = 0; i < kick.size(); ++i) frame.kick_slope[i] += value * kick[i];
+}
+
+Regressor difference(TurnModel::Prediction with, const TurnModel::Prediction& without, double per) {
+    Regressor of(std::move(with.phase_rad), std::move(with.frame.before_slope), std::move(with.frame.kick_slope));
+    for (std::size_t i = 0; i < of.series.size(); ++i) {
+        of.series[i] = (of.series[i] - without.phase_rad[i]) / per;
+        of.slope[i] = (of.slope[i] - without.frame.before_slope[i]) / per;
+        of.kick[i] = (of.kick[i] - without.frame.kick_slope[i]) / per;
+    }
+    return of;
+}
+
 TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows, Effects effects)
     : model_(&model), parameters_(start), rows_(std::move(rows)), effects_(effects), nuisance_(2 + drift_terms, 0.0) {
     if (parameters_.bias_deg_h == 0.0) parameters_.bias_deg_h = model.series().mean_rate_deg_h;
+    if (parameters_.injected_sd_rad > 0.0) fit_nuisances();
     fit_deterministic();
     fit_noise();
     climb();
@@ -72,10 +89,9 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
     }
     const auto change = [&](TurnParameters& p, double& value, double step) {
         value += step;
-        std::vector<double> series = model_->predict(p).phase_rad;
+        TurnModel::Prediction changed = model_->predict(p);
         value -= step;
-        for (std::size_t i = 0; i < n; ++i) series[i] = (series[i] - prediction.phase_rad[i]) / step;
-        return series;
+        return difference(std::move(changed), prediction, step);
     };
     TurnParameters p = parameters_;
     std::vector<double> rotation(n);
@@ -91,17 +107,16 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
             double& value = active.values.at(name);
             double step = 1e-4 * std::max(std::abs(value), 1e-2);
             if (value + step > parameter.max) step = -step;
-            std::vector<double> series;
             if (active.effect->adds_angle()) {
                 const auto here = model_->added_rad(prediction, *active.effect, active.values);
                 value += step;
-                series = model_->added_rad(prediction, *active.effect, active.values);
+                auto series = model_->added_rad(prediction, *active.effect, active.values);
                 value -= step;
                 for (std::size_t i = 0; i < n; ++i) series[i] = (series[i] - here[i]) / step;
+                all.push_back({std::string(active.effect->name()), name, std::move(series)});
             } else {
-                series = change(p, value, step);
+                all.push_back({std::string(active.effect->name()), name, change(p, value, step)});
             }
-            all.push_back({std::string(active.effect->name()), name, std::move(series)});
         }
     }
     return all;
@@ -111,42 +126,67 @@ std::size_t TurnFit::solved(const std::vector<Column>& all) const {
     return effects_ == Effects::held ? nuisance_.size() + base_columns : all.size();
 }
 
+/// Offset and amplitude, which the start knows nothing of, by the noise that it knows.
+void TurnFit::fit_nuisances() {
+    prediction_ = model_->predict(parameters_);
+    std::vector<Column> all = columns(prediction_);
+    all.erase(all.begin() + static_cast<std::ptrdiff_t>(nuisance_.size()), all.end());
+    set_rest(prediction_, all);
+    const Whitening whitening(prediction_.frame, model_->noise(parameters_));
+    const Eigen::VectorXd y = counted(whitening, rest_);
+    Eigen::MatrixXd x(y.size(), all.size());
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        x.col(static_cast<Eigen::Index>(k)) = counted(whitening, prediction_.frame, all[k].of);
+    }
+    const Eigen::VectorXd step = x.householderQr().solve(y);
+    for (std::size_t k = 0; k < all.size(); ++k) nuisance_[k] += step(static_cast<Eigen::Index>(k));
+    set_rest(prediction_, all);
+}
+
 void TurnFit::fit_deterministic() {
     constexpr int most = 4;
     constexpr double gained = 1e-3;  // of chi-squared, by another step
-    const std::size_t n = model_->series().size();
     for (int pass = 0; pass < most; ++pass) {
         prediction_ = model_->predict(parameters_);
         std::vector<Column> all = columns(prediction_);
-        all.resize(solved(all));
+        all.erase(all.begin() + static_cast<std::ptrdiff_t>(solved(all)), all.end());
         set_rest(prediction_, all);
         TurnParameters guess = parameters_;
-        if (guess.injected_sd_rad == 0.0) {
+        const bool guessed = guess.injected_sd_rad == 0.0;
+        if (guessed) {
             guess.injected_sd_rad = 1.0;
             guess.wander_sd_rad = 1e-3;
         }
         TurnNoise noise = model_->noise(guess);
         // Nothing is known yet: a radian a turn, that what wanders does not drown the kicks.
-        if (parameters_.injected_sd_rad == 0.0) noise.white_rad2_per_s = 1.0 / model_->series().interval_s;
+        if (guessed) noise.white_rad2_per_s = 1.0 / model_->series().interval_s;
         const Whitening whitening(prediction_.frame, noise);
-        Eigen::MatrixXd x(n, all.size());
-        Eigen::VectorXd y(n);
-        y = counted(whitening, rest_);
+        const Eigen::VectorXd y = counted(whitening, rest_);
+        // Beside a noise that is only guessed |1 - before'| makes up for nothing.
+        const Eigen::Index used = guessed ? y.size() / 2 : y.size();
+        Eigen::MatrixXd x(y.size(), all.size());
         Eigen::VectorXd scale(all.size());
         for (std::size_t k = 0; k < all.size(); ++k) {
             auto column = x.col(static_cast<Eigen::Index>(k));
-            column = counted(whitening, all[k].series);
+            column = counted(whitening, prediction_.frame, all[k].of);
             scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
             column /= scale(static_cast<Eigen::Index>(k));
         }
-        Eigen::MatrixXd normal = x.transpose() * x;
-        Eigen::VectorXd right = x.transpose() * y;
+        Eigen::MatrixXd normal = x.topRows(used).transpose() * x.topRows(used);
+        Eigen::VectorXd right = x.topRows(used).transpose() * y.head(used);
+        if (!guessed) {
+            for (std::size_t k = 0; k < all.size(); ++k) {
+                if (all[k].of.slope.empty()) continue;
+                const auto index = static_cast<Eigen::Index>(k);
+                right(index) = slope_of_objective(all[k].of, 1e-3 / scale(index)) / scale(index);
+            }
+        }
         add_priors(scale, normal, &right);
         Eigen::VectorXd step = normal.ldlt().solve(right);
         const bool arrived = right.dot(step) < gained;
         step = step.cwiseQuotient(scale);
         // Times and frequencies are far from linear: shorter steps where a whole one goes far or leads uphill.
-        const double squares = y.squaredNorm();
+        const double before = guessed ? squares_left(all, whitening) : objective_at(all);
         const TurnParameters from = parameters_;
         const std::vector<double> nuisance_from = nuisance_;
         bool possible = false;
@@ -155,8 +195,8 @@ void TurnFit::fit_deterministic() {
             nuisance_ = nuisance_from;
             take(share * step);
             try {
-                const double left = squares_left(all, whitening);
-                possible = parameters_.effects.empty() || left <= squares * (1.0 + 1e-9);
+                const double now = guessed ? squares_left(all, whitening) : objective_at(all);
+                possible = now <= before + 1e-9 * std::abs(before) || (guessed && parameters_.effects.empty());
             } catch (const RunError&) {
                 possible = false;  // no motion of a gyro with such parameters can be followed
             }
@@ -169,6 +209,17 @@ void TurnFit::fit_deterministic() {
         set_rest(model_->predict(parameters_), all);
         if (arrived || !possible) break;
     }
+}
+
+/// Of the likelihood, with all that the filter's gains and variances make of it.
+double TurnFit::slope_of_objective(const Regressor& of, double step) const {
+    const auto at = [&](double value) {
+        TurnFrame frame = prediction_.frame;
+        std::vector<double> rest = rest_;
+        of.take(value, rest, frame);
+        return objective(frame, parameters_, rest);
+    };
+    return (at(-step) - at(step)) / (2.0 * step);
 }
 
 /// How much of a step can be taken for times to move by a part of the record only, and frequencies by a part of a
@@ -209,7 +260,7 @@ void TurnFit::set_rest(const TurnModel::Prediction& prediction, const std::vecto
     rest_.resize(model_->series().size());
     for (std::size_t i = 0; i < rest_.size(); ++i) {
         rest_[i] = model_->phase_rad()[i] - prediction.phase_rad[i];
-        for (std::size_t k = 0; k < nuisance_.size(); ++k) rest_[i] -= nuisance_[k] * columns[k].series[i];
+        for (std::size_t k = 0; k < nuisance_.size(); ++k) rest_[i] -= nuisance_[k] * columns[k].of.series[i];
     }
 }
 
@@ -221,17 +272,33 @@ double TurnFit::squares_left(const std::vector<Column>& columns, const Whitening
     return squares;
 }
 
+double TurnFit::objective_at(const std::vector<Column>& columns) {
+    const TurnModel::Prediction prediction = model_->predict(parameters_);
+    set_rest(prediction, columns);
+    const Belief belief = belief_of(parameters_);
+    return objective(prediction.frame, parameters_, rest_) +
+           0.5 * (belief.bias * belief.bias + belief.threshold * belief.threshold);
+}
+
+TurnFit::Belief TurnFit::belief_of(const TurnParameters& parameters) const {
+    const double declared = std::max(model_->series().setup.lockin_threshold_deg_h, 1.0);
+    Belief belief{0.0, 0.0, 0.1 * declared, declared};
+    belief.bias = (model_->series().mean_rate_deg_h - parameters.bias_deg_h) / belief.bias_sd_deg_h;
+    belief.threshold = (declared - parameters.threshold_deg_h) / belief.threshold_sd_deg_h;
+    return belief;
+}
+
 /// A gyro that is locked shows its bias and its threshold together only: beside so weak a belief that no other record
 /// feels it, they would be without bounds.
 void TurnFit::add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, Eigen::VectorXd* right) const {
     const auto bias = static_cast<Eigen::Index>(nuisance_.size());
-    const double declared = std::max(model_->series().setup.lockin_threshold_deg_h, 1.0);
     const auto believe = [&](Eigen::Index k, double off, double sd) {
         normal(k, k) += 1.0 / (sd * sd * scale(k) * scale(k));
-        if (right != nullptr) (*right)(k) += off / (sd * sd * scale(k));
+        if (right != nullptr) (*right)(k) += off / (sd * scale(k));
     };
-    believe(bias, model_->series().mean_rate_deg_h - parameters_.bias_deg_h, 0.1 * declared);
-    believe(bias + 1, declared - parameters_.threshold_deg_h, declared);
+    const Belief belief = belief_of(parameters_);
+    believe(bias, belief.bias, belief.bias_sd_deg_h);
+    believe(bias + 1, belief.threshold, belief.threshold_sd_deg_h);
 }
 
 void TurnFit::finish() {
@@ -243,19 +310,20 @@ void TurnFit::finish() {
     whitening_ = std::make_shared<Whitening>(prediction_.frame, model_->noise(parameters_));
     innovations_ = whitening_->apply(rest_);
     sd_rad_ = whitening_->sd_rad();
+    for (std::size_t i = 0; i < n; ++i) sd_rad_[i] /= std::abs(1.0 - prediction_.frame.before_slope[i]);
     log_likelihood_ = -objective(parameters_, rest_);
     // Orthonormal basis, for scores.
     Eigen::VectorXd scale;
-    Eigen::HouseholderQR<Eigen::MatrixXd> qr(whitened_columns(scale));
-    basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(n), scale.size());
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(whitened_columns(scale));
+    basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(qr.rows(), scale.size());
 }
 
 Eigen::MatrixXd TurnFit::whitened_columns(Eigen::VectorXd& scale) const {
     const auto count = static_cast<Eigen::Index>(columns_.size());
-    Eigen::MatrixXd x(static_cast<Eigen::Index>(rest_.size()), count);
+    Eigen::MatrixXd x(static_cast<Eigen::Index>(2 * rest_.size()), count);
     scale.resize(count);
     for (Eigen::Index k = 0; k < count; ++k) {
-        x.col(k) = counted(*whitening_, columns_[static_cast<std::size_t>(k)].series);
+        x.col(k) = counted(*whitening_, prediction_.frame, columns_[static_cast<std::size_t>(k)].of);
         scale(k) = std::max(x.col(k).norm(), 1e-300);
         x.col(k) /= scale(k);
     }
@@ -285,47 +353,63 @@ std::vector<Estimate> TurnFit::estimates() const {
     return estimates;
 }
 
-Eigen::VectorXd TurnFit::counted(const Whitening& whitening, const std::vector<double>& series) const {
-    const auto white = whitening.apply(series);
-    Eigen::VectorXd column(static_cast<Eigen::Index>(white.size()));
-    for (std::size_t i = 0; i < white.size(); ++i) column(static_cast<Eigen::Index>(i)) = rows_[i] ? white[i] : 0.0;
+Eigen::VectorXd TurnFit::counted(const Whitening& whitening, const TurnFrame& frame, const Regressor& regressor) const {
+    Eigen::VectorXd column = below(whitening.apply(regressor.series), 0.0);
+    const std::size_t n = rows_.size();
+    for (std::size_t i = 0; i < regressor.slope.size(); ++i) {
+        if (rows_[i]) column(static_cast<Eigen::Index>(n + i)) = regressor.slope[i] / (1.0 - frame.before_slope[i]);
+    }
     return column;
 }
 
-TurnFit::Regression TurnFit::regress(const std::vector<std::vector<double>>& series) const {
-    Regression regression{0.0, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(series.size()))};
+Eigen::VectorXd TurnFit::counted(const Whitening& whitening, const std::vector<double>& rest) const {
+    return below(whitening.apply(rest), -1.0);
+}
+
+Eigen::VectorXd TurnFit::below(const std::vector<double>& white, double value) const {
+    const std::size_t n = white.size();
+    Eigen::VectorXd column(static_cast<Eigen::Index>(2 * n));
+    for (std::size_t i = 0; i < n; ++i) {
+        column(static_cast<Eigen::Index>(i)) = rows_[i] ? white[i] : 0.0;
+        column(static_cast<Eigen::Index>(n + i)) = rows_[i] ? value : 0.0;
+    }
+    return column;
+}
+
+TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors) const {
+    Regression regression{0.0, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(regressors.size()))};
     TurnParameters trial = parameters_;
+    TurnFrame frame = prediction_.frame;
     std::vector<double> rest = rest_;
     const std::size_t own = columns_.size();
-    const auto column_of = [&](std::size_t k) -> const std::vector<double>& {
-        return k < own ? columns_[k].series : series[k - own];
+    const auto column_of = [&](Eigen::Index k) -> const Regressor& {
+        const auto at = static_cast<std::size_t>(k);
+        return at < own ? columns_[at].of : regressors[at - own];
     };
     for (int pass = 0; pass < 2; ++pass) {
-        const Whitening whitening(prediction_.frame, model_->noise(trial));
-        Eigen::MatrixXd x(static_cast<Eigen::Index>(rest.size()), static_cast<Eigen::Index>(own + series.size()));
+        const Whitening whitening(frame, model_->noise(trial));
+        const Eigen::VectorXd y = counted(whitening, rest);
+        Eigen::MatrixXd x(y.size(), static_cast<Eigen::Index>(own + regressors.size()));
         Eigen::VectorXd scale(x.cols());
         for (Eigen::Index k = 0; k < x.cols(); ++k) {
-            x.col(k) = counted(whitening, column_of(static_cast<std::size_t>(k)));
+            x.col(k) = counted(whitening, frame, column_of(k));
             scale(k) = std::max(x.col(k).norm(), 1e-300);
             x.col(k) /= scale(k);
         }
         const Eigen::MatrixXd normal = x.transpose() * x;
-        const Eigen::VectorXd right = x.transpose() * counted(whitening, rest);
+        const Eigen::VectorXd right = x.transpose() * y;
         Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(normal);
         const Eigen::VectorXd value = decomposition.solve(right).cwiseQuotient(scale);
-        for (Eigen::Index k = 0; k < x.cols(); ++k) {
-            const auto& column = column_of(static_cast<std::size_t>(k));
-            for (std::size_t i = 0; i < rest.size(); ++i) rest[i] -= value(k) * column[i];
-        }
-        regression.value += value.tail(static_cast<Eigen::Index>(series.size()));
-        trial = with_noise_of(trial, rest);
+        for (Eigen::Index k = 0; k < x.cols(); ++k) column_of(k).take(value(k), rest, frame);
+        regression.value += value.tail(static_cast<Eigen::Index>(regressors.size()));
+        trial = with_noise_of(frame, trial, rest);
     }
-    regression.gain = objective(parameters_, rest_) - objective(trial, rest);
+    regression.gain = objective(parameters_, rest_) - objective(frame, trial, rest);
     return regression;
 }
 
-Eigen::VectorXd TurnFit::whitened(const std::vector<double>& series) const {
-    Eigen::VectorXd column = counted(*whitening_, series);
+Eigen::VectorXd TurnFit::whitened(const Regressor& regressor) const {
+    Eigen::VectorXd column = counted(*whitening_, prediction_.frame, regressor);
     const double all = column.norm();
     column -= basis_ * (basis_.transpose() * column);
     // What the model's own parameters can do as well leaves rounding only.
@@ -334,19 +418,13 @@ Eigen::VectorXd TurnFit::whitened(const std::vector<double>& series) const {
     return column;
 }
 
-Eigen::VectorXd TurnFit::residual() const {
-    Eigen::VectorXd y(static_cast<Eigen::Index>(innovations_.size()));
-    for (std::size_t i = 0; i < innovations_.size(); ++i)
-        y(static_cast<Eigen::Index>(i)) = rows_[i] ? innovations_[i] : 0.0;
-    return y;
-}
+Eigen::VectorXd TurnFit::residual() const { return below(innovations_, -1.0); }
 
-TurnFit::Score TurnFit::score(const std::vector<std::vector<double>>& series) const {
-    const auto n = static_cast<Eigen::Index>(innovations_.size());
-    const auto k = static_cast<Eigen::Index>(series.size());
-    Eigen::MatrixXd x(n, k);
-    for (Eigen::Index j = 0; j < k; ++j) x.col(j) = whitened(series[static_cast<std::size_t>(j)]);
+TurnFit::Score TurnFit::score(const std::vector<Regressor>& regressors) const {
+    const auto k = static_cast<Eigen::Index>(regressors.size());
     const Eigen::VectorXd y = residual();
+    Eigen::MatrixXd x(y.size(), k);
+    for (Eigen::Index j = 0; j < k; ++j) x.col(j) = whitened(regressors[static_cast<std::size_t>(j)]);
     Score score;
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(x.transpose() * x);
     const Eigen::VectorXd projected = x.transpose() * y;

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/closure/turn_model.hpp"
@@ -11,6 +12,24 @@ namespace ringlock::closure {
 
 /// Which turns count: 1 or 0 each.
 using Rows = std::vector<std::uint8_t>;
+
+/// What a parameter adds to the phases that are foretold, a unit of it.
+///
+/// Some of that follows from the very phase that it is added to: what the lock-in does before a turn, what is read at
+/// it. Its derivative by that phase, turn after turn, is the slope; empty where nothing does. Such a series goes with
+/// the innovations even where nothing is missing, which the likelihood's |1 - before'| makes up for. `kick` is the
+/// derivative of all that the turn adds to those after it.
+struct Regressor {
+    Regressor(std::vector<double> of_series, std::vector<double> of_slope = {}, std::vector<double> of_kick = {})
+        : series(std::move(of_series)), slope(std::move(of_slope)), kick(std::move(of_kick)) {}
+    std::vector<double> series, slope, kick;
+
+    /// Takes so much of it from a rest, and adds it to the frame.
+    void take(double value, std::vector<double>& rest, TurnFrame& frame) const;
+};
+
+/// How much further one model's phases are than another's, over `per`.
+Regressor difference(TurnModel::Prediction with, const TurnModel::Prediction& without, double per);
 
 /// A parameter as fitted; of the base model where `effect` is empty.
 struct Estimate {
@@ -43,7 +62,7 @@ class TurnFit {
     double log_likelihood() const { return log_likelihood_; }
     const Rows& rows() const { return rows_; }
 
-    /// Innovations of all turns over their standard deviations, and these [rad].
+    /// Innovations of all turns over their standard deviations, and those of the phases [rad].
     const std::vector<double>& innovations() const { return innovations_; }
     const std::vector<double>& sd_rad() const { return sd_rad_; }
 
@@ -55,15 +74,17 @@ class TurnFit {
         double chi2 = 0.0;
         int rank = 0;
     };
-    Score score(const std::vector<std::vector<double>>& series) const;
+    Score score(const std::vector<Regressor>& regressors) const;
     /// That regression with the noise fitted anew beside it.
     struct Regression {
         double gain = 0.0;  ///< of the log-likelihood
         Eigen::VectorXd value;
     };
-    Regression regress(const std::vector<std::vector<double>>& series) const;
-    /// One series whitened and freed likewise, rows that do not count zero.
-    Eigen::VectorXd whitened(const std::vector<double>& series) const;
+    Regression regress(const std::vector<Regressor>& regressors) const;
+    /// One series whitened and freed likewise, and what is left: their product is the derivative of the log-likelihood.
+    /// Rows that do not count are zero. As many again are those of |1 - before'|: what is left is -1 there, the series
+    /// its slope over 1 - before', so that their squares are what it adds to the information.
+    Eigen::VectorXd whitened(const Regressor& regressor) const;
     Eigen::VectorXd residual() const;
     /// One series whitened, and no more.
     std::vector<double> whitened_alone(const std::vector<double>& series) const { return whitening_->apply(series); }
@@ -79,26 +100,40 @@ class TurnFit {
    private:
     struct Column {
         std::string effect, name;
-        std::vector<double> series;
+        Regressor of;
     };
+    void fit_nuisances();
     void fit_deterministic();
     void climb();
     void fit_noise();
     void try_other_noise();
-    void try_noise(std::size_t knob, double value);
-    TurnParameters with_noise_of(const TurnParameters& start, const std::vector<double>& rest) const;
-    /// The series whitened, rows that do not count zero.
-    Eigen::VectorXd counted(const Whitening& whitening, const std::vector<double>& series) const;
+    void try_from(const TurnParameters& other);
+    TurnParameters with_noise_of(const TurnFrame& frame, const TurnParameters& start,
+                                 const std::vector<double>& rest) const;
+    /// The series whitened, rows that do not count zero, and the rows of |1 - before'| below.
+    Eigen::VectorXd counted(const Whitening& whitening, const TurnFrame& frame, const Regressor& regressor) const;
+    Eigen::VectorXd counted(const Whitening& whitening, const std::vector<double>& rest) const;
+    Eigen::VectorXd below(const std::vector<double>& white, double value) const;
     double longest_share(const Eigen::VectorXd& step) const;
     void take(const Eigen::VectorXd& step);
     void set_rest(const TurnModel::Prediction& prediction, const std::vector<Column>& columns);
     double squares_left(const std::vector<Column>& columns, const Whitening& whitening);
+    double objective_at(const std::vector<Column>& columns);
+    double slope_of_objective(const Regressor& of, double step) const;
     std::vector<Column> columns(const TurnModel::Prediction& prediction) const;
     void finish();
     Eigen::MatrixXd whitened_columns(Eigen::VectorXd& scale) const;  ///< of norm one, scale times as long
     void add_noise_estimates(std::vector<Estimate>& estimates) const;
+    /// How far bias and threshold are from what is believed of them, in standard deviations, and these.
+    struct Belief {
+        double bias, threshold, bias_sd_deg_h, threshold_sd_deg_h;
+    };
+    Belief belief_of(const TurnParameters& parameters) const;
     void add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, Eigen::VectorXd* right) const;
-    double objective(const TurnParameters& parameters, const std::vector<double>& rest) const;
+    double objective(const TurnParameters& parameters, const std::vector<double>& rest) const {
+        return objective(prediction_.frame, parameters, rest);
+    }
+    double objective(const TurnFrame& frame, const TurnParameters& parameters, const std::vector<double>& rest) const;
 
     /// How many of the columns, which those of effects come last of, are solved for.
     std::size_t solved(const std::vector<Column>& all) const;

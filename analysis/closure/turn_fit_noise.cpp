@@ -84,21 +84,32 @@ void TurnFit::try_other_noise() {
         const Knob knob = knobs(parameters_)[k];
         if (knob.name == "readout_noise_rad") continue;
         const bool of_effect = !knob.effect.empty();
-        if (*knob.value > 10.0 * none && (of_effect || *knob.value < readout)) try_noise(k, none);
-        if (!of_effect && *knobs(parameters_)[k].value < 1e-4 * readout) {
-            try_noise(k, readout * (knob.name == "injected_noise_rad" ? 0.05 : 1e-3));
+        TurnParameters other = parameters_;
+        if (*knob.value > 10.0 * none && (of_effect || *knob.value < readout)) {
+            *knobs(other)[k].value = none;
+            try_from(other);
         }
+        if (of_effect || *knobs(parameters_)[k].value > 1e-3 * readout) continue;
+        // In place of the other one.
+        other = parameters_;
+        const bool injected = knob.name == "injected_noise_rad";
+        other.injected_sd_rad = injected ? 0.05 * readout : none;
+        other.wander_sd_rad = injected ? none : 1e-3 * readout;
+        try_from(other);
     }
 }
 
-void TurnFit::try_noise(std::size_t knob, double value) {
+void TurnFit::try_from(const TurnParameters& other) {
     const TurnParameters from = parameters_;
     const std::vector<double> nuisance_from = nuisance_;
     const std::vector<double> rest_from = rest_;
     const TurnModel::Prediction prediction_from = prediction_;
     const double before = objective(parameters_, rest_);
-    *knobs(parameters_)[knob].value = value;
-    climb();
+    // Summits are near one another, or one of them is none.
+    constexpr double near = 20.0;
+    parameters_ = other;
+    fit_noise();
+    if (objective(parameters_, rest_) < before + near) climb();
     if (objective(parameters_, rest_) < before) return;
     parameters_ = from;
     nuisance_ = nuisance_from;
@@ -106,8 +117,9 @@ void TurnFit::try_noise(std::size_t knob, double value) {
     prediction_ = prediction_from;
 }
 
-double TurnFit::objective(const TurnParameters& parameters, const std::vector<double>& rest) const {
-    double sum = Whitening::minus_log_likelihood(prediction_.frame, model_->noise(parameters), rest, rows_);
+double TurnFit::objective(const TurnFrame& frame, const TurnParameters& parameters,
+                          const std::vector<double>& rest) const {
+    double sum = Whitening::minus_log_likelihood(frame, model_->noise(parameters), rest, rows_);
     // The radius of the quadrature has the noise of the phase: as many degrees of freedom again.
     const double radius = model_->series().radius_sd_rad;
     if (radius > least_radius_sd_rad) {
@@ -134,10 +146,11 @@ void TurnFit::fit_noise() {
         std::tie(parameters_.injected_sd_rad, parameters_.wander_sd_rad) = grid[static_cast<std::size_t>(best)];
         trial = parameters_;
     }
-    parameters_ = with_noise_of(trial, rest_);
+    parameters_ = with_noise_of(prediction_.frame, trial, rest_);
 }
 
-TurnParameters TurnFit::with_noise_of(const TurnParameters& start, const std::vector<double>& rest) const {
+TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParameters& start,
+                                      const std::vector<double>& rest) const {
     constexpr double least = 1e-9;
     TurnParameters trial = start;
     std::vector<double> x;
@@ -152,7 +165,7 @@ TurnParameters TurnFit::with_noise_of(const TurnParameters& start, const std::ve
     const auto value = [&](const double* at) {
         double beyond = 0.0;
         for (std::size_t k = 0; k < x.size(); ++k) beyond += square(at[k] - std::clamp(at[k], smallest, largest));
-        return objective(with(at), rest) + beyond;
+        return objective(frame, with(at), rest) + beyond;
     };
     ceres::GradientProblem problem(new Objective(x.size(), value));
     ceres::GradientProblemSolver::Options options;
@@ -185,7 +198,7 @@ void TurnFit::add_noise_estimates(std::vector<Estimate>& estimates) const {
         const auto white = moved.apply(rest_);
         for (std::size_t i = 0; i < n; ++i) {
             if (!rows_[i]) continue;
-            const double ratio = moved.sd_rad()[i] / sd_rad_[i];
+            const double ratio = moved.sd_rad()[i] / whitening_->sd_rad()[i];
             d.innovation[i] = (white[i] * ratio - innovations_[i]) / step;
             d.size[i] = (square(ratio) - 1.0) / step;
         }

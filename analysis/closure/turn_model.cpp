@@ -2,16 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "engine/core/units.hpp"
 #include "engine/gyro/device.hpp"
 
 namespace ringlock::closure {
 
-ActiveEffect* TurnParameters::find(std::string_view effect) {
+const ActiveEffect* TurnParameters::find(std::string_view effect) const {
     const auto found =
         std::find_if(effects.begin(), effects.end(), [&](const ActiveEffect& a) { return a.effect->name() == effect; });
     return found == effects.end() ? nullptr : &*found;
+}
+
+ActiveEffect* TurnParameters::find(std::string_view effect) {
+    return const_cast<ActiveEffect*>(std::as_const(*this).find(effect));
 }
 
 bool told_by_other_columns(const effects::Effect& effect) {

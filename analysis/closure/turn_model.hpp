@@ -32,6 +32,7 @@ struct TurnParameters {
     std::vector<ActiveEffect> effects;
 
     ActiveEffect* find(std::string_view effect);
+    const ActiveEffect* find(std::string_view effect) const;
 };
 
 /// Whether times, accelerations or the quadrature circle tell of the effect by themselves: the dither's shape, the

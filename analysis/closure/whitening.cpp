@@ -141,7 +141,8 @@ double Whitening::minus_log_likelihood(const TurnFrame& frame, const TurnNoise& 
             const double innovation = follower.innovation(series[i], frame.sign[i]);
             if (counts[i]) {
                 sum += 0.5 * innovation * innovation * over;
-                product *= f;
+                const double through = 1.0 - frame.before_slope[i];
+                product *= f / (through * through);
                 if (!(product > 1e-200 && product < 1e200)) {
                     sum += 0.5 * std::log(product);
                     product = 1.0;

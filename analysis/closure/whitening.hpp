@@ -46,8 +46,10 @@ class Whitening {
 
     Whitening(const TurnFrame& frame, const TurnNoise& noise);
 
-    /// Minus the log-likelihood of a series, but for a constant: sum over the turns that count (1, not 0) of half the
-    /// square of the innovation plus the logarithm of its standard deviation. In one pass that keeps nothing.
+    /// Minus the log-likelihood of the phases that leave this series, but for a constant: sum over the turns that count
+    /// (1, not 0) of half the square of the innovation plus the logarithm of its standard deviation. As the innovation
+    /// has before_n of the phase itself in it, the density of the phase has |1 - before'| beside that of the
+    /// innovation. In one pass that keeps nothing.
     static double minus_log_likelihood(const TurnFrame& frame, const TurnNoise& noise, std::span<const double> series,
                                        std::span<const std::uint8_t> counts);
 
