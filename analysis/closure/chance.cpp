@@ -1,10 +1,14 @@
 #include "analysis/closure/chance.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
 namespace ringlock::closure {
+
+std::string probability(double p) { return p < 1e-99 ? "< 1e-99" : fmt::format("{:.2g}", p); }
 
 double chi2_tail(double x, int freedom) {
     if (!(x > 0.0) || freedom < 1) return 1.0;

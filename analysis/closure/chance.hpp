@@ -1,8 +1,12 @@
 #pragma once
+#include <string>
 #include <vector>
 
 /// How probable something is by chance.
 namespace ringlock::closure {
+
+/// A p-value in two digits; "< 1e-99" where it is less than can be told.
+std::string probability(double p);
 
 /// P(chi-squared with so many degrees of freedom > x).
 double chi2_tail(double x, int freedom);

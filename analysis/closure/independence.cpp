@@ -4,9 +4,11 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <boost/math/special_functions/erf.hpp>
 #include <cmath>
 #include <complex>
 #include <memory>
+#include <numbers>
 #include <unsupported/Eigen/FFT>
 #include <utility>
 
@@ -356,9 +358,24 @@ void test_size(const TurnFit& fit, std::vector<View>& views) {
     const auto& e = fit.innovations();
     const auto& rows = fit.rows();
     const std::size_t n = e.size();
-    const auto [mean, variance] = squares_of(e, rows);
     views.push_back({size_over_time(e, rows, 20, 8.0)});
-    constexpr int columns = 8;
+    // Sizes as normal deviates of the same rarity: a few phases that hardly ever come weigh too much for squares.
+    const double sd = std::sqrt(squares_of(e, rows).mean);
+    std::vector<double> size(n);
+    double mean = 0.0;
+    double square = 0.0;
+    double counted = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!rows[i]) continue;
+        const double rarity = std::erfc(std::abs(e[i]) / (sd * std::numbers::sqrt2));
+        size[i] = std::numbers::sqrt2 * boost::math::erfc_inv(2.0 * std::clamp(rarity, 1e-300, 1.0 - 1e-15));
+        mean += size[i];
+        square += size[i] * size[i];
+        counted += 1.0;
+    }
+    mean /= counted;
+    const double variance = square / counted - mean * mean;
+    constexpr Eigen::Index columns = 8;
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(columns);
     Eigen::VectorXd row(columns);
@@ -369,13 +386,20 @@ void test_size(const TurnFit& fit, std::vector<View>& views) {
         row << std::cos(psi), std::sin(psi), std::cos(2 * psi), std::sin(2 * psi), d * std::cos(psi), d * std::sin(psi),
             d * std::cos(2 * psi), d * std::sin(2 * psi);
         normal += row * row.transpose();
-        right += row * (e[i] * e[i] - mean);
+        right += row * (size[i] - mean);
     }
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(normal);
-    decomposition.setThreshold(1e-6);
-    const double folded = right.dot(decomposition.solve(right)) / variance;
-    views.push_back({{Where::phase, "size of the residual over the turn's phase",
-                      chi2_tail(folded, static_cast<int>(decomposition.rank())), ""}});
+    // What only the first turns of a locked gyro have tells nothing of the others.
+    constexpr double enough = 1e-3;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(normal);
+    double folded = 0.0;
+    int freedom = 0;
+    for (Eigen::Index k = 0; k < columns; ++k) {
+        if (axes.eigenvalues()(k) < enough * axes.eigenvalues().maxCoeff()) continue;
+        const double along = axes.eigenvectors().col(k).dot(right);
+        folded += along * along / (axes.eigenvalues()(k) * variance);
+        ++freedom;
+    }
+    views.push_back({{Where::phase, "size of the residual over the turn's phase", chi2_tail(folded, freedom), ""}});
 }
 
 }  // namespace
@@ -399,7 +423,7 @@ std::string_view name_of(Where where) {
 }
 
 std::string ResidualTest::description() const {
-    return fmt::format("{}{}{}, by chance p {:.2g}", view, detail.empty() ? "" : ", ", detail, p_value);
+    return fmt::format("{}{}{}, by chance p {}", view, detail.empty() ? "" : ", ", detail, probability(p_value));
 }
 
 double refitted_merit(const TurnFit& fit, const View& view) {

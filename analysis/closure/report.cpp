@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "analysis/closure/chance.hpp"
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
 #include "engine/scenario/render.hpp"
@@ -77,8 +78,6 @@ nlohmann::json to_json(const Closure& closure) {
     object["notes"] = closure.notes;
     return object;
 }
-
-std::string probability(double p) { return p < 1e-99 ? "< 1e-99" : fmt::format("{:.2g}", p); }
 
 std::string verdict_sentence(const Closure& closure) {
     switch (closure.verdict) {

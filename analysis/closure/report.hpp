@@ -21,9 +21,6 @@ std::string to_text(const Predictive& predictive);
 /// The verdict in one sentence, with where structure is left.
 std::string verdict_sentence(const Closure& closure);
 
-/// A p-value in two digits; "< 1e-99" where it is less than can be told.
-std::string probability(double p);
-
 /// Writes closure.json, closed.toml and closure.h5 into the folder, which is made where it is missing. Throws
 /// InputError where it cannot be.
 void write_closure(const std::filesystem::path& folder, const std::string& source, const record::Record& record,

@@ -16,6 +16,7 @@ namespace ringlock::closure {
 
 namespace {
 
+/// Effects that change the phases as they are read.
 bool on_phase(const effects::Effect& effect) {
     return effect.name() == "readout_ellipse" || effect.name() == "missed_counts";
 }
@@ -69,8 +70,8 @@ std::shared_ptr<Fitted> fit_with(const record::Record& record, const Fitted& now
         }
     };
     fit_from(start);
-    if (is_random_rate(*candidate.effect)) {
-        // Without the process the rest may have gone far astray: anew from the start, too.
+    if (is_random_rate(*candidate.effect) || on_phase(*candidate.effect)) {
+        // Without it the rest may have gone far astray: anew from the start, too.
         TurnParameters anew;
         anew.effects = start.effects;
         fit_from(anew);

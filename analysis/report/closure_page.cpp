@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/closure/chance.hpp"
 #include "analysis/closure/report.hpp"
 #include "analysis/report/plot.hpp"
 #include "engine/core/atomic_path.hpp"

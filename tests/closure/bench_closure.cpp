@@ -9,9 +9,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +21,7 @@
 
 namespace {
 
+namespace record = ringlock::record;
 using namespace ringlock::test::closure;
 
 /// Whether a gyro in that condition shows the effect at all.
@@ -84,8 +83,7 @@ int main(int argc, char** argv) {
                   [&](const Case& of) { return !command.seed.empty() && std::to_string(of.seed) != command.seed; });
     // Neighbours by the same way of making: the generator takes several records at a time.
     std::stable_sort(cases.begin(), cases.end(), [](const Case& a, const Case& b) { return a.direct > b.direct; });
-    std::vector<std::optional<Outcome>> outcomes(cases.size());
-    std::atomic<std::size_t> done{0};
+    Tables tables(command.folder, cases.size(), "rad", "16 000 turns");
     constexpr std::size_t together = 8;
     oneapi::tbb::parallel_for(std::size_t{0}, (cases.size() + together - 1) / together, [&](std::size_t group) {
         const std::size_t first = group * together;
@@ -104,25 +102,23 @@ int main(int argc, char** argv) {
         });
         const auto records = make(std::span(cases).subspan(first, count));
         for (std::size_t k = first; k < first + count; ++k) {
-            if (!settled[k - first]) continue;
-            if (!command.seed.empty())
-                ringlock::record::write_record(command.folder + "/record.h5", records[k - first]);
-            try {
-                outcomes[k] = judge(cases[k], records[k - first]);
-            } catch (const std::exception& error) {
-                fmt::print(stderr, "record {} ({}): {}\n", k, cases[k].truth_text(), error.what());
+            const Case& of = cases[k];
+            const record::Record& record = records[k - first];
+            if (settled[k - first]) {
+                if (!command.seed.empty()) record::write_record(command.folder + "/record.h5", record);
+                try {
+                    const std::string where(of.kind == Kind::foreign ? ringlock::closure::name_of(of.where) : "");
+                    tables.keep(k,
+                                {of.kind, of.truth_text(), of.multiple, of.condition->name,
+                                 of.direct ? "equation" : "map", of.seed, values_of(of.truth), where},
+                                judge(of, record));
+                } catch (const std::exception& error) {
+                    fmt::print(stderr, "record {} ({}): {}\n", of.seed, of.truth_text(), error.what());
+                }
             }
-            const std::size_t now = ++done;
-            if (now % 50 == 0) fmt::print(stderr, "{} of {} records\n", now, cases.size());
+            tables.count();
         }
     });
-
-    std::vector<TableRow> truths;
-    for (const Case& of : cases) {
-        truths.push_back({of.kind, of.truth_text(), of.multiple, of.condition->name, of.direct ? "equation" : "map",
-                          of.seed, values_of(of.truth),
-                          of.kind == Kind::foreign ? std::string(ringlock::closure::name_of(of.where)) : ""});
-    }
-    write_tables(command.folder, truths, outcomes, "rad", "16 000 turns");
+    tables.write();
     return 0;
 }

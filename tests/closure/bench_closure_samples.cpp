@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
-#include <atomic>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -64,27 +63,23 @@ int main(int argc, char** argv) {
     std::vector<SampleCase> cases = all_cases(command);
     std::erase_if(
         cases, [&](const SampleCase& of) { return !command.seed.empty() && std::to_string(of.seed) != command.seed; });
-    Outcomes outcomes(cases.size());
-    std::atomic<std::size_t> done{0};
+    Tables tables(command.folder, cases.size(), "arcsec", "30 000 samples");
     oneapi::tbb::parallel_for(std::size_t{0}, cases.size(), [&](std::size_t k) {
         try {
             if (cases[k].multiple > 0.0) settle(cases[k]);
             const auto record = make(cases[k]);
             if (!command.seed.empty()) ringlock::record::write_record(command.folder + "/record.h5", record);
-            outcomes[k] = judge(cases[k], record);
+            const SampleCase& of = cases[k];
+            const std::string where(of.kind == Kind::foreign ? ringlock::closure::name_of(of.where) : "");
+            tables.keep(k,
+                        {of.kind, of.truth_text(), of.multiple, of.condition->name, "samples", of.seed,
+                         values_of(of.truth), where},
+                        judge(of, record));
         } catch (const std::exception& error) {
             fmt::print(stderr, "record {} ({}): {}\n", cases[k].seed, cases[k].truth_text(), error.what());
         }
-        const std::size_t now = ++done;
-        if (now % 50 == 0) fmt::print(stderr, "{} of {} records\n", now, cases.size());
+        tables.count();
     });
-
-    std::vector<TableRow> truths;
-    for (const SampleCase& of : cases) {
-        truths.push_back({of.kind, of.truth_text(), of.multiple, of.condition->name, "samples", of.seed,
-                          values_of(of.truth),
-                          of.kind == Kind::foreign ? std::string(ringlock::closure::name_of(of.where)) : ""});
-    }
-    write_tables(command.folder, truths, outcomes, "arcsec", "30 000 samples");
+    tables.write();
     return 0;
 }

@@ -187,19 +187,35 @@ std::string values_of(const std::vector<Added>& truth) {
     return values;
 }
 
-void write_tables(const std::string& folder, const std::vector<TableRow>& truths, const Outcomes& outcomes,
-                  const char* unit, const char* record_length) {
-    std::ofstream rows(folder + "/records.csv");
-    std::ofstream deviations(folder + "/deviations.csv");
+Tables::Tables(std::string folder, std::size_t records, const char* unit, const char* record_length)
+    : folder_(std::move(folder)), unit_(unit), record_length_(record_length), truths_(records), outcomes_(records) {}
+
+void Tables::keep(std::size_t k, TableRow truth, Outcome outcome) {
+    const std::lock_guard lock(filling_);
+    truths_[k] = std::move(truth);
+    outcomes_[k] = std::move(outcome);
+}
+
+void Tables::count() {
+    constexpr std::size_t now_and_then = 50;
+    const std::lock_guard lock(filling_);
+    if (++done_ % now_and_then != 0) return;
+    fmt::print(stderr, "{} of {} records\n", done_, outcomes_.size());
+    write();
+}
+
+void Tables::write() const {
+    std::ofstream rows(folder_ + "/records.csv");
+    std::ofstream deviations(folder_ + "/deviations.csv");
     fmt::print(rows,
                "kind,truth,multiple,condition,by,seed,values,judged,false_name,verdict,named,where,expected,"
                "before_{0},after_{0},floor_{0},oracle_{0},seconds\n",
-               unit);
+               unit_);
     fmt::print(deviations, "kind,truth,condition,seed,parameter,estimate,standard_error,standard_errors_off\n");
-    for (std::size_t k = 0; k < truths.size(); ++k) {
-        if (!outcomes[k]) continue;
-        const TableRow& of = truths[k];
-        const Outcome& o = *outcomes[k];
+    for (std::size_t k = 0; k < truths_.size(); ++k) {
+        if (!outcomes_[k]) continue;
+        const TableRow& of = truths_[k];
+        const Outcome& o = *outcomes_[k];
         fmt::print(rows, "{},{},{},\"{}\",{},{},{},{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.2f}\n",
                    name_of(of.kind), of.truth, of.multiple, of.condition, of.by, of.seed, of.values, name_of(o.judged),
                    o.false_name ? 1 : 0, o.verdict, o.named, o.where, of.expected, o.before, o.after, o.floor, o.oracle,
@@ -209,13 +225,13 @@ void write_tables(const std::string& folder, const std::vector<TableRow>& truths
                        of.condition, of.seed, d.parameter, d.value, d.sd, d.standard_errors);
         }
     }
-    std::ofstream figures(folder + "/figures.md");
-    std::ofstream confusion(folder + "/confusion.md");
-    std::ofstream matrix(folder + "/confusion.csv");
-    std::ofstream calibration(folder + "/calibration.md");
-    write_figures(figures, truths, outcomes, record_length);
-    write_confusion(confusion, matrix, truths, outcomes);
-    write_calibration(calibration, outcomes);
+    std::ofstream figures(folder_ + "/figures.md");
+    std::ofstream confusion(folder_ + "/confusion.md");
+    std::ofstream matrix(folder_ + "/confusion.csv");
+    std::ofstream calibration(folder_ + "/calibration.md");
+    write_figures(figures, truths_, outcomes_, record_length_);
+    write_confusion(confusion, matrix, truths_, outcomes_);
+    write_calibration(calibration, outcomes_);
 }
 
 }  // namespace ringlock::test::closure

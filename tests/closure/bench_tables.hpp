@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,8 +37,25 @@ std::string values_of(const std::vector<Added>& truth);
 
 using Outcomes = std::vector<std::optional<Outcome>>;
 
-/// Everything that a bench leaves in its folder. `unit` is that of the errors.
-void write_tables(const std::string& folder, const std::vector<TableRow>& truths, const Outcomes& outcomes,
-                  const char* unit, const char* record_length);
+/// Everything that a bench leaves in its folder. Many threads may fill it.
+class Tables {
+   public:
+    /// `unit` is that of the errors.
+    Tables(std::string folder, std::size_t records, const char* unit, const char* record_length);
+    /// What came of record k. All that is known is written now and then, so that a bench that is stopped leaves that.
+    void keep(std::size_t k, TableRow truth, Outcome outcome);
+    /// That a record is done with, which leaves nothing where an error has gone before.
+    void count();
+    void write() const;
+
+   private:
+    std::string folder_;
+    const char* unit_;
+    const char* record_length_;
+    std::vector<TableRow> truths_;
+    Outcomes outcomes_;
+    std::size_t done_ = 0;
+    std::mutex filling_;
+};
 
 }  // namespace ringlock::test::closure

@@ -265,6 +265,14 @@ TEST(Whitening, IsTheCholeskyFactorOfTheCovariance) {
         EXPECT_NEAR(whitening.sd_rad()[i], factor(row, row), 1e-9);
         EXPECT_NEAR(white[i], expected(row), 1e-8);
     }
+    // The density of phases, of which innovations are a function: its determinant is beside that of the filter.
+    double minus_log = 0.5 * expected.squaredNorm();
+    for (std::size_t i = 0; i < n; ++i) {
+        const auto row = static_cast<Eigen::Index>(i);
+        minus_log += std::log(factor(row, row)) - std::log(1.0 - frame.before_slope[i]);
+    }
+    const std::vector<std::uint8_t> all(n, 1);
+    EXPECT_NEAR(Whitening::minus_log_likelihood(frame, noise, series, all), minus_log, 1e-8);
 }
 
 TEST(JoinedPhase, CountAndQuadratureMayDifferByAQuarterAtItsEdge) {
@@ -313,6 +321,21 @@ TEST(Chance, KnowsItsTables) {
     // A statistic that does not vary with the nuisance needs no correction.
     EXPECT_NEAR(davies_bound(9.0, {3.0, 3.0, 3.0}), chi2_tail(9.0, 1), 1e-15);
     EXPECT_GT(davies_bound(9.0, {-3.0, 3.0, -3.0}), 3.0 * chi2_tail(9.0, 1));
+}
+
+TEST(Chance, AmplitudesAreIntegratedOutWithTheirLikeliestVariance) {
+    // x normal about an amplitude, that about zero with g times its variance: log of the ratio of densities is
+    // x^2/2 g/(1 + g) - log(1 + g)/2, twice as much for two.
+    for (const int amplitudes : {1, 2, 5}) {
+        for (const double gain : {0.3, 3.0, 8.0, 200.0}) {
+            double most = 0.0;
+            for (double g = 0.0; g < 3.0 * gain; g += 1e-3) {
+                most = std::max(most, gain * g / (1.0 + g) - 0.5 * amplitudes * std::log1p(g));
+            }
+            EXPECT_NEAR(gain - cost_of_amplitudes(gain, amplitudes), most, 1e-5) << amplitudes << " " << gain;
+        }
+    }
+    EXPECT_EQ(cost_of_amplitudes(7.0, 0), 0.0);
 }
 
 }  // namespace

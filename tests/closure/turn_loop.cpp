@@ -79,6 +79,40 @@ TEST(TurnLoop, ALockedGyroIsNoRiddle) {
     EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("locked")));
 }
 
+TEST(TurnLoop, ALockedGyroTellsItsThresholdWithAnHonestError) {
+    // By how fast it locks. All that the lock-in does before a turn follows from the very phase that is read there.
+    constexpr int gyros = 12;
+    double squares = 0.0;
+    for (int k = 0; k < gyros; ++k) {
+        scenario::Scenario scenario = gyro(6000, 300 + static_cast<std::uint64_t>(k), 0.0);
+        scenario.input.rate_deg_h = scenario.input.sweep_stop_deg_h = 0.1 * k - 0.5;
+        const Closure closure = close_loop(instrument::simulate_record(scenario));
+        EXPECT_EQ(closure.verdict, Verdict::nothing_missing)
+            << k << (closure.unexplained ? closure.unexplained->description() : "");
+        if (closure.verdict != Verdict::nothing_missing) print("locked", closure);
+        const double off = deviation(closure.base, "lockin_threshold_deg_h", 300.0);
+        EXPECT_LT(off, 4.0) << k;
+        squares += off * off;
+    }
+    std::printf("threshold of locked gyros: rms %.2f standard errors\n", std::sqrt(squares / gyros));
+    // Chi-squared of twelve: one in 2000 is above 34.
+    EXPECT_LT(squares, 34.0);
+}
+
+TEST(TurnLoop, WhatIsReadAgainIsFittedAnew) {
+    // What quarters lost made of the noise is not what the record has once they are counted again.
+    scenario::Scenario scenario = gyro(16000, 400, 0.0);
+    scenario.dither.amplitude_wander_relative_rt_s = 1e-5;
+    scenario.input.profile_time_s = {0.0, 20.0, 21.0, 40.0, 41.0, 1000.0};
+    scenario.input.profile_rate_deg_h = {100.0, 100.0, -200.0, -200.0, 150.0, 150.0};
+    scenario.effects.at("missed_counts").at("probability_per_turn") = 2e-3;
+    const Closure closure = close_loop(instrument::simulate_record(scenario));
+    print("missed counts, moving", closure);
+    ASSERT_EQ(closure.steps.size(), 1U);
+    EXPECT_EQ(closure.verdict, Verdict::closed);
+    EXPECT_LT(closure.heldout_after, 0.01);
+}
+
 struct Single {
     const char* effect;
     std::vector<std::pair<std::string, double>> values;
