@@ -9,6 +9,7 @@
 #include <complex>
 #include <memory>
 #include <numbers>
+#include <numeric>
 #include <unsupported/Eigen/FFT>
 #include <utility>
 
@@ -89,6 +90,24 @@ void test_phase(const TurnFit& fit, std::vector<View>& views) {
     }
 }
 
+/// Gain of the Kalman filter of a walk read with noise (Harvey 1989, section 4.1), whose variances the covariances of
+/// its steps tell.
+double gain_of_walk(const std::vector<double>& series) {
+    double variance = 0.0;
+    double next = 0.0;
+    const std::size_t n = series.size() - 2;  // the last swing is not known
+    for (std::size_t i = 1; i < n; ++i) {
+        const double step = series[i] - series[i - 1];
+        variance += step * step / static_cast<double>(n);
+        next += step * (series[i + 1] - series[i]) / static_cast<double>(n);
+    }
+    const double read = std::max(-next, 0.0);
+    // What is less than four standard errors may be none.
+    const double seen = variance + 2.0 * next - 4.0 * std::sqrt(6.0 / static_cast<double>(n)) * variance;
+    const double walk = std::max(seen, 0.0);
+    return std::clamp(2.0 * walk / (walk + std::sqrt(walk * walk + 4.0 * walk * read) + 1e-300), 1.0 / 200.0, 0.5);
+}
+
 void test_rates(const TurnFit& fit, std::vector<View>& views) {
     const auto& series = fit.model().series();
     const std::size_t n = series.size();
@@ -119,15 +138,14 @@ void test_rates(const TurnFit& fit, std::vector<View>& views) {
         against(Where::rate, "rates that follow the input rate, its square and its cube",
                 {integral(fit, series.input_rate_deg_h), integral(fit, square), integral(fit, cube)});
     }
-    // The amplitude of the cycles before, what the residual itself has done to it staying out, as well as the noise
-    // lets it be known: the gain of the Kalman filter of a walk (Harvey 1989, section 4.1).
-    const TurnParameters& p = fit.parameters();
-    const double walk = p.wander_sd_rad * p.wander_sd_rad;
-    const double read = 0.5 * (p.readout_sd_rad * p.readout_sd_rad + p.injected_sd_rad * p.injected_sd_rad);
-    const double memory =
-        std::clamp(2.0 * walk / (walk + std::sqrt(walk * walk + 4.0 * walk * read) + 1e-300), 1.0 / 200.0, 0.5);
+    // The amplitude of the cycles before, what the residual itself has done to it staying out.
+    const double memory = gain_of_walk(series.swing);
+    const auto stretch = static_cast<std::ptrdiff_t>(std::min<std::size_t>(n - 1, std::lround(2.0 / memory)));
+    const auto mean_of = [&](auto first) {
+        return std::accumulate(first, first + stretch, 0.0) / static_cast<double>(stretch);
+    };
     std::vector<double> amplitude(n);
-    double mean = 1.0;
+    double mean = mean_of(series.swing.begin());
     for (std::size_t i = 0; i < n; ++i) {
         amplitude[i] = mean - 1.0;
         if (i > 0) mean += memory * (series.swing[i - 1] - mean);
@@ -144,9 +162,9 @@ void test_rates(const TurnFit& fit, std::vector<View>& views) {
     against(Where::amplitude, "rates that follow the dither's amplitude and its square", angles(amplitude));
     if (!views.empty() && views.back().test.where == Where::amplitude) {
         // What it explains, once it is known to explain something: with the cycles after as well.
-        views.back().columns = [&fit, &series, amplitude, angles, memory, n] {
+        views.back().columns = [&series, amplitude, angles, memory, n, last = mean_of(series.swing.rbegin() + 1)] {
             std::vector<double> change = amplitude;
-            double after = 1.0;
+            double after = last;
             for (std::size_t i = n; i-- > 0;) {
                 if (i + 1 < n) after += memory * (series.swing[i] - after);
                 change[i] = 0.5 * (change[i] + after - 1.0);

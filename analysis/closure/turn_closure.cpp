@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <optional>
 
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decision.hpp"
@@ -97,6 +98,11 @@ void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
          setup.dither_peak_rate_deg_s * fitted.fit->sd_rad().front() / (fitted.series.amplitude_rad * std::sqrt(n))});
 }
 
+bool follows_column(const View& view) {
+    return view.test.where == Where::temperature || view.test.where == Where::rate ||
+           view.test.where == Where::amplitude;
+}
+
 /// Whether some view of the residual explains more than the best effect, the noise fitted anew beside either: then
 /// that one is only what comes nearest to something that the library does not have.
 ///
@@ -105,6 +111,7 @@ void add_dither(std::vector<Estimate>& base, const Fitted& fitted) {
 bool something_else(const TurnFit& fit, const Choice& choice) {
     constexpr std::size_t looked_at = 4;
     constexpr double first_order = 0.02;
+    constexpr double noise_of_column = 0.1;
     auto views = view_residual(fit);
     std::erase_if(views, [](const View& view) { return !view.columns || view.test.merit < tie; });
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
@@ -115,9 +122,11 @@ bool something_else(const TurnFit& fit, const Choice& choice) {
             const bool in_step =
                 view.test.where == Where::phase && held.effect->adds_angle() && fit.parameters().injected_sd_rad < 1.0;
             if (in_step) return merit > std::min(held.merit - tie, (1.0 - first_order) * held.merit);
-            // A random rate can follow what jumps, nearly as well as the jumps themselves.
-            const bool jumps = view.jumps && is_random_rate(*held.effect);
-            return merit > (jumps ? held.merit - tie : held.merit + tie);
+            if (!is_random_rate(*held.effect)) return merit > held.merit + tie;
+            // A random rate can follow what jumps nearly as well as the jumps themselves, and what follows another
+            // column better than a column with noise of its own.
+            const double least = std::min(held.merit - tie, (1.0 - noise_of_column) * held.merit);
+            return merit > (follows_column(view) ? least : view.jumps ? held.merit - tie : held.merit + tie);
         });
     });
 }
@@ -263,10 +272,15 @@ Closure close_turns(const record::Record& record) {
                                return step.effect == earlier->effect || is_random_rate(*effects::find(step.effect));
                            });
     if (on_random && closure.unexplained && closure.unexplained->where != Where::phase) {
-        // A rate is left that is none of the library's: the random one has only come nearest to it.
+        // A rate is left that is none of the library's: the random one has only come nearest to it. What it cannot
+        // follow tells where.
+        const ResidualTest told = *closure.unexplained;
         now = earlier->now;
         closure.steps = std::move(earlier->steps);
         test_what_is_left(*now->fit, closure);
+        const auto same = std::find_if(closure.tests.begin(), closure.tests.end(),
+                                       [&](const ResidualTest& test) { return test.view == told.view; });
+        closure.unexplained = same == closure.tests.end() ? told : *same;
     }
     take_residual(turns, *now, closure);
     take_figures(turns, *fit_record(record, now->fit->parameters(), Rows(turns.size(), 1)), closure);

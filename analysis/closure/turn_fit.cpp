@@ -377,6 +377,8 @@ Eigen::VectorXd TurnFit::below(const std::vector<double>& white, double value) c
 }
 
 TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors) const {
+    constexpr int most = 8;
+    constexpr double gained = 0.01;  // of the log-likelihood, by another pass
     Regression regression{0.0, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(regressors.size()))};
     TurnParameters trial = parameters_;
     TurnFrame frame = prediction_.frame;
@@ -386,7 +388,8 @@ TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors) c
         const auto at = static_cast<std::size_t>(k);
         return at < own ? columns_[at].of : regressors[at - own];
     };
-    for (int pass = 0; pass < 2; ++pass) {
+    const double before = objective(parameters_, rest_);
+    for (int pass = 0; pass < most; ++pass) {
         const Whitening whitening(frame, model_->noise(trial));
         const Eigen::VectorXd y = counted(whitening, rest);
         Eigen::MatrixXd x(y.size(), static_cast<Eigen::Index>(own + regressors.size()));
@@ -403,8 +406,11 @@ TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors) c
         for (Eigen::Index k = 0; k < x.cols(); ++k) column_of(k).take(value(k), rest, frame);
         regression.value += value.tail(static_cast<Eigen::Index>(regressors.size()));
         trial = with_noise_of(frame, trial, rest);
+        const double gain = before - objective(frame, trial, rest);
+        const bool arrived = pass > 0 && gain - regression.gain < gained;
+        regression.gain = gain;
+        if (arrived) break;
     }
-    regression.gain = objective(parameters_, rest_) - objective(frame, trial, rest);
     return regression;
 }
 

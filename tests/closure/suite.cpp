@@ -301,7 +301,7 @@ std::vector<Case> foreign_cases(std::size_t each) {
             {"lockin_third_harmonic",
              {{"ratio", injected ? even(0.1, 0.4) : even(0.02, 0.4)}, {"phase_rad", between(-3.0, 3.0)}}});
         add(0, Where::time, {"telegraph_bias", {{"step_deg_h", even(1e-3, 1e-1)}, {"dwell_s", between(4.0, 10.0)}}});
-        add(2, Where::rate, {"bias_per_rate_squared_h_deg", {{"", even(1e-8, 1e-6)}}});
+        add(2, Where::rate, {"bias_per_rate_squared_h_deg", {{"", even(1e-7, 1e-5)}}});
         add(2, Where::amplitude, {"bias_per_relative_amplitude_deg_h", {{"", even(100.0, 10000.0)}}});
         add(k % 2, Where::frequency,
             {"chirped_line",
