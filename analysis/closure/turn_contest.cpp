@@ -56,9 +56,10 @@ std::vector<Candidate> worth_a_fit(std::vector<Candidate> candidates, double lar
     return candidates;
 }
 
-/// All parameters of the model with it; none where no motion of a gyro with such parameters can be followed.
+/// All parameters of the model with it; none where no motion of a gyro with such parameters can be followed. `alike` is
+/// a model that has another random rate in its place, where there is one.
 std::shared_ptr<Fitted> fit_with(const record::Record& record, const Fitted& now, const Candidate& candidate,
-                                 const Rows& rows) {
+                                 const Rows& rows, const Fitted* alike = nullptr) {
     TurnParameters start = now.fit->parameters();
     start.effects.push_back({candidate.effect, candidate.values});
     std::shared_ptr<Fitted> best;
@@ -71,8 +72,8 @@ std::shared_ptr<Fitted> fit_with(const record::Record& record, const Fitted& now
     };
     fit_from(start);
     if (is_random_rate(*candidate.effect) || on_phase(*candidate.effect)) {
-        // Without it the rest may have gone far astray: anew from the start, too.
-        TurnParameters anew;
+        // Without it the rest may have gone far astray: anew, too, from where another has led or from the start.
+        TurnParameters anew = alike != nullptr ? alike->fit->parameters() : TurnParameters{};
         anew.effects = start.effects;
         fit_from(anew);
     }
@@ -151,15 +152,28 @@ Contest hold_contest(const record::Record& record, const Fitted& now, const Rows
         candidates = worth_a_fit(std::move(candidates), worth_looking, most);
     }
     std::vector<Contender> contenders(candidates.size());
-    oneapi::tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t k) {
+    std::vector<std::size_t> random;
+    for (std::size_t k = 0; k < candidates.size(); ++k) {
+        if (is_random_rate(*candidates[k].effect)) random.push_back(k);
+    }
+    const auto fit_contender = [&](std::size_t k, const Fitted* alike) {
         Contender& contender = contenders[k];
-        contender.fitted = fit_with(record, now, candidates[k], rows);
+        contender.fitted = fit_with(record, now, candidates[k], rows, alike);
         contender.candidate = std::move(candidates[k]);
         if (!contender.fitted) return;
         const Candidate& candidate = contender.candidate;
         contender.merit = merit_of(contest.side ? 0.5 * candidate.chi2 : gain_of(*contender.fitted, now), candidate);
         contender.p_value = contest.side ? candidate.p_value : p_of(*contender.fitted, now, candidate);
+    };
+    // The likeliest random rate goes before the others.
+    oneapi::tbb::parallel_for(std::size_t{0}, contenders.size(), [&](std::size_t k) {
+        if (random.empty() || k == random.front() || !is_random_rate(*candidates[k].effect)) fit_contender(k, nullptr);
     });
+    if (!random.empty()) {
+        oneapi::tbb::parallel_for(std::size_t{1}, random.size(), [&](std::size_t k) {
+            fit_contender(random[k], contenders[random.front()].fitted.get());
+        });
+    }
     std::erase_if(contenders, [](const Contender& contender) { return !contender.fitted; });
     std::sort(contenders.begin(), contenders.end(),
               [](const Contender& a, const Contender& b) { return a.merit > b.merit; });
@@ -189,7 +203,6 @@ std::vector<Account> pairs(const record::Record& record, const std::vector<Conte
     for (const Contender& contender : contenders) {
         if (is_random_rate(*contender.candidate.effect)) {
             random.push_back(&contender);
-            if (random.size() > 1) continue;
         } else if (++tried > tried_first) {
             continue;
         }

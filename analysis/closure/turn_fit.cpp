@@ -182,6 +182,7 @@ void TurnFit::fit_deterministic() {
             }
         }
         add_priors(scale, normal, &right);
+        hold_back(scale, normal);
         Eigen::VectorXd step = normal.ldlt().solve(right);
         const bool arrived = right.dot(step) < gained;
         step = step.cwiseQuotient(scale);
@@ -190,7 +191,7 @@ void TurnFit::fit_deterministic() {
         const TurnParameters from = parameters_;
         const std::vector<double> nuisance_from = nuisance_;
         bool possible = false;
-        for (double share = longest_share(step); share > 1e-3; share *= 0.5) {
+        for (double share = 1.0; share > 1e-3; share *= 0.5) {
             parameters_ = from;
             nuisance_ = nuisance_from;
             take(share * step);
@@ -222,23 +223,23 @@ double TurnFit::slope_of_objective(const Regressor& of, double step) const {
     return (at(-step) - at(step)) / (2.0 * step);
 }
 
-/// How much of a step can be taken for times to move by a part of the record only, and frequencies by a part of a
-/// period over it.
-double TurnFit::longest_share(const Eigen::VectorXd& step) const {
+/// Times move by a part of the record at once and frequencies by a part of a period over it, others as far as they
+/// will: a time between turns that count hardly shows in those that do.
+void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) const {
     constexpr double part = 0.1;
     const double duration_s = model_->series().time_s.back();
-    double share = 1.0;
-    if (effects_ == Effects::held) return share;
+    if (effects_ == Effects::held) return;
     auto k = static_cast<Eigen::Index>(nuisance_.size() + base_columns);
     for (const ActiveEffect& active : parameters_.effects) {
         for (const effects::Parameter& parameter : active.effect->parameters()) {
             if (!fitted_in_phase(*active.effect, parameter.role)) continue;
-            const double moved = std::abs(step(k++));
-            if (parameter.role == effects::Role::time) share = std::min(share, part * duration_s / moved);
-            if (parameter.role == effects::Role::frequency) share = std::min(share, part / duration_s / moved);
+            const double limit = parameter.role == effects::Role::time        ? part * duration_s
+                                 : parameter.role == effects::Role::frequency ? part / duration_s
+                                                                              : 0.0;
+            if (limit > 0.0) normal(k, k) += 1.0 / (limit * limit * scale(k) * scale(k));
+            ++k;
         }
     }
-    return share;
 }
 
 void TurnFit::take(const Eigen::VectorXd& step) {

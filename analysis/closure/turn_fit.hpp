@@ -114,7 +114,7 @@ class TurnFit {
     Eigen::VectorXd counted(const Whitening& whitening, const TurnFrame& frame, const Regressor& regressor) const;
     Eigen::VectorXd counted(const Whitening& whitening, const std::vector<double>& rest) const;
     Eigen::VectorXd below(const std::vector<double>& white, double value) const;
-    double longest_share(const Eigen::VectorXd& step) const;
+    void hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) const;
     void take(const Eigen::VectorXd& step);
     void set_rest(const TurnModel::Prediction& prediction, const std::vector<Column>& columns);
     double squares_left(const std::vector<Column>& columns, const Whitening& whitening);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <tuple>
 
 #include "analysis/closure/turn_fit.hpp"
@@ -54,7 +55,7 @@ class Objective final : public ceres::FirstOrderFunction {
         *cost = value_(x);
         if (!std::isfinite(*cost)) return false;
         if (gradient == nullptr) return true;
-        constexpr double step = 1e-3;
+        constexpr double step = 1e-2;
         std::vector<double> values(2 * size_);
         oneapi::tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t k) {
             std::vector<double> at(x, x + size_);
@@ -79,20 +80,18 @@ void TurnFit::try_other_noise() {
     constexpr double none = 1e-9;
     const double readout = parameters_.readout_sd_rad;
     if (parameters_.injected_sd_rad > readout) return;
-    const std::size_t count = knobs(parameters_, effects_ == Effects::fitted).size();
-    for (std::size_t k = 0; k < count; ++k) {
-        const Knob knob = knobs(parameters_)[k];
-        if (knob.name == "readout_noise_rad") continue;
-        const bool of_effect = !knob.effect.empty();
+    for (const bool injected : {true, false}) {
+        const auto own = [injected](TurnParameters& p) -> double& {
+            return injected ? p.injected_sd_rad : p.wander_sd_rad;
+        };
         TurnParameters other = parameters_;
-        if (*knob.value > 10.0 * none && (of_effect || *knob.value < readout)) {
-            *knobs(other)[k].value = none;
+        if (own(other) > 10.0 * none && own(other) < readout) {
+            own(other) = none;
             try_from(other);
         }
-        if (of_effect || *knobs(parameters_)[k].value > 1e-3 * readout) continue;
+        if (own(parameters_) > 1e-3 * readout) continue;
         // In place of the other one.
         other = parameters_;
-        const bool injected = knob.name == "injected_noise_rad";
         other.injected_sd_rad = injected ? 0.05 * readout : none;
         other.wander_sd_rad = injected ? none : 1e-3 * readout;
         try_from(other);
@@ -156,17 +155,57 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
     std::vector<double> x;
     const bool of_effects = effects_ == Effects::fitted;
     for (const Knob& knob : knobs(trial, of_effects)) x.push_back(std::log(std::max(*knob.value, least)));
-    const auto with = [&](const double* at) {
+    const auto size = static_cast<Eigen::Index>(x.size());
+    const Eigen::VectorXd from = Eigen::Map<const Eigen::VectorXd>(x.data(), size);
+    const auto with = [&](const Eigen::VectorXd& at) {
         TurnParameters changed = start;
-        for (const Knob& knob : knobs(changed, of_effects))
-            *knob.value = std::exp(std::clamp(*at++, smallest, largest));
+        Eigen::Index k = 0;
+        for (const Knob& knob : knobs(changed, of_effects)) {
+            *knob.value = std::exp(std::clamp(at(k++), smallest, largest));
+        }
         return changed;
     };
-    const auto value = [&](const double* at) {
-        double beyond = 0.0;
-        for (std::size_t k = 0; k < x.size(); ++k) beyond += square(at[k] - std::clamp(at[k], smallest, largest));
-        return objective(frame, with(at), rest) + beyond;
+    // From here in units of what the information says of them, beside so weak a belief that none goes far at once:
+    // what BFGS takes for its first guess of the curvature.
+    Eigen::MatrixXd information = Eigen::MatrixXd::Identity(size, size);
+    {
+        constexpr double step = 1e-3;
+        const auto innovations = [&](const Eigen::VectorXd& at) {
+            const Whitening whitening(frame, model_->noise(with(at)));
+            return std::pair(whitening.apply(rest), whitening.sd_rad());
+        };
+        const auto [white, sd] = innovations(from);
+        const std::size_t n = rest.size();
+        std::vector<Eigen::VectorXd> derivatives(x.size(), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(2 * n)));
+        oneapi::tbb::parallel_for(std::size_t{0}, x.size(), [&](std::size_t k) {
+            Eigen::VectorXd at = from;
+            at(static_cast<Eigen::Index>(k)) += step;
+            const auto [moved, moved_sd] = innovations(at);
+            for (std::size_t i = 0; i < n; ++i) {
+                if (!rows_[i]) continue;
+                const double ratio = moved_sd[i] / sd[i];
+                derivatives[k](static_cast<Eigen::Index>(i)) = (moved[i] * ratio - white[i]) / step;
+                derivatives[k](static_cast<Eigen::Index>(n + i)) = std::numbers::sqrt2 * (ratio - 1.0) / step;
+            }
+        });
+        for (Eigen::Index i = 0; i < size; ++i) {
+            for (Eigen::Index j = 0; j < size; ++j) {
+                information(i, j) +=
+                    derivatives[static_cast<std::size_t>(i)].dot(derivatives[static_cast<std::size_t>(j)]);
+            }
+        }
+        if (model_->series().radius_sd_rad > least_radius_sd_rad) information(2, 2) += 2.0 * static_cast<double>(n);
+    }
+    const Eigen::LLT<Eigen::MatrixXd> root(information);
+    const auto logarithms = [&](const double* at) -> Eigen::VectorXd {
+        return from + root.matrixU().solve(Eigen::Map<const Eigen::VectorXd>(at, size));
     };
+    const auto value = [&](const double* at) {
+        const Eigen::VectorXd logs = logarithms(at);
+        const double beyond = (logs.array() - logs.array().max(smallest).min(largest)).square().sum();
+        return objective(frame, with(logs), rest) + beyond;
+    };
+    std::fill(x.begin(), x.end(), 0.0);
     ceres::GradientProblem problem(new Objective(x.size(), value));
     ceres::GradientProblemSolver::Options options;
     options.logging_type = ceres::SILENT;
@@ -175,7 +214,7 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
     options.gradient_tolerance = 1e-4;
     ceres::GradientProblemSolver::Summary summary;
     ceres::Solve(options, problem, x.data(), &summary);
-    return with(x.data());
+    return with(logarithms(x.data()));
 }
 
 /// By Fisher's information on the variances, from the innovations' derivatives (Harvey 1989, 3.4): logarithms know
