@@ -201,6 +201,7 @@ std::vector<Account> pairs(const record::Record& record, const std::vector<Conte
     std::vector<const Contender*> random;
     std::size_t tried = 0;
     for (const Contender& contender : contenders) {
+        if (!passes(contender.p_value)) continue;
         if (is_random_rate(*contender.candidate.effect)) {
             random.push_back(&contender);
         } else if (++tried > tried_first) {
@@ -217,7 +218,12 @@ std::vector<Account> pairs(const record::Record& record, const std::vector<Conte
             const Fitted& alone = *random[a]->fitted;
             TurnParameters start = alone.fit->parameters();
             start.effects.push_back(*random[b]->fitted->fit->parameters().find(random[b]->candidate.effect->name()));
-            const auto both = fit_record(record, start, rows);
+            std::shared_ptr<Fitted> both;
+            try {
+                both = fit_record(record, start, rows);
+            } catch (const RunError&) {
+                continue;  // no motion of a gyro with such parameters can be followed
+            }
             const Candidate& second = random[b]->candidate;
             if (!passes(p_of(*both, alone, second))) continue;
             accounts.push_back(
@@ -250,8 +256,9 @@ Choice choose(const record::Record& record, const Contest& contest, const Rows& 
         return std::count_if(accounts.begin(), accounts.end(), [&](const Account& a) { return a.has(effect); });
     };
     if (partner != nullptr && in_how_many(partner) > in_how_many(choice.chosen->candidate.effect)) {
-        const auto other = std::find_if(contenders.begin(), contenders.end(),
-                                        [&](const Contender& c) { return c.candidate.effect == partner; });
+        const auto other = std::find_if(contenders.begin(), contenders.end(), [&](const Contender& c) {
+            return c.candidate.effect == partner && passes(c.p_value);
+        });
         if (other != contenders.end()) partner = std::exchange(choice.chosen, &*other)->candidate.effect;
     }
     const effects::Effect* chosen = choice.chosen->candidate.effect;
