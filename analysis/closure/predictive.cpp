@@ -135,11 +135,10 @@ class TurnSight {
         const JoinedPhase joined = join(turns, ellipse_, count_again_);
         const std::size_t n = std::min(turns.size(), measured_.size());
         const double arcsec_per_rad = measured_.setup.scale_factor_arcsec / units::two_pi;
-        std::vector<double> angle_arcsec(n);
-        for (std::size_t i = 0; i < n; ++i) {
-            angle_arcsec[i] =
-                arcsec_per_rad * joined.phase_rad[i] - measured_.input_angle_arcsec(turns.time_s[i] - turns.time_s[0]);
-        }
+        std::vector<double> time_s(n);
+        for (std::size_t i = 0; i < n; ++i) time_s[i] = turns.time_s[i] - turns.time_s[0];
+        std::vector<double> angle_arcsec = measured_.input_angles_arcsec(time_s);
+        for (std::size_t i = 0; i < n; ++i) angle_arcsec[i] = arcsec_per_rad * joined.phase_rad[i] - angle_arcsec[i];
         // A turn with half of those on either side: the dither is not in it, whatever its amplitude does.
         std::vector<double> steady_rad;
         for (std::size_t i = 1; i + 1 < n; ++i) {

@@ -55,6 +55,8 @@ Regressor difference(TurnModel::Prediction with, const TurnModel::Prediction& wi
 TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows, Effects effects)
     : model_(&model), parameters_(start), rows_(std::move(rows)), effects_(effects), nuisance_(2 + drift_terms, 0.0) {
     if (parameters_.bias_deg_h == 0.0) parameters_.bias_deg_h = model.series().mean_rate_deg_h;
+    prediction_ = model_->predict(parameters_);
+    columns_ = columns(prediction_);
     if (parameters_.injected_sd_rad > 0.0) fit_nuisances();
     fit_deterministic();
     fit_noise();
@@ -122,35 +124,33 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
     return all;
 }
 
-std::size_t TurnFit::solved(const std::vector<Column>& all) const {
-    return effects_ == Effects::held ? nuisance_.size() + base_columns : all.size();
+std::size_t TurnFit::solved() const {
+    return effects_ == Effects::held ? nuisance_.size() + base_columns : columns_.size();
 }
 
 /// Offset and amplitude, which the start knows nothing of, by the noise that it knows.
 void TurnFit::fit_nuisances() {
-    prediction_ = model_->predict(parameters_);
-    std::vector<Column> all = columns(prediction_);
-    all.erase(all.begin() + static_cast<std::ptrdiff_t>(nuisance_.size()), all.end());
-    set_rest(prediction_, all);
+    set_rest(prediction_);
     const Whitening whitening(prediction_.frame, model_->noise(parameters_));
     const Eigen::VectorXd y = counted(whitening, rest_);
-    Eigen::MatrixXd x(y.size(), all.size());
-    for (std::size_t k = 0; k < all.size(); ++k) {
-        x.col(static_cast<Eigen::Index>(k)) = counted(whitening, prediction_.frame, all[k].of);
+    Eigen::MatrixXd x(y.size(), nuisance_.size());
+    for (std::size_t k = 0; k < nuisance_.size(); ++k) {
+        x.col(static_cast<Eigen::Index>(k)) = counted(whitening, prediction_.frame, columns_[k].of);
     }
     const Eigen::VectorXd step = x.householderQr().solve(y);
-    for (std::size_t k = 0; k < all.size(); ++k) nuisance_[k] += step(static_cast<Eigen::Index>(k));
-    set_rest(prediction_, all);
+    for (std::size_t k = 0; k < nuisance_.size(); ++k) nuisance_[k] += step(static_cast<Eigen::Index>(k));
+    set_rest(prediction_);
 }
 
 void TurnFit::fit_deterministic() {
     constexpr int most = 4;
     constexpr double gained = 1e-3;  // of chi-squared, by another step
     for (int pass = 0; pass < most; ++pass) {
-        prediction_ = model_->predict(parameters_);
-        std::vector<Column> all = columns(prediction_);
-        all.erase(all.begin() + static_cast<std::ptrdiff_t>(solved(all)), all.end());
-        set_rest(prediction_, all);
+        // Those of so near a point that another step gains nothing serve as well.
+        if (moved_) columns_ = columns(prediction_);
+        moved_ = false;
+        const std::size_t count = solved();
+        set_rest(prediction_);
         TurnParameters guess = parameters_;
         const bool guessed = guess.injected_sd_rad == 0.0;
         if (guessed) {
@@ -164,22 +164,20 @@ void TurnFit::fit_deterministic() {
         const Eigen::VectorXd y = counted(whitening, rest_);
         // Beside a noise that is only guessed |1 - before'| makes up for nothing.
         const Eigen::Index used = guessed ? y.size() / 2 : y.size();
-        Eigen::MatrixXd x(y.size(), all.size());
-        Eigen::VectorXd scale(all.size());
-        for (std::size_t k = 0; k < all.size(); ++k) {
+        Eigen::MatrixXd x(y.size(), count);
+        Eigen::VectorXd scale(count);
+        for (std::size_t k = 0; k < count; ++k) {
             auto column = x.col(static_cast<Eigen::Index>(k));
-            column = counted(whitening, prediction_.frame, all[k].of);
+            column = counted(whitening, prediction_.frame, columns_[k].of);
             scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
             column /= scale(static_cast<Eigen::Index>(k));
         }
         Eigen::MatrixXd normal = x.topRows(used).transpose() * x.topRows(used);
         Eigen::VectorXd right = x.topRows(used).transpose() * y.head(used);
-        if (!guessed) {
-            for (std::size_t k = 0; k < all.size(); ++k) {
-                if (all[k].of.slope.empty()) continue;
-                const auto index = static_cast<Eigen::Index>(k);
-                right(index) = slope_of_objective(all[k].of, 1e-3 / scale(index)) / scale(index);
-            }
+        for (std::size_t k = 0; k < count && !guessed; ++k) {
+            if (columns_[k].of.slope.empty()) continue;
+            const auto index = static_cast<Eigen::Index>(k);
+            right(index) = slope_of_objective(columns_[k].of, 1e-3 / scale(index)) / scale(index);
         }
         add_priors(scale, normal, &right);
         hold_back(scale, normal);
@@ -187,28 +185,34 @@ void TurnFit::fit_deterministic() {
         const bool arrived = right.dot(step) < gained;
         step = step.cwiseQuotient(scale);
         // Times and frequencies are far from linear: shorter steps where a whole one goes far or leads uphill.
-        const double before = guessed ? squares_left(all, whitening) : objective_at(all);
+        const auto value = [&](const TurnModel::Prediction& prediction) {
+            return guessed ? squares_left(whitening) : objective_at(prediction);
+        };
+        const double before = value(prediction_);
         const TurnParameters from = parameters_;
         const std::vector<double> nuisance_from = nuisance_;
         bool possible = false;
-        for (double share = 1.0; share > 1e-3; share *= 0.5) {
+        for (double share = 1.0; share > 1e-3 && !possible; share *= 0.5) {
             parameters_ = from;
             nuisance_ = nuisance_from;
             take(share * step);
             try {
-                const double now = guessed ? squares_left(all, whitening) : objective_at(all);
+                TurnModel::Prediction prediction = model_->predict(parameters_);
+                set_rest(prediction);
+                const double now = value(prediction);
                 possible = now <= before + 1e-9 * std::abs(before) || (guessed && parameters_.effects.empty());
+                if (possible) prediction_ = std::move(prediction);
             } catch (const RunError&) {
                 possible = false;  // no motion of a gyro with such parameters can be followed
             }
-            if (possible) break;
         }
         if (!possible) {
             parameters_ = from;
             nuisance_ = nuisance_from;
+            set_rest(prediction_);
         }
-        set_rest(model_->predict(parameters_), all);
         if (arrived || !possible) break;
+        moved_ = true;
     }
 }
 
@@ -257,25 +261,22 @@ void TurnFit::take(const Eigen::VectorXd& step) {
     }
 }
 
-void TurnFit::set_rest(const TurnModel::Prediction& prediction, const std::vector<Column>& columns) {
+void TurnFit::set_rest(const TurnModel::Prediction& prediction) {
     rest_.resize(model_->series().size());
     for (std::size_t i = 0; i < rest_.size(); ++i) {
         rest_[i] = model_->phase_rad()[i] - prediction.phase_rad[i];
-        for (std::size_t k = 0; k < nuisance_.size(); ++k) rest_[i] -= nuisance_[k] * columns[k].of.series[i];
+        for (std::size_t k = 0; k < nuisance_.size(); ++k) rest_[i] -= nuisance_[k] * columns_[k].of.series[i];
     }
 }
 
-double TurnFit::squares_left(const std::vector<Column>& columns, const Whitening& whitening) {
-    set_rest(model_->predict(parameters_), columns);
+double TurnFit::squares_left(const Whitening& whitening) const {
     const auto white = whitening.apply(rest_);
     double squares = 0.0;
     for (std::size_t i = 0; i < white.size(); ++i) squares += rows_[i] ? white[i] * white[i] : 0.0;
     return squares;
 }
 
-double TurnFit::objective_at(const std::vector<Column>& columns) {
-    const TurnModel::Prediction prediction = model_->predict(parameters_);
-    set_rest(prediction, columns);
+double TurnFit::objective_at(const TurnModel::Prediction& prediction) const {
     const Belief belief = belief_of(parameters_);
     return objective(prediction.frame, parameters_, rest_) +
            0.5 * (belief.bias * belief.bias + belief.threshold * belief.threshold);
@@ -304,10 +305,8 @@ void TurnFit::add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, 
 
 void TurnFit::finish() {
     const std::size_t n = model_->series().size();
-    prediction_ = model_->predict(parameters_);
-    columns_ = columns(prediction_);
-    const std::vector<Column>& all = columns_;
-    set_rest(prediction_, all);
+    if (moved_) columns_ = columns(prediction_);
+    set_rest(prediction_);
     whitening_ = std::make_shared<Whitening>(prediction_.frame, model_->noise(parameters_));
     innovations_ = whitening_->apply(rest_);
     sd_rad_ = whitening_->sd_rad();

@@ -116,9 +116,9 @@ class TurnFit {
     Eigen::VectorXd below(const std::vector<double>& white, double value) const;
     void hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) const;
     void take(const Eigen::VectorXd& step);
-    void set_rest(const TurnModel::Prediction& prediction, const std::vector<Column>& columns);
-    double squares_left(const std::vector<Column>& columns, const Whitening& whitening);
-    double objective_at(const std::vector<Column>& columns);
+    void set_rest(const TurnModel::Prediction& prediction);
+    double squares_left(const Whitening& whitening) const;
+    double objective_at(const TurnModel::Prediction& prediction) const;  ///< with what is believed
     double slope_of_objective(const Regressor& of, double step) const;
     std::vector<Column> columns(const TurnModel::Prediction& prediction) const;
     void finish();
@@ -134,18 +134,22 @@ class TurnFit {
         return objective(prediction_.frame, parameters, rest);
     }
     double objective(const TurnFrame& frame, const TurnParameters& parameters, const std::vector<double>& rest) const;
+    /// The same under the noise of each of these parameters.
+    std::vector<double> objectives(const TurnFrame& frame, const std::vector<TurnParameters>& parameters,
+                                   const std::vector<double>& rest) const;
 
     /// How many of the columns, which those of effects come last of, are solved for.
-    std::size_t solved(const std::vector<Column>& all) const;
+    std::size_t solved() const;
 
     const TurnModel* model_;
     TurnParameters parameters_;
     Rows rows_;
     Effects effects_;
-    std::vector<double> nuisance_;  ///< offset, amplitude and its drift
-    TurnModel::Prediction prediction_;
-    std::vector<double> rest_;  ///< phases less all that is deterministic
+    std::vector<double> nuisance_;      ///< offset, amplitude and its drift
+    TurnModel::Prediction prediction_;  ///< of the parameters as they are
+    std::vector<double> rest_;          ///< phases less all that is deterministic
     std::vector<Column> columns_;
+    bool moved_ = false;  ///< far from where the columns are of
     std::vector<double> innovations_, sd_rad_;
     double log_likelihood_ = 0.0;
     Eigen::MatrixXd basis_;  ///< orthonormal, of the model's own whitened columns in the rows that count

@@ -49,26 +49,31 @@ constexpr double largest = 12.0;
 /// Ceres ends the program where a value has no finite gradient.
 class Objective final : public ceres::FirstOrderFunction {
    public:
-    Objective(std::size_t size, std::function<double(const double*)> value) : size_(size), value_(std::move(value)) {}
+    using Point = Eigen::VectorXd;
+    using Values = std::function<std::vector<double>(const std::vector<Point>&)>;  // of many points at once
+    Objective(Eigen::Index size, Values values) : size_(size), values_(std::move(values)) {}
     int NumParameters() const override { return static_cast<int>(size_); }
     bool Evaluate(const double* x, double* cost, double* gradient) const override {
-        *cost = value_(x);
+        constexpr double step = 1e-2;
+        std::vector<Point> points{Eigen::Map<const Point>(x, size_)};
+        for (Eigen::Index k = 0; gradient != nullptr && k < 2 * size_; ++k) {
+            points.push_back(points.front());
+            points.back()(k / 2) += k % 2 == 0 ? step : -step;
+        }
+        const std::vector<double> values = values_(points);
+        *cost = values.front();
         if (!std::isfinite(*cost)) return false;
         if (gradient == nullptr) return true;
-        constexpr double step = 1e-2;
-        std::vector<double> values(2 * size_);
-        oneapi::tbb::parallel_for(std::size_t{0}, values.size(), [&](std::size_t k) {
-            std::vector<double> at(x, x + size_);
-            at[k / 2] += k % 2 == 0 ? step : -step;
-            values[k] = value_(at.data());
-        });
-        for (std::size_t i = 0; i < size_; ++i) gradient[i] = (values[2 * i] - values[2 * i + 1]) / (2.0 * step);
+        for (Eigen::Index i = 0; i < size_; ++i) {
+            const auto k = static_cast<std::size_t>(2 * i);
+            gradient[i] = (values[k + 1] - values[k + 2]) / (2.0 * step);
+        }
         return std::all_of(gradient, gradient + size_, [](double g) { return std::isfinite(g); });
     }
 
    private:
-    std::size_t size_;
-    std::function<double(const double*)> value_;
+    Eigen::Index size_;
+    Values values_;
 };
 
 }  // namespace
@@ -103,6 +108,8 @@ void TurnFit::try_from(const TurnParameters& other) {
     const std::vector<double> nuisance_from = nuisance_;
     const std::vector<double> rest_from = rest_;
     const TurnModel::Prediction prediction_from = prediction_;
+    const std::vector<Column> columns_from = columns_;
+    const bool moved_from = moved_;
     const double before = objective(parameters_, rest_);
     // Summits are near one another, or one of them is none.
     constexpr double near = 20.0;
@@ -114,36 +121,41 @@ void TurnFit::try_from(const TurnParameters& other) {
     nuisance_ = nuisance_from;
     rest_ = rest_from;
     prediction_ = prediction_from;
+    columns_ = columns_from;
+    moved_ = moved_from;
+}
+
+std::vector<double> TurnFit::objectives(const TurnFrame& frame, const std::vector<TurnParameters>& parameters,
+                                        const std::vector<double>& rest) const {
+    std::vector<TurnNoise> noises;
+    for (const TurnParameters& p : parameters) noises.push_back(model_->noise(p));
+    std::vector<double> sums = Whitening::minus_log_likelihoods(frame, noises, rest, rows_);
+    // The radius of the quadrature has the noise of the phase: as many degrees of freedom again.
+    const double radius = model_->series().radius_sd_rad;
+    for (std::size_t k = 0; k < sums.size() && radius > least_radius_sd_rad; ++k) {
+        const double readout = parameters[k].readout_sd_rad;
+        const double over = radius / std::max(readout, 1e-12);
+        sums[k] += static_cast<double>(rest.size()) * (0.5 * over * over + std::log(readout));
+    }
+    return sums;
 }
 
 double TurnFit::objective(const TurnFrame& frame, const TurnParameters& parameters,
                           const std::vector<double>& rest) const {
-    double sum = Whitening::minus_log_likelihood(frame, model_->noise(parameters), rest, rows_);
-    // The radius of the quadrature has the noise of the phase: as many degrees of freedom again.
-    const double radius = model_->series().radius_sd_rad;
-    if (radius > least_radius_sd_rad) {
-        const double over = radius / std::max(parameters.readout_sd_rad, 1e-12);
-        sum += static_cast<double>(rest.size()) * (0.5 * over * over + std::log(parameters.readout_sd_rad));
-    }
-    return sum;
+    return objectives(frame, {parameters}, rest).front();
 }
 
 void TurnFit::fit_noise() {
     TurnParameters trial = parameters_;
     if (trial.injected_sd_rad == 0.0) {
-        std::vector<std::pair<double, double>> grid;
-        for (double injected = 1e-4; injected < 1e3; injected *= 4.0) {
-            for (double wander = 1e-7; wander < 1e2; wander *= 10.0) grid.emplace_back(injected, wander);
+        std::vector<TurnParameters> grid;
+        for (trial.injected_sd_rad = 1e-4; trial.injected_sd_rad < 1e3; trial.injected_sd_rad *= 4.0) {
+            for (trial.wander_sd_rad = 1e-7; trial.wander_sd_rad < 1e2; trial.wander_sd_rad *= 10.0) {
+                grid.push_back(trial);
+            }
         }
-        std::vector<double> values(grid.size());
-        oneapi::tbb::parallel_for(std::size_t{0}, grid.size(), [&](std::size_t k) {
-            TurnParameters at = parameters_;
-            std::tie(at.injected_sd_rad, at.wander_sd_rad) = grid[k];
-            values[k] = objective(at, rest_);
-        });
-        const auto best = std::min_element(values.begin(), values.end()) - values.begin();
-        std::tie(parameters_.injected_sd_rad, parameters_.wander_sd_rad) = grid[static_cast<std::size_t>(best)];
-        trial = parameters_;
+        const std::vector<double> values = objectives(prediction_.frame, grid, rest_);
+        trial = grid[static_cast<std::size_t>(std::min_element(values.begin(), values.end()) - values.begin())];
     }
     parameters_ = with_noise_of(prediction_.frame, trial, rest_);
 }
@@ -152,11 +164,13 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
                                       const std::vector<double>& rest) const {
     constexpr double least = 1e-9;
     TurnParameters trial = start;
-    std::vector<double> x;
     const bool of_effects = effects_ == Effects::fitted;
-    for (const Knob& knob : knobs(trial, of_effects)) x.push_back(std::log(std::max(*knob.value, least)));
-    const auto size = static_cast<Eigen::Index>(x.size());
-    const Eigen::VectorXd from = Eigen::Map<const Eigen::VectorXd>(x.data(), size);
+    const std::vector<Knob> turned = knobs(trial, of_effects);
+    const auto size = static_cast<Eigen::Index>(turned.size());
+    Eigen::VectorXd from(size);
+    for (Eigen::Index k = 0; k < size; ++k) {
+        from(k) = std::log(std::max(*turned[static_cast<std::size_t>(k)].value, least));
+    }
     const auto with = [&](const Eigen::VectorXd& at) {
         TurnParameters changed = start;
         Eigen::Index k = 0;
@@ -176,8 +190,9 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
         };
         const auto [white, sd] = innovations(from);
         const std::size_t n = rest.size();
-        std::vector<Eigen::VectorXd> derivatives(x.size(), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(2 * n)));
-        oneapi::tbb::parallel_for(std::size_t{0}, x.size(), [&](std::size_t k) {
+        std::vector<Eigen::VectorXd> derivatives(turned.size(),
+                                                 Eigen::VectorXd::Zero(static_cast<Eigen::Index>(2 * n)));
+        oneapi::tbb::parallel_for(std::size_t{0}, turned.size(), [&](std::size_t k) {
             Eigen::VectorXd at = from;
             at(static_cast<Eigen::Index>(k)) += step;
             const auto [moved, moved_sd] = innovations(at);
@@ -197,16 +212,21 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
         if (model_->series().radius_sd_rad > least_radius_sd_rad) information(2, 2) += 2.0 * static_cast<double>(n);
     }
     const Eigen::LLT<Eigen::MatrixXd> root(information);
-    const auto logarithms = [&](const double* at) -> Eigen::VectorXd {
-        return from + root.matrixU().solve(Eigen::Map<const Eigen::VectorXd>(at, size));
+    const auto logarithms = [&](const Objective::Point& at) -> Eigen::VectorXd {
+        return from + root.matrixU().solve(at);
     };
-    const auto value = [&](const double* at) {
-        const Eigen::VectorXd logs = logarithms(at);
-        const double beyond = (logs.array() - logs.array().max(smallest).min(largest)).square().sum();
-        return objective(frame, with(logs), rest) + beyond;
+    const auto values = [&](const std::vector<Objective::Point>& points) {
+        std::vector<TurnParameters> changed;
+        for (const auto& point : points) changed.push_back(with(logarithms(point)));
+        std::vector<double> found = objectives(frame, changed, rest);
+        for (std::size_t k = 0; k < points.size(); ++k) {
+            const Eigen::VectorXd logs = logarithms(points[k]);
+            found[k] += (logs.array() - logs.array().max(smallest).min(largest)).square().sum();
+        }
+        return found;
     };
-    std::fill(x.begin(), x.end(), 0.0);
-    ceres::GradientProblem problem(new Objective(x.size(), value));
+    Objective::Point x = Objective::Point::Zero(size);
+    ceres::GradientProblem problem(new Objective(size, values));
     ceres::GradientProblemSolver::Options options;
     options.logging_type = ceres::SILENT;
     options.max_num_iterations = 60;
@@ -214,7 +234,7 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
     options.gradient_tolerance = 1e-4;
     ceres::GradientProblemSolver::Summary summary;
     ceres::Solve(options, problem, x.data(), &summary);
-    return with(logarithms(x.data()));
+    return with(logarithms(x));
 }
 
 /// By Fisher's information on the variances, from the innovations' derivatives (Harvey 1989, 3.4): logarithms know
@@ -298,16 +318,16 @@ TurnFit::Spread TurnFit::spread(const ActiveEffect& effect, const std::string& p
         return without - objective(trial, rest_);
     };
     const double step = std::log(10.0);
-    double best = std::log(most);
-    double best_gain = 0.0;
-    double x = best;
-    for (int k = 0; k < 11; ++k, x -= step) {
-        const double here = gain(x);
-        if (here <= best_gain) continue;
-        best_gain = here;
-        best = x;
+    std::vector<TurnParameters> grid;
+    for (int k = 0; k < 11; ++k) {
+        deviation = most * std::pow(10.0, -k);
+        grid.push_back(trial);
     }
-    if (best_gain <= 0.0) return {};
+    const std::vector<double> values = objectives(prediction_.frame, grid, rest_);
+    const auto least = std::min_element(values.begin(), values.end());
+    const double best_gain = without - *least;
+    if (!(best_gain > 0.0)) return {};
+    const double best = std::log(most) - step * static_cast<double>(least - values.begin());
     const auto [at, value] =
         boost::math::tools::brent_find_minima([&](double l) { return -gain(l); }, best - step, best + step, 12);
     return {std::exp(at), 2.0 * std::max(-value, best_gain)};

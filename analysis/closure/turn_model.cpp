@@ -151,18 +151,20 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     const Kicks& kick_of = *shared_kicks;
     const std::vector<double> swing = dither_swings(kick_of);
     std::vector<double> factors(n, 1.0);
+    const std::complex<double> coupling_turn = std::polar(device.coupling.b_rad_s, device.coupling.phase_rad);
     for (std::size_t i = 0; i < n; ++i) {
-        const double psi = phase_rad_[i];
         for (const ActiveEffect& active : parameters.effects) {
             factors[i] *= active.effect->threshold_factor(active.values, temperature_change_k(i));
         }
         // From the zero-rate point to the dither's own turn.
         const double rate_deg_h = parameters.bias_deg_h + series_.input_rate_deg_h[i];
-        const double coupling = factors[i] * device.coupling.b_rad_s * std::sin(psi + device.coupling.phase_rad);
+        const double sine = turned_[i].real() * coupling_turn.imag() + turned_[i].imag() * coupling_turn.real();
+        const double coupling = factors[i] * sine;
         prediction.turn_s[i] =
             series_.time_s[i] + series_.direction[i] * (c * rate_deg_h + coupling) / series_.acceleration_rad_s2;
     }
     const std::vector<double> turn_s = smooth(prediction.turn_s);
+    const std::vector<double> input_arcsec = series_.input_angles_arcsec(turn_s);
     double lockin = 0.0;
     double angle_arcsec = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
@@ -176,8 +178,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
                     turn_s[i] - turn_s[last],
                     {temperature_change_k(last), temperature_change_k(i)},
                     {series_.input_rate_deg_h[last], series_.input_rate_deg_h[i]}};
-        angle_arcsec += interval.duration_s * parameters.bias_deg_h +
-                        (series_.input_angle_arcsec(turn_s[i]) - series_.input_angle_arcsec(turn_s[last]));
+        angle_arcsec += interval.duration_s * parameters.bias_deg_h + (input_arcsec[i] - input_arcsec[last]);
         for (const ActiveEffect& active : parameters.effects) {
             if (active.effect->adds_angle()) {
                 angle_arcsec += active.effect->added_angle_arcsec(active.values, interval);

@@ -108,12 +108,25 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
     return joined;
 }
 
-double TurnSeries::input_angle_arcsec(double time) const {
-    const auto next = static_cast<std::size_t>(std::upper_bound(input.time_s.begin(), input.time_s.end(), time) -
-                                               input.time_s.begin());
-    if (next == 0) return (time - input.time_s[0]) * input.value[0];
-    const std::size_t k = next - 1;
-    return input_angle[k] + 0.5 * (input.value[k] + input.at(time)) * (time - input.time_s[k]);
+std::vector<double> TurnSeries::input_angles_arcsec(std::span<const double> times_s) const {
+    const std::vector<double>& row_s = input.time_s;
+    std::vector<double> angles;
+    angles.reserve(times_s.size());
+    std::size_t next = 0;  // the first row after the time
+    for (const double time : times_s) {
+        while (next < row_s.size() && row_s[next] <= time) ++next;
+        while (next > 0 && row_s[next - 1] > time) --next;
+        if (next == 0) {
+            angles.push_back((time - row_s[0]) * input.value[0]);
+            continue;
+        }
+        const std::size_t row = next - 1;
+        const double since = time - row_s[row];
+        const double slope =
+            next < row_s.size() ? (input.value[next] - input.value[row]) / (row_s[next] - row_s[row]) : 0.0;
+        angles.push_back(input_angle[row] + (input.value[row] + 0.5 * slope * since) * since);
+    }
+    return angles;
 }
 
 TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {

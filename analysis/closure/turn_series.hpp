@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -45,8 +46,9 @@ struct TurnSeries {
     bool all_phases_come = true;
 
     std::size_t size() const { return time_s.size(); }
-    /// Integral of the input rate from the first turn on [arcsec], exact between the rows of the reference.
-    double input_angle_arcsec(double time_s) const;
+    /// Integral of the input rate from the first turn on to each of these times [arcsec], exact between the rows of the
+    /// reference. Fastest where each time is near the last.
+    std::vector<double> input_angles_arcsec(std::span<const double> times_s) const;
 
     record::Track input;              ///< the reference, times since the first turn
     std::vector<double> input_angle;  ///< its integral up to each row

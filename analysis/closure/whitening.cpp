@@ -1,7 +1,8 @@
 #include "analysis/closure/whitening.hpp"
 
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -9,7 +10,14 @@ namespace ringlock::closure {
 
 namespace {
 
-using State = Whitening::State;
+/// One state of the filter (FilterNoises).
+struct State {
+    double decay = 1.0;
+    double gain_s = 0.0;
+    double noise = 0.0;
+    double with_angle = 0.0;
+    double start = 0.0;
+};
 
 /// One step of a first-order Gauss-Markov rate and of its integral, the angle; what that gains goes to `angle`.
 State rate_state(const PhaseRateTerm& term, double dt, State& angle) {
@@ -24,7 +32,7 @@ State rate_state(const PhaseRateTerm& term, double dt, State& angle) {
             term.variance_rad2_s2};
 }
 
-std::vector<State> states_of(const TurnNoise& noise, double dt) {
+std::vector<State> states_of(const TurnNoise& noise, bool walks, double dt) {
     std::vector<State> states(2);
     states[0].noise = noise.white_rad2_per_s * dt;
     states[1].noise = noise.wander_rad2;
@@ -32,139 +40,68 @@ std::vector<State> states_of(const TurnNoise& noise, double dt) {
         const State state = rate_state(term, dt, states[0]);
         states.push_back(state);
     }
-    if (noise.walk_rad2_per_s3 > 0.0) {
+    if (walks) {
         const double w = noise.walk_rad2_per_s3;
         states[0].noise += w * dt * dt * dt / 3.0;
         states.push_back({1.0, dt, w * dt, 0.5 * w * dt * dt, 0.0});
     }
-    if (states.size() > Whitening::most_states) throw std::logic_error("Whitening: too many rates");
+    if (states.size() > FilterNoises::most_states) throw std::logic_error("Whitening: too many rates");
     return states;
 }
 
-/// The filter with D states, turn after turn. As each state but the angle keeps to itself, a step takes D^2 operations.
-template <std::size_t D, class Turn>
-void run(const TurnFrame& frame, const TurnNoise& noise, const std::vector<State>& states, Turn&& turn) {
-    using Row = std::array<double, D>;
-    Row decay{};
-    Row gain_s{};
-    Row added{};
-    Row with_angle{};
-    std::array<Row, D> p{};
-    for (std::size_t s = 0; s < D; ++s) {
-        decay[s] = states[s].decay;
-        gain_s[s] = states[s].gain_s;
-        added[s] = states[s].noise;
-        with_angle[s] = states[s].with_angle;
-        p[s][s] = states[s].start;
+FilterNoises beside(std::span<const TurnNoise> noises, double dt) {
+    const bool walks =
+        std::any_of(noises.begin(), noises.end(), [](const TurnNoise& n) { return n.walk_rad2_per_s3 > 0.0; });
+    const std::size_t states = states_of(noises.front(), walks, dt).size();
+    FilterNoises all(noises.size(), states);
+    for (std::size_t k = 0; k < all.row; ++k) {
+        const TurnNoise& noise = noises[std::min(k, noises.size() - 1)];
+        const std::vector<State> of = states_of(noise, walks, dt);
+        if (of.size() != states) throw std::logic_error("Whitening: noises with different rates");
+        all.injected_rad2[k] = noise.injected_rad2;
+        all.readout_rad2[k] = noise.readout_rad2;
+        for (std::size_t s = 0; s < states; ++s) {
+            const std::size_t at = s * all.row + k;
+            all.decay[at] = of[s].decay;
+            all.gain_s[at] = of[s].gain_s;
+            all.noise[at] = of[s].noise;
+            all.with_angle[at] = of[s].with_angle;
+            all.start[at] = of[s].start;
+        }
     }
-    for (std::size_t i = 0; i < frame.sign.size(); ++i) {
-        const double sign = frame.sign[i];
-        const double through = 1.0 - frame.before_slope[i];
-        const double kick = frame.kick_slope[i];
-        Row gain;
-        for (std::size_t s = 0; s < D; ++s) gain[s] = p[0][s] + sign * p[1][s];
-        const double f =
-            std::max(gain[0] + sign * gain[1] + noise.injected_rad2 + through * through * noise.readout_rad2, 1e-30);
-        for (std::size_t s = 2; s < D; ++s) {
-            gain[0] += gain_s[s] * gain[s];
-            gain[s] *= decay[s];
-        }
-        gain[0] -= kick * through * noise.readout_rad2;
-        // P <- T P T' + Q - gain gain'/f
-        Row angle = p[0];
-        for (std::size_t s = 2; s < D; ++s) {
-            for (std::size_t j = 0; j < D; ++j) angle[j] += gain_s[s] * p[s][j];
-        }
-        for (std::size_t s = 2; s < D; ++s) angle[0] += gain_s[s] * angle[s];
-        const double over = 1.0 / f;
-        for (std::size_t s = 1; s < D; ++s) {
-            const double share = gain[s] * over;
-            for (std::size_t j = 1; j < D; ++j) p[s][j] = p[s][j] * (decay[s] * decay[j]) - share * gain[j];
-            p[s][s] += added[s];
-        }
-        for (std::size_t j = 1; j < D; ++j) {
-            p[0][j] = p[j][0] = angle[j] * decay[j] + with_angle[j] - gain[0] * over * gain[j];
-        }
-        p[0][0] = angle[0] + added[0] + kick * kick * noise.readout_rad2 - gain[0] * gain[0] * over;
-        turn(i, f, over, gain);
-    }
+    return all;
 }
-
-/// Calls `with` with the number of states as a constant.
-template <std::size_t D = 2, class With>
-void for_states(std::size_t states, With&& with) {
-    if constexpr (D <= Whitening::most_states) {
-        if (states == D) return with(std::integral_constant<std::size_t, D>{});
-        for_states<D + 1>(states, with);
-    }
-}
-
-/// State of the filter fed with a series.
-template <std::size_t D>
-struct Follower {
-    std::array<double, D> x{};
-
-    double innovation(double value, double sign) const { return value - x[0] - sign * x[1]; }
-    /// `gain` per unit of innovation, on the way to the next turn.
-    void step(const std::vector<State>& states, const double* gain, double innovation) {
-        x[0] += gain[0] * innovation;
-        x[1] += gain[1] * innovation;
-        for (std::size_t s = 2; s < D; ++s) {
-            x[0] += states[s].gain_s * x[s];
-            x[s] = states[s].decay * x[s] + gain[s] * innovation;
-        }
-    }
-};
 
 }  // namespace
 
 Whitening::Whitening(const TurnFrame& frame, const TurnNoise& noise)
-    : frame_(frame), states_(states_of(noise, frame.interval_s)) {
-    gains_.resize(frame.sign.size() * states_.size());
+    : frame_(frame), noises_(beside({&noise, 1}, frame.interval_s)) {
+    gains_.resize(frame.sign.size() * noises_.states);
     sd_.resize(frame.sign.size());
-    for_states(states_.size(), [&](auto d) {
-        run<d>(frame, noise, states_, [&](std::size_t i, double f, double over, const auto& gain) {
-            for (std::size_t s = 0; s < d; ++s) gains_[i * d + s] = gain[s] * over;
-            sd_[i] = std::sqrt(f);
-        });
-    });
+    filter_gains(frame, noises_, gains_, sd_);
 }
 
 double Whitening::minus_log_likelihood(const TurnFrame& frame, const TurnNoise& noise, std::span<const double> series,
                                        std::span<const std::uint8_t> counts) {
-    const std::vector<State> states = states_of(noise, frame.interval_s);
-    double sum = 0.0;
-    double product = 1.0;  // of variances, whose logarithms cost more than all the rest
-    for_states(states.size(), [&](auto d) {
-        Follower<d> follower;
-        run<d>(frame, noise, states, [&](std::size_t i, double f, double over, auto gain) {
-            const double innovation = follower.innovation(series[i], frame.sign[i]);
-            if (counts[i]) {
-                sum += 0.5 * innovation * innovation * over;
-                const double through = 1.0 - frame.before_slope[i];
-                product *= f / (through * through);
-                if (!(product > 1e-200 && product < 1e200)) {
-                    sum += 0.5 * std::log(product);
-                    product = 1.0;
-                }
-            }
-            for (double& g : gain) g *= over;
-            follower.step(states, gain.data(), innovation);
-        });
+    return minus_log_likelihoods(frame, {&noise, 1}, series, counts).front();
+}
+
+std::vector<double> Whitening::minus_log_likelihoods(const TurnFrame& frame, std::span<const TurnNoise> noises,
+                                                     std::span<const double> series,
+                                                     std::span<const std::uint8_t> counts) {
+    constexpr std::size_t at_once = 8;  // the longest vectors
+    std::vector<double> all(noises.size());
+    oneapi::tbb::parallel_for(std::size_t{0}, (noises.size() + at_once - 1) / at_once, [&](std::size_t part) {
+        const auto some = noises.subspan(part * at_once, std::min(at_once, noises.size() - part * at_once));
+        const auto found = filter_likelihoods(frame, beside(some, frame.interval_s), series, counts);
+        std::copy(found.begin(), found.end(), all.begin() + static_cast<std::ptrdiff_t>(part * at_once));
     });
-    return sum + 0.5 * std::log(product);
+    return all;
 }
 
 std::vector<double> Whitening::apply(std::span<const double> series) const {
     std::vector<double> out(series.size());
-    for_states(states_.size(), [&](auto d) {
-        Follower<d> follower;
-        for (std::size_t i = 0; i < series.size(); ++i) {
-            const double innovation = follower.innovation(series[i], frame_.sign[i]);
-            out[i] = innovation / sd_[i];
-            follower.step(states_, gains_.data() + i * d, innovation);
-        }
-    });
+    filter_innovations(frame_, noises_, gains_, sd_, series, out);
     return out;
 }
 

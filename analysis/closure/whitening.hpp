@@ -3,6 +3,8 @@
 #include <span>
 #include <vector>
 
+#include "analysis/closure/turn_filter.hpp"
+
 namespace ringlock::closure {
 
 /// A stationary rate with an exponential autocorrelation, in optical phase.
@@ -42,8 +44,6 @@ struct TurnFrame {
 /// 1970, section 7.3: correlated noises).
 class Whitening {
    public:
-    static constexpr std::size_t most_states = 14;
-
     Whitening(const TurnFrame& frame, const TurnNoise& noise);
 
     /// Minus the log-likelihood of the phases that leave this series, but for a constant: sum over the turns that count
@@ -53,23 +53,19 @@ class Whitening {
     static double minus_log_likelihood(const TurnFrame& frame, const TurnNoise& noise, std::span<const double> series,
                                        std::span<const std::uint8_t> counts);
 
+    /// The same under each of several noises with as many rates each, in much less time than one after the other.
+    static std::vector<double> minus_log_likelihoods(const TurnFrame& frame, std::span<const TurnNoise> noises,
+                                                     std::span<const double> series,
+                                                     std::span<const std::uint8_t> counts);
+
     /// Innovations over their standard deviations. Linear in `series`: columns of a regression go the same way.
     std::vector<double> apply(std::span<const double> series) const;
     /// Standard deviation of each innovation [rad].
     const std::vector<double>& sd_rad() const { return sd_; }
 
-    /// States of the filter: a, m, then the rates. Each but a keeps to itself: x' = decay x, a' = a + gain_s x.
-    struct State {
-        double decay = 1.0;
-        double gain_s = 0.0;
-        double noise = 0.0;       ///< variance gained from turn to turn
-        double with_angle = 0.0;  ///< covariance of that with what a gains
-        double start = 0.0;       ///< variance at the first turn
-    };
-
    private:
     const TurnFrame& frame_;
-    std::vector<State> states_;
+    FilterNoises noises_;
     std::vector<double> gains_;  // [turn][state]
     std::vector<double> sd_;
 };

@@ -1,0 +1,41 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+/// The filter of Whitening (whitening.hpp), compiled for each instruction set: for one noise, or for several at once.
+namespace ringlock::closure {
+
+struct TurnFrame;
+
+/// Noises beside one another, each with as many states: a, m, then the rates. Each state but a keeps to itself:
+/// x' = decay x, a' = a + gain_s x.
+struct FilterNoises {
+    static constexpr std::size_t most_states = 14;
+    /// Rows are as long as whole vectors of any machine.
+    FilterNoises(std::size_t noises, std::size_t states);
+
+    std::size_t noises, states, row;
+    std::vector<double> injected_rad2, readout_rad2;  // [noise]
+    // [state][noise], rows of `row`
+    std::vector<double> decay;
+    std::vector<double> gain_s;
+    std::vector<double> noise;       ///< variance gained from turn to turn
+    std::vector<double> with_angle;  ///< covariance of that with what a gains
+    std::vector<double> start;       ///< variance at the first turn
+};
+
+/// Of the first noise, gains [turn][state] per unit of innovation on the way to the next turn, and the innovations'
+/// standard deviations [rad].
+void filter_gains(const TurnFrame& frame, const FilterNoises& noises, std::span<double> gains, std::span<double> sd);
+
+/// Innovations of a series over their standard deviations, by these gains.
+void filter_innovations(const TurnFrame& frame, const FilterNoises& noises, std::span<const double> gains,
+                        std::span<const double> sd, std::span<const double> series, std::span<double> innovations);
+
+/// Minus the log-likelihood of a series under each noise (Whitening::minus_log_likelihood).
+std::vector<double> filter_likelihoods(const TurnFrame& frame, const FilterNoises& noises,
+                                       std::span<const double> series, std::span<const std::uint8_t> counts);
+
+}  // namespace ringlock::closure
