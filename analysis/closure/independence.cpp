@@ -280,7 +280,7 @@ void test_levels(const TurnFit& fit, std::vector<View>& views) {
                      cost,
                      [&fit, found] { return Columns{two_level_angle(fit, found.shape)}; },
                      std::numeric_limits<double>::infinity(),
-                     true});
+                     found.changes > 1});
 }
 
 void test_whiteness(const TurnFit& fit, std::vector<View>& views) {

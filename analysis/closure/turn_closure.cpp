@@ -253,7 +253,7 @@ Closure close_turns(const record::Record& record) {
         if (!contest.side && something_else(*now->fit, choice)) break;
         Step step;
         step.effect = std::string(best.candidate.effect->name());
-        step.p_value = best.p_value;
+        step.p_value = choice.p_value;
         step.confounded_with = choice.confounded_with;
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
         if (!earlier && choice.on_random) earlier = {now, closure.steps, step.effect};

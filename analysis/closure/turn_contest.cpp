@@ -11,6 +11,7 @@
 #include "analysis/closure/decision.hpp"
 #include "analysis/closure/side_channels.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/units.hpp"
 
 namespace ringlock::closure {
 
@@ -36,21 +37,59 @@ int free_parameters(const effects::Effect& effect) {
 /// Level of each of them, with all of the library tried.
 double level_of_one_effect() { return level_of_effects / static_cast<double>(effects::registry().size()); }
 
-/// The gain less the search, the amplitudes integrated out: so has the likelihood of a random rate its course.
-double merit_of(double gain, const Candidate& candidate) {
-    using effects::Role;
-    const int places = count_of(*candidate.effect, {Role::time, Role::frequency});
-    const int amplitudes = count_of(*candidate.effect, {Role::size, Role::phase});
-    return gain - std::log(candidate.searched) - places - cost_of_amplitudes(gain, amplitudes);
+double cost_of_own_amplitudes(double gain, const effects::Effect& effect) {
+    return cost_of_amplitudes(gain, count_of(effect, {effects::Role::size, effects::Role::phase}));
 }
 
-/// Those worth a full fit, the likeliest first; random rates beside so many others. Scores are of the noise as it is,
-/// which may have swallowed what an effect does: they only say where to look.
+/// What a score promises, by the search that it took.
+double promise_of(const Candidate& candidate) {
+    const double gain = 0.5 * candidate.chi2;
+    const int places = count_of(*candidate.effect, {effects::Role::time, effects::Role::frequency});
+    return gain - std::log(candidate.searched) - places - cost_of_own_amplitudes(gain, *candidate.effect);
+}
+
+/// The gain with the amplitudes integrated out, and times and frequencies, which may be anywhere (Laplace): so has the
+/// likelihood of a random rate its course.
+double merit_of(double gain, const Fitted& fitted, const effects::Effect& effect) {
+    double merit = gain - cost_of_own_amplitudes(gain, effect);
+    if (count_of(effect, {effects::Role::time, effects::Role::frequency}) == 0) return merit;
+    for (const Estimate& estimate : fitted.fit->estimates()) {
+        if (estimate.effect != effect.name()) continue;
+        for (const effects::Parameter& parameter : effect.parameters()) {
+            if (parameter.name != estimate.name) continue;
+            const double range = parameter.role == effects::Role::time        ? fitted.series.time_s.back()
+                                 : parameter.role == effects::Role::frequency ? 0.5 / fitted.series.interval_s
+                                                                              : 0.0;
+            if (range > 0.0) merit -= std::max(0.0, std::log(range / (std::sqrt(units::two_pi) * estimate.sd)));
+        }
+    }
+    return merit;
+}
+
+/// Scores are of the noise as it is, which may have swallowed what an effect does, or without what of it hardly shows:
+/// they only say where to look.
+std::vector<Candidate> screen_by_any_noise(const TurnFit& fit) {
+    std::vector<Candidate> candidates = screen(fit);
+    const auto less = fit.with_less_noise();
+    if (!less) return candidates;
+    for (Candidate& other : screen(*less)) {
+        if (is_random_rate(*other.effect) || !passes(other.p_value)) continue;
+        const auto same = std::find_if(candidates.begin(), candidates.end(),
+                                       [&](const Candidate& c) { return c.effect == other.effect; });
+        if (same == candidates.end()) {
+            candidates.push_back(std::move(other));
+        } else if (other.chi2 > same->chi2) {
+            *same = std::move(other);
+        }
+    }
+    return candidates;
+}
+
+/// Those worth a full fit, the likeliest first; random rates beside so many others.
 std::vector<Candidate> worth_a_fit(std::vector<Candidate> candidates, double largest_p, std::size_t most) {
     std::erase_if(candidates, [&](const Candidate& c) { return !(c.p_value < largest_p); });
-    std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-        return merit_of(0.5 * a.chi2, a) > merit_of(0.5 * b.chi2, b);
-    });
+    std::sort(candidates.begin(), candidates.end(),
+              [](const Candidate& a, const Candidate& b) { return promise_of(a) > promise_of(b); });
     std::size_t taken = 0;
     std::erase_if(candidates, [&](const Candidate& c) { return !is_random_rate(*c.effect) && ++taken > most; });
     return candidates;
@@ -145,7 +184,7 @@ Contest hold_contest(const record::Record& record, const Fitted& now, const Rows
             }
         }
     } else {
-        candidates = screen(*now.fit);
+        candidates = screen_by_any_noise(*now.fit);
         if (among == Among::not_random) {
             std::erase_if(candidates, [](const Candidate& c) { return is_random_rate(*c.effect); });
         }
@@ -162,7 +201,9 @@ Contest hold_contest(const record::Record& record, const Fitted& now, const Rows
         contender.candidate = std::move(candidates[k]);
         if (!contender.fitted) return;
         const Candidate& candidate = contender.candidate;
-        contender.merit = merit_of(contest.side ? 0.5 * candidate.chi2 : gain_of(*contender.fitted, now), candidate);
+        contender.merit = contest.side
+                              ? promise_of(candidate)
+                              : merit_of(gain_of(*contender.fitted, now), *contender.fitted, *candidate.effect);
         contender.p_value = contest.side ? candidate.p_value : p_of(*contender.fitted, now, candidate);
     };
     // The likeliest random rate goes before the others.
@@ -188,47 +229,67 @@ struct Account {
     const Contender* first;
     const effects::Effect* second = nullptr;
     double merit = 0.0;
+    double p_value = 1.0;  ///< of the first, beside the second
 
     bool has(const effects::Effect* effect) const { return first->candidate.effect == effect || second == effect; }
 };
 
-/// The likeliest of either kind with what explains most beside it, and random rates by twos.
+/// The likeliest of either kind with what explains most beside it, and random rates by twos; each needed beside the
+/// other.
 std::vector<Account> pairs(const record::Record& record, const std::vector<Contender>& contenders, const Rows& rows) {
     constexpr std::size_t tried_first = 3;
     constexpr std::size_t tried_second = 2;
     const double second_choice = std::log(static_cast<double>(effects::registry().size()));
     std::vector<Account> accounts;
+    const auto add = [&](const Contender& first, const Fitted& both, const Candidate& second) {
+        const auto alone = std::find_if(contenders.begin(), contenders.end(),
+                                        [&](const Contender& c) { return c.candidate.effect == second.effect; });
+        double p_value = first.p_value;
+        if (alone != contenders.end()) p_value = p_of(both, *alone->fitted, first.candidate);
+        if (!passes(p_value) || !passes(p_of(both, *first.fitted, second))) return;
+        const double merit = merit_of(gain_of(both, *first.fitted), both, *second.effect);
+        accounts.push_back({&first, second.effect, first.merit + merit - second_choice, p_value});
+    };
+    std::vector<const Contender*> firsts;
     std::vector<const Contender*> random;
     std::size_t tried = 0;
     for (const Contender& contender : contenders) {
-        if (!passes(contender.p_value)) continue;
-        if (is_random_rate(*contender.candidate.effect)) {
-            random.push_back(&contender);
-        } else if (++tried > tried_first) {
-            continue;
+        const bool is_random = is_random_rate(*contender.candidate.effect);
+        if (is_random ? !passes(contender.p_value) : ++tried > tried_first) continue;
+        firsts.push_back(&contender);
+        if (is_random) random.push_back(&contender);
+    }
+    struct Pair {
+        const Contender* first;
+        const Contender* second;
+        std::shared_ptr<Fitted> both = {};
+    };
+    std::vector<Pair> of_random;
+    for (std::size_t a = 0; a < random.size(); ++a) {
+        for (std::size_t b = a + 1; b < random.size(); ++b) of_random.push_back({random[a], random[b]});
+    }
+    std::vector<Contest> beside(firsts.size());
+    oneapi::tbb::parallel_for(std::size_t{0}, firsts.size() + of_random.size(), [&](std::size_t k) {
+        if (k < firsts.size()) {
+            beside[k] = hold_contest(record, *firsts[k]->fitted, rows, tried_second, Among::not_random);
+            return;
         }
-        const Contest beside = hold_contest(record, *contender.fitted, rows, tried_second, Among::not_random);
-        for (const Contender& other : beside.contenders) {
-            if (beside.side || !passes(other.p_value)) continue;
-            accounts.push_back({&contender, other.candidate.effect, contender.merit + other.merit - second_choice});
+        Pair& pair = of_random[k - firsts.size()];
+        TurnParameters start = pair.first->fitted->fit->parameters();
+        start.effects.push_back(*pair.second->fitted->fit->parameters().find(pair.second->candidate.effect->name()));
+        try {
+            pair.both = fit_record(record, start, rows);
+        } catch (const RunError&) {
+            // no motion of a gyro with such parameters can be followed
+        }
+    });
+    for (std::size_t k = 0; k < firsts.size(); ++k) {
+        for (const Contender& other : beside[k].contenders) {
+            if (!beside[k].side) add(*firsts[k], *other.fitted, other.candidate);
         }
     }
-    for (std::size_t a = 0; a < random.size(); ++a) {
-        for (std::size_t b = a + 1; b < random.size(); ++b) {
-            const Fitted& alone = *random[a]->fitted;
-            TurnParameters start = alone.fit->parameters();
-            start.effects.push_back(*random[b]->fitted->fit->parameters().find(random[b]->candidate.effect->name()));
-            std::shared_ptr<Fitted> both;
-            try {
-                both = fit_record(record, start, rows);
-            } catch (const RunError&) {
-                continue;  // no motion of a gyro with such parameters can be followed
-            }
-            const Candidate& second = random[b]->candidate;
-            if (!passes(p_of(*both, alone, second))) continue;
-            accounts.push_back(
-                {random[a], second.effect, random[a]->merit + merit_of(gain_of(*both, alone), second) - second_choice});
-        }
+    for (const Pair& pair : of_random) {
+        if (pair.both) add(*pair.first, *pair.both, pair.second->candidate);
     }
     return accounts;
 }
@@ -240,7 +301,9 @@ Choice choose(const record::Record& record, const Contest& contest, const Rows& 
     const auto& contenders = contest.contenders;
     if (contenders.empty() || !passes(contenders.front().p_value)) return choice;
     std::vector<Account> accounts;
-    for (const Contender& contender : contenders) accounts.push_back({&contender, nullptr, contender.merit});
+    for (const Contender& contender : contenders) {
+        accounts.push_back({&contender, nullptr, contender.merit, contender.p_value});
+    }
     if (!contest.side && is_random_rate(*contenders.front().candidate.effect)) {
         for (const Account& pair : pairs(record, contenders, rows)) accounts.push_back(pair);
     }
@@ -251,6 +314,7 @@ Choice choose(const record::Record& record, const Contest& contest, const Rows& 
 
     // Of a pair, what more of those as likely have in them.
     choice.chosen = accounts.front().first;
+    choice.p_value = accounts.front().p_value;
     const effects::Effect* partner = accounts.front().second;
     const auto in_how_many = [&](const effects::Effect* effect) {
         return std::count_if(accounts.begin(), accounts.end(), [&](const Account& a) { return a.has(effect); });
@@ -259,7 +323,10 @@ Choice choose(const record::Record& record, const Contest& contest, const Rows& 
         const auto other = std::find_if(contenders.begin(), contenders.end(), [&](const Contender& c) {
             return c.candidate.effect == partner && passes(c.p_value);
         });
-        if (other != contenders.end()) partner = std::exchange(choice.chosen, &*other)->candidate.effect;
+        if (other != contenders.end()) {
+            partner = std::exchange(choice.chosen, &*other)->candidate.effect;
+            choice.p_value = other->p_value;
+        }
     }
     const effects::Effect* chosen = choice.chosen->candidate.effect;
     choice.held.push_back({chosen, accounts.front().merit});

@@ -58,6 +58,7 @@ struct Held {
 /// What to add, if anything.
 struct Choice {
     const Contender* chosen = nullptr;
+    double p_value = 1.0;    ///< beside what explains the record with it
     std::vector<Held> held;  ///< it and all that explain about as much
     bool on_random = false;  ///< it is a random rate, or was chosen with one beside it
     std::vector<std::string> confounded_with;

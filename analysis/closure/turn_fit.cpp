@@ -58,10 +58,23 @@ TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows,
     prediction_ = model_->predict(parameters_);
     columns_ = columns(prediction_);
     if (parameters_.injected_sd_rad > 0.0) fit_nuisances();
-    fit_deterministic();
+    fit_deterministic(4);
     fit_noise();
     climb();
     try_other_noise();
+    finish();
+}
+
+TurnFit::TurnFit(const TurnFit& of, TurnParameters parameters)
+    : model_(of.model_),
+      parameters_(std::move(parameters)),
+      rows_(of.rows_),
+      effects_(of.effects_),
+      nuisance_(of.nuisance_),
+      prediction_(of.prediction_),
+      columns_(of.columns_),
+      moved_(of.moved_) {
+    fit_deterministic(20);
     finish();
 }
 
@@ -70,7 +83,7 @@ void TurnFit::climb() {
     constexpr double gained = 0.01;
     for (int round = 0; round < most; ++round) {
         const double before = objective(parameters_, rest_);
-        fit_deterministic();
+        fit_deterministic(4);
         fit_noise();
         if (before - objective(parameters_, rest_) < gained) break;
     }
@@ -142,8 +155,7 @@ void TurnFit::fit_nuisances() {
     set_rest(prediction_);
 }
 
-void TurnFit::fit_deterministic() {
-    constexpr int most = 4;
+void TurnFit::fit_deterministic(int most) {
     constexpr double gained = 1e-3;  // of chi-squared, by another step
     for (int pass = 0; pass < most; ++pass) {
         // Those of so near a point that another step gains nothing serve as well.
@@ -181,10 +193,7 @@ void TurnFit::fit_deterministic() {
         }
         add_priors(scale, normal, &right);
         hold_back(scale, normal);
-        Eigen::VectorXd step = normal.ldlt().solve(right);
-        const bool arrived = right.dot(step) < gained;
-        step = step.cwiseQuotient(scale);
-        // Times and frequencies are far from linear: shorter steps where a whole one goes far or leads uphill.
+        const bool arrived = right.dot(normal.ldlt().solve(right)) < gained;
         const auto value = [&](const TurnModel::Prediction& prediction) {
             return guessed ? squares_left(whitening) : objective_at(prediction);
         };
@@ -192,15 +201,20 @@ void TurnFit::fit_deterministic() {
         const TurnParameters from = parameters_;
         const std::vector<double> nuisance_from = nuisance_;
         bool possible = false;
-        for (double share = 1.0; share > 1e-3 && !possible; share *= 0.5) {
+        bool gaining = true;
+        // Times, frequencies and phases are far from linear: shorter steps where a whole one goes far or leads uphill
+        // (Levenberg 1944), in units of each parameter's own information.
+        for (double damping = 0.0; damping < 1e5 && !possible; damping = std::max(1e-3, 10.0 * damping)) {
+            const Eigen::MatrixXd damped = normal + damping * Eigen::MatrixXd::Identity(normal.rows(), normal.cols());
             parameters_ = from;
             nuisance_ = nuisance_from;
-            take(share * step);
+            take(damped.ldlt().solve(right).cwiseQuotient(scale));
             try {
                 TurnModel::Prediction prediction = model_->predict(parameters_);
                 set_rest(prediction);
                 const double now = value(prediction);
                 possible = now <= before + 1e-9 * std::abs(before) || (guessed && parameters_.effects.empty());
+                gaining = !(std::abs(before - now) < 0.5 * gained);
                 if (possible) prediction_ = std::move(prediction);
             } catch (const RunError&) {
                 possible = false;  // no motion of a gyro with such parameters can be followed
@@ -211,7 +225,7 @@ void TurnFit::fit_deterministic() {
             nuisance_ = nuisance_from;
             set_rest(prediction_);
         }
-        if (arrived || !possible) break;
+        if (arrived || !gaining || !possible) break;
         moved_ = true;
     }
 }

@@ -54,6 +54,10 @@ class TurnFit {
     TurnFit(const TurnFit&) = delete;  // the filter refers to what the fit holds
     TurnFit& operator=(const TurnFit&) = delete;
 
+    /// The same without the noise that hardly shows, for scores: it may have swallowed what an effect does. None where
+    /// all of it shows.
+    std::unique_ptr<TurnFit> with_less_noise() const;
+
     const TurnModel& model() const { return *model_; }
     const TurnParameters& parameters() const { return parameters_; }
     /// Base parameters and those of effects, with standard errors.
@@ -98,12 +102,13 @@ class TurnFit {
     Spread spread(const ActiveEffect& effect, const std::string& parameter, double most) const;
 
    private:
+    TurnFit(const TurnFit& of, TurnParameters parameters);  ///< with that noise
     struct Column {
         std::string effect, name;
         Regressor of;
     };
     void fit_nuisances();
-    void fit_deterministic();
+    void fit_deterministic(int most);  ///< passes
     void climb();
     void fit_noise();
     void try_other_noise();

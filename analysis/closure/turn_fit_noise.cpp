@@ -1,5 +1,6 @@
 // The random part of the fit: standard deviations, by the likelihood of what the deterministic part leaves.
 #include <ceres/ceres.h>
+#include <glog/logging.h>
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
@@ -16,6 +17,7 @@ namespace ringlock::closure {
 
 namespace {
 
+constexpr double no_noise = 1e-9;             // rad: far below what shows
 constexpr double least_radius_sd_rad = 1e-7;  // below: a radius that shows no noise tells nothing of the phase's
 
 double square(double value) { return value * value; }
@@ -26,6 +28,7 @@ struct Knob {
     double* value;
 };
 
+/// The readout's noise is the third.
 std::vector<Knob> knobs(TurnParameters& p, bool of_effects = true) {
     std::vector<Knob> all{{"", "injected_noise_rad", &p.injected_sd_rad},
                           {"", "amplitude_wander_rad", &p.wander_sd_rad},
@@ -40,6 +43,33 @@ std::vector<Knob> knobs(TurnParameters& p, bool of_effects = true) {
     }
     return all;
 }
+
+/// Innovations of a rest over their standard deviations, and these.
+struct Innovations {
+    std::vector<double> white, sd_rad;
+
+    Innovations(std::vector<double> of_white, std::vector<double> of_sd_rad)
+        : white(std::move(of_white)), sd_rad(std::move(of_sd_rad)) {}
+    Innovations(const TurnFrame& frame, const TurnNoise& noise, const std::vector<double>& rest) {
+        const Whitening whitening(frame, noise);
+        white = whitening.apply(rest);
+        sd_rad = whitening.sd_rad();
+    }
+
+    /// How these and the logarithms of their variances differ under another noise, in the rows that count: its square
+    /// is Fisher's information on the change (Harvey 1989, 3.4).
+    Eigen::VectorXd change(const Innovations& moved, const Rows& rows) const {
+        const std::size_t n = white.size();
+        Eigen::VectorXd by = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(2 * n));
+        for (std::size_t i = 0; i < n; ++i) {
+            if (!rows[i]) continue;
+            const double ratio = moved.sd_rad[i] / sd_rad[i];
+            by(static_cast<Eigen::Index>(i)) = moved.white[i] * ratio - white[i];
+            by(static_cast<Eigen::Index>(n + i)) = std::numbers::sqrt2 * 0.5 * (square(ratio) - 1.0);
+        }
+        return by;
+    }
+};
 
 // Of a knob's logarithm: nothing is so small or so large.
 constexpr double smallest = -25.0;
@@ -76,13 +106,21 @@ class Objective final : public ceres::FirstOrderFunction {
     Values values_;
 };
 
+/// Ceres warns on standard error where a line search has nowhere to go, which is where it ends.
+void quiet_solver() {
+    static const bool done = [] {
+        if (!google::IsGoogleLoggingInitialized()) FLAGS_minloglevel = google::GLOG_ERROR;
+        return true;
+    }();
+    static_cast<void>(done);
+}
+
 }  // namespace
 
 /// The likelihood can have two summits: a small noise, or none at all, where what it does to the phases is foretold by
 /// their course. Of the one that is not stood on. What is larger than the readout's noise shows itself, and behind it
 /// there is no course.
 void TurnFit::try_other_noise() {
-    constexpr double none = 1e-9;
     const double readout = parameters_.readout_sd_rad;
     if (parameters_.injected_sd_rad > readout) return;
     for (const bool injected : {true, false}) {
@@ -90,17 +128,30 @@ void TurnFit::try_other_noise() {
             return injected ? p.injected_sd_rad : p.wander_sd_rad;
         };
         TurnParameters other = parameters_;
-        if (own(other) > 10.0 * none && own(other) < readout) {
-            own(other) = none;
+        if (own(other) > 10.0 * no_noise && own(other) < readout) {
+            own(other) = no_noise;
             try_from(other);
         }
         if (own(parameters_) > 1e-3 * readout) continue;
         // In place of the other one.
         other = parameters_;
-        other.injected_sd_rad = injected ? 0.05 * readout : none;
-        other.wander_sd_rad = injected ? none : 1e-3 * readout;
+        other.injected_sd_rad = injected ? 0.05 * readout : no_noise;
+        other.wander_sd_rad = injected ? no_noise : 1e-3 * readout;
         try_from(other);
     }
+}
+
+std::unique_ptr<TurnFit> TurnFit::with_less_noise() const {
+    constexpr double hardly = 100.0;  // of the log-likelihood: more than effects have that are hard to see
+    std::unique_ptr<TurnFit> least;
+    for (double TurnParameters::*own : {&TurnParameters::wander_sd_rad, &TurnParameters::injected_sd_rad}) {
+        TurnParameters less = least ? least->parameters_ : parameters_;
+        if (less.*own < 10.0 * no_noise || less.*own > less.readout_sd_rad) continue;
+        less.*own = no_noise;
+        std::unique_ptr<TurnFit> without(new TurnFit(*this, std::move(less)));
+        if (without->log_likelihood() > log_likelihood_ - hardly) least = std::move(without);
+    }
+    return least;
 }
 
 void TurnFit::try_from(const TurnParameters& other) {
@@ -162,14 +213,13 @@ void TurnFit::fit_noise() {
 
 TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParameters& start,
                                       const std::vector<double>& rest) const {
-    constexpr double least = 1e-9;
     TurnParameters trial = start;
     const bool of_effects = effects_ == Effects::fitted;
     const std::vector<Knob> turned = knobs(trial, of_effects);
     const auto size = static_cast<Eigen::Index>(turned.size());
     Eigen::VectorXd from(size);
     for (Eigen::Index k = 0; k < size; ++k) {
-        from(k) = std::log(std::max(*turned[static_cast<std::size_t>(k)].value, least));
+        from(k) = std::log(std::max(*turned[static_cast<std::size_t>(k)].value, no_noise));
     }
     const auto with = [&](const Eigen::VectorXd& at) {
         TurnParameters changed = start;
@@ -184,32 +234,17 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
     Eigen::MatrixXd information = Eigen::MatrixXd::Identity(size, size);
     {
         constexpr double step = 1e-3;
-        const auto innovations = [&](const Eigen::VectorXd& at) {
-            const Whitening whitening(frame, model_->noise(with(at)));
-            return std::pair(whitening.apply(rest), whitening.sd_rad());
-        };
-        const auto [white, sd] = innovations(from);
-        const std::size_t n = rest.size();
-        std::vector<Eigen::VectorXd> derivatives(turned.size(),
-                                                 Eigen::VectorXd::Zero(static_cast<Eigen::Index>(2 * n)));
-        oneapi::tbb::parallel_for(std::size_t{0}, turned.size(), [&](std::size_t k) {
+        const Innovations here(frame, model_->noise(with(from)), rest);
+        Eigen::MatrixXd derivatives(2 * rest.size(), size);
+        oneapi::tbb::parallel_for(Eigen::Index{0}, size, [&](Eigen::Index k) {
             Eigen::VectorXd at = from;
-            at(static_cast<Eigen::Index>(k)) += step;
-            const auto [moved, moved_sd] = innovations(at);
-            for (std::size_t i = 0; i < n; ++i) {
-                if (!rows_[i]) continue;
-                const double ratio = moved_sd[i] / sd[i];
-                derivatives[k](static_cast<Eigen::Index>(i)) = (moved[i] * ratio - white[i]) / step;
-                derivatives[k](static_cast<Eigen::Index>(n + i)) = std::numbers::sqrt2 * (ratio - 1.0) / step;
-            }
+            at(k) += step;
+            derivatives.col(k) = here.change(Innovations(frame, model_->noise(with(at)), rest), rows_) / step;
         });
-        for (Eigen::Index i = 0; i < size; ++i) {
-            for (Eigen::Index j = 0; j < size; ++j) {
-                information(i, j) +=
-                    derivatives[static_cast<std::size_t>(i)].dot(derivatives[static_cast<std::size_t>(j)]);
-            }
+        information += derivatives.transpose() * derivatives;
+        if (model_->series().radius_sd_rad > least_radius_sd_rad) {
+            information(2, 2) += 2.0 * static_cast<double>(rest.size());
         }
-        if (model_->series().radius_sd_rad > least_radius_sd_rad) information(2, 2) += 2.0 * static_cast<double>(n);
     }
     const Eigen::LLT<Eigen::MatrixXd> root(information);
     const auto logarithms = [&](const Objective::Point& at) -> Eigen::VectorXd {
@@ -233,6 +268,7 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
     options.function_tolerance = 1e-9;
     options.gradient_tolerance = 1e-4;
     ceres::GradientProblemSolver::Summary summary;
+    quiet_solver();
     ceres::Solve(options, problem, x.data(), &summary);
     return with(logarithms(x));
 }
@@ -243,61 +279,37 @@ void TurnFit::add_noise_estimates(std::vector<Estimate>& estimates) const {
     constexpr double seen = 0.1;  // of a standard error: as long as steps must be
     TurnParameters trial = parameters_;
     const std::vector<Knob> turned = knobs(trial);
-    const std::size_t n = rest_.size();
-    struct Derivative {
-        double variance;
-        std::vector<double> innovation, size;  // over the innovation's standard deviation; relative, of its square
-    };
-    const auto derivative = [&](const Knob& knob, double step) {
-        Derivative d{square(*knob.value), std::vector<double>(n, 0.0), std::vector<double>(n, 0.0)};
+    const Innovations here{innovations_, whitening_->sd_rad()};
+    const auto derivative = [&](const Knob& knob, double step) -> Eigen::VectorXd {
         const double value = *knob.value;
-        *knob.value = std::sqrt(d.variance + step);
-        const Whitening moved(prediction_.frame, model_->noise(trial));
+        *knob.value = std::sqrt(square(value) + step);
+        const Innovations moved(prediction_.frame, model_->noise(trial), rest_);
         *knob.value = value;
-        const auto white = moved.apply(rest_);
-        for (std::size_t i = 0; i < n; ++i) {
-            if (!rows_[i]) continue;
-            const double ratio = moved.sd_rad()[i] / whitening_->sd_rad()[i];
-            d.innovation[i] = (white[i] * ratio - innovations_[i]) / step;
-            d.size[i] = (square(ratio) - 1.0) / step;
-        }
-        return d;
+        return here.change(moved, rows_) / step;
     };
-    const auto information = [&](const Derivative& a, const Derivative& b) {
-        double sum = 0.0;
-        for (std::size_t i = 0; i < n; ++i) sum += 0.5 * a.size[i] * b.size[i] + a.innovation[i] * b.innovation[i];
-        return sum;
-    };
-    std::vector<Derivative> derivatives;
-    for (const Knob& knob : turned) {
-        double step = std::max(1e-2 * square(*knob.value), 1e-20);
-        Derivative d = derivative(knob, step);
-        for (int i = 0; i < 40 && !(square(step) * information(d, d) > square(seen)); ++i) {
-            step *= 10.0;
-            d = derivative(knob, step);
-        }
-        derivatives.push_back(std::move(d));
-    }
     const auto size = static_cast<Eigen::Index>(turned.size());
-    Eigen::MatrixXd matrix(size, size);
-    for (Eigen::Index i = 0; i < size; ++i) {
-        for (Eigen::Index j = 0; j <= i; ++j) {
-            matrix(i, j) = matrix(j, i) =
-                information(derivatives[static_cast<std::size_t>(i)], derivatives[static_cast<std::size_t>(j)]);
+    Eigen::MatrixXd derivatives(2 * rest_.size(), size);
+    for (Eigen::Index k = 0; k < size; ++k) {
+        const Knob& knob = turned[static_cast<std::size_t>(k)];
+        double step = std::max(1e-2 * square(*knob.value), 1e-20);
+        derivatives.col(k) = derivative(knob, step);
+        for (int i = 0; i < 40 && !(step * derivatives.col(k).norm() > seen); ++i) {
+            step *= 10.0;
+            derivatives.col(k) = derivative(knob, step);
         }
-        // The radius of the quadrature tells of the readout's noise as much again.
-        if (turned[static_cast<std::size_t>(i)].name == "readout_noise_rad" &&
-            model_->series().radius_sd_rad > least_radius_sd_rad) {
-            matrix(i, i) += 0.5 * static_cast<double>(n) / square(derivatives[static_cast<std::size_t>(i)].variance);
-        }
+    }
+    Eigen::MatrixXd matrix = derivatives.transpose() * derivatives;
+    // The radius of the quadrature tells of the readout's noise as much again.
+    if (model_->series().radius_sd_rad > least_radius_sd_rad) {
+        matrix(2, 2) += 0.5 * static_cast<double>(rest_.size()) / square(square(*turned[2].value));
     }
     const Eigen::VectorXd scale = matrix.diagonal().cwiseMax(1e-300).cwiseSqrt();
     const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * matrix * scale.cwiseInverse().asDiagonal();
     const Eigen::MatrixXd inverse = scaled.completeOrthogonalDecomposition().pseudoInverse();
     for (std::size_t k = 0; k < turned.size(); ++k) {
         const auto index = static_cast<Eigen::Index>(k);
-        const double variance = derivatives[k].variance;
-        const double value = std::sqrt(variance);
+        const double value = *turned[k].value;
+        const double variance = square(value);
         double sd = std::numeric_limits<double>::infinity();
         if (inverse(index, index) > 0.0) {
             const double of_variance = std::sqrt(inverse(index, index)) / scale(index);

@@ -24,6 +24,10 @@ namespace {
 namespace record = ringlock::record;
 using namespace ringlock::test::closure;
 
+// Sizes of single effects, of the detection limit.
+constexpr double near_the_limit[] = {1.0, 2.0};
+constexpr double evident[] = {6.0, 30.0};
+
 /// Whether a gyro in that condition shows the effect at all.
 bool shows(const std::string& effect, const Condition& condition) {
     return effect != "scale_factor_error" || condition.moving;
@@ -52,8 +56,8 @@ int main(int argc, char** argv) {
             of.truth.push_back(draw(effect, multiple * start_size(effect), 7 * cases.size() + turn,
                                     static_cast<double>(of.turns) / (2.0 * 124.68)));
         };
-        for (const double multiple : {1.0, 2.0}) {
-            for (std::size_t k = 0; command.wants(Kind::single) && k < command.scaled(6); ++k) {
+        const auto singles = [&](double multiple, double each) {
+            for (std::size_t k = 0; command.wants(Kind::single) && k < command.scaled(each); ++k) {
                 for (const std::string& effect : effects) {
                     const Condition* condition = &conditions[(k + turn++) % conditions.size()];
                     while (!shows(effect, *condition)) condition = &conditions[turn++ % conditions.size()];
@@ -62,7 +66,8 @@ int main(int argc, char** argv) {
                     add(std::move(of));
                 }
             }
-        }
+        };
+        for (const double multiple : near_the_limit) singles(multiple, 6);
         for (std::size_t a = 0, k = 0; command.wants(Kind::pair) && a < effects.size(); ++a) {
             for (std::size_t b = a + 1; b < effects.size(); ++b, ++k) {
                 if (k % static_cast<std::size_t>(std::round(2.0 / command.share)) != 0) continue;
@@ -74,6 +79,7 @@ int main(int argc, char** argv) {
                 add(std::move(of));
             }
         }
+        for (const double multiple : evident) singles(multiple, 4);
     }
     if (command.wants(Kind::foreign)) {
         for (Case& of : foreign_cases(command.scaled(12))) cases.push_back(std::move(of));

@@ -59,6 +59,13 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
     row("... not seen", count(kind(Kind::single, 1.0), is(Judged::missed)));
     row("single effects at twice their limit, named right", count(kind(Kind::single, 2.0), is(Judged::right)));
     row("... ties that hold the truth", count(kind(Kind::single, 2.0), is(Judged::tie)));
+    for (const double multiple : {6.0, 30.0}) {
+        const auto of = kind(Kind::single, multiple);
+        if (std::none_of(truths.begin(), truths.end(), of)) continue;
+        row(fmt::format("single effects at {:g} times their limit, named right", multiple).c_str(),
+            count(of, is(Judged::right)));
+        row("... ties that hold the truth", count(of, is(Judged::tie)));
+    }
     row("pairs, each at twice its limit, both named", count(kind(Kind::pair, 2.0), is(Judged::right)));
     row("... ties that hold the truth", count(kind(Kind::pair, 2.0), is(Judged::tie)));
     row("... not both of them", count(kind(Kind::pair, 2.0), is(Judged::missed)));
