@@ -139,16 +139,14 @@ Scenario closed_scenario(const record::Record& record, const Closure& closure) {
             if (value != found->second.end()) value->second = estimate.value;
         }
     }
-    if (!record.turns) {
-        // Of samples the step's time and the line's phase are those of the record's own clock.
-        const double start_s = start_of(record);
-        auto& when_s = scenario.effects.at("bias_step").at("time_s");
-        when_s = std::max(0.0, when_s - start_s);
-        auto& line = scenario.effects.at("base_vibration");
-        if (line.at("rate_deg_h") != 0.0) {
-            line.at("phase_rad") =
-                std::remainder(line.at("phase_rad") + units::two_pi * line.at("frequency_hz") * start_s, units::two_pi);
-        }
+    // The step's time and the line's phase are those of the record's own clock.
+    const double start_s = start_of(record);
+    auto& when_s = scenario.effects.at("bias_step").at("time_s");
+    when_s = std::max(0.0, when_s - start_s);
+    auto& line = scenario.effects.at("base_vibration");
+    if (line.at("rate_deg_h") != 0.0) {
+        line.at("phase_rad") =
+            std::remainder(line.at("phase_rad") + units::two_pi * line.at("frequency_hz") * start_s, units::two_pi);
     }
     return scenario;
 }

@@ -12,6 +12,7 @@
 #include "analysis/closure/side_channels.hpp"
 #include "analysis/closure/turn_contest.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/units.hpp"
 
 namespace ringlock::closure {
 
@@ -288,13 +289,33 @@ Closure close_turns(const record::Record& record) {
     return closure;
 }
 
+/// From the record's clock to one that begins with the first turn, as the fit's does (TurnFit::estimates: back again).
+std::vector<ActiveEffect> since_first_turn(std::vector<ActiveEffect> effects, const record::Record& record) {
+    const double start_s = record.turns->time_s.front();
+    for (ActiveEffect& active : effects) {
+        if (!active.effect->adds_angle()) continue;
+        const auto parameters = active.effect->parameters();
+        const auto of = [&](effects::Role role) -> double* {
+            const auto found = std::find_if(parameters.begin(), parameters.end(),
+                                            [&](const effects::Parameter& p) { return p.role == role; });
+            return found == parameters.end() ? nullptr : &active.values.at(std::string(found->name));
+        };
+        if (double* time = of(effects::Role::time)) *time = std::max(0.0, *time - start_s);
+        double* phase = of(effects::Role::phase);
+        const double* frequency = of(effects::Role::frequency);
+        if (phase == nullptr || frequency == nullptr) continue;
+        *phase = std::remainder(*phase + units::two_pi * *frequency * start_s, units::two_pi);
+    }
+    return effects;
+}
+
 Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>& effects) {
     Closure closure;
     closure.unit = "rad";
     closure.level = level;
     const record::Turns& turns = *record.turns;
     TurnParameters start;
-    start.effects = effects;
+    start.effects = since_first_turn(effects, record);
     const auto whole = fit_record(record, start, Rows(turns.size(), 1));
     const auto train = fit_record(record, whole->fit->parameters(), by_blocks(turns.size(), roles));
     for (const ActiveEffect& active : effects) closure.steps.emplace_back().effect = std::string(active.effect->name());
@@ -308,7 +329,7 @@ Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>&
 
 std::vector<Estimate> information_on_turns(const record::Record& record, const std::vector<ActiveEffect>& effects) {
     TurnParameters start;
-    start.effects = effects;
+    start.effects = since_first_turn(effects, record);
     const auto fitted = fit_record(record, start, Rows(record.turns->size(), 1), TurnFit::Effects::held);
     Closure closure;
     for (const ActiveEffect& active : effects) closure.steps.emplace_back().effect = std::string(active.effect->name());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
@@ -362,6 +363,31 @@ std::vector<Estimate> TurnFit::estimates() const {
             estimate.value = found.find(estimate.effect)->values.at(estimate.name);
         }
         estimates.push_back(std::move(estimate));
+    }
+    // Times and phases by the record's clock, which need not begin with the first turn.
+    const double start_s = model_->series().start_s;
+    for (const ActiveEffect& active : parameters_.effects) {
+        if (!active.effect->adds_angle()) continue;
+        std::optional<std::size_t> frequency;
+        std::optional<std::size_t> phase;
+        for (const effects::Parameter& parameter : active.effect->parameters()) {
+            for (std::size_t k = 0; k < estimates.size(); ++k) {
+                if (estimates[k].effect != active.effect->name() || estimates[k].name != parameter.name) continue;
+                if (parameter.role == effects::Role::time) estimates[k].value += start_s;
+                if (parameter.role == effects::Role::frequency) frequency = k;
+                if (parameter.role == effects::Role::phase) phase = k;
+            }
+        }
+        if (!frequency || !phase) continue;
+        const auto f = static_cast<Eigen::Index>(nuisance_.size() + *frequency);
+        const auto p = static_cast<Eigen::Index>(nuisance_.size() + *phase);
+        const double turned = units::two_pi * start_s;
+        estimates[*phase].value =
+            std::remainder(estimates[*phase].value - turned * estimates[*frequency].value, units::two_pi);
+        const double variance = covariance(p, p) / (scale(p) * scale(p)) +
+                                turned * turned * covariance(f, f) / (scale(f) * scale(f)) -
+                                2.0 * turned * covariance(p, f) / (scale(p) * scale(f));
+        estimates[*phase].sd = std::sqrt(std::max(variance, 0.0));
     }
     add_noise_estimates(estimates);
     return estimates;

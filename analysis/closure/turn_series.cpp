@@ -144,6 +144,7 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
     series.scale_factor_declared = declared.scale_factor_arcsec.has_value();
     setup.scale_factor_arcsec = declared.scale_factor_arcsec.value_or(setup.scale_factor_arcsec);
     setup.lockin_threshold_deg_h = declared.lockin_threshold_deg_h.value_or(setup.lockin_threshold_deg_h);
+    series.start_s = turns.time_s[0];
     for (std::size_t i = 0; i < n; ++i) {
         series.time_s.push_back(turns.time_s[i] - turns.time_s[0]);
         series.direction.push_back(turns.direction[i]);

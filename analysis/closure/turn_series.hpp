@@ -30,6 +30,7 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
 struct TurnSeries {
     gyro::Setup setup;  ///< as declared, or standard, with dither frequency and amplitude as measured; no effects
     bool scale_factor_declared = false;
+    double start_s = 0.0;        ///< the first zero-rate point, by the record's clock
     std::vector<double> time_s;  ///< of the zero-rate points, since the first
     std::vector<int> direction;
     std::vector<double> swing;  ///< of the half cycle after each turn, over the mean one

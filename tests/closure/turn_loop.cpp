@@ -9,6 +9,7 @@
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/report.hpp"
 #include "analysis/instrument/simulate.hpp"
+#include "engine/core/units.hpp"
 #include "engine/scenario/check.hpp"
 #include "engine/scenario/scenario.hpp"
 #include "tests/closure/generator.hpp"
@@ -164,6 +165,44 @@ INSTANTIATE_TEST_SUITE_P(Effects, TurnLoopFinds,
                                          Single{"readout_ellipse", {{"gain", 0.01}, {"offset_sin", -0.008}}},
                                          Single{"scale_factor_error", {{"relative", 2e-5}}, 0.0, 0.0, true}),
                          [](const auto& single) { return std::string(single.param.effect); });
+
+TEST(TurnLoop, TimesAndPhasesAreByTheRecordsClock) {
+    // A cycle of the line is no longer than six turns: its phase tells by which of them time is counted.
+    constexpr double frequency_hz = 40.7;
+    constexpr double phase_rad = 1.0;
+    scenario::Scenario scenario = gyro(12000, 125, 3.0);
+    scenario.effects.at("base_vibration") = {
+        {"frequency_hz", frequency_hz}, {"rate_deg_h", 200.0}, {"phase_rad", phase_rad}};
+    scenario.effects.at("bias_step") = {{"step_deg_h", 0.2}, {"time_s", 20.0}};
+    record::Record record = instrument::simulate_record(scenario);
+    for (const double late_s : {0.0, 100.0}) {
+        for (auto* times : {&record.turns->time_s, &record.temperature_c.time_s, &record.input_rate_deg_h.time_s}) {
+            for (double& time : *times) time += late_s;
+        }
+        const Closure closure = close_loop(record);
+        print("a line and a step", closure);
+        EXPECT_EQ(closure.verdict, Verdict::closed);
+        ASSERT_EQ(closure.steps.size(), 2U);
+        std::vector<Estimate> all = closure.steps[0].parameters;
+        all.insert(all.end(), closure.steps[1].parameters.begin(), closure.steps[1].parameters.end());
+        EXPECT_LT(deviation(all, "time_s", 20.0 + late_s), 4.0);
+        EXPECT_LT(deviation(all, "frequency_hz", frequency_hz), 4.0);
+        for (const Estimate& estimate : all) {
+            if (estimate.name != "phase_rad") continue;
+            const double truth = phase_rad - units::two_pi * frequency_hz * late_s;
+            EXPECT_LT(std::abs(std::remainder(estimate.value - truth, units::two_pi)), 4.0 * estimate.sd);
+            // Long before the record it is less well known.
+            EXPECT_LT(estimate.sd, late_s > 0.0 ? 0.5 : 0.05);
+        }
+        // The scenario has a clock that begins with the record.
+        const scenario::Scenario closed = ringlock::closure::closed_scenario(record, closure);
+        EXPECT_NEAR(closed.effects.at("bias_step").at("time_s"), 20.0, 0.5);
+        EXPECT_NEAR(std::remainder(closed.effects.at("base_vibration").at("phase_rad") - phase_rad -
+                                       units::two_pi * frequency_hz * (record.turns->time_s.front() - late_s),
+                                   units::two_pi),
+                    0.0, 0.2);
+    }
+}
 
 TEST(TurnLoop, ReadsWhatAnotherSimulatorWrote) {
     Truth plain;
