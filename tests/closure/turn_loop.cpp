@@ -80,13 +80,13 @@ TEST(TurnLoop, ALockedGyroIsNoRiddle) {
     EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("locked")));
 }
 
-TEST(TurnLoop, ALockedGyroTellsItsThresholdWithAnHonestError) {
-    // By how fast it locks. All that the lock-in does before a turn follows from the very phase that is read there.
-    constexpr int gyros = 12;
+/// How far the thresholds of so many locked gyros come out, squared and summed, in standard errors; by how fast they
+/// lock. All that the lock-in does before a turn follows from the very phase that is read there.
+double squares_of_locked_gyros(int gyros, std::uint64_t seed) {
     double squares = 0.0;
     for (int k = 0; k < gyros; ++k) {
-        scenario::Scenario scenario = gyro(6000, 300 + static_cast<std::uint64_t>(k), 0.0);
-        scenario.input.rate_deg_h = scenario.input.sweep_stop_deg_h = 0.1 * k - 0.5;
+        scenario::Scenario scenario = gyro(6000, seed + static_cast<std::uint64_t>(k), 0.0);
+        scenario.input.rate_deg_h = scenario.input.sweep_stop_deg_h = 0.1 * (k % 12) - 0.5;
         const Closure closure = close_loop(instrument::simulate_record(scenario));
         EXPECT_EQ(closure.verdict, Verdict::nothing_missing)
             << k << (closure.unexplained ? closure.unexplained->description() : "");
@@ -95,9 +95,18 @@ TEST(TurnLoop, ALockedGyroTellsItsThresholdWithAnHonestError) {
         EXPECT_LT(off, 4.0) << k;
         squares += off * off;
     }
-    std::printf("threshold of locked gyros: rms %.2f standard errors\n", std::sqrt(squares / gyros));
+    std::printf("threshold of %d locked gyros: rms %.2f standard errors\n", gyros, std::sqrt(squares / gyros));
+    return squares;
+}
+
+TEST(TurnLoop, ALockedGyroTellsItsThresholdWithAnHonestError) {
     // Chi-squared of twelve: one in 2000 is above 34.
-    EXPECT_LT(squares, 34.0);
+    EXPECT_LT(squares_of_locked_gyros(12, 300), 34.0);
+}
+
+TEST(LongTurnLoop, LockedGyrosTellTheirThresholdsWithHonestErrors) {
+    // Chi-squared of 120: one in 2000 is above 178.
+    EXPECT_LT(squares_of_locked_gyros(120, 700), 178.0);
 }
 
 TEST(TurnLoop, WhatIsReadAgainIsFittedAnew) {
