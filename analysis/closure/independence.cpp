@@ -372,39 +372,69 @@ void test_normality(const TurnFit& fit, std::vector<View>& views) {
     }
 }
 
+/// The normal deviate that is as rare as an innovation of that size over its standard deviation: a few phases that
+/// hardly ever come weigh too much for squares.
+double size_deviate(double size) {
+    const double rarity = std::erfc(size / std::numbers::sqrt2);
+    return std::numbers::sqrt2 * boost::math::erfc_inv(2.0 * std::clamp(rarity, 1e-300, 1.0 - 1e-15));
+}
+
+/// Mean of cos(y) times the deviate of |y|, y being normal with that standard deviation.
+double turned_with_size(double sd_rad) {
+    constexpr int points = 4000;
+    constexpr double end = 9.0;
+    double sum = 0.0;
+    for (int k = 0; k < points; ++k) {
+        const double t = (k + 0.5) * end / points;
+        sum += std::exp(-0.5 * t * t) * std::cos(sd_rad * t) * size_deviate(t);
+    }
+    return 2.0 * sum * end / points / std::sqrt(units::two_pi);
+}
+
 void test_size(const TurnFit& fit, std::vector<View>& views) {
     const auto& e = fit.innovations();
     const auto& rows = fit.rows();
     const std::size_t n = e.size();
     views.push_back({size_over_time(e, rows, 20, 8.0)});
-    // Sizes as normal deviates of the same rarity: a few phases that hardly ever come weigh too much for squares.
     const double sd = std::sqrt(squares_of(e, rows).mean);
     std::vector<double> size(n);
     double mean = 0.0;
     double square = 0.0;
     double counted = 0.0;
+    double sd_rad = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
         if (!rows[i]) continue;
-        const double rarity = std::erfc(std::abs(e[i]) / (sd * std::numbers::sqrt2));
-        size[i] = std::numbers::sqrt2 * boost::math::erfc_inv(2.0 * std::clamp(rarity, 1e-300, 1.0 - 1e-15));
+        size[i] = size_deviate(std::abs(e[i]) / sd);
         mean += size[i];
         square += size[i] * size[i];
+        sd_rad += fit.sd_rad()[i];
         counted += 1.0;
     }
     mean /= counted;
+    sd_rad /= counted;
     const double variance = square / counted - mean * mean;
-    constexpr Eigen::Index columns = 8;
+    const Eigen::Index columns = 8;
+    // The innovation is a part of the phase: where phases are foretold alike turn after turn, sizes follow the phase
+    // that comes of them even if nothing is missing.
+    Eigen::VectorXd expected(columns);
+    expected << turned_with_size(sd_rad), 0.0, turned_with_size(2.0 * sd_rad), 0.0, 0.0, 0.0, 0.0, 0.0;
+    expected(1) = expected(4) = expected(5) = expected(0);
+    expected(3) = expected(6) = expected(7) = expected(2);
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(columns);
-    Eigen::VectorXd row(columns);
+    const auto harmonics = [&](double psi, double d) {
+        Eigen::VectorXd row(columns);
+        row << std::cos(psi), std::sin(psi), std::cos(2 * psi), std::sin(2 * psi), d * std::cos(psi), d * std::sin(psi),
+            d * std::cos(2 * psi), d * std::sin(2 * psi);
+        return row;
+    };
     for (std::size_t i = 0; i < n; ++i) {
         if (!rows[i]) continue;
         const double psi = fit.model().phase_rad()[i];
         const double d = fit.model().series().direction[i];
-        row << std::cos(psi), std::sin(psi), std::cos(2 * psi), std::sin(2 * psi), d * std::cos(psi), d * std::sin(psi),
-            d * std::cos(2 * psi), d * std::sin(2 * psi);
+        const Eigen::VectorXd row = harmonics(psi, d);
         normal += row * row.transpose();
-        right += row * (size[i] - mean);
+        right += row * (size[i] - mean) - harmonics(psi - sd_rad * e[i], d).cwiseProduct(expected);
     }
     // What only the first turns of a locked gyro have tells nothing of the others.
     constexpr double enough = 1e-3;

@@ -82,6 +82,10 @@ double line_hz(const SampleModel& model, bool wanders) {
 
 bool is_line(const std::string& effect) { return effect == "dither_residue" || effect == "base_vibration"; }
 
+double p_of_gain(double gain, const SampleCandidate& candidate) {
+    return of_several(chi2_tail(2.0 * gain, candidate.freedom), candidate.searched);
+}
+
 class Loop {
    public:
     explicit Loop(const record::Record& record)
@@ -102,16 +106,25 @@ class Loop {
         SampleCandidate candidate;
         std::shared_ptr<SampleFit> fit;
         double merit;
+        bool passes = true;  ///< alone
     };
+    /// Several effects that explain more than one.
+    struct Set {
+        Contender first;
+        double merit = 0.0;
+        std::vector<std::string> others = {};
+    };
+    enum class Wanted { all, plain, plain_if_weak };
 
     double lattice_step() const { return series_.counted ? 0.25 * series_.scale_factor_arcsec : lattice_.step_arcsec; }
     std::vector<double> chosen_increments() const;
     void begin(Closure& closure);
     void take_lattice(Closure& closure);
-    std::vector<Contender> contenders(const State& state, int step, bool plain = false) const;
+    std::vector<Contender> contenders(const State& state, int step, Wanted wanted = Wanted::all) const;
     double rival_merit(const std::string& effect, double merit_of_effect) const;
-    std::optional<Contender> of_several_effects(std::vector<Contender> all, double least) const;
-    void take(Contender best, const std::vector<Contender>& all, Closure& closure);
+    std::optional<Set> of_several_effects(const std::vector<Contender>& all) const;
+    void take(Contender best, const std::vector<Contender>& all, const std::vector<std::string>& as_likely,
+              Closure& closure);
     void take_back_lines(Closure& closure);
     void drop_needless();
     void test_what_is_left(Closure& closure) const;
@@ -214,21 +227,26 @@ void Loop::take_lattice(Closure& closure) {
     now_.told.push_back({"count_quantization", next_step_++});
 }
 
-/// What the screening lets pass, each fitted in full; the likeliest first.
-std::vector<Loop::Contender> Loop::contenders(const State& state, int step, bool plain) const {
-    auto candidates = screen_samples(*state.fit, {record_.declared, series_, rows_, state.lines_hz, step, plain});
+bool passes_on_samples(double p_value) { return p_value * effects_on_samples < level_of_effects; }
+
+/// What the screening lets pass, each fitted in full; the likeliest first. Weak ones need not pass.
+std::vector<Loop::Contender> Loop::contenders(const State& state, int step, Wanted wanted) const {
+    constexpr double worth_looking = 0.01;
+    const bool weak = wanted == Wanted::plain_if_weak;
+    auto candidates =
+        screen_samples(*state.fit, {record_.declared, series_, rows_, state.lines_hz, step, wanted != Wanted::all});
     std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
     std::vector<Contender> all;
     for (SampleCandidate& candidate : candidates) {
-        if (!(candidate.p_value * effects_on_samples < level_of_effects)) continue;
+        if (!passes_on_samples(candidate.p_value) && !(weak && candidate.p_value < worth_looking)) continue;
         if (all.size() >= most_contenders + 2) break;
         auto fit = std::make_shared<SampleFit>(series_, candidate.model, rows_, candidate.noise);
         const double gain = fit->log_likelihood() - state.fit->log_likelihood();
-        const double merit = gain - std::log(candidate.searched) - candidate.parameters;
+        const double merit = gain - std::log(candidate.places.value_or(candidate.searched)) - candidate.parameters;
         // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
-        const double p_full = of_several(chi2_tail(2.0 * gain, candidate.freedom), candidate.searched);
-        if (merit < 0.0 || p_full * effects_on_samples >= level_of_effects) continue;
-        all.push_back({std::move(candidate), std::move(fit), merit});
+        const bool passes = passes_on_samples(p_of_gain(gain, candidate));
+        if (!weak && (merit < 0.0 || !passes)) continue;
+        all.push_back({std::move(candidate), std::move(fit), merit, passes});
     }
     std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.merit > b.merit; });
     return all;
@@ -258,6 +276,12 @@ double Loop::rival_merit(const std::string& effect, double merit_of_effect) cons
         const bool course = random && view.test.where == Where::time && !view.jumps;
         const double integrated = course ? 0.5 * std::log(static_cast<double>(series_.size())) - 1.0 : 0.0;
         const double merit = view.columns ? refitted_merit(*now_.fit, view, integrated) : view.test.merit;
+        if (effect == "resampling" && view.test.view == repeating_variance) {
+            // What resampling does to the variance it does to the correlations too: by half as much again, and more.
+            constexpr double of_variance_alone = 1.3;
+            most = std::max(most, of_variance_alone * merit);
+            continue;
+        }
         // The course of jumps is searched stretch by stretch and loses a part of what they explain.
         const double lost = random && view.jumps ? std::max(tie, 0.1 * merit_of_effect) : tie;
         most = std::max(most, merit + (followed ? lost : -tie));
@@ -266,32 +290,49 @@ double Loop::rival_merit(const std::string& effect, double merit_of_effect) cons
 }
 
 /// One effect at a time may explain less than a random rate, or a view, where several of the library together explain
-/// more: the first of the best such set, none of them a random rate, each found after the one before.
-std::optional<Loop::Contender> Loop::of_several_effects(std::vector<Contender> all, double least) const {
+/// more: the best such set, none of them a random rate, each found after the one before. The first need not pass alone,
+/// if it does beside the second.
+std::optional<Loop::Set> Loop::of_several_effects(const std::vector<Contender>& all) const {
     constexpr std::size_t starts = 4;
-    constexpr int most_of_them = 3;
-    std::erase_if(all, [](const Contender& c) { return is_random_rate(c.candidate.effect); });
-    if (all.size() > starts) all.resize(starts);
-    std::optional<Contender> best;
-    for (const Contender& first : all) {
-        double merit = first.merit;
+    constexpr std::size_t most_of_them = 3;
+    auto firsts = contenders(now_, next_step_, Wanted::plain_if_weak);
+    for (const Contender& contender : all) {
+        const bool known = std::any_of(firsts.begin(), firsts.end(), [&](const Contender& c) {
+            return c.candidate.effect == contender.candidate.effect;
+        });
+        if (!known && !is_random_rate(contender.candidate.effect)) firsts.push_back(contender);
+    }
+    std::sort(firsts.begin(), firsts.end(), [](const auto& a, const auto& b) { return a.merit > b.merit; });
+    std::optional<Set> best;
+    for (std::size_t start = 0; start < std::min(starts, firsts.size()); ++start) {
+        const Contender& first = firsts[start];
+        Set set{first, first.merit};
+        bool needed = first.passes;
         State state = now_;
-        state.fit = first.fit;
-        if (is_line(first.candidate.effect)) {
-            state.lines_hz.push_back(line_hz(first.fit->model(), first.candidate.wanders));
-        }
-        for (int k = 1; k < most_of_them; ++k) {
-            const auto more = contenders(state, next_step_ + k, true);
-            if (more.empty()) break;
-            merit += more.front().merit;
-            state.fit = more.front().fit;
-            if (is_line(more.front().candidate.effect)) {
-                state.lines_hz.push_back(line_hz(state.fit->model(), more.front().candidate.wanders));
+        const auto add = [&](const Contender& contender) {
+            state.fit = contender.fit;
+            if (is_line(contender.candidate.effect)) {
+                state.lines_hz.push_back(line_hz(contender.fit->model(), contender.candidate.wanders));
             }
+        };
+        add(first);
+        while (set.others.size() + 1 < most_of_them) {
+            const auto more = contenders(state, next_step_ + static_cast<int>(set.others.size()) + 1, Wanted::plain);
+            if (more.empty()) break;
+            const std::string& name = more.front().candidate.effect;
+            if (set.others.empty() && !needed) {
+                const auto alone = std::find_if(firsts.begin(), firsts.end(),
+                                                [&](const Contender& c) { return c.candidate.effect == name; });
+                if (alone == firsts.end()) break;
+                const double gain = more.front().fit->log_likelihood() - alone->fit->log_likelihood();
+                set.first.candidate.p_value = p_of_gain(gain, first.candidate);
+                needed = passes_on_samples(set.first.candidate.p_value);
+            }
+            set.merit += more.front().merit;
+            set.others.push_back(name);
+            add(more.front());
         }
-        if (merit <= least) continue;
-        least = merit;
-        best = first;
+        if (needed && (!best || set.merit > best->merit)) best = std::move(set);
     }
     return best;
 }
@@ -393,16 +434,20 @@ Closure Loop::run() {
         Contender best = all.front();
         const double rival = rival_merit(best.candidate.effect, best.merit);
         const bool random = is_random_rate(best.candidate.effect);
+        std::vector<std::string> as_likely;
         if (random || rival > best.merit) {
-            const auto first = of_several_effects(all, std::max(rival, random ? best.merit + tie : 0.0));
-            if (first) {
-                best = *first;
+            auto set = of_several_effects(all);
+            if (set && set->merit > std::max(rival, random ? best.merit + tie : 0.0)) {
+                best = std::move(set->first);
             } else if (rival > best.merit) {
                 break;
+            } else if (set && set->merit > best.merit - tie) {
+                as_likely = std::move(set->others);
+                as_likely.insert(as_likely.begin(), set->first.candidate.effect);
             }
         }
         if (!earlier && is_random_rate(best.candidate.effect)) earlier = now_;
-        take(std::move(best), all, closure);
+        take(std::move(best), all, as_likely, closure);
     }
     test_what_is_left(closure);
     if (earlier && closure.unexplained) {
@@ -416,19 +461,24 @@ Closure Loop::run() {
 }
 
 /// Adds an effect to the model.
-void Loop::take(Contender best, const std::vector<Contender>& all, Closure& closure) {
+void Loop::take(Contender best, const std::vector<Contender>& all, const std::vector<std::string>& as_likely,
+                Closure& closure) {
     const std::string effect = best.candidate.effect;
     Step step;
     step.effect = effect;
     step.p_value = best.candidate.p_value;
     step.confounded_with = best.candidate.confounded;
+    const auto confound = [&](const std::string& name) {
+        const auto& named = step.confounded_with;
+        if (name != effect && std::find(named.begin(), named.end(), name) == named.end()) {
+            step.confounded_with.push_back(name);
+        }
+    };
     for (const Contender& other : all) {
-        const std::string& name = other.candidate.effect;
-        const bool named =
-            std::find(step.confounded_with.begin(), step.confounded_with.end(), name) != step.confounded_with.end();
         // One that explains more by itself is as good, even where another and a second together explain more.
-        if (best.merit - other.merit < tie && name != effect && !named) step.confounded_with.push_back(name);
+        if (best.merit - other.merit < tie) confound(other.candidate.effect);
     }
+    for (const std::string& name : as_likely) confound(name);
     if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
     const Score before = heldout(*now_.fit, reported_, used_step_);
     now_.fit = best.fit;

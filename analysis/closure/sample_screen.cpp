@@ -85,6 +85,8 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     }
     const double p = davies_bound(best * best, roots);
     if (p > 0.01) return;
+    double as_good = 0.0;
+    for (const double root : roots) as_good += std::exp(0.5 * (root * root - best * best));
     for (std::size_t d = n / places / 2; d > 0; d /= 2) {
         for (const std::size_t row : {at > d ? at - d : at, std::min(n - 1, at + d)}) {
             const double root = std::abs(root_at(row));
@@ -94,8 +96,11 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
             }
         }
     }
-    SampleCandidate c{
-        .effect = "bias_step", .model = model, .p_value = p, .searched = static_cast<double>(places), .parameters = 2};
+    SampleCandidate c{.effect = "bias_step",
+                      .model = model,
+                      .p_value = p,
+                      .searched = static_cast<double>(places),
+                      .places = static_cast<double>(places) / as_good};
     c.model.columns.push_back(step_column(in.series, at));
     c.model.columns.back().step = in.step;
     out.push_back(std::move(c));

@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,8 @@ struct SampleCandidate {
     SampleModel model = {};
     double p_value = 1.0;
     double searched = 1.0;
+    /// All over those that explain as much, which the likelihood integrated over them costs: as searched, else.
+    std::optional<double> places = {};
     int parameters = 1;
     int freedom = 1;          ///< of its chi-squared, beside what the search counts
     bool wanders = false;     ///< a line as a narrow resonance

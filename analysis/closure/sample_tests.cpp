@@ -167,7 +167,7 @@ void test_size(const SampleFit& fit, Views& views) {
     const FoundCycle cycle = find_cycle(e, rows, fit.series().rate_hz);
     const double cost = 2.0 + std::log(cycle.searched);
     views.push_back(
-        {{Where::time, "variance and covariance that repeat", cycle.p_value,
+        {{Where::time, std::string(repeating_variance), cycle.p_value,
           fmt::format("{:.6g} times a second", cycle.frequency_hz), gain_of_variance(fit, cycle.frequency_hz) - cost}});
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <string_view>
 #include <vector>
 
 #include "analysis/closure/independence.hpp"
@@ -16,6 +17,9 @@ struct Disturbed {
     double p_value = 1.0;   ///< of the worst, if the residual were normal
 };
 Disturbed find_disturbed(const SampleFit& fit);
+
+/// The view of a variance that goes up and down evenly.
+inline constexpr std::string_view repeating_variance = "variance and covariance that repeat";
 
 /// Holds the innovations that count against everything that the record has: time, frequency, the place in the record
 /// modulo small numbers, witnesses, temperature, input rate, their own size. The views refer to the fit.

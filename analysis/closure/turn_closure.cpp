@@ -244,6 +244,7 @@ Closure close_turns(const record::Record& record) {
         std::string effect;
     };
     std::optional<Earlier> earlier;
+    std::string partner;  // of the effect that was added last
 
     // What stood in for another is dropped again, so that there may be more rounds than steps.
     for (std::size_t round = 0; round < 2 * most_steps && closure.steps.size() < most_steps; ++round) {
@@ -256,6 +257,16 @@ Closure close_turns(const record::Record& record) {
         step.effect = std::string(best.candidate.effect->name());
         step.p_value = choice.p_value;
         step.confounded_with = choice.confounded_with;
+        if (step.effect == partner) {
+            // What explains as much as both did without this one.
+            for (const std::string& name : closure.steps.back().confounded_with) {
+                auto& named = step.confounded_with;
+                if (name != step.effect && std::find(named.begin(), named.end(), name) == named.end()) {
+                    named.push_back(name);
+                }
+            }
+        }
+        partner = choice.partner;
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
         if (!earlier && choice.on_random) earlier = {now, closure.steps, step.effect};
         const Score before = heldout(*now->fit);

@@ -109,7 +109,23 @@ std::shared_ptr<Fitted> fit_with(const record::Record& record, const Fitted& now
         } catch (const RunError&) {
         }
     };
-    fit_from(start);
+    const auto with_share = [&](double share) {
+        TurnParameters from = start;
+        for (const effects::Parameter& parameter : candidate.effect->parameters()) {
+            if (parameter.role == effects::Role::size) {
+                from.effects.back().values.at(std::string(parameter.name)) *= share;
+            }
+        }
+        return from;
+    };
+    const auto gained = [&](double least) {
+        return best && best->fit->log_likelihood() - now.fit->log_likelihood() >= least;
+    };
+    // Coupling, threshold and bias move together: from next to nothing the first step takes all of them along.
+    const bool of_coupling = !candidate.effect->adds_angle() && !is_random_rate(*candidate.effect) &&
+                             !told_by_other_columns(*candidate.effect);
+    if (of_coupling) fit_from(with_share(0.01));
+    if (!of_coupling || !gained(0.25 * candidate.chi2)) fit_from(start);
     if (is_random_rate(*candidate.effect) || on_phase(*candidate.effect)) {
         // Without it the rest may have gone far astray: anew, too, from where another has led or from the start.
         TurnParameters anew = alike != nullptr ? alike->fit->parameters() : TurnParameters{};
@@ -118,13 +134,8 @@ std::shared_ptr<Fitted> fit_with(const record::Record& record, const Fitted& now
     }
     // The score says how large it would be were all linear: too far away, maybe.
     const int shorter = told_by_other_columns(*candidate.effect) ? 0 : 4;
-    for (int k = 0; k < shorter && !(best && best->fit->log_likelihood() >= now.fit->log_likelihood()); ++k) {
-        for (const effects::Parameter& parameter : candidate.effect->parameters()) {
-            if (parameter.role != effects::Role::size) continue;
-            start.effects.back().values.at(std::string(parameter.name)) *= 0.1;
-        }
-        fit_from(start);
-    }
+    double share = 1.0;
+    for (int k = 0; k < shorter && !gained(0.0); ++k) fit_from(with_share(share *= 0.1));
     return best;
 }
 
@@ -330,6 +341,7 @@ Choice choose(const record::Record& record, const Contest& contest, const Rows& 
     }
     const effects::Effect* chosen = choice.chosen->candidate.effect;
     choice.held.push_back({chosen, accounts.front().merit});
+    if (partner != nullptr) choice.partner = partner->name();
     choice.on_random = is_random_rate(*chosen) || (partner != nullptr && is_random_rate(*partner));
     for (const Account& account : accounts) {
         if (account.has(chosen)) continue;

@@ -62,6 +62,7 @@ struct Choice {
     std::vector<Held> held;  ///< it and all that explain about as much
     bool on_random = false;  ///< it is a random rate, or was chosen with one beside it
     std::vector<std::string> confounded_with;
+    std::string partner = {};  ///< what explains the rest, where two were chosen together; as confounded as the first
 };
 
 /// The likeliest where it passes, with all that are as likely tied to it. A random rate can follow two others at once:

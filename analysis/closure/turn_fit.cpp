@@ -194,7 +194,8 @@ void TurnFit::fit_deterministic(int most) {
         }
         add_priors(scale, normal, &right);
         hold_back(scale, normal);
-        const bool arrived = right.dot(normal.ldlt().solve(right)) < gained;
+        const Eigen::VectorXd whole = normal.ldlt().solve(right);
+        const bool arrived = right.dot(whole) < gained;
         const auto value = [&](const TurnModel::Prediction& prediction) {
             return guessed ? squares_left(whitening) : objective_at(prediction);
         };
@@ -203,19 +204,26 @@ void TurnFit::fit_deterministic(int most) {
         const std::vector<double> nuisance_from = nuisance_;
         bool possible = false;
         bool gaining = true;
-        // Times, frequencies and phases are far from linear: shorter steps where a whole one goes far or leads uphill
-        // (Levenberg 1944), in units of each parameter's own information.
-        for (double damping = 0.0; damping < 1e5 && !possible; damping = std::max(1e-3, 10.0 * damping)) {
-            const Eigen::MatrixXd damped = normal + damping * Eigen::MatrixXd::Identity(normal.rows(), normal.cols());
+        // Times, frequencies and phases are far from linear. Where a whole step goes far or leads uphill: a part of it,
+        // which follows a valley that bends, or a damped one (Levenberg 1944), which goes down its wall.
+        const auto shorter = [&](int trial) -> Eigen::VectorXd {
+            constexpr int parts = 4;
+            if (trial < parts) return std::exp2(-trial) * whole;
+            const double damping = 1e-3 * std::pow(10.0, trial - parts);
+            const auto size = normal.rows();
+            return (normal + damping * Eigen::MatrixXd::Identity(size, size)).ldlt().solve(right);
+        };
+        constexpr int trials = 12;
+        for (int trial = 0; trial < trials && !possible; ++trial) {
             parameters_ = from;
             nuisance_ = nuisance_from;
-            take(damped.ldlt().solve(right).cwiseQuotient(scale));
+            take(shorter(trial).cwiseQuotient(scale));
             try {
                 TurnModel::Prediction prediction = model_->predict(parameters_);
                 set_rest(prediction);
                 const double now = value(prediction);
                 possible = now <= before + 1e-9 * std::abs(before) || (guessed && parameters_.effects.empty());
-                gaining = !(std::abs(before - now) < 0.5 * gained);
+                gaining = trial > 0 || !(std::abs(before - now) < 0.5 * gained);
                 if (possible) prediction_ = std::move(prediction);
             } catch (const RunError&) {
                 possible = false;  // no motion of a gyro with such parameters can be followed
@@ -242,8 +250,9 @@ double TurnFit::slope_of_objective(const Regressor& of, double step) const {
     return (at(-step) - at(step)) / (2.0 * step);
 }
 
-/// Times move by a part of the record at once and frequencies by a part of a period over it, others as far as they
-/// will: a time between turns that count hardly shows in those that do.
+/// Times move by a part of the record at once, frequencies by a part of a period over it and phases by a part of a
+/// turn, others as far as they will: a time between turns that count hardly shows in those that do, nor does a phase
+/// of what is next to nothing.
 void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) const {
     constexpr double part = 0.1;
     const double duration_s = model_->series().time_s.back();
@@ -254,6 +263,7 @@ void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) c
             if (!fitted_in_phase(*active.effect, parameter.role)) continue;
             const double limit = parameter.role == effects::Role::time        ? part * duration_s
                                  : parameter.role == effects::Role::frequency ? part / duration_s
+                                 : parameter.role == effects::Role::phase     ? part * units::two_pi
                                                                               : 0.0;
             if (limit > 0.0) normal(k, k) += 1.0 / (limit * limit * scale(k) * scale(k));
             ++k;
