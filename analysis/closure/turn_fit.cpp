@@ -157,12 +157,10 @@ void TurnFit::fit_nuisances() {
 }
 
 void TurnFit::fit_deterministic(int most) {
-    constexpr double gained = 1e-3;  // of chi-squared, by another step
     for (int pass = 0; pass < most; ++pass) {
         // Those of so near a point that another step gains nothing serve as well.
         if (moved_) columns_ = columns(prediction_);
         moved_ = false;
-        const std::size_t count = solved();
         set_rest(prediction_);
         TurnParameters guess = parameters_;
         const bool guessed = guess.injected_sd_rad == 0.0;
@@ -174,69 +172,76 @@ void TurnFit::fit_deterministic(int most) {
         // Nothing is known yet: a radian a turn, that what wanders does not drown the kicks.
         if (guessed) noise.white_rad2_per_s = 1.0 / model_->series().interval_s;
         const Whitening whitening(prediction_.frame, noise);
-        const Eigen::VectorXd y = counted(whitening, rest_);
-        // Beside a noise that is only guessed |1 - before'| makes up for nothing.
-        const Eigen::Index used = guessed ? y.size() / 2 : y.size();
-        Eigen::MatrixXd x(y.size(), count);
-        Eigen::VectorXd scale(count);
-        for (std::size_t k = 0; k < count; ++k) {
-            auto column = x.col(static_cast<Eigen::Index>(k));
-            column = counted(whitening, prediction_.frame, columns_[k].of);
-            scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
-            column /= scale(static_cast<Eigen::Index>(k));
-        }
-        Eigen::MatrixXd normal = x.topRows(used).transpose() * x.topRows(used);
-        Eigen::VectorXd right = x.topRows(used).transpose() * y.head(used);
-        for (std::size_t k = 0; k < count && !guessed; ++k) {
-            if (columns_[k].of.slope.empty()) continue;
-            const auto index = static_cast<Eigen::Index>(k);
-            right(index) = slope_of_objective(columns_[k].of, 1e-3 / scale(index)) / scale(index);
-        }
-        add_priors(scale, normal, &right);
-        hold_back(scale, normal);
-        const Eigen::VectorXd whole = normal.ldlt().solve(right);
-        const bool arrived = right.dot(whole) < gained;
-        const auto value = [&](const TurnModel::Prediction& prediction) {
-            return guessed ? squares_left(whitening) : objective_at(prediction);
-        };
-        const double before = value(prediction_);
-        const TurnParameters from = parameters_;
-        const std::vector<double> nuisance_from = nuisance_;
-        bool possible = false;
-        bool gaining = true;
-        // Times, frequencies and phases are far from linear. Where a whole step goes far or leads uphill: a part of it,
-        // which follows a valley that bends, or a damped one (Levenberg 1944), which goes down its wall.
-        const auto shorter = [&](int trial) -> Eigen::VectorXd {
-            constexpr int parts = 4;
-            if (trial < parts) return std::exp2(-trial) * whole;
-            const double damping = 1e-3 * std::pow(10.0, trial - parts);
-            const auto size = normal.rows();
-            return (normal + damping * Eigen::MatrixXd::Identity(size, size)).ldlt().solve(right);
-        };
-        constexpr int trials = 12;
-        for (int trial = 0; trial < trials && !possible; ++trial) {
-            parameters_ = from;
-            nuisance_ = nuisance_from;
-            take(shorter(trial).cwiseQuotient(scale));
-            try {
-                TurnModel::Prediction prediction = model_->predict(parameters_);
-                set_rest(prediction);
-                const double now = value(prediction);
-                possible = now <= before + 1e-9 * std::abs(before) || (guessed && parameters_.effects.empty());
-                gaining = trial > 0 || !(std::abs(before - now) < 0.5 * gained);
-                if (possible) prediction_ = std::move(prediction);
-            } catch (const RunError&) {
-                possible = false;  // no motion of a gyro with such parameters can be followed
-            }
-        }
-        if (!possible) {
-            parameters_ = from;
-            nuisance_ = nuisance_from;
-            set_rest(prediction_);
-        }
-        if (arrived || !gaining || !possible) break;
-        moved_ = true;
+        moved_ = go_down(equations(whitening, guessed), guessed ? &whitening : nullptr);
+        if (!moved_) break;
     }
+}
+
+TurnFit::Equations TurnFit::equations(const Whitening& whitening, bool guessed) const {
+    const std::size_t count = solved();
+    const Eigen::VectorXd y = counted(whitening, rest_);
+    // Beside a noise that is only guessed |1 - before'| makes up for nothing.
+    const Eigen::Index used = guessed ? y.size() / 2 : y.size();
+    Eigen::MatrixXd x(y.size(), count);
+    Eigen::VectorXd scale(count);
+    for (std::size_t k = 0; k < count; ++k) {
+        auto column = x.col(static_cast<Eigen::Index>(k));
+        column = counted(whitening, prediction_.frame, columns_[k].of);
+        scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
+        column /= scale(static_cast<Eigen::Index>(k));
+    }
+    Eigen::MatrixXd normal = x.topRows(used).transpose() * x.topRows(used);
+    Eigen::VectorXd right = x.topRows(used).transpose() * y.head(used);
+    for (std::size_t k = 0; k < count && !guessed; ++k) {
+        if (columns_[k].of.slope.empty()) continue;
+        const auto index = static_cast<Eigen::Index>(k);
+        right(index) = slope_of_objective(columns_[k].of, 1e-3 / scale(index)) / scale(index);
+    }
+    add_priors(scale, normal, &right);
+    hold_back(scale, normal);
+    return {std::move(normal), std::move(right), std::move(scale)};
+}
+
+/// Times, frequencies and phases are far from linear. Where a whole step goes far or leads uphill: a part of it, which
+/// follows a valley that bends, or a damped one (Levenberg 1944), which goes down its wall.
+bool TurnFit::go_down(const Equations& equations, const Whitening* guessed) {
+    constexpr double gained = 1e-3;  // of chi-squared: another step is not worth it
+    constexpr int parts = 4;
+    constexpr int trials = 12;
+    const auto& [normal, right, scale] = equations;
+    const Eigen::VectorXd whole = normal.ldlt().solve(right);
+    const auto step = [&](int trial) -> Eigen::VectorXd {
+        if (trial < parts) return std::exp2(-trial) * whole;
+        const double damping = 1e-3 * std::pow(10.0, trial - parts);
+        return (normal + damping * Eigen::MatrixXd::Identity(normal.rows(), normal.cols())).ldlt().solve(right);
+    };
+    const auto value = [&](const TurnModel::Prediction& prediction) {
+        return guessed != nullptr ? squares_left(*guessed) : objective_at(prediction);
+    };
+    const double before = value(prediction_);
+    const TurnParameters from = parameters_;
+    const std::vector<double> nuisance_from = nuisance_;
+    for (int trial = 0; trial < trials; ++trial) {
+        parameters_ = from;
+        nuisance_ = nuisance_from;
+        take(step(trial).cwiseQuotient(scale));
+        try {
+            TurnModel::Prediction prediction = model_->predict(parameters_);
+            set_rest(prediction);
+            const double now = value(prediction);
+            const bool down = now <= before + 1e-9 * std::abs(before);
+            if (!down && !(guessed != nullptr && parameters_.effects.empty())) continue;
+            prediction_ = std::move(prediction);
+            const bool arrived = right.dot(whole) < gained || (trial == 0 && std::abs(before - now) < 0.5 * gained);
+            return !arrived;
+        } catch (const RunError&) {
+            // no motion of a gyro with such parameters can be followed
+        }
+    }
+    parameters_ = from;
+    nuisance_ = nuisance_from;
+    set_rest(prediction_);
+    return false;
 }
 
 /// Of the likelihood, with all that the filter's gains and variances make of it.

@@ -109,6 +109,15 @@ class TurnFit {
     };
     void fit_nuisances();
     void fit_deterministic(int most);  ///< passes
+    /// Of a step by Gauss and Newton, in units of the columns' norms.
+    struct Equations {
+        Eigen::MatrixXd normal;
+        Eigen::VectorXd right, scale;
+    };
+    Equations equations(const Whitening& whitening, bool guessed) const;
+    /// Such a step, shorter where that is better, in the squares under a noise that is guessed or in the objective.
+    /// Tells whether another may gain something.
+    bool go_down(const Equations& equations, const Whitening* guessed);
     void climb();
     void fit_noise();
     void try_other_noise();
