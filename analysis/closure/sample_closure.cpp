@@ -25,6 +25,7 @@ namespace {
 
 /// What samples can tell of; the rest of the library needs turns.
 constexpr double effects_on_samples = 12.0;
+bool passes_on_samples(double p_value) { return p_value * effects_on_samples < level_of_effects; }
 
 /// Of ten blocks, three are only reported.
 constexpr BlockRoles roles{1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
@@ -227,8 +228,6 @@ void Loop::take_lattice(Closure& closure) {
     now_.told.push_back({"count_quantization", next_step_++});
 }
 
-bool passes_on_samples(double p_value) { return p_value * effects_on_samples < level_of_effects; }
-
 /// What the screening lets pass, each fitted in full; the likeliest first. Weak ones need not pass.
 std::vector<Loop::Contender> Loop::contenders(const State& state, int step, Wanted wanted) const {
     constexpr double worth_looking = 0.01;
@@ -356,7 +355,7 @@ void Loop::drop_needless() {
         auto fitted = std::make_shared<SampleFit>(series_, std::move(without), rows_, SampleFit::Noise::near);
         const double chi2 = 2.0 * (now_.fit->log_likelihood() - fitted->log_likelihood());
         const int parameters = effect == "bias_step" ? 2 : 1;
-        if (chi2_tail(chi2, parameters) * effects_on_samples < level_of_effects) continue;
+        if (passes_on_samples(chi2_tail(chi2, parameters))) continue;
         now_.fit = std::move(fitted);
         now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
         now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));

@@ -12,6 +12,7 @@
 #include <tuple>
 
 #include "analysis/closure/turn_fit.hpp"
+#include "engine/core/error.hpp"
 
 namespace ringlock::closure {
 
@@ -148,8 +149,12 @@ std::unique_ptr<TurnFit> TurnFit::with_less_noise() const {
         TurnParameters less = least ? least->parameters_ : parameters_;
         if (less.*own < 10.0 * no_noise || less.*own > less.readout_sd_rad) continue;
         less.*own = no_noise;
-        std::unique_ptr<TurnFit> without(new TurnFit(*this, std::move(less)));
-        if (without->log_likelihood() > log_likelihood_ - hardly) least = std::move(without);
+        try {
+            std::unique_ptr<TurnFit> without(new TurnFit(*this, std::move(less)));
+            if (without->log_likelihood() > log_likelihood_ - hardly) least = std::move(without);
+        } catch (const RunError&) {
+            // no motion of a gyro with such parameters can be followed
+        }
     }
     return least;
 }
