@@ -30,11 +30,9 @@ struct Arguments {
     std::string dev = "oadev";
     std::string tau = "octave";
     double confidence = allan::Options{}.confidence;
+    std::string bias = "corrected";
     bool json = false;
 };
-
-constexpr std::array<std::string_view, 12> contract_deviations = {
-    "adev", "oadev", "mdev", "tdev", "hdev", "ohdev", "totdev", "mtotdev", "ttotdev", "htotdev", "mtie", "tierms"};
 
 struct Unit {
     std::string_view name;
@@ -91,17 +89,20 @@ const Unit* parse_unit(const std::string& unit, allan::Kind kind) {
         unit));
 }
 
+std::string known_deviations() {
+    std::string list;
+    for (const allan::Traits& t : allan::all_estimators) list += fmt::format("{}{}", list.empty() ? "" : ", ", t.name);
+    return list;
+}
+
 std::vector<allan::Estimator> parse_deviations(const std::string& list) {
     std::vector<allan::Estimator> out;
     for (const std::string& part : split(list)) {
-        if (std::find(contract_deviations.begin(), contract_deviations.end(), part) == contract_deviations.end()) {
-            throw InputError(fmt::format("--dev '{}' is not known; there are adev and oadev", part));
+        const auto estimator = allan::estimator_named(part);
+        if (!estimator) {
+            throw InputError(fmt::format("--dev '{}' is not known; there are {}", part, known_deviations()));
         }
-        if (part != "adev" && part != "oadev") {
-            throw InputError(fmt::format("--dev {}: not there yet; for now adev and oadev", part));
-        }
-        const auto estimator = part == "adev" ? allan::Estimator::adev : allan::Estimator::oadev;
-        if (std::find(out.begin(), out.end(), estimator) == out.end()) out.push_back(estimator);
+        if (std::find(out.begin(), out.end(), *estimator) == out.end()) out.push_back(*estimator);
     }
     return out;
 }
@@ -131,13 +132,14 @@ TauChoice parse_tau(const std::string& tau) {
     return out;
 }
 
-std::vector<std::int64_t> factors_for(const TauChoice& choice, std::int64_t largest) {
+std::vector<std::int64_t> factors_for(const TauChoice& choice, allan::Estimator estimator, std::int64_t points) {
+    const std::int64_t largest = allan::largest_factor(estimator, points);
     if (choice.word == "octave") return allan::octave_factors(largest);
     if (choice.word == "decade") return allan::decade_factors(largest);
     if (choice.word == "all") return allan::all_factors(largest);
     if (choice.list.back() > largest) {
-        throw InputError(
-            fmt::format("--tau {}: this record allows averaging factors 1 to {}", choice.list.back(), largest));
+        throw InputError(fmt::format("--tau {}: for {} this record allows averaging factors 1 to {}",
+                                     choice.list.back(), allan::name(estimator), largest));
     }
     return choice.list;
 }
@@ -174,23 +176,22 @@ void run(const Arguments& a) {
     out.n = series.values.size();
     out.tau0_s = 1.0 / a.rate_hz;
     out.confidence = a.confidence;
-    if (unit != nullptr && unit->to_arcsec != 1.0) {
-        for (double& v : series.values) v *= unit->to_arcsec;
-    }
-    const std::vector<double> phase = allan::centred_phase(series.values, kind, out.tau0_s);
-    if (phase.size() < 3) {
+    const double scale = unit != nullptr ? unit->to_arcsec : 1.0;
+    const allan::Phase phase = allan::phase_of(series.values, kind, out.tau0_s, scale);
+    const auto points = static_cast<std::int64_t>(phase.x.size());
+    if (points < 3) {
         throw InputError(fmt::format("{}: {} data; a deviation needs at least {}", a.data, out.n,
                                      kind == allan::Kind::phase ? 3 : 2));
     }
     std::vector<double>().swap(series.values);
 
     for (const allan::Estimator estimator : estimators) {
-        const std::int64_t largest = allan::largest_factor(estimator, static_cast<std::int64_t>(phase.size()));
-        const std::vector<std::int64_t> factors = factors_for(taus, largest);
-        out.deviations.emplace_back(allan::name(estimator), allan::deviation(estimator, phase, out.tau0_s, factors,
-                                                                             {.confidence = a.confidence}));
+        const std::vector<std::int64_t> factors = factors_for(taus, estimator, points);
+        out.deviations.emplace_back(
+            estimator, allan::deviation(estimator, phase, out.tau0_s, factors,
+                                        {.confidence = a.confidence, .correct_bias = a.bias == "corrected"}));
     }
-    if (unit != nullptr) out.noise = noise::fit_noise(phase, out.tau0_s);
+    if (unit != nullptr) out.noise = noise::fit_noise(phase.x, out.tau0_s);
     const std::string text = a.json ? allan_json(out) : allan_text(out);
     put(text);
 }
@@ -207,9 +208,13 @@ void add_allan(CLI::App& root) {
     sub->add_option("--unit", a->unit,
                     "arcsec, deg, rad (phase, increment); deg/h, deg/s, rad/s (rate); none: dimensionless");
     sub->add_option("--column", a->column, "Name or number (from 1) of the column, or path of an HDF5 dataset");
-    sub->add_option("--dev", a->dev, "Deviations, comma between: adev, oadev")->capture_default_str();
+    sub->add_option("--dev", a->dev, "Deviations, comma between: " + known_deviations())->capture_default_str();
     sub->add_option("--tau", a->tau, "octave | decade | all | averaging factors M,M,...")->capture_default_str();
     sub->add_option("--confidence", a->confidence, "Level of the intervals of the deviation")->capture_default_str();
+    sub->add_option("--bias", a->bias,
+                    "corrected | raw: variances of the total family divided by their known bias or not")
+        ->check(CLI::IsMember({"corrected", "raw"}))
+        ->capture_default_str();
     sub->add_flag("--json", a->json, "One JSON object on standard output");
     sub->callback([a] { run(*a); });
 }

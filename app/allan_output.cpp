@@ -40,10 +40,17 @@ std::string_view noise_name(int alpha) {
             return "white rate";
         case -1:
             return "flicker rate";
-        default:
+        case -2:
             return "random walk rate";
+        case -3:
+            return "flicker walk rate";
+        default:
+            return "random run rate";
     }
 }
+
+/// A number in scientific notation, or a dash where there is none.
+std::string shown(double v, int digits) { return std::isfinite(v) ? fmt::format("{:.{}e}", v, digits) : "-"; }
 
 }  // namespace
 
@@ -56,19 +63,20 @@ std::string allan_json(const AllanOutput& out) {
     json["unit"] = out.gyro ? Json("deg/h") : Json(nullptr);
     json["confidence"] = number(out.confidence);
     json["deviations"] = Json::object();
-    for (const auto& [name, points] : out.deviations) {
+    for (const auto& [estimator, points] : out.deviations) {
         Json list = Json::array();
         for (const allan::Point& p : points) {
             list.push_back({{"m", p.m},
                             {"tau_s", number(p.tau_s)},
                             {"dev", number(p.dev)},
                             {"terms", p.terms},
-                            {"alpha", p.alpha},
+                            {"alpha", std::isfinite(p.edf) ? Json(p.alpha) : Json(nullptr)},
+                            {"bias", number(p.bias)},
                             {"edf", number(p.edf)},
                             {"lo", number(p.lo)},
                             {"hi", number(p.hi)}});
         }
-        json["deviations"][name] = std::move(list);
+        json["deviations"][std::string(allan::name(estimator))] = std::move(list);
     }
     json["noise"] = nullptr;
     if (out.noise) {
@@ -89,15 +97,20 @@ std::string allan_json(const AllanOutput& out) {
 }
 
 std::string allan_text(const AllanOutput& out) {
-    const std::string unit = out.gyro ? " [deg/h]" : "";
     std::string text = fmt::format("{}, column {}: {} data ({}{}{}), tau0 = {:.6g} s\n", out.data, out.column, out.n,
                                    out.kind, out.input_unit.empty() ? "" : ", ", out.input_unit, out.tau0_s);
-    for (const auto& [name, points] : out.deviations) {
-        text += fmt::format("\n{:>9} {:>12} {:>17} {:>27} {:>10} {:>10}  {}\n", "m", "tau [s]", name + unit,
-                            fmt::format("{:.4g} % interval", 100.0 * out.confidence), "edf", "terms", "noise");
+    for (const auto& [estimator, points] : out.deviations) {
+        const allan::Traits& t = allan::traits(estimator);
+        const std::string_view unit = !out.gyro ? "" : t.time ? " [arcsec]" : " [deg/h]";
+        const std::string interval =
+            t.has_interval ? fmt::format("{:.4g} % interval", 100.0 * out.confidence) : "no interval";
+        text += fmt::format("\n{:>9} {:>12} {:>17} {:>27} {:>10} {:>10}  {}\n", "m", "tau [s]",
+                            fmt::format("{}{}", t.name, unit), interval, "edf", "terms", "noise");
         for (const allan::Point& p : points) {
-            text += fmt::format("{:>9} {:>12.6g} {:>17.6e} {:>13.5e} {:>13.5e} {:>10.4g} {:>10}  {}\n", p.m, p.tau_s,
-                                p.dev, p.lo, p.hi, p.edf, p.terms, noise_name(p.alpha));
+            text +=
+                fmt::format("{:>9} {:>12.6g} {:>17.6e} {:>13} {:>13} {:>10} {:>10}  {}\n", p.m, p.tau_s, p.dev,
+                            shown(p.lo, 5), shown(p.hi, 5), std::isfinite(p.edf) ? fmt::format("{:.4g}", p.edf) : "-",
+                            p.terms, t.has_interval ? noise_name(p.alpha) : "");
         }
     }
     if (!out.noise) {

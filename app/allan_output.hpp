@@ -15,11 +15,11 @@ struct AllanOutput {
     std::string column;
     std::string kind;
     std::string input_unit;  ///< empty: dimensionless
-    bool gyro = false;       ///< the input has a unit: deviations in deg/h, noise fitted
+    bool gyro = false;       ///< the input has a unit: deviations in deg/h (time errors in arcsec), noise fitted
     std::size_t n = 0;
     double tau0_s = 0.0;
     double confidence = 0.0;
-    std::vector<std::pair<std::string, std::vector<allan::Point>>> deviations;
+    std::vector<std::pair<allan::Estimator, std::vector<allan::Point>>> deviations;
     std::optional<noise::NoiseFit> noise;
 };
 

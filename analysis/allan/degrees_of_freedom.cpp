@@ -2,50 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
+
+#include "analysis/allan/power_law.hpp"
 
 namespace ringlock::allan {
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-/// Generalised autocovariance of the integrated phase, up to a positive constant.
-double s_w(double t, int alpha) {
-    const double a = std::abs(t);
-    if (a == 0.0) return 0.0;
-    const double t2 = a * a;
-    switch (alpha) {
-        case 2:
-            return -a;
-        case 1:
-            return t2 * std::log(a);
-        case 0:
-            return a * t2;
-        case -1:
-            return -t2 * t2 * std::log(a);
-        case -2:
-            return -a * t2 * t2;
-        case -3:
-            return t2 * t2 * t2 * std::log(a);
-        case -4:
-            return a * t2 * t2 * t2;
-        default:
-            throw std::domain_error("degrees of freedom: alpha outside -4...2");
-    }
-}
-
-/// Autocovariance of the phase averaged over tau/F; F infinite is the limit of no averaging.
-double s_x(double t, double filter, int alpha) {
-    if (std::isinf(filter)) return s_w(t, alpha + 2);
-    if (alpha == 1) {
-        // t^2 ln t in units of the filter's length: the factor F^2 cancels and no digits are lost for large F.
-        const double u = std::abs(t) * filter;
-        if (u > 64.0) return -2.0 * std::log(std::abs(t)) - 3.0 + 1.0 / (6.0 * u * u);
-        return 2.0 * s_w(u, 1) - s_w(u - 1.0, 1) - s_w(u + 1.0, 1) + 2.0 * std::log(filter);
-    }
-    return filter * filter * (2.0 * s_w(t, alpha) - s_w(t - 1.0 / filter, alpha) - s_w(t + 1.0 / filter, alpha));
-}
 
 double binomial(int n, int k) {
     double b = 1.0;
@@ -58,7 +20,7 @@ double s_z(double t, double filter, int alpha, int d) {
     double z = 0.0;
     for (int k = -d; k <= d; ++k) {
         const double sign = k % 2 == 0 ? 1.0 : -1.0;
-        z += sign * binomial(2 * d, d + k) * s_x(t + k, filter, alpha);
+        z += sign * binomial(2 * d, d + k) * phase_autocovariance(t + k, filter, alpha);
     }
     return z;
 }
@@ -103,7 +65,7 @@ double degrees_of_freedom(const EstimatorShape& shape, int alpha, std::int64_t m
         return terms / sum;
     }
     double filter = 1.0;
-    if (!shape.modified) filter = alpha <= 0 ? infinity : static_cast<double>(m);
+    if (!shape.modified) filter = alpha <= 0 ? sampled : static_cast<double>(m);
     // Beyond d + 1 taus the terms of the stationary noises are uncorrelated, those of the others nearly.
     const std::int64_t end = std::min(term_count, (d + 1) * strides);
     const double z0 = s_z(0.0, filter, alpha, d);

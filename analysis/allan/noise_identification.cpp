@@ -49,11 +49,14 @@ std::optional<double> lag1_autocorrelation(const std::vector<double>& x) {
 
 }  // namespace
 
-std::optional<int> identify_noise(std::span<const double> phase, std::int64_t m) {
-    constexpr int most_differences = 2;
-    std::vector<double> x;
-    x.reserve(phase.size() / static_cast<std::size_t>(m) + 1);
-    for (std::size_t i = 0; i < phase.size(); i += static_cast<std::size_t>(m)) x.push_back(phase[i]);
+std::optional<int> identify_noise(std::span<const double> phase, std::int64_t m, int most_differences) {
+    constexpr std::size_t most_points = std::size_t{1} << 20;
+    const auto step = static_cast<std::size_t>(m);
+    const std::size_t points = phase.empty() ? 0 : (phase.size() - 1) / step + 1;
+    const std::size_t taken = std::min(points, most_points);
+    std::vector<double> x(taken);
+    const std::size_t first = (points - taken) / 2;
+    for (std::size_t i = 0; i < taken; ++i) x[i] = phase[(first + i) * step];
     if (static_cast<std::int64_t>(x.size()) < noise_identification_points) return std::nullopt;
     remove_parabola(x);
     for (int d = 0;; ++d) {
@@ -62,7 +65,7 @@ std::optional<int> identify_noise(std::span<const double> phase, std::int64_t m)
         const double rho = *r / (1.0 + *r);
         if (rho < 0.25 || d == most_differences) {
             const int alpha = 2 - 2 * d - static_cast<int>(std::lround(2.0 * rho));
-            return std::clamp(alpha, -2, 2);
+            return std::clamp(alpha, 2 - 2 * most_differences, 2);
         }
         for (std::size_t i = 0; i + 1 < x.size(); ++i) x[i] = x[i + 1] - x[i];
         x.pop_back();

@@ -75,6 +75,37 @@ TEST_F(AllanCommand, JsonHasTheFieldsAndPublishedFigures) {
     EXPECT_NEAR(json["deviations"]["adev"][2]["dev"], 3.897804e-2, 5e-9);
 }
 
+// All names of the family; errors of time carry the unit of the data, and what has no interval says null.
+TEST_F(AllanCommand, EveryDeviationIsThere) {
+    const std::string data = write(test::sp1065_frequencies());
+    const std::string names = "adev,oadev,mdev,tdev,hdev,ohdev,totdev,mtotdev,ttotdev,htotdev,mtie,tierms";
+    const Outcome r = run(data + " --rate 1 --kind rate --tau 1,10,100 --json --dev " + names);
+    ASSERT_EQ(r.status, 0) << r.err;
+    const auto json = nlohmann::json::parse(r.out)["deviations"];
+    ASSERT_EQ(json.size(), 12u);
+    for (const auto& [name, points] : json.items()) {
+        ASSERT_EQ(points.size(), 3u) << name;
+        const bool error = name == "mtie" || name == "tierms";
+        for (const auto& p : points) {
+            EXPECT_GT(p["dev"], 0.0);
+            EXPECT_GT(p["terms"], 0);
+            for (const char* field : {"alpha", "edf", "lo", "hi"})
+                EXPECT_EQ(p[field].is_null(), error) << name << field;
+        }
+    }
+    EXPECT_NEAR(json["htotdev"][2]["dev"], 3.058103e-2, 5e-9);
+    const auto raw = nlohmann::json::parse(
+        run(data + " --rate 1 --kind rate --tau 1,10,100 --json --bias raw --dev " + names).out)["deviations"];
+    EXPECT_NEAR(raw["mtotdev"][0]["dev"], 2.0664e-1, 5e-6);
+    EXPECT_EQ(raw["mtotdev"][0]["bias"], 1.0);
+    EXPECT_EQ(json["mtotdev"][0]["bias"], 0.73);
+    // The correction is of the deviation, not of what is known about the truth.
+    EXPECT_EQ(raw["mtotdev"][0]["lo"], json["mtotdev"][0]["lo"]);
+    const Outcome text = run(data + " --rate 1 --kind rate --unit deg/h --dev tdev,mtie --tau 1,10");
+    EXPECT_THAT(text.out, HasSubstr("tdev [arcsec]"));
+    EXPECT_THAT(text.out, HasSubstr("no interval"));
+}
+
 // One record in every kind and unit gives one answer.
 TEST_F(AllanCommand, KindsAndUnitsAgree) {
     const auto angle = test::simulate_angle({.n = 0.3}, 1200, 0.5, 1);
@@ -134,7 +165,8 @@ TEST_F(AllanCommand, WrongInputEndsWithTwoAndSaysWhy) {
     expect(data + " --rate 0 --kind rate", "positive");
     expect(data + " --rate 10 --kind rate --unit arcsec", "deg/h, deg/s, rad/s");
     expect(data + " --rate 10 --kind rate --unit furlong", "'furlong'");
-    expect(data + " --rate 10 --kind rate --dev hdev", "not there yet");
+    expect(data + " --rate 10 --kind rate --dev oadev,pdev", "'pdev' is not known; there are adev, oadev, mdev");
+    expect(data + " --rate 10 --kind rate --bias maybe", "--bias");
     expect(data + " --rate 10 --kind rate --dev xdev", "not known");
     expect(data + " --rate 10 --kind rate --tau 1,9", "1 to 3");
     expect(data + " --rate 10 --kind rate --tau 0.5", "not seconds");

@@ -1,0 +1,372 @@
+#include "analysis/allan/difference_sums.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "analysis/allan/difference_sums.cpp"
+#include "engine/simd/targets.hpp"
+// The above must come first.
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+HWY_BEFORE_NAMESPACE();
+namespace ringlock::allan::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Running sums, whatever the width of a vector: term i goes to the (i mod columns)-th.
+constexpr std::size_t columns = 32;
+
+template <int order, class D>
+HWY_INLINE hn::Vec<D> difference_at(D d, const double* x, std::size_t m) {
+    if constexpr (order == 1) {
+        return hn::Sub(hn::LoadU(d, x + m), hn::LoadU(d, x));
+    } else if constexpr (order == 2) {
+        const auto middle = hn::LoadU(d, x + m);
+        return hn::Sub(hn::Sub(hn::LoadU(d, x + 2 * m), middle), hn::Sub(middle, hn::LoadU(d, x)));
+    } else {
+        const auto inner = hn::Sub(hn::LoadU(d, x + 2 * m), hn::LoadU(d, x + m));
+        const auto outer = hn::Sub(hn::LoadU(d, x + 3 * m), hn::LoadU(d, x));
+        return hn::Sub(outer, hn::Mul(inner, hn::Set(d, 3.0)));
+    }
+}
+
+template <int order, bool skipping>
+void add_differences(const double* HWY_RESTRICT x, std::size_t m, std::size_t count, double* HWY_RESTRICT sums,
+                     std::int64_t& terms) {
+    const hn::CappedTag<double, 8> d;
+    constexpr std::size_t width = hn::MaxLanes(d);
+    constexpr std::size_t vectors = columns / width;
+    hn::Vec<decltype(d)> total[vectors];
+    for (std::size_t v = 0; v < vectors; ++v) total[v] = hn::LoadU(d, sums + v * width);
+    std::size_t i = 0;
+    std::size_t skipped = 0;
+    for (; i + columns <= count; i += columns) {
+        for (std::size_t v = 0; v < vectors; ++v) {
+            const auto z = difference_at<order>(d, x + i + v * width, m);
+            const auto square = hn::Mul(z, z);
+            if constexpr (skipping) {
+                const auto there = hn::Eq(square, square);
+                skipped += width - hn::CountTrue(d, there);
+                total[v] = hn::Add(total[v], hn::IfThenElseZero(there, square));
+            } else {
+                total[v] = hn::Add(total[v], square);
+            }
+        }
+    }
+    for (std::size_t v = 0; v < vectors; ++v) hn::StoreU(total[v], d, sums + v * width);
+    const hn::CappedTag<double, 1> one;
+    for (; i < count; ++i) {
+        const double z = hn::GetLane(difference_at<order>(one, x + i, m));
+        if (skipping && std::isnan(z)) {
+            ++skipped;
+            continue;
+        }
+        sums[i % columns] += z * z;
+    }
+    terms += static_cast<std::int64_t>(count - skipped);
+}
+
+/// Adds the squares of `count` differences from x on to sums[32], and their number to terms.
+void add_squares_of_differences(const double* x, int order, bool skipping, std::size_t m, std::size_t count,
+                                double* sums, std::int64_t& terms) {
+    if (order == 1) {
+        return skipping ? add_differences<1, true>(x, m, count, sums, terms)
+                        : add_differences<1, false>(x, m, count, sums, terms);
+    }
+    if (order == 2) {
+        return skipping ? add_differences<2, true>(x, m, count, sums, terms)
+                        : add_differences<2, false>(x, m, count, sums, terms);
+    }
+    return skipping ? add_differences<3, true>(x, m, count, sums, terms)
+                    : add_differences<3, false>(x, m, count, sums, terms);
+}
+
+/// out[i] = x[i + 3m] - 3 x[i + 2m] + 3 x[i + m] - x[i].
+void third_differences(const double* HWY_RESTRICT x, std::size_t m, std::size_t count, double* HWY_RESTRICT out) {
+    const hn::CappedTag<double, 8> d;
+    const std::size_t width = hn::Lanes(d);
+    std::size_t i = 0;
+    for (; i + width <= count; i += width) hn::StoreU(difference_at<3>(d, x + i, m), d, out + i);
+    const hn::CappedTag<double, 1> one;
+    for (; i < count; ++i) out[i] = hn::GetLane(difference_at<3>(one, x + i, m));
+}
+
+/// Adds the squares of base + z[i] to sums[32].
+void add_squares(const double* HWY_RESTRICT z, double base, std::size_t count, double* HWY_RESTRICT sums) {
+    const hn::CappedTag<double, 8> d;
+    constexpr std::size_t width = hn::MaxLanes(d);
+    constexpr std::size_t vectors = columns / width;
+    hn::Vec<decltype(d)> total[vectors];
+    for (std::size_t v = 0; v < vectors; ++v) total[v] = hn::LoadU(d, sums + v * width);
+    const auto from = hn::Set(d, base);
+    std::size_t i = 0;
+    for (; i + columns <= count; i += columns) {
+        for (std::size_t v = 0; v < vectors; ++v) {
+            const auto term = hn::Add(from, hn::LoadU(d, z + i + v * width));
+            total[v] = hn::Add(total[v], hn::Mul(term, term));
+        }
+    }
+    for (std::size_t v = 0; v < vectors; ++v) hn::StoreU(total[v], d, sums + v * width);
+    for (; i < count; ++i) {
+        const double term = base + z[i];
+        sums[i % columns] += term * term;
+    }
+}
+
+}  // namespace ringlock::allan::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ringlock::allan {
+
+HWY_EXPORT(add_squares_of_differences);
+HWY_EXPORT(third_differences);
+HWY_EXPORT(add_squares);
+
+namespace {
+
+/// Sums of one piece of work.
+struct Sums {
+    alignas(64) std::array<double, 32> columns{};
+    std::int64_t terms = 0;
+
+    void add(const double* x, Difference difference, std::size_t m, std::size_t count) {
+        HWY_DYNAMIC_DISPATCH(add_squares_of_differences)
+        (x, difference.order, difference.skipping, m, count, columns.data(), terms);
+    }
+    SquareMean folded() const {
+        std::array<double, 32> part = columns;
+        for (std::size_t half = part.size() / 2; half > 0; half /= 2) {
+            for (std::size_t i = 0; i < half; ++i) part[i] += part[i + half];
+        }
+        return {part[0], terms};
+    }
+};
+
+/// Adds up neighbours, then pairs of pairs: rounding grows with the logarithm of their number.
+SquareMean pairwise(std::vector<SquareMean> parts) {
+    if (parts.empty()) return {};
+    for (std::size_t n = parts.size(); n > 1; n = (n + 1) / 2) {
+        for (std::size_t i = 0; i < n / 2; ++i) {
+            parts[i] = parts[2 * i];
+            parts[i] += parts[2 * i + 1];
+        }
+        if (n % 2 == 1) parts[n / 2] = parts[n - 1];
+    }
+    return parts.front();
+}
+
+/// Calls work(piece) for 0...pieces-1 on all threads.
+template <class Work>
+void for_pieces(std::size_t pieces, const Work& work) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pieces, 1), [&](const tbb::blocked_range<std::size_t>& range) {
+        for (std::size_t piece = range.begin(); piece < range.end(); ++piece) work(piece);
+    });
+}
+
+/// Starts of a piece of the record, and the longest step that is taken from pieces: a piece and what its differences
+/// reach, 4 x 8192 points at most, fit a second-level cache.
+constexpr std::size_t piece_starts = 8192;
+/// Points of a column that is copied out of the record.
+constexpr std::size_t column_points = 40960;
+
+/// Number of starts of a difference in a record.
+std::size_t starts_of(std::size_t size, int order, std::size_t m) {
+    const std::size_t reach = static_cast<std::size_t>(order) * m;
+    return size > reach ? size - reach : 0;
+}
+
+/// Steps that fit the cache.
+void short_steps(std::span<const double> x, Difference difference, std::span<const std::size_t> m,
+                 std::span<const std::size_t> which, std::vector<SquareMean>& out) {
+    const std::size_t pieces = (x.size() + piece_starts - 1) / piece_starts;
+    std::vector<SquareMean> parts(pieces * which.size());
+    for_pieces(pieces, [&](std::size_t piece) {
+        const std::size_t first = piece * piece_starts;
+        for (std::size_t k = 0; k < which.size(); ++k) {
+            const std::size_t step = m[which[k]];
+            const std::size_t last = std::min(first + piece_starts, starts_of(x.size(), difference.order, step));
+            if (last <= first) continue;
+            Sums sums;
+            sums.add(x.data() + first, difference, step, last - first);
+            parts[k * pieces + piece] = sums.folded();
+        }
+    });
+    for (std::size_t k = 0; k < which.size(); ++k) {
+        out[which[k]] = pairwise({parts.begin() + static_cast<std::ptrdiff_t>(k * pieces),
+                                  parts.begin() + static_cast<std::ptrdiff_t>((k + 1) * pieces)});
+    }
+}
+
+/// Steps that are multiples of `row`: the record is written in rows of that length and taken column by column.
+void long_steps(std::span<const double> x, Difference difference, std::span<const std::size_t> m,
+                std::span<const std::size_t> which, std::size_t row, std::vector<SquareMean>& out) {
+    const std::size_t rows = (x.size() + row - 1) / row;
+    const std::size_t width = std::min(row, std::max<std::size_t>(8, column_points / rows / 8 * 8));
+    const std::size_t pieces = (row + width - 1) / width;
+    std::vector<SquareMean> parts(pieces * which.size());
+    for_pieces(pieces, [&](std::size_t piece) {
+        const std::size_t left = piece * width;
+        const std::size_t wide = std::min(width, row - left);
+        std::vector<double> column(rows * wide);
+        for (std::size_t r = 0; r < rows && r * row + left < x.size(); ++r) {
+            const std::size_t there = std::min(wide, x.size() - r * row - left);
+            std::copy_n(x.data() + r * row + left, there, column.data() + r * wide);
+        }
+        for (std::size_t k = 0; k < which.size(); ++k) {
+            const std::size_t step = m[which[k]];
+            // Starts r row + left + c < starts: whole rows first, then a part of one.
+            const std::size_t starts = starts_of(x.size(), difference.order, step);
+            if (starts <= left) continue;
+            const std::size_t whole = starts >= left + wide ? (starts - left - wide) / row + 1 : 0;
+            const std::size_t beyond = whole * row + left;
+            const std::size_t rest = starts > beyond ? std::min(wide, starts - beyond) : 0;
+            Sums sums;
+            sums.add(column.data(), difference, step / row * wide, whole * wide + rest);
+            parts[k * pieces + piece] = sums.folded();
+        }
+    });
+    for (std::size_t k = 0; k < which.size(); ++k) {
+        out[which[k]] = pairwise({parts.begin() + static_cast<std::ptrdiff_t>(k * pieces),
+                                  parts.begin() + static_cast<std::ptrdiff_t>((k + 1) * pieces)});
+    }
+}
+
+/// Squares of the sums from `first` on: each is the one before and a third difference of the phase. Eight chains of
+/// additions side by side hide what one addition waits for the other.
+SquareMean mean_difference_piece(const double* x, std::size_t m, std::size_t count, double begin) {
+    constexpr std::size_t chains = 8;
+    alignas(64) std::array<double, piece_starts> z;
+    // z[i] is to be term i less the chain's first term.
+    const std::size_t length = (count + chains - 1) / chains;
+    HWY_DYNAMIC_DISPATCH(third_differences)(x, m, count - 1, z.data() + 1);
+    z[0] = 0.0;
+    std::array<double, chains> running{};
+    for (std::size_t i = 0; i < length; ++i) {
+        for (std::size_t k = 0; k < chains; ++k) {
+            const std::size_t at = k * length + i;
+            if (at >= count) break;
+            running[k] += z[at];
+            z[at] = running[k];
+        }
+    }
+    Sums sums;
+    double base = begin;
+    for (std::size_t k = 0; k < chains && k * length < count; ++k) {
+        const std::size_t there = std::min(length, count - k * length);
+        HWY_DYNAMIC_DISPATCH(add_squares)(z.data() + k * length, base, there, sums.columns.data());
+        base += running[k];
+    }
+    sums.terms = static_cast<std::int64_t>(count);
+    return sums.folded();
+}
+
+}  // namespace
+
+SquareMean sum_of_differences(std::span<const double> x, Difference difference, std::size_t m, std::size_t first,
+                              std::size_t last) {
+    if (last <= first) return {};
+    const std::size_t pieces = (last - first + piece_starts - 1) / piece_starts;
+    std::vector<SquareMean> parts(pieces);
+    for_pieces(pieces, [&](std::size_t piece) {
+        const std::size_t from = first + piece * piece_starts;
+        Sums sums;
+        sums.add(x.data() + from, difference, m, std::min(piece_starts, last - from));
+        parts[piece] = sums.folded();
+    });
+    return pairwise(std::move(parts));
+}
+
+SquareMean sum_of_strided_differences(std::span<const double> x, Difference difference, std::size_t m,
+                                      std::size_t stride) {
+    const std::size_t starts = starts_of(x.size(), difference.order, m);
+    const std::size_t count = (starts + stride - 1) / stride;
+    // Only every stride-th point counts where steps are a whole number of strides, as they are here.
+    std::vector<double> every(count + static_cast<std::size_t>(difference.order) * m / stride);
+    if (count == 0) return {};
+    for (std::size_t i = 0; i < every.size(); ++i) every[i] = x[i * stride];
+    return sum_of_differences(every, difference, m / stride, 0, count);
+}
+
+std::vector<SquareMean> sums_of_differences(std::span<const double> x, Difference difference,
+                                            std::span<const std::size_t> m) {
+    std::vector<SquareMean> out(m.size());
+    std::vector<std::size_t> near;
+    std::vector<std::size_t> far;
+    for (std::size_t k = 0; k < m.size(); ++k) {
+        (m[k] <= piece_starts ? near : far).push_back(k);
+    }
+    if (!near.empty()) short_steps(x, difference, m, near, out);
+    if (far.empty()) return out;
+    std::size_t row = m[far.front()];
+    for (const std::size_t k : far) row = std::min(row, m[k]);
+    std::vector<std::size_t> regular;
+    for (const std::size_t k : far) {
+        if (m[k] % row == 0) {
+            regular.push_back(k);
+        } else {
+            out[k] = sum_of_differences(x, difference, m[k], 0, starts_of(x.size(), difference.order, m[k]));
+        }
+    }
+    long_steps(x, difference, m, regular, row, out);
+    return out;
+}
+
+void MeanDifferences::Exact::add(double x) {
+    const double sum = value + x;
+    const double back = sum - value;
+    rest += (value - (sum - back)) + (x - back);
+    value = sum;
+}
+
+MeanDifferences::MeanDifferences(std::span<const double> x) : x_(x) {
+    before_.reserve(x.size() / spacing + 1);
+    Exact total;
+    for (std::size_t i = 0; i <= x.size(); ++i) {
+        if (i % spacing == 0) before_.push_back(total);
+        if (i < x.size()) total.add(x[i]);
+    }
+}
+
+MeanDifferences::Exact MeanDifferences::before(std::size_t i) const {
+    Exact total = before_[i / spacing];
+    for (std::size_t k = i / spacing * spacing; k < i; ++k) total.add(x_[k]);
+    return total;
+}
+
+double MeanDifferences::difference(std::size_t i, std::size_t m) const {
+    const std::array<Exact, 4> at = {before(i), before(i + m), before(i + 2 * m), before(i + 3 * m)};
+    // The sums over m points first, then their differences: each step is done with what it rounds away.
+    const auto over = [&](std::size_t k) {
+        Exact sum = at[k + 1];
+        sum.add(-at[k].value);
+        sum.add(-at[k].rest);
+        return sum;
+    };
+    Exact z = over(2);
+    const Exact middle = over(1);
+    const Exact first = over(0);
+    for (const double v : {-2.0 * middle.value, -2.0 * middle.rest, first.value, first.rest}) z.add(v);
+    return z.value + z.rest;
+}
+
+SquareMean MeanDifferences::sum(std::size_t m) const {
+    if (m == 0 || x_.size() < 3 * m) return {};
+    const std::size_t starts = x_.size() - 3 * m + 1;
+    const std::size_t pieces = (starts + piece_starts - 1) / piece_starts;
+    std::vector<SquareMean> parts(pieces);
+    for_pieces(pieces, [&](std::size_t piece) {
+        const std::size_t first = piece * piece_starts;
+        parts[piece] =
+            mean_difference_piece(x_.data() + first, m, std::min(piece_starts, starts - first), difference(first, m));
+    });
+    SquareMean total = pairwise(std::move(parts));
+    total.sum /= static_cast<double>(m) * static_cast<double>(m);
+    return total;
+}
+
+}  // namespace ringlock::allan
+#endif  // HWY_ONCE

@@ -1,0 +1,73 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+/// Sums of squares that the estimators are made of. They do not depend on the number of threads nor on the instruction
+/// set: what is added to what is fixed by the data's positions alone.
+namespace ringlock::allan {
+
+/// Sum of squares, and how many.
+struct SquareMean {
+    double sum = 0.0;
+    std::int64_t terms = 0;
+    SquareMean& operator+=(const SquareMean& other) {
+        sum += other.sum;
+        terms += other.terms;
+        return *this;
+    }
+};
+
+/// What to do with a difference.
+struct Difference {
+    int order = 2;          ///< 1, 2 or 3
+    bool skipping = false;  ///< leave out those that meet a NaN
+};
+
+/// Squares of all differences of the given order and step m whose first point is one of x[first], ..., x[last - 1].
+///
+/// \param x      phase; points up to last - 1 + order m are read
+/// \param first, last  where differences begin
+SquareMean sum_of_differences(std::span<const double> x, Difference difference, std::size_t m, std::size_t first,
+                              std::size_t last);
+
+/// The same at every `stride`-th start from the first point on, as far as the record goes.
+SquareMean sum_of_strided_differences(std::span<const double> x, Difference difference, std::size_t m,
+                                      std::size_t stride);
+
+/// The same at every start of the record, for many steps at once, in about two readings of the record where they are
+/// octaves: steps that fit the cache are taken from pieces of the record, those beyond from columns of the record
+/// written in rows of the least of them, where a long step is a few rows.
+///
+/// \param m  steps, in any order
+/// \return one for each
+std::vector<SquareMean> sums_of_differences(std::span<const double> x, Difference difference,
+                                            std::span<const std::size_t> m);
+
+/// Second differences of means over m neighbouring points of one record.
+class MeanDifferences {
+   public:
+    /// \param x  phase without gaps; kept by reference
+    explicit MeanDifferences(std::span<const double> x);
+
+    /// Squares of ((x_{i+2m} + ...) - 2 (x_{i+m} + ...) + (x_i + ...))/m for every i with i + 3m <= size.
+    SquareMean sum(std::size_t m) const;
+
+   private:
+    /// A sum with twice the digits of a double.
+    struct Exact {
+        double value = 0.0;
+        double rest = 0.0;
+        void add(double x);
+    };
+    static constexpr std::size_t spacing = 256;
+
+    Exact before(std::size_t i) const;
+    double difference(std::size_t i, std::size_t m) const;
+
+    std::span<const double> x_;
+    std::vector<Exact> before_;  ///< sums over all points before every `spacing`-th one
+};
+
+}  // namespace ringlock::allan
