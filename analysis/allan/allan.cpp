@@ -17,9 +17,10 @@
 namespace ringlock::allan {
 namespace {
 
-/// Identifies the noise at each factor; beyond the last one with enough points what was found there is kept. With fewer
-/// than 100 points the redder of what is found there and an octave below is taken: so few points tell alpha to about
-/// +-1, and a false white phase noise would claim thousands of degrees of freedom where there are a few.
+/// Identifies the noise at each factor; beyond the last one with enough points what was found there is kept. Fewer than
+/// 100 points tell the exponent to +-0.3 to 0.6: it is taken together with that of the octave below, which has twice as
+/// many, and phase noise is believed only where both show it, since it would claim thousands of degrees of freedom
+/// where there are a few.
 class NoisePerFactor {
    public:
     NoisePerFactor(std::span<const double> phase, int differences)
@@ -39,9 +40,11 @@ class NoisePerFactor {
    private:
     int found_at(std::int64_t m) const {
         constexpr std::int64_t sure = 100;
-        const int found = identify_noise(phase_, m, differences_).value_or(0);
-        if (m == 1 || steps_ / m >= sure) return found;
-        return std::min(found, identify_noise(phase_, m / 2, differences_).value_or(0));
+        const double here = noise_exponent(phase_, m, differences_).value_or(0.0);
+        if (m == 1 || steps_ / m >= sure) return nearest_noise(here, differences_);
+        const double below = noise_exponent(phase_, m / 2, differences_).value_or(0.0);
+        const int both = nearest_noise((here + 2.0 * below) / 3.0, differences_);
+        return std::min(both, std::max(0, nearest_noise(below, differences_)));
     }
 
     std::span<const double> phase_;
@@ -232,7 +235,6 @@ std::vector<Point> variances_with_intervals(Estimator estimator, const Record& r
     const std::vector<SquareMean> sums = square_sums(t, record, phase, steps);
     const std::vector<double> filled = record.stretches.size() > 1 ? bridged(*phase) : std::vector<double>{};
     NoisePerFactor noise(filled.empty() ? record.x : std::span<const double>(filled), t.differences);
-    Uncertainties uncertainty(options.confidence);
 
     std::vector<Point> out;
     for (std::size_t k = 0; k < factors.size(); ++k) {
@@ -248,7 +250,7 @@ std::vector<Point> variances_with_intervals(Estimator estimator, const Record& r
         if (options.correct_bias) there.bias = published_bias(estimator, there.alpha, p.m, alike);
         const double variance = variance_of(t, sums[k].sum / static_cast<double>(p.terms), p.m, tau0_s);
         there.dev = std::sqrt(variance / there.bias);
-        const Uncertainty u = uncertainty(estimator, there.alpha, p.m, alike);
+        const Uncertainty u = uncertainty_of(estimator, there.alpha, p.m, alike, options.confidence);
         there.edf = u.edf;
         there.lo = std::sqrt(variance / (u.bias * u.high));
         there.hi = std::sqrt(variance / (u.bias * u.low));

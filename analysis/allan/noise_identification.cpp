@@ -49,7 +49,7 @@ std::optional<double> lag1_autocorrelation(const std::vector<double>& x) {
 
 }  // namespace
 
-std::optional<int> identify_noise(std::span<const double> phase, std::int64_t m, int most_differences) {
+std::optional<double> noise_exponent(std::span<const double> phase, std::int64_t m, int most_differences) {
     constexpr std::size_t most_points = std::size_t{1} << 20;
     const auto step = static_cast<std::size_t>(m);
     const std::size_t points = phase.empty() ? 0 : (phase.size() - 1) / step + 1;
@@ -63,13 +63,16 @@ std::optional<int> identify_noise(std::span<const double> phase, std::int64_t m,
         const std::optional<double> r = lag1_autocorrelation(x);
         if (!r) return std::nullopt;
         const double rho = *r / (1.0 + *r);
-        if (rho < 0.25 || d == most_differences) {
-            const int alpha = 2 - 2 * d - static_cast<int>(std::lround(2.0 * rho));
-            return std::clamp(alpha, 2 - 2 * most_differences, 2);
-        }
+        if (rho < 0.25 || d == most_differences) return 2.0 - 2.0 * (d + rho);
         for (std::size_t i = 0; i + 1 < x.size(); ++i) x[i] = x[i + 1] - x[i];
         x.pop_back();
     }
+}
+
+int nearest_noise(double exponent, int most_differences) {
+    constexpr double red_shift = 0.22;
+    const double shifted = exponent < -1.0 ? exponent + red_shift : exponent;
+    return static_cast<int>(std::lround(std::clamp(shifted, 2.0 - 2.0 * most_differences, 2.0)));
 }
 
 }  // namespace ringlock::allan

@@ -8,20 +8,25 @@ namespace ringlock::allan {
 /// Fewest decimated phase points from which a noise type is identified (Riley & Greenhall 2004 advise about 30).
 inline constexpr std::int64_t noise_identification_points = 30;
 
-/// Power-law exponent alpha of the noise that dominates at one averaging factor: S_y(f) ~ f^alpha.
+/// Power-law exponent of the noise that dominates at one averaging factor, S_y(f) ~ f^alpha, before it is rounded.
 ///
 /// \param phase   phase samples, any unit
 /// \param m       averaging factor >= 1
 /// \param most_differences  how often the phase may be differenced: 2 for Allan deviations, 3 for Hadamard's
-/// \return 2 (white phase), 1, 0 (white frequency, angle random walk), -1 (flicker), -2 (rate random walk), with three
-///         differences down to -4; nothing where fewer than noise_identification_points remain or the decimated data
-///         do not vary
-///
-/// Of very long records a part in the middle is looked at, 2^20 decimated points: they tell alpha to a thousandth.
+/// \return nothing where fewer than noise_identification_points remain or the decimated data do not vary
 ///
 /// Lag-1 autocorrelation r of the phase taken every m points, a parabola removed, differenced d times until
-/// rho = r/(1+r) < 1/4; then alpha = 2 - 2 d - round(2 rho). W. Riley, C. Greenhall, "Power law noise identification
-/// using the lag 1 autocorrelation", 18th EFTF (2004); NIST SP1065 section 5.5.6.
-std::optional<int> identify_noise(std::span<const double> phase, std::int64_t m, int most_differences = 2);
+/// rho = r/(1+r) < 1/4; then 2 - 2 (d + rho). W. Riley, C. Greenhall, "Power law noise identification using the lag 1
+/// autocorrelation", 18th EFTF (2004); NIST SP1065 section 5.5.6. Of very long records a part in the middle is looked
+/// at, 2^20 decimated points: they tell the exponent to a thousandth.
+std::optional<double> noise_exponent(std::span<const double> phase, std::int64_t m, int most_differences = 2);
+
+/// The kind of noise nearest to an exponent: 2 (white phase), 1, 0 (white frequency, angle random walk), -1 (flicker),
+/// -2 (rate random walk); with three differences down to -4.
+///
+/// The method's formula holds for noise made of independent samples. Rates that are means of a continuous process over
+/// tau, as a gyro's are at any tau, have exponents of -1.45 for flicker and -2.40 for a random walk (their differences
+/// are correlated; the tests show it), so that flicker ends at -1.72, half-way from -1.45 to -2, and not at -1.5.
+int nearest_noise(double exponent, int most_differences = 2);
 
 }  // namespace ringlock::allan

@@ -158,12 +158,12 @@ Matrix covariance(int alpha, std::int64_t m, std::int64_t points) {
 
 }  // namespace
 
-WeightedSquares::WeightedSquares(std::vector<double> weights) : weights_(std::move(weights)) {
-    mean_ = std::accumulate(weights_.begin(), weights_.end(), 0.0);
+WeightedSquares::WeightedSquares(std::vector<Share> shares) : shares_(std::move(shares)) {
+    for (const Share& s : shares_) mean_ += s.count * s.weight;
     double squares = 0.0;
-    for (double& w : weights_) {
-        w /= mean_;
-        squares += w * w;
+    for (Share& s : shares_) {
+        s.weight /= mean_;
+        squares += s.count * s.weight * s.weight;
     }
     degrees_ = 1.0 / squares;
 }
@@ -178,17 +178,18 @@ double WeightedSquares::probability_below(double x) const {
     };
     const auto at = [&](double t) {
         Cumulants k;
-        for (const double w : weights_) {
-            const double rest = 1.0 - 2.0 * w * t;
-            const double share = w / rest;
-            k.value -= 0.5 * std::log(rest);
-            k.first += share;
-            k.second += 2.0 * share * share;
-            k.third += 8.0 * share * share * share;
+        for (const auto& [weight, count] : shares_) {
+            const double rest = 1.0 - 2.0 * weight * t;
+            const double share = weight / rest;
+            k.value -= 0.5 * count * std::log(rest);
+            k.first += count * share;
+            k.second += 2.0 * count * share * share;
+            k.third += 8.0 * count * share * share * share;
         }
         return k;
     };
-    const double largest = *std::max_element(weights_.begin(), weights_.end());
+    double largest = 0.0;
+    for (const Share& s : shares_) largest = std::max(largest, s.weight);
     double low = -1.0;
     while (at(low).first > x) low *= 4.0;
     double high = 0.5 / largest;
@@ -247,9 +248,9 @@ WeightedSquares distribution_of(Estimator estimator, int alpha, std::int64_t m, 
     Matrix near = covariance(alpha, m, base_span);
     const double truth = (term * near * term.transpose())(0, 0);
     const auto terms = static_cast<double>(term_count(estimator, m, points));
-    std::vector<double> weights;
+    std::vector<WeightedSquares::Share> weights;
     for (std::int64_t i = 0; i < eigenvalues.size(); ++i) {
-        if (eigenvalues(i) > 1e-9 * eigenvalues.maxCoeff()) weights.push_back(eigenvalues(i) / (terms * truth));
+        if (eigenvalues(i) > 1e-9 * eigenvalues.maxCoeff()) weights.push_back({eigenvalues(i) / (terms * truth)});
     }
     return WeightedSquares(std::move(weights));
 }

@@ -10,8 +10,14 @@ namespace ringlock::allan {
 /// variances, exactly.
 class WeightedSquares {
    public:
-    /// \param weights  >= 0, not all 0
-    explicit WeightedSquares(std::vector<double> weights);
+    /// Squares of one weight, and how many: not necessarily a whole number.
+    struct Share {
+        double weight = 0.0;
+        double count = 1.0;
+    };
+
+    /// \param shares  weights > 0; at least one
+    explicit WeightedSquares(std::vector<Share> shares);
 
     double mean() const { return mean_; }
     /// Degrees of freedom of the chi-squared of equal mean and variance.
@@ -25,7 +31,7 @@ class WeightedSquares {
    private:
     double probability_below(double x) const;
 
-    std::vector<double> weights_;  ///< of sum 1
+    std::vector<Share> shares_;  ///< of sum 1
     double mean_ = 0.0;
     double degrees_ = 0.0;
 };

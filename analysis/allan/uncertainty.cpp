@@ -3,17 +3,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <mutex>
 #include <numbers>
-#include <stdexcept>
+#include <tuple>
 
 #include "analysis/allan/degrees_of_freedom.hpp"
 #include "analysis/allan/interval.hpp"
+#include "analysis/allan/quadratic_form.hpp"
 
 namespace ringlock::allan {
 namespace {
 
 /// Samples of a tau in the short records that stand for others, and the most taus that those have.
-constexpr std::int64_t fine = 8;
+constexpr std::int64_t finest = 8;
 constexpr std::int64_t most_taus = 16;
 /// Degrees of freedom from which an estimate is chi-squared for all purposes.
 constexpr double many_degrees = 16.0;
@@ -22,6 +25,13 @@ EstimatorShape shape_of(Estimator estimator) {
     const Traits& t = traits(estimator);
     const bool modified = t.family == Family::modified || t.family == Family::modified_total;
     return {.differences = t.differences, .modified = modified, .overlapping = t.overlapping};
+}
+
+/// Degrees of an estimator without reflections. Phase averaged over one sample is sampled phase.
+double degrees_of(Estimator estimator, int alpha, std::int64_t m, std::int64_t points) {
+    EstimatorShape shape = shape_of(estimator);
+    shape.modified = shape.modified && m > 1;
+    return degrees_of_freedom(shape, alpha, m, points);
 }
 
 /// The estimator without reflections that is like it.
@@ -38,21 +48,141 @@ Estimator plain(Estimator estimator) {
     }
 }
 
-bool is_total(Estimator estimator) { return plain(estimator) != estimator; }
-
 /// A record of as many tau as that of `points`, with at most `fine` samples to each.
 struct Short {
     std::int64_t m;
     std::int64_t points;
 };
 
-Short short_record(Estimator estimator, std::int64_t m, std::int64_t points) {
+Short short_record(Estimator estimator, std::int64_t m, std::int64_t points, std::int64_t fine) {
     const Traits& t = traits(estimator);
-    const std::int64_t few = !t.overlapping ? 1 : std::min(m, fine);
+    const std::int64_t few = t.overlapping ? std::min(m, fine) : 1;
     const double taus = static_cast<double>(points - 1) / static_cast<double>(m);
-    const auto steps = static_cast<std::int64_t>(t.overlapping ? std::llround(taus * static_cast<double>(few))
-                                                               : static_cast<std::int64_t>(taus));
+    const std::int64_t steps =
+        t.overlapping ? std::llround(taus * static_cast<double>(few)) : static_cast<std::int64_t>(taus);
     return {few, std::max(span_of(estimator, few), steps + 1)};
+}
+
+/// What is known of an estimate on a short record.
+struct Known {
+    double degrees;
+    double mean;
+    double low;
+    double high;
+};
+
+/// Worked out once; a record of a study differs from the next in nothing that matters here.
+Known known(Estimator estimator, int alpha, const Short& record, double confidence) {
+    static std::mutex guard;
+    static std::map<std::tuple<Estimator, int, std::int64_t, std::int64_t, double>, Known> kept;
+    const std::tuple key{estimator, alpha, record.m, record.points, confidence};
+    {
+        const std::lock_guard lock(guard);
+        if (const auto found = kept.find(key); found != kept.end()) return found->second;
+    }
+    const WeightedSquares squares = distribution_of(estimator, alpha, record.m, record.points);
+    const Known out{squares.degrees(), squares.mean(), squares.quantile(0.5 * (1.0 - confidence)),
+                    squares.quantile(0.5 * (1.0 + confidence))};
+    const std::lock_guard lock(guard);
+    kept.emplace(key, out);
+    return out;
+}
+
+/// Whether the distribution of an estimate depends on the length of the record in tau alone. That of sampled phase
+/// noise does not: every sample is new.
+bool scale_free(Estimator estimator, int alpha) {
+    const Traits& t = traits(estimator);
+    if (alpha <= 0) return true;
+    if (t.family == Family::modified || t.family == Family::modified_total) return true;
+    return !t.overlapping && alpha == 2;
+}
+
+void set_chi_squared(Uncertainty& u, double confidence) {
+    u.low = relative_chi_squared_quantile(u.edf, 0.5 * (1.0 - confidence));
+    u.high = relative_chi_squared_quantile(u.edf, 0.5 * (1.0 + confidence));
+}
+
+Uncertainty uncertainty_of_plain(Estimator estimator, int alpha, std::int64_t m, std::int64_t points,
+                                 double confidence) {
+    Uncertainty out;
+    out.edf = degrees_of(estimator, alpha, m, points);
+    if (out.edf >= many_degrees || !scale_free(estimator, alpha)) {
+        set_chi_squared(out, confidence);
+        return out;
+    }
+    const Known there = known(estimator, alpha, short_record(estimator, m, points, finest), confidence);
+    out.low = there.low;
+    out.high = there.high;
+    return out;
+}
+
+/// Degrees of the plain counterpart, on a record that is long enough for it.
+double plain_degrees(Estimator estimator, int alpha, std::int64_t m, std::int64_t points) {
+    const Estimator like = plain(estimator);
+    return degrees_of(like, alpha, m, std::max(points, span_of(like, m)));
+}
+
+/// Degrees of the total deviation with so many samples to a tau.
+struct Sampled {
+    std::int64_t m;
+    double degrees;
+};
+
+/// Phase noise in the total deviation: the images of an end all carry the error of its one phase, a part of the
+/// variance that more samples do not lessen, and a square of its own for each end. 1/edf = a/m + b on both short
+/// records; a longer one has more terms, of which fewer see the ends.
+void set_by_ends(Uncertainty& u, const Sampled& less, const Sampled& more, std::int64_t m, double beyond,
+                 double confidence) {
+    const auto part = [](const Sampled& s) { return 1.0 / static_cast<double>(s.m); };
+    const double a = (1.0 / less.degrees - 1.0 / more.degrees) / (part(less) - part(more));
+    const double ends = std::max(0.0, 1.0 / more.degrees - a * part(more)) * beyond * beyond;
+    const double rest = a / static_cast<double>(m) * beyond;
+    const double end = std::sqrt(0.5 * ends);
+    const double others = 1.0 - 2.0 * end;
+    if (!(rest > 0.0 && others > 0.0)) return set_chi_squared(u, confidence);
+    u.edf = 1.0 / (rest + ends);
+    const double count = others * others / rest;
+    const WeightedSquares squares({{end, 2.0}, {others / count, count}});
+    u.low = squares.quantile(0.5 * (1.0 - confidence));
+    u.high = squares.quantile(0.5 * (1.0 + confidence));
+}
+
+Uncertainty uncertainty_of_total(Estimator estimator, int alpha, std::int64_t m, std::int64_t points,
+                                 double confidence) {
+    const bool reflected = traits(estimator).family == Family::total;
+    // What the ends of the record do to the total deviation fades in proportion to tau/T, and is followed down to 1/16.
+    const std::int64_t longest = std::min(points, most_taus * m + 1);
+    const double beyond = static_cast<double>(longest - 1) / static_cast<double>(points - 1);
+    const Short little = short_record(estimator, m, longest, finest);
+    const Known there = known(estimator, alpha, little, confidence);
+    const double like = plain_degrees(estimator, alpha, m, points);
+    const double like_there = plain_degrees(estimator, alpha, little.m, little.points);
+    Uncertainty out;
+    out.edf = there.degrees * like / like_there;
+    out.bias = there.mean;
+    if (m > finest) {
+        // From half as many samples in a tau to as many as there are: the distance goes with 1/m for phase noise, with
+        // 1/m^2 for what is smooth.
+        const Short less = short_record(estimator, m, longest, finest / 2);
+        const Known before = known(estimator, alpha, less, confidence);
+        const double power = alpha > 0 ? 1.0 : 2.0;
+        const double share = (1.0 - std::pow(static_cast<double>(finest) / static_cast<double>(m), power)) /
+                             (std::pow(2.0, power) - 1.0);
+        out.bias += share * (there.mean - before.mean);
+        if (reflected && alpha > 0) {
+            out.bias = 1.0 + (out.bias - 1.0) * beyond;
+            set_by_ends(out, {less.m, before.degrees}, {little.m, there.degrees}, m, beyond, confidence);
+            return out;
+        }
+    }
+    if (reflected) out.bias = 1.0 + (out.bias - 1.0) * beyond;
+    if (out.edf < many_degrees && scale_free(estimator, alpha)) {
+        out.low = there.low;
+        out.high = there.high;
+    } else {
+        set_chi_squared(out, confidence);
+    }
+    return out;
 }
 
 }  // namespace
@@ -78,52 +208,10 @@ double published_bias(Estimator estimator, int alpha, std::int64_t m, std::int64
     }
 }
 
-Uncertainties::Uncertainties(double confidence) : confidence_(confidence) {}
-
-const WeightedSquares& Uncertainties::form(Estimator estimator, int alpha, std::int64_t m, std::int64_t points) {
-    auto& kept = forms_[{estimator, alpha, m, points}];
-    if (!kept) kept = std::make_unique<WeightedSquares>(distribution_of(estimator, alpha, m, points));
-    return *kept;
-}
-
-double Uncertainties::total_degrees(Estimator estimator, int alpha, std::int64_t m, std::int64_t points) {
-    const Estimator like = plain(estimator);
-    const Short little = short_record(estimator, m, std::min(points, most_taus * m + 1));
-    const double ratio = form(estimator, alpha, little.m, little.points).degrees();
-    const std::int64_t enough = std::max(points, span_of(like, m));
-    const std::int64_t little_enough = std::max(little.points, span_of(like, little.m));
-    return ratio * degrees_of_freedom(shape_of(like), alpha, m, enough) /
-           degrees_of_freedom(shape_of(like), alpha, little.m, little_enough);
-}
-
-void Uncertainties::set_quantiles(Uncertainty& out, const WeightedSquares* exact) const {
-    const double below = 0.5 * (1.0 - confidence_);
-    const double above = 0.5 * (1.0 + confidence_);
-    out.low = exact != nullptr ? exact->quantile(below) : relative_chi_squared_quantile(out.edf, below);
-    out.high = exact != nullptr ? exact->quantile(above) : relative_chi_squared_quantile(out.edf, above);
-}
-
-Uncertainty Uncertainties::operator()(Estimator estimator, int alpha, std::int64_t m, std::int64_t points) {
-    Uncertainty out;
-    const WeightedSquares* exact = nullptr;
-    const bool scale_free = alpha <= 0;
-    if (is_total(estimator)) {
-        out.edf = total_degrees(estimator, alpha, m, points);
-        const Short little = short_record(estimator, m, std::min(points, most_taus * m + 1));
-        const WeightedSquares& there = form(estimator, alpha, little.m, little.points);
-        out.bias = there.mean();
-        // Beyond, what the ends do fades in proportion to tau/T.
-        if (traits(estimator).family == Family::total && points - 1 > most_taus * m) {
-            out.bias = 1.0 + (out.bias - 1.0) * static_cast<double>(most_taus * m) / static_cast<double>(points - 1);
-        }
-        if (scale_free && out.edf < many_degrees) exact = &there;
-    } else {
-        out.edf = degrees_of_freedom(shape_of(estimator), alpha, m, points);
-        const Short little = short_record(estimator, m, points);
-        if (scale_free && out.edf < many_degrees) exact = &form(estimator, alpha, little.m, little.points);
-    }
-    set_quantiles(out, exact);
-    return out;
+Uncertainty uncertainty_of(Estimator estimator, int alpha, std::int64_t m, std::int64_t points, double confidence) {
+    const bool total = plain(estimator) != estimator;
+    return total ? uncertainty_of_total(estimator, alpha, m, points, confidence)
+                 : uncertainty_of_plain(estimator, alpha, m, points, confidence);
 }
 
 }  // namespace ringlock::allan

@@ -1,11 +1,7 @@
 #pragma once
 #include <cstdint>
-#include <map>
-#include <memory>
-#include <tuple>
 
 #include "analysis/allan/estimator.hpp"
-#include "analysis/allan/quadratic_form.hpp"
 
 namespace ringlock::allan {
 
@@ -29,27 +25,17 @@ struct Uncertainty {
     double high = 1.0;
 };
 
-/// Uncertainties of one curve; remembers what it has worked out for short records.
+/// Uncertainty of one point of a curve.
+///
+/// \param points      phase points of the record; with gaps, of one without that has as many terms
+/// \param confidence  two-sided, in (0, 1)
 ///
 /// From sixteen degrees of freedom on an estimate is taken as chi-squared; below, the distribution is that of the
-/// estimator's own quadratic form (distribution_of), on a record of the same length in tau with eight samples to a tau:
-/// for frequency noise the statistics do not depend on the sampling. The total family has no sums over lags: the
-/// degrees of its plain counterpart (degrees_of_freedom) are multiplied by the ratio between the two quadratic forms,
-/// for records of at most sixteen tau; it changes by a few per cent beyond.
-class Uncertainties {
-   public:
-    explicit Uncertainties(double confidence);
-
-    /// \param points  phase points of the record; with gaps, of one without that has as many terms
-    Uncertainty operator()(Estimator estimator, int alpha, std::int64_t m, std::int64_t points);
-
-   private:
-    const WeightedSquares& form(Estimator estimator, int alpha, std::int64_t m, std::int64_t points);
-    double total_degrees(Estimator estimator, int alpha, std::int64_t m, std::int64_t points);
-    void set_quantiles(Uncertainty& out, const WeightedSquares* exact) const;
-
-    double confidence_;
-    std::map<std::tuple<Estimator, int, std::int64_t, std::int64_t>, std::unique_ptr<WeightedSquares>> forms_;
-};
+/// estimator's own quadratic form (distribution_of), on a record of the same length in tau with eight samples to a tau,
+/// wherever the statistics do not depend on the sampling. The total family has no sums over lags: the degrees of its
+/// plain counterpart (degrees_of_freedom) are multiplied by the ratio between the two quadratic forms, on records of at
+/// most sixteen tau, and bias follows from the forms with four and eight samples to a tau. What is worked out for a
+/// short record is kept for the next one of its kind. Thread-safe.
+Uncertainty uncertainty_of(Estimator estimator, int alpha, std::int64_t m, std::int64_t points, double confidence);
 
 }  // namespace ringlock::allan

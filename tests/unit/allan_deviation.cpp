@@ -145,8 +145,7 @@ TEST(AllanDeviation, EachNoiseHasItsLevelAndIsIdentified) {
                                     2 * std::numbers::ln2 / std::numbers::pi * t.b * t.b + t.k * t.k * tau / 3;
             EXPECT_NEAR(variance[i] / expected, 1.0, 0.03) << "alpha " << c.alpha << " tau " << tau;
         }
-        // Flicker lies between two neighbours half an exponent away; the method is coarse.
-        EXPECT_GE(identified, records * (c.alpha == -1 ? 6 : 9) / 10) << "alpha " << c.alpha;
+        EXPECT_GE(identified, records * 9 / 10) << "alpha " << c.alpha;
     }
 }
 
