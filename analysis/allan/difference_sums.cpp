@@ -11,6 +11,8 @@
 #include <array>
 #include <cmath>
 
+#include "analysis/allan/exact_sum.hpp"
+
 HWY_BEFORE_NAMESPACE();
 namespace ringlock::allan::HWY_NAMESPACE {
 
@@ -128,23 +130,14 @@ HWY_EXPORT(add_squares);
 
 namespace {
 
-/// Sums of one piece of work.
-struct Sums {
-    alignas(64) std::array<double, 32> columns{};
-    std::int64_t terms = 0;
+using Columns = std::array<double, 32>;
 
-    void add(const double* x, Difference difference, std::size_t m, std::size_t count) {
-        HWY_DYNAMIC_DISPATCH(add_squares_of_differences)
-        (x, difference.order, difference.skipping, m, count, columns.data(), terms);
+double folded_columns(Columns part) {
+    for (std::size_t half = part.size() / 2; half > 0; half /= 2) {
+        for (std::size_t i = 0; i < half; ++i) part[i] += part[i + half];
     }
-    SquareMean folded() const {
-        std::array<double, 32> part = columns;
-        for (std::size_t half = part.size() / 2; half > 0; half /= 2) {
-            for (std::size_t i = 0; i < half; ++i) part[i] += part[i + half];
-        }
-        return {part[0], terms};
-    }
-};
+    return part[0];
+}
 
 /// Adds up neighbours, then pairs of pairs: rounding grows with the logarithm of their number.
 SquareMean pairwise(std::vector<SquareMean> parts) {
@@ -190,7 +183,7 @@ void short_steps(std::span<const double> x, Difference difference, std::span<con
             const std::size_t step = m[which[k]];
             const std::size_t last = std::min(first + piece_starts, starts_of(x.size(), difference.order, step));
             if (last <= first) continue;
-            Sums sums;
+            DifferenceSums sums;
             sums.add(x.data() + first, difference, step, last - first);
             parts[k * pieces + piece] = sums.folded();
         }
@@ -224,7 +217,7 @@ void long_steps(std::span<const double> x, Difference difference, std::span<cons
             const std::size_t whole = starts >= left + wide ? (starts - left - wide) / row + 1 : 0;
             const std::size_t beyond = whole * row + left;
             const std::size_t rest = starts > beyond ? std::min(wide, starts - beyond) : 0;
-            Sums sums;
+            DifferenceSums sums;
             sums.add(column.data(), difference, step / row * wide, whole * wide + rest);
             parts[k * pieces + piece] = sums.folded();
         }
@@ -253,18 +246,24 @@ SquareMean mean_difference_piece(const double* x, std::size_t m, std::size_t cou
             z[at] = running[k];
         }
     }
-    Sums sums;
+    alignas(64) Columns columns{};
     double base = begin;
     for (std::size_t k = 0; k < chains && k * length < count; ++k) {
         const std::size_t there = std::min(length, count - k * length);
-        HWY_DYNAMIC_DISPATCH(add_squares)(z.data() + k * length, base, there, sums.columns.data());
+        HWY_DYNAMIC_DISPATCH(add_squares)(z.data() + k * length, base, there, columns.data());
         base += running[k];
     }
-    sums.terms = static_cast<std::int64_t>(count);
-    return sums.folded();
+    return {folded_columns(columns), static_cast<std::int64_t>(count)};
 }
 
 }  // namespace
+
+void DifferenceSums::add(const double* x, Difference difference, std::size_t m, std::size_t count) {
+    HWY_DYNAMIC_DISPATCH(add_squares_of_differences)
+    (x, difference.order, difference.skipping, m, count, columns_.data(), terms_);
+}
+
+SquareMean DifferenceSums::folded() const { return {folded_columns(columns_), terms_}; }
 
 SquareMean sum_of_differences(std::span<const double> x, Difference difference, std::size_t m, std::size_t first,
                               std::size_t last) {
@@ -273,7 +272,7 @@ SquareMean sum_of_differences(std::span<const double> x, Difference difference, 
     std::vector<SquareMean> parts(pieces);
     for_pieces(pieces, [&](std::size_t piece) {
         const std::size_t from = first + piece * piece_starts;
-        Sums sums;
+        DifferenceSums sums;
         sums.add(x.data() + from, difference, m, std::min(piece_starts, last - from));
         parts[piece] = sums.folded();
     });
@@ -316,10 +315,9 @@ std::vector<SquareMean> sums_of_differences(std::span<const double> x, Differenc
 }
 
 void MeanDifferences::Exact::add(double x) {
-    const double sum = value + x;
-    const double back = sum - value;
-    rest += (value - (sum - back)) + (x - back);
-    value = sum;
+    const ExactSum sum = two_sum(value, x);
+    rest += sum.error;
+    value = sum.value;
 }
 
 MeanDifferences::MeanDifferences(std::span<const double> x) : x_(x) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -23,6 +24,19 @@ struct SquareMean {
 struct Difference {
     int order = 2;          ///< 1, 2 or 3
     bool skipping = false;  ///< leave out those that meet a NaN
+};
+
+/// A running sum of squares of differences. Thirty-two sums side by side, folded at the end: the same whatever the
+/// width of a machine's vectors.
+class DifferenceSums {
+   public:
+    /// Adds the differences that begin at x[0], ..., x[count - 1]; points up to x[count - 1 + order m] are read.
+    void add(const double* x, Difference difference, std::size_t m, std::size_t count);
+    SquareMean folded() const;
+
+   private:
+    alignas(64) std::array<double, 32> columns_{};
+    std::int64_t terms_ = 0;
 };
 
 /// Squares of all differences of the given order and step m whose first point is one of x[first], ..., x[last - 1].

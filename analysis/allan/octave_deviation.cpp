@@ -14,14 +14,14 @@ namespace ringlock::allan {
 namespace {
 
 /// The exponent of the noise whose Allan variance goes as m^mu.
-int exponent(double mu) {
+int exponent(double mu, int differences) {
     if (mu < -1.5) return 2;
-    return std::clamp(-1 - static_cast<int>(std::lround(mu)), -2, 0);
+    return std::clamp(-1 - static_cast<int>(std::lround(mu)), 2 - 2 * differences, 0);
 }
 
 }  // namespace
 
-std::vector<int> noise_of_octaves(const std::vector<double>& variances, std::int64_t samples) {
+std::vector<int> noise_of_octaves(const std::vector<double>& variances, std::int64_t samples, int differences) {
     constexpr std::int64_t sure = 100;
     std::vector<int> alpha(variances.size(), 0);
     int before = 0;  // found an octave below
@@ -36,41 +36,53 @@ std::vector<int> noise_of_octaves(const std::vector<double>& variances, std::int
             continue;
         }
         const double octaves = static_cast<double>(above - below);
-        const int found = exponent(std::log2(variances[above] / variances[below]) / octaves);
+        const int found = exponent(std::log2(variances[above] / variances[below]) / octaves, differences);
         alpha[i] = i == 0 || taus >= sure ? found : std::min(found, before);
         before = found;
     }
     return alpha;
 }
 
-std::vector<Point> deviation(const OctaveStream& stream, std::size_t lane, double unit_per_count, double tau0_s,
-                             double confidence) {
+std::vector<Point> octave_points(const std::vector<OctaveMean>& octaves, int differences, std::int64_t samples,
+                                 double tau0_s, double confidence) {
     check_deviation_input(tau0_s, confidence);
-    if (!(unit_per_count > 0.0) || !std::isfinite(unit_per_count)) {
-        throw InputError(fmt::format("unit of a count {}: must be a positive number", unit_per_count));
-    }
-    constexpr EstimatorShape shape{.starts_per_tau = OctaveStream::starts_per_tau};
-    const std::vector<Octave> octaves = stream.octaves(lane);
+    const EstimatorShape shape{.differences = differences, .starts_per_tau = OctaveStream::starts_per_tau};
     std::vector<double> variances;
-    for (const Octave& octave : octaves) {
-        const auto m = static_cast<double>(octave.m);
-        variances.push_back(octave.sum.rounded() / (2.0 * static_cast<double>(octave.terms)) / (m * m));
+    for (const OctaveMean& octave : octaves) {
+        const double tau = static_cast<double>(octave.m) * tau0_s;
+        variances.push_back(octave.mean_square / ((differences == 3 ? 6.0 : 2.0) * tau * tau));
     }
-    const std::vector<int> alpha = noise_of_octaves(variances, stream.samples());
+    const std::vector<int> alpha = noise_of_octaves(variances, samples, differences);
 
     std::vector<Point> out;
     for (std::size_t i = 0; i < octaves.size(); ++i) {
         Point p;
         p.m = octaves[i].m;
         p.tau_s = static_cast<double>(p.m) * tau0_s;
-        p.dev = std::sqrt(variances[i]) * (unit_per_count / tau0_s);
+        p.dev = std::sqrt(variances[i]);
         p.terms = octaves[i].terms;
         p.alpha = alpha[i];
-        p.edf = degrees_of_freedom(shape, p.alpha, p.m, stream.samples());
+        // A record with gaps is worth one without that has as many terms.
+        const std::int64_t stride = std::max<std::int64_t>(1, p.m / OctaveStream::starts_per_tau);
+        const std::int64_t alike = std::min(samples, 1 + p.m * differences + (p.terms - 1) * stride + stride - 1);
+        p.edf = degrees_of_freedom(shape, p.alpha, p.m, alike);
         set_interval(p, confidence);
         out.push_back(p);
     }
     return out;
+}
+
+std::vector<Point> deviation(const OctaveStream& stream, std::size_t lane, double unit_per_count, double tau0_s,
+                             double confidence) {
+    if (!(unit_per_count > 0.0) || !std::isfinite(unit_per_count)) {
+        throw InputError(fmt::format("unit of a count {}: must be a positive number", unit_per_count));
+    }
+    std::vector<OctaveMean> octaves;
+    for (const Octave& octave : stream.octaves(lane)) {
+        const double mean_square = octave.sum.rounded() / static_cast<double>(octave.terms);
+        octaves.push_back({octave.m, mean_square * unit_per_count * unit_per_count, octave.terms});
+    }
+    return octave_points(octaves, 2, stream.samples(), tau0_s, confidence);
 }
 
 }  // namespace ringlock::allan

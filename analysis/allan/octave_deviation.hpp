@@ -11,6 +11,7 @@ namespace ringlock::allan {
 ///
 /// \param variances  Allan variances at m = 1, 2, 4, ..., any unit, >= 0
 /// \param samples    length of the record [phase samples]
+/// \param differences  2 for Allan variances; with Hadamard's (3) exponents go down to -4
 /// \return S_y(f) ~ f^alpha for each: 2 (white phase, and flicker phase, which has nearly its slope), 0 (white
 ///         frequency), -1 (flicker), -2 (random walk and redder); 0 where nothing can be told
 ///
@@ -18,7 +19,26 @@ namespace ringlock::allan {
 /// the ends; alpha = -1 - round(mu), and 2 for mu < -3/2 (NIST SP1065 section 5.5.5, table 6). Beyond n/m = 30
 /// averaging times the last exponent is kept, and from 100 on the redder of it and the octave's below taken, as for
 /// stored records.
-std::vector<int> noise_of_octaves(const std::vector<double>& variances, std::int64_t samples);
+std::vector<int> noise_of_octaves(const std::vector<double>& variances, std::int64_t samples, int differences = 2);
+
+/// What a stream knows of one octave.
+struct OctaveMean {
+    std::int64_t m = 0;        ///< averaging factor, a power of two
+    double mean_square = 0.0;  ///< of differences of the phase by m, in units of it
+    std::int64_t terms = 0;
+};
+
+/// Deviations with intervals from sums with a stride of tau/8 (OctaveStream::starts_per_tau).
+///
+/// \param octaves      m = 1, 2, 4, ... as far as there are terms
+/// \param differences  2 Allan, 3 Hadamard
+/// \param samples      phase samples of the record
+/// \param tau0_s       sampling interval [s], > 0
+/// \param confidence   two-sided level of the intervals, in (0, 1)
+///
+/// Throws InputError where tau0 or confidence are out of range.
+std::vector<Point> octave_points(const std::vector<OctaveMean>& octaves, int differences, std::int64_t samples,
+                                 double tau0_s, double confidence);
 
 /// Allan deviation of one gyro at every octave that has a term, with intervals.
 ///

@@ -4,21 +4,12 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/allan/exact_sum.hpp"
+
 namespace ringlock::allan {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-struct Sum {
-    double value;
-    double error;  ///< value + error is the exact sum
-};
-
-Sum two_sum(double a, double b) {
-    const double s = a + b;
-    const double bb = s - a;
-    return {s, (a - (s - bb)) + (b - bb)};
-}
 
 /// Stretches of samples that are there.
 template <class There>
@@ -55,13 +46,13 @@ class Reals {
     double slope() const { return slope_; }
     /// Sample i less the line, `steps` samples after where the line begins.
     double above_line(std::size_t i, std::size_t steps) const {
-        const Sum d = two_sum(data_[i], -origin_);
+        const ExactSum d = two_sum(data_[i], -origin_);
         return std::fma(-slope_, static_cast<double>(steps), d.value) + d.error;
     }
     void begin() { running_ = {0.0, 0.0}; }
     double add(std::size_t i) {
-        const Sum step = two_sum(data_[i], -slope_);
-        const Sum next = two_sum(running_.value, step.value);
+        const ExactSum step = two_sum(data_[i], -slope_);
+        const ExactSum next = two_sum(running_.value, step.value);
         running_ = {next.value, running_.error + next.error + step.error};
         return running_.value + running_.error;
     }
@@ -70,7 +61,7 @@ class Reals {
     std::span<const double> data_;
     double origin_ = 0.0;
     double slope_ = 0.0;
-    Sum running_{0.0, 0.0};
+    ExactSum running_{0.0, 0.0};
 };
 
 /// Whole counts in two's complement: nothing is rounded.
