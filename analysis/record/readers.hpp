@@ -50,6 +50,9 @@ inline constexpr std::array<SampleKind, 3> sample_kinds = {SampleKind::angle_inc
 inline constexpr const char* format_name = "rlg-record";
 inline constexpr std::int64_t format_version = 1;
 
+/// Bytes of the machine's memory.
+double memory_bytes();
+
 /// "a, b, c", at most the first 20.
 std::string listed(const std::vector<std::string>& names);
 
