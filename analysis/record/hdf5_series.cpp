@@ -194,6 +194,12 @@ class Column {
         const std::optional<Extent> extent = dataset_.valid() ? column_extent(dataset_) : std::nullopt;
         if (!extent) throw InputError(fmt::format("{}: cannot be opened; is the file damaged?", label()));
         extent_ = *extent;
+        // The library copies by this size, be it damaged, and from beyond what it has unpacked.
+        const std::size_t most_bytes = is_whole() ? sizeof(std::int64_t) : sizeof(long double);
+        if (H5Tget_size(type_) > most_bytes) {
+            throw InputError(fmt::format("{}: holds {} of {} bytes each; allowed are up to {}. Is the file damaged?",
+                                         label(), is_whole() ? "integers" : "numbers", H5Tget_size(type_), most_bytes));
+        }
         if (extent_.length == 0) throw InputError(fmt::format("{}: is empty", label()));
         // Reading it would give zeros, as many as it says. Of a virtual dataset the library does not know.
         const Handle creation(H5Dget_create_plist(dataset_), H5Pclose);
@@ -206,7 +212,6 @@ class Column {
     hsize_t length() const { return extent_.length; }
     bool is_whole() const { return H5Tget_class(type_) == H5T_INTEGER; }
     bool is_signed() const { return H5Tget_sign(type_) != H5T_SGN_NONE; }
-    std::size_t bytes() const { return H5Tget_size(type_); }
 
     std::string label() const { return fmt::format("{}: dataset {}", path_, name_); }
     std::string place(std::size_t element) const {
@@ -280,10 +285,6 @@ void read_rows(const Column& column, const Column* time, SeriesRows& rows) {
 
 void read_rows(const Column& column, const Column* time, SeriesRows& rows) {
     if (!column.is_whole()) return read_rows<double>(column, time, rows);
-    if (column.bytes() > sizeof(std::int64_t)) {
-        throw InputError(
-            fmt::format("{}: holds integers of {} bytes; allowed are up to 8", column.label(), column.bytes()));
-    }
     if (column.is_signed()) return read_rows<std::int64_t>(column, time, rows);
     return read_rows<std::uint64_t>(column, time, rows);
 }

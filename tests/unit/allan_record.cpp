@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include <cstdlib>
+#include <random>
 #include <thread>
 
 #include "tests/unit/allan_record_support.hpp"
@@ -192,6 +193,66 @@ TEST_F(AllanRecord, StreamsTextInBoundedPieces) {
     EXPECT_EQ(streamed.info.missing, 150u);
     EXPECT_EQ(streamed.info.column, "x");
     EXPECT_EQ(streamed.info.rate_hz, 5.0);
+}
+
+// Whatever the bytes are: a series that adds up, or an error that names the file.
+TEST_F(AllanRecord, AnyTextIsASeriesOrAnError) {
+    std::mt19937_64 engine(3);
+    const std::vector<std::string> parts = {"1",
+                                            "-2.5",
+                                            "1e3",
+                                            "nan",
+                                            "NA",
+                                            ",",
+                                            ",",
+                                            " ",
+                                            "\n",
+                                            "\n",
+                                            "\n",
+                                            "\r\n",
+                                            "#",
+                                            "# rate_hz = 2\n",
+                                            "inf",
+                                            "x",
+                                            "9007199254740993",
+                                            "99999999999999999999",
+                                            "\t",
+                                            std::string(1, '\0'),
+                                            "\xff",
+                                            "+",
+                                            "."};
+    int read = 0, refused = 0;
+    for (int trial = 0; trial < 2000; ++trial) {
+        // Few different parts make texts that agree with themselves now and then.
+        const std::size_t kinds = 1 + engine() % parts.size();
+        const std::size_t first = engine() % parts.size();
+        std::string text;
+        for (std::size_t i = engine() % 12; i > 0; --i) text += parts[(first + engine() % kinds) % parts.size()];
+        record::SeriesRequest request{file(text), std::nullopt, std::nullopt, 1.0};
+        if (engine() % 2 == 0) request.column = "1";
+        if (engine() % 4 == 0) request.time = "2";
+        const std::string error = test::message_or(
+            [&] {
+                const auto s = record::read_series(request);
+                ++read;
+                EXPECT_EQ(s.values.size(), s.n) << text;
+                std::size_t missing = 0;
+                for (const double v : s.values) {
+                    missing += std::isnan(v) ? 1 : 0;
+                    EXPECT_FALSE(std::isinf(v)) << text;
+                }
+                EXPECT_EQ(missing, s.missing) << text;
+                EXPECT_LT(missing, s.n) << text;
+                EXPECT_EQ(s.counts.size(), s.rounded ? s.n : 0) << text;
+                EXPECT_THAT(test::stream(request).values, same_numbers(s.values)) << text;
+            },
+            "");
+        if (error.empty()) continue;
+        ++refused;
+        EXPECT_THAT(error, HasSubstr("data.txt")) << text;
+    }
+    EXPECT_GT(read, 50);
+    EXPECT_GT(refused, 50);
 }
 
 // Doubles alone are streamed; who streams is told that they are not all that there was.

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <pthread.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -157,13 +158,35 @@ TEST_F(AllanRecordHdf5, TruncatedFilesAreRefusedAtAnyLength) {
     }
 }
 
+// The library copies elements of the size that the file names, from beyond what it has unpacked.
+TEST_F(AllanRecordHdf5, ElementsOfAnAbsurdSizeAreRefused) {
+    write("x", std::vector<double>(300, 0.5), {.sides = {}, .chunk = 50});
+    close();
+    std::string bytes = contents();
+    const std::size_t type = bytes.find(std::string("\x11\x20\x3f\0\x08\0\0\0", 8));
+    ASSERT_NE(type, std::string::npos);
+    bytes[type + 5] = '\xdf';
+    EXPECT_THAT(error_of(file(bytes, "bad.h5")), AllOf(HasSubstr("bad.h5"), HasSubstr("57096 bytes each")));
+}
+
+// What damage crashes the library depends on what lies in memory beside; so the process that would crash is looked for.
+TEST_F(AllanRecordHdf5, ReadingIsTriedInAnotherProcessFirst) {
+    static int processes = 0;
+    pthread_atfork(
+        nullptr, [] { ++processes; }, nullptr);
+    write("x", {1.0, 2.0});
+    read();
+    EXPECT_EQ(processes, 1);
+    test::stream({.path = path(), .column = std::nullopt, .time = std::nullopt});
+    EXPECT_EQ(processes, 2);
+}
+
 TEST_F(AllanRecordHdf5, OverwrittenBytesNeverCrash) {
     write("t", {0.0, 1.0, 3.0});
     write("packed", std::vector<double>(3000, 0.5), {.sides = {}, .chunk = 500});
     write("x", H5T_STD_I64LE, H5T_NATIVE_INT64, std::vector<std::int64_t>{1, 2, 3});
     close();
-    std::ifstream in(path(), std::ios::binary);
-    const std::string whole{std::istreambuf_iterator<char>(in), {}};
+    const std::string whole = contents();
     int refused = 0;
     for (std::size_t at = 0; at < whole.size(); at += whole.size() / 60) {
         std::string bad = whole;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <string>
@@ -88,6 +89,11 @@ class AllanRecordHdf5 : public AllanRecord {
         h5_ = -1;
     }
     std::string path() const { return (directory_ / "data.h5").string(); }
+
+    std::string contents() const {
+        std::ifstream in(path(), std::ios::binary);
+        return {std::istreambuf_iterator<char>(in), {}};
+    }
 
     template <class T>
     void write(const char* name, hid_t stored, hid_t in_memory, const std::vector<T>& values,
