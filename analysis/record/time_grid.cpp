@@ -18,6 +18,7 @@ constexpr double rate_tolerance = 1e-3;  // relative
 constexpr double most_left_out = 1e9;
 // Rows from which the stamps tell the length of an interval better than the rate, for the far side of a gap.
 constexpr double rows_to_know_rate = 1000.0;
+constexpr double rows_to_judge_rate = 5.0;
 constexpr double rows_to_judge_steps = 10.0;
 
 }  // namespace
@@ -88,7 +89,7 @@ TimeGrid::Drift TimeGrid::drift() const {
 }
 
 bool TimeGrid::contradicts_rate() const {
-    if (rows_ < 3.0) return false;
+    if (rows_ < rows_to_judge_rate) return false;
     const Drift found = drift();
     constexpr double standard_errors = 4.0;  // or rounded stamps of a short record would contradict every rate
     return std::abs(found.slope) > rate_tolerance && std::abs(found.slope) > standard_errors * found.error;
