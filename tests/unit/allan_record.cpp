@@ -174,7 +174,8 @@ TEST_F(AllanRecord, ReadsStandardInput) {
     EXPECT_THAT(record::read_series(request).values, ElementsAre(3.0, 4.0));
 }
 
-// A pipe that has a name is opened and closed once: where it is closed and opened again, its writer may be gone.
+// A pipe that has a name is opened and closed once: where it is closed and opened again, its writer may be gone, and
+// reading waits for another.
 TEST_F(AllanRecord, ReadsANamedPipeInOneGo) {
     const std::string path = (directory_ / "pipe").string();
     ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
