@@ -98,7 +98,7 @@ bool TimeGrid::contradicts_rate() const {
 void TimeGrid::fail_rate() const {
     throw InputError(
         fmt::format("{}: up to here the times say {:.8g} samples a second, gaps allowed for, which "
-                    "contradicts the rate of {} Hz by more than {:g}; give the rate that the instrument "
+                    "contradicts the rate of {} Hz by more than {:g} of it; give the rate that the instrument "
                     "had, and times in seconds",
                     place_(last_row_), rate_hz_ / (1.0 + drift().slope), rate_hz_, rate_tolerance));
 }
@@ -107,7 +107,7 @@ void TimeGrid::fail_off_grid(double time_s, std::size_t row, double advance) con
     if (contradicts_rate()) fail_rate();
     throw InputError(
         fmt::format("{}: the time {} s is {:.6g} sampling intervals (1/rate = {:.6g} s) after {} s of "
-                    "{}; must be a whole number of them, from 1 on and within {}. Give the rate that the instrument "
+                    "{}; allowed are 1, 2, 3, ..., give or take {}. Give the rate that the instrument "
                     "had, and times in seconds; samples that are not uniform must be resampled knowingly",
                     place_(row), time_s, advance, 1.0 / rate_hz_, last_s_, row_before(), furthest_off));
 }
