@@ -167,6 +167,7 @@ void run(const Arguments& a) {
     record::Series series =
         record::read_series(a.data, a.column.empty() ? std::nullopt : std::optional<std::string>(a.column));
     check_rate(a, series);
+    if (series.missing > 0) throw InputError(fmt::format("{}: {} values are missing", a.data, series.missing));
     AllanOutput out;
     out.data = a.data;
     out.column = series.column;

@@ -12,16 +12,6 @@
 namespace ringlock::record {
 namespace {
 
-/// Text of a file as it may stand in a message.
-std::string shown(std::string_view text) {
-    constexpr std::size_t longest = 60;
-    std::string out;
-    for (const char c : text.substr(0, longest)) {
-        out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
-    }
-    return out + (text.size() > longest ? "..." : "");
-}
-
 bool is_identifier(std::string_view key) {
     return !key.empty() && std::all_of(key.begin(), key.end(), [](char c) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '.';

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -17,11 +16,6 @@ namespace {
 
 [[noreturn]] void fail(const store::Node& node, const std::string& what) {
     throw InputError(fmt::format("{}: {}: {}", node.file(), node.path(), what));
-}
-
-/// Bytes of the machine's memory.
-double memory_bytes() {
-    return static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
 std::string shape_text(const store::Shape& shape) {

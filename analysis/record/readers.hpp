@@ -3,12 +3,14 @@
 
 #include "analysis/record/record.hpp"
 #include "analysis/record/series.hpp"
+#include "analysis/record/series_rows.hpp"
 
 /// The two kinds of file behind read_series and read_record.
 namespace ringlock::record {
 
-Series read_text_series(const std::string& path, const std::optional<std::string>& column);
-Series read_hdf5_series(const std::string& path, const std::optional<std::string>& column);
+/// Both leave it to the caller that a value is there, and find a rate where there are time stamps.
+SeriesInfo stream_text_series(const SeriesRequest& request, const TakePiece& take);
+SeriesInfo stream_hdf5_series(const SeriesRequest& request, const TakePiece& take);
 
 /// Both leave check() to the caller. `file` is HDF5.
 Record read_csv_record(const std::string& path);
@@ -49,6 +51,9 @@ inline constexpr std::array<SampleKind, 3> sample_kinds = {SampleKind::angle_inc
 
 inline constexpr const char* format_name = "rlg-record";
 inline constexpr std::int64_t format_version = 1;
+
+/// Bytes of the machine's memory.
+double memory_bytes();
 
 /// "a, b, c", at most the first 20.
 std::string listed(const std::vector<std::string>& names);

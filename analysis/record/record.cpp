@@ -1,6 +1,7 @@
 #include "analysis/record/record.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -36,16 +37,20 @@ const char* name_of(SampleKind kind) {
     return "quarter_count";
 }
 
+double memory_bytes() {
+    return static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
 bool is_hdf5(const std::string& path) {
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored)) {
         throw InputError(fmt::format("{}: is a directory, must be a data file", path));
     }
+    // A pipe must be opened and read once only, and is always text.
+    if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored)) return false;
     constexpr std::array<unsigned char, 8> signature = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
     if (!file) throw InputError(fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
-    // A pipe must be read once only and is always text.
-    if (!std::filesystem::is_regular_file(path, ignored)) return false;
     // At the start, or behind a block of the user's of 512, 1024, ... bytes, which MATLAB writes.
     for (long at = 0; at >= 0 && at < (1L << 40); at = at == 0 ? 512 : 2 * at) {
         std::array<unsigned char, 8> head{};

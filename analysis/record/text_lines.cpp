@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/core/error.hpp"
+#include "engine/core/interrupt.hpp"
 
 namespace ringlock::record {
 
@@ -39,19 +40,45 @@ bool Fields::next(std::string_view& field) {
     return true;
 }
 
-bool parse_number(std::string_view field, double& value) {
+namespace {
+
+template <class Number>
+std::errc parse_whole_field(std::string_view field, Number& value) {
     if (field.size() > 1 && field.front() == '+' && field[1] != '-') field.remove_prefix(1);
     const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-    return error == std::errc() && end == field.data() + field.size();
+    return end == field.data() + field.size() ? error : std::errc::invalid_argument;
 }
 
-void for_each_line(const std::string& path, const std::function<void(std::string_view)>& line) {
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
+int leave_open(std::FILE*) { return 0; }
+
+}  // namespace
+
+bool parse_number(std::string_view field, double& value) { return parse_whole_field(field, value) == std::errc(); }
+
+std::errc parse_whole_number(std::string_view field, std::int64_t& value) { return parse_whole_field(field, value); }
+
+std::string shown(std::string_view text) {
+    constexpr std::size_t longest = 60;
+    std::string out;
+    for (const char c : text.substr(0, longest)) {
+        out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
+    }
+    return out + (text.size() > longest ? "..." : "");
+}
+
+std::string name_of_file(const std::string& path) { return path == standard_input ? "standard input" : path; }
+
+void for_each_line(const std::string& given_path, const std::function<void(std::string_view)>& line) {
+    const bool standard = given_path == standard_input;
+    const std::string path = name_of_file(given_path);
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(standard ? stdin : std::fopen(path.c_str(), "rb"),
+                                                               standard ? &leave_open : &std::fclose);
     if (!file) throw InputError(fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
     constexpr std::size_t longest_line = std::size_t{1} << 22;
     std::vector<char> buffer(std::size_t{1} << 18);
     std::size_t filled = 0;
     for (;;) {
+        check_interrupt();
         const std::size_t got = std::fread(buffer.data() + filled, 1, buffer.size() - filled, file.get());
         if (got == 0) {
             if (std::ferror(file.get())) {

@@ -1,48 +1,27 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <hdf5.h>
+#include <sys/inotify.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
+#include <random>
+#include <thread>
 
-#include "analysis/record/series.hpp"
-#include "engine/core/error.hpp"
+#include "tests/unit/allan_record_support.hpp"
 
+// Series as text: columns, values, what is missing, whole numbers, streams.
 namespace {
 
 using namespace ringlock;
+using test::AllanRecord;
+using test::same_numbers;
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
-/// A directory of this test alone, gone afterwards.
-class AllanRecord : public testing::Test {
-   protected:
-    void SetUp() override {
-        const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-        directory_ = std::filesystem::temp_directory_path() /
-                     ("ringlock-allan-record-" + std::string(info->name()) + "-" + std::to_string(::getpid()));
-        std::filesystem::create_directories(directory_);
-    }
-    void TearDown() override { std::filesystem::remove_all(directory_); }
-
-    std::string file(const std::string& text, const std::string& name = "data.txt") {
-        const auto path = directory_ / name;
-        std::ofstream(path, std::ios::binary) << text;
-        return path.string();
-    }
-    static std::string error_of(const std::string& path, const std::optional<std::string>& column = std::nullopt) {
-        try {
-            record::read_series(path, column);
-        } catch (const InputError& e) {
-            return e.what();
-        }
-        return "no error";
-    }
-
-    std::filesystem::path directory_;
-};
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 TEST_F(AllanRecord, ReadsOneColumnWithCommentsAndBlankLines) {
     const auto s = record::read_series(file("# a note\n1\n\n2.5e-3 # why\n  -3\n+4"), std::nullopt);
@@ -87,12 +66,11 @@ TEST_F(AllanRecord, ErrorsNameFileLineColumnAndWhatIsAllowed) {
     EXPECT_THAT(error_of(file("1\n2\n1e999\n")), HasSubstr("'1e999'"));
     EXPECT_THAT(error_of(file("1 2\n3\n"), "1"),
                 AllOf(HasSubstr("data.txt:2:"), HasSubstr("1 column"), HasSubstr("2")));
-    EXPECT_THAT(error_of(file("1\nnan\n")), AllOf(HasSubstr("data.txt:2:"), HasSubstr("'nan'"), HasSubstr("gaps")));
-    EXPECT_THAT(error_of(file("1\n-inf\n")), AllOf(HasSubstr("'-inf'"), HasSubstr("finite")));
-    EXPECT_THAT(error_of(file("1,2\n3,\n"), "2"), AllOf(HasSubstr(":2:"), HasSubstr("empty")));
+    EXPECT_THAT(error_of(file("1\n-inf\n")), AllOf(HasSubstr("data.txt:2:"), HasSubstr("'-inf'"), HasSubstr("finite")));
+    EXPECT_THAT(error_of(file("1\nNaNa\n")), AllOf(HasSubstr("data.txt:2:"), HasSubstr("'NaNa'")));
     EXPECT_THAT(error_of(file("")), HasSubstr("no data"));
     EXPECT_THAT(error_of(file("# only a comment\nname\n")), HasSubstr("no data"));
-    EXPECT_THAT(error_of(directory_.string()), HasSubstr("directory"));
+    EXPECT_THAT(error_of(directory_.path().string()), HasSubstr("directory"));
     EXPECT_THAT(error_of((directory_ / "absent").string()), AllOf(HasSubstr("absent"), HasSubstr("cannot be opened")));
 }
 
@@ -108,40 +86,191 @@ TEST_F(AllanRecord, LongFilesAreReadWhole) {
     EXPECT_THAT(record::read_series(file("1\n" + wide + "2\n3\n"), std::nullopt).values, ElementsAre(1.0, 2.0, 3.0));
 }
 
-TEST_F(AllanRecord, ReadsHdf5DatasetsByPathOrName) {
-    const auto path = (directory_ / "data.h5").string();
-    const hid_t h5 = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-    const hid_t group = H5Gcreate2(h5, "samples", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-    const hsize_t size = 3;
-    const hid_t space = H5Screate_simple(1, &size, nullptr);
-    const double angle[] = {0.5, 1.5, -2.0};
-    const long long counts[] = {4, 5, 6};
-    const hid_t a = H5Dcreate2(group, "angle_arcsec", H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-    H5Dwrite(a, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, angle);
-    const hid_t b = H5Dcreate2(group, "quarter_count", H5T_STD_I64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-    H5Dwrite(b, H5T_NATIVE_LLONG, H5S_ALL, H5S_ALL, H5P_DEFAULT, counts);
-    const hid_t scalar = H5Screate(H5S_SCALAR);
-    const double rate = 200.0;
-    const hid_t attribute = H5Acreate2(group, "rate_hz", H5T_IEEE_F64LE, scalar, H5P_DEFAULT, H5P_DEFAULT);
-    H5Awrite(attribute, H5T_NATIVE_DOUBLE, &rate);
-    H5Aclose(attribute);
-    H5Sclose(scalar);
-    H5Dclose(a);
-    H5Dclose(b);
-    H5Sclose(space);
-    H5Gclose(group);
-    H5Fclose(h5);
+// A missing value keeps its place, whatever the gap was written as.
+TEST_F(AllanRecord, MissingValuesAreKept) {
+    const auto s = record::read_series(file("1\nnan\nNaN\nNA\nna\n-nan\n+NAN\n2.5\n"), std::nullopt);
+    EXPECT_THAT(s.values, same_numbers({1.0, nan, nan, nan, nan, nan, nan, 2.5}));
+    EXPECT_EQ(s.missing, 6u);
+    EXPECT_EQ(s.n, 8u);
+    const auto empty = record::read_series(file("a,b\n,\n1,2\nx,\n,4\nnan,NA\n"), "b");
+    EXPECT_THAT(empty.values, same_numbers({nan, 2.0, nan, 4.0, nan}));
+    EXPECT_EQ(empty.missing, 3u);
+}
 
-    const auto s = record::read_series(path, "/samples/angle_arcsec");
-    EXPECT_THAT(s.values, ElementsAre(0.5, 1.5, -2.0));
-    EXPECT_EQ(s.rate_hz, 200.0);
-    EXPECT_THAT(record::read_series(path, "quarter_count").values, ElementsAre(4.0, 5.0, 6.0));
-    EXPECT_THAT(error_of(path),
-                AllOf(HasSubstr("2 datasets"), HasSubstr("/samples/angle_arcsec"), HasSubstr("--column")));
-    EXPECT_THAT(error_of(path, "absent"), AllOf(HasSubstr("'absent'"), HasSubstr("/samples/quarter_count")));
+TEST_F(AllanRecord, OnlyMissingValuesOfTheColumnCount) {
+    const auto s = record::read_series(file("1,nan\n2,\n3,NA\n4,inf\n"), "1");
+    EXPECT_THAT(s.values, ElementsAre(1.0, 2.0, 3.0, 4.0));
+    EXPECT_EQ(s.missing, 0u);
+}
 
-    std::filesystem::resize_file(path, 600);
-    EXPECT_THAT(error_of(path, "quarter_count"), HasSubstr("HDF5"));
+TEST_F(AllanRecord, AFirstRowOfMissingValuesIsNoHeader) {
+    EXPECT_THAT(record::read_series(file("NA\n1\n"), std::nullopt).values, same_numbers({nan, 1.0}));
+    EXPECT_THAT(record::read_series(file("nan -NA\n1 2\n"), "2").values, same_numbers({nan, 2.0}));
+}
+
+TEST_F(AllanRecord, NothingButMissingValuesIsAnError) {
+    EXPECT_THAT(error_of(file("rate\nnan\nNA\n")),
+                AllOf(HasSubstr("data.txt"), HasSubstr("column rate"), HasSubstr("all 2 values are missing")));
+    EXPECT_THAT(error_of(file("1,\n2,\n"), "2"), HasSubstr("all 2 values are missing"));
+}
+
+TEST_F(AllanRecord, WholeNumbersBeyondDoublesAreKeptExactly) {
+    const auto s = record::read_series(file("9007199254740993\nnan\n-9223372036854775808\n+9223372036854775807\n-1\n"),
+                                       std::nullopt);
+    EXPECT_THAT(s.counts, ElementsAre(9007199254740993, 0, std::numeric_limits<std::int64_t>::min(),
+                                      std::numeric_limits<std::int64_t>::max(), -1));
+    EXPECT_THAT(s.values, same_numbers({9007199254740992.0, nan, -0x1p63, 0x1p63, -1.0}));
+    EXPECT_TRUE(s.rounded);
+}
+
+TEST_F(AllanRecord, CountsAreGivenOnlyWhereDoublesDoNotDo) {
+    for (const char* text : {"9007199254740992\n-9007199254740992\n3\n", "9007199254740993\n1.5\n",
+                             "1.5\n9007199254740993\n", "9007199254740993\n2e0\n", "1e17\n"}) {
+        const auto s = record::read_series(file(text), std::nullopt);
+        EXPECT_THAT(s.counts, IsEmpty()) << text;
+        EXPECT_FALSE(s.rounded) << text;
+    }
+    EXPECT_EQ(record::read_series(file("9007199254740993\n1.5\n"), std::nullopt).values[0], 9007199254740992.0);
+}
+
+// The first number that a double rounds stands behind several pieces of others.
+TEST_F(AllanRecord, CountsReachBackToTheFirstRow) {
+    constexpr std::int64_t rows = 200000;
+    std::string text;
+    for (std::int64_t i = 0; i < rows; ++i) text += i % 7 == 3 ? "nan\n" : std::to_string(3 * i - rows) + "\n";
+    const auto s = record::read_series(file(text + "9007199254740993\n5\n"), std::nullopt);
+    ASSERT_EQ(s.counts.size(), static_cast<std::size_t>(rows) + 2);
+    for (std::int64_t i = 0; i < rows; ++i) ASSERT_EQ(s.counts[i], i % 7 == 3 ? 0 : 3 * i - rows);
+    EXPECT_EQ(s.counts[rows], 9007199254740993);
+    EXPECT_EQ(s.counts[rows + 1], 5);
+    const auto first = record::read_series(file("9007199254740993\n" + text), std::nullopt);
+    ASSERT_EQ(first.counts.size(), static_cast<std::size_t>(rows) + 1);
+    EXPECT_EQ(first.counts.front(), 9007199254740993);
+    EXPECT_EQ(first.counts.back(), s.counts[rows - 1]);
+    const auto rounded = record::read_series(file("9007199254740993\n" + text + "0.5\n"), std::nullopt);
+    EXPECT_THAT(rounded.counts, IsEmpty());
+    EXPECT_EQ(rounded.values.back(), 0.5);
+}
+
+TEST_F(AllanRecord, CountsBeyond64BitsAreRefusedUnlessTheColumnHoldsOthers) {
+    EXPECT_THAT(error_of(file("1\nnan\n9223372036854775808\n2\n")),
+                AllOf(HasSubstr("data.txt:3:"), HasSubstr("9223372036854775808"), HasSubstr("9223372036854775807")));
+    EXPECT_THAT(error_of(file("-9223372036854775809\n")), HasSubstr("data.txt:1:"));
+    EXPECT_THAT(record::read_series(file("1\n9223372036854775808\n0.5\n"), std::nullopt).values,
+                ElementsAre(1.0, 0x1p63, 0.5));
+}
+
+TEST_F(AllanRecord, ReadsStandardInput) {
+    const auto from_stdin = [&](const std::string& text, const record::SeriesRequest& request) {
+        const std::string path = file(text);
+        EXPECT_NE(std::freopen(path.c_str(), "rb", stdin), nullptr);
+        return test::message_or([&] { record::read_series(request); }, "no error");
+    };
+    const record::SeriesRequest request{.path = "-", .column = std::nullopt, .time = std::nullopt};
+    EXPECT_EQ(from_stdin("1\n2\n", request), "no error");
+    EXPECT_THAT(from_stdin("1\nx\n", request), HasSubstr("standard input:2:"));
+    EXPECT_THAT(from_stdin("\x89HDF\r\n\x1a\n", request), AllOf(HasSubstr("standard input"), HasSubstr("HDF5")));
+    ASSERT_NE(std::freopen(file("3\n4\n").c_str(), "rb", stdin), nullptr);
+    EXPECT_THAT(record::read_series(request).values, ElementsAre(3.0, 4.0));
+}
+
+// A pipe that has a name is opened and closed once: where it is closed and opened again, its writer may be gone, and
+// reading waits for another.
+TEST_F(AllanRecord, ReadsANamedPipeInOneGo) {
+    const std::string path = (directory_ / "pipe").string();
+    ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+    const int watch = inotify_init1(IN_NONBLOCK | IN_CLOEXEC);
+    ASSERT_GE(inotify_add_watch(watch, path.c_str(), IN_OPEN | IN_CLOSE_NOWRITE), 0);
+    std::thread writer([&] { std::ofstream(path) << "1\n2\n"; });
+    const auto s = record::read_series(path, std::nullopt);
+    writer.join();
+    EXPECT_THAT(s.values, ElementsAre(1.0, 2.0));
+    int closed = 0;
+    for (inotify_event event; ::read(watch, &event, sizeof event) == sizeof event;) {
+        if ((event.mask & IN_CLOSE_NOWRITE) != 0) ++closed;
+    }
+    ::close(watch);
+    EXPECT_EQ(closed, 1);
+}
+
+TEST_F(AllanRecord, StreamsTextInBoundedPieces) {
+    std::string text = "# rate_hz = 5\nn x\n";
+    for (int i = 0; i < 150000; ++i) text += std::to_string(i) + (i % 1000 == 17 ? " nan\n" : " 0.25\n");
+    const record::SeriesRequest request{.path = file(text), .column = "x", .time = std::nullopt};
+    const auto streamed = test::stream(request);
+    const auto read = record::read_series(request);
+    EXPECT_THAT(streamed.values, same_numbers(read.values));
+    EXPECT_LE(streamed.longest, 65536u);
+    EXPECT_EQ(streamed.info.n, 150000u);
+    EXPECT_EQ(streamed.info.missing, 150u);
+    EXPECT_EQ(streamed.info.column, "x");
+    EXPECT_EQ(streamed.info.rate_hz, 5.0);
+}
+
+// Whatever the bytes are: a series that adds up, or an error that names the file.
+TEST_F(AllanRecord, AnyTextIsASeriesOrAnError) {
+    std::mt19937_64 engine(3);
+    const std::vector<std::string> parts = {"1",
+                                            "-2.5",
+                                            "1e3",
+                                            "nan",
+                                            "NA",
+                                            ",",
+                                            ",",
+                                            " ",
+                                            "\n",
+                                            "\n",
+                                            "\n",
+                                            "\r\n",
+                                            "#",
+                                            "# rate_hz = 2\n",
+                                            "inf",
+                                            "x",
+                                            "9007199254740993",
+                                            "99999999999999999999",
+                                            "\t",
+                                            std::string(1, '\0'),
+                                            "\xff",
+                                            "+",
+                                            "."};
+    int read = 0, refused = 0;
+    for (int trial = 0; trial < 2000; ++trial) {
+        // Few different parts make texts that agree with themselves now and then.
+        const std::size_t kinds = 1 + engine() % parts.size();
+        const std::size_t first = engine() % parts.size();
+        std::string text;
+        for (std::size_t i = engine() % 12; i > 0; --i) text += parts[(first + engine() % kinds) % parts.size()];
+        record::SeriesRequest request{file(text), std::nullopt, std::nullopt, 1.0};
+        if (engine() % 2 == 0) request.column = "1";
+        if (engine() % 4 == 0) request.time = "2";
+        const std::string error = test::message_or(
+            [&] {
+                const auto s = record::read_series(request);
+                ++read;
+                EXPECT_EQ(s.values.size(), s.n) << text;
+                std::size_t missing = 0;
+                for (const double v : s.values) {
+                    missing += std::isnan(v) ? 1 : 0;
+                    EXPECT_FALSE(std::isinf(v)) << text;
+                }
+                EXPECT_EQ(missing, s.missing) << text;
+                EXPECT_LT(missing, s.n) << text;
+                EXPECT_EQ(s.counts.size(), s.rounded ? s.n : 0) << text;
+                EXPECT_THAT(test::stream(request).values, same_numbers(s.values)) << text;
+            },
+            "");
+        if (error.empty()) continue;
+        ++refused;
+        EXPECT_THAT(error, HasSubstr("data.txt")) << text;
+    }
+    EXPECT_GT(read, 50);
+    EXPECT_GT(refused, 50);
+}
+
+// Doubles alone are streamed; who streams is told that they are not all that there was.
+TEST_F(AllanRecord, AStreamSaysWhereItsValuesAreRounded) {
+    EXPECT_TRUE(test::stream({.path = file("9007199254740993\n1\n"), .column = {}, .time = {}}).info.rounded);
+    EXPECT_FALSE(test::stream({.path = file("9007199254740993\n1.5\n"), .column = {}, .time = {}}).info.rounded);
 }
 
 // Real data, where it is there: RINGLOCK_TEST_DATA names the folder.

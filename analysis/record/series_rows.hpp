@@ -1,0 +1,74 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "analysis/record/series.hpp"
+#include "analysis/record/time_grid.hpp"
+
+namespace ringlock::record {
+
+/// Values in the order of time.
+struct SeriesPiece {
+    std::span<const double> values;        ///< NaN where missing
+    std::span<const std::int64_t> counts;  ///< as long, 0 where missing; empty once a value was no whole number
+};
+/// Whether a double may have lost digits of it.
+inline bool is_beyond_doubles(std::int64_t count) {
+    constexpr std::int64_t exact = std::int64_t{1} << 53;
+    return count > exact || count < -exact;
+}
+
+using TakePiece = std::function<void(const SeriesPiece&)>;
+
+/// Takes the rows that a reader finds and hands them on in pieces of bounded length, with what is missing between.
+class SeriesRows {
+   public:
+    explicit SeriesRows(TakePiece take) : take_(std::move(take)), values_(longest), counts_(longest) {}
+
+    static constexpr std::size_t longest = 65536;
+
+    /// The rows have times; to be called before the first.
+    void set_grid(TimeGrid grid) { grid_ = std::move(grid); }
+    /// The time of the row whose value comes next.
+    void time(double time_s, std::size_t row);
+    void value(double value) {
+        all_whole_ = false;
+        push(value, 0);
+    }
+    void count(std::int64_t count) {
+        beyond_doubles_ = beyond_doubles_ || is_beyond_doubles(count);
+        push(static_cast<double>(count), count);
+    }
+    void missing() {
+        ++info_.missing;
+        push(std::numeric_limits<double>::quiet_NaN(), 0);
+    }
+
+    /// Behind the last row. Of what is returned, column and rate_hz are the reader's.
+    SeriesInfo finish();
+
+   private:
+    void push(double value, std::int64_t count) {
+        values_[filled_] = value;
+        counts_[filled_] = count;
+        if (++filled_ == longest) flush();
+    }
+    void flush();
+
+    TakePiece take_;
+    std::optional<TimeGrid> grid_;
+    std::vector<double> values_;
+    std::vector<std::int64_t> counts_;
+    std::size_t filled_ = 0;
+    SeriesInfo info_;
+    bool all_whole_ = true;
+    bool beyond_doubles_ = false;
+};
+
+}  // namespace ringlock::record

@@ -1,0 +1,187 @@
+#include <fmt/format.h>
+
+#include <random>
+
+#include "tests/unit/allan_record_support.hpp"
+
+// Rows placed by their time stamps.
+namespace {
+
+using namespace ringlock;
+using test::AllanRecord;
+using test::same_numbers;
+using testing::AllOf;
+using testing::HasSubstr;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+class AllanRecordTime : public AllanRecord {
+   protected:
+    /// Rows "time value" of values 1, 2, ...
+    static std::string rows(const std::vector<double>& times_s) {
+        std::string text;
+        for (std::size_t i = 0; i < times_s.size(); ++i) text += fmt::format("{:.17g} {}\n", times_s[i], i + 1);
+        return text;
+    }
+    record::SeriesRequest request(const std::vector<double>& times_s, double rate_hz) const {
+        return {file(rows(times_s)), "2", "1", rate_hz};
+    }
+    record::Series read(const std::vector<double>& times_s, double rate_hz) const {
+        return record::read_series(request(times_s, rate_hz));
+    }
+    std::string refusal(const std::vector<double>& times_s, double rate_hz) const {
+        return error_of(request(times_s, rate_hz));
+    }
+    /// Of n rows that miss nothing, `interval_s` apart.
+    static std::vector<double> uniform(int n, double interval_s, double from_s = 0.0) {
+        std::vector<double> times_s;
+        for (int i = 0; i < n; ++i) times_s.push_back(from_s + i * interval_s);
+        return times_s;
+    }
+};
+
+TEST_F(AllanRecordTime, RowsLeftOutAreMissing) {
+    const auto s = read({5.0, 5.1, 5.4, 5.5, 5.7}, 10.0);
+    EXPECT_THAT(s.values, same_numbers({1.0, 2.0, nan, nan, 3.0, 4.0, nan, 5.0}));
+    EXPECT_EQ(s.missing, 3u);
+    EXPECT_EQ(s.column, "2");
+    EXPECT_EQ(read({5.0, 5.1, 5.2}, 10.0).missing, 0u);
+}
+
+TEST_F(AllanRecordTime, MissingValuesAndMissingRowsAddUp) {
+    const auto path = file("t,x\n0,NA\n1,2\n3,\n4,5\n5,nan\n");
+    const auto s = record::read_series(record::SeriesRequest{path, "x", "t", 1.0});
+    EXPECT_THAT(s.values, same_numbers({nan, 2.0, nan, nan, 5.0, nan}));
+    EXPECT_EQ(s.missing, 4u);
+}
+
+TEST_F(AllanRecordTime, TheColumnNeedsNoNameBesideTheTime) {
+    EXPECT_THAT(record::read_series(record::SeriesRequest{file("x,t\n7,1\n8,2\n"), {}, "t", 1.0}).values,
+                same_numbers({7.0, 8.0}));
+    EXPECT_THAT(error_of(record::SeriesRequest{file("x,t,y\n7,1,3\n"), {}, "t", 1.0}),
+                AllOf(HasSubstr(":1:"), HasSubstr("3 columns, of which t is the time"), HasSubstr("--column")));
+    EXPECT_THAT(error_of(record::SeriesRequest{file("t\n1\n"), {}, "t", 1.0}), HasSubstr("1 column,"));
+    EXPECT_THAT(error_of(record::SeriesRequest{file("x,t\n7,1\n"), "x", "time", 1.0}),
+                AllOf(HasSubstr("'time'"), HasSubstr("x, t")));
+}
+
+// Rows left out, with stamps of a clock that jitters and runs off, and nan written in their place are one series.
+TEST_F(AllanRecordTime, RandomGapsComeBackWhereTheyWere) {
+    std::mt19937_64 engine(7);
+    const auto uniform_in = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(engine);
+    };
+    for (int trial = 0; trial < 60; ++trial) {
+        const double rate_hz = std::pow(10.0, uniform_in(-3.0, 4.0));
+        const double start_s = trial % 3 == 0 ? 0.0 : uniform_in(-1e3, 1e5) / rate_hz;
+        const double clock = 1.0 + uniform_in(-3e-4, 3e-4);
+        // Two stamps that are each a tenth off, and where the grid lags behind, stay within a quarter.
+        const double jitter = trial % 2 == 0 ? 0.1 : 0.0;
+        const double kept = uniform_in(0.2, 1.0);
+        std::string stamped, plain;
+        std::size_t missing = 0, pending = 0;
+        for (int i = 0; i < 3000; ++i) {
+            const bool in_long_gap = i > 1500 && i < 1500 + trial;
+            if (i > 0 && (in_long_gap || uniform_in(0.0, 1.0) > kept)) {
+                ++pending;
+                continue;
+            }
+            for (; pending > 0; --pending, ++missing) plain += "nan\n";
+            const double value = i % 50 == 3 ? nan : uniform_in(-1.0, 1.0);
+            missing += std::isnan(value) ? 1 : 0;
+            stamped +=
+                fmt::format("{:.17g},{:.17g}\n", start_s + (i + uniform_in(-jitter, jitter)) * clock / rate_hz, value);
+            plain += fmt::format("{:.17g}\n", value);
+        }
+        const auto placed = record::read_series(record::SeriesRequest{file(stamped), "2", "1", rate_hz});
+        const auto written = record::read_series(file(plain), std::nullopt);
+        ASSERT_EQ(placed.n, written.n) << trial;
+        ASSERT_THAT(placed.values, same_numbers(written.values)) << trial;
+        EXPECT_EQ(placed.missing, missing) << trial;
+        EXPECT_EQ(written.missing, missing) << trial;
+    }
+}
+
+// Milliseconds at 430 Hz: no stamp is off by more than 0.215 intervals, but two rows are up to 1.29 apart.
+TEST_F(AllanRecordTime, RoundedStampsStayOnTheGrid) {
+    std::vector<double> times_s;
+    for (int i = 0; i < 20000; ++i) times_s.push_back(std::round(1000.0 * i / 430.0) / 1000.0);
+    EXPECT_EQ(read(times_s, 430.0).missing, 0u);
+    times_s.erase(times_s.begin() + 777, times_s.begin() + 780);
+    EXPECT_EQ(read(times_s, 430.0).missing, 3u);
+    // The mean rate of so few rows is wrong by more than a thousandth, by the rounding alone.
+    for (std::size_t n = 3; n < 60; ++n)
+        EXPECT_EQ(refusal({times_s.begin(), times_s.begin() + n}, 430.0), "no error") << n;
+}
+
+// The clock runs 1e-4 off, two whole samples in the gap: what it did before tells how many are missing.
+TEST_F(AllanRecordTime, AGapIsMeasuredByTheClockOfTheStamps) {
+    std::vector<double> times_s;
+    for (int i = 0; i < 5000; ++i) times_s.push_back(i * 1.0001);
+    for (int i = 25000; i < 25100; ++i) times_s.push_back(i * 1.0001);
+    const auto s = read(times_s, 1.0);
+    EXPECT_EQ(s.n, 25100u);
+    EXPECT_EQ(s.missing, 20000u);
+    EXPECT_EQ(s.values[25000], 5001.0);
+}
+
+TEST_F(AllanRecordTime, TimesOffTheGridNameBothRows) {
+    EXPECT_THAT(refusal({0.0, 1.0, 2.4}, 1.0),
+                AllOf(HasSubstr("data.txt:3: column 1"), HasSubstr("2.4 s"), HasSubstr("1.4 sampling intervals"),
+                      HasSubstr("1 s of the row before it"), HasSubstr("data.txt:2")));
+    EXPECT_THAT(refusal({0.0, 0.2}, 1.0), AllOf(HasSubstr("data.txt:2"), HasSubstr("0.2 sampling intervals")));
+    EXPECT_THAT(refusal({0.0, 0.9}, 1.0), HasSubstr("no error"));
+    EXPECT_THAT(refusal({0.0, 1.0, 0.5}, 1.0),
+                AllOf(HasSubstr("data.txt:3"), HasSubstr("0.5 s is before the 1 s"), HasSubstr("data.txt:2")));
+    EXPECT_THAT(refusal({0.0, 1.0, 1.0}, 1.0), AllOf(HasSubstr("data.txt:3"), HasSubstr("1 s repeats the 1 s")));
+}
+
+TEST_F(AllanRecordTime, TimesThatAreMissingOrNoNumbersAreNamed) {
+    const auto refused = [&](const std::string& text) {
+        return error_of(record::SeriesRequest{file("t,x\n" + text), "x", "t", 1.0});
+    };
+    EXPECT_THAT(refused("0,1\n,2\n"), AllOf(HasSubstr("data.txt:3: column t"), HasSubstr("no time")));
+    EXPECT_THAT(refused("nan,1\n2,2\n"), AllOf(HasSubstr("data.txt:2: column t"), HasSubstr("no time")));
+    EXPECT_THAT(refused("0,1\n1,2\ninf,3\n"), AllOf(HasSubstr("data.txt:4: column t"), HasSubstr("infinite")));
+    EXPECT_THAT(refused("0,1\n12:30:00,2\n"),
+                AllOf(HasSubstr("data.txt:3: column t"), HasSubstr("'12:30:00'"), HasSubstr("seconds")));
+}
+
+TEST_F(AllanRecordTime, ARateThatTheStampsContradictIsAnError) {
+    for (const int n : {10, 40, 3000}) {
+        EXPECT_THAT(refusal(uniform(n, 0.0101), 100.0),
+                    AllOf(HasSubstr("contradicts the rate of 100 Hz"), HasSubstr("say 99.0099")))
+            << n;
+        EXPECT_EQ(refusal(uniform(n, 0.010005, 3.0), 100.0), "no error") << n;
+    }
+    EXPECT_THAT(refusal(uniform(3000, 0.00998), 100.0), HasSubstr("contradicts"));
+    // Every step is a gap, or the time is in milliseconds.
+    EXPECT_THAT(refusal(uniform(50, 0.02), 100.0), AllOf(HasSubstr("closer than 2 intervals"), HasSubstr("100 Hz")));
+    EXPECT_THAT(refusal(uniform(50, 10.0), 100.0), HasSubstr("not in seconds"));
+    for (const double rate_hz : {0.0, -1.0, nan, std::numeric_limits<double>::infinity()}) {
+        EXPECT_THAT(refusal(uniform(3, 1.0), rate_hz), HasSubstr("sampling rate")) << rate_hz;
+    }
+}
+
+TEST_F(AllanRecordTime, AHugeGapIsAnErrorAndNoAllocation) {
+    EXPECT_THAT(refusal({0.0, 1.0, 2e9}, 1.0),
+                AllOf(HasSubstr("data.txt:3"), HasSubstr("2e+09 s"), HasSubstr("1e+09"), HasSubstr("data.txt:2")));
+    EXPECT_THAT(refusal({0.0, 1.0, 1e300}, 1.0), HasSubstr("data.txt:3"));
+    EXPECT_THAT(refusal({-1e308, 1e308}, 1e9), HasSubstr("data.txt:2"));
+    // Each of the two alone would do.
+    const auto both = request({0.0, 1e6, 1e6 + 9.995e8}, 1.0);
+    EXPECT_THAT(test::message_or([&] { test::stream(both); }, "no error"),
+                AllOf(HasSubstr("data.txt:3"), HasSubstr("in all")));
+}
+
+TEST_F(AllanRecordTime, LongGapsAreStreamedInBoundedPieces) {
+    const auto streamed = test::stream(request({0.0, 1.0, 2e6, 2e6 + 1.0}, 1.0));
+    EXPECT_LE(streamed.longest, 65536u);
+    EXPECT_EQ(streamed.info.n, 2000002u);
+    EXPECT_EQ(streamed.info.missing, 1999998u);
+    ASSERT_EQ(streamed.values.size(), 2000002u);
+    EXPECT_EQ(streamed.values[2000000], 3.0);
+    EXPECT_TRUE(std::isnan(streamed.values[1999999]));
+}
+
+}  // namespace
