@@ -5,6 +5,7 @@
 #include "engine/simd/targets.hpp"
 // The above must come first.
 #include <tbb/blocked_range.h>
+#include <tbb/cache_aligned_allocator.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -20,6 +21,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// Running sums, whatever the width of a vector: term i goes to the (i mod columns)-th.
 constexpr std::size_t columns = 32;
+/// The same of four octaves at once.
+constexpr std::size_t octave_columns = 8;
 
 template <int order, class D>
 HWY_INLINE hn::Vec<D> difference_at(D d, const double* x, std::size_t m) {
@@ -86,6 +89,37 @@ void add_squares_of_differences(const double* x, int order, bool skipping, std::
                     : add_differences<3, false>(x, m, count, sums, terms);
 }
 
+/// Adds the squares of `count` second differences at each of the steps m, 2m, 4m, 8m to sums[4][8]: x_{i+2m} of one step
+/// is x_{i+m} of the next, so that a difference costs one load. count must be a multiple of 8.
+void add_four_octaves(const double* HWY_RESTRICT x, std::size_t m, std::size_t count, double* HWY_RESTRICT sums) {
+    const hn::CappedTag<double, octave_columns> d;
+    constexpr std::size_t width = hn::MaxLanes(d);
+    constexpr std::size_t vectors = octave_columns / width;
+    using V = hn::Vec<decltype(d)>;
+    V total[4][vectors];
+    for (std::size_t k = 0; k < 4; ++k) {
+        for (std::size_t v = 0; v < vectors; ++v) total[k][v] = hn::LoadU(d, sums + k * octave_columns + v * width);
+    }
+    const V minus_two = hn::Set(d, -2.0);
+    for (std::size_t i = 0; i < count; i += octave_columns) {
+        for (std::size_t v = 0; v < vectors; ++v) {
+            const double* at = x + i + v * width;
+            const V first = hn::LoadU(d, at);
+            V near = hn::Sub(hn::LoadU(d, at + m), first);
+            for (std::size_t k = 0; k < 4; ++k) {
+                const V far = hn::Sub(hn::LoadU(d, at + (m << (k + 1))), first);
+                // Twice a number is exact, so that a fused rounding is the same as two.
+                const V z = hn::MulAdd(near, minus_two, far);
+                total[k][v] = hn::Add(total[k][v], hn::Mul(z, z));
+                near = far;
+            }
+        }
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+        for (std::size_t v = 0; v < vectors; ++v) hn::StoreU(total[k][v], d, sums + k * octave_columns + v * width);
+    }
+}
+
 /// out[i] = x[i + 3m] - 3 x[i + 2m] + 3 x[i + m] - x[i].
 void third_differences(const double* HWY_RESTRICT x, std::size_t m, std::size_t count, double* HWY_RESTRICT out) {
     const hn::CappedTag<double, 8> d;
@@ -125,12 +159,20 @@ HWY_AFTER_NAMESPACE();
 namespace ringlock::allan {
 
 HWY_EXPORT(add_squares_of_differences);
+HWY_EXPORT(add_four_octaves);
 HWY_EXPORT(third_differences);
 HWY_EXPORT(add_squares);
 
 namespace {
 
 using Columns = std::array<double, 32>;
+using Aligned = std::vector<double, tbb::cache_aligned_allocator<double>>;
+
+/// Memory of a thread that is kept from piece to piece: to ask the system for it anew costs more than to fill it.
+Aligned& workspace() {
+    thread_local Aligned memory;
+    return memory;
+}
 
 double folded_columns(Columns part) {
     for (std::size_t half = part.size() / 2; half > 0; half /= 2) {
@@ -161,8 +203,9 @@ void for_pieces(std::size_t pieces, const Work& work) {
 }
 
 /// Starts of a piece of the record, and the longest step that is taken from pieces: a piece and what its differences
-/// reach, 4 x 8192 points at most, fit a second-level cache.
-constexpr std::size_t piece_starts = 8192;
+/// reach, 5 x 8192 points at most, fit a second-level cache.
+constexpr std::size_t piece_starts = 16384;
+constexpr std::size_t longest_short_step = 8192;
 /// Points of a column that is copied out of the record.
 constexpr std::size_t column_points = 40960;
 
@@ -172,29 +215,93 @@ std::size_t starts_of(std::size_t size, int order, std::size_t m) {
     return size > reach ? size - reach : 0;
 }
 
-/// Steps that fit the cache.
-void short_steps(std::span<const double> x, Difference difference, std::span<const std::size_t> m,
-                 std::span<const std::size_t> which, std::vector<SquareMean>& out) {
-    const std::size_t pieces = (x.size() + piece_starts - 1) / piece_starts;
-    std::vector<SquareMean> parts(pieces * which.size());
-    for_pieces(pieces, [&](std::size_t piece) {
-        const std::size_t first = piece * piece_starts;
-        for (std::size_t k = 0; k < which.size(); ++k) {
-            const std::size_t step = m[which[k]];
-            const std::size_t last = std::min(first + piece_starts, starts_of(x.size(), difference.order, step));
-            if (last <= first) continue;
-            DifferenceSums sums;
-            sums.add(x.data() + first, difference, step, last - first);
-            parts[k * pieces + piece] = sums.folded();
+/// Starts of a piece that are taken at once where the steps are so short that they fit the first-level cache.
+constexpr std::size_t cached_starts = 2048;
+constexpr std::size_t cached_step = 512;
+
+/// A step in a piece of work: which of those asked for, and how many starts it has there.
+struct Step {
+    std::size_t which;
+    std::size_t m;
+    std::size_t starts;
+};
+
+/// Whether four steps from this one on double from each to the next.
+bool four_octaves(std::span<const Step> steps) {
+    if (steps.size() < 4) return false;
+    for (std::size_t k = 1; k < 4; ++k) {
+        if (steps[k].m != 2 * steps[k - 1].m) return false;
+    }
+    return true;
+}
+
+/// Sums of all steps over one stretch of memory, x[0] being where their first difference begins. Steps ascend, so that
+/// starts do not.
+void add_steps(const double* x, Difference difference, std::span<const Step> steps, std::vector<SquareMean>& parts,
+               std::size_t piece, std::size_t pieces) {
+    const auto part = [&](const Step& step) -> SquareMean& { return parts[step.which * pieces + piece]; };
+    for (std::size_t s = 0; s < steps.size();) {
+        std::size_t done = 0;
+        const std::span<const Step> left = steps.subspan(s);
+        const bool four = difference.order == 2 && !difference.skipping && four_octaves(left);
+        if (four) {
+            done = left[3].starts / 8 * 8;
+            alignas(64) std::array<double, 32> sums{};
+            const std::size_t at_once = left[3].m <= cached_step ? cached_starts : done;
+            for (std::size_t i = 0; i < done; i += at_once) {
+                HWY_DYNAMIC_DISPATCH(add_four_octaves)(x + i, left[0].m, std::min(at_once, done - i), sums.data());
+            }
+            for (std::size_t k = 0; k < 4; ++k) {
+                const double* c = sums.data() + 8 * k;
+                part(left[k]) += {((c[0] + c[4]) + (c[1] + c[5])) + ((c[2] + c[6]) + (c[3] + c[7])),
+                                  static_cast<std::int64_t>(done)};
+            }
         }
-    });
+        const std::size_t taken = four ? 4 : 1;
+        for (std::size_t k = 0; k < taken; ++k) {
+            if (left[k].starts <= done) continue;
+            DifferenceSums rest;
+            rest.add(x + done, difference, left[k].m, left[k].starts - done);
+            part(left[k]) += rest.folded();
+        }
+        s += taken;
+    }
+}
+
+void gather(const std::vector<SquareMean>& parts, std::span<const std::size_t> which, std::size_t pieces,
+            std::vector<SquareMean>& out) {
     for (std::size_t k = 0; k < which.size(); ++k) {
         out[which[k]] = pairwise({parts.begin() + static_cast<std::ptrdiff_t>(k * pieces),
                                   parts.begin() + static_cast<std::ptrdiff_t>((k + 1) * pieces)});
     }
 }
 
-/// Steps that are multiples of `row`: the record is written in rows of that length and taken column by column.
+/// Steps that fit the cache, ascending.
+void short_steps(std::span<const double> x, Difference difference, std::span<const std::size_t> m,
+                 std::span<const std::size_t> which, std::vector<SquareMean>& out) {
+    const std::size_t pieces = (x.size() + piece_starts - 1) / piece_starts;
+    std::vector<SquareMean> parts(pieces * which.size());
+    for_pieces(pieces, [&](std::size_t piece) {
+        const std::size_t first = piece * piece_starts;
+        std::vector<Step> steps;
+        for (std::size_t k = 0; k < which.size(); ++k) {
+            const std::size_t step = m[which[k]];
+            const std::size_t last = std::min(first + piece_starts, starts_of(x.size(), difference.order, step));
+            if (last > first) steps.push_back({k, step, last - first});
+        }
+        if (steps.empty()) return;
+        const std::size_t reach = static_cast<std::size_t>(difference.order) * steps.back().m;
+        const std::size_t end = std::min(x.size(), first + piece_starts + reach);
+        // Copied to where a cache line begins: a vector that lies across two lines costs two loads.
+        Aligned& here = workspace();
+        here.assign(x.begin() + static_cast<std::ptrdiff_t>(first), x.begin() + static_cast<std::ptrdiff_t>(end));
+        add_steps(here.data(), difference, steps, parts, piece, pieces);
+    });
+    gather(parts, which, pieces, out);
+}
+
+/// Steps that are multiples of `row`, ascending: the record is written in rows of that length and taken column by
+/// column.
 void long_steps(std::span<const double> x, Difference difference, std::span<const std::size_t> m,
                 std::span<const std::size_t> which, std::size_t row, std::vector<SquareMean>& out) {
     const std::size_t rows = (x.size() + row - 1) / row;
@@ -204,11 +311,13 @@ void long_steps(std::span<const double> x, Difference difference, std::span<cons
     for_pieces(pieces, [&](std::size_t piece) {
         const std::size_t left = piece * width;
         const std::size_t wide = std::min(width, row - left);
-        std::vector<double> column(rows * wide);
+        Aligned& column = workspace();
+        column.resize(rows * wide);
         for (std::size_t r = 0; r < rows && r * row + left < x.size(); ++r) {
             const std::size_t there = std::min(wide, x.size() - r * row - left);
             std::copy_n(x.data() + r * row + left, there, column.data() + r * wide);
         }
+        std::vector<Step> steps;
         for (std::size_t k = 0; k < which.size(); ++k) {
             const std::size_t step = m[which[k]];
             // Starts r row + left + c < starts: whole rows first, then a part of one.
@@ -217,15 +326,11 @@ void long_steps(std::span<const double> x, Difference difference, std::span<cons
             const std::size_t whole = starts >= left + wide ? (starts - left - wide) / row + 1 : 0;
             const std::size_t beyond = whole * row + left;
             const std::size_t rest = starts > beyond ? std::min(wide, starts - beyond) : 0;
-            DifferenceSums sums;
-            sums.add(column.data(), difference, step / row * wide, whole * wide + rest);
-            parts[k * pieces + piece] = sums.folded();
+            steps.push_back({k, step / row * wide, whole * wide + rest});
         }
+        add_steps(column.data(), difference, steps, parts, piece, pieces);
     });
-    for (std::size_t k = 0; k < which.size(); ++k) {
-        out[which[k]] = pairwise({parts.begin() + static_cast<std::ptrdiff_t>(k * pieces),
-                                  parts.begin() + static_cast<std::ptrdiff_t>((k + 1) * pieces)});
-    }
+    gather(parts, which, pieces, out);
 }
 
 /// Squares of the sums from `first` on: each is the one before and a third difference of the phase. Eight chains of
@@ -296,12 +401,14 @@ std::vector<SquareMean> sums_of_differences(std::span<const double> x, Differenc
     std::vector<std::size_t> near;
     std::vector<std::size_t> far;
     for (std::size_t k = 0; k < m.size(); ++k) {
-        (m[k] <= piece_starts ? near : far).push_back(k);
+        (m[k] <= longest_short_step ? near : far).push_back(k);
+    }
+    for (std::vector<std::size_t>* list : {&near, &far}) {
+        std::sort(list->begin(), list->end(), [&](std::size_t a, std::size_t b) { return m[a] < m[b]; });
     }
     if (!near.empty()) short_steps(x, difference, m, near, out);
     if (far.empty()) return out;
-    std::size_t row = m[far.front()];
-    for (const std::size_t k : far) row = std::min(row, m[k]);
+    const std::size_t row = m[far.front()];
     std::vector<std::size_t> regular;
     for (const std::size_t k : far) {
         if (m[k] % row == 0) {

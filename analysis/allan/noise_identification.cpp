@@ -50,7 +50,7 @@ std::optional<double> lag1_autocorrelation(const std::vector<double>& x) {
 }  // namespace
 
 std::optional<double> noise_exponent(std::span<const double> phase, std::int64_t m, int most_differences) {
-    constexpr std::size_t most_points = std::size_t{1} << 20;
+    constexpr std::size_t most_points = std::size_t{1} << 17;
     const auto step = static_cast<std::size_t>(m);
     const std::size_t points = phase.empty() ? 0 : (phase.size() - 1) / step + 1;
     const std::size_t taken = std::min(points, most_points);

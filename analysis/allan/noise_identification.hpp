@@ -17,8 +17,8 @@ inline constexpr std::int64_t noise_identification_points = 30;
 ///
 /// Lag-1 autocorrelation r of the phase taken every m points, a parabola removed, differenced d times until
 /// rho = r/(1+r) < 1/4; then 2 - 2 (d + rho). W. Riley, C. Greenhall, "Power law noise identification using the lag 1
-/// autocorrelation", 18th EFTF (2004); NIST SP1065 section 5.5.6. Of very long records a part in the middle is looked
-/// at, 2^20 decimated points: they tell the exponent to a thousandth.
+/// autocorrelation", 18th EFTF (2004); NIST SP1065 section 5.5.6. Of long records a part in the middle is looked at,
+/// 2^17 decimated points: they tell the exponent to a hundredth.
 std::optional<double> noise_exponent(std::span<const double> phase, std::int64_t m, int most_differences = 2);
 
 /// The kind of noise nearest to an exponent: 2 (white phase), 1, 0 (white frequency, angle random walk), -1 (flicker),
