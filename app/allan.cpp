@@ -11,8 +11,11 @@
 #include <string>
 #include <string_view>
 
+#include "analysis/allan/running_deviation.hpp"
 #include "analysis/noise/fit.hpp"
 #include "analysis/record/series.hpp"
+#include "analysis/report/plot.hpp"
+#include "app/allan_figure.hpp"
 #include "app/allan_output.hpp"
 #include "app/command.hpp"
 #include "app/output.hpp"
@@ -31,6 +34,9 @@ struct Arguments {
     std::string tau = "octave";
     double confidence = allan::Options{}.confidence;
     std::string bias = "corrected";
+    std::string time;
+    std::string plot;
+    bool stream = false;
     bool json = false;
 };
 
@@ -144,7 +150,7 @@ std::vector<std::int64_t> factors_for(const TauChoice& choice, allan::Estimator 
     return choice.list;
 }
 
-void check_rate(const Arguments& a, const record::Series& series) {
+void check_rate(const Arguments& a, const record::SeriesInfo& series) {
     if (!series.rate_hz) return;
     if (std::abs(*series.rate_hz - a.rate_hz) > 1e-9 * a.rate_hz) {
         throw InputError(
@@ -152,49 +158,127 @@ void check_rate(const Arguments& a, const record::Series& series) {
     }
 }
 
-void run(const Arguments& a) {
-    const allan::Kind kind = parse_kind(a.kind);
-    const Unit* unit = parse_unit(a.unit, kind);
-    const std::vector<allan::Estimator> estimators = parse_deviations(a.dev);
+/// The command line, checked.
+struct Request {
+    allan::Kind kind;
+    const Unit* unit;
+    std::vector<allan::Estimator> estimators;
+    TauChoice taus;
+    record::SeriesRequest series;
+
+    double scale() const { return unit != nullptr ? unit->to_arcsec : 1.0; }
+};
+
+Request checked(const Arguments& a) {
+    Request out{parse_kind(a.kind), nullptr, parse_deviations(a.dev), {}, {}};
+    out.unit = parse_unit(a.unit, out.kind);
     if (!(a.rate_hz > 0.0) || !std::isfinite(a.rate_hz)) {
         throw InputError(fmt::format("--rate {}: must be a positive number of samples a second", a.rate_hz));
     }
     if (!(a.confidence > 0.0 && a.confidence < 1.0)) {
         throw InputError(fmt::format("--confidence {}: must lie between 0 and 1, such as 0.6827", a.confidence));
     }
-    const TauChoice taus = parse_tau(a.tau);
-
-    record::Series series =
-        record::read_series(a.data, a.column.empty() ? std::nullopt : std::optional<std::string>(a.column));
-    check_rate(a, series);
-    if (series.missing > 0) throw InputError(fmt::format("{}: {} values are missing", a.data, series.missing));
-    AllanOutput out;
-    out.data = a.data;
-    out.column = series.column;
-    out.kind = a.kind;
-    out.input_unit = a.unit;
-    out.gyro = unit != nullptr;
-    out.n = series.values.size();
-    out.tau0_s = 1.0 / a.rate_hz;
-    out.confidence = a.confidence;
-    const double scale = unit != nullptr ? unit->to_arcsec : 1.0;
-    const allan::Phase phase = allan::phase_of(series.values, kind, out.tau0_s, scale);
-    const auto points = static_cast<std::int64_t>(phase.x.size());
-    if (points < 3) {
-        throw InputError(fmt::format("{}: {} data; a deviation needs at least {}", a.data, out.n,
-                                     kind == allan::Kind::phase ? 3 : 2));
+    out.taus = parse_tau(a.tau);
+    if (!a.plot.empty()) check_figure(a.plot);
+    const auto named = [](const std::string& name) {
+        return name.empty() ? std::nullopt : std::optional<std::string>(name);
+    };
+    out.series = {.path = a.data, .column = named(a.column), .time = named(a.time), .rate_hz = a.rate_hz};
+    if (!a.stream) return out;
+    if (out.taus.word != "octave") {
+        throw InputError(fmt::format("--tau {}: a record that is not kept (--stream) has octaves only", a.tau));
     }
-    std::vector<double>().swap(series.values);
+    for (const allan::Estimator e : out.estimators) {
+        if (e == allan::Estimator::oadev || e == allan::Estimator::ohdev) continue;
+        throw InputError(
+            fmt::format("--dev {}: a record that is not kept (--stream) has oadev and ohdev only", allan::name(e)));
+    }
+    return out;
+}
 
-    for (const allan::Estimator estimator : estimators) {
-        const std::vector<std::int64_t> factors = factors_for(taus, estimator, points);
+void check_size(const Arguments& a, allan::Kind kind, std::int64_t points, std::size_t data) {
+    if (points >= 3) return;
+    throw InputError(fmt::format("{}: {} data; a deviation needs at least {}", a.data, data,
+                                 kind == allan::Kind::phase ? 3 : 2));
+}
+
+/// The noise of the longest part without gaps.
+void fit_longest(const allan::Phase& phase, AllanOutput& out) {
+    const auto longest =
+        std::max_element(phase.stretches.begin(), phase.stretches.end(),
+                         [](const allan::Stretch& l, const allan::Stretch& r) { return l.size() < r.size(); });
+    out.noise = noise::fit_noise(std::span(phase.x).subspan(longest->begin, longest->size()), out.tau0_s);
+    if (!phase.whole()) out.noise_stretch = longest->size();
+}
+
+void from_record(const Arguments& a, const Request& request, AllanOutput& out) {
+    record::Series series = record::read_series(request.series);
+    check_rate(a, series);
+    const allan::Phase phase =
+        series.counts.empty()
+            ? allan::phase_of(series.values, request.kind, out.tau0_s, request.scale())
+            : allan::phase_of(series.counts, series.values, request.kind, out.tau0_s, request.scale());
+    out.column = series.column;
+    out.missing = series.missing;
+    out.n = series.n - series.missing;
+    const auto points = static_cast<std::int64_t>(phase.x.size());
+    check_size(a, request.kind, points, out.n);
+    series = {};
+    for (const allan::Estimator estimator : request.estimators) {
+        const std::vector<std::int64_t> factors = factors_for(request.taus, estimator, points);
         out.deviations.emplace_back(
             estimator, allan::deviation(estimator, phase, out.tau0_s, factors,
                                         {.confidence = a.confidence, .correct_bias = a.bias == "corrected"}));
     }
-    if (unit != nullptr) out.noise = noise::fit_noise(phase.x, out.tau0_s);
-    const std::string text = a.json ? allan_json(out) : allan_text(out);
-    put(text);
+    if (request.unit != nullptr) fit_longest(phase, out);
+}
+
+void from_stream(const Arguments& a, const Request& request, AllanOutput& out) {
+    std::vector<allan::RunningDeviation> running;
+    for (const allan::Estimator e : request.estimators) {
+        running.emplace_back(request.kind, out.tau0_s, e, request.scale());
+    }
+    const record::SeriesInfo info = record::stream_series(request.series, [&](std::span<const double> piece) {
+        for (allan::RunningDeviation& r : running) r.add(piece);
+    });
+    check_rate(a, info);
+    if (info.rounded) {
+        throw InputError(fmt::format("{}: counts beyond 2^53 lose their last digits in a stream; without --stream they "
+                                     "are kept whole",
+                                     a.data));
+    }
+    out.column = info.column;
+    out.missing = info.missing;
+    out.n = info.n - info.missing;
+    out.streamed = true;
+    check_size(a, request.kind, static_cast<std::int64_t>(out.n) + (request.kind == allan::Kind::phase ? 0 : 1), out.n);
+    for (std::size_t k = 0; k < running.size(); ++k) {
+        out.deviations.emplace_back(request.estimators[k], running[k].points(a.confidence));
+    }
+    if (request.unit == nullptr) return;
+    const std::vector<double> thin = running.front().thinned_phase();
+    if (thin.empty()) {
+        out.noise.emplace();
+        out.noise->reason = "values are missing, and a stream keeps no part of the record to be fitted by itself";
+        return;
+    }
+    const auto every = running.front().thinning();
+    out.noise = noise::fit_noise(thin, out.tau0_s * static_cast<double>(every));
+    if (every > 1) out.noise_thinning = every;
+}
+
+void run(const Arguments& a) {
+    const Request request = checked(a);
+    AllanOutput out;
+    out.data = a.data;
+    out.kind = a.kind;
+    out.input_unit = a.unit;
+    out.gyro = request.unit != nullptr;
+    out.tau0_s = 1.0 / a.rate_hz;
+    out.confidence = a.confidence;
+    a.stream ? from_stream(a, request, out) : from_record(a, request, out);
+    if (!a.plot.empty()) report::write_svg(a.plot, allan_figure(out));
+    put(a.json ? allan_json(out) : allan_text(out));
 }
 
 }  // namespace
@@ -203,12 +287,13 @@ void add_allan(CLI::App& root) {
     auto a = std::make_shared<Arguments>();
     CLI::App* sub =
         root.add_subcommand("allan", "Allan deviation with intervals, and gyro noise coefficients, of a data file");
-    sub->add_option("DATA", a->data, "Text, HDF5 or rlg-record")->required();
+    sub->add_option("DATA", a->data, "Text, HDF5 or rlg-record; - for text from standard input")->required();
     sub->add_option("--rate", a->rate_hz, "Samples a second [Hz]")->required();
     sub->add_option("--kind", a->kind, "phase | increment | rate: what the numbers are (never guessed)");
     sub->add_option("--unit", a->unit,
                     "arcsec, deg, rad (phase, increment); deg/h, deg/s, rad/s (rate); none: dimensionless");
     sub->add_option("--column", a->column, "Name or number (from 1) of the column, or path of an HDF5 dataset");
+    sub->add_option("--time", a->time, "Column or dataset of the times of the samples [s]: rows left out become gaps");
     sub->add_option("--dev", a->dev, "Deviations, comma between: " + known_deviations())->capture_default_str();
     sub->add_option("--tau", a->tau, "octave | decade | all | averaging factors M,M,...")->capture_default_str();
     sub->add_option("--confidence", a->confidence, "Level of the intervals of the deviation")->capture_default_str();
@@ -216,6 +301,8 @@ void add_allan(CLI::App& root) {
                     "corrected | raw: variances of the total family divided by their known bias or not")
         ->check(CLI::IsMember({"corrected", "raw"}))
         ->capture_default_str();
+    sub->add_flag("--stream", a->stream, "Keep no record: octaves of oadev and ohdev in little memory");
+    sub->add_option("--plot", a->plot, "also draw the figure into this SVG file");
     sub->add_flag("--json", a->json, "One JSON object on standard output");
     sub->callback([a] { run(*a); });
 }

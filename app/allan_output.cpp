@@ -57,11 +57,13 @@ std::string shown(double v, int digits) { return std::isfinite(v) ? fmt::format(
 std::string allan_json(const AllanOutput& out) {
     Json json;
     json["n"] = out.n;
+    json["missing"] = out.missing;
     json["tau0_s"] = number(out.tau0_s);
     json["kind"] = out.kind;
     json["column"] = out.column;
     json["unit"] = out.gyro ? Json("deg/h") : Json(nullptr);
     json["confidence"] = number(out.confidence);
+    json["stride"] = out.streamed ? "tau/8" : "tau0";
     json["deviations"] = Json::object();
     for (const auto& [estimator, points] : out.deviations) {
         Json list = Json::array();
@@ -91,6 +93,8 @@ std::string allan_json(const AllanOutput& out) {
         }
         json["noise"] = std::move(noise);
         json["noise_upper_limits_95"] = std::move(limits);
+        json["noise_fitted_points"] = out.noise_stretch ? Json(*out.noise_stretch) : Json(nullptr);
+        json["noise_fitted_every"] = out.noise_thinning ? Json(*out.noise_thinning) : Json(nullptr);
         json["noise_withheld"] = out.noise->described ? Json(nullptr) : Json(out.noise->reason);
     }
     return json.dump() + "\n";
@@ -99,6 +103,10 @@ std::string allan_json(const AllanOutput& out) {
 std::string allan_text(const AllanOutput& out) {
     std::string text = fmt::format("{}, column {}: {} data ({}{}{}), tau0 = {:.6g} s\n", out.data, out.column, out.n,
                                    out.kind, out.input_unit.empty() ? "" : ", ", out.input_unit, out.tau0_s);
+    if (out.missing > 0) {
+        text += fmt::format("{} data are missing: terms that need them are left out\n", out.missing);
+    }
+    if (out.streamed) text += "no record kept: sums with a stride of tau/8\n";
     for (const auto& [estimator, points] : out.deviations) {
         const allan::Traits& t = allan::traits(estimator);
         const std::string_view unit = !out.gyro ? "" : t.time ? " [arcsec]" : " [deg/h]";
@@ -116,6 +124,12 @@ std::string allan_text(const AllanOutput& out) {
     if (!out.noise) {
         text += "\nNo gyro coefficients: say the unit of the data with --unit to have them.\n";
         return text;
+    }
+    if (out.noise_stretch) {
+        text += fmt::format("\nCoefficients from the longest part without gaps, {} points.\n", *out.noise_stretch);
+    }
+    if (out.noise_thinning) {
+        text += fmt::format("\nCoefficients from every {}th point, which was kept.\n", *out.noise_thinning);
     }
     if (!out.noise->described) {
         text += fmt::format(

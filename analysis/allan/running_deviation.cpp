@@ -79,7 +79,7 @@ void RunningDeviation::take(std::span<const double> data) {
     std::size_t count = 0;
     const auto put = [&](double x) {
         points[count++] = x;
-        if (count == batch) push(0, points, std::exchange(count, 0));
+        if (count == batch) put_all(points, std::exchange(count, 0));
     };
     for (const double v : data) {
         const bool there = !std::isnan(v);
@@ -94,7 +94,7 @@ void RunningDeviation::take(std::span<const double> data) {
             continue;
         }
         if (!there) {
-            push(0, points, std::exchange(count, 0));
+            put_all(points, std::exchange(count, 0));
             break_off();
             broken_ = true;
             continue;
@@ -109,6 +109,21 @@ void RunningDeviation::take(std::span<const double> data) {
         phase_ = next.value;
         rest_ += next.error + step.error;
         put((phase_ + rest_) * scale_);
+    }
+    put_all(points, count);
+}
+
+void RunningDeviation::put_all(const double* points, std::size_t count) {
+    constexpr std::size_t most_thin = 32768;
+    for (std::size_t i = 0; i < count; ++i, ++points_) {
+        if (points_ % thinning_ != 0) continue;
+        if (thin_.size() == most_thin) {
+            for (std::size_t k = 0; k < most_thin / 2; ++k) thin_[k] = thin_[2 * k];
+            thin_.resize(most_thin / 2);
+            thinning_ *= 2;
+            if (points_ % thinning_ != 0) continue;
+        }
+        thin_.push_back(points[i]);
     }
     push(0, points, count);
 }
@@ -177,13 +192,23 @@ void RunningDeviation::break_off() {
     }
 }
 
-std::vector<Point> RunningDeviation::points(double confidence) const {
+RunningDeviation RunningDeviation::completed() const {
     RunningDeviation done(*this);
     if (!done.started_) {
         done.slope_ = lead_slope(done.lead_, kind_);
         done.started_ = true;
         done.take(done.lead_);
     }
+    return done;
+}
+
+std::vector<double> RunningDeviation::thinned_phase() const {
+    if (missing_ > 0) return {};
+    return started_ ? thin_ : completed().thin_;
+}
+
+std::vector<Point> RunningDeviation::points(double confidence) const {
+    RunningDeviation done = completed();
     done.break_off();
     std::vector<OctaveMean> octaves;
     std::int64_t interval = 1;

@@ -32,6 +32,11 @@ class RunningDeviation {
     std::int64_t samples() const { return samples_; }
     std::int64_t missing() const { return missing_; }
 
+    /// Phase at few enough instants to be kept, for what needs a record (a fit of noise coefficients) and not its
+    /// shortest times: every thinning()-th point, at most 32 768; empty where a sample is missing.
+    std::vector<double> thinned_phase() const;
+    std::int64_t thinning() const { return thinning_; }
+
     /// m = 1, 2, 4, ... as far as there is a term.
     std::vector<Point> points(double confidence = Options{}.confidence) const;
 
@@ -48,6 +53,8 @@ class RunningDeviation {
     };
 
     void take(std::span<const double> data);
+    void put_all(const double* points, std::size_t count);
+    RunningDeviation completed() const;
     void push(std::size_t level, const double* points, std::size_t count);
     void process(std::size_t level);
     void break_off();
@@ -69,6 +76,9 @@ class RunningDeviation {
     double rest_ = 0.0;
     bool broken_ = true;  ///< the next increment begins a new origin
     std::vector<Level> levels_;
+    std::vector<double> thin_;    ///< every thinning-th point
+    std::int64_t thinning_ = 1;   ///< a power of two
+    std::int64_t points_ = 0;     ///< of the phase so far
 };
 
 }  // namespace ringlock::allan

@@ -153,6 +153,24 @@ TEST(AllanRunning, MissingIncrementsPartTheRecord) {
     for (const allan::Point& p : points) EXPECT_LE(2 * p.m, 3000);
 }
 
+// What is kept for a fit is the phase less a line.
+TEST(AllanRunning, ThinnedPhaseIsThePhase) {
+    for (const std::size_t n : {100U, 32'768U, 32'769U, 200'000U}) {
+        const std::vector<double> x = test::simulate_angle({.n = 1.0}, n - 1, 1.0, n);
+        allan::RunningDeviation running(Kind::phase, 1.0);
+        running.add(x);
+        const std::vector<double> thin = running.thinned_phase();
+        const auto every = static_cast<std::size_t>(running.thinning());
+        ASSERT_EQ(thin.size(), (n - 1) / every + 1) << n;
+        EXPECT_LE(thin.size(), 32'768U);
+        EXPECT_GT(2 * thin.size(), std::min<std::size_t>(n, 32'768U));
+        for (std::size_t k = 2; k < thin.size(); ++k) {
+            const double z = thin[k] - 2.0 * thin[k - 1] + thin[k - 2];
+            EXPECT_NEAR(z, x[k * every] - 2.0 * x[(k - 1) * every] + x[(k - 2) * every], 1e-8) << n;
+        }
+    }
+}
+
 TEST(AllanRunning, RefusesWhatItCannot) {
     EXPECT_THROW(allan::RunningDeviation(Kind::phase, 1.0, Estimator::mdev), InputError);
     EXPECT_THROW(allan::RunningDeviation(Kind::phase, 0.0), InputError);

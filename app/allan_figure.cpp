@@ -1,0 +1,77 @@
+#include "app/allan_figure.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/noise/allan_variance.hpp"
+
+namespace ringlock::app {
+namespace {
+
+using Style = report::Curve::Style;
+
+/// Whether the terms of the noise are those of what the estimator estimates.
+bool estimates_allan_variance(allan::Estimator e) {
+    return e == allan::Estimator::adev || e == allan::Estimator::oadev || e == allan::Estimator::totdev;
+}
+
+report::Curve curve_of(allan::Estimator estimator, const std::vector<allan::Point>& points) {
+    report::Curve curve{std::string(allan::name(estimator)), {}, {}, {}, {}, Style::points};
+    for (const allan::Point& p : points) {
+        curve.x.push_back(p.tau_s);
+        curve.y.push_back(p.dev);
+        curve.lo.push_back(p.lo);
+        curve.hi.push_back(p.hi);
+    }
+    return curve;
+}
+
+void add_fit(const AllanOutput& out, std::vector<double> tau_s, report::Figure& figure) {
+    const auto terms = noise::variance_terms(*out.noise, tau_s);
+    if (terms.empty()) return;
+    report::Curve sum{"fit", tau_s, std::vector<double>(tau_s.size()), {}, {}, Style::dashed};
+    double least = figure.curves.front().y.front();
+    for (const report::Curve& c : figure.curves) least = std::min(least, *std::min_element(c.y.begin(), c.y.end()));
+    for (const noise::VarianceTerm& term : terms) {
+        report::Curve line{term.name, {}, {}, {}, {}, Style::line};
+        for (std::size_t i = 0; i < tau_s.size(); ++i) {
+            sum.y[i] += term.variances[i];
+            const double dev = std::sqrt(term.variances[i]);
+            // Far below the curve a line only stretches the axis.
+            if (dev < 0.3 * least) continue;
+            line.x.push_back(tau_s[i]);
+            line.y.push_back(dev);
+        }
+        figure.curves.push_back(std::move(line));
+    }
+    for (double& y : sum.y) y = std::sqrt(y);
+    figure.curves.push_back(std::move(sum));
+}
+
+}  // namespace
+
+report::Figure allan_figure(const AllanOutput& out) {
+    report::Figure figure;
+    const bool times = std::all_of(out.deviations.begin(), out.deviations.end(),
+                                   [](const auto& d) { return allan::traits(d.first).time; });
+    const bool rates = std::none_of(out.deviations.begin(), out.deviations.end(),
+                                    [](const auto& d) { return allan::traits(d.first).time; });
+    figure.title = fmt::format("{}, column {}", out.data, out.column);
+    figure.x_label = "averaging time tau [s]";
+    figure.y_label = out.gyro ? times ? "deviation [arcsec]" : rates ? "deviation [deg/h]" : "deviation [deg/h; times: arcsec]"
+                              : "deviation";
+    figure.log_x = figure.log_y = true;
+    std::vector<double> tau_s;
+    for (const auto& [estimator, points] : out.deviations) {
+        figure.curves.push_back(curve_of(estimator, points));
+        if (estimates_allan_variance(estimator) && figure.curves.back().x.size() > tau_s.size()) {
+            tau_s = figure.curves.back().x;
+        }
+    }
+    if (out.noise && out.noise->described && !tau_s.empty()) add_fit(out, tau_s, figure);
+    return figure;
+}
+
+}  // namespace ringlock::app
