@@ -33,7 +33,7 @@ struct Arguments {
     std::string dev = "oadev";
     std::string tau = "octave";
     double confidence = allan::Options{}.confidence;
-    std::string bias = "corrected";
+    std::string bias = "published";
     std::string time;
     std::string plot;
     bool stream = false;
@@ -111,6 +111,11 @@ std::vector<allan::Estimator> parse_deviations(const std::string& list) {
         if (std::find(out.begin(), out.end(), *estimator) == out.end()) out.push_back(*estimator);
     }
     return out;
+}
+
+allan::Bias parse_bias(const std::string& bias) {
+    if (bias == "exact") return allan::Bias::exact;
+    return bias == "raw" ? allan::Bias::none : allan::Bias::published;
 }
 
 /// What --tau asks for: one of the words, or a list.
@@ -198,8 +203,8 @@ Request checked(const Arguments& a) {
 
 void check_size(const Arguments& a, allan::Kind kind, std::int64_t points, std::size_t data) {
     if (points >= 3) return;
-    throw InputError(fmt::format("{}: {} data; a deviation needs at least {}", a.data, data,
-                                 kind == allan::Kind::phase ? 3 : 2));
+    throw InputError(
+        fmt::format("{}: {} data; a deviation needs at least {}", a.data, data, kind == allan::Kind::phase ? 3 : 2));
 }
 
 /// The noise of the longest part without gaps.
@@ -226,9 +231,9 @@ void from_record(const Arguments& a, const Request& request, AllanOutput& out) {
     series = {};
     for (const allan::Estimator estimator : request.estimators) {
         const std::vector<std::int64_t> factors = factors_for(request.taus, estimator, points);
-        out.deviations.emplace_back(
-            estimator, allan::deviation(estimator, phase, out.tau0_s, factors,
-                                        {.confidence = a.confidence, .correct_bias = a.bias == "corrected"}));
+        out.deviations.emplace_back(estimator,
+                                    allan::deviation(estimator, phase, out.tau0_s, factors,
+                                                     {.confidence = a.confidence, .bias = parse_bias(a.bias)}));
     }
     if (request.unit != nullptr) fit_longest(phase, out);
 }
@@ -243,9 +248,10 @@ void from_stream(const Arguments& a, const Request& request, AllanOutput& out) {
     });
     check_rate(a, info);
     if (info.rounded) {
-        throw InputError(fmt::format("{}: counts beyond 2^53 lose their last digits in a stream; without --stream they "
-                                     "are kept whole",
-                                     a.data));
+        throw InputError(
+            fmt::format("{}: counts beyond 2^53 lose their last digits in a stream; without --stream they "
+                        "are kept whole",
+                        a.data));
     }
     out.column = info.column;
     out.missing = info.missing;
@@ -298,8 +304,8 @@ void add_allan(CLI::App& root) {
     sub->add_option("--tau", a->tau, "octave | decade | all | averaging factors M,M,...")->capture_default_str();
     sub->add_option("--confidence", a->confidence, "Level of the intervals of the deviation")->capture_default_str();
     sub->add_option("--bias", a->bias,
-                    "corrected | raw: variances of the total family divided by their known bias or not")
-        ->check(CLI::IsMember({"corrected", "raw"}))
+                    "published | exact | raw: by what the variances of the total family are divided (docs/allan.md)")
+        ->check(CLI::IsMember({"published", "exact", "raw"}))
         ->capture_default_str();
     sub->add_flag("--stream", a->stream, "Keep no record: octaves of oadev and ohdev in little memory");
     sub->add_option("--plot", a->plot, "also draw the figure into this SVG file");

@@ -60,7 +60,9 @@ report::Figure allan_figure(const AllanOutput& out) {
                                     [](const auto& d) { return allan::traits(d.first).time; });
     figure.title = fmt::format("{}, column {}", out.data, out.column);
     figure.x_label = "averaging time tau [s]";
-    figure.y_label = out.gyro ? times ? "deviation [arcsec]" : rates ? "deviation [deg/h]" : "deviation [deg/h; times: arcsec]"
+    figure.y_label = out.gyro ? times   ? "deviation [arcsec]"
+                                : rates ? "deviation [deg/h]"
+                                        : "deviation [deg/h; times: arcsec]"
                               : "deviation";
     figure.log_x = figure.log_y = true;
     std::vector<double> tau_s;

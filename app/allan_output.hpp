@@ -14,8 +14,8 @@ struct AllanOutput {
     std::string data;
     std::string column;
     std::string kind;
-    std::string input_unit;  ///< empty: dimensionless
-    bool gyro = false;       ///< the input has a unit: deviations in deg/h (time errors in arcsec), noise fitted
+    std::string input_unit;   ///< empty: dimensionless
+    bool gyro = false;        ///< the input has a unit: deviations in deg/h (time errors in arcsec), noise fitted
     std::size_t n = 0;        ///< data used
     std::size_t missing = 0;  ///< data that are missing among them
     bool streamed = false;    ///< sums with a stride of tau/8
@@ -23,7 +23,8 @@ struct AllanOutput {
     double confidence = 0.0;
     std::vector<std::pair<allan::Estimator, std::vector<allan::Point>>> deviations;
     std::optional<noise::NoiseFit> noise;
-    std::optional<std::size_t> noise_stretch;   ///< points of the part without gaps that was fitted, where there are gaps
+    std::optional<std::size_t>
+        noise_stretch;  ///< points of the part without gaps that was fitted, where there are gaps
     std::optional<std::int64_t> noise_thinning;  ///< samples from one to the next of those that were fitted, if not all
 };
 

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "analysis/allan/difference_sums.hpp"
+#include "analysis/allan/gapped_rates.hpp"
 #include "analysis/allan/interval.hpp"
 #include "analysis/allan/interval_error.hpp"
 #include "analysis/allan/noise_identification.hpp"
@@ -82,26 +83,28 @@ struct Record {
     bool skipping() const { return stretches.size() > 1 && one_origin; }
 };
 
-/// Adds over(part) to the sums: of the whole record where a NaN can be skipped, else stretch by stretch.
-template <class Over>
-void add_parts(const Record& record, std::vector<SquareMean>& sums, const Over& over) {
-    const auto add = [&](std::span<const double> part) {
-        const std::vector<SquareMean> more = over(part);
-        for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += more[k];
-    };
-    if (record.one_origin) return add(record.x);
-    for (const Stretch& s : record.stretches) add(record.of(s));
-}
-
 std::vector<SquareMean> difference_sums(const Traits& t, const Record& record, std::span<const std::size_t> m) {
     const Difference difference{.order = t.differences, .skipping = record.skipping()};
+    if (t.overlapping) return sums_of_differences(record.x, difference, m);
+    std::vector<SquareMean> out;
+    for (const std::size_t step : m) out.push_back(sum_of_strided_differences(record.x, difference, step, step));
+    return out;
+}
+
+std::vector<SquareMean> gapped_sums(const Traits& t, const Phase& phase, std::span<const std::size_t> m) {
+    const GappedRates rates(phase);
+    std::vector<SquareMean> out;
+    for (const std::size_t step : m) out.push_back(rates.sum(t.differences, step, t.overlapping ? 1 : step));
+    return out;
+}
+
+/// Errors of time where the origin was lost: within stretches.
+std::vector<SquareMean> error_sums(const Record& record, std::span<const std::size_t> m) {
     std::vector<SquareMean> sums(m.size());
-    add_parts(record, sums, [&](std::span<const double> x) {
-        if (t.overlapping) return sums_of_differences(x, difference, m);
-        std::vector<SquareMean> out;
-        for (const std::size_t step : m) out.push_back(sum_of_strided_differences(x, difference, step, step));
-        return out;
-    });
+    for (const Stretch& s : record.stretches) {
+        const std::vector<SquareMean> more = sums_of_differences(record.of(s), {.order = 1}, m);
+        for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += more[k];
+    }
     return sums;
 }
 
@@ -130,13 +133,14 @@ std::vector<SquareMean> piece_sums(const Record& record, std::span<const std::si
     return sums;
 }
 
-/// Sums of squares of differences in units where a difference is divided by what `per_term` says.
+/// What the family sums at each factor.
 std::vector<SquareMean> square_sums(const Traits& t, const Record& record, const Phase* phase,
                                     std::span<const std::size_t> m) {
     switch (t.family) {
         case Family::difference:
+            return record.one_origin ? difference_sums(t, record, m) : gapped_sums(t, *phase, m);
         case Family::interval_error:
-            return difference_sums(t, record, m);
+            return record.one_origin ? difference_sums(t, record, m) : error_sums(record, m);
         case Family::modified:
             return mean_difference_sums(record, m);
         case Family::modified_total:
@@ -247,13 +251,13 @@ std::vector<Point> variances_with_intervals(Estimator estimator, const Record& r
         Point& there = out.back();
         there.alpha = noise(p.m);
         const std::int64_t alike = effective_points(estimator, p.m, p.terms, points);
-        if (options.correct_bias) there.bias = published_bias(estimator, there.alpha, p.m, alike);
-        const double variance = variance_of(t, sums[k].sum / static_cast<double>(p.terms), p.m, tau0_s);
-        there.dev = std::sqrt(variance / there.bias);
         const Uncertainty u = uncertainty_of(estimator, there.alpha, p.m, alike, options.confidence);
+        if (options.bias == Bias::published) there.bias = published_bias(estimator, there.alpha, p.m, alike);
+        if (options.bias == Bias::exact) there.bias = u.bias;
+        there.dev = std::sqrt(variance_of(t, sums[k].sum / static_cast<double>(p.terms), p.m, tau0_s) / there.bias);
         there.edf = u.edf;
-        there.lo = std::sqrt(variance / (u.bias * u.high));
-        there.hi = std::sqrt(variance / (u.bias * u.low));
+        there.lo = there.dev / std::sqrt(u.high);
+        there.hi = there.dev / std::sqrt(u.low);
     }
     return out;
 }

@@ -22,9 +22,17 @@ struct Point {
     double hi = 0.0;
 };
 
+/// By what the variances of the total family, and the intervals with them, are divided.
+enum class Bias {
+    published,  ///< published_bias(): the figures of the literature and of Stable32
+    exact,      ///< Uncertainty::bias, which knows averaging factors and the length of the record; what intervals need
+                ///< to cover the truth
+    none        ///< 1: the definition as it stands
+};
+
 struct Options {
     double confidence = 0.682689492137;  ///< two-sided level of lo...hi, in (0, 1)
-    bool correct_bias = true;            ///< divide the variances of the total family by published_bias()
+    Bias bias = Bias::published;
 };
 
 /// Deviations of phase at the averaging factors asked for, with intervals.
@@ -35,7 +43,8 @@ struct Options {
 /// \return one point for each factor, in their order; those of which gaps leave no term are missing
 ///
 /// Definitions: NIST SP1065 sections 5.2.2 to 5.2.18, as named in estimator.hpp; docs/allan.md writes them out. A term
-/// that needs a missing point is left out of the mean. Noise is identified at each factor (noise_identification.hpp;
+/// that needs a missing point is left out of the mean; the differences of rates of which a tenth at most is missing are
+/// taken from the means of the others (gapped_rates.hpp). Noise is identified at each factor (noise_identification.hpp;
 /// gaps are bridged by straight lines for that), intervals are those of uncertainty.hpp. Throws InputError where a
 /// factor has no term in a record of that length, tau0 is not positive or the confidence outside (0, 1).
 std::vector<Point> deviation(Estimator estimator, const Phase& phase, double tau0_s,

@@ -89,8 +89,8 @@ void add_squares_of_differences(const double* x, int order, bool skipping, std::
                     : add_differences<3, false>(x, m, count, sums, terms);
 }
 
-/// Adds the squares of `count` second differences at each of the steps m, 2m, 4m, 8m to sums[4][8]: x_{i+2m} of one step
-/// is x_{i+m} of the next, so that a difference costs one load. count must be a multiple of 8.
+/// Adds the squares of `count` second differences at each of the steps m, 2m, 4m, 8m to sums[4][8]: x_{i+2m} of one
+/// step is x_{i+m} of the next, so that a difference costs one load. count must be a multiple of 8.
 void add_four_octaves(const double* HWY_RESTRICT x, std::size_t m, std::size_t count, double* HWY_RESTRICT sums) {
     const hn::CappedTag<double, octave_columns> d;
     constexpr std::size_t width = hn::MaxLanes(d);

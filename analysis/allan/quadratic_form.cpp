@@ -3,10 +3,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
-#include <boost/math/distributions/normal.hpp>
 #include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
-#include <numeric>
+#include <complex>
+#include <numbers>
 #include <stdexcept>
 
 #include "analysis/allan/power_law.hpp"
@@ -168,43 +168,54 @@ WeightedSquares::WeightedSquares(std::vector<Share> shares) : shares_(std::move(
     degrees_ = 1.0 / squares;
 }
 
-double WeightedSquares::probability_below(double x) const {
-    // Cumulant function K(t) = -1/2 sum ln(1 - 2 w t) and its derivatives; K'(t) = x grows with t.
-    struct Cumulants {
-        double value = 0.0;
-        double first = 0.0;
-        double second = 0.0;
-        double third = 0.0;
-    };
-    const auto at = [&](double t) {
-        Cumulants k;
-        for (const auto& [weight, count] : shares_) {
-            const double rest = 1.0 - 2.0 * weight * t;
-            const double share = weight / rest;
-            k.value -= 0.5 * count * std::log(rest);
-            k.first += count * share;
-            k.second += 2.0 * count * share * share;
-            k.third += 8.0 * count * share * share * share;
-        }
-        return k;
-    };
+double WeightedSquares::saddle_point(double x) const {
     double largest = 0.0;
     for (const Share& s : shares_) largest = std::max(largest, s.weight);
     double low = -1.0;
-    while (at(low).first > x) low *= 4.0;
+    while (cumulants(low).first > x) low *= 4.0;
     double high = 0.5 / largest;
     double t = 0.0;
-    for (int i = 0; i < 200 && high - low > 1e-12 * (1.0 + std::abs(t)); ++i) {
+    for (int i = 0; i < 100 && high - low > 1e-6 * (1.0 + std::abs(t)); ++i) {
         t = 0.5 * (low + high);
-        (at(t).first > x ? high : low) = t;
+        (cumulants(t).first > x ? high : low) = t;
     }
-    const Cumulants k = at(t);
-    const boost::math::normal normal;
-    const double w = std::copysign(std::sqrt(std::max(0.0, 2.0 * (t * x - k.value))), t);
-    const double u = t * std::sqrt(k.second);
-    double correction = -k.third / (6.0 * std::pow(k.second, 1.5));
-    if (std::abs(w) > 1e-4) correction = 1.0 / w - 1.0 / u;
-    return std::clamp(boost::math::cdf(normal, w) + boost::math::pdf(normal, w) * correction, 0.0, 1.0);
+    return t;
+}
+
+WeightedSquares::Cumulants WeightedSquares::cumulants(double t) const {
+    Cumulants k;
+    for (const auto& [weight, count] : shares_) {
+        const double share = weight / (1.0 - 2.0 * weight * t);
+        k.first += count * share;
+        k.second += 2.0 * count * share * share;
+        k.third += 8.0 * count * share * share * share;
+    }
+    return k;
+}
+
+double WeightedSquares::probability_below(double x) const {
+    double t = saddle_point(x);
+    // Away from the pole at zero, which stands for the whole probability.
+    const double nearest = 0.5 / std::sqrt(cumulants(0.0).second);
+    if (std::abs(t) < nearest) t = -nearest;
+    const Cumulants k = cumulants(t);
+    const double step = 0.1 / std::sqrt(k.second);
+    const double bend = k.third / (6.0 * k.second);
+    // Trapezoids; the path is a mirror image of itself below the real axis.
+    double sum = 0.0;
+    double largest = 0.0;
+    for (int i = 0; i < 2000; ++i) {
+        const double y = step * i;
+        const std::complex<double> s(t + bend * y * y, y);
+        std::complex<double> exponent = -s * x;
+        for (const auto& [weight, count] : shares_) exponent -= 0.5 * count * std::log(1.0 - 2.0 * weight * s);
+        const std::complex<double> value = std::exp(exponent) / s * std::complex<double>(2.0 * bend * y, 1.0);
+        sum += (i == 0 ? 0.5 : 1.0) * value.imag();
+        largest = std::max(largest, std::abs(value));
+        if (std::abs(value) < 1e-9 * largest) break;
+    }
+    const double integral = sum * step / std::numbers::pi;
+    return std::clamp(t < 0.0 ? -integral : 1.0 - integral, 0.0, 1.0);
 }
 
 double WeightedSquares::quantile(double probability) const {

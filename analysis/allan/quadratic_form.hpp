@@ -24,11 +24,20 @@ class WeightedSquares {
     double degrees() const { return degrees_; }
     /// Value over the mean that is not exceeded with this probability, in (0, 1).
     ///
-    /// From the saddle point of the cumulant function (R. Lugannani, S. Rice, Adv. Appl. Prob. 12 (1980) 475); the
-    /// probability is off by less than 0.005, for a single weight, which is the worst case.
+    /// From the inversion of the moment generating function M, P(Q > x) = int M(s) e^{-sx}/s ds/(2 pi i), along a
+    /// parabola through its saddle point that bends away from the cut of M: trapezoids converge at once there, however
+    /// few the weights. Good to 1e-6.
     double quantile(double probability) const;
 
    private:
+    /// Derivatives of the cumulant function ln M(t) = -1/2 sum ln(1 - 2 w t).
+    struct Cumulants {
+        double first = 0.0;
+        double second = 0.0;
+        double third = 0.0;
+    };
+    Cumulants cumulants(double t) const;
+    double saddle_point(double x) const;
     double probability_below(double x) const;
 
     std::vector<Share> shares_;  ///< of sum 1

@@ -47,7 +47,9 @@ double lead_slope(std::span<const double> lead, Kind kind) {
 }  // namespace
 
 RunningDeviation::RunningDeviation(Kind kind, double tau0_s, Estimator estimator, double scale)
-    : kind_(kind), tau0_s_(tau0_s), scale_(kind == Kind::rate ? scale * tau0_s : scale),
+    : kind_(kind),
+      tau0_s_(tau0_s),
+      scale_(kind == Kind::rate ? scale * tau0_s : scale),
       differences_(traits(estimator).differences) {
     check_deviation_input(tau0_s, Options{}.confidence);
     if (estimator != Estimator::oadev && estimator != Estimator::ohdev) {

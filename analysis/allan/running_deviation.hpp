@@ -43,12 +43,12 @@ class RunningDeviation {
    private:
     /// Every 2^k-th point of the phase: the last ones, and the sums that are made of them.
     struct Level {
-        std::vector<double> rows;     ///< `history` points that are done, then up to `batch` waiting ones
-        std::size_t before = 0;       ///< points of the history that are there
+        std::vector<double> rows;  ///< `history` points that are done, then up to `batch` waiting ones
+        std::size_t before = 0;    ///< points of the history that are there
         std::size_t waiting = 0;
-        bool hand_on = true;          ///< whether the first waiting point goes to the next level
-        std::vector<double> sums;     ///< one for each step
-        std::vector<double> rests;    ///< what rounding took from them
+        bool hand_on = true;        ///< whether the first waiting point goes to the next level
+        std::vector<double> sums;   ///< one for each step
+        std::vector<double> rests;  ///< what rounding took from them
         std::vector<std::int64_t> terms;
     };
 
@@ -76,9 +76,9 @@ class RunningDeviation {
     double rest_ = 0.0;
     bool broken_ = true;  ///< the next increment begins a new origin
     std::vector<Level> levels_;
-    std::vector<double> thin_;    ///< every thinning-th point
-    std::int64_t thinning_ = 1;   ///< a power of two
-    std::int64_t points_ = 0;     ///< of the phase so far
+    std::vector<double> thin_;   ///< every thinning-th point
+    std::int64_t thinning_ = 1;  ///< a power of two
+    std::int64_t points_ = 0;    ///< of the phase so far
 };
 
 }  // namespace ringlock::allan

@@ -79,9 +79,9 @@ std::vector<Column> simulate(const Noise& noise, std::size_t records) {
         const auto phase = test::simulate_angle(noise.truth, increments, 1.0, 1000 + record);
         for (Column& column : columns) {
             const std::array<std::int64_t, 1> m = {column.m};
-            const allan::Point p =
-                allan::deviation(column.estimator, phase, 1.0, m, {.confidence = confidence, .correct_bias = false})[0];
-            column.seen[record] = {p.dev * p.dev, p.lo, p.hi, p.alpha};
+            const allan::Point p = allan::deviation(column.estimator, phase, 1.0, m,
+                                                    {.confidence = confidence, .bias = allan::Bias::exact})[0];
+            column.seen[record] = {p.dev * p.dev * p.bias, p.lo, p.hi, p.alpha};
         }
     });
     return columns;

@@ -90,15 +90,18 @@ std::vector<double> python_seconds(std::size_t points, std::string& library) {
 }
 
 double total(const std::vector<allan::SquareMean>& sums) {
-    return std::accumulate(sums.begin(), sums.end(), 0.0, [](double t, const allan::SquareMean& s) { return t + s.sum; });
+    return std::accumulate(sums.begin(), sums.end(), 0.0,
+                           [](double t, const allan::SquareMean& s) { return t + s.sum; });
 }
 
 void octaves(const std::vector<double>& x) {
-    const auto factors = allan::octave_factors(allan::largest_factor(Estimator::oadev, static_cast<std::int64_t>(x.size())));
+    const auto factors =
+        allan::octave_factors(allan::largest_factor(Estimator::oadev, static_cast<std::int64_t>(x.size())));
     const std::vector<std::size_t> m(factors.begin(), factors.end());
     const auto sums = [&] { return total(allan::sums_of_differences(x, {.order = 2}, m)); };
     std::vector<Contender> all = {
-        {"the record read twice, one thread", [&] { return bench::read_all(x.data(), x.size()) + bench::read_all(x.data(), x.size()); }},
+        {"the record read twice, one thread",
+         [&] { return bench::read_all(x.data(), x.size()) + bench::read_all(x.data(), x.size()); }},
         {"sums of oadev, all threads", sums},
         {"sums of oadev, one thread",
          [&] {
@@ -114,15 +117,18 @@ void octaves(const std::vector<double>& x) {
         {"oadev with noise and intervals", [&] { return allan::deviation(Estimator::oadev, x, 1.0, factors)[0].dev; }},
         {"ohdev with noise and intervals",
          [&] {
-             const auto fewer = allan::octave_factors(allan::largest_factor(Estimator::ohdev, static_cast<std::int64_t>(x.size())));
+             const auto fewer =
+                 allan::octave_factors(allan::largest_factor(Estimator::ohdev, static_cast<std::int64_t>(x.size())));
              return allan::deviation(Estimator::ohdev, x, 1.0, fewer)[0].dev;
          }},
         {"mdev with noise and intervals",
          [&] {
-             const auto fewer = allan::octave_factors(allan::largest_factor(Estimator::mdev, static_cast<std::int64_t>(x.size())));
+             const auto fewer =
+                 allan::octave_factors(allan::largest_factor(Estimator::mdev, static_cast<std::int64_t>(x.size())));
              return allan::deviation(Estimator::mdev, x, 1.0, fewer)[0].dev;
          }},
-        {"totdev with noise and intervals", [&] { return allan::deviation(Estimator::totdev, x, 1.0, factors)[0].dev; }},
+        {"totdev with noise and intervals",
+         [&] { return allan::deviation(Estimator::totdev, x, 1.0, factors)[0].dev; }},
         {"mtie", [&] { return allan::deviation(Estimator::mtie, x, 1.0, factors)[0].dev; }},
     };
     race(all);
@@ -148,8 +154,10 @@ void octaves(const std::vector<double>& x) {
     fmt::print("\n");
     bench::head({"figure", "wanted", "reached"});
     bench::row({"sums of oadev over the record read twice", "<= 1", fmt::format("{:.2f}", ratio(all[1], all[0]))});
-    bench::row({"plain loop over sums of oadev, one thread each", ">= 1.5", fmt::format("{:.2f}", ratio(all[3], all[2]))});
-    bench::row({library + " over oadev with noise and intervals", ">= 20", fmt::format("{:.1f}", s / median(all[4].seconds))});
+    bench::row(
+        {"plain loop over sums of oadev, one thread each", ">= 1.5", fmt::format("{:.2f}", ratio(all[3], all[2]))});
+    bench::row(
+        {library + " over oadev with noise and intervals", ">= 20", fmt::format("{:.1f}", s / median(all[4].seconds))});
 }
 
 void streams(const std::vector<double>& x) {

@@ -52,7 +52,7 @@ TEST(AllanOracle, CountsAreExactInEveryEstimator) {
     const allan::Phase phase = allan::phase_of(x, {}, allan::Kind::phase, 1.0, 1.0);
     for (const allan::Traits& t : allan::all_estimators) {
         const std::vector<std::int64_t> factors = some_factors(t.estimator, n);
-        const auto points = allan::deviation(t.estimator, phase, 1.0, factors, {.correct_bias = false});
+        const auto points = allan::deviation(t.estimator, phase, 1.0, factors, {.bias = allan::Bias::none});
         ASSERT_EQ(points.size(), factors.size());
         for (const allan::Point& p : points) {
             EXPECT_LE(distance(p.dev, test::oracle_variance(t.estimator, whole(x), p.m)), 1e-13)
@@ -71,7 +71,7 @@ TEST(AllanOracle, LongRecordsAreExactInPiecesAndColumns) {
          {Estimator::oadev, Estimator::ohdev, Estimator::adev, Estimator::mdev, Estimator::totdev, Estimator::tierms}) {
         std::vector<std::int64_t> factors = allan::octave_factors(allan::largest_factor(e, n));
         for (const std::int64_t m : {3, 1000, 8191, 8193, 9000, 12345, 18000, 20000}) factors.push_back(m);
-        for (const allan::Point& p : allan::deviation(e, phase, 1.0, factors, {.correct_bias = false})) {
+        for (const allan::Point& p : allan::deviation(e, phase, 1.0, factors, {.bias = allan::Bias::none})) {
             EXPECT_LE(distance(p.dev, test::oracle_variance(e, whole(x), p.m)), 1e-13)
                 << allan::name(e) << " m = " << p.m;
         }
@@ -85,7 +85,7 @@ TEST(AllanOracle, IncrementsOfCountsAreThePhase) {
     const allan::Phase phase = allan::phase_of(steps, {}, allan::Kind::increment, 1.0, 1.0);
     for (const allan::Traits& t : allan::all_estimators) {
         const std::vector<std::int64_t> factors = {1, 7, 50};
-        for (const allan::Point& p : allan::deviation(t.estimator, phase, 1.0, factors, {.correct_bias = false})) {
+        for (const allan::Point& p : allan::deviation(t.estimator, phase, 1.0, factors, {.bias = allan::Bias::none})) {
             EXPECT_LE(distance(p.dev, test::oracle_variance(t.estimator, whole(x), p.m)), 1e-13)
                 << t.name << " m = " << p.m;
         }
@@ -105,7 +105,7 @@ TEST(AllanOracle, RealPhaseFarFromZeroKeepsItsDigits) {
     const allan::Phase phase = allan::phase_of(real, allan::Kind::phase, 1.0);
     for (const allan::Traits& t : allan::all_estimators) {
         const std::vector<std::int64_t> factors = {1, 7, 50};
-        for (const allan::Point& p : allan::deviation(t.estimator, phase, 1.0, factors, {.correct_bias = false})) {
+        for (const allan::Point& p : allan::deviation(t.estimator, phase, 1.0, factors, {.bias = allan::Bias::none})) {
             EXPECT_LE(distance(p.dev, test::oracle_variance(t.estimator, exact, p.m)), 1e-13)
                 << t.name << " m = " << p.m;
         }

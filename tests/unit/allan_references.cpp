@@ -17,9 +17,9 @@ using allan::Estimator;
 
 std::string printed(double value, int digits) { return fmt::format("{:.{}e}", value, digits); }
 
-allan::Point at(Estimator e, const allan::Phase& phase, std::int64_t m, bool correct_bias = true) {
+allan::Point at(Estimator e, const allan::Phase& phase, std::int64_t m, allan::Bias bias = allan::Bias::published) {
     const std::vector<std::int64_t> one = {m};
-    return allan::deviation(e, phase, 1.0, one, {.correct_bias = correct_bias}).at(0);
+    return allan::deviation(e, phase, 1.0, one, {.bias = bias}).at(0);
 }
 
 struct Value {
@@ -28,9 +28,9 @@ struct Value {
 };
 
 void expect_values(Estimator e, const allan::Phase& phase, const std::vector<Value>& values, int digits,
-                   bool correct_bias = true) {
+                   allan::Bias bias = allan::Bias::published) {
     for (const Value& v : values) {
-        EXPECT_EQ(printed(at(e, phase, v.m, correct_bias).dev, digits), v.dev) << allan::name(e) << ", m = " << v.m;
+        EXPECT_EQ(printed(at(e, phase, v.m, bias).dev, digits), v.dev) << allan::name(e) << ", m = " << v.m;
     }
 }
 
@@ -53,8 +53,8 @@ TEST(AllanReferences, TenPointsOfNbsMonograph140) {
     expect_values(Estimator::ttotdev, phase, {{1, "4.359112e+01"}, {2, "8.756794e+01"}}, 6);
     expect_values(Estimator::htotdev, phase, {{1, "7.080607e+01"}, {2, "9.116396e+01"}}, 6);
     // Without correction, from Stable32 1.60 (test data of allantools).
-    expect_values(Estimator::mtotdev, phase, {{1, "6.4509e+01"}, {2, "6.4794e+01"}}, 4, false);
-    expect_values(Estimator::ttotdev, phase, {{1, "3.7244e+01"}, {2, "7.4818e+01"}}, 4, false);
+    expect_values(Estimator::mtotdev, phase, {{1, "6.4509e+01"}, {2, "6.4794e+01"}}, 4, allan::Bias::none);
+    expect_values(Estimator::ttotdev, phase, {{1, "3.7244e+01"}, {2, "7.4818e+01"}}, 4, allan::Bias::none);
 }
 
 TEST(AllanReferences, ThousandFrequenciesOfSp1065) {
@@ -171,7 +171,7 @@ TEST(AllanReferences, PhaseDatAgreesWithStable32) {
                    {64, "2.3606e-02"},
                    {128, "1.6668e-02"},
                    {256, "5.9607e-03"}},
-                  4, false);
+                  4, allan::Bias::none);
     expect_values(Estimator::ttotdev, phase,
                   {{1, "1.1930e-01"},
                    {2, "1.6555e-01"},
@@ -182,7 +182,7 @@ TEST(AllanReferences, PhaseDatAgreesWithStable32) {
                    {64, "8.7227e-01"},
                    {128, "1.2318e+00"},
                    {256, "8.8101e-01"}},
-                  4, false);
+                  4, allan::Bias::none);
     expect_values(Estimator::mtie, phase,
                   {{1, "5.0597e-01"},
                    {3, "1.2984e+00"},
@@ -241,7 +241,7 @@ TEST(AllanReferences, TotalsWithBiasCorrectedAgreeWithStable32) {
                    {64, "3.3492e-02"},
                    {128, "2.8790e-02"},
                    {256, "1.4773e-02"}},
-                  4, false);
+                  4, allan::Bias::none);
 }
 
 // The terms that Stable32 counts.

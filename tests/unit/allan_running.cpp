@@ -30,8 +30,8 @@ Batch batch(const std::vector<long double>& x, const std::vector<int>& origin, s
     const std::int64_t stride = std::max<std::int64_t>(1, m / 8);
     for (std::int64_t i = 0; i + order * m < n; i += stride) {
         if (!origin.empty() && origin[i] != origin[i + order * m]) continue;
-        const long double z = order == 2 ? x[i + 2 * m] - 2 * x[i + m] + x[i]
-                                         : x[i + 3 * m] - 3 * x[i + 2 * m] + 3 * x[i + m] - x[i];
+        const long double z =
+            order == 2 ? x[i + 2 * m] - 2 * x[i + m] + x[i] : x[i + 3 * m] - 3 * x[i + 2 * m] + 3 * x[i + m] - x[i];
         if (std::isnan(z)) continue;
         out.variance += z * z;
         ++out.terms;
