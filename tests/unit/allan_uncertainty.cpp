@@ -101,7 +101,8 @@ TEST(QuadraticForm, BiasesAreNearThePublishedOnes) {
     }
 }
 
-// What short records stand for is there on long ones: nothing jumps where the one ends and the other begins.
+// What short records stand for is there on long ones: nothing jumps where the one ends and the other begins. An eighth
+// more tau is a fifth fewer degrees, and up to two fifths where few are left.
 TEST(Uncertainty, IsSmoothInTau) {
     for (const Estimator e : {Estimator::oadev, Estimator::mdev, Estimator::ohdev, Estimator::totdev,
                               Estimator::mtotdev, Estimator::htotdev}) {
@@ -114,7 +115,7 @@ TEST(Uncertainty, IsSmoothInTau) {
                 EXPECT_GT(u.high, 1.0);
                 if (before > 0.0) {
                     EXPECT_LT(u.edf, before * 1.02) << allan::name(e) << " alpha " << alpha << " m " << m;
-                    EXPECT_GT(u.edf, before * 0.75) << allan::name(e) << " alpha " << alpha << " m " << m;
+                    EXPECT_GT(u.edf, before * 0.6) << allan::name(e) << " alpha " << alpha << " m " << m;
                     EXPECT_NEAR(u.low, low_before, 0.2) << allan::name(e) << " alpha " << alpha << " m " << m;
                 }
                 before = u.edf;
