@@ -128,7 +128,7 @@ TEST(AllanSpectrum, MaximumIsAMaximum) {
                 const double there = best.theta[i] + factor * scale;
                 if (there < 0.0) continue;
                 Model frozen = all;
-                TermValues start = best.theta;
+                Parameters start = best.theta;
                 const Maximum other = likelihood.maximise(frozen, &start, i, there);
                 EXPECT_GE(other.deviance, best.deviance - 1e-4) << seed << " term " << i;
             }
