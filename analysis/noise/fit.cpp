@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -18,7 +19,7 @@
 namespace ringlock::noise {
 namespace {
 
-constexpr double one_sided_95 = 1.6448536269515;
+constexpr double one_sigma_below = 0.841344746068543;  // of a normal deviate below 1
 
 /// From a variance of the model to the coefficient: sqrt(theta) times this.
 double unit_factor(std::size_t term, double tau0_s) {
@@ -60,37 +61,39 @@ class Claims {
                 parts.markov.best.theta) {
         const Prices prices = prices_at(significance);
         best_ = fits_.best(prices);
-        arw_best_ = fits_.best(prices, Mask{1} << angle_random_walk);
+        arw_best_ = fits_.best(prices, arw_bit);
         for (Mask bit = 1; bit <= ramp_bit; bit <<= 1) {
             if ((best_ & bit) != 0 && fits_.evidence(bit) >= prices.of(bit)) claimed_ |= bit;
         }
-        model_ = fits_.best(prices_at(std::max(significance, doubtful)), claimed_);
+        const bool drifts = (claimed_ & drifting) != 0;
+        const Mask model = drifts ? fits_.all() : fits_.best(prices_at(std::max(significance, doubtful)), claimed_);
+        model_ = model_of(model);
+        estimate_ = restricted(model_, model);
     }
 
     /// The model that the values are of, at its maximum.
-    const Maximum& chosen() const { return fits_[model_]; }
+    const Maximum& estimate() const { return estimate_; }
 
     void describe(double tau0_s, NoiseFit& out) const {
         Model full = model_of(fits_.all());
-        full.restricted = true;
-        const Maximum full_restricted = likelihood_.maximise(full, &fits_[fits_.all()].theta);
+        const Maximum of_full = restricted(full, fits_.all());
         const std::array<Coefficient*, 4> coefficients = {&out.quantization_arcsec, &out.arw_deg_rt_h,
                                                           &out.bias_instability_deg_h, &out.rrw_deg_h_rt_h};
         for (std::size_t i = 0; i < coefficients.size(); ++i) {
             Coefficient& c = *coefficients[i];
             const double factor = unit_factor(i, tau0_s);
             c.resolved = claimed(Mask{1} << i);
-            if (i == flicker && c.resolved) c.resolved = has_floor(chosen(), likelihood_.samples());
+            if (i == flicker && c.resolved) c.resolved = has_floor(estimate(), likelihood_.samples());
             if (c.resolved) {
-                const Ends ends = central_interval(likelihood_, model_of(model_), chosen(), i);
-                c.value = factor * std::sqrt(chosen().theta[i]);
+                const Ends ends = central_interval(likelihood_, model_, estimate(), i);
+                c.value = factor * std::sqrt(estimate().theta[i]);
                 c.lo = factor * std::sqrt(ends.lo);
                 c.hi = factor * std::sqrt(ends.hi);
-            } else if (const auto limit = upper_limit(likelihood_, full, full_restricted, i)) {
+            } else if (const auto limit = upper_limit(likelihood_, full, of_full, i)) {
                 c.hi = factor * std::sqrt(*limit);
             }
         }
-        describe_ramp(3600.0 / tau0_s, out.rate_ramp_deg_h_h);
+        describe_ramp(of_full, 3600.0 / tau0_s, out.rate_ramp_deg_h_h);
         if (claimed(correlated_bit)) out.correlated = correlated_noise(tau0_s);
         for (std::size_t i = 0; i < parts_.lines.size(); ++i) {
             out.sinusoids.push_back(sinusoid(parts_.lines[i], parts_.evidence[i], tau0_s));
@@ -101,9 +104,19 @@ class Claims {
     }
 
    private:
-    /// A term too weak to be claimed still moves the others when it is left out, by as much as its own standard errors:
-    /// whatever this share of records without it would show at most is kept beside the claimed ones.
-    static constexpr double doubtful = 0.05;
+    /// A term too weak to be claimed still moves the others when it is left out, by as much as their standard errors.
+    /// Where the rate is noisy at low frequencies, where several terms vie for a few coefficients, values are of the
+    /// model that has them all. Elsewhere they are of what is claimed and of terms that this share of records without
+    /// them would show at most.
+    static constexpr double doubtful = 0.01;
+    static constexpr Mask arw_bit = Mask{1} << angle_random_walk;
+    static constexpr Mask angle_noise_bit = Mask{1} << quantisation;
+    static constexpr Mask drifting = Mask{1} << flicker | Mask{1} << rate_random_walk | correlated_bit;
+
+    Maximum restricted(Model& model, Mask mask) const {
+        model.restricted = true;
+        return likelihood_.maximise(model, &fits_[mask].theta);
+    }
 
     Prices prices_at(double significance) const {
         const boost::math::chi_squared one(1.0);
@@ -113,34 +126,39 @@ class Claims {
     }
     bool claimed(Mask bit) const {
         return (claimed_ & bit) != 0 &&
-               (bit == ramp_bit || chosen().theta[static_cast<std::size_t>(std::countr_zero(bit))] > 0.0);
+               (bit == ramp_bit || estimate().theta[static_cast<std::size_t>(std::countr_zero(bit))] > 0.0);
     }
 
-    void describe_ramp(double per_hour, Coefficient& ramp) const {
+    /// The ramp's variance is that of the slowest terms, known with few degrees of freedom.
+    static double ramp_error(const Maximum& fit, double probability) {
+        const boost::math::students_t t(fit.ramp_degrees);
+        return boost::math::quantile(t, probability) * std::sqrt(fit.ramp_variance);
+    }
+    void describe_ramp(const Maximum& of_full, double per_hour, Coefficient& ramp) const {
         ramp.resolved = claimed(ramp_bit);
+        const Maximum& fit = ramp.resolved ? estimate_ : of_full;
+        const double value = per_hour * std::abs(fit.ramp);
         if (ramp.resolved) {
-            const double spread = per_hour * std::sqrt(chosen().ramp_variance);
-            ramp.value = per_hour * std::abs(chosen().ramp);
-            ramp.lo = std::max(0.0, *ramp.value - spread);
-            ramp.hi = *ramp.value + spread;
+            const double spread = per_hour * ramp_error(fit, one_sigma_below);
+            ramp.value = value;
+            ramp.lo = std::max(0.0, value - spread);
+            ramp.hi = value + spread;
         } else {
-            const Maximum& full = fits_[fits_.all()];
-            ramp.hi = per_hour * (std::abs(full.ramp) + one_sided_95 * std::sqrt(full.ramp_variance));
+            ramp.hi = value + per_hour * ramp_error(fit, 0.95);
         }
     }
 
     Correlated correlated_noise(double tau0_s) const {
         Correlated out;
-        const Model model = model_of(model_);
-        const Ends time = central_interval(likelihood_, model, chosen(), log_time);
-        out.correlation_time_s = {tau0_s * std::exp(chosen().theta[log_time]), tau0_s * std::exp(time.lo),
+        const Ends time = central_interval(likelihood_, model_, estimate(), log_time);
+        out.correlation_time_s = {tau0_s * std::exp(estimate().theta[log_time]), tau0_s * std::exp(time.lo),
                                   tau0_s * std::exp(time.hi)};
-        const double variance = chosen().theta[correlated];
-        const Ends ends = central_interval(likelihood_, model, chosen(), correlated);
+        const double variance = estimate().theta[correlated];
+        const Ends ends = central_interval(likelihood_, model_, estimate(), correlated);
         out.rms_rate_deg_h = {std::sqrt(variance), std::sqrt(ends.lo), std::sqrt(ends.hi)};
         // q_c^2 = 2 variance/T_c; (deg/h)/sqrt(s) to (deg/h)/sqrt(h) is a factor of 60
         const double q = 60.0 * std::sqrt(2.0 * variance / out.correlation_time_s.value);
-        const auto& c = chosen().covariance;
+        const auto& c = estimate().covariance;
         const double spread =
             0.5 * std::sqrt(std::max(0.0, c[correlated][correlated] / (variance * variance) -
                                               2.0 * c[correlated][log_time] / variance + c[log_time][log_time]));
@@ -164,8 +182,6 @@ class Claims {
     }
 
     Pooling pooling(double tau0_s) const {
-        constexpr Mask arw_bit = Mask{1} << angle_random_walk;
-        constexpr Mask angle_noise_bit = Mask{1} << quantisation;
         const auto arw_of = [&](Mask mask) {
             return unit_factor(angle_random_walk, tau0_s) * std::sqrt(fits_[mask].theta[angle_random_walk]);
         };
@@ -185,7 +201,8 @@ class Claims {
     Mask best_ = 0;      ///< subset of least deviance plus prices
     Mask arw_best_ = 0;  ///< the same of those with angle random walk
     Mask claimed_ = 0;
-    Mask model_ = 0;  ///< what the values are estimated with
+    Model model_;  ///< what the values are estimated with; restricted, for a ramp takes a degree of freedom of few
+    Maximum estimate_;
 };
 
 std::vector<double> increments(std::span<const double> angle, double& largest) {
@@ -255,7 +272,7 @@ NoiseFit fit_noise(std::span<const double> angle_arcsec, double tau0_s, const Op
     const Likelihood likelihood(parts.noise);
     const Claims claims(likelihood, parts, options.significance);
     claims.describe(tau0_s, out);
-    out.goodness = goodness_of_fit(parts.noise, claims.chosen(), parts.lines, tau0_s, options.misfit_threshold);
+    out.goodness = goodness_of_fit(parts.noise, claims.estimate(), parts.lines, tau0_s, options.misfit_threshold);
     out.described = out.goodness.accepted;
     out.reason = out.goodness.reason;
     return out;

@@ -61,6 +61,7 @@ struct Likelihood::State {
     Matrix curvature = Matrix::Zero();  ///< its expectation: twice the Fisher information
     double ramp = 0.0;
     double ramp_variance = 0.0;
+    Vector ramp_information_slope = Vector::Zero();
     std::array<double, 2> corner{};
 };
 
@@ -135,10 +136,10 @@ Likelihood::State Likelihood::evaluate(const Parameters& theta, const Model& mod
         denominator[quantisation] += uu[p];
         s.gradient += k[p] * denominator + q * c * c * k[p] * k[p] * denominator - 2.0 * q * k[p] * c * duz[p];
         s.gradient[quantisation] -= k[p] * c * c;
-        if (p == 1 && restricted) {
-            Vector change = ddd + q * k[1] * k[1] * du * du * denominator - 2.0 * q * k[1] * du * ddu;
-            change[quantisation] -= k[1] * du * du;
-            s.gradient += change / information;
+        if (p == 1 && information > 0.0) {
+            s.ramp_information_slope = ddd + q * k[1] * k[1] * du * du * denominator - 2.0 * q * k[1] * du * ddu;
+            s.ramp_information_slope[quantisation] -= k[1] * du * du;
+            if (restricted) s.gradient += s.ramp_information_slope / information;
         }
     }
     return s;
@@ -245,6 +246,18 @@ Maximum Likelihood::maximise(const Model& model, const Parameters* start, std::s
                 inverse(a, b) * scale(a) * scale(b);
         }
     }
+    // V = 1/information: 2 V^2 over the variance of V
+    double variance = 0.0;
+    for (Eigen::Index a = 0; a < count; ++a) {
+        for (Eigen::Index b = 0; b < count; ++b) {
+            const auto i = static_cast<std::size_t>(inside[static_cast<std::size_t>(a)]);
+            const auto k = static_cast<std::size_t>(inside[static_cast<std::size_t>(b)]);
+            variance += out.covariance[i][k] * state.ramp_information_slope[static_cast<Eigen::Index>(i)] *
+                        state.ramp_information_slope[static_cast<Eigen::Index>(k)];
+        }
+    }
+    const double relative_variance = variance * out.ramp_variance * out.ramp_variance;
+    if (relative_variance > 2e-9) out.ramp_degrees = 2.0 / relative_variance;
     return out;
 }
 

@@ -21,9 +21,10 @@ using Parameters = std::array<double, parameter_count>;
 /// A model at the maximum of its likelihood.
 struct Maximum {
     Parameters theta{};
-    double ramp = 0.0;                                     ///< rate gained per sample
-    double ramp_variance = 0.0;                            ///< of that, under this model
-    double deviance = 0.0;                                 ///< -2 ln L up to a constant of the record
+    double ramp = 0.0;           ///< rate gained per sample
+    double ramp_variance = 0.0;  ///< of that, under this model
+    double ramp_degrees = 1e9;   ///< degrees of freedom that this variance rests on (Satterthwaite)
+    double deviance = 0.0;       ///< -2 ln L up to a constant of the record
     std::array<Parameters, parameter_count> covariance{};  ///< of theta, inverse Fisher information
     std::array<double, 2> corner{};                        ///< expected end errors, even and odd coefficients
 };
