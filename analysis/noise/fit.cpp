@@ -57,7 +57,7 @@ class Claims {
     Claims(const Likelihood& likelihood, const Decomposition& parts, double significance)
         : likelihood_(likelihood),
           parts_(parts),
-          fits_(likelihood, parts.markov.supported ? five_terms | correlated_bit : five_terms,
+          fits_(likelihood, parts.markov.supported(significance) ? five_terms | correlated_bit : five_terms,
                 parts.markov.best.theta) {
         const Prices prices = prices_at(significance);
         best_ = fits_.best(prices);
@@ -122,7 +122,7 @@ class Claims {
         const boost::math::chi_squared one(1.0);
         return {.variance = boost::math::quantile(boost::math::complement(one, 2.0 * significance)),
                 .ramp = boost::math::quantile(boost::math::complement(one, significance)),
-                .correlated = parts_.markov.price};
+                .correlated = parts_.markov.price(significance)};
     }
     bool claimed(Mask bit) const {
         return (claimed_ & bit) != 0 &&

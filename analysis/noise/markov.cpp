@@ -8,21 +8,6 @@
 namespace ringlock::noise {
 namespace {
 
-/// c^2 with P(z > c) + length/(2 pi) exp(-c^2/2) = significance.
-double price_of_search(double length, double significance) {
-    const auto exceeds = [&](double c) {
-        return 0.5 * std::erfc(c * std::numbers::sqrt2 / 2.0) +
-               0.5 * length / std::numbers::pi * std::exp(-0.5 * c * c);
-    };
-    double lo = 0.0;
-    double hi = 40.0;
-    for (int i = 0; i < 60; ++i) {
-        const double middle = 0.5 * (lo + hi);
-        (exceeds(middle) > significance ? lo : hi) = middle;
-    }
-    return hi * hi;
-}
-
 struct Score {
     double log_time = 0.0;
     double z = 0.0;         ///< standard normal without correlated noise
@@ -82,16 +67,28 @@ std::vector<Score> scores(const Likelihood& likelihood, const Maximum& five, dou
 
 }  // namespace
 
-Markov find_markov(const Likelihood& likelihood, const Maximum& five, double significance) {
+double Markov::price(double significance) const {
+    const auto exceeds = [&](double c) {
+        return 0.5 * std::erfc(c / std::numbers::sqrt2) + 0.5 * path_length / std::numbers::pi * std::exp(-0.5 * c * c);
+    };
+    double lo = 0.0;
+    double hi = 40.0;
+    for (int i = 0; i < 60; ++i) {
+        const double middle = 0.5 * (lo + hi);
+        (exceeds(middle) > significance ? lo : hi) = middle;
+    }
+    return hi * hi;
+}
+
+Markov find_markov(const Likelihood& likelihood, const Maximum& five) {
+    // Where no score comes near what this share of records reach, the deviance will not either.
+    constexpr double worth_a_look = 0.3;
     Markov out;
+    out.best = five;
     const LogTimes range = log_times(likelihood.samples());
     if (!(range.hi > range.lo) || !std::isfinite(five.deviance)) return out;
-    double path_length = 0.0;
-    const std::vector<Score> along = scores(likelihood, five, path_length);
-    out.price = price_of_search(path_length, significance);
-    // Where no score comes near, the deviance will not either.
-    const double least = 0.5 * std::sqrt(out.price);
-    out.best = five;
+    const std::vector<Score> along = scores(likelihood, five, out.path_length);
+    const double least = std::sqrt(out.price(worth_a_look));
     for (std::size_t k = 0; k < along.size(); ++k) {
         const double z = along[k].z;
         const bool peak = (k == 0 || along[k - 1].z < z) && (k + 1 == along.size() || along[k + 1].z <= z);
@@ -103,8 +100,7 @@ Markov find_markov(const Likelihood& likelihood, const Maximum& five, double sig
         if (there.deviance < out.best.deviance) out.best = there;
     }
     const double time = out.best.theta[log_time];
-    const bool inside = time > range.lo + 1e-3 && time < range.hi - 1e-3;
-    out.supported = inside && five.deviance - out.best.deviance >= out.price;
+    if (time > range.lo + 1e-3 && time < range.hi - 1e-3) out.evidence = five.deviance - out.best.deviance;
     return out;
 }
 
