@@ -8,10 +8,11 @@ namespace ringlock::noise {
 
 /// A record parted into sinusoids and noise.
 struct Decomposition {
-    Spectrum noise;                ///< without the sinusoids
-    std::vector<Line> lines;       ///< those that the terms of noise cannot take the place of, in order of frequency
-    std::vector<double> evidence;  ///< of each line: by how much it lowered the deviance, everything else free
-    Maximum five;                  ///< maximum of the five terms
+    Spectrum noise;           ///< without the sinusoids
+    std::vector<Line> lines;  ///< those that the terms of noise cannot take the place of
+    std::vector<double>
+        evidence;  ///< of each line: by how much it lowered the deviance when it was found, all else free
+    Maximum five;  ///< maximum of the five terms
     Markov markov;
 };
 

@@ -65,8 +65,11 @@ class Claims {
         for (Mask bit = 1; bit <= ramp_bit; bit <<= 1) {
             if ((best_ & bit) != 0 && fits_.evidence(bit) >= prices.of(bit)) claimed_ |= bit;
         }
+        // A term too weak to be claimed still moves the others when it is left out, by as much as their standard
+        // errors, where several terms vie for a few coefficients at low frequencies: values of such records are of all
+        // terms.
         const bool drifts = (claimed_ & drifting) != 0;
-        const Mask model = drifts ? fits_.all() : fits_.best(prices_at(std::max(significance, doubtful)), claimed_);
+        const Mask model = drifts ? fits_.all() : best_;
         model_ = model_of(model);
         estimate_ = restricted(model_, model);
     }
@@ -104,11 +107,6 @@ class Claims {
     }
 
    private:
-    /// A term too weak to be claimed still moves the others when it is left out, by as much as their standard errors.
-    /// Where the rate is noisy at low frequencies, where several terms vie for a few coefficients, values are of the
-    /// model that has them all. Elsewhere they are of what is claimed and of terms that this share of records without
-    /// them would show at most.
-    static constexpr double doubtful = 0.01;
     static constexpr Mask arw_bit = Mask{1} << angle_random_walk;
     static constexpr Mask angle_noise_bit = Mask{1} << quantisation;
     static constexpr Mask drifting = Mask{1} << flicker | Mask{1} << rate_random_walk | correlated_bit;

@@ -28,7 +28,7 @@ struct Estimate {
 struct Sinusoid {
     Estimate frequency_hz;          ///< f_0, as sampled: one above half the sampling rate appears folded below it
     Estimate rate_amplitude_deg_h;  ///< Omega_0 of the rate itself, before it was averaged over tau0
-    double evidence = 0.0;          ///< rise of the deviance without it, everything else free
+    double evidence = 0.0;          ///< fall of the deviance when it was found, all else free
 };
 
 /// Exponentially correlated rate: covariance rms^2 exp(-|t|/T_c), spectrum (q_c T_c)^2/(1 + (2 pi f T_c)^2).
