@@ -21,10 +21,12 @@ class Variance {
         for (std::size_t i = 0; i < b.shape.size(); ++i) v += theta_[i] * b.shape[i];
         return v;
     }
-    Vector derivatives(const Bin& b) const {
-        Vector g = Vector::Zero();
+    /// By the first `count` parameters: all of them, or those before `correlated`.
+    template <int count>
+    Eigen::Matrix<double, count, 1> derivatives(const Bin& b) const {
+        Eigen::Matrix<double, count, 1> g;
         std::copy(b.shape.begin(), b.shape.end(), g.data());
-        if (correlated_) {
+        if constexpr (count > correlated) {
             const CorrelatedShape::Value there = shape_(b.sin2);
             g[correlated] = there.shape;
             g[log_time] = theta_[correlated] * there.slope;
@@ -37,6 +39,48 @@ class Variance {
     bool correlated_;
     CorrelatedShape shape_;
 };
+
+/// Derivatives of the sums over bins that make up the deviance, by the parameters.
+struct DerivativeSums {
+    Vector gradient = Vector::Zero();
+    Matrix curvature = Matrix::Zero();
+    std::array<Vector, 2> uu = {Vector::Zero(), Vector::Zero()};
+    std::array<Vector, 2> uz = {Vector::Zero(), Vector::Zero()};
+    Vector dd = Vector::Zero();
+    Vector du = Vector::Zero();
+};
+
+template <int count>
+DerivativeSums derivative_sums(const std::vector<Bin>& bins, const Variance& variance, double ramp) {
+    using Part = Eigen::Matrix<double, count, 1>;
+    Part gradient = Part::Zero(), dd = Part::Zero(), du = Part::Zero();
+    Eigen::Matrix<double, count, count> curvature = Eigen::Matrix<double, count, count>::Zero();
+    std::array<Part, 2> uu = {Part::Zero(), Part::Zero()};
+    std::array<Part, 2> uz = {Part::Zero(), Part::Zero()};
+    for (const Bin& b : bins) {
+        const Part g = variance.derivatives<count>(b);
+        const double w = 1.0 / variance(b);
+        const Part gw2 = w * w * g;
+        gradient += b.count * w * g - (b.power + ramp * (ramp * b.ramp2 - 2.0 * b.ramp_data)) * gw2;
+        curvature += b.count * (gw2 * g.transpose());
+        dd -= b.ramp2 * gw2;
+        du -= b.ramp_corner * gw2;
+        for (std::size_t p = 0; p < 2; ++p) {
+            uu[p] -= b.corner2[p] * gw2;
+            uz[p] -= (b.corner_data[p] - (p == 1 ? ramp * b.ramp_corner : 0.0)) * gw2;
+        }
+    }
+    DerivativeSums out;
+    out.gradient.template head<count>() = gradient;
+    out.curvature.template topLeftCorner<count, count>() = curvature;
+    out.dd.template head<count>() = dd;
+    out.du.template head<count>() = du;
+    for (std::size_t p = 0; p < 2; ++p) {
+        out.uu[p].template head<count>() = uu[p];
+        out.uz[p].template head<count>() = uz[p];
+    }
+    return out;
+}
 
 /// The parameters that a step may move: those of the model but for a variance that is zero and would rather be less.
 /// A correlation time has a meaning where there is something correlated only.
@@ -112,32 +156,19 @@ Likelihood::State Likelihood::evaluate(const Parameters& theta, const Model& mod
     if (!derivatives) return s;
 
     // By the envelope theorem the ramp may be held while the variances move.
-    std::array<Vector, 2> duu = {Vector::Zero(), Vector::Zero()};
-    std::array<Vector, 2> duz = {Vector::Zero(), Vector::Zero()};
-    Vector ddd = Vector::Zero();
-    Vector ddu = Vector::Zero();
-    for (const Bin& b : bins_) {
-        const Vector g = variance.derivatives(b);
-        const double w = 1.0 / variance(b);
-        const double w2 = w * w;
-        const double residual_power = b.power + r * (r * b.ramp2 - 2.0 * b.ramp_data);
-        s.gradient += (b.count * w - residual_power * w2) * g;
-        s.curvature += b.count * w2 * (g * g.transpose());
-        ddd -= b.ramp2 * w2 * g;
-        ddu -= b.ramp_corner * w2 * g;
-        for (std::size_t p = 0; p < 2; ++p) {
-            duu[p] -= b.corner2[p] * w2 * g;
-            duz[p] -= (b.corner_data[p] - (p == 1 ? r * b.ramp_corner : 0.0)) * w2 * g;
-        }
-    }
+    const DerivativeSums sums = model.has[correlated] ? derivative_sums<parameter_count>(bins_, variance, r)
+                                                      : derivative_sums<correlated>(bins_, variance, r);
+    s.gradient = sums.gradient;
+    s.curvature = sums.curvature;
     for (std::size_t p = 0; p < 2; ++p) {
         const double c = uz[p];
-        Vector denominator = q * duu[p];  // derivative of 1 + q uu
+        Vector denominator = q * sums.uu[p];  // derivative of 1 + q uu
         denominator[quantisation] += uu[p];
-        s.gradient += k[p] * denominator + q * c * c * k[p] * k[p] * denominator - 2.0 * q * k[p] * c * duz[p];
+        s.gradient += k[p] * denominator + q * c * c * k[p] * k[p] * denominator - 2.0 * q * k[p] * c * sums.uz[p];
         s.gradient[quantisation] -= k[p] * c * c;
         if (p == 1 && information > 0.0) {
-            s.ramp_information_slope = ddd + q * k[1] * k[1] * du * du * denominator - 2.0 * q * k[1] * du * ddu;
+            s.ramp_information_slope =
+                sums.dd + q * k[1] * k[1] * du * du * denominator - 2.0 * q * k[1] * du * sums.du;
             s.ramp_information_slope[quantisation] -= k[1] * du * du;
             if (restricted) s.gradient += s.ramp_information_slope / information;
         }
@@ -192,6 +223,7 @@ Maximum Likelihood::maximise(const Model& model, const Parameters* start, std::s
         Eigen::MatrixXd scaled = scale.asDiagonal() * h * scale.asDiagonal();
         scaled.diagonal().array() += 1e-12;
         const Eigen::VectorXd step = -(scale.asDiagonal() * scaled.ldlt().solve(scale.asDiagonal() * g)).eval();
+        if (-0.5 * g.dot(step) < enough) break;
         double length = 1.0;
         bool moved = false;
         double gain = 0.0;
