@@ -117,7 +117,7 @@ TEST_F(AllanCommand, WithholdsCoefficientsThatDoNotDescribeTheRecord) {
         for (std::size_t i = 0; i < angle.size(); ++i) angle[i] += 0.3 * std::sin(turn * static_cast<double>(i));
     }
     const auto json = nlohmann::json::parse(run(write(angle) + " --rate 1 --kind phase --unit arcsec --json").out);
-    EXPECT_THAT(json["noise_withheld"].get<std::string>(), HasSubstr("line at 0.06366"));
+    EXPECT_THAT(json["noise_withheld"].get<std::string>(), HasSubstr("line at 0.0636"));
     for (const auto& [key, value] : json["noise"].items()) EXPECT_TRUE(value.is_null()) << key;
     EXPECT_EQ(json["noise"].size(), 5u);
 }
