@@ -183,4 +183,31 @@ TEST(AllanSpectrum, MaximumIsAMaximum) {
     }
 }
 
+// The same with correlated noise and its time; a wrong derivative by the time would end elsewhere.
+TEST(AllanSpectrum, MaximumWithCorrelatedNoiseIsAMaximum) {
+    for (const std::uint64_t seed : {1, 2, 3, 4}) {
+        const test::Truth truth{.q = 0.2, .n = 0.2, .correlated_rms = 0.2, .correlation_time_s = 15.0};
+        const auto angle = test::simulate_angle(truth, 4000, 1.0, seed);
+        std::vector<double> rate(4000);
+        for (std::size_t i = 0; i < 4000; ++i) rate[i] = angle[i + 1] - angle[i];
+        const Spectrum s = cosine_spectrum(rate);
+        const Likelihood likelihood(s);
+        Model model;
+        model.has = {true, true, false, false, true};
+        model.ramp = true;
+        model.restricted = seed % 2 == 0;
+        Parameters start{0.04, 0.04, 0.0, 0.0, 0.04, std::log(5.0)};
+        const Maximum best = likelihood.maximise(model, &start);
+        EXPECT_NEAR(best.theta[log_time], std::log(15.0), 0.8) << seed;
+        for (const std::size_t i :
+             {std::size_t{quantisation}, std::size_t{angle_random_walk}, std::size_t{correlated}, log_time}) {
+            for (const double step : {-0.02, 0.02}) {
+                const double there = i == log_time ? best.theta[i] + step : best.theta[i] * (1.0 + step);
+                const Maximum other = likelihood.maximise(model, &best.theta, i, there);
+                EXPECT_GE(other.deviance, best.deviance - 1e-4) << seed << " parameter " << i;
+            }
+        }
+    }
+}
+
 }  // namespace
