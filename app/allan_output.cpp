@@ -14,6 +14,26 @@ using Json = nlohmann::ordered_json;
 
 Json number(double v) { return std::isfinite(v) ? Json(v) : Json(nullptr); }
 Json number(const std::optional<double>& v) { return v ? number(*v) : Json(nullptr); }
+Json estimate(const noise::Estimate& e) {
+    return {{"value", number(e.value)}, {"lo", number(e.lo)}, {"hi", number(e.hi)}};
+}
+
+Json correlated(const noise::NoiseFit& fit) {
+    if (!fit.described || !fit.correlated) return nullptr;
+    return {{"correlation_time_s", estimate(fit.correlated->correlation_time_s)},
+            {"amplitude_deg_h_rt_h", estimate(fit.correlated->amplitude_deg_h_rt_h)},
+            {"rms_rate_deg_h", estimate(fit.correlated->rms_rate_deg_h)}};
+}
+
+Json sinusoids(const noise::NoiseFit& fit) {
+    Json list = Json::array();
+    if (!fit.described) return list;
+    for (const noise::Sinusoid& line : fit.sinusoids) {
+        list.push_back({{"frequency_hz", estimate(line.frequency_hz)},
+                        {"rate_amplitude_deg_h", estimate(line.rate_amplitude_deg_h)}});
+    }
+    return list;
+}
 
 struct Line {
     std::string_view key;
@@ -91,6 +111,8 @@ std::string allan_json(const AllanOutput& out) {
                 shown ? Json({{"value", number(c.value)}, {"lo", number(c.lo)}, {"hi", number(c.hi)}}) : Json(nullptr);
             limits[line.key] = out.noise->described && !c.resolved ? number(c.hi) : Json(nullptr);
         }
+        noise["correlated"] = correlated(*out.noise);
+        noise["sinusoidal"] = sinusoids(*out.noise);
         json["noise"] = std::move(noise);
         json["noise_upper_limits_95"] = std::move(limits);
         json["noise_fitted_points"] = out.noise_stretch ? Json(*out.noise_stretch) : Json(nullptr);
@@ -150,6 +172,18 @@ std::string allan_text(const AllanOutput& out) {
         } else {
             text += fmt::format("  {:<20} not resolved\n", line.name);
         }
+    }
+    const auto add = [&](const std::string& name, const noise::Estimate& e, const char* unit) {
+        text += fmt::format("  {:<20} {:>11.5g}  ({:.5g} to {:.5g}) {}\n", name, e.value, e.lo, e.hi, unit);
+    };
+    if (out.noise->correlated) {
+        add("correlated noise q_c", out.noise->correlated->amplitude_deg_h_rt_h, "(deg/h)/sqrt(h)");
+        add("  correlation time", out.noise->correlated->correlation_time_s, "s");
+        add("  rms rate", out.noise->correlated->rms_rate_deg_h, "deg/h");
+    }
+    for (const noise::Sinusoid& line : out.noise->sinusoids) {
+        add("sinusoidal rate", line.rate_amplitude_deg_h, "deg/h");
+        add("  frequency", line.frequency_hz, "Hz");
     }
     return text;
 }

@@ -166,6 +166,13 @@ WeightedSquares::WeightedSquares(std::vector<Share> shares) : shares_(std::move(
         squares += s.count * s.weight * s.weight;
     }
     degrees_ = 1.0 / squares;
+    std::sort(shares_.begin(), shares_.end(), [](const Share& a, const Share& b) { return a.weight < b.weight; });
+    double sum = 0.0;
+    for (const Share& s : shares_) {
+        sum += s.count * s.weight;
+        common_weight_ = s.weight;
+        if (sum >= 0.2) break;
+    }
 }
 
 double WeightedSquares::saddle_point(double x) const {
@@ -188,7 +195,6 @@ WeightedSquares::Cumulants WeightedSquares::cumulants(double t) const {
         const double share = weight / (1.0 - 2.0 * weight * t);
         k.first += count * share;
         k.second += 2.0 * count * share * share;
-        k.third += 8.0 * count * share * share * share;
     }
     return k;
 }
@@ -200,7 +206,7 @@ double WeightedSquares::probability_below(double x) const {
     if (std::abs(t) < nearest) t = -nearest;
     const Cumulants k = cumulants(t);
     const double step = 0.1 / std::sqrt(k.second);
-    const double bend = k.third / (6.0 * k.second);
+    const double bend = 2.0 / 3.0 * common_weight_ / (1.0 - 2.0 * common_weight_ * t);
     // Trapezoids; the path is a mirror image of itself below the real axis.
     double sum = 0.0;
     double largest = 0.0;

@@ -4,104 +4,22 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "analysis/noise/decomposition.hpp"
+#include "analysis/noise/interval.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::noise {
 namespace {
 
-constexpr std::size_t mask_count = std::size_t{1} << (term_count + 1);  // bit term_count: the ramp
-constexpr std::size_t ramp_bit = std::size_t{1} << term_count;
-constexpr std::size_t full_mask = mask_count - 1;
-constexpr double one_sided_95 = 1.6448536269515;
-
-Model model_of(std::size_t mask) {
-    Model m;
-    for (std::size_t i = 0; i < term_count; ++i) m.has[i] = ((mask >> i) & 1u) != 0;
-    m.ramp = (mask & ramp_bit) != 0;
-    return m;
-}
-
-/// All subsets of the terms at their maxima.
-class Subsets {
-   public:
-    explicit Subsets(const Likelihood& likelihood) : likelihood_(likelihood) {
-        for (std::size_t mask = 1; mask < mask_count; ++mask) {
-            if ((mask & ~ramp_bit) == 0) continue;
-            fits_[mask] = likelihood.maximise(model_of(mask));
-            // A model is never worse than one of its parts; where the search stopped early, go on from the best part.
-            for (std::size_t bit = 1; bit < mask_count; bit <<= 1) {
-                const std::size_t part = mask & ~bit;
-                if ((mask & bit) == 0 || (part & ~ramp_bit) == 0) continue;
-                if (fits_[part].deviance < fits_[mask].deviance - 1e-6) restart(mask, part);
-            }
-        }
-    }
-    const Maximum& operator[](std::size_t mask) const { return fits_[mask]; }
-
-   private:
-    void restart(std::size_t mask, std::size_t part) {
-        const TermValues start = fits_[part].theta;
-        Maximum again = likelihood_.maximise(model_of(mask), &start);
-        if (again.deviance < fits_[mask].deviance) fits_[mask] = again;
-    }
-
-    const Likelihood& likelihood_;
-    std::array<Maximum, mask_count> fits_{};
-};
-
-/// Rise of the deviance at a one-sided 95 % upper limit of a variance known with k degrees of freedom: k chi-squared
-/// ordinates of sum w have deviance w - k - k ln(w/k), and w lies below its 5 % point once in twenty. 2.71 for large
-/// k, 4.54 for one.
-double limit_deviance(double k) {
-    k = std::clamp(k, 1.0, 1e4);
-    const double w = boost::math::quantile(boost::math::chi_squared(k), 0.05);
-    return w - k - k * std::log(w / k);
-}
-
-/// Value of theta[term] at which the deviance, all other terms free, has risen to a one-sided 95 % limit.
-std::optional<double> upper_limit(const Likelihood& likelihood, const Maximum& full, std::size_t term) {
-    Model model = model_of(full_mask);
-    model.restricted = true;
-    TermValues start = full.theta;
-    const auto rise = [&](double value) {
-        const Maximum there = likelihood.maximise(model, &start, term, value);
-        const double degrees = 2.0 * value * value / there.covariance[term][term];
-        return there.deviance - full.deviance - limit_deviance(std::isfinite(degrees) ? degrees : 1.0);
-    };
-    double inside = full.theta[term];
-    const double spread = std::sqrt(full.covariance[term][term]);
-    double outside = inside + 2.0 * spread;
-    if (!(outside > inside)) {
-        // On the boundary: begin from a share of what the term alone would have.
-        Model alone;
-        alone.has[term] = true;
-        outside = 1e-6 * likelihood.maximise(alone).theta[term];
-        if (!(outside > 0.0)) return std::nullopt;
-    }
-    double rise_inside = -limit_deviance(1e4);
-    double rise_outside = rise(outside);
-    for (int doubling = 0; rise_outside < 0.0; ++doubling) {
-        if (doubling == 60) return std::nullopt;
-        inside = outside;
-        rise_inside = rise_outside;
-        outside *= 4.0;
-        rise_outside = rise(outside);
-    }
-    for (int i = 0; i < 40 && outside - inside > 0.005 * outside && rise_outside > 0.01; ++i) {
-        const double share = std::clamp(rise_inside / (rise_inside - rise_outside), 0.1, 0.9);
-        const double middle = inside + share * (outside - inside);
-        const double r = rise(middle);
-        (r < 0.0 ? inside : outside) = middle;
-        (r < 0.0 ? rise_inside : rise_outside) = r;
-    }
-    return outside;
-}
+constexpr double one_sigma_below = 0.841344746068543;  // of a normal deviate below 1
 
 /// From a variance of the model to the coefficient: sqrt(theta) times this.
 double unit_factor(std::size_t term, double tau0_s) {
@@ -118,15 +36,172 @@ double unit_factor(std::size_t term, double tau0_s) {
 }
 
 /// Whether flicker is the largest part of the Allan variance somewhere between tau0 and a quarter of the record.
-bool has_floor(const TermValues& theta, double ramp, std::size_t samples) {
+bool has_floor(const Maximum& fit, std::size_t samples) {
+    const Parameters& theta = fit.theta;
     const double floor = 2.0 * std::numbers::ln2 / std::numbers::pi * theta[flicker];
+    const double time = std::exp(theta[log_time]);
     for (double m = 1.0; m <= 0.25 * static_cast<double>(samples); m *= 1.05) {
+        // correlated noise: IEEE Std 952, annex C, with (q_c T_c)^2 = 2 T_c times its variance
+        const double decays = 3.0 - 4.0 * std::exp(-m / time) + std::exp(-2.0 * m / time);
         const double others = 3.0 * theta[quantisation] / (m * m) + theta[angle_random_walk] / m +
-                              theta[rate_random_walk] * m / 3.0 + 0.5 * ramp * ramp * m * m;
+                              theta[rate_random_walk] * m / 3.0 + 0.5 * fit.ramp * fit.ramp * m * m +
+                              2.0 * theta[correlated] * time / m * (1.0 - 0.5 * time / m * decays);
         if (floor >= others) return true;
     }
     return false;
 }
+
+/// What of the parts of a record is claimed, and how well it is known.
+class Claims {
+   public:
+    Claims(const Likelihood& likelihood, const Decomposition& parts, double significance)
+        : likelihood_(likelihood),
+          parts_(parts),
+          fits_(likelihood, parts.markov.supported(significance) ? five_terms | correlated_bit : five_terms,
+                parts.markov.best.theta) {
+        const Prices prices = prices_at(significance);
+        best_ = fits_.best(prices);
+        arw_best_ = fits_.best(prices, arw_bit);
+        for (Mask bit = 1; bit <= ramp_bit; bit <<= 1) {
+            if ((best_ & bit) != 0 && fits_.evidence(bit) >= prices.of(bit)) claimed_ |= bit;
+        }
+        // A term too weak to be claimed still moves the others when it is left out, by as much as their standard
+        // errors, where several terms vie for a few coefficients at low frequencies: values of such records are of all
+        // terms.
+        const bool drifts = (claimed_ & drifting) != 0;
+        const Mask model = drifts ? fits_.all() : best_;
+        model_ = model_of(model);
+        estimate_ = restricted(model_, model);
+    }
+
+    /// The model that the values are of, at its maximum.
+    const Maximum& estimate() const { return estimate_; }
+
+    void describe(double tau0_s, NoiseFit& out) const {
+        Model full = model_of(fits_.all());
+        const Maximum of_full = restricted(full, fits_.all());
+        const std::array<Coefficient*, 4> coefficients = {&out.quantization_arcsec, &out.arw_deg_rt_h,
+                                                          &out.bias_instability_deg_h, &out.rrw_deg_h_rt_h};
+        for (std::size_t i = 0; i < coefficients.size(); ++i) {
+            Coefficient& c = *coefficients[i];
+            const double factor = unit_factor(i, tau0_s);
+            c.resolved = claimed(Mask{1} << i);
+            if (i == flicker && c.resolved) c.resolved = has_floor(estimate(), likelihood_.samples());
+            if (c.resolved) {
+                const Ends ends = central_interval(likelihood_, model_, estimate(), i);
+                c.value = factor * std::sqrt(estimate().theta[i]);
+                c.lo = factor * std::sqrt(ends.lo);
+                c.hi = factor * std::sqrt(ends.hi);
+            } else if (const auto limit = upper_limit(likelihood_, full, of_full, i)) {
+                c.hi = factor * std::sqrt(*limit);
+            }
+        }
+        describe_ramp(of_full, 3600.0 / tau0_s, out.rate_ramp_deg_h_h);
+        if (claimed(correlated_bit)) out.correlated = correlated_noise(tau0_s);
+        for (std::size_t i = 0; i < parts_.lines.size(); ++i) {
+            out.sinusoids.push_back(sinusoid(parts_.lines[i], parts_.evidence[i], tau0_s));
+        }
+        std::sort(out.sinusoids.begin(), out.sinusoids.end(),
+                  [](const Sinusoid& a, const Sinusoid& b) { return a.frequency_hz.value < b.frequency_hz.value; });
+        out.pooling = pooling(tau0_s);
+    }
+
+   private:
+    static constexpr Mask arw_bit = Mask{1} << angle_random_walk;
+    static constexpr Mask angle_noise_bit = Mask{1} << quantisation;
+    static constexpr Mask drifting = Mask{1} << flicker | Mask{1} << rate_random_walk | correlated_bit;
+
+    Maximum restricted(Model& model, Mask mask) const {
+        model.restricted = true;
+        return likelihood_.maximise(model, &fits_[mask].theta);
+    }
+
+    Prices prices_at(double significance) const {
+        const boost::math::chi_squared one(1.0);
+        return {.variance = boost::math::quantile(boost::math::complement(one, 2.0 * significance)),
+                .ramp = boost::math::quantile(boost::math::complement(one, significance)),
+                .correlated = parts_.markov.price(significance)};
+    }
+    bool claimed(Mask bit) const {
+        return (claimed_ & bit) != 0 &&
+               (bit == ramp_bit || estimate().theta[static_cast<std::size_t>(std::countr_zero(bit))] > 0.0);
+    }
+
+    /// The ramp's variance is that of the slowest terms, known with few degrees of freedom.
+    static double ramp_error(const Maximum& fit, double probability) {
+        const boost::math::students_t t(fit.ramp_degrees);
+        return boost::math::quantile(t, probability) * std::sqrt(fit.ramp_variance);
+    }
+    void describe_ramp(const Maximum& of_full, double per_hour, Coefficient& ramp) const {
+        ramp.resolved = claimed(ramp_bit);
+        const Maximum& fit = ramp.resolved ? estimate_ : of_full;
+        const double value = per_hour * std::abs(fit.ramp);
+        if (ramp.resolved) {
+            const double spread = per_hour * ramp_error(fit, one_sigma_below);
+            ramp.value = value;
+            ramp.lo = std::max(0.0, value - spread);
+            ramp.hi = value + spread;
+        } else {
+            ramp.hi = value + per_hour * ramp_error(fit, 0.95);
+        }
+    }
+
+    Correlated correlated_noise(double tau0_s) const {
+        Correlated out;
+        const Ends time = central_interval(likelihood_, model_, estimate(), log_time);
+        out.correlation_time_s = {tau0_s * std::exp(estimate().theta[log_time]), tau0_s * std::exp(time.lo),
+                                  tau0_s * std::exp(time.hi)};
+        const double variance = estimate().theta[correlated];
+        const Ends ends = central_interval(likelihood_, model_, estimate(), correlated);
+        out.rms_rate_deg_h = {std::sqrt(variance), std::sqrt(ends.lo), std::sqrt(ends.hi)};
+        // q_c^2 = 2 variance/T_c; (deg/h)/sqrt(s) to (deg/h)/sqrt(h) is a factor of 60
+        const double q = 60.0 * std::sqrt(2.0 * variance / out.correlation_time_s.value);
+        const auto& c = estimate().covariance;
+        const double spread =
+            0.5 * std::sqrt(std::max(0.0, c[correlated][correlated] / (variance * variance) -
+                                              2.0 * c[correlated][log_time] / variance + c[log_time][log_time]));
+        out.amplitude_deg_h_rt_h = {q, q * std::exp(-spread), q * std::exp(spread)};
+        out.evidence = fits_.evidence(correlated_bit);
+        return out;
+    }
+
+    Sinusoid sinusoid(const Line& line, double evidence, double tau0_s) const {
+        Sinusoid out;
+        const double x = 0.5 * line.index / static_cast<double>(likelihood_.samples());
+        const double x_spread = 0.5 * std::sqrt(line.covariance[2][2]) / static_cast<double>(likelihood_.samples());
+        out.frequency_hz = {x / tau0_s, (x - x_spread) / tau0_s, (x + x_spread) / tau0_s};
+        // A mean over tau0 has sin(pi x)/(pi x) of the amplitude. 1 arcsec/s is 1 deg/h.
+        const double gain = std::numbers::pi * x / std::sin(std::numbers::pi * x);
+        const double spread = std::sqrt(line.amplitude_variance());
+        out.rate_amplitude_deg_h = {gain * line.amplitude(), gain * (line.amplitude() - spread),
+                                    gain * (line.amplitude() + spread)};
+        out.evidence = evidence;
+        return out;
+    }
+
+    Pooling pooling(double tau0_s) const {
+        const auto arw_of = [&](Mask mask) {
+            return unit_factor(angle_random_walk, tau0_s) * std::sqrt(fits_[mask].theta[angle_random_walk]);
+        };
+        Pooling out;
+        out.arw_evidence = std::max(0.0, fits_.evidence(arw_bit));
+        out.angle_noise_evidence = std::max(0.0, fits_[arw_bit].deviance - fits_[arw_bit | angle_noise_bit].deviance);
+        out.arw_alone_deg_rt_h = arw_of(arw_bit);
+        out.arw_beside_angle_noise_deg_rt_h = arw_of(arw_bit | angle_noise_bit);
+        out.arw_best_deg_rt_h = arw_of(arw_best_);
+        out.red = (best_ & ~(arw_bit | angle_noise_bit)) != 0;
+        return out;
+    }
+
+    const Likelihood& likelihood_;
+    const Decomposition& parts_;
+    Subsets fits_;
+    Mask best_ = 0;      ///< subset of least deviance plus prices
+    Mask arw_best_ = 0;  ///< the same of those with angle random walk
+    Mask claimed_ = 0;
+    Model model_;  ///< what the values are estimated with; restricted, for a ramp takes a degree of freedom of few
+    Maximum estimate_;
+};
 
 std::vector<double> increments(std::span<const double> angle, double& largest) {
     std::vector<double> y(angle.size() > 0 ? angle.size() - 1 : 0);
@@ -187,81 +262,15 @@ NoiseFit fit_noise(std::span<const double> angle_arcsec, double tau0_s, const Op
         return out;
     }
 
-    const Likelihood likelihood(spectrum);
-    const Subsets fits(likelihood);
-    const boost::math::chi_squared one(1.0);
-    const double variance_price = boost::math::quantile(boost::math::complement(one, 2.0 * options.significance));
-    const double ramp_price = boost::math::quantile(boost::math::complement(one, options.significance));
-
-    constexpr std::size_t arw_bit = std::size_t{1} << angle_random_walk;
-    std::size_t best = 0;
-    std::size_t best_with_arw = 0;
-    double best_score = std::numeric_limits<double>::infinity();
-    double best_score_with_arw = std::numeric_limits<double>::infinity();
-    for (std::size_t mask = 1; mask < mask_count; ++mask) {
-        if ((mask & ~ramp_bit) == 0) continue;
-        double score = fits[mask].deviance + ((mask & ramp_bit) != 0 ? ramp_price : 0.0);
-        for (std::size_t i = 0; i < term_count; ++i) score += ((mask >> i) & 1u) != 0 ? variance_price : 0.0;
-        if (score < best_score) {
-            best_score = score;
-            best = mask;
-        }
-        if ((mask & arw_bit) != 0 && score < best_score_with_arw) {
-            best_score_with_arw = score;
-            best_with_arw = mask;
-        }
+    const Decomposition parts = decompose(spectrum, options.significance);
+    if (!parts.lines.empty() && only_rounding(parts.noise, largest / tau0_s)) {
+        out.reason = "the record shows no noise above the rounding of its numbers beside spectral lines";
+        return out;
     }
-    const Maximum& chosen = fits[best];
-    const Maximum& full = fits[full_mask];
-    Model restricted = model_of(full_mask);
-    restricted.restricted = true;
-    const Maximum full_restricted = likelihood.maximise(restricted, &full.theta);
-    const auto supported = [&](std::size_t bit, double price) {
-        return (best & bit) != 0 && fits[full_mask & ~bit].deviance - full.deviance >= price;
-    };
-
-    const std::array<Coefficient*, term_count> coefficients = {&out.quantization_arcsec, &out.arw_deg_rt_h,
-                                                               &out.bias_instability_deg_h, &out.rrw_deg_h_rt_h};
-    for (std::size_t i = 0; i < term_count; ++i) {
-        Coefficient& c = *coefficients[i];
-        const double factor = unit_factor(i, tau0_s);
-        c.resolved = supported(std::size_t{1} << i, variance_price) && chosen.theta[i] > 0.0;
-        if (i == flicker && c.resolved) c.resolved = has_floor(chosen.theta, chosen.ramp, spectrum.samples);
-        if (c.resolved) {
-            // The estimate is near normal on the scale of ln theta; half of that is the scale of ln coefficient.
-            const double spread = 0.5 * std::sqrt(chosen.covariance[i][i]) / chosen.theta[i];
-            c.value = factor * std::sqrt(chosen.theta[i]);
-            c.lo = *c.value * std::exp(-spread);
-            c.hi = *c.value * std::exp(spread);
-        } else if (const auto limit = upper_limit(likelihood, full_restricted, i)) {
-            c.hi = factor * std::sqrt(*limit);
-        }
-    }
-
-    const auto arw_of = [&](std::size_t mask) {
-        return unit_factor(angle_random_walk, tau0_s) * std::sqrt(fits[mask].theta[angle_random_walk]);
-    };
-    constexpr std::size_t angle_noise_bit = std::size_t{1} << quantisation;
-    out.pooling.arw_evidence = std::max(0.0, fits[full_mask & ~arw_bit].deviance - full.deviance);
-    out.pooling.angle_noise_evidence = std::max(0.0, fits[arw_bit].deviance - fits[arw_bit | angle_noise_bit].deviance);
-    out.pooling.arw_alone_deg_rt_h = arw_of(arw_bit);
-    out.pooling.arw_beside_angle_noise_deg_rt_h = arw_of(arw_bit | angle_noise_bit);
-    out.pooling.arw_best_deg_rt_h = arw_of(best_with_arw);
-    out.pooling.red = (best & ~(arw_bit | angle_noise_bit)) != 0;
-
-    Coefficient& ramp = out.rate_ramp_deg_h_h;
-    const double per_hour = 3600.0 / tau0_s;
-    ramp.resolved = supported(ramp_bit, ramp_price);
-    if (ramp.resolved) {
-        const double spread = per_hour * std::sqrt(chosen.ramp_variance);
-        ramp.value = per_hour * std::abs(chosen.ramp);
-        ramp.lo = std::max(0.0, *ramp.value - spread);
-        ramp.hi = *ramp.value + spread;
-    } else {
-        ramp.hi = per_hour * (std::abs(full.ramp) + one_sided_95 * std::sqrt(full.ramp_variance));
-    }
-
-    out.goodness = goodness_of_fit(spectrum, chosen, tau0_s, options.misfit_threshold);
+    const Likelihood likelihood(parts.noise);
+    const Claims claims(likelihood, parts, options.significance);
+    claims.describe(tau0_s, out);
+    out.goodness = goodness_of_fit(parts.noise, claims.estimate(), parts.lines, tau0_s, options.misfit_threshold);
     out.described = out.goodness.accepted;
     out.reason = out.goodness.reason;
     return out;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <vector>
 
 namespace ringlock::noise {
 namespace {
@@ -21,39 +22,28 @@ double kolmogorov_tail(double t) {
     return std::clamp(2.0 * sum, 0.0, 1.0);
 }
 
-/// Variances of all coefficients: of each bin's middle, interpolated on logarithmic scales between.
-std::vector<double> variances(const Spectrum& spectrum, const TermValues& theta) {
-    std::vector<double> at_bin;
-    for (const Bin& b : spectrum.bins) {
-        double v = 0.0;
-        for (std::size_t i = 0; i < term_count; ++i) v += theta[i] * b.shape[i];
-        at_bin.push_back(std::log(v));
-    }
-    std::vector<double> out(spectrum.z.size());
-    std::size_t right = 0;
-    for (std::size_t j = 1; j <= out.size(); ++j) {
-        const double x = spectrum.x(j);
-        while (right + 1 < spectrum.bins.size() && spectrum.bins[right].x < x) ++right;
-        double v = at_bin[right];
-        if (right > 0) {
-            const double x0 = spectrum.bins[right - 1].x;
-            const double x1 = spectrum.bins[right].x;
-            v = at_bin[right - 1] + (at_bin[right] - at_bin[right - 1]) * (x - x0) / (x1 - x0);
-        }
-        out[j - 1] = std::exp(v);
-    }
-    return out;
+/// Upper tail of the squares beside a line: whether what was taken for one is broad.
+double broadness(std::span<const double> w, const Line& line) {
+    constexpr std::ptrdiff_t beside = 12;
+    const auto middle = static_cast<std::ptrdiff_t>(std::llround(line.index));
+    const std::ptrdiff_t begin = std::max<std::ptrdiff_t>(1, middle - beside);
+    const std::ptrdiff_t end = std::min(static_cast<std::ptrdiff_t>(w.size()), middle + beside);
+    double sum = 0.0;
+    for (std::ptrdiff_t j = begin; j <= end; ++j) sum += w[static_cast<std::size_t>(j - 1)];
+    const auto degrees = static_cast<double>(end - begin + 1 - 3);  // less what the line has taken
+    return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees), std::min(sum, 1e6)));
 }
 
 }  // namespace
 
-Goodness goodness_of_fit(const Spectrum& spectrum, const Maximum& best, double tau0_s, double threshold) {
+Goodness goodness_of_fit(const Spectrum& spectrum, const Maximum& best, std::span<const Line> lines, double tau0_s,
+                         double threshold) {
     const std::size_t n = spectrum.z.size();
-    std::vector<double> w = variances(spectrum, best.theta);
+    std::vector<double> w = residual(spectrum, best);
+    const std::vector<double> variance = coefficient_variances(spectrum, best);
     double total = 0.0;
     for (std::size_t j = 1; j <= n; ++j) {
-        const double e = spectrum.z[j - 1] - best.ramp * spectrum.ramp(j) - best.corner[j % 2] * spectrum.corner(j);
-        w[j - 1] = e * e / w[j - 1];
+        w[j - 1] *= w[j - 1] / variance[j - 1];
         total += w[j - 1];
     }
     const auto frequency = [&](std::size_t j) { return spectrum.x(j) / tau0_s; };
@@ -100,7 +90,20 @@ Goodness goodness_of_fit(const Spectrum& spectrum, const Maximum& best, double t
     }
     out.p_bands = boost::math::cdf(boost::math::complement(boost::math::chi_squared(bands), std::min(chi2, 1e6)));
 
-    if (out.p_line < threshold) {
+    const Line* broadest = nullptr;
+    for (const Line& line : lines) {
+        const double p = std::min(1.0, static_cast<double>(lines.size()) * broadness(w, line));
+        if (p < out.p_beside) {
+            out.p_beside = p;
+            broadest = &line;
+        }
+    }
+
+    if (out.p_beside < threshold) {
+        out.reason =
+            fmt::format("a peak at {:.4g} Hz that is broader than a line (p = {:.1e})",
+                        0.5 * broadest->index / (static_cast<double>(spectrum.samples) * tau0_s), out.p_beside);
+    } else if (out.p_line < threshold) {
         out.reason = fmt::format("a spectral line at {:.4g} Hz (p = {:.1e})", frequency(largest), out.p_line);
     } else if (out.p_bands < threshold) {
         out.reason = fmt::format("the spectrum departs from the model, most near {:.3g} Hz (p = {:.1e})",

@@ -148,9 +148,11 @@ TEST_F(AllanCommand, KindsAndUnitsAgree) {
 
 TEST_F(AllanCommand, WithholdsCoefficientsThatDoNotDescribeTheRecord) {
     auto angle = test::simulate_angle({.n = 0.3}, 4000, 1.0, 1);
-    for (std::size_t i = 0; i < angle.size(); ++i) angle[i] += 0.3 * std::sin(1.1 * static_cast<double>(i));
+    for (const double turn : {0.4, 1.1, 1.9, 2.5}) {  // one line more than are taken off
+        for (std::size_t i = 0; i < angle.size(); ++i) angle[i] += 0.3 * std::sin(turn * static_cast<double>(i));
+    }
     const auto json = nlohmann::json::parse(run(write(angle) + " --rate 1 --kind phase --unit arcsec --json").out);
-    EXPECT_THAT(json["noise_withheld"].get<std::string>(), HasSubstr("line at 0.175"));
+    EXPECT_THAT(json["noise_withheld"].get<std::string>(), HasSubstr("line at 0.0636"));
     for (const auto& [key, value] : json["noise"].items()) EXPECT_TRUE(value.is_null()) << key;
     EXPECT_EQ(json["noise"].size(), 5u);
 }

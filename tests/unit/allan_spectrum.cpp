@@ -65,6 +65,53 @@ TEST(AllanSpectrum, FlickerIsNearlyDiagonal) {
     }
 }
 
+// Covariance exp(-|t|/T), integrated twice T^2 exp(-|t|/T) + T |t|. The model leaves out exp(-n/T), which is 5e-5 at
+// the longest time.
+TEST(AllanSpectrum, CorrelatedNoiseHasTheDiagonalOfItsCovariance) {
+    for (const std::size_t n : {40, 200}) {
+        const LogTimes range = log_times(n);
+        for (const double log_time : {range.lo, 0.3, range.hi}) {
+            const double time = std::exp(log_time);
+            const auto f = [&](double t) { return time * time * std::exp(-std::abs(t) / time) + time * std::abs(t); };
+            const auto c = [&](std::size_t lag) {
+                const auto t = static_cast<double>(lag);
+                return f(t + 1) - 2.0 * f(t) + f(t - 1);
+            };
+            const CorrelatedShape shape(log_time, n);
+            for (const std::size_t j : {1, 2, 3, 9, 20, 39}) {
+                const double s = std::sin(0.5 * pi * static_cast<double>(j) / static_cast<double>(n));
+                const double expected = shape(s * s).shape;
+                EXPECT_NEAR(variance_of(cosine(n, j), c), expected, 6e-5 * expected) << n << ' ' << time << ' ' << j;
+            }
+        }
+    }
+}
+
+// Of long times it is a random walk, of short ones white.
+TEST(AllanSpectrum, CorrelatedNoiseBetweenItsLimits) {
+    constexpr std::size_t n = 1000000;
+    const double time = 1e5;
+    const double x = 0.2;
+    const double s2 = std::pow(std::sin(pi * x), 2);
+    EXPECT_NEAR(CorrelatedShape(std::log(time), n)(s2).shape * time / 2.0 / shapes(x)[rate_random_walk], 1.0, 1e-4);
+    // q_c T_c = 1 is a variance of 1/(2 T). Of first order in T what neighbours share is missing: 2 T s^2.
+    const double brief = 0.02;
+    EXPECT_NEAR(CorrelatedShape(std::log(brief), n)(s2).shape / (2.0 * brief), 1.0 - 2.0 * brief * s2, 1e-3);
+}
+
+TEST(AllanSpectrum, SlopeOfCorrelatedNoiseIsItsDerivative) {
+    for (const double log_time : {-0.6, 0.0, 2.2, 2.4, 5.0}) {  // on both sides of where a series takes over
+        for (const double s2 : {1e-6, 1e-3, 0.2, 1.0}) {
+            constexpr double h = 1e-4;
+            const double up = CorrelatedShape(log_time + h, 4000)(s2).shape;
+            const double down = CorrelatedShape(log_time - h, 4000)(s2).shape;
+            const CorrelatedShape::Value at = CorrelatedShape(log_time, 4000)(s2);
+            // third derivatives are of the size of the shape: h^2 of it
+            EXPECT_NEAR(at.slope, 0.5 * (up - down) / h, 1e-6 * at.shape) << log_time << ' ' << s2;
+        }
+    }
+}
+
 // White angle noise is the diagonal part plus the two end errors.
 TEST(AllanSpectrum, AngleNoiseIsDiagonalButForTheEnds) {
     constexpr std::size_t n = 48;
@@ -128,9 +175,36 @@ TEST(AllanSpectrum, MaximumIsAMaximum) {
                 const double there = best.theta[i] + factor * scale;
                 if (there < 0.0) continue;
                 Model frozen = all;
-                TermValues start = best.theta;
+                Parameters start = best.theta;
                 const Maximum other = likelihood.maximise(frozen, &start, i, there);
                 EXPECT_GE(other.deviance, best.deviance - 1e-4) << seed << " term " << i;
+            }
+        }
+    }
+}
+
+// The same with correlated noise and its time; a wrong derivative by the time would end elsewhere.
+TEST(AllanSpectrum, MaximumWithCorrelatedNoiseIsAMaximum) {
+    for (const std::uint64_t seed : {1, 2, 3, 4}) {
+        const test::Truth truth{.q = 0.2, .n = 0.2, .correlated_rms = 0.2, .correlation_time_s = 15.0};
+        const auto angle = test::simulate_angle(truth, 4000, 1.0, seed);
+        std::vector<double> rate(4000);
+        for (std::size_t i = 0; i < 4000; ++i) rate[i] = angle[i + 1] - angle[i];
+        const Spectrum s = cosine_spectrum(rate);
+        const Likelihood likelihood(s);
+        Model model;
+        model.has = {true, true, false, false, true};
+        model.ramp = true;
+        model.restricted = seed % 2 == 0;
+        Parameters start{0.04, 0.04, 0.0, 0.0, 0.04, std::log(5.0)};
+        const Maximum best = likelihood.maximise(model, &start);
+        EXPECT_NEAR(best.theta[log_time], std::log(15.0), 0.8) << seed;
+        for (const std::size_t i :
+             {std::size_t{quantisation}, std::size_t{angle_random_walk}, std::size_t{correlated}, log_time}) {
+            for (const double step : {-0.02, 0.02}) {
+                const double there = i == log_time ? best.theta[i] + step : best.theta[i] * (1.0 + step);
+                const Maximum other = likelihood.maximise(model, &best.theta, i, there);
+                EXPECT_GE(other.deviance, best.deviance - 1e-4) << seed << " parameter " << i;
             }
         }
     }

@@ -28,15 +28,18 @@ TEST(WeightedSquares, OfEqualWeightsAreChiSquared) {
     }
 }
 
-// Any others against draws, whose error is 0.001.
+// Any others against draws, whose error is 0.0016.
 TEST(WeightedSquares, QuantilesAreThoseOfDraws) {
-    const std::vector<std::vector<WeightedSquares::Share>> cases = {
-        {{1.0}, {0.3}, {0.1}}, {{5.0}, {1.0, 20.0}}, {{1.0}, {0.9}, {0.2, 3.0}, {0.01, 100.0}}};
+    const std::vector<std::vector<WeightedSquares::Share>> cases = {{{1.0}, {0.3}, {0.1}},
+                                                                    {{5.0}, {1.0, 20.0}},
+                                                                    {{1.0}, {0.9}, {0.2, 3.0}, {0.01, 100.0}},
+                                                                    {{0.125, 2.0}, {0.002, 380.0}},
+                                                                    {{0.02, 2.0}, {0.0024, 400.0}}};
     for (const auto& shares : cases) {
         const WeightedSquares squares(shares);
         std::mt19937_64 random(5);
         std::normal_distribution<double> normal;
-        constexpr int draws = 200'000;
+        constexpr int draws = 100'000;
         const std::vector<double> probabilities = {0.1587, 0.5, 0.8413};
         std::vector<int> below(probabilities.size());
         std::vector<double> quantiles;
@@ -52,7 +55,7 @@ TEST(WeightedSquares, QuantilesAreThoseOfDraws) {
             for (std::size_t i = 0; i < quantiles.size(); ++i) below[i] += sum <= quantiles[i] ? 1 : 0;
         }
         for (std::size_t i = 0; i < probabilities.size(); ++i) {
-            EXPECT_NEAR(static_cast<double>(below[i]) / draws, probabilities[i], 0.005);
+            EXPECT_NEAR(static_cast<double>(below[i]) / draws, probabilities[i], 0.006);
         }
     }
 }
