@@ -17,6 +17,7 @@
 #include "analysis/report/plot.hpp"
 #include "app/allan_figure.hpp"
 #include "app/allan_output.hpp"
+#include "app/arguments.hpp"
 #include "app/command.hpp"
 #include "app/output.hpp"
 #include "engine/core/error.hpp"
@@ -53,20 +54,6 @@ constexpr std::array<Unit, 6> units_known = {{{"arcsec", false, 1.0},
                                               {"deg/s", true, 3600.0},
                                               {"rad/s", true, 648000.0 / 3.141592653589793238462643}}};
 
-std::vector<std::string> split(const std::string& text) {
-    std::vector<std::string> parts;
-    std::size_t begin = 0;
-    for (;;) {
-        const std::size_t comma = text.find(',', begin);
-        std::string part = text.substr(begin, comma == std::string::npos ? comma : comma - begin);
-        part.erase(0, part.find_first_not_of(' '));
-        part.erase(part.find_last_not_of(' ') + 1);
-        parts.push_back(part);
-        if (comma == std::string::npos) return parts;
-        begin = comma + 1;
-    }
-}
-
 allan::Kind parse_kind(const std::string& kind) {
     if (kind == "phase") return allan::Kind::phase;
     if (kind == "increment") return allan::Kind::increment;
@@ -93,24 +80,6 @@ const Unit* parse_unit(const std::string& unit, allan::Kind kind) {
     throw InputError(fmt::format(
         "--unit '{}' is not known; allowed are arcsec, deg, rad (phase, increment) and deg/h, deg/s, rad/s (rate)",
         unit));
-}
-
-std::string known_deviations() {
-    std::string list;
-    for (const allan::Traits& t : allan::all_estimators) list += fmt::format("{}{}", list.empty() ? "" : ", ", t.name);
-    return list;
-}
-
-std::vector<allan::Estimator> parse_deviations(const std::string& list) {
-    std::vector<allan::Estimator> out;
-    for (const std::string& part : split(list)) {
-        const auto estimator = allan::estimator_named(part);
-        if (!estimator) {
-            throw InputError(fmt::format("--dev '{}' is not known; there are {}", part, known_deviations()));
-        }
-        if (std::find(out.begin(), out.end(), *estimator) == out.end()) out.push_back(*estimator);
-    }
-    return out;
 }
 
 allan::Bias parse_bias(const std::string& bias) {

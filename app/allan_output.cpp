@@ -26,8 +26,8 @@ Json correlated(const noise::NoiseFit& fit) {
 }
 
 Json sinusoids(const noise::NoiseFit& fit) {
+    if (!fit.described) return nullptr;
     Json list = Json::array();
-    if (!fit.described) return list;
     for (const noise::Sinusoid& line : fit.sinusoids) {
         list.push_back({{"frequency_hz", estimate(line.frequency_hz)},
                         {"rate_amplitude_deg_h", estimate(line.rate_amplitude_deg_h)}});

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <limits>
 #include <system_error>
@@ -30,6 +31,38 @@ scenario::Scenario load_scenario(const std::string& file, const std::optional<st
             whole_number("--seed", *seed, largest, fmt::format("between 0 and {}", largest)));
     }
     return scenario;
+}
+
+std::vector<std::string> split(const std::string& text) {
+    std::vector<std::string> parts;
+    std::size_t begin = 0;
+    for (;;) {
+        const std::size_t comma = text.find(',', begin);
+        std::string part = text.substr(begin, comma == std::string::npos ? comma : comma - begin);
+        part.erase(0, part.find_first_not_of(' '));
+        part.erase(part.find_last_not_of(' ') + 1);
+        parts.push_back(part);
+        if (comma == std::string::npos) return parts;
+        begin = comma + 1;
+    }
+}
+
+std::string known_deviations() {
+    std::string list;
+    for (const allan::Traits& t : allan::all_estimators) list += fmt::format("{}{}", list.empty() ? "" : ", ", t.name);
+    return list;
+}
+
+std::vector<allan::Estimator> parse_deviations(const std::string& list) {
+    std::vector<allan::Estimator> out;
+    for (const std::string& part : split(list)) {
+        const auto estimator = allan::estimator_named(part);
+        if (!estimator) {
+            throw InputError(fmt::format("--dev '{}' is not known; there are {}", part, known_deviations()));
+        }
+        if (std::find(out.begin(), out.end(), *estimator) == out.end()) out.push_back(*estimator);
+    }
+    return out;
 }
 
 }  // namespace ringlock::app

@@ -81,6 +81,22 @@ bool has_closed_form(const study::ArmSummary& arm) {
                        [](const study::SweepPoint& point) { return point.closed_form_rate_deg_h.has_value(); });
 }
 
+Json json_family(const std::vector<study::FamilyDeviation>& family) {
+    Json json = Json::object();
+    for (const study::FamilyDeviation& deviation : family) {
+        Json list = Json::array();
+        for (const study::EnsemblePoint& point : deviation.points) {
+            list.push_back({{"tau_s", point.tau_s},
+                            {"dev", number(point.dev_deg_h)},
+                            {"lo", number(point.lo)},
+                            {"hi", number(point.hi)},
+                            {"edf", number(point.edf)}});
+        }
+        json[std::string(allan::name(deviation.estimator))] = std::move(list);
+    }
+    return json;
+}
+
 Json json_arm(const study::ArmSummary& arm) {
     Json json{{"gyros", arm.gyros},
               {"arw_deg_rt_h", arm.noise_injected ? json_figure(arm.arw_deg_rt_h) : Json(nullptr)},
@@ -97,6 +113,7 @@ Json json_arm(const study::ArmSummary& arm) {
                                  {"hi", number(point.hi)},
                                  {"edf", number(point.edf)}});
     }
+    if (!arm.family.empty()) json["deviations"] = json_family(arm.family);
     if (!arm.sweep.empty()) {
         json["locked_up_to_deg_h"] = number(study::locked_up_to_deg_h(arm));
         json["sweep"] = Json::array();
@@ -339,6 +356,30 @@ report::Figure sweep_figure(const study::Study& study, const study::Summary& sum
     return figure;
 }
 
+/// One table a deviation: averaging times down, arms across.
+std::string family_text(const study::Summary& summary) {
+    std::string text;
+    const auto& first = summary.arms.front().family;
+    for (std::size_t k = 0; k < first.size(); ++k) {
+        const allan::Traits& t = allan::traits(first[k].estimator);
+        text += fmt::format("\n{} [{}]{}\n{:>12}", t.name, t.time ? "arcsec" : "deg/h",
+                            t.has_interval ? ", 68.27 % intervals" : "", "tau [s]");
+        for (const study::ArmSummary& arm : summary.arms) text += fmt::format("  {:>36}", arm.name);
+        text += "\n";
+        for (std::size_t i = 0; i < first[k].points.size(); ++i) {
+            text += fmt::format("{:>12.6g}", first[k].points[i].tau_s);
+            for (const study::ArmSummary& arm : summary.arms) {
+                const study::EnsemblePoint& p = arm.family[k].points[i];
+                const std::string interval =
+                    std::isfinite(p.lo) ? fmt::format(" ({:.3e} .. {:.3e})", p.lo, p.hi) : std::string();
+                text += fmt::format("  {:>36}", fmt::format("{:.4e}{}", p.dev_deg_h, interval));
+            }
+            text += "\n";
+        }
+    }
+    return text;
+}
+
 }  // namespace
 
 std::string study_json(const study::Study& study, const study::Summary& summary, const store::Provenance& provenance) {
@@ -375,6 +416,7 @@ std::string study_text(const study::Study& study, const study::Summary& summary,
             "not noise.\n";
     }
     if (!summary.arms.front().sweep.empty()) text += "\n" + sweep_text(study, summary);
+    if (!summary.arms.front().family.empty()) text += family_text(summary);
     return text;
 }
 

@@ -119,22 +119,9 @@ MeanFigure mean_figure(const std::vector<double>& values) {
 }
 
 std::vector<EnsemblePoint> ensemble_allan(const ArmStatistics& arm) {
-    std::vector<EnsemblePoint> points;
-    for (std::size_t i = 0; i < arm.gyros.front().allan.size(); ++i) {
-        EnsemblePoint point;
-        point.tau_s = arm.gyros.front().allan[i].tau_s;
-        double variance = 0.0;
-        for (const GyroStatistics& gyro : arm.gyros) {
-            variance += gyro.allan[i].dev * gyro.allan[i].dev;
-            point.edf += gyro.allan[i].edf;
-        }
-        point.dev_deg_h = std::sqrt(variance / static_cast<double>(arm.gyros.size()));
-        const boost::math::chi_squared chi2(std::max(point.edf, 1e-3));
-        point.lo = point.dev_deg_h * std::sqrt(point.edf / quantile(chi2, 0.5 * (1.0 + confidence)));
-        point.hi = point.dev_deg_h * std::sqrt(point.edf / quantile(chi2, 0.5 * (1.0 - confidence)));
-        points.push_back(point);
-    }
-    return points;
+    std::vector<std::vector<allan::Point>> curves;
+    for (const GyroStatistics& gyro : arm.gyros) curves.push_back(gyro.allan);
+    return ensemble_points(curves);
 }
 
 std::vector<SweepPoint> sweep(const Study& study, const ArmStatistics& arm) {
@@ -234,6 +221,29 @@ std::optional<double> locked_up_to_deg_h(const ArmSummary& arm) {
         edge = point.input_rate_deg_h;
     }
     return edge;
+}
+
+std::vector<EnsemblePoint> ensemble_points(const std::vector<std::vector<allan::Point>>& curves) {
+    std::vector<EnsemblePoint> points;
+    for (std::size_t i = 0; i < curves.front().size(); ++i) {
+        EnsemblePoint point;
+        point.tau_s = curves.front()[i].tau_s;
+        double variance = 0.0;
+        for (const std::vector<allan::Point>& curve : curves) {
+            variance += curve[i].dev * curve[i].dev;
+            point.edf += curve[i].edf;
+        }
+        point.dev_deg_h = std::sqrt(variance / static_cast<double>(curves.size()));
+        if (std::isnan(point.edf)) {
+            point.lo = point.hi = point.edf;
+        } else {
+            const boost::math::chi_squared chi2(std::max(point.edf, 1e-3));
+            point.lo = point.dev_deg_h * std::sqrt(point.edf / quantile(chi2, 0.5 * (1.0 + confidence)));
+            point.hi = point.dev_deg_h * std::sqrt(point.edf / quantile(chi2, 0.5 * (1.0 - confidence)));
+        }
+        points.push_back(point);
+    }
+    return points;
 }
 
 Summary summarise(const Study& study) {

@@ -60,6 +60,12 @@ struct Reduction {
     std::optional<double> hi;     ///< absent where the other's interval begins at zero
 };
 
+/// One deviation of the Allan family, of an ensemble.
+struct FamilyDeviation {
+    allan::Estimator estimator = allan::Estimator::oadev;
+    std::vector<EnsemblePoint> points;  ///< deg/h, time errors in arcsec; lo, hi and edf NaN where there are none
+};
+
 struct ArmSummary {
     std::string name;
     std::int64_t gyros = 0;
@@ -71,6 +77,7 @@ struct ArmSummary {
     std::vector<SweepPoint> sweep;            ///< empty without a sweep
     std::vector<Step> steps;                  ///< of the closed form, in the order of the sweep
     std::optional<ScaleFactor> scale_factor;  ///< of sweeps of three rates and more, with two gyros and more
+    std::vector<FamilyDeviation> family;      ///< empty unless asked for
     std::optional<Reduction> arw_reduction;   ///< of arms behind injected noise, beside `noise_injected` itself
 };
 
@@ -89,6 +96,11 @@ struct Summary {
 /// Highest rate of the sweep up to which, from its first rate that can tell on, every gyro of the arm is locked; none
 /// where the first is not.
 std::optional<double> locked_up_to_deg_h(const ArmSummary& arm);
+
+/// The root of the mean variance of some gyros, with the 68.27 % interval of their degrees of freedom together.
+///
+/// \param curves  one deviation curve a gyro, all of the same averaging times
+std::vector<EnsemblePoint> ensemble_points(const std::vector<std::vector<allan::Point>>& curves);
 
 /// Sums the study up. No noise is claimed for a locking arm without injected noise: its error is deterministic, a dead
 /// band and a staircase, whatever spectrum it has. No bias instability is claimed unless most records resolve an Allan

@@ -110,6 +110,76 @@ TEST_F(AllanCommand, EveryDeviationIsThere) {
     EXPECT_THAT(text.out, HasSubstr("no interval"));
 }
 
+// Rows left out and values that are not there are the same gap, counted and not closed up.
+TEST_F(AllanCommand, GapsAreCountedAndNotClosedUp) {
+    const auto angle = test::simulate_angle({.n = 0.3}, 3000, 0.5, 2);
+    const auto write_rows = [&](const char* name, bool stamps) {
+        const auto path = directory_ / name;
+        std::ofstream out(path);
+        out.precision(12);
+        for (std::size_t i = 0; i < angle.size(); ++i) {
+            const bool missing = i % 301 == 7 || (i > 1200 && i < 1260);
+            if (stamps && missing) continue;
+            if (stamps) out << 100.0 + 0.5 * static_cast<double>(i) << ',';
+            (missing ? out << "nan" : out << angle[i]) << '\n';
+        }
+        return path.string();
+    };
+    const std::string options = " --rate 2 --kind phase --unit arcsec --json --dev oadev,mdev";
+    const Outcome by_value = run(write_rows("values.txt", false) + options);
+    const Outcome by_time = run(write_rows("times.txt", true) + options + " --column 2 --time 1");
+    ASSERT_EQ(by_value.status, 0) << by_value.err;
+    ASSERT_EQ(by_time.status, 0) << by_time.err;
+    const auto a = nlohmann::json::parse(by_value.out);
+    const auto b = nlohmann::json::parse(by_time.out);
+    EXPECT_EQ(a["missing"], 68);
+    EXPECT_EQ(a["n"], 3001 - 68);
+    EXPECT_EQ(a["deviations"], b["deviations"]);
+    EXPECT_LT(a["deviations"]["oadev"][0]["terms"], 2999);
+    EXPECT_GT(a["noise_fitted_points"], 250);
+    const double dev = a["deviations"]["oadev"][5]["dev"];
+    EXPECT_NEAR(dev, 0.3 / 4.0, 0.3 / 4.0 * 0.15);  // N/sqrt(tau) at 16 s
+    EXPECT_THAT(run(write_rows("values.txt", false) + " --rate 2 --kind phase").out, HasSubstr("68 data are missing"));
+}
+
+TEST_F(AllanCommand, StreamsAgreeWithRecords) {
+    const auto angle = test::simulate_angle({.n = 0.3}, 40'000, 0.5, 3);
+    std::vector<double> rates;
+    for (std::size_t i = 0; i + 1 < angle.size(); ++i) rates.push_back((angle[i + 1] - angle[i]) / 0.5);
+    const std::string data = write(rates);
+    const std::string options = " --rate 2 --kind rate --unit deg/h --json --dev oadev,ohdev";
+    const auto kept = nlohmann::json::parse(run(data + options).out);
+    const Outcome piped = run("- --stream" + options + " < '" + data + "'");
+    ASSERT_EQ(piped.status, 0) << piped.err;
+    const auto streamed = nlohmann::json::parse(piped.out);
+    EXPECT_EQ(streamed["stride"], "tau/8");
+    EXPECT_EQ(streamed["n"], 40'000);
+    EXPECT_EQ(streamed["noise_fitted_every"], 2);
+    for (const char* name : {"oadev", "ohdev"}) {
+        const auto& a = kept["deviations"][name];
+        const auto& b = streamed["deviations"][name];
+        ASSERT_EQ(a.size(), b.size());
+        for (std::size_t i = 0; i < 4; ++i) {
+            EXPECT_NEAR(a[i]["dev"], b[i]["dev"], 1e-9 * a[i]["dev"].get<double>());
+        }
+    }
+    const double n = kept["noise"]["arw_deg_rt_h"]["value"];
+    EXPECT_NEAR(streamed["noise"]["arw_deg_rt_h"]["value"], n, 0.03 * n);
+    EXPECT_THAT(run(data + " --rate 2 --kind rate --stream --dev mdev").err, HasSubstr("oadev and ohdev only"));
+    EXPECT_THAT(run(data + " --rate 2 --kind rate --stream --tau all").err, HasSubstr("octaves only"));
+}
+
+TEST_F(AllanCommand, DrawsTheDeviationsAndTheFit) {
+    const std::string data = write(test::simulate_angle({.n = 0.3, .k = 0.01}, 5000, 1.0, 4));
+    const auto figure = directory_ / "figure.svg";
+    const Outcome r = run(data + " --rate 1 --kind phase --unit arcsec --plot '" + figure.string() + "'");
+    ASSERT_EQ(r.status, 0) << r.err;
+    const std::string svg = contents(figure);
+    EXPECT_THAT(svg, HasSubstr("oadev"));
+    EXPECT_THAT(svg, HasSubstr(">fit<"));
+    EXPECT_EQ(run(data + " --rate 1 --kind phase --plot figure.png").status, 2);
+}
+
 // One record in every kind and unit gives one answer.
 TEST_F(AllanCommand, KindsAndUnitsAgree) {
     const auto angle = test::simulate_angle({.n = 0.3}, 1200, 0.5, 1);
@@ -154,7 +224,7 @@ TEST_F(AllanCommand, WithholdsCoefficientsThatDoNotDescribeTheRecord) {
     const auto json = nlohmann::json::parse(run(write(angle) + " --rate 1 --kind phase --unit arcsec --json").out);
     EXPECT_THAT(json["noise_withheld"].get<std::string>(), HasSubstr("line at 0.0636"));
     for (const auto& [key, value] : json["noise"].items()) EXPECT_TRUE(value.is_null()) << key;
-    EXPECT_EQ(json["noise"].size(), 5u);
+    EXPECT_EQ(json["noise"].size(), 7u);
 }
 
 TEST_F(AllanCommand, WrongInputEndsWithTwoAndSaysWhy) {

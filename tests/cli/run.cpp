@@ -362,6 +362,25 @@ TEST_F(RunCommand, AnalyzeSaysWhatRunSaid) {
     EXPECT_EQ(valid.out, "out.h5: a valid result of 4 gyros and 4 arms\n");
 }
 
+// The whole family of a result's arms, from its angle records.
+TEST_F(RunCommand, AnalyzeTakesTheFamilyFromAngleRecords) {
+    ASSERT_EQ(run({"run", "s.toml", "-o", "out.h5"}).status, 0);
+    const Outcome r = run({"analyze", "out.h5", "--json", "--dev", "oadev,mdev,htotdev,mtie"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    const json found = json::parse(r.out);
+    for (const auto& [name, arm] : found["arms"].items()) {
+        ASSERT_EQ(arm["deviations"].size(), 4u) << name;
+        ASSERT_FALSE(arm["deviations"]["mdev"].empty()) << name;
+        for (const auto& point : arm["deviations"]["mdev"]) {
+            EXPECT_LE(point["lo"], point["dev"]) << name;
+            EXPECT_GE(point["hi"], point["dev"]) << name;
+        }
+        EXPECT_TRUE(arm["deviations"]["mtie"][0]["lo"].is_null()) << name;
+    }
+    EXPECT_THAT(run({"analyze", "out.h5", "--dev", "tdev"}).out, HasSubstr("tdev [arcsec]"));
+    expect_refused({"analyze", "out.h5", "--dev", "pdev"}, HasSubstr("'pdev' is not known"));
+}
+
 TEST_F(RunCommand, DamagedResultsAreRefusedByName) {
     ASSERT_EQ(run({"run", "s.toml", "-o", "out.h5"}).status, 0);
     const std::string whole = read("out.h5");
