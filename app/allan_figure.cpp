@@ -28,7 +28,17 @@ report::Curve curve_of(allan::Estimator estimator, const std::vector<allan::Poin
     return curve;
 }
 
-void add_fit(const AllanOutput& out, std::vector<double> tau_s, report::Figure& figure) {
+/// From the first to the last, close enough that a sinusoid is seen as one.
+std::vector<double> fine_grid(double first_s, double last_s) {
+    constexpr double points_per_decade = 60.0;
+    const double decades = std::log10(last_s / first_s);
+    const auto steps = static_cast<int>(std::ceil(points_per_decade * decades));
+    std::vector<double> out = {first_s};
+    for (int i = 1; i <= steps; ++i) out.push_back(first_s * std::pow(10.0, decades * i / steps));
+    return out;
+}
+
+void add_fit(const AllanOutput& out, const std::vector<double>& tau_s, report::Figure& figure) {
     const auto terms = noise::variance_terms(*out.noise, tau_s);
     if (terms.empty()) return;
     report::Curve sum{"fit", tau_s, std::vector<double>(tau_s.size()), {}, {}, Style::dashed};
@@ -72,7 +82,8 @@ report::Figure allan_figure(const AllanOutput& out) {
             tau_s = figure.curves.back().x;
         }
     }
-    if (out.noise && out.noise->described && !tau_s.empty()) add_fit(out, tau_s, figure);
+    if (out.noise && out.noise->described && !tau_s.empty())
+        add_fit(out, fine_grid(tau_s.front(), tau_s.back()), figure);
     return figure;
 }
 

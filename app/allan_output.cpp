@@ -183,7 +183,8 @@ std::string allan_text(const AllanOutput& out) {
     }
     for (const noise::Sinusoid& line : out.noise->sinusoids) {
         add("sinusoidal rate", line.rate_amplitude_deg_h, "deg/h");
-        add("  frequency", line.frequency_hz, "Hz");
+        const noise::Estimate& f = line.frequency_hz;
+        text += fmt::format("  {:<20} {:>11.8g}  ({:.8g} to {:.8g}) Hz\n", "  frequency", f.value, f.lo, f.hi);
     }
     return text;
 }
