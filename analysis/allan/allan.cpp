@@ -10,6 +10,7 @@
 #include "analysis/allan/gapped_rates.hpp"
 #include "analysis/allan/interval.hpp"
 #include "analysis/allan/interval_error.hpp"
+#include "analysis/allan/mean_differences.hpp"
 #include "analysis/allan/noise_identification.hpp"
 #include "analysis/allan/total_sums.hpp"
 #include "analysis/allan/uncertainty.hpp"

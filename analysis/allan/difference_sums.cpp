@@ -4,15 +4,11 @@
 #define HWY_TARGET_INCLUDE "analysis/allan/difference_sums.cpp"
 #include "engine/simd/targets.hpp"
 // The above must come first.
-#include <tbb/blocked_range.h>
 #include <tbb/cache_aligned_allocator.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-
-#include "analysis/allan/exact_sum.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ringlock::allan::HWY_NAMESPACE {
@@ -120,38 +116,6 @@ void add_four_octaves(const double* HWY_RESTRICT x, std::size_t m, std::size_t c
     }
 }
 
-/// out[i] = x[i + 3m] - 3 x[i + 2m] + 3 x[i + m] - x[i].
-void third_differences(const double* HWY_RESTRICT x, std::size_t m, std::size_t count, double* HWY_RESTRICT out) {
-    const hn::CappedTag<double, 8> d;
-    const std::size_t width = hn::Lanes(d);
-    std::size_t i = 0;
-    for (; i + width <= count; i += width) hn::StoreU(difference_at<3>(d, x + i, m), d, out + i);
-    const hn::CappedTag<double, 1> one;
-    for (; i < count; ++i) out[i] = hn::GetLane(difference_at<3>(one, x + i, m));
-}
-
-/// Adds the squares of base + z[i] to sums[32].
-void add_squares(const double* HWY_RESTRICT z, double base, std::size_t count, double* HWY_RESTRICT sums) {
-    const hn::CappedTag<double, 8> d;
-    constexpr std::size_t width = hn::MaxLanes(d);
-    constexpr std::size_t vectors = columns / width;
-    hn::Vec<decltype(d)> total[vectors];
-    for (std::size_t v = 0; v < vectors; ++v) total[v] = hn::LoadU(d, sums + v * width);
-    const auto from = hn::Set(d, base);
-    std::size_t i = 0;
-    for (; i + columns <= count; i += columns) {
-        for (std::size_t v = 0; v < vectors; ++v) {
-            const auto term = hn::Add(from, hn::LoadU(d, z + i + v * width));
-            total[v] = hn::Add(total[v], hn::Mul(term, term));
-        }
-    }
-    for (std::size_t v = 0; v < vectors; ++v) hn::StoreU(total[v], d, sums + v * width);
-    for (; i < count; ++i) {
-        const double term = base + z[i];
-        sums[i % columns] += term * term;
-    }
-}
-
 }  // namespace ringlock::allan::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -160,12 +124,9 @@ namespace ringlock::allan {
 
 HWY_EXPORT(add_squares_of_differences);
 HWY_EXPORT(add_four_octaves);
-HWY_EXPORT(third_differences);
-HWY_EXPORT(add_squares);
 
 namespace {
 
-using Columns = std::array<double, 32>;
 using Aligned = std::vector<double, tbb::cache_aligned_allocator<double>>;
 
 /// Memory of a thread that is kept from piece to piece: to ask the system for it anew costs more than to fill it.
@@ -174,37 +135,7 @@ Aligned& workspace() {
     return memory;
 }
 
-double folded_columns(Columns part) {
-    for (std::size_t half = part.size() / 2; half > 0; half /= 2) {
-        for (std::size_t i = 0; i < half; ++i) part[i] += part[i + half];
-    }
-    return part[0];
-}
-
-/// Adds up neighbours, then pairs of pairs: rounding grows with the logarithm of their number.
-SquareMean pairwise(std::vector<SquareMean> parts) {
-    if (parts.empty()) return {};
-    for (std::size_t n = parts.size(); n > 1; n = (n + 1) / 2) {
-        for (std::size_t i = 0; i < n / 2; ++i) {
-            parts[i] = parts[2 * i];
-            parts[i] += parts[2 * i + 1];
-        }
-        if (n % 2 == 1) parts[n / 2] = parts[n - 1];
-    }
-    return parts.front();
-}
-
-/// Calls work(piece) for 0...pieces-1 on all threads.
-template <class Work>
-void for_pieces(std::size_t pieces, const Work& work) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pieces, 1), [&](const tbb::blocked_range<std::size_t>& range) {
-        for (std::size_t piece = range.begin(); piece < range.end(); ++piece) work(piece);
-    });
-}
-
-/// Starts of a piece of the record, and the longest step that is taken from pieces: a piece and what its differences
-/// reach, 5 x 8192 points at most, fit a second-level cache.
-constexpr std::size_t piece_starts = 16384;
+/// The longest step that is taken from pieces of the record.
 constexpr std::size_t longest_short_step = 8192;
 /// Points of a column that is copied out of the record.
 constexpr std::size_t column_points = 40960;
@@ -333,34 +264,6 @@ void long_steps(std::span<const double> x, Difference difference, std::span<cons
     gather(parts, which, pieces, out);
 }
 
-/// Squares of the sums from `first` on: each is the one before and a third difference of the phase. Eight chains of
-/// additions side by side hide what one addition waits for the other.
-SquareMean mean_difference_piece(const double* x, std::size_t m, std::size_t count, double begin) {
-    constexpr std::size_t chains = 8;
-    alignas(64) std::array<double, piece_starts> z;
-    // z[i] is to be term i less the chain's first term.
-    const std::size_t length = (count + chains - 1) / chains;
-    HWY_DYNAMIC_DISPATCH(third_differences)(x, m, count - 1, z.data() + 1);
-    z[0] = 0.0;
-    std::array<double, chains> running{};
-    for (std::size_t i = 0; i < length; ++i) {
-        for (std::size_t k = 0; k < chains; ++k) {
-            const std::size_t at = k * length + i;
-            if (at >= count) break;
-            running[k] += z[at];
-            z[at] = running[k];
-        }
-    }
-    alignas(64) Columns columns{};
-    double base = begin;
-    for (std::size_t k = 0; k < chains && k * length < count; ++k) {
-        const std::size_t there = std::min(length, count - k * length);
-        HWY_DYNAMIC_DISPATCH(add_squares)(z.data() + k * length, base, there, columns.data());
-        base += running[k];
-    }
-    return {folded_columns(columns), static_cast<std::int64_t>(count)};
-}
-
 }  // namespace
 
 void DifferenceSums::add(const double* x, Difference difference, std::size_t m, std::size_t count) {
@@ -368,7 +271,7 @@ void DifferenceSums::add(const double* x, Difference difference, std::size_t m, 
     (x, difference.order, difference.skipping, m, count, columns_.data(), terms_);
 }
 
-SquareMean DifferenceSums::folded() const { return {folded_columns(columns_), terms_}; }
+SquareMean DifferenceSums::folded() const { return {folded_sum(columns_), terms_}; }
 
 SquareMean sum_of_differences(std::span<const double> x, Difference difference, std::size_t m, std::size_t first,
                               std::size_t last) {
@@ -419,58 +322,6 @@ std::vector<SquareMean> sums_of_differences(std::span<const double> x, Differenc
     }
     long_steps(x, difference, m, regular, row, out);
     return out;
-}
-
-void MeanDifferences::Exact::add(double x) {
-    const ExactSum sum = two_sum(value, x);
-    rest += sum.error;
-    value = sum.value;
-}
-
-MeanDifferences::MeanDifferences(std::span<const double> x) : x_(x) {
-    before_.reserve(x.size() / spacing + 1);
-    Exact total;
-    for (std::size_t i = 0; i <= x.size(); ++i) {
-        if (i % spacing == 0) before_.push_back(total);
-        if (i < x.size()) total.add(x[i]);
-    }
-}
-
-MeanDifferences::Exact MeanDifferences::before(std::size_t i) const {
-    Exact total = before_[i / spacing];
-    for (std::size_t k = i / spacing * spacing; k < i; ++k) total.add(x_[k]);
-    return total;
-}
-
-double MeanDifferences::difference(std::size_t i, std::size_t m) const {
-    const std::array<Exact, 4> at = {before(i), before(i + m), before(i + 2 * m), before(i + 3 * m)};
-    // The sums over m points first, then their differences: each step is done with what it rounds away.
-    const auto over = [&](std::size_t k) {
-        Exact sum = at[k + 1];
-        sum.add(-at[k].value);
-        sum.add(-at[k].rest);
-        return sum;
-    };
-    Exact z = over(2);
-    const Exact middle = over(1);
-    const Exact first = over(0);
-    for (const double v : {-2.0 * middle.value, -2.0 * middle.rest, first.value, first.rest}) z.add(v);
-    return z.value + z.rest;
-}
-
-SquareMean MeanDifferences::sum(std::size_t m) const {
-    if (m == 0 || x_.size() < 3 * m) return {};
-    const std::size_t starts = x_.size() - 3 * m + 1;
-    const std::size_t pieces = (starts + piece_starts - 1) / piece_starts;
-    std::vector<SquareMean> parts(pieces);
-    for_pieces(pieces, [&](std::size_t piece) {
-        const std::size_t first = piece * piece_starts;
-        parts[piece] =
-            mean_difference_piece(x_.data() + first, m, std::min(piece_starts, starts - first), difference(first, m));
-    });
-    SquareMean total = pairwise(std::move(parts));
-    total.sum /= static_cast<double>(m) * static_cast<double>(m);
-    return total;
 }
 
 }  // namespace ringlock::allan

@@ -5,20 +5,11 @@
 #include <span>
 #include <vector>
 
+#include "analysis/allan/pieces.hpp"
+
 /// Sums of squares that the estimators are made of. They do not depend on the number of threads nor on the instruction
 /// set: what is added to what is fixed by the data's positions alone.
 namespace ringlock::allan {
-
-/// Sum of squares, and how many.
-struct SquareMean {
-    double sum = 0.0;
-    std::int64_t terms = 0;
-    SquareMean& operator+=(const SquareMean& other) {
-        sum += other.sum;
-        terms += other.terms;
-        return *this;
-    }
-};
 
 /// What to do with a difference.
 struct Difference {
@@ -58,30 +49,5 @@ SquareMean sum_of_strided_differences(std::span<const double> x, Difference diff
 /// \return one for each
 std::vector<SquareMean> sums_of_differences(std::span<const double> x, Difference difference,
                                             std::span<const std::size_t> m);
-
-/// Second differences of means over m neighbouring points of one record.
-class MeanDifferences {
-   public:
-    /// \param x  phase without gaps; kept by reference
-    explicit MeanDifferences(std::span<const double> x);
-
-    /// Squares of ((x_{i+2m} + ...) - 2 (x_{i+m} + ...) + (x_i + ...))/m for every i with i + 3m <= size.
-    SquareMean sum(std::size_t m) const;
-
-   private:
-    /// A sum with twice the digits of a double.
-    struct Exact {
-        double value = 0.0;
-        double rest = 0.0;
-        void add(double x);
-    };
-    static constexpr std::size_t spacing = 256;
-
-    Exact before(std::size_t i) const;
-    double difference(std::size_t i, std::size_t m) const;
-
-    std::span<const double> x_;
-    std::vector<Exact> before_;  ///< sums over all points before every `spacing`-th one
-};
 
 }  // namespace ringlock::allan

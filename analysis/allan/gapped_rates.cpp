@@ -1,8 +1,5 @@
 #include "analysis/allan/gapped_rates.hpp"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -32,9 +29,9 @@ SquareMean GappedRates::sum(int order, std::size_t m, std::size_t stride) const 
     if (sums_.size() <= reach) return {};
     const std::size_t starts = (sums_.size() - reach - 1) / stride + 1;
     const auto wanted = static_cast<std::int64_t>(m);
-    constexpr std::size_t batch = 8192;
+    constexpr std::size_t batch = piece_starts;
     std::vector<SquareMean> parts((starts + batch - 1) / batch);
-    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t part) {
+    for_pieces(parts.size(), [&](std::size_t part) {
         SquareMean& out = parts[part];
         for (std::size_t k = part * batch; k < std::min(starts, (part + 1) * batch); ++k) {
             const std::size_t i = k * stride;
@@ -50,9 +47,7 @@ SquareMean GappedRates::sum(int order, std::size_t m, std::size_t stride) const 
             out += {z * z, 1};
         }
     });
-    SquareMean total;
-    for (const SquareMean& part : parts) total += part;
-    return total;
+    return pairwise(std::move(parts));
 }
 
 }  // namespace ringlock::allan

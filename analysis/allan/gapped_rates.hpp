@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "analysis/allan/difference_sums.hpp"
 #include "analysis/allan/phase.hpp"
+#include "analysis/allan/pieces.hpp"
 
 namespace ringlock::allan {
 

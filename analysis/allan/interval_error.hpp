@@ -3,7 +3,6 @@
 #include <span>
 #include <vector>
 
-#include "analysis/allan/difference_sums.hpp"
 #include "analysis/allan/phase.hpp"
 
 namespace ringlock::allan {

@@ -5,6 +5,7 @@
 
 #include "analysis/allan/difference_sums.hpp"
 #include "analysis/allan/phase.hpp"
+#include "analysis/allan/pieces.hpp"
 
 namespace ringlock::allan {
 
