@@ -9,6 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "analysis/allan/interval.hpp"
 #include "analysis/allan/power_law.hpp"
 
 namespace ringlock::allan {
@@ -205,7 +206,7 @@ double WeightedSquares::probability_below(double x) const {
     const double nearest = 0.5 / std::sqrt(cumulants(0.0).second);
     if (std::abs(t) < nearest) t = -nearest;
     const Cumulants k = cumulants(t);
-    const double step = 0.1 / std::sqrt(k.second);
+    const double step = 0.15 / std::sqrt(k.second);
     const double bend = 2.0 / 3.0 * common_weight_ / (1.0 - 2.0 * common_weight_ * t);
     // Trapezoids; the path is a mirror image of itself below the real axis.
     double sum = 0.0;
@@ -218,21 +219,23 @@ double WeightedSquares::probability_below(double x) const {
         const std::complex<double> value = std::exp(exponent) / s * std::complex<double>(2.0 * bend * y, 1.0);
         sum += (i == 0 ? 0.5 : 1.0) * value.imag();
         largest = std::max(largest, std::abs(value));
-        if (std::abs(value) < 1e-9 * largest) break;
+        if (std::abs(value) < 1e-8 * largest) break;
     }
     const double integral = sum * step / std::numbers::pi;
     return std::clamp(t < 0.0 ? -integral : 1.0 - integral, 0.0, 1.0);
 }
 
 double WeightedSquares::quantile(double probability) const {
-    double low = 0.5;
-    double high = 2.0;
+    // Near that of the chi-squared with as many degrees of freedom.
+    const double near = relative_chi_squared_quantile(degrees_, probability);
+    double low = 0.8 * near;
+    double high = 1.2 * near;
     while (probability_below(low) > probability && low > 1e-12) low *= 0.25;
     while (probability_below(high) < probability && high < 1e6) high *= 2.0;
     const auto distance = [&](double log_x) { return probability_below(std::exp(log_x)) - probability; };
     std::uintmax_t steps = 60;
     const auto [a, b] = boost::math::tools::toms748_solve(distance, std::log(low), std::log(high),
-                                                          boost::math::tools::eps_tolerance<double>(24), steps);
+                                                          boost::math::tools::eps_tolerance<double>(20), steps);
     return std::exp(0.5 * (a + b));
 }
 

@@ -117,16 +117,17 @@ void RunningDeviation::take(std::span<const double> data) {
 
 void RunningDeviation::put_all(const double* points, std::size_t count) {
     constexpr std::size_t most_thin = 32768;
-    for (std::size_t i = 0; i < count; ++i, ++points_) {
-        if (points_ % thinning_ != 0) continue;
+    // The first of these points that is kept, then every thinning-th.
+    const auto first = static_cast<std::size_t>((thinning_ - (points_ & (thinning_ - 1))) & (thinning_ - 1));
+    for (std::size_t i = first; i < count; i += static_cast<std::size_t>(thinning_)) {
         if (thin_.size() == most_thin) {
             for (std::size_t k = 0; k < most_thin / 2; ++k) thin_[k] = thin_[2 * k];
             thin_.resize(most_thin / 2);
-            thinning_ *= 2;
-            if (points_ % thinning_ != 0) continue;
+            thinning_ *= 2;  // the point at hand, the 2 x most_thin-th step, is one of the fewer
         }
         thin_.push_back(points[i]);
     }
+    points_ += static_cast<std::int64_t>(count);
     push(0, points, count);
 }
 

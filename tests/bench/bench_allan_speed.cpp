@@ -94,7 +94,31 @@ double total(const std::vector<allan::SquareMean>& sums) {
                            [](double t, const allan::SquareMean& s) { return t + s.sum; });
 }
 
+/// The record in a file, bytes and nothing else, which the system has in its memory.
+class RecordFile {
+   public:
+    explicit RecordFile(const std::vector<double>& x) : file_(std::tmpfile()), points_(x.size()) {
+        if (file_ == nullptr || std::fwrite(x.data(), sizeof(double), x.size(), file_) != x.size()) std::abort();
+    }
+    RecordFile(const RecordFile&) = delete;
+    RecordFile& operator=(const RecordFile&) = delete;
+    ~RecordFile() { std::fclose(file_); }
+
+    double read() {
+        std::rewind(file_);
+        buffer_.resize(points_);
+        if (std::fread(buffer_.data(), sizeof(double), points_, file_) != points_) std::abort();
+        return buffer_.back();
+    }
+
+   private:
+    std::FILE* file_;
+    std::size_t points_;
+    std::vector<double> buffer_;
+};
+
 void octaves(const std::vector<double>& x) {
+    RecordFile file(x);
     const auto factors =
         allan::octave_factors(allan::largest_factor(Estimator::oadev, static_cast<std::int64_t>(x.size())));
     const std::vector<std::size_t> m(factors.begin(), factors.end());
@@ -102,6 +126,7 @@ void octaves(const std::vector<double>& x) {
     std::vector<Contender> all = {
         {"the record read twice, one thread",
          [&] { return bench::read_all(x.data(), x.size()) + bench::read_all(x.data(), x.size()); }},
+        {"a file of it read twice, one thread", [&] { return file.read() + file.read(); }},
         {"sums of oadev, all threads", sums},
         {"sums of oadev, one thread",
          [&] {
@@ -141,7 +166,7 @@ void octaves(const std::vector<double>& x) {
         const double s = median(c.seconds);
         bench::row({c.name, fmt::format("{:.1f}", 1e3 * s),
                     fmt::format("{:.3f}", 1e9 * s / static_cast<double>(x.size() * m.size())),
-                    fmt::format("{:.2f}", ratio(c, all[1]))});
+                    fmt::format("{:.2f}", ratio(c, all[2]))});
     }
     if (python.empty()) {
         fmt::print("\nNo NumPy here to be compared with (Debian: python3-numpy).\n");
@@ -150,14 +175,16 @@ void octaves(const std::vector<double>& x) {
     const double s = median(python);
     bench::row({library + ", oadev without intervals", fmt::format("{:.1f}", 1e3 * s),
                 fmt::format("{:.3f}", 1e9 * s / static_cast<double>(x.size() * m.size())),
-                fmt::format("{:.1f}", s / median(all[1].seconds))});
+                fmt::format("{:.1f}", s / median(all[2].seconds))});
     fmt::print("\n");
     bench::head({"figure", "wanted", "reached"});
-    bench::row({"sums of oadev over the record read twice", "<= 1", fmt::format("{:.2f}", ratio(all[1], all[0]))});
-    bench::row(
-        {"plain loop over sums of oadev, one thread each", ">= 1.5", fmt::format("{:.2f}", ratio(all[3], all[2]))});
-    bench::row(
-        {library + " over oadev with noise and intervals", ">= 20", fmt::format("{:.1f}", s / median(all[4].seconds))});
+    const auto figure = [&](const std::string& what, const char* wanted, double reached) {
+        bench::row({what, wanted, fmt::format("{:.2f}", reached)});
+    };
+    figure("sums of oadev over the record read twice from memory", "<= 1", ratio(all[2], all[0]));
+    figure("sums of oadev over the record read twice from a file", "<= 1", ratio(all[2], all[1]));
+    figure("plain loop over sums of oadev, one thread each", ">= 1.5", ratio(all[4], all[3]));
+    figure(library + " over oadev with noise and intervals", ">= 20", s / median(all[5].seconds));
 }
 
 void streams(const std::vector<double>& x) {
@@ -184,7 +211,7 @@ void streams(const std::vector<double>& x) {
 
 /// Every factor, each in time proportional to the record.
 void all_factors(const std::vector<double>& x) {
-    fmt::print("\nEvery factor of shorter records, ns a point and factor.\n\n");
+    fmt::print("\nEvery factor of shorter records, the second time in a process, ns a point and factor.\n\n");
     bench::head({"points", "factors", "oadev", "mdev", "totdev"});
     for (const std::size_t n : {10'000U, 40'000U}) {
         const std::span<const double> part(x.data(), n);
@@ -192,6 +219,8 @@ void all_factors(const std::vector<double>& x) {
         for (const Estimator e : {Estimator::oadev, Estimator::mdev, Estimator::totdev}) {
             const auto factors = allan::all_factors(allan::largest_factor(e, static_cast<std::int64_t>(n)));
             if (e == Estimator::oadev) cells.push_back(std::to_string(factors.size()));
+            // Twice: distributions of few degrees of freedom are worked out once in a process.
+            kept = allan::deviation(e, part, 1.0, factors)[0].dev;
             const double s = seconds_of([&] { kept = allan::deviation(e, part, 1.0, factors)[0].dev; });
             cells.push_back(fmt::format("{:.2f}", 1e9 * s / static_cast<double>(n * factors.size())));
         }
