@@ -200,9 +200,18 @@ void from_record(const Arguments& a, const Request& request, AllanOutput& out) {
     series = {};
     for (const allan::Estimator estimator : request.estimators) {
         const std::vector<std::int64_t> factors = factors_for(request.taus, estimator, points);
-        out.deviations.emplace_back(estimator,
-                                    allan::deviation(estimator, phase, out.tau0_s, factors,
-                                                     {.confidence = a.confidence, .bias = parse_bias(a.bias)}));
+        DeviationOutput deviation{estimator, {}, {}};
+        deviation.points = allan::deviation(estimator, phase, out.tau0_s, factors,
+                                            {.confidence = a.confidence, .bias = parse_bias(a.bias)});
+        std::size_t there = 0;
+        for (const std::int64_t m : factors) {
+            if (there < deviation.points.size() && deviation.points[there].m == m) {
+                ++there;
+            } else {
+                deviation.without_terms.push_back(m);
+            }
+        }
+        out.deviations.push_back(std::move(deviation));
     }
     if (request.unit != nullptr) fit_longest(phase, out);
 }
@@ -228,7 +237,7 @@ void from_stream(const Arguments& a, const Request& request, AllanOutput& out) {
     out.streamed = true;
     check_size(a, request.kind, static_cast<std::int64_t>(out.n) + (request.kind == allan::Kind::phase ? 0 : 1), out.n);
     for (std::size_t k = 0; k < running.size(); ++k) {
-        out.deviations.emplace_back(request.estimators[k], running[k].points(a.confidence));
+        out.deviations.push_back({request.estimators[k], running[k].points(a.confidence), {}});
     }
     if (request.unit == nullptr) return;
     const std::vector<double> thin = running.front().thinned_phase();

@@ -65,9 +65,9 @@ void add_fit(const AllanOutput& out, const std::vector<double>& tau_s, report::F
 report::Figure allan_figure(const AllanOutput& out) {
     report::Figure figure;
     const bool times = std::all_of(out.deviations.begin(), out.deviations.end(),
-                                   [](const auto& d) { return allan::traits(d.first).time; });
+                                   [](const auto& d) { return allan::traits(d.estimator).time; });
     const bool rates = std::none_of(out.deviations.begin(), out.deviations.end(),
-                                    [](const auto& d) { return allan::traits(d.first).time; });
+                                    [](const auto& d) { return allan::traits(d.estimator).time; });
     figure.title = fmt::format("{}, column {}", out.data, out.column);
     figure.x_label = "averaging time tau [s]";
     figure.y_label = out.gyro ? times   ? "deviation [arcsec]"
@@ -76,9 +76,10 @@ report::Figure allan_figure(const AllanOutput& out) {
                               : "deviation";
     figure.log_x = figure.log_y = true;
     std::vector<double> tau_s;
-    for (const auto& [estimator, points] : out.deviations) {
-        figure.curves.push_back(curve_of(estimator, points));
-        if (estimates_allan_variance(estimator) && figure.curves.back().x.size() > tau_s.size()) {
+    for (const DeviationOutput& d : out.deviations) {
+        if (d.points.empty()) continue;
+        figure.curves.push_back(curve_of(d.estimator, d.points));
+        if (estimates_allan_variance(d.estimator) && figure.curves.back().x.size() > tau_s.size()) {
             tau_s = figure.curves.back().x;
         }
     }

@@ -1,6 +1,7 @@
 #include "app/allan_output.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <array>
 #include <cmath>
@@ -85,9 +86,9 @@ std::string allan_json(const AllanOutput& out) {
     json["confidence"] = number(out.confidence);
     json["stride"] = out.streamed ? "tau/8" : "tau0";
     json["deviations"] = Json::object();
-    for (const auto& [estimator, points] : out.deviations) {
+    for (const DeviationOutput& d : out.deviations) {
         Json list = Json::array();
-        for (const allan::Point& p : points) {
+        for (const allan::Point& p : d.points) {
             list.push_back({{"m", p.m},
                             {"tau_s", number(p.tau_s)},
                             {"dev", number(p.dev)},
@@ -98,7 +99,12 @@ std::string allan_json(const AllanOutput& out) {
                             {"lo", number(p.lo)},
                             {"hi", number(p.hi)}});
         }
-        json["deviations"][std::string(allan::name(estimator))] = std::move(list);
+        json["deviations"][std::string(allan::name(d.estimator))] = std::move(list);
+    }
+    json["factors_without_terms"] = Json::object();
+    for (const DeviationOutput& d : out.deviations) {
+        if (!d.without_terms.empty())
+            json["factors_without_terms"][std::string(allan::name(d.estimator))] = d.without_terms;
     }
     json["noise"] = nullptr;
     if (out.noise) {
@@ -129,7 +135,7 @@ std::string allan_text(const AllanOutput& out) {
         text += fmt::format("{} data are missing: terms that need them are left out\n", out.missing);
     }
     if (out.streamed) text += "no record kept: sums with a stride of tau/8\n";
-    for (const auto& [estimator, points] : out.deviations) {
+    for (const auto& [estimator, points, without_terms] : out.deviations) {
         const allan::Traits& t = allan::traits(estimator);
         const std::string_view unit = !out.gyro ? "" : t.time ? " [arcsec]" : " [deg/h]";
         const std::string interval =
@@ -141,6 +147,11 @@ std::string allan_text(const AllanOutput& out) {
                 fmt::format("{:>9} {:>12.6g} {:>17.6e} {:>13} {:>13} {:>10} {:>10}  {}\n", p.m, p.tau_s, p.dev,
                             shown(p.lo, 5), shown(p.hi, 5), std::isfinite(p.edf) ? fmt::format("{:.4g}", p.edf) : "-",
                             p.terms, t.has_interval ? noise_name(p.alpha) : "");
+        }
+        if (!without_terms.empty()) {
+            text += fmt::format("gaps leave no term to m = {}\n", fmt::join(without_terms, ", "));
+        } else if (points.empty()) {
+            text += "the record is too short for a term\n";
         }
     }
     if (!out.noise) {

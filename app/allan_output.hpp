@@ -1,13 +1,20 @@
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "analysis/allan/allan.hpp"
 #include "analysis/noise/fit.hpp"
 
 namespace ringlock::app {
+
+/// One deviation of the record.
+struct DeviationOutput {
+    allan::Estimator estimator = allan::Estimator::oadev;
+    std::vector<allan::Point> points;
+    std::vector<std::int64_t> without_terms;  ///< averaging factors of which gaps leave no term
+};
 
 /// Everything `ringlock allan` has to say.
 struct AllanOutput {
@@ -21,7 +28,7 @@ struct AllanOutput {
     bool streamed = false;    ///< sums with a stride of tau/8
     double tau0_s = 0.0;
     double confidence = 0.0;
-    std::vector<std::pair<allan::Estimator, std::vector<allan::Point>>> deviations;
+    std::vector<DeviationOutput> deviations;
     std::optional<noise::NoiseFit> noise;
     std::optional<std::size_t>
         noise_stretch;  ///< points of the part without gaps that was fitted, where there are gaps

@@ -142,6 +142,19 @@ TEST_F(AllanCommand, GapsAreCountedAndNotClosedUp) {
     EXPECT_THAT(run(write_rows("values.txt", false) + " --rate 2 --kind phase").out, HasSubstr("68 data are missing"));
 }
 
+TEST_F(AllanCommand, FactorsThatGapsLeaveNothingOfAreNamed) {
+    const auto path = directory_ / "gaps.txt";
+    std::ofstream(path) << "1\nnan\n2\nnan\n3\nnan\n4\n5\n7\n";
+    const Outcome text = run(path.string() + " --rate 1 --kind rate --dev oadev,mdev");
+    EXPECT_EQ(text.status, 0);
+    EXPECT_THAT(text.out, HasSubstr("gaps leave no term to m = 2, 4"));
+    const auto json = nlohmann::json::parse(run(path.string() + " --rate 1 --kind rate --tau 1,2 --json").out);
+    EXPECT_EQ(json["deviations"]["oadev"].size(), 1u);
+    EXPECT_EQ(json["factors_without_terms"]["oadev"], nlohmann::json::array({2}));
+    std::ofstream(path) << "1\n2\n";
+    EXPECT_THAT(run(path.string() + " --rate 1 --kind rate --dev hdev").out, HasSubstr("too short for a term"));
+}
+
 TEST_F(AllanCommand, StreamsAgreeWithRecords) {
     const auto angle = test::simulate_angle({.n = 0.3}, 40'000, 0.5, 3);
     std::vector<double> rates;
