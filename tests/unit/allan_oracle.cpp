@@ -1,12 +1,16 @@
 #include "tests/support/allan_oracle.hpp"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "analysis/allan/allan.hpp"
+#include "engine/simd/target.hpp"
 
 /// The estimators against their definitions in quadruple precision.
 namespace {
@@ -110,6 +114,37 @@ TEST(AllanOracle, RealPhaseFarFromZeroKeepsItsDigits) {
                 << t.name << " m = " << p.m;
         }
     }
+}
+
+// Octaves of a record longer than a piece take every way that sums are made: four octaves at once, single steps,
+// columns, third differences, means of a phase with gaps.
+TEST(AllanOracle, BitsDependNeitherOnTheInstructionSetNorOnThreads) {
+    const std::vector<std::int64_t> x = counts(70'001, 5);
+    std::vector<double> real;
+    for (const std::int64_t v : x) real.push_back(0.1 * static_cast<double>(v - x[0]));
+    const allan::Phase whole = allan::phase_of(real, allan::Kind::phase, 1.0);
+    real[12'345] = std::numeric_limits<double>::quiet_NaN();
+    const allan::Phase gapped = allan::phase_of(real, allan::Kind::phase, 1.0);
+    using allan::Estimator;
+    const auto all = [&] {
+        std::vector<double> out;
+        for (const allan::Phase* phase : {&whole, &gapped}) {
+            for (const Estimator e : {Estimator::oadev, Estimator::ohdev, Estimator::adev, Estimator::mdev,
+                                      Estimator::totdev, Estimator::tierms}) {
+                const auto factors = allan::octave_factors(allan::largest_factor(e, 70'001));
+                for (const allan::Point& p : allan::deviation(e, *phase, 1.0, factors)) out.push_back(p.dev);
+            }
+        }
+        return out;
+    };
+    const std::vector<double> best = all();
+    for (const std::string& target : simd::available_targets()) {
+        simd::use_target(target);
+        EXPECT_EQ(all(), best) << target;
+    }
+    simd::use_best_target();
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    EXPECT_EQ(all(), best);
 }
 
 }  // namespace
