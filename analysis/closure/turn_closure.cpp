@@ -237,6 +237,7 @@ Closure close_turns(const record::Record& record) {
             "the dither's shape is not looked for");
     }
     closure.heldout_before = heldout(*now->fit).error;
+    const double base_log_likelihood = now->fit->log_likelihood();
     // Before the first effect that was taken on the strength of a random rate.
     struct Earlier {
         std::shared_ptr<Fitted> now;
@@ -294,6 +295,7 @@ Closure close_turns(const record::Record& record) {
                                        [&](const ResidualTest& test) { return test.view == told.view; });
         closure.unexplained = same == closure.tests.end() ? told : *same;
     }
+    closure.log_likelihood_gain = now->fit->log_likelihood() - base_log_likelihood;
     take_residual(turns, *now, closure);
     take_figures(turns, *fit_record(record, now->fit->parameters(), Rows(turns.size(), 1)), closure);
     closure.verdict = verdict_of(closure);
@@ -328,7 +330,9 @@ Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>&
     TurnParameters start;
     start.effects = since_first_turn(effects, record);
     const auto whole = fit_record(record, start, Rows(turns.size(), 1));
-    const auto train = fit_record(record, whole->fit->parameters(), by_blocks(turns.size(), roles));
+    const Rows rows = by_blocks(turns.size(), roles);
+    const auto train = fit_record(record, whole->fit->parameters(), rows);
+    closure.log_likelihood_gain = train->fit->log_likelihood() - fit_record(record, {}, rows)->fit->log_likelihood();
     for (const ActiveEffect& active : effects) closure.steps.emplace_back().effect = std::string(active.effect->name());
     take_residual(turns, *train, closure);
     closure.heldout_before = closure.heldout_after;

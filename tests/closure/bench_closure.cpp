@@ -3,8 +3,9 @@
 //   bench_closure FOLDER [--share S] [--only KIND] [--seed N]
 //
 // FOLDER gets records.csv (a row a record), deviations.csv (estimates less truth, in standard errors), confusion.csv
-// and the tables of the page: figures.md, confusion.md, calibration.md. A share S of 0.1 makes a tenth of the records;
-// with a seed only that record is made, and kept as record.h5. tools/closure puts the tables into the page.
+// and the tables of the page: figures.md, misses.md, confusion.md, calibration.md. A share S of 0.1 makes a tenth of
+// the records; with a seed only that record is made, and kept as record.h5. tools/closure puts the tables into the
+// page.
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 

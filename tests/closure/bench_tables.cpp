@@ -35,6 +35,19 @@ double quantile(std::vector<double> values, double at) {
     return values[static_cast<std::size_t>(at * static_cast<double>(values.size() - 1))];
 }
 
+bool of_library(Kind kind) { return kind == Kind::single || kind == Kind::pair; }
+
+bool settled(const Outcome& o) { return o.judged == Judged::right || o.judged == Judged::tie; }
+
+/// Whether the record prefers the truth to what was answered by as much as the level asks for.
+bool shown(const Outcome& o) { return o.truth_gain - o.answer_gain >= o.asked_gain; }
+
+std::string answer_of(const Outcome& o) {
+    std::string answer = o.verdict == "unexplained" ? "unexplained, " + o.where : o.named;
+    if (o.verdict == "unexplained" && !o.named.empty()) answer += ", after " + o.named;
+    return answer.empty() ? "nothing_missing" : answer;
+}
+
 /// How often what came out.
 void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const Outcomes& outcomes,
                    const char* record_length) {
@@ -57,8 +70,20 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
     row("single effects at their detection limit, named right", count(kind(Kind::single, 1.0), is(Judged::right)));
     row("... ties that hold the truth", count(kind(Kind::single, 1.0), is(Judged::tie)));
     row("... not seen", count(kind(Kind::single, 1.0), is(Judged::missed)));
+    const auto missed_though_shown = [&](Kind of, double multiple) {
+        std::size_t missed = 0;
+        std::size_t though = 0;
+        for (std::size_t k = 0; k < truths.size(); ++k) {
+            if (!outcomes[k] || !kind(of, multiple)(truths[k]) || outcomes[k]->missing.empty()) continue;
+            ++missed;
+            if (shown(*outcomes[k])) ++though;
+        }
+        row("... of those that miss something, such whose record shows it", share_of(though, missed));
+    };
+    missed_though_shown(Kind::single, 1.0);
     row("single effects at twice their limit, named right", count(kind(Kind::single, 2.0), is(Judged::right)));
     row("... ties that hold the truth", count(kind(Kind::single, 2.0), is(Judged::tie)));
+    missed_though_shown(Kind::single, 2.0);
     for (const double multiple : {6.0, 30.0}) {
         const auto of = kind(Kind::single, multiple);
         if (std::none_of(truths.begin(), truths.end(), of)) continue;
@@ -69,6 +94,7 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
     row("pairs, each at twice its limit, both named", count(kind(Kind::pair, 2.0), is(Judged::right)));
     row("... ties that hold the truth", count(kind(Kind::pair, 2.0), is(Judged::tie)));
     row("... not both of them", count(kind(Kind::pair, 2.0), is(Judged::missed)));
+    missed_though_shown(Kind::pair, 2.0);
     row("effects outside the library, `unexplained` with the right place",
         count(kind(Kind::foreign, 0.0), is(Judged::right)));
     const auto all = [](const TableRow&) { return true; };
@@ -102,10 +128,7 @@ void write_confusion(std::ostream& out, std::ostream& matrix, const std::vector<
     for (std::size_t k = 0; k < truths.size(); ++k) {
         if (!outcomes[k] || truths[k].kind == Kind::pair) continue;
         const Outcome& o = *outcomes[k];
-        std::string answer = o.verdict == "unexplained" ? "unexplained, " + o.where : o.named;
-        if (o.verdict == "unexplained" && !o.named.empty()) answer += ", after " + o.named;
-        if (answer.empty()) answer = "nothing_missing";
-        ++taken[{truths[k].truth, truths[k].multiple}][answer];
+        ++taken[{truths[k].truth, truths[k].multiple}][answer_of(o)];
     }
     fmt::print(out, "| in the record | size over its limit | taken for |\n|---|---|---|\n");
     matrix << "truth,multiple,answer,records\n";
@@ -122,6 +145,23 @@ void write_confusion(std::ostream& out, std::ostream& matrix, const std::vector<
         }
         fmt::print(out, "| {} | {} | {} |\n", truth.first, truth.second > 0.0 ? fmt::format("{:g}", truth.second) : "-",
                    text);
+    }
+}
+
+/// What was neither right nor a tie from twice the limit on, and what the record says of it.
+void write_misses(std::ostream& out, const std::vector<TableRow>& truths, const Outcomes& outcomes) {
+    fmt::print(
+        out,
+        "| record | in it | size over its limit | answer | not named | gain of the truth over the base model | over "
+        "the answer | asked for |\n|---|---|---|---|---|---|---|---|\n");
+    const auto nats = [](double gain) { return std::isfinite(gain) ? fmt::format("{:.1f}", gain) : std::string("-"); };
+    for (std::size_t k = 0; k < truths.size(); ++k) {
+        const TableRow& of = truths[k];
+        if (!outcomes[k] || !of_library(of.kind) || of.multiple < 2.0 || settled(*outcomes[k])) continue;
+        const Outcome& o = *outcomes[k];
+        fmt::print(out, "| {} ({}) | {} | {:g} | {} | {} | {} | {} | {} |\n", of.seed, of.condition, of.truth,
+                   of.multiple, answer_of(o), fmt::join(o.missing, ", "), nats(o.truth_gain),
+                   nats(o.truth_gain - o.answer_gain), nats(o.asked_gain));
     }
 }
 
@@ -216,17 +256,18 @@ void Tables::write() const {
     std::ofstream deviations(folder_ + "/deviations.csv");
     fmt::print(rows,
                "kind,truth,multiple,condition,by,seed,values,judged,false_name,verdict,named,where,expected,"
-               "before_{0},after_{0},floor_{0},oracle_{0},seconds\n",
+               "before_{0},after_{0},floor_{0},oracle_{0},truth_gain,answer_gain,seconds\n",
                unit_);
     fmt::print(deviations, "kind,truth,condition,seed,parameter,estimate,standard_error,standard_errors_off\n");
     for (std::size_t k = 0; k < truths_.size(); ++k) {
         if (!outcomes_[k]) continue;
         const TableRow& of = truths_[k];
         const Outcome& o = *outcomes_[k];
-        fmt::print(rows, "{},{},{},\"{}\",{},{},{},{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.2f}\n",
+        fmt::print(rows,
+                   "{},{},{},\"{}\",{},{},{},{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.2f},{:.2f},{:.2f}\n",
                    name_of(of.kind), of.truth, of.multiple, of.condition, of.by, of.seed, of.values, name_of(o.judged),
                    o.false_name ? 1 : 0, o.verdict, o.named, o.where, of.expected, o.before, o.after, o.floor, o.oracle,
-                   o.seconds);
+                   o.truth_gain, o.answer_gain, o.seconds);
         for (const auto& d : o.deviations) {
             fmt::print(deviations, "{},{},\"{}\",{},{},{:.9g},{:.3g},{:.4f}\n", name_of(of.kind), of.truth,
                        of.condition, of.seed, d.parameter, d.value, d.sd, d.standard_errors);
@@ -235,9 +276,11 @@ void Tables::write() const {
     std::ofstream figures(folder_ + "/figures.md");
     std::ofstream confusion(folder_ + "/confusion.md");
     std::ofstream matrix(folder_ + "/confusion.csv");
+    std::ofstream misses(folder_ + "/misses.md");
     std::ofstream calibration(folder_ + "/calibration.md");
     write_figures(figures, truths_, outcomes_, record_length_);
     write_confusion(confusion, matrix, truths_, outcomes_);
+    write_misses(misses, truths_, outcomes_);
     write_calibration(calibration, outcomes_);
 }
 

@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <random>
 #include <set>
 
+#include "analysis/closure/decision.hpp"
 #include "analysis/instrument/simulate.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
@@ -313,6 +315,23 @@ std::vector<Case> foreign_cases(std::size_t each) {
     return cases;
 }
 
+double gain_asked(const std::vector<std::string>& missing, double library) {
+    constexpr double none = std::numeric_limits<double>::quiet_NaN();
+    double least = std::numeric_limits<double>::infinity();
+    for (const std::string& effect : missing) {
+        const effects::Effect& of = *effects::find(effect);
+        if (ringlock::closure::told_by_other_columns(of)) return none;
+        const auto parameters = of.parameters();
+        const auto freedom = std::count_if(parameters.begin(), parameters.end(), [](const effects::Parameter& p) {
+            return p.role != effects::Role::time && p.role != effects::Role::frequency;
+        });
+        const boost::math::chi_squared chi2(static_cast<double>(freedom));
+        const double level = ringlock::closure::level_of_effects / library;
+        least = std::min(least, 0.5 * boost::math::quantile(boost::math::complement(chi2, level)));
+    }
+    return std::isfinite(least) ? least : none;
+}
+
 void compare(const Closure& closure, bool foreign, Where where, const std::vector<Added>& truth, Outcome& outcome) {
     outcome.verdict = std::string(name_of(closure.verdict));
     outcome.before = closure.heldout_before;
@@ -336,11 +355,13 @@ void compare(const Closure& closure, bool foreign, Where where, const std::vecto
         }
         bool tied_to_truth = false;
         for (const std::string& other : step.confounded_with) {
-            if (missing.erase(other) > 0) tied_to_truth = true;
+            missing.erase(other);
+            tied_to_truth = tied_to_truth || true_effects.contains(other);
         }
         ties = ties || tied_to_truth;
         if (!tied_to_truth) outcome.false_name = true;
     }
+    outcome.missing.assign(missing.begin(), missing.end());
     if (closure.verdict == Verdict::unexplained) {
         outcome.judged =
             foreign && closure.unexplained->where == where && !outcome.false_name ? Judged::right : Judged::unexplained;
@@ -360,13 +381,17 @@ Outcome judge(const Case& of, const record::Record& record) {
     outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const bool foreign = of.kind == Kind::foreign;
     compare(closure, foreign, of.where, of.truth, outcome);
+    outcome.answer_gain = closure.log_likelihood_gain;
     if (foreign) return outcome;
 
     std::vector<ActiveEffect> known;
     for (const Added& added : of.truth) {
         known.push_back({effects::find(added.effect), {added.values.begin(), added.values.end()}});
     }
-    outcome.oracle = fit_turns(record, known).heldout_after;
+    const Closure oracle = fit_turns(record, known);
+    outcome.oracle = oracle.heldout_after;
+    outcome.truth_gain = oracle.log_likelihood_gain;
+    outcome.asked_gain = gain_asked(outcome.missing, static_cast<double>(effects::registry().size()));
     if (outcome.judged != Judged::right) return outcome;
     const Device device = device_of(of);
     const std::map<std::string, double> base_truth = {

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <span>
 #include <string>
@@ -83,6 +84,12 @@ struct Outcome {
     std::string where;
     double before = 0.0, after = 0.0, floor = 0.0;
     double oracle = 0.0;  ///< held-out error of the true model; NaN where the library does not have it
+    /// Of the true model and of the one answered over the base model, on the rows that choose [nats]; NaN where there
+    /// is none. Effects that change the phases as they are read have another base.
+    double truth_gain = std::numeric_limits<double>::quiet_NaN();
+    double answer_gain = std::numeric_limits<double>::quiet_NaN();
+    std::vector<std::string> missing;                              ///< true effects that are neither named nor tied
+    double asked_gain = std::numeric_limits<double>::quiet_NaN();  ///< for these, see gain_asked
     double seconds = 0.0;
     struct Deviation {
         std::string parameter;
@@ -90,6 +97,11 @@ struct Outcome {
     };
     std::vector<Deviation> deviations;  ///< of the estimates, where the truth has been named
 };
+
+/// What the least of these effects must add to the log-likelihood [nats] to pass the family-wise level over a library
+/// of that size, were its time or frequency known beforehand. NaN where there is none, or one that other columns tell
+/// of.
+double gain_asked(const std::vector<std::string>& missing, double library);
 
 /// An answer held against the truth: what was said, and what that is judged. The oracle's error is left to be found.
 void compare(const ringlock::closure::Closure& closure, bool foreign, ringlock::closure::Where where,
