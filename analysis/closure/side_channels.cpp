@@ -95,6 +95,21 @@ double free_of_phase(std::vector<double>& series, const std::vector<std::uint8_t
     return std::sqrt(squares / static_cast<double>(n));
 }
 
+/// What a rotation adds to `sides` at a turn. The phase stands still asin(share)/w off the dither's turn, where the
+/// acceleration changes by w share/sqrt(1 - share^2) of itself a second; by two pulses t_1 and t_2 after that
+/// (sqrt(a) = sqrt(2) (sqrt(d_2) - sqrt(d_1))/(t_2 - t_1)) it comes out too large by (t_1 + t_2)/3 of it, before it too
+/// small.
+double sides_by_jerk(int direction, double phase_rad, double share, const TurnSeries& series) {
+    constexpr double quarter_rad = 0.5 * units::pi;
+    const double quarters = phase_rad / quarter_rad;
+    const double first_rad =
+        quarter_rad * (direction > 0 ? std::ceil(quarters) - quarters : quarters - std::floor(quarters));
+    const double root = std::sqrt(1.0 - share * share);
+    const double angles = (std::sqrt(2.0 * first_rad) + std::sqrt(2.0 * (first_rad + quarter_rad))) /
+                          std::sqrt(series.amplitude_rad * root);  // w (t_1 + t_2)
+    return share / root * angles / 6.0;
+}
+
 /// Chi-squared of a mean, with the doubt of its standard error in it: what a normal deviate of the same rarity has.
 double chi2_of(const BlockMean& mean, double expected) {
     if (!std::isfinite(mean.sd) || mean.sd == 0.0) return 0.0;
@@ -121,20 +136,30 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     }
     // Clocks that find the zero-rate point from pulses do not follow the lock-in's shift of it all the way.
     const double followed_s = free_of_phase(late, valid, fit);
-    // Beneath: what the approximations of turn times leave, 1e-7 of an asymmetry, and a twentieth of what they do not
-    // follow.
-    const double least_s = std::hypot(5e-8 * series.interval_s, 0.05 * followed_s);
+    // Beneath: what the approximations of turn times leave, 1e-7 of an asymmetry, a twentieth of what they do not
+    // follow, and what they would not of a rotation: middles between pulses lie off by w^2 t^2/6 of the shift.
+    double mean_share = 0.0;
+    const auto share_at = [&](std::size_t i) {
+        return series.relative_rate(fit.parameters().bias_deg_h + series.input_rate_deg_h[i]);
+    };
+    for (std::size_t i = 0; i < n; ++i) mean_share += share_at(i) / static_cast<double>(n);
+    const double w = units::pi / series.interval_s;
+    const double least_s =
+        std::hypot(5e-8 * series.interval_s, 0.05 * followed_s, mean_share / (series.amplitude_rad * w));
     DitherShape shape{block_mean(late, valid, fit.rows(), least_s), {}, {}};
     std::vector<double> sides(n, 0.0);
     std::vector<double> minima(n, 0.0);
     std::fill(valid.begin(), valid.end(), std::uint8_t{0});
     std::size_t seen = 0;
+    double jerks = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
         if (!(turns.accel_before_rad_s2[i] > 0.0) || !(turns.accel_after_rad_s2[i] > 0.0)) continue;
         const double before = std::log(turns.accel_before_rad_s2[i] / series.acceleration_rad_s2);
         const double after = std::log(turns.accel_after_rad_s2[i] / series.acceleration_rad_s2);
         if (std::abs(before) > 1.0 || std::abs(after) > 1.0) continue;
-        sides[i] = 0.25 * series.direction[i] * (after - before);
+        const double jerk = sides_by_jerk(series.direction[i], fit.model().phase_rad()[i], share_at(i), series);
+        jerks += jerk;
+        sides[i] = 0.25 * series.direction[i] * (after - before) - jerk;
         minima[i] = 0.25 * series.direction[i] * (after + before);
         valid[i] = 1;
         ++seen;
@@ -142,11 +167,13 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     if (seen > n / 4) {
         // Accelerations are computed from distances that the detectors have read: their ellipse is in them.
         const gyro::Ellipse ellipse = fit.model().setup(fit.parameters()).ellipse;
+        constexpr double of_jerk = 0.2;  // pulses may be made accelerations of in other ways
+        const double least_sides = of_jerk * std::abs(jerks) / static_cast<double>(seen);
         const double least_ratio = 1e-5 + std::max({std::abs(ellipse.gain), std::abs(ellipse.offset_sin),
                                                     std::abs(ellipse.offset_cos), std::abs(ellipse.orthogonality_rad)});
         free_of_phase(sides, valid, fit);
         free_of_phase(minima, valid, fit);
-        shape.sides = block_mean(sides, valid, fit.rows(), least_ratio);
+        shape.sides = block_mean(sides, valid, fit.rows(), std::hypot(least_ratio, least_sides));
         shape.turns = block_mean(minima, valid, fit.rows(), least_ratio);
     }
     return shape;

@@ -216,6 +216,19 @@ void take_residual(const record::Turns& turns, const Fitted& fitted, Closure& cl
     }
 }
 
+/// The first fit. Where the declared device, or the standard one, cannot have made such turns, nothing else will do.
+std::shared_ptr<Fitted> fit_base(const record::Record& record, const Rows& rows) {
+    try {
+        return fit_record(record, {}, rows);
+    } catch (const RunError&) {
+        throw InputError(
+            "/turns: half cycles of so few fringes beside so strong a lock-in cannot be followed, since the phase "
+            "never "
+            "runs fast in them; record with more dither, or declare lock-in threshold and scale factor where they are "
+            "wrong or missing");
+    }
+}
+
 }  // namespace
 
 Closure close_turns(const record::Record& record) {
@@ -224,7 +237,7 @@ Closure close_turns(const record::Record& record) {
     closure.level = level;
     const record::Turns& turns = *record.turns;
     const Rows rows = by_blocks(turns.size(), roles);
-    auto now = fit_record(record, {}, rows);
+    auto now = fit_base(record, rows);
     if (!now->series.scale_factor_declared) {
         closure.notes.push_back(
             fmt::format("the record declares no scale factor; {:g} arcsec per fringe assumed, with "

@@ -147,6 +147,14 @@ double p_of(const Fitted& fitted, const Fitted& without, const Candidate& candid
     return of_several(p_of_gain(gain_of(fitted, without), *candidate.effect), candidate.searched);
 }
 
+/// The noise of the dither at the turns by how neighbouring swings of one sign differ, which have four of its values in
+/// them [rad].
+double injected_by_swings(const TurnSeries& series) {
+    double squares = 0.0;
+    for (std::size_t i = 0; i + 3 < series.size(); ++i) squares += std::pow(series.swing[i + 2] - series.swing[i], 2);
+    return series.amplitude_rad * std::sqrt(squares / static_cast<double>(series.size()));
+}
+
 }  // namespace
 
 std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParameters& start, const Rows& rows,
@@ -162,11 +170,18 @@ std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParam
     fitted->series = prepare(record, fitted->joined);
     fitted->model = std::make_unique<TurnModel>(fitted->series, fitted->joined.phase_rad);
     TurnParameters parameters = start;
-    if (parameters.readout_sd_rad == 0.0) {
+    const bool from_nothing = parameters.readout_sd_rad == 0.0;
+    if (from_nothing) {
         parameters.readout_sd_rad = std::max(fitted->joined.readout_sd_rad, 1e-6);
         parameters.threshold_deg_h = fitted->series.setup.lockin_threshold_deg_h;
     }
     fitted->fit = std::make_unique<TurnFit>(*fitted->model, parameters, rows, effects);
+    if (!from_nothing) return fitted;
+    // Where noise is injected the swings say how much: a fit that is not told may end beside a summit.
+    parameters.injected_sd_rad = injected_by_swings(fitted->series);
+    if (parameters.injected_sd_rad < parameters.readout_sd_rad) return fitted;
+    auto other = std::make_unique<TurnFit>(*fitted->model, parameters, rows, effects);
+    if (other->log_likelihood() > fitted->fit->log_likelihood()) fitted->fit = std::move(other);
     return fitted;
 }
 

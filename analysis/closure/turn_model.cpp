@@ -46,12 +46,15 @@ std::vector<double> TurnModel::dither_swings(const Kicks& kicks) const {
     std::vector<double> swing(n, 1.0);
     double sums[2] = {};
     double counts[2] = {};
+    const auto over = [&](std::size_t i) {
+        return swing_over_dither(series_.relative_rate(series_.mean_rate_deg_h + series_.input_rate_deg_h[i]));
+    };
     for (std::size_t i = 0; i + 1 < n; ++i) {
         // Were the lock-in left in it, kicks would depend on their own size.
         const double lockin = kicks[i].after_rad + kicks[i + 1].before_rad;
         const double rotation =
             units::two_pi / series_.setup.scale_factor_arcsec * series_.interval_s * series_.input_rate_deg_h[i];
-        swing[i] = series_.direction[i] * (phase_rad_[i + 1] - phase_rad_[i] - lockin - rotation);
+        swing[i] = series_.direction[i] * (phase_rad_[i + 1] - phase_rad_[i] - lockin - rotation) / over(i);
         const std::size_t side = series_.direction[i] > 0 ? 0 : 1;
         sums[side] += swing[i];
         counts[side] += 1.0;
@@ -151,6 +154,8 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     const Kicks& kick_of = *shared_kicks;
     const std::vector<double> swing = dither_swings(kick_of);
     std::vector<double> factors(n, 1.0);
+    const double w = units::pi / series_.interval_s;
+    const double peak_rad_s = series_.amplitude_rad * w;
     const std::complex<double> coupling_turn = std::polar(device.coupling.b_rad_s, device.coupling.phase_rad);
     for (std::size_t i = 0; i < n; ++i) {
         for (const ActiveEffect& active : parameters.effects) {
@@ -159,9 +164,10 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         // From the zero-rate point to the dither's own turn.
         const double rate_deg_h = parameters.bias_deg_h + series_.input_rate_deg_h[i];
         const double sine = turned_[i].real() * coupling_turn.imag() + turned_[i].imag() * coupling_turn.real();
-        const double coupling = factors[i] * sine;
-        prediction.turn_s[i] =
-            series_.time_s[i] + series_.direction[i] * (c * rate_deg_h + coupling) / series_.acceleration_rad_s2;
+        const double rate_rad_s = c * rate_deg_h + factors[i] * sine;
+        const bool before = series_.direction[i] * rate_rad_s > 0.0;
+        const double share = rate_rad_s / (peak_rad_s * swing[before && i > 0 ? i - 1 : i]);
+        prediction.turn_s[i] = series_.time_s[i] + series_.direction[i] * std::asin(std::clamp(share, -1.0, 1.0)) / w;
     }
     const std::vector<double> turn_s = smooth(prediction.turn_s);
     const std::vector<double> input_arcsec = series_.input_angles_arcsec(turn_s);

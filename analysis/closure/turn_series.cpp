@@ -129,6 +129,40 @@ std::vector<double> TurnSeries::input_angles_arcsec(std::span<const double> time
     return angles;
 }
 
+double swing_over_dither(double share) { return std::sqrt(1.0 - share * share) + share * std::asin(share); }
+
+namespace {
+
+/// Amplitude and swings of the dither from those of the phase. Of the swings, which are relative, only what the
+/// rotation changes from turn to turn is taken.
+void take_rotation_from_swings(double half_swing_rad, TurnSeries& series) {
+    constexpr double most_share = 0.5;
+    constexpr int passes = 12;  // each a tenth of the one before, or less
+    const auto n = static_cast<double>(series.size());
+    const auto rate_deg_h = [&](std::size_t i) { return series.mean_rate_deg_h + series.input_rate_deg_h[i]; };
+    std::vector<double> over(series.size(), 1.0);
+    double mean = 1.0;
+    for (int pass = 0; pass < passes; ++pass) {
+        series.amplitude_rad = half_swing_rad / mean;
+        mean = 0.0;
+        for (std::size_t i = 0; i < over.size(); ++i) {
+            over[i] = swing_over_dither(std::clamp(series.relative_rate(rate_deg_h(i)), -1.0, 1.0));
+            mean += over[i] / n;
+        }
+    }
+    for (std::size_t i = 0; i < over.size(); ++i) {
+        series.swing[i] *= mean / over[i];
+        const double share = std::abs(series.relative_rate(rate_deg_h(i)));
+        if (share < most_share) continue;
+        throw InputError(fmt::format(
+            "/turns: at turn {} the gyro rotates by {:.4g} deg/h, {:.0f} % of the dither's peak rate; the "
+            "phase must reverse well within each half cycle: records with more than {:.0f} % are not closed",
+            i, rate_deg_h(i), 100.0 * share, 100.0 * most_share));
+    }
+}
+
+}  // namespace
+
 TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
     constexpr std::size_t fewest = 400;
     const record::Turns& turns = *record.turns;
@@ -154,6 +188,13 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
         series.input_rate_deg_h[i] = record.input_rate_deg_h.at(turns.time_s[i]);
     }
     series.interval_s = series.time_s.back() / static_cast<double>(n - 1);
+    // Between turns of one kind: the dither is not in it.
+    const std::size_t last = (n - 1) / 2 * 2;
+    double input = 0.0;
+    for (std::size_t i = 0; i < last; ++i) input += series.input_rate_deg_h[i] / static_cast<double>(last);
+    series.mean_rate_deg_h = (joined.phase_rad[last] - joined.phase_rad[0]) / series.time_s[last] *
+                                 setup.scale_factor_arcsec / units::two_pi -
+                             input;
     // Rotation lengthens swings of one sign and shortens those of the other: no matter of the dither's amplitude.
     const double rotation_rad = units::two_pi / setup.scale_factor_arcsec * series.interval_s;
     double swings_of[2] = {};
@@ -176,7 +217,7 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
     }
     for (std::size_t i = 0; i + 1 < n; ++i) series.swing[i] /= swings_of[turns.direction[i] > 0 ? 0 : 1];
     series.swing[n - 1] = 1.0;
-    series.amplitude_rad = 0.5 * swings;
+    take_rotation_from_swings(0.5 * swings, series);
     setup.dither_frequency_hz = 0.5 / series.interval_s;
     const double w = units::pi / series.interval_s;
     // A = 2 pi Omega_D/(K w)
@@ -193,13 +234,6 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
         series.input_angle[k] = series.input_angle[k - 1] +
                                 0.5 * (rows.value[k] + rows.value[k - 1]) * (rows.time_s[k] - rows.time_s[k - 1]);
     }
-    // Between turns of one kind: the dither is not in it.
-    const std::size_t last = (n - 1) / 2 * 2;
-    double input = 0.0;
-    for (std::size_t i = 0; i < last; ++i) input += series.input_rate_deg_h[i] / static_cast<double>(last);
-    series.mean_rate_deg_h = (joined.phase_rad[last] - joined.phase_rad[0]) / series.time_s[last] *
-                                 setup.scale_factor_arcsec / units::two_pi -
-                             input;
     if (!record.temperature_c.empty()) {
         const double start = record.temperature_c.at(turns.time_s[0]);
         for (std::size_t i = 0; i < n; ++i) {

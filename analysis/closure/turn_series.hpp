@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "analysis/record/record.hpp"
+#include "engine/core/units.hpp"
 #include "engine/gyro/setup.hpp"
 
 namespace ringlock::closure {
@@ -26,6 +27,10 @@ struct JoinedPhase {
 /// the phase; otherwise two of them and more become whole fringes.
 JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool count_again);
 
+/// How much further the phase swings than the dither, rotation of the mean half cycle taken off, where the input is
+/// that share of its peak rate: the phase turns asin(share) later or sooner than the dither. 1 + share^2/2 and so on.
+double swing_over_dither(double share);
+
 /// A turn record prepared for the fit.
 struct TurnSeries {
     gyro::Setup setup;  ///< as declared, or standard, with dither frequency and amplitude as measured; no effects
@@ -35,7 +40,7 @@ struct TurnSeries {
     std::vector<int> direction;
     std::vector<double> swing;  ///< of the half cycle after each turn, over the mean one
     double interval_s = 0.0;
-    double amplitude_rad = 0.0;  ///< half the mean swing
+    double amplitude_rad = 0.0;  ///< of the dither: half the mean swing but for what the rotation adds to it
     double acceleration_rad_s2 = 0.0;
     double radius_sd_rad = 0.0;                ///< of the quadrature, over its mean
     std::vector<double> temperature_change_k;  ///< since the first turn; empty where unknown
@@ -47,6 +52,10 @@ struct TurnSeries {
     bool all_phases_come = true;
 
     std::size_t size() const { return time_s.size(); }
+    /// A rotation over the dither's peak rate, so that the phase stands still asin of it off the dither's turns.
+    double relative_rate(double rate_deg_h) const {
+        return units::two_pi / setup.scale_factor_arcsec * rate_deg_h * interval_s / (units::pi * amplitude_rad);
+    }
     /// Integral of the input rate from the first turn on to each of these times [arcsec], exact between the rows of the
     /// reference. Fastest where each time is near the last.
     std::vector<double> input_angles_arcsec(std::span<const double> times_s) const;

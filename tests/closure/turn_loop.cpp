@@ -9,6 +9,7 @@
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/report.hpp"
 #include "analysis/instrument/simulate.hpp"
+#include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 #include "engine/scenario/check.hpp"
 #include "engine/scenario/scenario.hpp"
@@ -69,6 +70,79 @@ TEST(TurnLoop, NothingIsMissingWhereNothingIs) {
             EXPECT_NEAR(closure.heldout_after / closure.noise_floor, 1.0, 0.06);
         }
     }
+}
+
+/// Such a rotation moves zero-rate points by its share of the dither's peak rate, 2.8 and 28 % here, and lets swings
+/// and accelerations differ from the dither's.
+TEST(TurnLoop, AStrongRotationIsNoShapeOfTheDither) {
+    std::vector<Truth> truths;
+    for (const double rate_deg_h : {-5000.0, 50000.0}) {
+        for (const double injected_rad : {0.0, 6.0}) {
+            Truth truth;
+            truth.scale_factor_arcsec = 1.2;
+            truth.dither_frequency_hz = 450.0;
+            truth.dither_peak_rate_deg_s = 50.0;
+            truth.injected_noise_rad = injected_rad;
+            truth.input_rate_deg_h = rate_deg_h;
+            truth.bias_deg_h = -16.9;
+            truth.readout_noise = 0.001;
+            truth.turns = 6000;
+            truth.seed = 40 + truths.size();
+            truths.push_back(truth);
+        }
+    }
+    const auto records = generate(truths);
+    for (std::size_t k = 0; k < records.size(); ++k) {
+        const Closure closure = close_loop(records[k]);
+        print("rotating", closure);
+        EXPECT_EQ(closure.verdict, Verdict::nothing_missing) << k;
+        EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", truths[k].lockin_threshold_deg_h), 4.0) << k;
+        EXPECT_LT(deviation(closure.base, "bias_deg_h", truths[k].bias_deg_h), 4.0) << k;
+    }
+}
+
+/// Where the dither swings little, injected noise is a part of it that matters: the fit must not end where a threshold
+/// of zero explains all, beside which the true one is likelier by thousands.
+TEST(TurnLoop, InjectedNoiseOfAFiftiethOfTheDitherIsFitted) {
+    Truth truth;
+    truth.scale_factor_arcsec = 1.2;
+    truth.dither_frequency_hz = 450.0;
+    truth.dither_peak_rate_deg_s = 50.0;
+    truth.injected_noise_rad = 6.0;
+    truth.input_rate_deg_h = -5000.0;
+    truth.bias_deg_h = -16.923;
+    truth.initial_phase_rad = 2.843;
+    truth.readout_noise = 0.001;
+    truth.turns = 16000;
+    truth.seed = 112;
+    const Closure closure = close_loop(generate({&truth, 1}).front());
+    print("much noise", closure);
+    EXPECT_EQ(closure.verdict, Verdict::nothing_missing);
+    EXPECT_NEAR(closure.heldout_after, truth.injected_noise_rad, 0.3);
+}
+
+TEST(TurnLoop, RecordsThatCannotBeFollowedAreRefused) {
+    Truth truth;
+    truth.scale_factor_arcsec = 1.2;
+    truth.dither_frequency_hz = 450.0;
+    truth.dither_peak_rate_deg_s = 50.0;
+    truth.input_rate_deg_h = 100000.0;
+    truth.turns = 1000;
+    EXPECT_THAT(
+        [&] {
+            close_loop(generate({&truth, 1}).front());
+        },
+        testing::ThrowsMessage<InputError>(testing::HasSubstr("% of the dither's peak rate")));
+    truth.input_rate_deg_h = 0.0;
+    truth.lockin_threshold_deg_h = 600.0;
+    truth.scale_factor_arcsec = 2.0;
+    truth.dither_frequency_hz = 600.3;
+    truth.dither_peak_rate_deg_s = 20.0;
+    EXPECT_THAT(
+        [&] {
+            close_loop(generate({&truth, 1}).front());
+        },
+        testing::ThrowsMessage<InputError>(testing::HasSubstr("half cycles of so few fringes")));
 }
 
 TEST(TurnLoop, ALockedGyroIsNoRiddle) {
