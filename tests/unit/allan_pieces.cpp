@@ -43,6 +43,7 @@ std::vector<Series> all_series(std::size_t n) {
     add("cubic", [&](double i) { return std::pow(i / length, 3); });
     add("exponential", [&](double i) { return std::exp(20.0 * i / length); });
     add("white phase on a drift", [&](double i) { return 1e9 + 3.7 * i + 1e-3 * i * i + normal(random); });
+    add("white phase on a steep line", [&](double i) { return 1e7 / 3.0 * i + normal(random); });
     add("wave of 40 samples", [&](double i) { return std::cos(std::numbers::pi * i / 20.0) + 1e-5 * normal(random); });
     add("wild first sample", [&](double i) { return i == 0.0 ? 1e9 : normal(random); });
     add("jump", [&](double i) { return (i < length / 3.0 ? 0.0 : 1e6) + normal(random); });
