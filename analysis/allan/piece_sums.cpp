@@ -136,22 +136,26 @@ class Block {
         const double origin = x[samples_ / 2];
         const double middle = 0.5 * static_cast<double>(samples_ - 1);
         const auto time = [=](std::size_t i) { return static_cast<double>(i) - middle; };
-        const double count = 3.0 * static_cast<double>(m_) * static_cast<double>(starts_);
+        const double size = 3.0 * static_cast<double>(m_);
+        const auto starts = static_cast<double>(starts_);
+        const double count = size * starts;
+        // The weights are two boxes convolved, whose variances add.
+        const double square = count * ((size * size - 1.0) + (starts * starts - 1.0)) / 12.0;
         const double level = origin + sum_over_samples([=](std::size_t i) { return x[i] - origin; }) / count;
-        const double slope = sum_over_samples([=](std::size_t i) { return time(i) * (x[i] - origin); }) /
-                             sum_over_samples([=](std::size_t i) { return time(i) * time(i); });
+        const double slope = sum_over_samples([=](std::size_t i) { return time(i) * (x[i] - origin); }) / square;
         // Two parts of 24 bits: multiples of them are exact.
         const double coarse = leading_bits(slope);
         const double fine = leading_bits(slope - coarse);
-        Running total;
-        p_[0] = 0.0;
+        double* HWY_RESTRICT p = p_;
         for (std::size_t i = 0; i < samples_; ++i) {
             const ExactSum above = two_sum(x[i], -level);
             const ExactSum tilted = two_sum(above.value, -coarse * time(i));
             const ExactSum flat = two_sum(tilted.value, -fine * time(i));
-            p_[i + 1] = total.add(flat.value + (flat.error + (tilted.error + above.error)));
+            p[i + 1] = flat.value + (flat.error + (tilted.error + above.error));
         }
-        double* p = p_;
+        Running total;
+        p[0] = 0.0;
+        for (std::size_t i = 1; i <= samples_; ++i) p[i] = total.add(p[i]);
         const double centre = sum_over_windows(3 * m_, starts_, [=](std::size_t i) { return p[i]; }) / count;
         for (std::size_t i = 0; i <= samples_; ++i) p[i] -= centre;
     }
@@ -206,8 +210,12 @@ class Block {
     double mirrored() {
         double* chain = scratch_;
         chain[0] = chain[1] = 0.0;
-        Running total[2];
-        for (std::size_t i = 0; i <= samples_; ++i) chain[i + 2] = total[i % 2].add(p_[i]);
+        Running even;
+        Running odd;
+        for (std::size_t i = 0; i <= samples_; i += 2) {
+            chain[i + 2] = even.add(p_[i]);
+            if (i < samples_) chain[i + 3] = odd.add(p_[i + 1]);
+        }
         const auto about = [&](std::size_t taus, std::size_t from) {
             return sum_of_mirrored(p_, chain, taus * m_, from * m_, starts_);
         };
@@ -222,16 +230,18 @@ class Block {
         double* lines = sums + samples_ + 1;
         double* parabolas = lines + samples_ + 1;
         const double middle = static_cast<double>(samples_ / 2);
-        Running total[3];
+        Running sum;
+        Running line;
+        Running parabola;
         sums[0] = lines[0] = parabolas[0] = 0.0;
-        double left[3] = {p_[0], -middle * p_[0], middle * middle * p_[0]};
         for (std::size_t i = 1; i <= samples_; ++i) {
-            const double k = static_cast<double>(i) - middle;
-            const double right[3] = {p_[i], k * p_[i], k * (k * p_[i])};
-            sums[i] = total[0].add(0.5 * (left[0] + right[0]));
-            lines[i] = total[1].add(0.5 * (left[1] + right[1]));
-            parabolas[i] = total[2].add(0.5 * (left[2] + right[2]));
-            std::copy(right, right + 3, left);
+            const double to = static_cast<double>(i) - middle;
+            const double from = to - 1.0;
+            const double left = from * p_[i - 1];
+            const double right = to * p_[i];
+            sums[i] = sum.add(0.5 * (p_[i - 1] + p_[i]));
+            lines[i] = line.add(0.5 * (left + right));
+            parabolas[i] = parabola.add(0.5 * (from * left + to * right));
         }
         const double* p = p_;
         const std::size_t m = m_;
