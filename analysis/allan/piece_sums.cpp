@@ -126,10 +126,17 @@ class Block {
         const double squares = sum_over_windows(3 * m, starts_, [=](std::size_t i) { return p[i] * p[i]; });
         const double near = sum_over_windows(2 * m, starts_, [=](std::size_t i) { return p[i] * p[i + m]; });
         const double far = sum_over_windows(m, starts_, [=](std::size_t i) { return p[i] * p[i + 2 * m]; });
-        return (40.0 * squares - 60.0 * near + 24.0 * far) + mirrored() + single();
+        const double sum = (40.0 * squares - 60.0 * near + 24.0 * far) + mirrored() + single();
+        lost_ = 40.0 * squares > most_lost * sum;
+        // A sum of squares that is nearly zero may be rounded to less.
+        return std::max(0.0, sum);
     }
+    /// Whether so much has cancelled from the last sum() that it lacks two digits and more.
+    bool lost() const { return lost_; }
 
    private:
+    static constexpr double most_lost = 100.0;
+
     /// The sums over the samples before each, less the line that suits the samples best, and their mean. What is left
     /// is of the size of what the pieces show, if each sample counts as often as there are pieces that have it.
     void sum_samples(const double* x) {
@@ -279,12 +286,19 @@ class Block {
     std::size_t samples_;        ///< of all pieces together
     double* p_ = nullptr;        ///< sums of the samples before each: samples_ + 1
     double* scratch_ = nullptr;  ///< room beyond
+    bool lost_ = false;
 };
+
+/// Pieces that are summed one by one where together they have lost digits.
+constexpr std::size_t most_repeated = 1024;
 
 double sum_of_block(const double* x, std::size_t m, std::size_t starts, bool singly, std::vector<double>& workspace) {
     Block block(x, m, starts, workspace);
-    // A sum of squares that is nearly zero may be rounded to less.
-    return singly ? block.sum_of_single_pieces() : std::max(0.0, block.sum());
+    if (singly) return block.sum_of_single_pieces();
+    const double sum = block.sum();
+    // A wave of period m with its crest where a piece begins shows in none of its differences. Where pieces begin at
+    // every phase of it others show it.
+    return block.lost() && starts <= most_repeated ? block.sum_of_single_pieces() : sum;
 }
 
 }  // namespace ringlock::allan::HWY_NAMESPACE
@@ -299,8 +313,6 @@ namespace {
 
 /// Pieces of so short a step are summed one by one, which is faster.
 constexpr std::size_t longest_single_step = 8;
-/// So are few pieces, where a wave of period m with its crest at their beginning would cancel and leave its rounding.
-constexpr std::size_t most_single_pieces = 16;
 
 SquareMean sum_of_blocks(std::span<const double> x, std::size_t m, bool singly) {
     const std::size_t size = 3 * m;
@@ -331,7 +343,7 @@ SquareMean sum_of_blocks(std::span<const double> x, std::size_t m, bool singly) 
 
 SquareMean sum_of_pieces(std::span<const double> x, std::size_t m) {
     if (m == 0 || x.size() < 3 * m) return {};
-    return sum_of_blocks(x, m, m <= longest_single_step || x.size() - 3 * m < most_single_pieces);
+    return sum_of_blocks(x, m, m <= longest_single_step);
 }
 
 SquareMean sum_of_single_pieces(std::span<const double> x, std::size_t m) {

@@ -85,6 +85,22 @@ TEST(AllanPieces, LongPiecesKeepTheirDigits) {
     }
 }
 
+// Such a wave shows in none of the differences of a piece that begins with its crest, and little in the next ones: sums
+// of all pieces together would lose four digits.
+TEST(AllanPieces, AWaveOfATauInFewPiecesKeepsItsDigits) {
+    constexpr std::size_t m = 2000;
+    std::mt19937_64 random(12);
+    std::normal_distribution<double> normal;
+    for (const std::size_t pieces : {1U, 2U, 17U, 31U, 101U, 501U}) {
+        std::vector<double> x;
+        for (std::size_t i = 0; i < 3 * m + pieces - 1; ++i) {
+            x.push_back(std::cos(std::numbers::pi * (2.0 * static_cast<double>(i) + 1.0) / m) + 1e-3 * normal(random));
+        }
+        const double single = allan::sum_of_single_pieces(x, m).sum;
+        EXPECT_LE(relative(allan::sum_of_pieces(x, m).sum, single), 3e-14) << pieces;
+    }
+}
+
 // What differences are blind to leaves nothing: whole numbers not even rounding, and no sum is below zero.
 TEST(AllanPieces, ALineLeavesNothing) {
     std::vector<double> whole;
