@@ -276,8 +276,11 @@ void add_allan(CLI::App& root) {
     sub->add_option("--kind", a->kind, "phase | increment | rate: what the numbers are (never guessed)");
     sub->add_option("--unit", a->unit,
                     "arcsec, deg, rad (phase, increment); deg/h, deg/s, rad/s (rate); none: dimensionless");
-    sub->add_option("--column", a->column, "Name or number (from 1) of the column, or path of an HDF5 dataset");
-    sub->add_option("--time", a->time, "Column or dataset of the times of the samples [s]: rows left out become gaps");
+    sub->add_option("--column", a->column,
+                    "Name or number (from 1) of the column, or path of an HDF5 dataset; of a two-dimensional one "
+                    "'PATH[I,:]' is row I, 'PATH[:,J]' column J (from 0)");
+    sub->add_option("--time", a->time,
+                    "Column or dataset, named alike, of the times of the samples [s]: rows left out become gaps");
     sub->add_option("--dev", a->dev, "Deviations, comma between: " + known_deviations())->capture_default_str();
     sub->add_option("--tau", a->tau, "octave | decade | all | averaging factors M,M,...")->capture_default_str();
     sub->add_option("--confidence", a->confidence, "Level of the intervals of the deviation")->capture_default_str();

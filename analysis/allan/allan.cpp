@@ -12,6 +12,7 @@
 #include "analysis/allan/interval_error.hpp"
 #include "analysis/allan/mean_differences.hpp"
 #include "analysis/allan/noise_identification.hpp"
+#include "analysis/allan/piece_sums.hpp"
 #include "analysis/allan/total_sums.hpp"
 #include "analysis/allan/uncertainty.hpp"
 #include "engine/core/error.hpp"

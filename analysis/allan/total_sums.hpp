@@ -26,11 +26,4 @@ class Reflected {
     bool skipping_ = false;
 };
 
-/// The sums of the modified total deviation (SP1065 section 5.2.12) and, of frequencies, the Hadamard total deviation
-/// (5.2.14): every piece of 3m samples less the line through the means of its halves, continued by its mirror image at
-/// both ends; the mean square of the 6m second differences of neighbouring means over m that it has. Costs 6m a piece.
-///
-/// \return over all pieces: sum of mean squares, and how many pieces
-SquareMean sum_of_pieces(std::span<const double> x, std::size_t m);
-
 }  // namespace ringlock::allan

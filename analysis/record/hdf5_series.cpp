@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/record/hdf5_choice.hpp"
 #include "analysis/record/probe.hpp"
 #include "analysis/record/readers.hpp"
 #include "engine/core/error.hpp"
@@ -49,24 +50,14 @@ class QuietErrors {
 
 constexpr int most_dimensions = 2;
 
-/// Extent of a dataset that is one column: of one dimension, or of two where one is 1, as MATLAB has them.
-struct Extent {
-    int dimensions = 0;
-    int long_side = 0;
-    hsize_t length = 0;
-};
-
-std::optional<Extent> column_extent(hid_t dataset) {
+/// Sides of a dataset of one or two dimensions; else nothing.
+std::optional<std::vector<std::uint64_t>> sides_of(hid_t dataset) {
     const Handle space(H5Dget_space(dataset), H5Sclose);
-    Extent extent;
-    extent.dimensions = H5Sget_simple_extent_ndims(space);
-    if (extent.dimensions < 1 || extent.dimensions > most_dimensions) return std::nullopt;
-    hsize_t sides[most_dimensions] = {1, 1};
+    const int dimensions = H5Sget_simple_extent_ndims(space);
+    if (dimensions < 1 || dimensions > most_dimensions) return std::nullopt;
+    hsize_t sides[most_dimensions] = {};
     if (H5Sget_simple_extent_dims(space, sides, nullptr) < 0) return std::nullopt;
-    if (sides[0] != 1 && sides[1] != 1) return std::nullopt;
-    extent.long_side = extent.dimensions == 2 && sides[1] != 1 ? 1 : 0;
-    extent.length = sides[extent.long_side];
-    return extent;
+    return std::vector<std::uint64_t>(sides, sides + dimensions);
 }
 
 herr_t collect(hid_t root, const char* name, const H5O_info_t* info, void* into) {
@@ -75,57 +66,17 @@ herr_t collect(hid_t root, const char* name, const H5O_info_t* info, void* into)
     if (!dataset.valid()) return 0;
     const Handle type(H5Dget_type(dataset), H5Tclose);
     const H5T_class_t kind = H5Tget_class(type);
-    if (column_extent(dataset) && (kind == H5T_FLOAT || kind == H5T_INTEGER)) {
-        static_cast<std::vector<std::string>*>(into)->push_back(fmt::format("/{}", name));
+    const auto sides = sides_of(dataset);
+    if (sides && (kind == H5T_FLOAT || kind == H5T_INTEGER)) {
+        static_cast<std::vector<Dataset>*>(into)->push_back({fmt::format("/{}", name), *sides});
     }
     return 0;
 }
 
-std::vector<std::string> series_in(hid_t file) {
-    std::vector<std::string> names;
-    H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, collect, &names, H5O_INFO_BASIC);
-    return names;
-}
-
-/// The dataset asked for: by path, or by the last part of its path where only one ends so.
-std::string find(const std::string& path, const std::vector<std::string>& there, const std::string& asked) {
-    const std::string absolute = asked.starts_with("/") ? asked : fmt::format("/{}", asked);
-    std::vector<std::string> matches;
-    for (const std::string& name : there) {
-        if (name == absolute) return name;
-        if (name.ends_with(absolute)) matches.push_back(name);
-    }
-    if (matches.size() == 1) return matches.front();
-    if (matches.size() > 1) {
-        throw InputError(
-            fmt::format("{}: '{}' is the name of several datasets; say which: {}", path, asked, listed(matches)));
-    }
-    throw InputError(
-        fmt::format("{}: has no one-dimensional dataset of numbers '{}'; there are {}", path, asked, listed(there)));
-}
-
-struct Choice {
-    std::string column;
-    std::optional<std::string> time;
-};
-
-Choice choose(const SeriesRequest& request, std::vector<std::string> there) {
-    const std::string& path = request.path;
-    if (there.empty()) throw InputError(fmt::format("{}: holds no one-dimensional dataset of numbers", path));
-    Choice choice;
-    if (request.time) choice.time = find(path, there, *request.time);
-    if (request.column) {
-        choice.column = find(path, there, *request.column);
-        return choice;
-    }
-    if (choice.time) there.erase(std::find(there.begin(), there.end(), *choice.time));
-    if (there.size() != 1) {
-        throw InputError(fmt::format("{}: has {} datasets{}; say which with --column ({})", path, there.size(),
-                                     choice.time ? fmt::format(" beside {}, the time", *choice.time) : "",
-                                     listed(there)));
-    }
-    choice.column = there.front();
-    return choice;
+std::vector<Dataset> datasets_in(hid_t file) {
+    std::vector<Dataset> found;
+    H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, collect, &found, H5O_INFO_BASIC);
+    return found;
 }
 
 std::optional<double> rate_of(hid_t file, const std::string& path, const std::string& object) {
@@ -182,38 +133,39 @@ hid_t memory_type() {
     if constexpr (std::is_same_v<T, std::uint64_t>) return H5T_NATIVE_UINT64;
 }
 
-/// One dataset, read piece by piece.
+/// One series of a dataset, read piece by piece.
 class Column {
    public:
-    Column(hid_t file, const std::string& path, const std::string& name)
+    Column(hid_t file, const std::string& path, const Slice& slice)
         : path_(path),
-          name_(name),
-          dataset_(open_for_pieces(file, name), H5Dclose),
+          slice_(slice),
+          dataset_(open_for_pieces(file, slice.path), H5Dclose),
           type_(H5Dget_type(dataset_), H5Tclose),
           space_(H5Dget_space(dataset_), H5Sclose) {
-        const std::optional<Extent> extent = dataset_.valid() ? column_extent(dataset_) : std::nullopt;
-        if (!extent) throw InputError(fmt::format("{}: cannot be opened; is the file damaged?", label()));
-        extent_ = *extent;
+        const auto sides = dataset_.valid() ? sides_of(dataset_) : std::nullopt;
+        if (!sides) throw InputError(fmt::format("{}: cannot be opened; is the file damaged?", label()));
+        dimensions_ = static_cast<int>(sides->size());
+        length_ = sides->at(static_cast<std::size_t>(slice.along));
         // The library copies by this size, be it damaged, and from beyond what it has unpacked.
         const std::size_t most_bytes = is_whole() ? sizeof(std::int64_t) : sizeof(long double);
         if (H5Tget_size(type_) > most_bytes) {
             throw InputError(fmt::format("{}: holds {} of {} bytes each; allowed are up to {}. Is the file damaged?",
                                          label(), is_whole() ? "integers" : "numbers", H5Tget_size(type_), most_bytes));
         }
-        if (extent_.length == 0) throw InputError(fmt::format("{}: is empty", label()));
+        if (length_ == 0) throw InputError(fmt::format("{}: is empty", label()));
         // Reading it would give zeros, as many as it says. Of a virtual dataset the library does not know.
         const Handle creation(H5Dget_create_plist(dataset_), H5Pclose);
         if (H5Pget_layout(creation) != H5D_VIRTUAL && H5Dget_storage_size(dataset_) == 0) {
             throw InputError(
-                fmt::format("{}: was never written, although it has room for {} values", label(), extent_.length));
+                fmt::format("{}: was never written, although it has room for {} values", label(), length_));
         }
     }
 
-    hsize_t length() const { return extent_.length; }
+    hsize_t length() const { return length_; }
     bool is_whole() const { return H5Tget_class(type_) == H5T_INTEGER; }
     bool is_signed() const { return H5Tget_sign(type_) != H5T_SGN_NONE; }
 
-    std::string label() const { return fmt::format("{}: dataset {}", path_, name_); }
+    std::string label() const { return fmt::format("{}: dataset {}", path_, slice_.name()); }
     std::string place(std::size_t element) const {
         return fmt::format("{}, element {} (counted from 0)", label(), element);
     }
@@ -223,9 +175,10 @@ class Column {
     void read(hsize_t first, std::span<T> into) const {
         hsize_t start[most_dimensions] = {0, 0};
         hsize_t count[most_dimensions] = {1, 1};
-        start[extent_.long_side] = first;
-        count[extent_.long_side] = into.size();
-        const Handle memory(H5Screate_simple(extent_.dimensions, count, nullptr), H5Sclose);
+        start[1 - slice_.along] = slice_.at;
+        start[slice_.along] = first;
+        count[slice_.along] = into.size();
+        const Handle memory(H5Screate_simple(dimensions_, count, nullptr), H5Sclose);
         if (H5Sselect_hyperslab(space_, H5S_SELECT_SET, start, nullptr, count, nullptr) < 0 ||
             H5Dread(dataset_, memory_type<T>(), memory, space_, H5P_DEFAULT, into.data()) < 0) {
             throw InputError(
@@ -237,11 +190,12 @@ class Column {
 
    private:
     std::string path_;
-    std::string name_;
+    Slice slice_;
     Handle dataset_;
     Handle type_;
     Handle space_;
-    Extent extent_;
+    int dimensions_ = 0;
+    hsize_t length_ = 0;
 };
 
 void hand_on(double value, const Column& column, std::size_t element, SeriesRows& rows) {
@@ -295,7 +249,7 @@ SeriesInfo stream_file(const SeriesRequest& request, const TakePiece& take) {
     const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
     if (!file.valid())
         throw InputError(fmt::format("{}: is not a readable HDF5 file (damaged, or open for writing)", path));
-    const Choice choice = choose(request, series_in(file));
+    const Choice choice = choose_datasets(request, datasets_in(file));
     const Column column(file, path, choice.column);
     std::optional<Column> time;
     SeriesRows rows(take);
@@ -303,14 +257,14 @@ SeriesInfo stream_file(const SeriesRequest& request, const TakePiece& take) {
         time.emplace(file, path, *choice.time);
         if (time->length() != column.length()) {
             throw InputError(fmt::format("{} has {} elements, {} has {}; must be as many times as values",
-                                         time->label(), time->length(), choice.column, column.length()));
+                                         time->label(), time->length(), choice.column.name(), column.length()));
         }
         rows.set_grid(TimeGrid(request.rate_hz, [&time](std::size_t element) { return time->place(element); }));
     }
-    const std::optional<double> rate_hz = rate_above(file, path, choice.column);
+    const std::optional<double> rate_hz = rate_above(file, path, choice.column.path);
     read_rows(column, time ? &*time : nullptr, rows);
     SeriesInfo info = rows.finish();
-    info.column = choice.column;
+    info.column = choice.column.name();
     info.rate_hz = rate_hz;
     return info;
 }

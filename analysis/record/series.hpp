@@ -15,8 +15,9 @@ struct SeriesRequest {
     /// Text (`#` comments; commas or white space between columns; a first row that is not all numbers is a header), the
     /// CSV form of an rlg-record (`# key = value` lines such as rate_hz) or HDF5; "-" is text from standard input.
     std::string path;
-    /// Name of the column, its number from 1, or the path of an HDF5 dataset (of an rlg-record also its name alone).
-    /// May be left out where there is only one beside the time.
+    /// Name of the column, its number from 1, or the path of an HDF5 dataset or the end of it, with [I,:] for row I or
+    /// [:,J] for column J of a two-dimensional one, counted from 0. May be left out where there is only one beside the
+    /// time.
     std::optional<std::string> column;
     /// Likewise, a column of the times of the rows [s]. Without it rows follow each other without gaps.
     std::optional<std::string> time;

@@ -1,5 +1,6 @@
 // How fast the Allan family is, beside a plain loop, NumPy and reading the record; side by side in one run.
-// `bench_allan_speed [--points N]` prints a page; 10^7 points unless told.
+// `bench_allan_speed [--points N]` prints a page; 10^7 points unless told. `bench_allan_speed totals` prints that of
+// the totals of pieces.
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
@@ -9,12 +10,15 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <limits>
 #include <numeric>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "analysis/allan/allan.hpp"
 #include "analysis/allan/difference_sums.hpp"
+#include "analysis/allan/piece_sums.hpp"
 #include "analysis/allan/running_deviation.hpp"
 #include "engine/random/stream.hpp"
 #include "tests/bench/page.hpp"
@@ -228,10 +232,72 @@ void all_factors(const std::vector<double>& x) {
     }
 }
 
+/// Seconds of the quickest of some rounds: it has been disturbed least.
+double quickest(int times, const std::function<double()>& work) {
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < times; ++i) least = std::min(least, seconds_of([&] { kept = work(); }));
+    return least;
+}
+
+/// Octaves of the modified (of phase) and the Hadamard total (of rates), beside the sums piece by piece, which take so
+/// long that they are made once and not of the longest record.
+void octaves_of_totals(const std::vector<double>& x) {
+    fmt::print("Octaves, all threads.\n\n");
+    bench::head({"points", "deviation", "octaves", "sums, ms", "ns a point and factor", "sums piece by piece, ms",
+                 "piece by piece over sums", "with noise and intervals, ms"});
+    for (const std::size_t n : {10'000U, 100'000U, 1'000'000U}) {
+        const std::span<const double> phase(x.data(), n);
+        std::vector<double> steps;
+        for (std::size_t i = 0; i + 1 < n; ++i) steps.push_back(x[i + 1] - x[i]);
+        for (const Estimator e : {Estimator::mtotdev, Estimator::htotdev}) {
+            const std::span<const double> samples = e == Estimator::mtotdev ? phase : std::span<const double>(steps);
+            const auto factors = allan::octave_factors(allan::largest_factor(e, static_cast<std::int64_t>(n)));
+            const auto sum_with = [&](allan::SquareMean (*sum)(std::span<const double>, std::size_t)) {
+                double all = 0.0;
+                for (const std::int64_t m : factors) all += sum(samples, static_cast<std::size_t>(m)).sum;
+                return all;
+            };
+            const double together = quickest(3, [&] { return sum_with(allan::sum_of_pieces); });
+            const double one_by_one =
+                n <= 100'000 ? quickest(1, [&] { return sum_with(allan::sum_of_single_pieces); }) : 0.0;
+            const double whole = quickest(3, [&] { return allan::deviation(e, phase, 1.0, factors)[0].dev; });
+            bench::row({std::to_string(n), std::string(allan::name(e)), std::to_string(factors.size()),
+                        fmt::format("{:.1f}", 1e3 * together),
+                        fmt::format("{:.1f}", 1e9 * together / static_cast<double>(n * factors.size())),
+                        one_by_one > 0.0 ? fmt::format("{:.0f}", 1e3 * one_by_one) : "",
+                        one_by_one > 0.0 ? fmt::format("{:.0f}", one_by_one / together) : "",
+                        fmt::format("{:.1f}", 1e3 * whole)});
+        }
+    }
+}
+
+void every_factor_of_totals(const std::vector<double>& x) {
+    fmt::print("\nEvery factor, with noise and intervals, the second time in a process.\n\n");
+    bench::head({"points", "factors", "mtotdev, s", "htotdev, s"});
+    for (const std::size_t n : {2'000U, 20'000U}) {
+        const std::span<const double> part(x.data(), n);
+        std::vector<std::string> cells = {std::to_string(n)};
+        for (const Estimator e : {Estimator::mtotdev, Estimator::htotdev}) {
+            const auto factors = allan::all_factors(allan::largest_factor(e, static_cast<std::int64_t>(n)));
+            if (e == Estimator::mtotdev) cells.push_back(std::to_string(factors.size()));
+            kept = allan::deviation(e, part, 1.0, factors)[0].dev;
+            cells.push_back(
+                fmt::format("{:.2f}", quickest(1, [&] { return allan::deviation(e, part, 1.0, factors)[0].dev; })));
+        }
+        bench::row(cells);
+    }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
     std::size_t points = 10'000'000;
+    if (argc == 2 && std::strcmp(argv[1], "totals") == 0) {
+        const std::vector<double> x = random_walk(1'000'000);
+        octaves_of_totals(x);
+        every_factor_of_totals(x);
+        return 0;
+    }
     if (argc == 3 && std::strcmp(argv[1], "--points") == 0) points = std::stoul(argv[2]);
     const std::vector<double> x = random_walk(points);
     octaves(x);

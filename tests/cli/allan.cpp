@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <hdf5.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -263,6 +264,55 @@ TEST_F(AllanCommand, WrongInputEndsWithTwoAndSaysWhy) {
     expect(data + " --kind rate", "--rate");
     expect("absent.txt --rate 10 --kind rate", "absent.txt");
     expect(write({1}) + " --rate 10 --kind rate", "at least 2");
+}
+
+// Rows and columns of a table are what they are in a file of their own, streamed or not.
+TEST_F(AllanCommand, RowsAndColumnsOfATableOfHdf5) {
+    const auto angle = test::simulate_angle({.n = 1.0}, 599, 1.0, 4);
+    std::vector<double> log;
+    for (std::size_t i = 0; i < angle.size(); ++i) {
+        log.insert(log.end(), {100.0 + static_cast<double>(i), angle[i], -1.0});
+    }
+    const std::string data = (directory_ / "data.h5").string();
+    const hid_t file = H5Fcreate(data.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    const auto dataset = [&](const char* name, const std::vector<hsize_t>& sides) {
+        const hid_t space = H5Screate_simple(static_cast<int>(sides.size()), sides.data(), nullptr);
+        const hid_t made = H5Dcreate2(file, name, H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+        H5Dwrite(made, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, log.data());
+        H5Dclose(made);
+        H5Sclose(space);
+    };
+    dataset("log", {angle.size(), 3});
+    dataset("gyros", {2, 900});
+    dataset("x", {1800});
+    H5Fclose(file);
+    const std::string how = " --rate 1 --kind phase --json";
+    const auto deviations = [&](const std::string& arguments) {
+        const Outcome r = run(arguments);
+        EXPECT_EQ(r.status, 0) << r.err;
+        return nlohmann::json::parse(r.out)["deviations"];
+    };
+    const auto expected = deviations(write(angle) + how);
+    EXPECT_EQ(deviations(data + " --column 'log[:,1]'" + how), expected);
+    EXPECT_EQ(deviations(data + " --column 'log[:,1]' --time '/log[:,0]'" + how), expected);
+    EXPECT_EQ(deviations(data + " --column 'log[:,1]' --stream" + how), deviations(write(angle) + how + " --stream"));
+    EXPECT_EQ(deviations(data + " --column 'gyros[1,:]'" + how),
+              deviations(write({log.begin() + 900, log.end()}) + how));
+
+    const auto expect = [&](const std::string& column, const std::vector<std::string>& words) {
+        for (const char* streamed : {"", " --stream"}) {
+            const Outcome r = run(data + column + how + streamed);
+            EXPECT_EQ(r.status, 2) << column;
+            EXPECT_EQ(r.out, "") << column;
+            for (const std::string& word : words) EXPECT_THAT(r.err, HasSubstr(word)) << column;
+        }
+    };
+    expect(" --column gyros", {"/gyros has 2 rows and 900 columns", "--column 'gyros[I,:]' for row I = 0 to 1"});
+    expect(" --column 'gyros[2,:]'", {"has no row 2", "row I = 0 to 1"});
+    expect(" --column 'log[:,3]'", {"has no column 3", "column J = 0 to 2"});
+    expect(" --column 'log[1]'", {"'log[1]'", "[I,:] for row I or [:,J] for column J"});
+    expect(" --column 'x[0,:]'", {"/x has one dimension", "leave the brackets out"});
+    expect(" --column 'log[:,1]' --time log", {"/log has 600 rows and 3 columns", "--time 'log[I,:]'"});
 }
 
 // A constant record is all zeros and no noise: figures, not NaN, and null where there is none.

@@ -136,6 +136,33 @@ TEST(AllanGaps, MeanRatesAreThoseOfWhatIsThere) {
     }
 }
 
+// Pieces lie within the parts without gaps: those of each part on its own, none that reaches across.
+TEST(AllanGaps, TotalsOfPiecesAreThoseOfThePartsWithoutGaps) {
+    std::vector<double> x = test::simulate_angle({.q = 0.3, .n = 1.0}, 600, 1.0, 8);
+    x[250] = x[251] = x[400] = nan;
+    const allan::Phase phase = allan::phase_of(x, Kind::phase, 1.0);
+    const std::vector<std::vector<double>> parts = {
+        {x.begin(), x.begin() + 250}, {x.begin() + 252, x.begin() + 400}, {x.begin() + 401, x.end()}};
+    for (const Estimator e : {Estimator::mtotdev, Estimator::htotdev}) {
+        const std::vector<std::int64_t> factors = {1, 7, 20, 60};
+        for (const allan::Point& p : allan::deviation(e, phase, 1.0, factors, {.bias = allan::Bias::none})) {
+            double squares = 0.0;
+            std::int64_t terms = 0;
+            for (const std::vector<double>& part : parts) {
+                if (allan::largest_factor(e, static_cast<std::int64_t>(part.size())) < p.m) continue;
+                const std::vector<std::int64_t> one = {p.m};
+                const allan::Point of_part = allan::deviation(e, part, 1.0, one, {.bias = allan::Bias::none}).at(0);
+                squares += of_part.dev * of_part.dev * static_cast<double>(of_part.terms);
+                terms += of_part.terms;
+            }
+            EXPECT_EQ(p.terms, terms) << allan::name(e) << " m = " << p.m;
+            // The line through the whole record is taken out of one, none of the other: rounding of the phase.
+            EXPECT_NEAR(p.dev, std::sqrt(squares / static_cast<double>(terms)), 1e-11 * p.dev)
+                << allan::name(e) << " m = " << p.m;
+        }
+    }
+}
+
 // Nothing is closed up: a hundred samples left out of a ramp would show as a step of 50. At the edges of the gap means
 // lack a tenth at one side, which moves them by up to m/40.
 TEST(AllanGaps, ARampWithAGapIsARamp) {

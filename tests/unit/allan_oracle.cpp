@@ -117,7 +117,7 @@ TEST(AllanOracle, RealPhaseFarFromZeroKeepsItsDigits) {
 }
 
 // Octaves of a record longer than a piece take every way that sums are made: four octaves at once, single steps,
-// columns, third differences, means of a phase with gaps.
+// columns, third differences, means of a phase with gaps, pieces one by one and together.
 TEST(AllanOracle, BitsDependNeitherOnTheInstructionSetNorOnThreads) {
     const std::vector<std::int64_t> x = counts(70'001, 5);
     std::vector<double> real;
@@ -130,7 +130,7 @@ TEST(AllanOracle, BitsDependNeitherOnTheInstructionSetNorOnThreads) {
         std::vector<double> out;
         for (const allan::Phase* phase : {&whole, &gapped}) {
             for (const Estimator e : {Estimator::oadev, Estimator::ohdev, Estimator::adev, Estimator::mdev,
-                                      Estimator::totdev, Estimator::tierms}) {
+                                      Estimator::totdev, Estimator::tierms, Estimator::mtotdev, Estimator::htotdev}) {
                 const auto factors = allan::octave_factors(allan::largest_factor(e, 70'001));
                 for (const allan::Point& p : allan::deviation(e, *phase, 1.0, factors)) out.push_back(p.dev);
             }

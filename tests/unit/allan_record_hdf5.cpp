@@ -93,7 +93,60 @@ TEST_F(AllanRecordHdf5, ColumnsOfAMatrixOfOneColumnAreRead) {
     write("matrix", {1.0, 2.0, 3.0, 4.0}, {.sides = {2, 2}});
     EXPECT_THAT(read("down").values, ElementsAre(1.0, 2.0, 3.0));
     EXPECT_THAT(read("across").values, ElementsAre(4.0, 5.0));
-    EXPECT_THAT(refusal("matrix"), AllOf(HasSubstr("'matrix'"), HasSubstr("/across, /down")));
+    EXPECT_THAT(refusal("absent"), AllOf(HasSubstr("'absent'"), HasSubstr("/across, /down, /matrix")));
+}
+
+TEST_F(AllanRecordHdf5, RowsAndColumnsOfTablesAreRead) {
+    write("table", {0.0, 1.0, 2.0, 10.0, 11.0, 12.0}, {.sides = {2, 3}});
+    write("counts", H5T_STD_I64LE, H5T_NATIVE_INT64, std::vector<std::int64_t>{1, 9007199254740993, 3, 5},
+          {.sides = {2, 2}});
+    write("down", {1.0, 2.0, 3.0}, {.sides = {3, 1}});
+    write("odd[0]", {7.0, 8.0});
+    const auto row = read("table[1,:]");
+    EXPECT_THAT(row.values, ElementsAre(10.0, 11.0, 12.0));
+    EXPECT_EQ(row.column, "/table[1,:]");
+    EXPECT_THAT(read("/table[ : , 2 ]").values, ElementsAre(2.0, 12.0));
+    EXPECT_THAT(read("counts[:,1]").values, ElementsAre(9007199254740992.0, 5.0));
+    EXPECT_THAT(read("counts[:,1]").counts, ElementsAre(9007199254740993, 5));
+    EXPECT_THAT(read("down[:,0]").values, ElementsAre(1.0, 2.0, 3.0));
+    EXPECT_THAT(read("odd[0]").values, ElementsAre(7.0, 8.0));  // a name may have brackets of its own
+    EXPECT_THAT(refusal("table[:,1]", "table[1,:]", 1.0), AllOf(HasSubstr("/table[1,:] has 3"), HasSubstr("has 2")));
+}
+
+TEST_F(AllanRecordHdf5, ATableOfTimesAndValuesIsOneFile) {
+    write("log", {5.0, 1.0, 6.0, 2.0, 8.0, nan, 9.0, 4.0}, {.sides = {4, 2}});
+    EXPECT_THAT(read("log[:,1]", "log[:,0]", 1.0).values, same_numbers({1.0, 2.0, nan, nan, 4.0}));
+    EXPECT_THAT(refusal("log[:,0]", "log[:,1]", 1.0),
+                AllOf(HasSubstr("/log[:,1], element"), HasSubstr("counted from 0")));
+}
+
+TEST_F(AllanRecordHdf5, AnIndexThatIsMissingOrWrongIsExplained) {
+    write("table", {0.0, 1.0, 2.0, 10.0, 11.0, 12.0}, {.sides = {2, 3}});
+    write("empty", std::vector<double>{}, {.sides = {0, 3}});
+    EXPECT_THAT(refusal("table"), AllOf(HasSubstr("/table has 2 rows and 3 columns"), HasSubstr("'table[I,:]'"),
+                                        HasSubstr("I = 0 to 1"), HasSubstr("J = 0 to 2")));
+    EXPECT_THAT(refusal("table[2,:]"), AllOf(HasSubstr("no row 2"), HasSubstr("2 rows and 3 columns"),
+                                             HasSubstr("I = 0 to 1"), HasSubstr("'table[:,J]'")));
+    EXPECT_THAT(refusal("table[:,3]"), AllOf(HasSubstr("no column 3"), HasSubstr("J = 0 to 2")));
+    for (const char* wrong : {"table[1]", "table[1,2]", "table[:,:]", "table[-1,:]", "table[]", "table[1.5,:]",
+                              "table[a,:]", "table[99999999999999999999,:]"}) {
+        EXPECT_THAT(refusal(wrong), AllOf(HasSubstr(wrong), HasSubstr("[I,:] for row I"))) << wrong;
+    }
+    EXPECT_THAT(refusal("empty[0,:]"), HasSubstr("empty"));
+    EXPECT_THAT(refusal("empty"), HasSubstr("empty"));
+    EXPECT_THAT(refusal("absent[0,:]"), AllOf(HasSubstr("'absent[0,:]'"), HasSubstr("/table")));
+    EXPECT_THAT(refusal(), AllOf(HasSubstr("2 datasets"), HasSubstr("/table[I,:] or [:,J]")));
+}
+
+TEST_F(AllanRecordHdf5, ASeriesHasNoRowsAndColumns) {
+    write("x", {1.0, 2.0});
+    EXPECT_THAT(refusal("x[0,:]"), AllOf(HasSubstr("/x has one dimension"), HasSubstr("leave the brackets out")));
+}
+
+TEST_F(AllanRecordHdf5, TheOnlyTableOfAFileWantsAnIndex) {
+    write("table", {1.0, 2.0, 3.0, 4.0}, {.sides = {2, 2}});
+    EXPECT_THAT(refusal(),
+                AllOf(HasSubstr("--column '/table[I,:]'"), HasSubstr("'/table[:,J]' for column J = 0 to 1")));
 }
 
 TEST_F(AllanRecordHdf5, PlacesRowsByTheirTimes) {
@@ -136,6 +189,26 @@ TEST_F(AllanRecordHdf5, StreamsInBoundedPiecesWhateverTheChunks) {
         EXPECT_THAT(streamed.values, same_numbers(values)) << name;
         EXPECT_THAT(record::read_series(path(), name).values, same_numbers(values)) << name;
     }
+}
+
+TEST_F(AllanRecordHdf5, StreamsColumnsOfLongTables) {
+    std::vector<double> table;
+    std::vector<double> second;
+    for (int i = 0; i < 150'000; ++i) {
+        table.insert(table.end(), {1.0 * i, 0.5 * i * i, -1.0});
+        second.push_back(0.5 * i * i);
+    }
+    write("plain", table, {.sides = {150'000, 3}, .chunk = 0});
+    write("packed", table, {.sides = {150'000, 3}, .chunk = 7001});
+    write("rows", table, {.sides = {3, 150'000}, .chunk = 1});
+    close();
+    for (const char* name : {"plain[:,1]", "packed[:,1]"}) {
+        const auto streamed = test::stream({.path = path(), .column = name, .time = std::nullopt});
+        EXPECT_LE(streamed.longest, 65536u) << name;
+        EXPECT_EQ(streamed.values, second) << name;
+    }
+    const auto row = test::stream({.path = path(), .column = "rows[2,:]", .time = std::nullopt});
+    EXPECT_EQ(row.values, std::vector<double>(table.begin() + 300'000, table.end()));
 }
 
 // It would be read as zeros, a trillion of them.

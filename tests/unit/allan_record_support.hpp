@@ -103,7 +103,9 @@ class AllanRecordHdf5 : public AllanRecord {
         const hid_t space = H5Screate_simple(static_cast<int>(sides.size()), sides.data(), nullptr);
         const hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
         if (storage.chunk > 0) {
-            H5Pset_chunk(creation, 1, &storage.chunk);
+            std::vector<hsize_t> chunk = sides;
+            chunk[0] = storage.chunk;
+            H5Pset_chunk(creation, static_cast<int>(chunk.size()), chunk.data());
             H5Pset_deflate(creation, 1);
         }
         const hid_t dataset = H5Dcreate2(h5_, name, stored, space, H5P_DEFAULT, creation, H5P_DEFAULT);
