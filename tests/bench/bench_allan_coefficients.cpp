@@ -259,7 +259,7 @@ void correlated_noise() {
                     size.add(f.correlated->rms_rate_deg_h, rms);
                 }
                 const auto of = static_cast<int>(all.size());
-                row({c.terms, number(time_s, 0), number(rms, 1), std::to_string(c.samples), share_of(found, of),
+                row({c.terms, number(time_s, 0), number(rms, 2), std::to_string(c.samples), share_of(found, of),
                      share_of(time.covered, time.claimed), share_of(drive.covered, drive.claimed),
                      share_of(size.covered, size.claimed), share_of(arw.covered, arw.claimed), number(arw.mean(), 3),
                      share_of(withheld, of), share_of(seen, of)});
