@@ -20,10 +20,7 @@
 namespace ringlock::allan {
 namespace {
 
-/// Identifies the noise at each factor; beyond the last one with enough points what was found there is kept. Fewer than
-/// 100 points tell the exponent to +-0.3 to 0.6: it is taken together with that of the octave below, which has twice as
-/// many, and phase noise is believed only where both show it, since it would claim thousands of degrees of freedom
-/// where there are a few.
+/// Identifies the noise at each factor; beyond the last one with enough points what was found there is kept.
 class NoisePerFactor {
    public:
     NoisePerFactor(std::span<const double> phase, int differences)
@@ -42,12 +39,7 @@ class NoisePerFactor {
 
    private:
     int found_at(std::int64_t m) const {
-        constexpr std::int64_t sure = 100;
-        const double here = noise_exponent(phase_, m, differences_).value_or(0.0);
-        if (m == 1 || steps_ / m >= sure) return nearest_noise(here, differences_);
-        const double below = noise_exponent(phase_, m / 2, differences_).value_or(0.0);
-        const int both = nearest_noise((here + 2.0 * below) / 3.0, differences_);
-        return std::min(both, std::max(0, nearest_noise(below, differences_)));
+        return nearest_noise(pooled_noise_exponent(phase_, m, differences_).value_or(0.0), differences_);
     }
 
     std::span<const double> phase_;

@@ -69,6 +69,31 @@ std::optional<double> noise_exponent(std::span<const double> phase, std::int64_t
     }
 }
 
+std::optional<double> pooled_noise_exponent(std::span<const double> phase, std::int64_t m, int most_differences) {
+    constexpr double many_points = 200.0;
+    constexpr int most_octaves = 3;
+    constexpr double most_deviations = 2.5;
+    constexpr double least_of_phase_noise = 0.5;
+    const auto points_at = [&](std::int64_t k) { return static_cast<double>((std::ssize(phase) - 1) / k + 1); };
+    const std::optional<double> here = noise_exponent(phase, m, most_differences);
+    if (!here || m == 1 || points_at(m) > many_points) return here;
+    double mean = *here;
+    double points = points_at(m);
+    double most = mean;
+    std::int64_t k = m / 2;
+    for (int octave = 1; octave <= most_octaves && k >= 1; ++octave, k /= 2) {
+        const std::optional<double> below = noise_exponent(phase, k, most_differences);
+        if (!below) break;
+        if (octave == 1) most = std::max(*below, std::nextafter(least_of_phase_noise, 0.0));
+        const double more = points_at(k);
+        const double deviation = (*below > -0.5 ? 2.0 : 2.8) * std::sqrt(1.0 / more + 1.0 / points);
+        if (std::abs(*below - mean) > most_deviations * deviation) break;
+        mean = (mean * points + *below * more) / (points + more);
+        points += more;
+    }
+    return std::min(mean, most);
+}
+
 int nearest_noise(double exponent, int most_differences) {
     constexpr double red_shift = 0.22;
     const double shifted = exponent < -1.0 ? exponent + red_shift : exponent;

@@ -21,17 +21,12 @@ constexpr std::int64_t most_taus = 16;
 /// Degrees of freedom from which an estimate is chi-squared for all purposes.
 constexpr double many_degrees = 16.0;
 
-EstimatorShape shape_of(Estimator estimator) {
+/// Degrees of an estimator without reflections.
+double degrees_of(Estimator estimator, int alpha, std::int64_t m, std::int64_t points) {
     const Traits& t = traits(estimator);
     const bool modified = t.family == Family::modified || t.family == Family::modified_total;
-    return {.differences = t.differences, .modified = modified, .overlapping = t.overlapping};
-}
-
-/// Degrees of an estimator without reflections. Phase averaged over one sample is sampled phase.
-double degrees_of(Estimator estimator, int alpha, std::int64_t m, std::int64_t points) {
-    EstimatorShape shape = shape_of(estimator);
-    shape.modified = shape.modified && m > 1;
-    return degrees_of_freedom(shape, alpha, m, points);
+    return degrees_of_freedom({.differences = t.differences, .modified = modified, .overlapping = t.overlapping}, alpha,
+                              m, points);
 }
 
 /// The estimator without reflections that is like it.
@@ -157,8 +152,9 @@ Uncertainty uncertainty_of_total(Estimator estimator, int alpha, std::int64_t m,
     const Known there = known(estimator, alpha, little, confidence);
     const double like = plain_degrees(estimator, alpha, m, points);
     const double like_there = plain_degrees(estimator, alpha, little.m, little.points);
+    const double over_plain = there.degrees / like_there;
     Uncertainty out;
-    out.edf = there.degrees * like / like_there;
+    out.edf = like * (reflected ? 1.0 + (over_plain - 1.0) * beyond : over_plain);
     out.bias = there.mean;
     if (m > finest) {
         // From half as many samples in a tau to as many as there are: the distance goes with 1/m for phase noise, with

@@ -34,8 +34,8 @@ struct Uncertainty {
 /// estimator's own quadratic form (distribution_of), on a record of the same length in tau with eight samples to a tau,
 /// wherever the statistics do not depend on the sampling. The total family has no sums over lags: the degrees of its
 /// plain counterpart (degrees_of_freedom) are multiplied by the ratio between the two quadratic forms, on records of at
-/// most sixteen tau, and bias follows from the forms with four and eight samples to a tau. What is worked out for a
-/// short record is kept for the next one of its kind. Thread-safe.
+/// most sixteen tau (of the total deviation it fades with tau/T beyond), and bias follows from the forms with four and
+/// eight samples to a tau. What is worked out for a short record is kept for the next one of its kind. Thread-safe.
 Uncertainty uncertainty_of(Estimator estimator, int alpha, std::int64_t m, std::int64_t points, double confidence);
 
 }  // namespace ringlock::allan

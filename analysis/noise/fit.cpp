@@ -54,21 +54,17 @@ bool has_floor(const Maximum& fit, std::size_t samples) {
 /// What of the parts of a record is claimed, and how well it is known.
 class Claims {
    public:
-    Claims(const Likelihood& likelihood, const Decomposition& parts, double significance)
-        : likelihood_(likelihood),
-          parts_(parts),
-          fits_(likelihood, parts.markov.supported(significance) ? five_terms | correlated_bit : five_terms,
-                parts.markov.best.theta) {
-        const Prices prices = prices_at(significance);
-        best_ = fits_.best(prices);
-        arw_best_ = fits_.best(prices, arw_bit);
+    Claims(const Likelihood& likelihood, const Decomposition& parts, const Options& options)
+        : likelihood_(likelihood), parts_(parts), prices_(prices_at(options.significance)), fits_(fits_of(options)) {
+        best_ = fits_.best(prices_);
+        arw_best_ = fits_.best(prices_, arw_bit);
         for (Mask bit = 1; bit <= ramp_bit; bit <<= 1) {
-            if ((best_ & bit) != 0 && fits_.evidence(bit) >= prices.of(bit)) claimed_ |= bit;
+            if ((best_ & bit) != 0 && fits_.evidence(bit) >= prices_.of(bit)) claimed_ |= bit;
         }
         // A term too weak to be claimed still moves the others when it is left out, by as much as their standard
         // errors, where several terms vie for a few coefficients at low frequencies: values of such records are of all
-        // terms.
-        const bool drifts = (claimed_ & drifting) != 0;
+        // terms. Likewise beside correlated noise that is not claimed but cannot be excluded.
+        const bool drifts = (claimed_ & drifting) != 0 || (fits_.all() & correlated_bit) != 0;
         const Mask model = drifts ? fits_.all() : best_;
         model_ = model_of(model);
         estimate_ = restricted(model_, model);
@@ -122,6 +118,23 @@ class Claims {
                 .ramp = boost::math::quantile(boost::math::complement(one, significance)),
                 .correlated = parts_.markov.price(significance)};
     }
+    /// Correlated noise that cannot be excluded is among the terms though it is not claimed, unless it would stand in
+    /// the place of white noise: of a time within a sample or so it is white itself.
+    Subsets fits_of(const Options& options) const {
+        const Parameters& start = parts_.markov.best.theta;
+        if (parts_.markov.supported(options.significance)) return {likelihood_, five_terms | correlated_bit, start};
+        Subsets five(likelihood_, five_terms, start);
+        if (!parts_.markov.supported(options.nuisance_significance)) return five;
+        Subsets six(likelihood_, five_terms | correlated_bit, start);
+        const auto shown = [&](const Subsets& fits, Mask bit) {
+            return (fits.best(prices_) & bit) != 0 && fits.evidence(bit) >= prices_.of(bit);
+        };
+        for (const Mask bit : {angle_noise_bit, arw_bit}) {
+            if (shown(five, bit) && !shown(six, bit)) return five;
+        }
+        return six;
+    }
+
     bool claimed(Mask bit) const {
         return (claimed_ & bit) != 0 &&
                (bit == ramp_bit || estimate().theta[static_cast<std::size_t>(std::countr_zero(bit))] > 0.0);
@@ -195,6 +208,7 @@ class Claims {
 
     const Likelihood& likelihood_;
     const Decomposition& parts_;
+    Prices prices_;
     Subsets fits_;
     Mask best_ = 0;      ///< subset of least deviance plus prices
     Mask arw_best_ = 0;  ///< the same of those with angle random walk
@@ -268,7 +282,7 @@ NoiseFit fit_noise(std::span<const double> angle_arcsec, double tau0_s, const Op
         return out;
     }
     const Likelihood likelihood(parts.noise);
-    const Claims claims(likelihood, parts, options.significance);
+    const Claims claims(likelihood, parts, options);
     claims.describe(tau0_s, out);
     out.goodness = goodness_of_fit(parts.noise, claims.estimate(), parts.lines, tau0_s, options.misfit_threshold);
     out.described = out.goodness.accepted;

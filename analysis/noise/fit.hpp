@@ -40,9 +40,11 @@ struct Correlated {
 };
 
 struct Options {
-    double significance = 1e-3;       ///< of the likelihood-ratio test that a term must pass, with its search
-    double misfit_threshold = 2e-3;   ///< p below which each of the goodness-of-fit tests rejects
-    std::size_t fewest_samples = 32;  ///< increments below which nothing is fitted
+    double significance = 1e-3;           ///< of the likelihood-ratio test that a term must pass, with its search
+    double nuisance_significance = 1e-2;  ///< of the same test: where correlated noise passes, the others are told
+                                          ///< beside it, claimed or not
+    double misfit_threshold = 2e-3;       ///< p below which each of the goodness-of-fit tests rejects
+    std::size_t fewest_samples = 32;      ///< increments below which nothing is fitted
 };
 
 /// What is needed to decide over many records of like gyros together, where each by itself is too short to.

@@ -229,8 +229,8 @@ void sinusoids() {
 }
 
 void correlated_noise() {
-    head({"terms", "T_c [s]", "rms [deg/h]", "n", "found", "T_c held", "q_c held", "rms held", "N held", "withheld",
-          "withheld or found"});
+    head({"terms", "T_c [s]", "rms [deg/h]", "n", "found", "T_c held", "q_c held", "rms held", "N held", "N mean/truth",
+          "withheld", "withheld or found"});
     struct Case {
         const char* terms;
         Truth truth;
@@ -239,7 +239,7 @@ void correlated_noise() {
     const Truth white{.n = 0.3};
     for (const Case& c : {Case{"N", white, 4096}, Case{"Q, N, B, K, R", five(), 32768}}) {
         for (const double time_s : {3.0, 30.0, 200.0}) {
-            for (const double rms : {0.1, 0.3}) {
+            for (const double rms : {0.05, 0.1, 0.3}) {
                 Study study{"", c.samples, 1000, c.truth};
                 study.truth.correlated_rms = rms;
                 study.truth.correlation_time_s = time_s;
@@ -259,10 +259,10 @@ void correlated_noise() {
                     size.add(f.correlated->rms_rate_deg_h, rms);
                 }
                 const auto of = static_cast<int>(all.size());
-                row({c.terms, number(time_s, 0), number(rms, 1), std::to_string(c.samples), share_of(found, of),
+                row({c.terms, number(time_s, 0), number(rms, 2), std::to_string(c.samples), share_of(found, of),
                      share_of(time.covered, time.claimed), share_of(drive.covered, drive.claimed),
-                     share_of(size.covered, size.claimed), share_of(arw.covered, arw.claimed), share_of(withheld, of),
-                     share_of(seen, of)});
+                     share_of(size.covered, size.claimed), share_of(arw.covered, arw.claimed), number(arw.mean(), 3),
+                     share_of(withheld, of), share_of(seen, of)});
             }
         }
     }

@@ -66,16 +66,18 @@ TEST(QuadraticForm, DegreesAreThoseOfTheSumsOverLags) {
     struct Case {
         Estimator estimator;
         allan::EstimatorShape shape;
+        double left_out = 0.006;
     };
     const std::vector<Case> cases = {{Estimator::oadev, {.differences = 2}},
                                      {Estimator::adev, {.differences = 2, .overlapping = false}},
+                                     {Estimator::mdev, {.differences = 2, .modified = true}, 0.01},
                                      {Estimator::ohdev, {.differences = 3}},
                                      {Estimator::hdev, {.differences = 3, .overlapping = false}}};
     for (const Case& c : cases) {
         for (const int alpha : {2, 0, -1, -2}) {
-            for (const std::int64_t m : {1, 4}) {
+            for (const std::int64_t m : {1, 2, 4, 8}) {
                 const WeightedSquares squares = allan::distribution_of(c.estimator, alpha, m, 50);
-                EXPECT_NEAR(squares.degrees() / allan::degrees_of_freedom(c.shape, alpha, m, 50), 1.0, 0.006)
+                EXPECT_NEAR(squares.degrees() / allan::degrees_of_freedom(c.shape, alpha, m, 50), 1.0, c.left_out)
                     << allan::name(c.estimator) << " alpha " << alpha << " m " << m;
                 EXPECT_NEAR(squares.mean(), 1.0, 1e-6);
             }
@@ -101,6 +103,18 @@ TEST(QuadraticForm, BiasesAreNearThePublishedOnes) {
         EXPECT_NEAR(allan::distribution_of(Estimator::mtotdev, alpha, 12, 160).mean(),
                     allan::published_bias(Estimator::mtotdev, alpha, 12, 160), 0.06)
             << alpha;
+    }
+}
+
+// The total deviation of a record of many tau, whose degrees follow from those of sixteen: the ends matter less the
+// longer it is.
+TEST(Uncertainty, DegreesOfTheTotalDeviationAreThoseOfItsForm) {
+    for (const int alpha : {2, 0, -1, -2}) {
+        for (const std::int64_t m : {1, 2, 4, 8}) {
+            const double exact = allan::distribution_of(Estimator::totdev, alpha, m, 64 * m + 1).degrees();
+            EXPECT_NEAR(allan::uncertainty_of(Estimator::totdev, alpha, m, 64 * m + 1, 0.6827).edf / exact, 1.0, 0.015)
+                << "alpha " << alpha << " m " << m;
+        }
     }
 }
 
