@@ -8,6 +8,7 @@
 #include <unsupported/Eigen/FFT>
 
 #include "analysis/closure/chance.hpp"
+#include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -236,16 +237,20 @@ std::vector<Candidate> screen(const TurnFit& fit) {
         TurnParameters p = fit.parameters();
         if (p.find(effect->name()) != nullptr || told_by_other_columns(*effect)) return;
         const Values rest = values_at_rest(*effect);
-        if (first_of(*effect, Role::frequency) != nullptr) {
-            if (effect->adds_angle()) found[k] = at_some_frequency(fit, without, *effect, rest);
-        } else if (first_of(*effect, Role::time) != nullptr) {
-            if (effect->adds_angle()) found[k] = at_some_time(fit, without, *effect, rest);
-        } else if (first_of(*effect, Role::deviation) != nullptr) {
-            found[k] = spread(fit, *effect, rest);
-        } else if (first_of(*effect, Role::size) != nullptr) {
-            found[k] = sizes(fit, without, *effect, rest);
-        } else if (first_of(*effect, Role::phase) != nullptr) {
-            found[k] = coupling_phase(fit, *effect, rest);
+        try {
+            if (first_of(*effect, Role::frequency) != nullptr) {
+                if (effect->adds_angle()) found[k] = at_some_frequency(fit, without, *effect, rest);
+            } else if (first_of(*effect, Role::time) != nullptr) {
+                if (effect->adds_angle()) found[k] = at_some_time(fit, without, *effect, rest);
+            } else if (first_of(*effect, Role::deviation) != nullptr) {
+                found[k] = spread(fit, *effect, rest);
+            } else if (first_of(*effect, Role::size) != nullptr) {
+                found[k] = sizes(fit, without, *effect, rest);
+            } else if (first_of(*effect, Role::phase) != nullptr) {
+                found[k] = coupling_phase(fit, *effect, rest);
+            }
+        } catch (const RunError&) {
+            // no motion of a gyro with a little of it can be followed
         }
     });
     std::vector<Candidate> candidates;

@@ -95,20 +95,32 @@ double free_of_phase(std::vector<double>& series, const std::vector<std::uint8_t
     return std::sqrt(squares / static_cast<double>(n));
 }
 
-/// What a rotation adds to `sides` at a turn. The phase stands still asin(share)/w off the dither's turn, where the
-/// acceleration changes by w share/sqrt(1 - share^2) of itself a second; by two pulses t_1 and t_2 after that
-/// (sqrt(a) = sqrt(2) (sqrt(d_2) - sqrt(d_1))/(t_2 - t_1)) it comes out too large by (t_1 + t_2)/3 of it, before it too
-/// small.
-double sides_by_jerk(int direction, double phase_rad, double share, const TurnSeries& series) {
-    constexpr double quarter_rad = 0.5 * units::pi;
-    const double quarters = phase_rad / quarter_rad;
-    const double first_rad =
-        quarter_rad * (direction > 0 ? std::ceil(quarters) - quarters : quarters - std::floor(quarters));
-    const double root = std::sqrt(1.0 - share * share);
-    const double angles = (std::sqrt(2.0 * first_rad) + std::sqrt(2.0 * (first_rad + quarter_rad))) /
-                          std::sqrt(series.amplitude_rad * root);  // w (t_1 + t_2)
-    return share / root * angles / 6.0;
-}
+/// w t of the two pulses of quarter fringes next to a turn.
+///
+/// Where the phase stands still off the dither's turn by an angle d, |d| << 1, the acceleration changes by w d of
+/// itself a second. With sqrt(a) = sqrt(2) (sqrt(d_2) - sqrt(d_1))/(t_2 - t_1) of pulses at distances d_1, d_2 it comes
+/// out too large by d w (t_1 + t_2)/3 of it on one side of the turn, and too small on the other: a rotation by the
+/// share x of the dither's peak rate, d = x, adds x w (t_1 + t_2)/6 to `sides`.
+struct PulseAngles {
+    double first, second;
+
+    PulseAngles(int direction, double phase_rad, double amplitude_rad) {
+        constexpr double quarter_rad = 0.5 * units::pi;
+        const double quarters = phase_rad / quarter_rad;
+        const double first_rad =
+            quarter_rad * (direction > 0 ? std::ceil(quarters) - quarters : quarters - std::floor(quarters));
+        first = std::sqrt(2.0 * first_rad / amplitude_rad);
+        second = std::sqrt(2.0 * (first_rad + quarter_rad) / amplitude_rad);
+    }
+
+    /// How much of the change of the acceleration at a turn of the dither, which is off by that angle, the two show of
+    /// the half cycle that the phase's turn is in: with d(t) in two pieces, to first order in the change.
+    double share_of_other(double off) const {
+        if (off >= second) return 1.0;
+        if (off <= first) return off * off / (first * second);
+        return (2.0 * off - off * off / second - first) / (second - first);
+    }
+};
 
 /// Chi-squared of a mean, with the doubt of its standard error in it: what a normal deviate of the same rarity has.
 double chi2_of(const BlockMean& mean, double expected) {
@@ -121,7 +133,92 @@ double chi2_of(const BlockMean& mean, double expected) {
            (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
 }
 
+/// Asymmetry r and second harmonic (sine s, cosine c of its phase times its ratio) by what the columns tell, with
+/// l = w late:
+///
+///     l = (pi/2) r - s,     sides = j r - k s,     turns = c,     j = sides_by_ratio, k = sides_by_sine.
+struct ShapeFit {
+    double ratio = 0.0, ratio_sd = 0.0;
+    double sine = 0.0, sine_sd = 0.0;
+    double cosine = 0.0, cosine_sd = 0.0;
+    double left = 0.0;  ///< chi-squared of what they do not account for
+
+    ShapeFit(const DitherShape& shape, double w, bool asymmetry, bool harmonic) {
+        const Eigen::Vector2d of_ratio{0.5 * units::pi, shape.sides_by_ratio};
+        const Eigen::Vector2d of_sine{-1.0, -shape.sides_by_sine};
+        const bool sides = shape.sides && std::isfinite(shape.sides->sd);
+        const Eigen::Vector2d told{w * shape.late_s.value, sides ? shape.sides->value : 0.0};
+        const Eigen::Vector2d weight{std::pow(w * shape.late_s.sd, -2), sides ? std::pow(shape.sides->sd, -2) : 0.0};
+        if (asymmetry && harmonic && sides) {
+            Eigen::Matrix2d model;
+            model << of_ratio, of_sine;
+            const Eigen::Matrix2d back = model.inverse();
+            const Eigen::Vector2d found = back * told;
+            const Eigen::Matrix2d covariance = back * weight.cwiseInverse().asDiagonal() * back.transpose();
+            ratio = found(0);
+            ratio_sd = std::sqrt(covariance(0, 0));
+            sine = found(1);
+            sine_sd = std::sqrt(covariance(1, 1));
+        } else if (asymmetry || harmonic) {
+            const Eigen::Vector2d& model = asymmetry ? of_ratio : of_sine;
+            const double information = model.cwiseAbs2().dot(weight);
+            (asymmetry ? ratio_sd : sine_sd) = std::sqrt(1.0 / information);
+            if (information > 0.0) {
+                (asymmetry ? ratio : sine) = model.cwiseProduct(told).dot(weight) / information;
+            }
+        }
+        if (harmonic && shape.turns && std::isfinite(shape.turns->sd)) {
+            cosine = shape.turns->value;
+            cosine_sd = shape.turns->sd;
+        }
+        const Eigen::Vector2d expected = ratio * of_ratio + sine * of_sine;
+        left = chi2_of(shape.late_s, expected(0) / w);
+        if (shape.sides) left += chi2_of(*shape.sides, expected(1));
+        if (shape.turns) left += chi2_of(*shape.turns, cosine);
+    }
+
+    double harmonic_ratio() const { return std::hypot(sine, cosine); }
+    double harmonic_phase_rad() const { return std::atan2(sine, cosine); }
+
+    void tell_asymmetry(Candidate& candidate) const {
+        candidate.values.at("ratio") = ratio;
+        candidate.sd["ratio"] = ratio_sd;
+    }
+    void tell_harmonic(Candidate& candidate) const {
+        const double f = harmonic_phase_rad();
+        candidate.values.at("ratio") = harmonic_ratio();
+        candidate.values.at("phase_rad") = f;
+        candidate.sd["ratio"] = std::hypot(std::sin(f) * sine_sd, std::cos(f) * cosine_sd);
+        candidate.sd["phase_rad"] = std::hypot(std::cos(f) * sine_sd, std::sin(f) * cosine_sd) / harmonic_ratio();
+    }
+};
+
 }  // namespace
+
+std::optional<TurnParameters> shape_read_again(const record::Turns& turns, const TurnFit& fit) {
+    constexpr double same = 0.1;  // standard errors
+    TurnParameters parameters = fit.parameters();
+    ActiveEffect* asymmetry = parameters.find("dither_asymmetry");
+    ActiveEffect* harmonic = parameters.find("dither_second_harmonic");
+    if (asymmetry == nullptr && harmonic == nullptr) return std::nullopt;
+    const ShapeFit told(dither_shape(turns, fit), units::pi / fit.model().series().interval_s, asymmetry != nullptr,
+                        harmonic != nullptr);
+    bool moved = false;
+    if (asymmetry != nullptr) {
+        double& ratio = asymmetry->values.at("ratio");
+        moved = std::abs(told.ratio - ratio) > same * told.ratio_sd;
+        ratio = told.ratio;
+    }
+    if (harmonic != nullptr) {
+        double& ratio = harmonic->values.at("ratio");
+        double& phase_rad = harmonic->values.at("phase_rad");
+        moved = moved || std::abs(told.sine - ratio * std::sin(phase_rad)) > same * told.sine_sd ||
+                std::abs(told.cosine - ratio * std::cos(phase_rad)) > same * told.cosine_sd;
+        ratio = told.harmonic_ratio();
+        phase_rad = told.harmonic_phase_rad();
+    }
+    return moved ? std::optional(parameters) : std::nullopt;
+}
 
 DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     const auto& series = fit.model().series();
@@ -152,12 +249,18 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     std::fill(valid.begin(), valid.end(), std::uint8_t{0});
     std::size_t seen = 0;
     double jerks = 0.0;
+    double angles = 0.0;
+    double of_other = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
         if (!(turns.accel_before_rad_s2[i] > 0.0) || !(turns.accel_after_rad_s2[i] > 0.0)) continue;
         const double before = std::log(turns.accel_before_rad_s2[i] / series.acceleration_rad_s2);
         const double after = std::log(turns.accel_after_rad_s2[i] / series.acceleration_rad_s2);
         if (std::abs(before) > 1.0 || std::abs(after) > 1.0) continue;
-        const double jerk = sides_by_jerk(series.direction[i], fit.model().phase_rad()[i], share_at(i), series);
+        const double share = share_at(i);
+        const PulseAngles pulses(series.direction[i], fit.model().phase_rad()[i], series.amplitude_rad);
+        const double jerk = share * (pulses.first + pulses.second) / 6.0;
+        angles += pulses.first + pulses.second;
+        of_other += pulses.share_of_other(std::abs(share));
         jerks += jerk;
         sides[i] = 0.25 * series.direction[i] * (after - before) - jerk;
         minima[i] = 0.25 * series.direction[i] * (after + before);
@@ -167,8 +270,13 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     if (seen > n / 4) {
         // Accelerations are computed from distances that the detectors have read: their ellipse is in them.
         const gyro::Ellipse ellipse = fit.model().setup(fit.parameters()).ellipse;
-        constexpr double of_jerk = 0.2;  // pulses may be made accelerations of in other ways
-        const double least_sides = of_jerk * std::abs(jerks) / static_cast<double>(seen);
+        constexpr double of_jerk = 0.2;  // accelerations may be made of pulses in other ways
+        shape.sides_by_sine = 0.5 * angles / static_cast<double>(seen);
+        of_other /= static_cast<double>(seen);
+        shape.sides_by_ratio = 1.0 - of_other;
+        const double moved =
+            std::hypot(jerks / static_cast<double>(seen), (shape.sides_by_sine + of_other) * w * shape.late_s.value);
+        const double least_sides = of_jerk * moved;
         const double least_ratio = 1e-5 + std::max({std::abs(ellipse.gain), std::abs(ellipse.offset_sin),
                                                     std::abs(ellipse.offset_cos), std::abs(ellipse.orthogonality_rad)});
         free_of_phase(sides, valid, fit);
@@ -268,57 +376,20 @@ std::vector<Candidate> screen_side_channels(const record::Turns& turns, const Tu
     const Effect* harmonic = wanted("dither_second_harmonic");
     if (asymmetry == nullptr && harmonic == nullptr) return candidates;
     const DitherShape shape = dither_shape(turns, fit);
-    const double period_s = 2.0 * fit.model().series().interval_s;
-    const double w = units::two_pi / period_s;
-    // What the other one, where it is in the model, foretells.
-    double late = 0.0;
-    double sides = 0.0;
-    double minima = 0.0;
-    if (const ActiveEffect* active = p.find("dither_asymmetry"); active != nullptr && !again) {
-        late += 0.25 * period_s * active->values.at("ratio");
-        sides += active->values.at("ratio");
-    }
-    if (const ActiveEffect* active = p.find("dither_second_harmonic"); active != nullptr && !again) {
-        late -= active->values.at("ratio") * std::sin(active->values.at("phase_rad")) / w;
-        minima += active->values.at("ratio") * std::cos(active->values.at("phase_rad"));
-    }
-    const double from_late = chi2_of(shape.late_s, late);
-    const double from_sides = shape.sides ? chi2_of(*shape.sides, sides) : 0.0;
-    const double from_turns = shape.turns ? chi2_of(*shape.turns, minima) : 0.0;
+    const double w = units::pi / fit.model().series().interval_s;
+    const bool has_asymmetry = p.find("dither_asymmetry") != nullptr;
+    const bool has_harmonic = p.find("dither_second_harmonic") != nullptr;
     if (asymmetry != nullptr) {
-        // One ratio for both: weighted mean, and what is left of their difference.
-        const double by_late = (shape.late_s.value - late) / (0.25 * period_s);
-        const double late_sd = shape.late_s.sd / (0.25 * period_s);
-        double ratio = by_late;
-        double sd = late_sd;
-        double left = 0.0;
-        if (shape.sides && std::isfinite(shape.sides->sd)) {
-            const double by_sides = shape.sides->value - sides;
-            const double weights = 1.0 / (late_sd * late_sd) + 1.0 / (shape.sides->sd * shape.sides->sd);
-            ratio = (by_late / (late_sd * late_sd) + by_sides / (shape.sides->sd * shape.sides->sd)) / weights;
-            sd = 1.0 / std::sqrt(weights);
-            left = chi2_of(*shape.sides, sides + ratio);
-        }
-        const double chi2 = std::max(0.0, from_late + from_sides - left);
-        Candidate candidate{asymmetry, values_at_rest(*asymmetry), chi2, chi2_tail(chi2, 1), 1.0};
-        candidate.values.at("ratio") = ratio;
-        candidate.sd["ratio"] = sd;
-        candidates.push_back(candidate);
+        const ShapeFit with(shape, w, true, has_harmonic);
+        const double chi2 = std::max(0.0, ShapeFit(shape, w, false, has_harmonic).left - with.left);
+        candidates.push_back({asymmetry, values_at_rest(*asymmetry), chi2, chi2_tail(chi2, 1), 1.0});
+        with.tell_asymmetry(candidates.back());
     }
     if (harmonic != nullptr) {
-        const double chi2 = from_late + from_turns;
-        Candidate candidate{harmonic, values_at_rest(*harmonic), chi2, chi2_tail(chi2, 2), 1.0};
-        const double sine = -w * (shape.late_s.value - late);
-        const double cosine = shape.turns ? shape.turns->value - minima : 0.0;
-        candidate.values.at("ratio") = std::hypot(sine, cosine);
-        candidate.values.at("phase_rad") = std::atan2(sine, cosine);
-        const double sine_sd = w * shape.late_s.sd;
-        const double cosine_sd = shape.turns ? shape.turns->sd : 0.0;
-        const double f = candidate.values.at("phase_rad");
-        candidate.sd["ratio"] = std::hypot(std::sin(f) * sine_sd, std::cos(f) * cosine_sd);
-        candidate.sd["phase_rad"] =
-            std::hypot(std::cos(f) * sine_sd, std::sin(f) * cosine_sd) / candidate.values.at("ratio");
-        candidates.push_back(candidate);
+        const ShapeFit with(shape, w, has_asymmetry, true);
+        const double chi2 = std::max(0.0, ShapeFit(shape, w, has_asymmetry, false).left - with.left);
+        candidates.push_back({harmonic, values_at_rest(*harmonic), chi2, chi2_tail(chi2, 2), 1.0});
+        with.tell_harmonic(candidates.back());
     }
     return candidates;
 }

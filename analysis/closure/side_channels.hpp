@@ -21,12 +21,18 @@ struct BlockMean {
 ///   sides   acceleration of positive half cycles over that of negative ones, a quarter of the logarithm;
 ///   turns   acceleration at minima over that at maxima, a quarter of the logarithm of the product of both sides.
 /// An asymmetry r makes late = r T/4, sides = r; a second harmonic of ratio r and phase f makes late = -r sin f/w,
-/// turns = r cos f.
+/// turns = r cos f and, by two pulses at t1 and t2 after the turn, sides = -r sin f w (t1 + t2)/2.
 struct DitherShape {
     BlockMean late_s;
     std::optional<BlockMean> sides, turns;  ///< none where the record has no accelerations
+    double sides_by_sine = 0.0;             ///< mean of w (t1 + t2)/2
+    double sides_by_ratio = 1.0;  ///< where a rotation moves turns into one half cycle, less of the other is seen
 };
 DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit);
+
+/// The shape effects that are in the model as these columns tell of them together; nothing where they tell what the
+/// model has already.
+std::optional<TurnParameters> shape_read_again(const record::Turns& turns, const TurnFit& fit);
 
 /// How the radius of the quadrature circle follows its phase.
 struct RadiusFold {

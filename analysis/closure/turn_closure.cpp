@@ -160,6 +160,20 @@ void test_what_is_left(const TurnFit& fit, Closure& closure) {
     }
 }
 
+/// What times and accelerations say of the dither's shape depends on the rates in the model and on each other.
+void read_shape_again(const record::Record& record, const Rows& rows, std::shared_ptr<Fitted>& now) {
+    constexpr int most = 3;
+    for (int pass = 0; pass < most; ++pass) {
+        const auto told = shape_read_again(*record.turns, *now->fit);
+        if (!told) return;
+        try {
+            now = fit_record(record, *told, rows);
+        } catch (const RunError&) {
+            return;  // no motion of a gyro with such parameters can be followed
+        }
+    }
+}
+
 /// Effects that stood in for the one added last are no longer needed beside it.
 void drop_needless(const record::Record& record, const Rows& rows, std::shared_ptr<Fitted>& now,
                    std::vector<Step>& steps) {
@@ -168,7 +182,12 @@ void drop_needless(const record::Record& record, const Rows& rows, std::shared_p
         if (told_by_other_columns(*effect)) continue;
         TurnParameters without = now->fit->parameters();
         std::erase_if(without.effects, [&](const ActiveEffect& active) { return active.effect == effect; });
-        const auto fitted = fit_record(record, without, rows);
+        std::shared_ptr<Fitted> fitted;
+        try {
+            fitted = fit_record(record, without, rows);
+        } catch (const RunError&) {
+            continue;  // no motion of a gyro with such parameters can be followed
+        }
         if (passes(p_of_gain(now->fit->log_likelihood() - fitted->fit->log_likelihood(), *effect))) continue;
         now = fitted;
         steps.erase(steps.begin() + static_cast<std::ptrdiff_t>(k));
@@ -285,6 +304,7 @@ Closure close_turns(const record::Record& record) {
         if (!earlier && choice.on_random) earlier = {now, closure.steps, step.effect};
         const Score before = heldout(*now->fit);
         now = best.fitted;
+        read_shape_again(record, rows, now);
         drop_needless(record, rows, now, closure.steps);
         const Score after = heldout(*now->fit);
         step.heldout_error_before = before.error;

@@ -104,10 +104,18 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
         all.push_back({"", "amplitude", std::move(drift)});
     }
     const auto change = [&](TurnParameters& p, double& value, double step) {
-        value += step;
-        TurnModel::Prediction changed = model_->predict(p);
-        value -= step;
-        return difference(std::move(changed), prediction, step);
+        const double here = value;
+        const auto by = [&](double moved) {
+            value = here + moved;
+            TurnModel::Prediction changed = model_->predict(p);
+            value = here;
+            return difference(std::move(changed), prediction, moved);
+        };
+        try {
+            return by(step);
+        } catch (const RunError&) {
+            return by(-step);  // on the edge of what can be followed
+        }
     };
     TurnParameters p = parameters_;
     std::vector<double> rotation(n);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 #include "engine/gyro/device.hpp"
 
@@ -136,6 +137,64 @@ std::vector<double> TurnModel::added_rad(const Prediction& prediction, const eff
     return phase;
 }
 
+std::vector<double> TurnModel::dither_turns(const std::vector<double>& rate_deg_h,
+                                            const std::vector<double>& threshold_factors,
+                                            const std::vector<double>& swing, const gyro::Device& device) const {
+    const double c = units::two_pi / series_.setup.scale_factor_arcsec;
+    const double w = units::pi / series_.interval_s;
+    const double peak_rad_s = series_.amplitude_rad * w;
+    const std::complex<double> coupling_turn = std::polar(device.coupling.b_rad_s, device.coupling.phase_rad);
+    // Accelerations of the half cycle that ends at the turn and of the one that begins, over those of a plain dither.
+    double relative[2][2];
+    for (const int direction : {1, -1}) {
+        for (const int after : {0, 1}) {
+            const gyro::HalfCycle half = device.half_cycle(after ? direction : -direction, series_.amplitude_rad);
+            relative[direction > 0][after] = half.end_acceleration_rad_s2(after ? 0 : 1) / (peak_rad_s * w);
+        }
+    }
+    std::vector<double> turn_s(series_.size());
+    for (std::size_t i = 0; i < turn_s.size(); ++i) {
+        const double sine = turned_[i].real() * coupling_turn.imag() + turned_[i].imag() * coupling_turn.real();
+        const double rate_rad_s = c * rate_deg_h[i] + threshold_factors[i] * sine;
+        const bool before = series_.direction[i] * rate_rad_s > 0.0;
+        const double share = rate_rad_s / (peak_rad_s * swing[before && i > 0 ? i - 1 : i] *
+                                           relative[series_.direction[i] > 0][before ? 0 : 1]);
+        turn_s[i] = series_.time_s[i] + series_.direction[i] * std::asin(std::clamp(share, -1.0, 1.0)) / w;
+    }
+    return turn_s;
+}
+
+std::vector<effects::Interval> TurnModel::intervals(const std::vector<double>& turn_s) const {
+    std::vector<effects::Interval> all(turn_s.size());
+    for (std::size_t i = 0; i < turn_s.size(); ++i) {
+        const std::size_t last = i > 0 ? i - 1 : 0;
+        all[i] = {turn_s[last],
+                  turn_s[i] - turn_s[last],
+                  {temperature_change_k(last), temperature_change_k(i)},
+                  {series_.input_rate_deg_h[last], series_.input_rate_deg_h[i]}};
+    }
+    return all;
+}
+
+bool TurnModel::add_rates(const TurnParameters& parameters, const std::vector<effects::Interval>& intervals,
+                          std::vector<double>& rate_deg_h) {
+    bool any = false;
+    std::vector<double> added_deg_h(intervals.size());
+    for (const ActiveEffect& active : parameters.effects) {
+        if (!active.effect->adds_angle()) continue;
+        any = true;
+        for (std::size_t i = 1; i < intervals.size(); ++i) {
+            added_deg_h[i] += active.effect->added_angle_arcsec(active.values, intervals[i]) / intervals[i].duration_s;
+        }
+    }
+    if (!any) return false;
+    added_deg_h[0] = added_deg_h[1];
+    for (std::size_t i = 0; i < intervals.size(); ++i) {
+        rate_deg_h[i] += 0.5 * (added_deg_h[i] + added_deg_h[std::min(i + 1, intervals.size() - 1)]);
+    }
+    return true;
+}
+
 TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const {
     const std::size_t n = series_.size();
     const gyro::Setup device_setup = setup(parameters);
@@ -147,29 +206,26 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     frame.before_slope.resize(n);
     frame.kick_slope.resize(n);
     prediction.phase_rad.resize(n);
-    prediction.turn_s.resize(n);
-    prediction.intervals.resize(n);
     const double c = device.phase_per_arcsec;
     const std::shared_ptr<const Kicks> shared_kicks = kicks(device_setup);
     const Kicks& kick_of = *shared_kicks;
     const std::vector<double> swing = dither_swings(kick_of);
     std::vector<double> factors(n, 1.0);
-    const double w = units::pi / series_.interval_s;
-    const double peak_rad_s = series_.amplitude_rad * w;
-    const std::complex<double> coupling_turn = std::polar(device.coupling.b_rad_s, device.coupling.phase_rad);
     for (std::size_t i = 0; i < n; ++i) {
         for (const ActiveEffect& active : parameters.effects) {
             factors[i] *= active.effect->threshold_factor(active.values, temperature_change_k(i));
         }
-        // From the zero-rate point to the dither's own turn.
-        const double rate_deg_h = parameters.bias_deg_h + series_.input_rate_deg_h[i];
-        const double sine = turned_[i].real() * coupling_turn.imag() + turned_[i].imag() * coupling_turn.real();
-        const double rate_rad_s = c * rate_deg_h + factors[i] * sine;
-        const bool before = series_.direction[i] * rate_rad_s > 0.0;
-        const double share = rate_rad_s / (peak_rad_s * swing[before && i > 0 ? i - 1 : i]);
-        prediction.turn_s[i] = series_.time_s[i] + series_.direction[i] * std::asin(std::clamp(share, -1.0, 1.0)) / w;
     }
-    const std::vector<double> turn_s = smooth(prediction.turn_s);
+    std::vector<double> rate_deg_h(n);
+    for (std::size_t i = 0; i < n; ++i) rate_deg_h[i] = parameters.bias_deg_h + series_.input_rate_deg_h[i];
+    prediction.turn_s = dither_turns(rate_deg_h, factors, swing, device);
+    std::vector<double> turn_s = smooth(prediction.turn_s);
+    prediction.intervals = intervals(turn_s);
+    if (add_rates(parameters, prediction.intervals, rate_deg_h)) {
+        prediction.turn_s = dither_turns(rate_deg_h, factors, swing, device);
+        turn_s = smooth(prediction.turn_s);
+        prediction.intervals = intervals(turn_s);
+    }
     const std::vector<double> input_arcsec = series_.input_angles_arcsec(turn_s);
     double lockin = 0.0;
     double angle_arcsec = 0.0;
@@ -179,11 +235,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         const double before = factors[i] / std::sqrt(swing[i > 0 ? i - 1 : i]);
         const double after = factors[i] / std::sqrt(swing[i]);
         const std::size_t last = i > 0 ? i - 1 : 0;
-        effects::Interval& interval = prediction.intervals[i];
-        interval = {turn_s[last],
-                    turn_s[i] - turn_s[last],
-                    {temperature_change_k(last), temperature_change_k(i)},
-                    {series_.input_rate_deg_h[last], series_.input_rate_deg_h[i]}};
+        const effects::Interval& interval = prediction.intervals[i];
         angle_arcsec += interval.duration_s * parameters.bias_deg_h + (input_arcsec[i] - input_arcsec[last]);
         for (const ActiveEffect& active : parameters.effects) {
             if (active.effect->adds_angle()) {
@@ -195,6 +247,9 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         lockin += before * kick.before_rad + after * kick.after_rad;
         frame.sign[i] = -series_.direction[i];
         frame.before_slope[i] = before * kick.before_slope;
+        if (!(std::abs(frame.before_slope[i]) < 1.0)) {
+            throw RunError("lock-in so strong that a turn's phase does not tell the phase without it");
+        }
         frame.kick_slope[i] = before * kick.before_slope + after * kick.after_slope;
     }
     return prediction;

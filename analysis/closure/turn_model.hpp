@@ -13,6 +13,7 @@
 #include "analysis/closure/turn_series.hpp"
 #include "analysis/closure/whitening.hpp"
 #include "engine/effects/effect.hpp"
+#include "engine/gyro/device.hpp"
 
 namespace ringlock::closure {
 
@@ -69,6 +70,16 @@ class TurnModel {
     std::shared_ptr<const Kicks> kicks(gyro::Setup setup) const;
 
     double temperature_change_k(std::size_t turn) const;
+    /// When the dither turned, from when the phase did, at these rates: the phase stands still where the dither's own
+    /// rate and they, the lock-in's among them, add up to nothing.
+    std::vector<double> dither_turns(const std::vector<double>& rate_deg_h,
+                                     const std::vector<double>& threshold_factors, const std::vector<double>& swing,
+                                     const gyro::Device& device) const;
+    /// Half cycles that end at the turns.
+    std::vector<effects::Interval> intervals(const std::vector<double>& turn_s) const;
+    /// Those that effects add at the turns; says whether any does.
+    static bool add_rates(const TurnParameters& parameters, const std::vector<effects::Interval>& intervals,
+                          std::vector<double>& rate_deg_h);
     /// Times of the dither's turns by a resonator that drifts slowly.
     std::vector<double> smooth(const std::vector<double>& turn_s) const;
     /// Swing of the dither after each turn over the mean one of its sign.
