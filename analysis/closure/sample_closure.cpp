@@ -140,6 +140,7 @@ class Loop {
     Disturbed disturbed_;
     Lattice lattice_;
     double used_step_ = 0.0;  ///< of the lattice in the model
+    double base_log_likelihood_ = 0.0;  ///< of the rows that choose
     State now_;
     int next_step_ = 0;
 };
@@ -178,6 +179,7 @@ void Loop::begin(Closure& closure) {
             100.0 * disturbed_.share, disturbed_.worst, disturbed_.at_s, with));
         closure.heldout_before = heldout(*now_.fit, reported_, 0.0).error;
     }
+    base_log_likelihood_ = now_.fit->log_likelihood();
 }
 
 /// Values that nothing is held out of: steps are chosen like any other effect.
@@ -398,6 +400,7 @@ void Loop::finish(Closure& closure) {
     const Score last = heldout(*now_.fit, reported_, used_step_);
     closure.heldout_after = last.error;
     closure.noise_floor = last.floor;
+    closure.log_likelihood_gain = now_.fit->log_likelihood() - base_log_likelihood_;
     closure.residual.time_s = series_.time_s;
     for (std::size_t i = 0; i < series_.size(); ++i) {
         closure.residual.innovation.push_back(now_.fit->innovations()[i] * now_.fit->sd(i));

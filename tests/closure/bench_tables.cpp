@@ -216,17 +216,17 @@ void Tables::write() const {
     std::ofstream deviations(folder_ + "/deviations.csv");
     fmt::print(rows,
                "kind,truth,multiple,condition,by,seed,values,judged,false_name,verdict,named,where,expected,"
-               "before_{0},after_{0},floor_{0},oracle_{0},seconds\n",
+               "before_{0},after_{0},floor_{0},oracle_{0},truth_gain,answer_gain,seconds\n",
                unit_);
     fmt::print(deviations, "kind,truth,condition,seed,parameter,estimate,standard_error,standard_errors_off\n");
     for (std::size_t k = 0; k < truths_.size(); ++k) {
         if (!outcomes_[k]) continue;
         const TableRow& of = truths_[k];
         const Outcome& o = *outcomes_[k];
-        fmt::print(rows, "{},{},{},\"{}\",{},{},{},{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.2f}\n",
+        fmt::print(rows, "{},{},{},\"{}\",{},{},{},{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.2f},{:.2f},{:.2f}\n",
                    name_of(of.kind), of.truth, of.multiple, of.condition, of.by, of.seed, of.values, name_of(o.judged),
                    o.false_name ? 1 : 0, o.verdict, o.named, o.where, of.expected, o.before, o.after, o.floor, o.oracle,
-                   o.seconds);
+                   o.truth_gain, o.answer_gain, o.seconds);
         for (const auto& d : o.deviations) {
             fmt::print(deviations, "{},{},\"{}\",{},{},{:.9g},{:.3g},{:.4f}\n", name_of(of.kind), of.truth,
                        of.condition, of.seed, d.parameter, d.value, d.sd, d.standard_errors);

@@ -289,7 +289,9 @@ Outcome judge(const SampleCase& of, const record::Record& record) {
     const bool foreign = of.kind == Kind::foreign;
     compare(closure, foreign, of.where, of.truth, outcome);
     if (foreign) return outcome;
-    outcome.oracle = ringlock::closure::fit_samples(record, known(of.truth)).heldout_after;
+    const Closure oracle = ringlock::closure::fit_samples(record, known(of.truth));
+    outcome.oracle = oracle.heldout_after;
+    outcome.truth_gain = oracle.log_likelihood_gain;
     // Estimates of what has been named: a tie names it first.
     if (outcome.judged != Judged::right && outcome.judged != Judged::tie) return outcome;
     const SampleTruth truth = truth_of(of);

@@ -318,6 +318,7 @@ void compare(const Closure& closure, bool foreign, Where where, const std::vecto
     outcome.before = closure.heldout_before;
     outcome.after = closure.heldout_after;
     outcome.floor = closure.noise_floor;
+    outcome.answer_gain = closure.log_likelihood_gain;
     outcome.oracle = std::numeric_limits<double>::quiet_NaN();
     if (closure.unexplained) outcome.where = std::string(name_of(closure.unexplained->where));
     std::set<std::string> missing;

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <span>
 #include <string>
@@ -83,6 +84,10 @@ struct Outcome {
     std::string where;
     double before = 0.0, after = 0.0, floor = 0.0;
     double oracle = 0.0;  ///< held-out error of the true model; NaN where the library does not have it
+    /// Of the log-likelihood over that of the base model, on the rows that choose [nats]: by the true model, and by the
+    /// one that was answered.
+    double truth_gain = std::numeric_limits<double>::quiet_NaN();
+    double answer_gain = std::numeric_limits<double>::quiet_NaN();
     double seconds = 0.0;
     struct Deviation {
         std::string parameter;
