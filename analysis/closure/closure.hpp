@@ -43,7 +43,8 @@ struct Closure {
     double heldout_before = 0.0;
     double heldout_after = 0.0;
     double noise_floor = 0.0;
-    double log_likelihood_gain = 0.0;  ///< of the model of all that was chosen over the base model, on the rows that choose [nats]
+    double log_likelihood_gain =
+        0.0;  ///< of the model of all that was chosen over the base model, on the rows that choose [nats]
     std::vector<ResidualTest> tests;  ///< of the final residual
     std::optional<ResidualTest> unexplained;
     std::vector<std::string> notes;      ///< what was assumed

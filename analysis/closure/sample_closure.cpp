@@ -139,7 +139,7 @@ class Loop {
     Rows whole_;
     Disturbed disturbed_;
     Lattice lattice_;
-    double used_step_ = 0.0;  ///< of the lattice in the model
+    double used_step_ = 0.0;            ///< of the lattice in the model
     double base_log_likelihood_ = 0.0;  ///< of the rows that choose
     State now_;
     int next_step_ = 0;
@@ -536,6 +536,10 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
     SampleModel model = now_.fit->model();
     const double duration_s = static_cast<double>(series_.size()) * series_.interval_s;
     SampleFit::Noise noise = SampleFit::Noise::near;
+    double from_hz = 0.0;
+    for (const ActiveEffect& active : effects) {
+        if (active.effect->name() == "resampling") from_hz = active.values.at("from_hz");
+    }
     for (const ActiveEffect& active : effects) {
         const std::string effect(active.effect->name());
         const int k = next_step_++;
@@ -544,11 +548,10 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
             lattice_ = find_lattice(chosen_increments());
             used_step_ = lattice_.printed_arcsec;
         } else if (is_line(effect)) {
-            SampleLine line{alias(active.values.at("frequency_hz"), series_.rate_hz)};
+            const Alias shown = alias(active.values.at("frequency_hz"), series_.rate_hz, from_hz);
+            SampleLine line{shown.hz};
             if (effect == "dither_residue") {
-                const double hz = active.values.at("frequency_hz");
-                const bool folded = hz < std::round(hz / series_.rate_hz) * series_.rate_hz;
-                line.drift_hz_per_s = (folded ? -1.0 : 1.0) * active.values.at("drift_hz_per_s");
+                line.drift_hz_per_s = (shown.folded ? -1.0 : 1.0) * active.values.at("drift_hz_per_s");
                 line.drifts = line.drift_hz_per_s != 0.0;
             }
             add_line(model, series_, line, effect, k);

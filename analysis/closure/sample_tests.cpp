@@ -11,6 +11,7 @@
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
 #include "analysis/closure/normality.hpp"
+#include "analysis/closure/sample_line_search.hpp"
 #include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_search.hpp"
 #include "analysis/closure/two_levels.hpp"
@@ -76,11 +77,12 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     }
     views.push_back({{Where::frequency, "spectrum in bands", chi2_tail(chi2, bands),
                       fmt::format("most at {:.4g} Hz, {:.3g} times the mean", worst_hz, worst_ratio)}});
-    const FoundLine line = find_line(e, fit.series().rate_hz, true);
+    const FoundLines lines = find_lines(e, fit.series().rate_hz);
+    const FoundLine line = lines.likeliest();
     const double cost = 3.0 + std::log(line.searched);
     // A line whose power is scattered explains as much as follows it from stretch to stretch.
-    const double gain = 0.5 * std::max(line.chi2, line.scattered);
-    const bool coherent = line.chi2 >= line.scattered;
+    const double gain = 0.5 * std::max(line.chi2, lines.scattered);
+    const bool coherent = line.chi2 >= lines.scattered;
     double p = line.p_value;
     if (coherent && p < 0.01) {
         // The level about a line is itself a random number: what the regression says counts as well.
@@ -89,7 +91,7 @@ void test_spectrum(const SampleFit& fit, Views& views) {
         p = std::max(p, of_several(chi2_tail(refined.chi2, 2), line.searched));
     }
     View view{{Where::frequency, "lines, still and drifting", p,
-               fmt::format("at {:.6g} Hz", coherent ? line.frequency_hz : line.scattered_hz), gain - cost},
+               fmt::format("at {:.6g} Hz", coherent ? line.frequency_hz : lines.scattered_hz), gain - cost},
               cost};
     if (coherent) {
         view.columns = [n, rate_hz = fit.series().rate_hz, line] {
@@ -479,9 +481,10 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
     for (std::size_t i = 0; i < e.size(); ++i) {
         if (fit.telling()[i]) e[i] = fit.innovations()[i];
     }
-    const FoundLine line = find_line(e, fit.series().rate_hz, true);
+    const FoundLines left = find_lines(e, fit.series().rate_hz);
+    const FoundLine line = left.likeliest();
     constexpr double near_hz = 1.0;
-    const double hz = line.coherent ? line.frequency_hz : line.scattered_hz;
+    const double hz = line.chi2 >= left.scattered ? line.frequency_hz : left.scattered_hz;
     least.beside = line.p_value < level_of_residual && std::abs(hz - least.hz) < near_hz;
     return least;
 }

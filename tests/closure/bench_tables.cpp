@@ -223,7 +223,8 @@ void Tables::write() const {
         if (!outcomes_[k]) continue;
         const TableRow& of = truths_[k];
         const Outcome& o = *outcomes_[k];
-        fmt::print(rows, "{},{},{},\"{}\",{},{},{},{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.2f},{:.2f},{:.2f}\n",
+        fmt::print(rows,
+                   "{},{},{},\"{}\",{},{},{},{},{},{},{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.2f},{:.2f},{:.2f}\n",
                    name_of(of.kind), of.truth, of.multiple, of.condition, of.by, of.seed, of.values, name_of(o.judged),
                    o.false_name ? 1 : 0, o.verdict, o.named, o.where, of.expected, o.before, o.after, o.floor, o.oracle,
                    o.truth_gain, o.answer_gain, o.seconds);

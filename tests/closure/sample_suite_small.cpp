@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 #include <string>
@@ -10,6 +11,7 @@
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/sample_filter.hpp"
 #include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_line_search.hpp"
 #include "tests/closure/sample_suite.hpp"
 
 namespace ringlock::test::closure {
@@ -106,6 +108,50 @@ TEST(ClosureSampleSuite, KnownInputIsNoStructure) {
     EXPECT_EQ(found.steps[0].effect, "scale_factor_error");
     const auto& relative = found.steps[0].parameters.at(0);
     EXPECT_NEAR(relative.value, 0.01, 4.0 * relative.sd);
+}
+
+// A declared dither is looked for where it shows: what all frequencies and drifts would drown is named.
+TEST(ClosureSampleSuite, ADeclaredDitherNeedsLess) {
+    SampleTruth truth;
+    truth.size = 20000;
+    truth.seed = 11;
+    truth.white_angle_arcsec = 0.1;
+    truth.rates.quantum_noise_deg_rt_h = 0.02;
+    truth.dither_residue = {437.3, 0.0, 0.0092, 1.0};
+    EXPECT_EQ(ringlock::closure::close_samples(generate_samples(truth)).verdict,
+              ringlock::closure::Verdict::nothing_missing);
+    truth.declared.emplace().dither_frequency_hz = 437.0;
+    const auto found = ringlock::closure::close_samples(generate_samples(truth));
+    ASSERT_EQ(found.steps.size(), 1U);
+    EXPECT_EQ(found.steps[0].effect, "dither_residue");
+    EXPECT_TRUE(found.steps[0].confounded_with.empty());
+    EXPECT_NEAR(found.steps[0].parameters[0].value, 437.3, 4.0 * found.steps[0].parameters[0].sd);
+}
+
+// Searches are counted as what they are worth: in noise alone each p-value is as rare as it says. Three standard errors
+// above; a count ten times too large would leave none.
+TEST(SampleLines, CountTheirSearches) {
+    constexpr int records = 100;
+    constexpr double p = 0.1;
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> normal;
+    std::array<int, 5> rare{};
+    for (int k = 0; k < records; ++k) {
+        std::vector<double> values(2100, 0.0);
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            const double x = normal(random);
+            if (i / 100 % 3 != 2) values[i] = x;
+        }
+        const auto lines = ringlock::closure::find_lines(values, 100.0);
+        const auto narrow = ringlock::closure::find_lines_in(values, 100.0, {37.0, 2.0, 0.01});
+        const std::array<double, 5> found = {lines.still.p_value, lines.slow.p_value, lines.likeliest().p_value,
+                                             narrow.still.p_value, narrow.drifting.p_value};
+        for (std::size_t j = 0; j < found.size(); ++j) rare[j] += found[j] < p ? 1 : 0;
+    }
+    for (const int count : rare) {
+        EXPECT_LE(count, records * p + 3.0 * std::sqrt(records * p));
+        EXPECT_GE(count, 1);
+    }
 }
 
 // The filter's likelihood is that of the increments' covariance matrix: here by its Cholesky factor.
