@@ -470,12 +470,12 @@ void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witn
 
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in) {
     std::vector<SampleCandidate> out;
-    screen_line(now, in, out);
     screen_rates(now, in, out);
-    if (in.plain) return out;
+    screen_noises(now, in, out);
+    if (in.slow) return out;
+    screen_line(now, in, out);
     screen_witnesses(now, in, out);
     screen_resampling(now, in, out);
-    screen_noises(now, in, out);
     return out;
 }
 

@@ -34,7 +34,7 @@ struct SampleContext {
     const Rows& rows;                     ///< fitted
     const std::vector<double>& lines_hz;  ///< that are in the model
     int step = 0;                         ///< that a candidate would be
-    bool plain = false;                   ///< rates without chance and lines only
+    bool slow = false;                    ///< slow rates only
 };
 
 /// Rates in proportion to one number that the record can tell of: time, temperature, input rate.

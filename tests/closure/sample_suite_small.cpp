@@ -128,6 +128,23 @@ TEST(ClosureSampleSuite, ADeclaredDitherNeedsLess) {
     EXPECT_NEAR(found.steps[0].parameters[0].value, 437.3, 4.0 * found.steps[0].parameters[0].sd);
 }
 
+// A random rate explains more than a ramp or a scale factor's error alone, but less than both.
+TEST(ClosureSampleSuite, TwoEffectsThatHideEachOtherAreNamed) {
+    SampleTruth truth;
+    truth.size = 20000;
+    truth.white_angle_arcsec = 0.2;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.input_profile_deg_h = {{0.0, 100.0, 101.0, 200.0}, {-150.0, -150.0, 150.0, 150.0}};
+    truth.rates.bias_ramp_deg_h_per_h = -60.0;
+    truth.scale_factor_error = 0.008;
+    const auto found = ringlock::closure::close_samples(generate_samples(truth));
+    ASSERT_EQ(found.steps.size(), 2U);
+    for (const auto& step : found.steps) {
+        EXPECT_TRUE(step.effect == "bias_ramp" || step.effect == "scale_factor_error") << step.effect;
+    }
+    EXPECT_GT(found.log_likelihood_gain, 20.0);
+}
+
 // Searches are counted as what they are worth: in noise alone each p-value is as rare as it says. Three standard errors
 // above; a count ten times too large would leave none.
 TEST(SampleLines, CountTheirSearches) {
