@@ -218,7 +218,7 @@ void Loop::drop_needless() {
             continue;
         }
         auto fitted = std::make_shared<SampleFit>(series_, std::move(without), rows_, SampleFit::Noise::near);
-        const double chi2 = 2.0 * (now_.fit->log_likelihood() - fitted->log_likelihood());
+        const double chi2 = 2.0 * (now_.fit->gain_over(*fitted));
         const int parameters = effect == "bias_step" ? 2 : 1;
         if (passes_on_samples(chi2_tail(chi2, parameters))) continue;
         now_.fit = std::move(fitted);

@@ -101,7 +101,7 @@ std::vector<SampleCandidate> Contest::screened(const SampleState& state, Wanted 
 Contest::Shared Contest::fitted(const SampleState& state, SampleCandidate candidate) const {
     auto contender = std::make_shared<SampleContender>();
     contender->fit = std::make_shared<SampleFit>(series_, candidate.model, rows_, candidate.noise);
-    const double gain = contender->fit->log_likelihood() - state.fit->log_likelihood();
+    const double gain = contender->fit->gain_over(*state.fit);
     contender->merit = gain - std::log(candidate.places.value_or(candidate.searched)) - candidate.parameters;
     // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
     contender->passes = contender->merit > 0.0 && passes_on_samples(p_of_gain(gain, candidate));
@@ -136,18 +136,18 @@ double Contest::p_beside(const SampleContender& first, const SampleContender& se
     const std::string& name = second.candidate.effect;
     const auto fitted_already =
         std::find_if(firsts.begin(), firsts.end(), [&](const Shared& c) { return c->candidate.effect == name; });
-    double alone = 0.0;
+    std::shared_ptr<SampleFit> alone;
     if (fitted_already != firsts.end()) {
-        alone = (*fitted_already)->fit->log_likelihood();
+        alone = (*fitted_already)->fit;
     } else {
         const auto same = std::find_if(candidates.begin(), candidates.end(),
                                        [&](const SampleCandidate& c) { return c.effect == name; });
         if (same == candidates.end()) return first.passes ? first.candidate.p_value : 1.0;
-        alone = fitted(now_, *same)->fit->log_likelihood();
+        alone = fitted(now_, *same)->fit;
     }
-    const double p = p_of_gain(second.fit->log_likelihood() - alone, first.candidate);
+    const double p = p_of_gain(second.fit->gain_over(*alone), first.candidate);
     if (first.passes) return p;
-    const double both = second.fit->log_likelihood() - now_.fit->log_likelihood();
+    const double both = second.fit->gain_over(*now_.fit);
     return std::max(p, of_several(chi2_tail(2.0 * both, first.candidate.freedom + second.candidate.freedom),
                                   others * first.candidate.searched * second.candidate.searched));
 }

@@ -27,7 +27,7 @@ SampleColumn rate_column(const SampleSeries& series, std::string effect, std::st
                          const std::function<double(std::size_t)>& rate) {
     std::vector<double> values(series.size());
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = rate(i) * series.interval_s;
-    return {std::move(effect), std::move(name), shared(std::move(values))};
+    return {.effect = std::move(effect), .name = std::move(name), .series = shared(std::move(values)), .of_rate = true};
 }
 
 bool has(const SampleModel& model, std::string_view effect) {
@@ -57,7 +57,7 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     const double worth = sums > 20.0 ? std::min(1.0, sums / spread) : 1.0;
     const auto one = [&](SampleColumn column) {
         if (has(model, column.effect)) return;
-        const auto score = now.score({*column.series});
+        const auto score = now.score({now.as_taken(*column.series)});
         if (score.rank == 0) return;
         SampleCandidate c{.effect = column.effect, .model = model, .p_value = chi2_tail(worth * score.chi2, 1)};
         column.step = in.step;
@@ -73,7 +73,7 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     const auto root_at = [&](std::size_t row) {
         std::vector<double> step(n, 0.0);
         std::fill(step.begin() + static_cast<std::ptrdiff_t>(row), step.end(), in.series.interval_s);
-        const auto score = now.score({step});
+        const auto score = now.score({now.as_taken(step)});
         return score.rank == 0 ? 0.0 : std::copysign(std::sqrt(worth * score.chi2), score.value[0]);
     };
     constexpr std::size_t places = 80;
@@ -111,7 +111,7 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
 void screen_noises(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
     const auto one = [&](const std::string& effect, SampleModel model) {
         const SampleFit fit(in.series, std::move(model), in.rows, SampleFit::Noise::near);
-        const double chi2 = std::max(0.0, 2.0 * (fit.log_likelihood() - now.log_likelihood()));
+        const double chi2 = std::max(0.0, 2.0 * fit.gain_over(now));
         // A variance cannot be negative: half of the time there is no gain at all (Chernoff 1954).
         out.push_back({.effect = effect, .model = fit.model(), .p_value = 0.5 * chi2_tail(chi2, 1)});
     };

@@ -145,6 +145,25 @@ TEST(ClosureSampleSuite, TwoEffectsThatHideEachOtherAreNamed) {
     EXPECT_GT(found.log_likelihood_gain, 20.0);
 }
 
+// What a resampled record's source was given, it has on the straight lines between the source's times.
+TEST(ClosureSampleSuite, KnownInputIsResampledToo) {
+    SampleTruth truth;
+    truth.size = 10000;
+    truth.seed = 5;
+    truth.white_angle_arcsec = 0.2;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.input_profile_deg_h = {{0.0, 30.0, 31.0, 65.0, 66.0, 100.0}, {200.0, 200.0, -300.0, -300.0, 50.0, 50.0}};
+    truth.scale_factor_error = 0.01;
+    truth.resampling.from_hz = 77.3;
+    const auto found = ringlock::closure::close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, ringlock::closure::Verdict::closed);
+    ASSERT_EQ(found.steps.size(), 2U);
+    EXPECT_EQ(found.steps[0].effect, "resampling");
+    EXPECT_EQ(found.steps[1].effect, "scale_factor_error");
+    const auto& relative = found.steps[1].parameters.at(0);
+    EXPECT_NEAR(relative.value, 0.01, 4.0 * relative.sd);
+}
+
 // Searches are counted as what they are worth: in noise alone each p-value is as rare as it says. Three standard errors
 // above; a count ten times too large would leave none.
 TEST(SampleLines, CountTheirSearches) {
