@@ -73,6 +73,7 @@ class Contest {
                     const std::vector<SampleCandidate>& candidates) const;
     std::vector<Rival> rivals() const;
     static double bar(const Account& account, const std::vector<Rival>& rivals, std::size_t rows);
+    bool beside_each_other(const SampleContender& a, const SampleContender& b) const;
     static void tie(const Account& best, const std::vector<Account>& as_likely, SampleChoice& choice);
 
     const record::Declared& declared_;
@@ -247,7 +248,8 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
             most = std::max(most, of_variance_alone * merit);
             continue;
         }
-        double more = -closure::tie;
+        // Several effects are chosen from many: they get nothing for being of the library.
+        double more = account.members.size() > 1 ? 0.0 : -closure::tie;
         if (random && rival.where == Where::time && !rival.jumps) {
             // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
             // course in time (Schwarz 1978).
@@ -264,6 +266,33 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
     return most;
 }
 
+/// Whether two effects of different kinds explain different things: one is needed beside the other as well. Such may
+/// have the same merit, and are no answer in each other's place.
+bool Contest::beside_each_other(const SampleContender& a, const SampleContender& b) const {
+    const auto kind = [](const std::string& effect) { return is_slow(effect) ? 0 : is_line(effect) ? 1 : 2; };
+    if (kind(a.candidate.effect) == kind(b.candidate.effect)) return false;
+    for (const auto& [with, without] : {std::pair{&a, &b}, std::pair{&b, &a}}) {
+        std::vector<std::vector<double>> added;
+        for (const SampleColumn& column : with->fit->model().columns) {
+            if (column.step != now_.step) continue;
+            added.push_back(column.of_rate ? without->fit->as_taken(*column.series) : *column.series);
+        }
+        if (!added.empty()) return 0.5 * without->fit->score(added).chi2 > closure::tie;
+    }
+    const SampleContender& random = is_random_rate(a.candidate.effect) ? a : b;
+    const SampleContender& other = is_random_rate(a.candidate.effect) ? b : a;
+    if (!is_random_rate(random.candidate.effect)) return false;
+    SampleModel model = other.fit->model();
+    const SampleModel& rates = random.fit->model();
+    model.walk = rates.walk;
+    model.flicker = rates.flicker;
+    model.flicker_deg_h = rates.flicker_deg_h;
+    model.noise.walk_arcsec2_s3 = rates.noise.walk_arcsec2_s3;
+    model.noise.terms = rates.noise.terms;
+    const SampleFit both(series_, std::move(model), rows_, SampleFit::Noise::near);
+    return both.gain_over(*other.fit) > closure::tie;
+}
+
 /// All that explains as much without the first is tied to it. Where others are added next, one of these is tied to each
 /// of them instead.
 void Contest::tie(const Account& best, const std::vector<Account>& as_likely, SampleChoice& choice) {
@@ -276,7 +305,14 @@ void Contest::tie(const Account& best, const std::vector<Account>& as_likely, Sa
         if (member->candidate.effect != effect) choice.of_partners.push_back({member->candidate.effect, {}});
     }
     for (const Account& other : as_likely) {
-        if (other.has(effect)) continue;
+        if (other.has(effect)) {
+            // The same with another drift, which may go by other names.
+            if (other.members.size() > 1) continue;
+            for (const std::string& name : other.members.front()->candidate.confounded) {
+                add(choice.confounded_with, name);
+            }
+            continue;
+        }
         std::vector<std::string> instead;
         for (const Shared& member : other.members) {
             if (!best.has(member->candidate.effect)) instead.push_back(member->candidate.effect);
@@ -337,6 +373,9 @@ SampleChoice Contest::choose() {
         choice.chosen = first ? member : fitted(now_, *same);
         choice.p_value = first ? best->p_value : member->candidate.p_value;
     }
+    std::erase_if(as_likely, [&](const Account& account) {
+        return account.members.size() == 1 && beside_each_other(*choice.chosen, *account.members.front());
+    });
     tie(*best, as_likely, choice);
     const double from_hz = choice.chosen->fit->model().noise.from_hz;
     for (const Account& account : as_likely) {
