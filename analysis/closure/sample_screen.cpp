@@ -101,7 +101,7 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     SampleCandidate c{.effect = "bias_step",
                       .model = model,
                       .p_value = p,
-                      .searched = static_cast<double>(places),
+                      .searched = places_of_step(best * best, 0.5 / static_cast<double>(places)),
                       .places = static_cast<double>(places) / as_good};
     c.model.columns.push_back(step_column(in.series, at));
     c.model.columns.back().step = in.step;

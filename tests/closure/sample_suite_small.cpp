@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/closure/chance.hpp"
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/sample_filter.hpp"
 #include "analysis/closure/sample_fit.hpp"
@@ -162,6 +163,33 @@ TEST(ClosureSampleSuite, KnownInputIsResampledToo) {
     EXPECT_EQ(found.steps[1].effect, "scale_factor_error");
     const auto& relative = found.steps[1].parameters.at(0);
     EXPECT_NEAR(relative.value, 0.01, 4.0 * relative.sd);
+}
+
+// The largest standardised difference of means before and after, over all places but 0.6 % at either end: by
+// simulation, which has places between which nothing is looked at. Three standard errors above.
+TEST(SampleSteps, AreCountedAsABrownianBridge) {
+    constexpr int records = 4000;
+    constexpr std::size_t n = 1000;
+    constexpr double chi2 = 9.0;
+    constexpr double ends = 0.00625;
+    std::mt19937_64 random(4);
+    std::normal_distribution<double> normal;
+    int above = 0;
+    std::vector<double> sum(n + 1, 0.0);
+    for (int k = 0; k < records; ++k) {
+        for (std::size_t i = 0; i < n; ++i) sum[i + 1] = sum[i] + normal(random);
+        double most = 0.0;
+        for (std::size_t i = 1; i < n; ++i) {
+            const double t = static_cast<double>(i) / n;
+            if (t < ends || t > 1.0 - ends) continue;
+            const double bridge = sum[i] - t * sum[n];
+            most = std::max(most, bridge * bridge / (n * t * (1.0 - t)));
+        }
+        above += most > chi2 ? 1 : 0;
+    }
+    const double p = ringlock::closure::chi2_tail(chi2, 1) * ringlock::closure::places_of_step(chi2, ends);
+    EXPECT_LT(above, records * p + 3.0 * std::sqrt(records * p));
+    EXPECT_GT(above, 0.7 * records * p);
 }
 
 // Searches are counted as what they are worth: in noise alone each p-value is as rare as it says. Three standard errors
