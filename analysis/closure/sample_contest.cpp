@@ -248,8 +248,9 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
             most = std::max(most, of_variance_alone * merit);
             continue;
         }
-        // Several effects are chosen from many: they get nothing for being of the library.
-        double more = account.members.size() > 1 ? 0.0 : -closure::tie;
+        // Several effects are chosen from many: against what follows another column of the record they get nothing for
+        // being of the library. A course in time follows all of them.
+        double more = account.members.size() > 1 && rival.where != Where::time ? 0.0 : -closure::tie;
         if (random && rival.where == Where::time && !rival.jumps) {
             // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
             // course in time (Schwarz 1978).
