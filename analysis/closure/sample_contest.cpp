@@ -116,7 +116,8 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
                                                  std::vector<SampleCandidate> candidates) const {
     std::vector<Shared> all;
     for (SampleCandidate& candidate : candidates) {
-        const bool worth = is_slow(candidate.effect) && candidate.p_value < worth_looking;
+        const bool worth =
+            (is_slow(candidate.effect) || is_line(candidate.effect)) && candidate.p_value < worth_looking;
         if (!passes_on_samples(candidate.p_value) && !worth) continue;
         if (all.size() >= most_contenders + 2) break;
         Shared contender = fitted(state, std::move(candidate));
