@@ -6,6 +6,8 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 
+#include "engine/core/units.hpp"
+
 namespace ringlock::closure {
 
 std::string probability(double p) { return p < 1e-99 ? "< 1e-99" : fmt::format("{:.2g}", p); }
@@ -28,6 +30,14 @@ double davies_places(double chi2, const std::vector<double>& roots) {
     for (std::size_t i = 1; i < roots.size(); ++i) variation += std::abs(roots[i] - roots[i - 1]);
     // V exp(-u/2)/sqrt(2 pi) over sqrt(2/(pi u)) exp(-u/2), the tail of one degree of freedom.
     return 1.0 + 0.5 * variation * std::sqrt(std::max(chi2, 0.0));
+}
+
+double places_of_step(double chi2, double share_at_ends) {
+    const double b = std::sqrt(std::max(chi2, 1.0));
+    const double density = std::exp(-0.5 * b * b) / std::sqrt(units::two_pi);
+    const double range = 2.0 * std::log((1.0 - share_at_ends) / share_at_ends);
+    const double p = density * ((b - 1.0 / b) * range + 4.0 / b);
+    return std::max(1.0, p / chi2_tail(b * b, 1));
 }
 
 double davies_bound(double chi2, const std::vector<double>& roots) {

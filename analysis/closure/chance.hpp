@@ -23,6 +23,11 @@ double davies_bound(double chi2, const std::vector<double>& roots);
 /// being the likeliest (George and Foster, Biometrika 87, 2000, 731: the marginal likelihood of one model).
 double cost_of_amplitudes(double gain, int amplitudes);
 
+/// How many independent places a step anywhere in white noise is worth, but for that share of it at either end, at that
+/// chi-squared: the probability of the largest standardised Brownian bridge (Miller and Siegmund, Biometrics 38, 1982,
+/// 1011) over that of one place.
+double places_of_step(double chi2, double share_at_ends);
+
 /// The bound over the probability of one place: how many independent ones the search is worth.
 double davies_places(double chi2, const std::vector<double>& roots);
 

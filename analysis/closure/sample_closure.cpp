@@ -9,11 +9,11 @@
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/sample_contest.hpp"
 #include "analysis/closure/sample_figures.hpp"
 #include "analysis/closure/sample_fit.hpp"
 #include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_screen.hpp"
-#include "analysis/closure/sample_search.hpp"
 #include "analysis/closure/sample_series.hpp"
 #include "analysis/closure/sample_tests.hpp"
 #include "engine/core/units.hpp"
@@ -22,10 +22,6 @@
 namespace ringlock::closure {
 
 namespace {
-
-/// What samples can tell of; the rest of the library needs turns.
-constexpr double effects_on_samples = 12.0;
-bool passes_on_samples(double p_value) { return p_value * effects_on_samples < level_of_effects; }
 
 /// Of ten blocks, three are only reported.
 constexpr BlockRoles roles{1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
@@ -73,18 +69,9 @@ Score heldout(const SampleFit& fit, const Rows& reported, double lattice) {
     return score;
 }
 
-/// A random rate can follow whatever the library does not have, more or less.
-bool is_random_rate(const std::string& effect) { return effect == "rate_random_walk" || effect == "bias_instability"; }
-
 /// Of the line that was added last.
 double line_hz(const SampleModel& model, bool wanders) {
     return wanders ? model.noise.resonances.back().hz : model.columns[model.columns.size() - 2].hz;
-}
-
-bool is_line(const std::string& effect) { return effect == "dither_residue" || effect == "base_vibration"; }
-
-double p_of_gain(double gain, const SampleCandidate& candidate) {
-    return of_several(chi2_tail(2.0 * gain, candidate.freedom), candidate.searched);
 }
 
 class Loop {
@@ -102,30 +89,14 @@ class Loop {
         std::vector<Step> steps;
         std::vector<SampleStep> told;  ///< as many
         std::vector<double> lines_hz;
+        /// What is added after another that was chosen with it is as confounded.
+        std::vector<std::pair<std::string, std::vector<std::string>>> of_partners;
     };
-    struct Contender {
-        SampleCandidate candidate;
-        std::shared_ptr<SampleFit> fit;
-        double merit;
-        bool passes = true;  ///< alone
-    };
-    /// Several effects that explain more than one.
-    struct Set {
-        Contender first;
-        double merit = 0.0;
-        std::vector<std::string> others = {};
-    };
-    enum class Wanted { all, plain, plain_if_weak };
-
     double lattice_step() const { return series_.counted ? 0.25 * series_.scale_factor_arcsec : lattice_.step_arcsec; }
     std::vector<double> chosen_increments() const;
     void begin(Closure& closure);
     void take_lattice(Closure& closure);
-    std::vector<Contender> contenders(const State& state, int step, Wanted wanted = Wanted::all) const;
-    double rival_merit(const std::string& effect, double merit_of_effect) const;
-    std::optional<Set> of_several_effects(const std::vector<Contender>& all) const;
-    void take(Contender best, const std::vector<Contender>& all, const std::vector<std::string>& as_likely,
-              Closure& closure);
+    void take(const SampleChoice& choice, Closure& closure);
     void take_back_lines(Closure& closure);
     void drop_needless();
     void test_what_is_left(Closure& closure) const;
@@ -139,7 +110,8 @@ class Loop {
     Rows whole_;
     Disturbed disturbed_;
     Lattice lattice_;
-    double used_step_ = 0.0;  ///< of the lattice in the model
+    double used_step_ = 0.0;            ///< of the lattice in the model
+    double base_log_likelihood_ = 0.0;  ///< of the rows that choose
     State now_;
     int next_step_ = 0;
 };
@@ -178,6 +150,7 @@ void Loop::begin(Closure& closure) {
             100.0 * disturbed_.share, disturbed_.worst, disturbed_.at_s, with));
         closure.heldout_before = heldout(*now_.fit, reported_, 0.0).error;
     }
+    base_log_likelihood_ = now_.fit->log_likelihood();
 }
 
 /// Values that nothing is held out of: steps are chosen like any other effect.
@@ -228,114 +201,6 @@ void Loop::take_lattice(Closure& closure) {
     now_.told.push_back({"count_quantization", next_step_++});
 }
 
-/// What the screening lets pass, each fitted in full; the likeliest first. Weak ones need not pass.
-std::vector<Loop::Contender> Loop::contenders(const State& state, int step, Wanted wanted) const {
-    constexpr double worth_looking = 0.01;
-    const bool weak = wanted == Wanted::plain_if_weak;
-    auto candidates =
-        screen_samples(*state.fit, {record_.declared, series_, rows_, state.lines_hz, step, wanted != Wanted::all});
-    std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
-    std::vector<Contender> all;
-    for (SampleCandidate& candidate : candidates) {
-        if (!passes_on_samples(candidate.p_value) && !(weak && candidate.p_value < worth_looking)) continue;
-        if (all.size() >= most_contenders + 2) break;
-        auto fit = std::make_shared<SampleFit>(series_, candidate.model, rows_, candidate.noise);
-        const double gain = fit->log_likelihood() - state.fit->log_likelihood();
-        const double merit = gain - std::log(candidate.places.value_or(candidate.searched)) - candidate.parameters;
-        // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
-        const bool passes = passes_on_samples(p_of_gain(gain, candidate));
-        if (!weak && (merit < 0.0 || !passes)) continue;
-        all.push_back({std::move(candidate), std::move(fit), merit, passes});
-    }
-    std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.merit > b.merit; });
-    return all;
-}
-
-/// The most that a view of the residual explains, the noise fitted anew beside it: where it is more than the best
-/// effect does, that one is only what comes nearest to something that the library does not have. What a view must have
-/// more than an effect to be taken for the truth is off it.
-double Loop::rival_merit(const std::string& effect, double merit_of_effect) const {
-    constexpr std::size_t looked_at = 4;
-    auto views = view_samples(*now_.fit, lattice_step());
-    std::erase_if(views, [](const View& view) { return view.test.merit < tie; });
-    std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
-    if (views.size() > looked_at) {
-        // Jumps are looked at in any case: a random rate can follow them, and no other view says what they are.
-        const auto jumps = std::find_if(views.begin() + looked_at, views.end(), [](const View& v) { return v.jumps; });
-        if (jumps != views.end()) std::swap(views[looked_at - 1], *jumps);
-        views.resize(looked_at);
-    }
-    const bool random = is_random_rate(effect);
-    double most = 0.0;
-    for (const View& view : views) {
-        // What follows jumps, or another column of the record, a random rate can follow nearly as well.
-        const bool followed = random && (view.jumps || view.test.where != Where::time);
-        // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
-        // course in time (Schwarz 1978).
-        const bool course = random && view.test.where == Where::time && !view.jumps;
-        const double integrated = course ? 0.5 * std::log(static_cast<double>(series_.size())) - 1.0 : 0.0;
-        const double merit = view.columns ? refitted_merit(*now_.fit, view, integrated) : view.test.merit;
-        if (effect == "resampling" && view.test.view == repeating_variance) {
-            // What resampling does to the variance it does to the correlations too: by half as much again, and more.
-            constexpr double of_variance_alone = 1.3;
-            most = std::max(most, of_variance_alone * merit);
-            continue;
-        }
-        // The course of jumps is searched stretch by stretch and loses a part of what they explain.
-        const double lost = random && view.jumps ? std::max(tie, 0.1 * merit_of_effect) : tie;
-        most = std::max(most, merit + (followed ? lost : -tie));
-    }
-    return most;
-}
-
-/// One effect at a time may explain less than a random rate, or a view, where several of the library together explain
-/// more: the best such set, none of them a random rate, each found after the one before. The first need not pass alone,
-/// if it does beside the second.
-std::optional<Loop::Set> Loop::of_several_effects(const std::vector<Contender>& all) const {
-    constexpr std::size_t starts = 4;
-    constexpr std::size_t most_of_them = 3;
-    auto firsts = contenders(now_, next_step_, Wanted::plain_if_weak);
-    for (const Contender& contender : all) {
-        const bool known = std::any_of(firsts.begin(), firsts.end(), [&](const Contender& c) {
-            return c.candidate.effect == contender.candidate.effect;
-        });
-        if (!known && !is_random_rate(contender.candidate.effect)) firsts.push_back(contender);
-    }
-    std::sort(firsts.begin(), firsts.end(), [](const auto& a, const auto& b) { return a.merit > b.merit; });
-    std::optional<Set> best;
-    for (std::size_t start = 0; start < std::min(starts, firsts.size()); ++start) {
-        const Contender& first = firsts[start];
-        Set set{first, first.merit};
-        bool needed = first.passes;
-        State state = now_;
-        const auto add = [&](const Contender& contender) {
-            state.fit = contender.fit;
-            if (is_line(contender.candidate.effect)) {
-                state.lines_hz.push_back(line_hz(contender.fit->model(), contender.candidate.wanders));
-            }
-        };
-        add(first);
-        while (set.others.size() + 1 < most_of_them) {
-            const auto more = contenders(state, next_step_ + static_cast<int>(set.others.size()) + 1, Wanted::plain);
-            if (more.empty()) break;
-            const std::string& name = more.front().candidate.effect;
-            if (set.others.empty() && !needed) {
-                const auto alone = std::find_if(firsts.begin(), firsts.end(),
-                                                [&](const Contender& c) { return c.candidate.effect == name; });
-                if (alone == firsts.end()) break;
-                const double gain = more.front().fit->log_likelihood() - alone->fit->log_likelihood();
-                set.first.candidate.p_value = p_of_gain(gain, first.candidate);
-                needed = passes_on_samples(set.first.candidate.p_value);
-            }
-            set.merit += more.front().merit;
-            set.others.push_back(name);
-            add(more.front());
-        }
-        if (needed && (!best || set.merit > best->merit)) best = std::move(set);
-    }
-    return best;
-}
-
 /// Effects that stood in for the one added last are no longer needed beside it.
 void Loop::drop_needless() {
     for (std::size_t k = now_.steps.size(); k-- > 0;) {
@@ -353,7 +218,7 @@ void Loop::drop_needless() {
             continue;
         }
         auto fitted = std::make_shared<SampleFit>(series_, std::move(without), rows_, SampleFit::Noise::near);
-        const double chi2 = 2.0 * (now_.fit->log_likelihood() - fitted->log_likelihood());
+        const double chi2 = 2.0 * (now_.fit->gain_over(*fitted));
         const int parameters = effect == "bias_step" ? 2 : 1;
         if (passes_on_samples(chi2_tail(chi2, parameters))) continue;
         now_.fit = std::move(fitted);
@@ -398,6 +263,7 @@ void Loop::finish(Closure& closure) {
     const Score last = heldout(*now_.fit, reported_, used_step_);
     closure.heldout_after = last.error;
     closure.noise_floor = last.floor;
+    closure.log_likelihood_gain = now_.fit->log_likelihood() - base_log_likelihood_;
     closure.residual.time_s = series_.time_s;
     for (std::size_t i = 0; i < series_.size(); ++i) {
         closure.residual.innovation.push_back(now_.fit->innovations()[i] * now_.fit->sd(i));
@@ -428,25 +294,11 @@ Closure Loop::run() {
     take_lattice(closure);
     std::optional<State> earlier;  // before the first random rate
     while (now_.steps.size() < most_steps) {
-        auto all = contenders(now_, next_step_);
-        if (all.empty()) break;
-        Contender best = all.front();
-        const double rival = rival_merit(best.candidate.effect, best.merit);
-        const bool random = is_random_rate(best.candidate.effect);
-        std::vector<std::string> as_likely;
-        if (random || rival > best.merit) {
-            auto set = of_several_effects(all);
-            if (set && set->merit > std::max(rival, random ? best.merit + tie : 0.0)) {
-                best = std::move(set->first);
-            } else if (rival > best.merit) {
-                break;
-            } else if (set && set->merit > best.merit - tie) {
-                as_likely = std::move(set->others);
-                as_likely.insert(as_likely.begin(), set->first.candidate.effect);
-            }
-        }
-        if (!earlier && is_random_rate(best.candidate.effect)) earlier = now_;
-        take(std::move(best), all, as_likely, closure);
+        const SampleChoice choice =
+            choose_on_samples(record_.declared, series_, rows_, {now_.fit, now_.lines_hz, next_step_}, lattice_step());
+        if (!choice.chosen) break;
+        if (!earlier && is_random_rate(choice.chosen->candidate.effect)) earlier = now_;
+        take(choice, closure);
     }
     test_what_is_left(closure);
     if (earlier && closure.unexplained) {
@@ -460,24 +312,21 @@ Closure Loop::run() {
 }
 
 /// Adds an effect to the model.
-void Loop::take(Contender best, const std::vector<Contender>& all, const std::vector<std::string>& as_likely,
-                Closure& closure) {
+void Loop::take(const SampleChoice& choice, Closure& closure) {
+    const SampleContender& best = *choice.chosen;
     const std::string effect = best.candidate.effect;
     Step step;
     step.effect = effect;
-    step.p_value = best.candidate.p_value;
-    step.confounded_with = best.candidate.confounded;
-    const auto confound = [&](const std::string& name) {
-        const auto& named = step.confounded_with;
-        if (name != effect && std::find(named.begin(), named.end(), name) == named.end()) {
-            step.confounded_with.push_back(name);
+    step.p_value = choice.p_value;
+    step.confounded_with = choice.confounded_with;
+    for (const auto& [partner, names] : now_.of_partners) {
+        if (partner != effect) continue;
+        for (const std::string& name : names) {
+            const auto& named = step.confounded_with;
+            if (std::find(named.begin(), named.end(), name) == named.end()) step.confounded_with.push_back(name);
         }
-    };
-    for (const Contender& other : all) {
-        // One that explains more by itself is as good, even where another and a second together explain more.
-        if (best.merit - other.merit < tie) confound(other.candidate.effect);
     }
-    for (const std::string& name : as_likely) confound(name);
+    now_.of_partners.insert(now_.of_partners.end(), choice.of_partners.begin(), choice.of_partners.end());
     if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
     const Score before = heldout(*now_.fit, reported_, used_step_);
     now_.fit = best.fit;
@@ -496,13 +345,7 @@ void Loop::take(Contender best, const std::vector<Contender>& all, const std::ve
         }
     }
     now_.steps.push_back(std::move(step));
-    SampleStep told{effect, next_step_++, best.candidate.witness, best.candidate.strong};
-    for (const Contender& other : all) {
-        const double hz = other.fit->model().noise.from_hz;
-        if (effect != "resampling" || other.candidate.effect != effect || best.merit - other.merit >= tie) continue;
-        if (std::abs(hz - best.fit->model().noise.from_hz) > 1e-3 * series_.rate_hz) told.other_hz.push_back(hz);
-    }
-    now_.told.push_back(std::move(told));
+    now_.told.push_back({effect, next_step_++, best.candidate.witness, best.candidate.strong, choice.other_hz});
 }
 
 /// A line of the library keeps its amplitude, and its frequency but for an even drift. One that does not, as its own
@@ -533,6 +376,10 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
     SampleModel model = now_.fit->model();
     const double duration_s = static_cast<double>(series_.size()) * series_.interval_s;
     SampleFit::Noise noise = SampleFit::Noise::near;
+    double from_hz = 0.0;
+    for (const ActiveEffect& active : effects) {
+        if (active.effect->name() == "resampling") from_hz = active.values.at("from_hz");
+    }
     for (const ActiveEffect& active : effects) {
         const std::string effect(active.effect->name());
         const int k = next_step_++;
@@ -541,11 +388,10 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
             lattice_ = find_lattice(chosen_increments());
             used_step_ = lattice_.printed_arcsec;
         } else if (is_line(effect)) {
-            SampleLine line{alias(active.values.at("frequency_hz"), series_.rate_hz)};
+            const Alias shown = alias(active.values.at("frequency_hz"), series_.rate_hz, from_hz);
+            SampleLine line{shown.hz};
             if (effect == "dither_residue") {
-                const double hz = active.values.at("frequency_hz");
-                const bool folded = hz < std::round(hz / series_.rate_hz) * series_.rate_hz;
-                line.drift_hz_per_s = (folded ? -1.0 : 1.0) * active.values.at("drift_hz_per_s");
+                line.drift_hz_per_s = (shown.folded ? -1.0 : 1.0) * active.values.at("drift_hz_per_s");
                 line.drifts = line.drift_hz_per_s != 0.0;
             }
             add_line(model, series_, line, effect, k);

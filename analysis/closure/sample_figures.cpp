@@ -31,13 +31,14 @@ struct Unaliased {
     double hz;
     double drift_sign;
 };
-Unaliased unaliased(double hz, double rate_hz, const record::Declared& declared) {
+Unaliased unaliased(double hz, const SampleFit& fit, const record::Declared& declared) {
     if (!declared.dither_frequency_hz) return {hz, 1.0};
     for (int h = 1; h <= 3; ++h) {
         const double of_dither = h * *declared.dither_frequency_hz;
-        if (std::abs(alias(of_dither, rate_hz) - hz) >= declared_to * of_dither) continue;
-        const double whole = std::round(of_dither / rate_hz) * rate_hz;
-        return of_dither >= whole ? Unaliased{whole + hz, 1.0} : Unaliased{whole - hz, -1.0};
+        const Alias shown = alias(of_dither, fit.series().rate_hz, fit.model().noise.from_hz);
+        if (std::abs(shown.hz - hz) >= declared_to * of_dither) continue;
+        const double sign = shown.folded ? -1.0 : 1.0;
+        return {of_dither + sign * (hz - shown.hz), sign};
     }
     return {hz, 1.0};
 }
@@ -58,7 +59,7 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     // Of the amplitude and of the phase in the middle, by a, b
     const Eigen::Vector2d along(a / amplitude, b / amplitude);
     const double amplitude_sd = std::sqrt(std::max(0.0, along.dot(joint.block<2, 2>(of_a, of_a) * along)));
-    const Unaliased real = unaliased(line.hz, series.rate_hz, declared);
+    const Unaliased real = unaliased(line.hz, fit, declared);
     const double hz = effect == "dither_residue" ? real.hz : line.hz;
     all.push_back({effect, "frequency_hz", hz, std::sqrt(std::max(0.0, joint(of_hz, of_hz)))});
     if (effect == "dither_residue") {
@@ -243,7 +244,7 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<SampleStep>& st
             // A line that wanders
             const auto& line = model.noise.resonances[k];
             const auto& sd = errors.noise.resonances[k];
-            const Unaliased real = unaliased(line.hz, fit.series().rate_hz, declared);
+            const Unaliased real = unaliased(line.hz, fit, declared);
             all.push_back({effect, "frequency_hz", real.hz, sd.hz});
             all.push_back(
                 {effect, "amplitude_arcsec", std::numbers::sqrt2 * line.arcsec, std::numbers::sqrt2 * sd.arcsec});

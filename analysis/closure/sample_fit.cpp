@@ -110,6 +110,7 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
     if (model_.columns.empty()) {
         model_.columns.push_back(
             {"", "mean_rate_deg_h", std::make_shared<std::vector<double>>(series.size(), series.interval_s)});
+        model_.columns.back().of_rate = true;
         take_off();
         double mean = 0.0;
         for (const double x : rest_) mean += x / static_cast<double>(series.size());
@@ -136,19 +137,47 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
     finish();
 }
 
+std::vector<double> SampleFit::as_taken(const std::vector<double>& increments) const {
+    if (!(model_.noise.from_hz > 0.0)) return increments;
+    const std::size_t n = increments.size();
+    std::vector<double> angle(n + 1, 0.0);
+    for (std::size_t i = 0; i < n; ++i) angle[i + 1] = angle[i] + increments[i];
+    const double ratio = model_.noise.from_hz * series_->interval_s;
+    const double first = model_.noise.from_phase;
+    const auto reading = [&](double tick) {
+        const double row = (tick - first) / ratio;
+        const auto i = static_cast<std::size_t>(std::clamp(row, 0.0, static_cast<double>(n - 1)));
+        return angle[i] + (row - static_cast<double>(i)) * (angle[i + 1] - angle[i]);
+    };
+    std::vector<double> taken(n);
+    double before = 0.0;
+    for (std::size_t i = 0; i <= n; ++i) {
+        const double place = first + ratio * static_cast<double>(i);
+        const double tick = std::floor(place);
+        const double from = reading(tick);
+        const double now = from + (place - tick) * (reading(tick + 1.0) - from);
+        if (i > 0) taken[i - 1] = now - before;
+        before = now;
+    }
+    return taken;
+}
+
 void SampleFit::take_off() {
     rest_ = series_->increment;
     if (!series_->input_rate_deg_h.empty()) {
         // What is known of the input but for its mean, which belongs to the mean rate.
         const auto& input = series_->input_rate_deg_h;
         const double mean = std::accumulate(input.begin(), input.end(), 0.0) / static_cast<double>(input.size());
-        for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= (input[i] - mean) * series_->interval_s;
+        std::vector<double> known(rest_.size());
+        for (std::size_t i = 0; i < known.size(); ++i) known[i] = (input[i] - mean) * series_->interval_s;
+        known = as_taken(known);
+        for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= known[i];
     }
     if (!model_.motion.empty()) {
         for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= model_.motion[i];
     }
     for (const SampleColumn& column : model_.columns) {
-        const auto& c = *column.series;
+        const auto& c = column.of_rate ? as_taken(*column.series) : *column.series;
         for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= column.value * c[i];
     }
 }
@@ -341,8 +370,15 @@ SampleModel SampleFit::noise_errors() const {
 
 void SampleFit::fit_columns() {
     // rest + columns = what was measured; a correction to each value.
+    take_off();
+    telling_ = *rows_;
+    for (std::size_t i = 0; i < telling_.size(); ++i) {
+        if (filter_->settled(i)) telling_[i] = 0;
+    }
     whitened_.clear();
-    for (const SampleColumn& column : model_.columns) whitened_.push_back(filter_->apply(*column.series));
+    for (const SampleColumn& column : model_.columns) {
+        whitened_.push_back(filter_->apply(column.of_rate ? as_taken(*column.series) : *column.series));
+    }
     const auto e = filter_->apply(rest_);
     const auto m = static_cast<Eigen::Index>(whitened_.size());
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(m, m);
@@ -353,12 +389,12 @@ void SampleFit::fit_columns() {
             const auto& wb = whitened_[static_cast<std::size_t>(b)];
             double sum = 0.0;
             for (std::size_t i = 0; i < e.size(); ++i) {
-                if ((*rows_)[i]) sum += wa[i] * wb[i];
+                if (telling_[i]) sum += wa[i] * wb[i];
             }
             normal(a, b) = normal(b, a) = sum;
         }
         for (std::size_t i = 0; i < e.size(); ++i) {
-            if ((*rows_)[i]) right(a) += wa[i] * e[i];
+            if (telling_[i]) right(a) += wa[i] * e[i];
         }
     }
     Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt();
@@ -379,13 +415,23 @@ void SampleFit::fit_columns() {
 void SampleFit::finish() {
     innovations_ = filter_->apply(rest_);
     log_likelihood_ = 0.0;
-    telling_ = *rows_;
-    for (std::size_t i = 0; i < telling_.size(); ++i) {
-        if (filter_->settled(i)) telling_[i] = 0;
-    }
     for (std::size_t i = 0; i < innovations_.size(); ++i) {
         if ((*rows_)[i]) log_likelihood_ -= 0.5 * innovations_[i] * innovations_[i] + std::log(sd(i));
     }
+}
+
+double SampleFit::gain_over(const SampleFit& other) const {
+    if (!(model_.noise.from_hz > 0.0) || !(other.model_.noise.from_hz > 0.0)) {
+        return log_likelihood_ - other.log_likelihood_;
+    }
+    double gain = 0.0;
+    for (std::size_t i = 0; i < innovations_.size(); ++i) {
+        if (!telling_[i] || !other.telling_[i]) continue;
+        const double e = innovations_[i];
+        const double f = other.innovations_[i];
+        gain += 0.5 * (f * f - e * e) + std::log(other.sd(i) / sd(i));
+    }
+    return gain;
 }
 
 Eigen::MatrixXd SampleFit::normal_with(const std::vector<std::vector<double>>& series, Eigen::VectorXd& right) const {
@@ -403,12 +449,12 @@ Eigen::MatrixXd SampleFit::normal_with(const std::vector<std::vector<double>>& s
             const auto& wb = *all[static_cast<std::size_t>(b)];
             double sum = 0.0;
             for (std::size_t i = 0; i < wa.size(); ++i) {
-                if ((*rows_)[i]) sum += wa[i] * wb[i];
+                if (telling_[i]) sum += wa[i] * wb[i];
             }
             normal(a, b) = normal(b, a) = sum;
         }
         for (std::size_t i = 0; i < wa.size(); ++i) {
-            if ((*rows_)[i]) right(a) += wa[i] * innovations_[i];
+            if (telling_[i]) right(a) += wa[i] * innovations_[i];
         }
     }
     return normal;

@@ -16,7 +16,8 @@ struct SampleColumn {
     std::shared_ptr<const std::vector<double>> series;
     double value = 0.0;
     double sd = 0.0;
-    int step = -1;  ///< of the loop that added it
+    int step = -1;         ///< of the loop that added it
+    bool of_rate = false;  ///< a rate that is there at all times: a resampled record has it as it was taken
     /// Of a line's cosine, which its sine follows: frequency in the middle of the record.
     double hz = 0.0, drift_hz_per_s = 0.0;
     bool drifts = false;
@@ -56,7 +57,14 @@ class SampleFit {
     const std::vector<double>& innovations() const { return innovations_; }
     double sd(std::size_t row) const { return filter_->sd(row); }
     double log_likelihood() const { return log_likelihood_; }
+    /// Of the log-likelihood over that of another model of the same rows. Where both are resampled, rows that are
+    /// settled to their digits say how exactly the source's times are known, and nothing of the effects: they are left
+    /// out.
+    double gain_over(const SampleFit& other) const;
     const SampleFilter& filter() const { return *filter_; }
+    /// Increments of an angle that the record's source takes at its own times: on the straight lines between these,
+    /// where the record is resampled. Rows that those before them settle know it to their digits.
+    std::vector<double> as_taken(const std::vector<double>& increments) const;
     /// Increments less all that is deterministic.
     const std::vector<double>& rest() const { return rest_; }
     /// Standard errors of the noise, by Fisher's information of the rows that count: a model that holds them in the

@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include "analysis/closure/sample_search.hpp"
+#include "analysis/closure/sample_line_search.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {

@@ -10,8 +10,7 @@ namespace ringlock::closure {
 struct SampleLine {
     double hz = 0.0, drift_hz_per_s = 0.0;
     bool drifts = false;
-    double chi2 = 0.0;        ///< that its two amplitudes explain
-    double chi2_still = 0.0;  ///< of the best without drift near by
+    double chi2 = 0.0;  ///< that its two amplitudes explain
 };
 
 std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, double hz, double drift_hz_per_s);

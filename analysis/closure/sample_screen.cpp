@@ -1,6 +1,7 @@
 #include "analysis/closure/sample_screen.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -8,6 +9,7 @@
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/sample_line_search.hpp"
 #include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_search.hpp"
 #include "engine/core/units.hpp"
@@ -25,7 +27,7 @@ SampleColumn rate_column(const SampleSeries& series, std::string effect, std::st
                          const std::function<double(std::size_t)>& rate) {
     std::vector<double> values(series.size());
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = rate(i) * series.interval_s;
-    return {std::move(effect), std::move(name), shared(std::move(values))};
+    return {.effect = std::move(effect), .name = std::move(name), .series = shared(std::move(values)), .of_rate = true};
 }
 
 bool has(const SampleModel& model, std::string_view effect) {
@@ -55,7 +57,7 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     const double worth = sums > 20.0 ? std::min(1.0, sums / spread) : 1.0;
     const auto one = [&](SampleColumn column) {
         if (has(model, column.effect)) return;
-        const auto score = now.score({*column.series});
+        const auto score = now.score({now.as_taken(*column.series)});
         if (score.rank == 0) return;
         SampleCandidate c{.effect = column.effect, .model = model, .p_value = chi2_tail(worth * score.chi2, 1)};
         column.step = in.step;
@@ -71,7 +73,7 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     const auto root_at = [&](std::size_t row) {
         std::vector<double> step(n, 0.0);
         std::fill(step.begin() + static_cast<std::ptrdiff_t>(row), step.end(), in.series.interval_s);
-        const auto score = now.score({step});
+        const auto score = now.score({now.as_taken(step)});
         return score.rank == 0 ? 0.0 : std::copysign(std::sqrt(worth * score.chi2), score.value[0]);
     };
     constexpr std::size_t places = 80;
@@ -99,7 +101,7 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     SampleCandidate c{.effect = "bias_step",
                       .model = model,
                       .p_value = p,
-                      .searched = static_cast<double>(places),
+                      .searched = places_of_step(best * best, 0.5 / static_cast<double>(places)),
                       .places = static_cast<double>(places) / as_good};
     c.model.columns.push_back(step_column(in.series, at));
     c.model.columns.back().step = in.step;
@@ -109,7 +111,7 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
 void screen_noises(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
     const auto one = [&](const std::string& effect, SampleModel model) {
         const SampleFit fit(in.series, std::move(model), in.rows, SampleFit::Noise::near);
-        const double chi2 = std::max(0.0, 2.0 * (fit.log_likelihood() - now.log_likelihood()));
+        const double chi2 = std::max(0.0, 2.0 * fit.gain_over(now));
         // A variance cannot be negative: half of the time there is no gain at all (Chernoff 1954).
         out.push_back({.effect = effect, .model = fit.model(), .p_value = 0.5 * chi2_tail(chi2, 1)});
     };
@@ -144,59 +146,146 @@ void screen_noises(const SampleFit& now, const SampleContext& in, std::vector<Sa
     }
 }
 
+/// How the level of two effects goes to lines. Lines that keep their frequency have that of `base_vibration`. That of
+/// `dither_residue` goes to lines that drift; where a dither is declared nearly all of it to what shows near its
+/// frequency and its harmonics, one half to lines that keep and one to those that drift: a declaration makes these
+/// likely.
+struct LineShares {
+    double drifting = 1.0;
+    double declared = 0.0;
+};
+constexpr LineShares nothing_declared{1.0, 0.0};
+constexpr LineShares dither_declared{0.1, 0.45};
+constexpr int most_harmonics = 3;
+/// Of the declared: most is left of the dither itself.
+constexpr std::array<double, most_harmonics> of_harmonic{0.7, 0.15, 0.15};
+
+/// A line of the share of a level.
+struct OfferedLine {
+    FoundLine found;
+    bool drifts = false;
+    bool declared = false;
+};
+
+void take_share(FoundLine& line, double share) {
+    line.searched /= share;
+    line.p_value = std::min(1.0, line.p_value / share);
+}
+
+bool near_declared(const SampleFit& now, const SampleContext& in, double hz) {
+    if (!in.declared.dither_frequency_hz) return false;
+    for (int h = 1; h <= most_harmonics; ++h) {
+        const double of_dither = h * *in.declared.dither_frequency_hz;
+        const double shown = alias(of_dither, in.series.rate_hz, now.model().noise.from_hz).hz;
+        if (std::abs(hz - shown) < declared_to * of_dither) return true;
+    }
+    return false;
+}
+
+/// The likeliest line near the declared dither or a harmonic, by its own frequency range and drifts of a physical size.
+std::vector<OfferedLine> declared_lines(const SampleFit& now, const SampleContext& in, const std::vector<double>& e,
+                                        double width_hz) {
+    OfferedLine still{{}, false, true};
+    OfferedLine drifting{{}, true, true};
+    for (int h = 1; h <= most_harmonics; ++h) {
+        const double of_dither = h * *in.declared.dither_frequency_hz;
+        const double shown = alias(of_dither, in.series.rate_hz, now.model().noise.from_hz).hz;
+        NarrowLines lines =
+            find_lines_in(e, in.series.rate_hz, {shown, declared_to * of_dither, dither_drift_per_s * of_dither},
+                          in.lines_hz, width_hz);
+        const double share = dither_declared.declared * of_harmonic[static_cast<std::size_t>(h - 1)];
+        take_share(lines.still, share);
+        take_share(lines.drifting, share);
+        if (lines.still.p_value < still.found.p_value) still.found = lines.still;
+        if (lines.drifting.p_value < drifting.found.p_value) drifting.found = lines.drifting;
+    }
+    return {still, drifting};
+}
+
+/// A line whose phase does not keep over the record: a narrow resonance.
+SampleCandidate wandering_line(const SampleFit& now, const SampleContext& in, const FoundLines& lines, double p_value,
+                               bool declared) {
+    const double duration_s = static_cast<double>(in.series.size()) * in.series.interval_s;
+    SampleCandidate c{.effect = "dither_residue",
+                      .model = now.model(),
+                      .p_value = p_value,
+                      .searched = lines.tracked.searched,
+                      .parameters = 3,
+                      .freedom = 3,
+                      .wanders = true};
+    if (!declared) c.confounded = {"base_vibration"};
+    double squares = 0.0;
+    double rows = 0.0;
+    for (std::size_t i = 0; i < in.rows.size(); ++i) {
+        if (!in.rows[i]) continue;
+        squares += now.innovations()[i] * now.innovations()[i];
+        rows += 1.0;
+    }
+    // Power over the level is chi-squared of two a piece; the angle's increments have 2 sin of it.
+    const double sd = now.sd(0) * std::sqrt(squares / rows);
+    const double gain = 2.0 * std::sin(units::pi * lines.scattered_hz / in.series.rate_hz);
+    const double rms = sd * std::sqrt(lines.scattered / rows) / std::max(gain, 1e-6);
+    c.model.noise.resonances.push_back({rms, lines.scattered_hz, 64.0 / duration_s});
+    c.model.resonances.push_back(c.effect);
+    c.model.resonance_steps.push_back(in.step);
+    return c;
+}
+
 void screen_line(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
+    constexpr double worth_looking = 0.01;
+    // Above that a base hardly moves.
+    constexpr double fast_hz = 30.0;
     std::vector<double> e = now.innovations();
     for (std::size_t i = 0; i < e.size(); ++i) {
         if (!in.rows[i]) e[i] = 0.0;
     }
     const double duration_s = static_cast<double>(in.series.size()) * in.series.interval_s;
     // What is left beside a line that is in the model is that line, not being what the model says.
-    const FoundLine line = find_line(e, in.series.rate_hz, true, in.lines_hz, 64.0 / duration_s);
-    if (!(line.p_value < 0.01)) return;
-    SampleCandidate c{
-        .model = now.model(), .p_value = line.p_value, .searched = line.searched, .parameters = 2, .freedom = 2};
-    const SampleLine still = refine_line(now, {.hz = line.frequency_hz, .drift_hz_per_s = 0.0, .drifts = false});
-    const SampleLine moving =
-        refine_line(now, {.hz = line.frequency_hz, .drift_hz_per_s = line.drift_hz_per_s, .drifts = true});
-    const bool drifts = moving.chi2 - std::max(line.chi2_still, still.chi2) > 25.0 &&
-                        std::abs(moving.drift_hz_per_s) * duration_s * duration_s > 1.0;
-    bool dither = drifts;
-    bool declared = false;
+    const double width_hz = 64.0 / duration_s;
+    const FoundLines lines = find_lines(e, in.series.rate_hz, in.lines_hz, width_hz);
+    const FoundLine likeliest = lines.likeliest();
+    const auto refined = [&](const FoundLine& line, bool drifts) {
+        return refine_line(
+            now, {.hz = line.frequency_hz, .drift_hz_per_s = drifts ? line.drift_hz_per_s : 0.0, .drifts = drifts});
+    };
+    if (likeliest.p_value < worth_looking) {
+        const double most = std::max(refined(likeliest, false).chi2, refined(likeliest, true).chi2);
+        if (lines.scattered > 1.5 * most + 60.0) {
+            // Slow ones are what a base does as well.
+            const bool declared = near_declared(now, in, likeliest.frequency_hz);
+            if (!declared && likeliest.frequency_hz <= fast_hz) return;
+            out.push_back(wandering_line(now, in, lines, likeliest.p_value, declared));
+            return;
+        }
+    }
+    const LineShares shares = in.declared.dither_frequency_hz ? dither_declared : nothing_declared;
+    std::vector<OfferedLine> offered{{lines.still}};
+    for (FoundLine line : {lines.slow, lines.tracked}) {
+        take_share(line, 0.5 * shares.drifting);
+        offered.push_back({line, true});
+    }
+    std::erase_if(offered, [&](const OfferedLine& line) { return near_declared(now, in, line.found.frequency_hz); });
     if (in.declared.dither_frequency_hz) {
-        for (int h = 1; h <= 3; ++h) {
-            const double hz = alias(h * *in.declared.dither_frequency_hz, in.series.rate_hz);
-            if (std::abs(line.frequency_hz - hz) < declared_to * h * *in.declared.dither_frequency_hz) declared = true;
-        }
+        for (OfferedLine& line : declared_lines(now, in, e, width_hz)) offered.push_back(std::move(line));
     }
-    dither = dither || declared;
-    const bool fast = line.frequency_hz > 30.0;
-    c.effect = dither || fast ? "dither_residue" : "base_vibration";
-    if (!dither) c.confounded.emplace_back(fast ? "base_vibration" : "dither_residue");
-    if (line.scattered > 1.5 * std::max(still.chi2, moving.chi2) + 60.0) {
-        // Its phase does not keep over the record: a narrow resonance. Slow ones are what a base does as well.
-        if (!fast && !declared) return;
-        c.effect = "dither_residue";
-        if (!declared) c.confounded = {"base_vibration"};
-        c.wanders = true;
-        c.parameters = c.freedom = 3;
-        double squares = 0.0;
-        double rows = 0.0;
-        for (std::size_t i = 0; i < e.size(); ++i) {
-            squares += e[i] * e[i];
-            rows += in.rows[i];
-        }
-        // Power over the level is chi-squared of two a piece; the angle's increments have 2 sin of it.
-        const double sd = now.sd(0) * std::sqrt(squares / rows);
-        const double gain = 2.0 * std::sin(units::pi * line.scattered_hz / in.series.rate_hz);
-        const double rms = sd * std::sqrt(line.scattered / rows) / std::max(gain, 1e-6);
-        c.model.noise.resonances.push_back({rms, line.scattered_hz, 64.0 / duration_s});
-        c.model.resonances.push_back(c.effect);
-        c.model.resonance_steps.push_back(in.step);
+    for (const OfferedLine& line : offered) {
+        if (!(line.found.p_value < worth_looking)) continue;
+        // The level of the spectrum about a line is itself a random number: what the regression says is closer.
+        const SampleLine mended = refined(line.found, line.drifts);
+        // What hardly drifts is told as well without.
+        if (line.drifts && !(std::abs(mended.drift_hz_per_s) * duration_s * duration_s > 1.0)) continue;
+        const bool fast = mended.hz > fast_hz;
+        const bool dither = line.declared || line.drifts;
+        SampleCandidate c{.effect = dither || fast ? "dither_residue" : "base_vibration",
+                          .model = now.model(),
+                          .p_value = of_several(chi2_tail(mended.chi2, 2), line.found.searched),
+                          .searched = line.found.searched,
+                          .parameters = 2,
+                          .freedom = 2};
+        if (!dither) c.confounded.emplace_back(fast ? "base_vibration" : "dither_residue");
+        add_line(c.model, in.series, mended, c.effect, in.step);
         out.push_back(std::move(c));
-        return;
     }
-    add_line(c.model, in.series, drifts ? moving : SampleLine{still.hz, 0.0, false}, c.effect, in.step);
-    out.push_back(std::move(c));
 }
 
 void screen_resampling(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
@@ -314,9 +403,14 @@ void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector
 
 }  // namespace
 
-double alias(double hz, double rate_hz) {
-    const double turns = hz / rate_hz;
-    return std::abs(turns - std::round(turns)) * rate_hz;
+Alias alias(double hz, double rate_hz, double from_hz) {
+    Alias seen{hz};
+    for (const double rate : {from_hz, rate_hz}) {
+        if (!(rate > 0.0)) continue;
+        const double off = seen.hz - std::round(seen.hz / rate) * rate;
+        seen = {std::abs(off), seen.folded != (off < 0.0)};
+    }
+    return seen;
 }
 
 std::vector<SampleColumn> rate_columns(const SampleSeries& series) {
@@ -376,12 +470,12 @@ void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witn
 
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in) {
     std::vector<SampleCandidate> out;
-    screen_line(now, in, out);
     screen_rates(now, in, out);
-    if (in.plain) return out;
+    screen_noises(now, in, out);
+    if (in.slow) return out;
+    screen_line(now, in, out);
     screen_witnesses(now, in, out);
     screen_resampling(now, in, out);
-    screen_noises(now, in, out);
     return out;
 }
 

@@ -34,7 +34,7 @@ struct SampleContext {
     const Rows& rows;                     ///< fitted
     const std::vector<double>& lines_hz;  ///< that are in the model
     int step = 0;                         ///< that a candidate would be
-    bool plain = false;                   ///< rates without chance and lines only
+    bool slow = false;                    ///< slow rates only
 };
 
 /// Rates in proportion to one number that the record can tell of: time, temperature, input rate.
@@ -47,8 +47,16 @@ std::vector<std::vector<double>> motion_columns(const std::vector<double>& witne
 void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witness, int step);
 /// Of itself, a declared frequency of the dither may be off: more, with its harmonics, would be half of all lines.
 inline constexpr double declared_to = 0.002;
-/// Where a frequency shows in samples of that rate.
-double alias(double hz, double rate_hz);
+/// Of itself a second, a dither drifts so much at most: springs of steel soften by 2.5e-4 a kelvin, the resonance
+/// by half of that, while a gyro warms up by a kelvin a minute.
+inline constexpr double dither_drift_per_s = 2e-6;
+/// Where a frequency shows in samples, and whether it goes down there as it goes up.
+struct Alias {
+    double hz = 0.0;
+    bool folded = false;
+};
+/// In samples of that rate, taken at `from_hz` and interpolated where that is not zero.
+Alias alias(double hz, double rate_hz, double from_hz = 0.0);
 
 /// The effects that samples can tell of and that the fit does not have yet, held against what it has left.
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in);

@@ -11,6 +11,7 @@
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
 #include "analysis/closure/normality.hpp"
+#include "analysis/closure/sample_line_search.hpp"
 #include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_search.hpp"
 #include "analysis/closure/two_levels.hpp"
@@ -76,11 +77,12 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     }
     views.push_back({{Where::frequency, "spectrum in bands", chi2_tail(chi2, bands),
                       fmt::format("most at {:.4g} Hz, {:.3g} times the mean", worst_hz, worst_ratio)}});
-    const FoundLine line = find_line(e, fit.series().rate_hz, true);
+    const FoundLines lines = find_lines(e, fit.series().rate_hz);
+    const FoundLine line = lines.likeliest();
     const double cost = 3.0 + std::log(line.searched);
     // A line whose power is scattered explains as much as follows it from stretch to stretch.
-    const double gain = 0.5 * std::max(line.chi2, line.scattered);
-    const bool coherent = line.chi2 >= line.scattered;
+    const double gain = 0.5 * std::max(line.chi2, lines.scattered);
+    const bool coherent = line.chi2 >= lines.scattered;
     double p = line.p_value;
     if (coherent && p < 0.01) {
         // The level about a line is itself a random number: what the regression says counts as well.
@@ -89,7 +91,7 @@ void test_spectrum(const SampleFit& fit, Views& views) {
         p = std::max(p, of_several(chi2_tail(refined.chi2, 2), line.searched));
     }
     View view{{Where::frequency, "lines, still and drifting", p,
-               fmt::format("at {:.6g} Hz", coherent ? line.frequency_hz : line.scattered_hz), gain - cost},
+               fmt::format("at {:.6g} Hz", coherent ? line.frequency_hz : lines.scattered_hz), gain - cost},
               cost};
     if (coherent) {
         view.columns = [n, rate_hz = fit.series().rate_hz, line] {
@@ -175,7 +177,9 @@ void test_rates(const SampleFit& fit, Views& views) {
     const SampleSeries& series = fit.series();
     const std::size_t n = series.size();
     const auto against = [&](Where where, std::string view, Columns columns) {
-        const auto score = fit.score(columns);
+        Columns taken;
+        for (const auto& column : columns) taken.push_back(fit.as_taken(column));
+        const auto score = fit.score(taken);
         if (score.rank == 0) return;
         const double cost = score.rank;
         views.push_back(
@@ -230,7 +234,7 @@ void test_rates(const SampleFit& fit, Views& views) {
         return step;
     };
     for (std::size_t k = 1; k < places; ++k) {
-        const auto score = fit.score({step_at(n * k / places)});
+        const auto score = fit.score({fit.as_taken(step_at(n * k / places))});
         const double root = score.rank > 0 ? std::copysign(std::sqrt(score.chi2), score.value[0]) : 0.0;
         roots.push_back(root);
         if (std::abs(root) > best) {
@@ -263,14 +267,15 @@ std::vector<double> two_level_rate(const SampleFit& fit, const Eigen::VectorXd& 
         }
         return out;
     };
-    double best = fit.score({rate()}).chi2;
+    double best = fit.score({fit.as_taken(rate())}).chi2;
     const std::size_t length = std::max<std::size_t>(1, n / stretches);
     for (std::size_t step = length / 2; step > length / 50; step /= 2) {
         for (std::size_t& jump : jumps) {
             for (const bool later : {false, true}) {
                 const std::size_t from = jump;
                 jump = later ? std::min(n, jump + step) : jump - std::min(jump, step);
-                const double chi2 = std::is_sorted(jumps.begin(), jumps.end()) ? fit.score({rate()}).chi2 : 0.0;
+                const double chi2 =
+                    std::is_sorted(jumps.begin(), jumps.end()) ? fit.score({fit.as_taken(rate())}).chi2 : 0.0;
                 if (chi2 > best) {
                     best = chi2;
                 } else {
@@ -301,15 +306,16 @@ void test_levels(const SampleFit& fit, Views& views) {
         std::vector<double> column(n, 0.0);
         std::fill(column.begin() + static_cast<std::ptrdiff_t>(n * s / stretches),
                   column.begin() + static_cast<std::ptrdiff_t>(n * (s + 1) / stretches), fit.series().interval_s);
-        column = fit.filter().apply(column);
+        column = fit.filter().apply(fit.as_taken(column));
         double most = 0.0;
         for (const double x : column) most = std::max(most, std::abs(x));
         std::size_t last = n;
         while (last > 0 && std::abs(column[last - 1]) < 1e-5 * most) --last;
-        responses[s].from = n * s / stretches;
+        // Of a resampled record it begins with the source's interval before.
+        responses[s].from = n * s / stretches - std::min<std::size_t>(n * s / stretches, 4);
         double sum = 0.0;
         for (std::size_t i = responses[s].from; i < last; ++i) {
-            if (!fit.rows()[i]) column[i] = 0.0;
+            if (!fit.telling()[i]) column[i] = 0.0;
             responses[s].values.push_back(static_cast<float>(column[i]));
             sum += column[i] * fit.innovations()[i];
         }
@@ -479,9 +485,10 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
     for (std::size_t i = 0; i < e.size(); ++i) {
         if (fit.telling()[i]) e[i] = fit.innovations()[i];
     }
-    const FoundLine line = find_line(e, fit.series().rate_hz, true);
+    const FoundLines left = find_lines(e, fit.series().rate_hz);
+    const FoundLine line = left.likeliest();
     constexpr double near_hz = 1.0;
-    const double hz = line.coherent ? line.frequency_hz : line.scattered_hz;
+    const double hz = line.chi2 >= left.scattered ? line.frequency_hz : left.scattered_hz;
     least.beside = line.p_value < level_of_residual && std::abs(hz - least.hz) < near_hz;
     return least;
 }
@@ -491,10 +498,10 @@ double refitted_merit(const SampleFit& fit, const View& view, double of_a_coeffi
     const auto columns = view.columns();
     for (const auto& column : columns) {
         model.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(column.series)});
+        model.columns.back().of_rate = view.test.where != Where::frequency;
     }
     const SampleFit with(fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near);
-    return with.log_likelihood() - fit.log_likelihood() - view.cost -
-           of_a_coefficient * static_cast<double>(columns.size());
+    return with.gain_over(fit) - view.cost - of_a_coefficient * static_cast<double>(columns.size());
 }
 
 std::vector<View> view_samples(const SampleFit& fit, double lattice_arcsec) {

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "analysis/closure/closure.hpp"
+#include "analysis/closure/sample_contest.hpp"
 #include "analysis/closure/sample_fit.hpp"
 #include "analysis/closure/sample_screen.hpp"
 #include "engine/core/units.hpp"
@@ -289,7 +290,10 @@ Outcome judge(const SampleCase& of, const record::Record& record) {
     const bool foreign = of.kind == Kind::foreign;
     compare(closure, foreign, of.where, of.truth, outcome);
     if (foreign) return outcome;
-    outcome.oracle = ringlock::closure::fit_samples(record, known(of.truth)).heldout_after;
+    const Closure oracle = ringlock::closure::fit_samples(record, known(of.truth));
+    outcome.oracle = oracle.heldout_after;
+    outcome.truth_gain = oracle.log_likelihood_gain;
+    outcome.asked_gain = gain_asked(outcome.missing, ringlock::closure::effects_on_samples);
     // Estimates of what has been named: a tie names it first.
     if (outcome.judged != Judged::right && outcome.judged != Judged::tie) return outcome;
     const SampleTruth truth = truth_of(of);

@@ -2,14 +2,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "analysis/closure/chance.hpp"
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/sample_filter.hpp"
 #include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_line_search.hpp"
 #include "tests/closure/sample_suite.hpp"
 
 namespace ringlock::test::closure {
@@ -106,6 +109,113 @@ TEST(ClosureSampleSuite, KnownInputIsNoStructure) {
     EXPECT_EQ(found.steps[0].effect, "scale_factor_error");
     const auto& relative = found.steps[0].parameters.at(0);
     EXPECT_NEAR(relative.value, 0.01, 4.0 * relative.sd);
+}
+
+// A declared dither is looked for where it shows: what all frequencies and drifts would drown is named.
+TEST(ClosureSampleSuite, ADeclaredDitherNeedsLess) {
+    SampleTruth truth;
+    truth.size = 20000;
+    truth.seed = 11;
+    truth.white_angle_arcsec = 0.1;
+    truth.rates.quantum_noise_deg_rt_h = 0.02;
+    truth.dither_residue = {437.3, 0.0, 0.0092, 1.0};
+    EXPECT_EQ(ringlock::closure::close_samples(generate_samples(truth)).verdict,
+              ringlock::closure::Verdict::nothing_missing);
+    truth.declared.emplace().dither_frequency_hz = 437.0;
+    const auto found = ringlock::closure::close_samples(generate_samples(truth));
+    ASSERT_EQ(found.steps.size(), 1U);
+    EXPECT_EQ(found.steps[0].effect, "dither_residue");
+    EXPECT_TRUE(found.steps[0].confounded_with.empty());
+    EXPECT_NEAR(found.steps[0].parameters[0].value, 437.3, 4.0 * found.steps[0].parameters[0].sd);
+}
+
+// A random rate explains more than a ramp or a scale factor's error alone, but less than both.
+TEST(ClosureSampleSuite, TwoEffectsThatHideEachOtherAreNamed) {
+    SampleTruth truth;
+    truth.size = 20000;
+    truth.white_angle_arcsec = 0.2;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.input_profile_deg_h = {{0.0, 100.0, 101.0, 200.0}, {-150.0, -150.0, 150.0, 150.0}};
+    truth.rates.bias_ramp_deg_h_per_h = -60.0;
+    truth.scale_factor_error = 0.008;
+    const auto found = ringlock::closure::close_samples(generate_samples(truth));
+    ASSERT_EQ(found.steps.size(), 2U);
+    for (const auto& step : found.steps) {
+        EXPECT_TRUE(step.effect == "bias_ramp" || step.effect == "scale_factor_error") << step.effect;
+    }
+    EXPECT_GT(found.log_likelihood_gain, 20.0);
+}
+
+// What a resampled record's source was given, it has on the straight lines between the source's times.
+TEST(ClosureSampleSuite, KnownInputIsResampledToo) {
+    SampleTruth truth;
+    truth.size = 10000;
+    truth.seed = 5;
+    truth.white_angle_arcsec = 0.2;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.input_profile_deg_h = {{0.0, 30.0, 31.0, 65.0, 66.0, 100.0}, {200.0, 200.0, -300.0, -300.0, 50.0, 50.0}};
+    truth.scale_factor_error = 0.01;
+    truth.resampling.from_hz = 77.3;
+    const auto found = ringlock::closure::close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, ringlock::closure::Verdict::closed);
+    ASSERT_EQ(found.steps.size(), 2U);
+    EXPECT_EQ(found.steps[0].effect, "resampling");
+    EXPECT_EQ(found.steps[1].effect, "scale_factor_error");
+    const auto& relative = found.steps[1].parameters.at(0);
+    EXPECT_NEAR(relative.value, 0.01, 4.0 * relative.sd);
+}
+
+// The largest standardised difference of means before and after, over all places but 0.6 % at either end: by
+// simulation, which has places between which nothing is looked at. Three standard errors above.
+TEST(SampleSteps, AreCountedAsABrownianBridge) {
+    constexpr int records = 4000;
+    constexpr std::size_t n = 1000;
+    constexpr double chi2 = 9.0;
+    constexpr double ends = 0.00625;
+    std::mt19937_64 random(4);
+    std::normal_distribution<double> normal;
+    int above = 0;
+    std::vector<double> sum(n + 1, 0.0);
+    for (int k = 0; k < records; ++k) {
+        for (std::size_t i = 0; i < n; ++i) sum[i + 1] = sum[i] + normal(random);
+        double most = 0.0;
+        for (std::size_t i = 1; i < n; ++i) {
+            const double t = static_cast<double>(i) / n;
+            if (t < ends || t > 1.0 - ends) continue;
+            const double bridge = sum[i] - t * sum[n];
+            most = std::max(most, bridge * bridge / (n * t * (1.0 - t)));
+        }
+        above += most > chi2 ? 1 : 0;
+    }
+    const double p = ringlock::closure::chi2_tail(chi2, 1) * ringlock::closure::places_of_step(chi2, ends);
+    EXPECT_LT(above, records * p + 3.0 * std::sqrt(records * p));
+    EXPECT_GT(above, 0.7 * records * p);
+}
+
+// Searches are counted as what they are worth: in noise alone each p-value is as rare as it says. Three standard errors
+// above; a count ten times too large would leave none.
+TEST(SampleLines, CountTheirSearches) {
+    constexpr int records = 100;
+    constexpr double p = 0.1;
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> normal;
+    std::array<int, 5> rare{};
+    for (int k = 0; k < records; ++k) {
+        std::vector<double> values(2100, 0.0);
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            const double x = normal(random);
+            if (i / 100 % 3 != 2) values[i] = x;
+        }
+        const auto lines = ringlock::closure::find_lines(values, 100.0);
+        const auto narrow = ringlock::closure::find_lines_in(values, 100.0, {37.0, 2.0, 0.01});
+        const std::array<double, 5> found = {lines.still.p_value, lines.slow.p_value, lines.likeliest().p_value,
+                                             narrow.still.p_value, narrow.drifting.p_value};
+        for (std::size_t j = 0; j < found.size(); ++j) rare[j] += found[j] < p ? 1 : 0;
+    }
+    for (const int count : rare) {
+        EXPECT_LE(count, records * p + 3.0 * std::sqrt(records * p));
+        EXPECT_GE(count, 1);
+    }
 }
 
 // The filter's likelihood is that of the increments' covariance matrix: here by its Cholesky factor.

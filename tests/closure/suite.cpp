@@ -337,6 +337,7 @@ void compare(const Closure& closure, bool foreign, Where where, const std::vecto
     outcome.before = closure.heldout_before;
     outcome.after = closure.heldout_after;
     outcome.floor = closure.noise_floor;
+    outcome.answer_gain = closure.log_likelihood_gain;
     outcome.oracle = std::numeric_limits<double>::quiet_NaN();
     if (closure.unexplained) outcome.where = std::string(name_of(closure.unexplained->where));
     std::set<std::string> missing;
@@ -381,7 +382,6 @@ Outcome judge(const Case& of, const record::Record& record) {
     outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const bool foreign = of.kind == Kind::foreign;
     compare(closure, foreign, of.where, of.truth, outcome);
-    outcome.answer_gain = closure.log_likelihood_gain;
     if (foreign) return outcome;
 
     std::vector<ActiveEffect> known;

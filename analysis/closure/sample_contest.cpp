@@ -1,0 +1,398 @@
+#include "analysis/closure/sample_contest.hpp"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "analysis/closure/chance.hpp"
+#include "analysis/closure/decision.hpp"
+#include "analysis/closure/sample_tests.hpp"
+
+namespace ringlock::closure {
+
+bool passes_on_samples(double p_value) { return p_value * effects_on_samples < level_of_effects; }
+
+bool is_random_rate(const std::string& effect) { return effect == "rate_random_walk" || effect == "bias_instability"; }
+
+bool is_line(const std::string& effect) { return effect == "dither_residue" || effect == "base_vibration"; }
+
+namespace {
+
+/// Rates that change slowly: each can be taken for another, or for two others together.
+bool is_slow(const std::string& effect) {
+    return is_random_rate(effect) || effect == "scale_factor_error" || effect.starts_with("bias_");
+}
+
+constexpr double worth_looking = 0.01;
+
+double p_of_gain(double gain, const SampleCandidate& candidate) {
+    return of_several(chi2_tail(2.0 * gain, candidate.freedom), candidate.searched);
+}
+
+/// The contest on one state of the model.
+class Contest {
+   public:
+    Contest(const record::Declared& declared, const SampleSeries& series, const Rows& rows, const SampleState& now,
+            double lattice_arcsec)
+        : declared_(declared), series_(series), rows_(rows), now_(now), lattice_arcsec_(lattice_arcsec) {}
+
+    SampleChoice choose();
+
+   private:
+    using Shared = std::shared_ptr<SampleContender>;
+    enum class Wanted { all, slow };
+    /// What may explain a record: an effect, or several, each added beside those before it.
+    struct Account {
+        std::vector<Shared> members;
+        double merit = 0.0;
+        double p_value = 1.0;  ///< of the first, beside the second
+
+        bool has(const std::string& effect) const;
+        bool random() const;
+    };
+    /// What a view of the residual explains, the noise fitted anew beside it.
+    struct Rival {
+        double merit = 0.0;
+        double coefficients = 0.0;
+        Where where = Where::time;
+        bool jumps = false;
+        bool repeats = false;  ///< a variance that does
+    };
+
+    std::vector<SampleCandidate> screened(const SampleState& state, Wanted wanted) const;
+    Shared fitted(const SampleState& state, SampleCandidate candidate) const;
+    std::vector<Shared> contenders(const SampleState& state, std::vector<SampleCandidate> candidates) const;
+    SampleState beside(const SampleState& state, const SampleContender& contender) const;
+    std::vector<Account> sets(const std::vector<Shared>& all, const std::vector<SampleCandidate>& candidates) const;
+    std::vector<Account> sets_from(const Shared& first, const std::vector<Shared>& firsts,
+                                   const std::vector<SampleCandidate>& candidates) const;
+    double p_beside(const SampleContender& first, const SampleContender& second, const std::vector<Shared>& firsts,
+                    const std::vector<SampleCandidate>& candidates) const;
+    std::vector<Rival> rivals() const;
+    static double bar(const Account& account, const std::vector<Rival>& rivals, std::size_t rows);
+    bool beside_each_other(const SampleContender& a, const SampleContender& b) const;
+    static void tie(const Account& best, const std::vector<Account>& as_likely, SampleChoice& choice);
+
+    const record::Declared& declared_;
+    const SampleSeries& series_;
+    const Rows& rows_;
+    const SampleState& now_;
+    double lattice_arcsec_;
+};
+
+bool Contest::Account::has(const std::string& effect) const {
+    return std::any_of(members.begin(), members.end(), [&](const Shared& m) { return m->candidate.effect == effect; });
+}
+
+bool Contest::Account::random() const {
+    return std::any_of(members.begin(), members.end(),
+                       [](const Shared& m) { return is_random_rate(m->candidate.effect); });
+}
+
+std::vector<SampleCandidate> Contest::screened(const SampleState& state, Wanted wanted) const {
+    auto candidates =
+        screen_samples(*state.fit, {declared_, series_, rows_, state.lines_hz, state.step, wanted == Wanted::slow});
+    std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
+    return candidates;
+}
+
+Contest::Shared Contest::fitted(const SampleState& state, SampleCandidate candidate) const {
+    auto contender = std::make_shared<SampleContender>();
+    contender->fit = std::make_shared<SampleFit>(series_, candidate.model, rows_, candidate.noise);
+    const double gain = contender->fit->gain_over(*state.fit);
+    contender->merit = gain - std::log(candidate.places.value_or(candidate.searched)) - candidate.parameters;
+    // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
+    contender->passes = contender->merit > 0.0 && passes_on_samples(p_of_gain(gain, candidate));
+    contender->candidate = std::move(candidate);
+    return contender;
+}
+
+/// What the screening lets pass, each fitted in full, and still passes; the likeliest first. Scores are of the noise as
+/// it is, which may have swallowed a slow rate: of these more are looked at.
+std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
+                                                 std::vector<SampleCandidate> candidates) const {
+    std::vector<Shared> all;
+    for (SampleCandidate& candidate : candidates) {
+        const bool worth =
+            (is_slow(candidate.effect) || is_line(candidate.effect)) && candidate.p_value < worth_looking;
+        if (!passes_on_samples(candidate.p_value) && !worth) continue;
+        if (all.size() >= most_contenders + 2) break;
+        Shared contender = fitted(state, std::move(candidate));
+        if (contender->passes) all.push_back(std::move(contender));
+    }
+    std::sort(all.begin(), all.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
+    return all;
+}
+
+SampleState Contest::beside(const SampleState& state, const SampleContender& contender) const {
+    return {contender.fit, state.lines_hz, state.step + 1};
+}
+
+/// Probability of what the first gains over the second alone; of both, where only the two of them show anything.
+double Contest::p_beside(const SampleContender& first, const SampleContender& second, const std::vector<Shared>& firsts,
+                         const std::vector<SampleCandidate>& candidates) const {
+    constexpr double others = 0.5 * (effects_on_samples - 1.0);  // of all pairs, for each effect
+    const std::string& name = second.candidate.effect;
+    const auto fitted_already =
+        std::find_if(firsts.begin(), firsts.end(), [&](const Shared& c) { return c->candidate.effect == name; });
+    std::shared_ptr<SampleFit> alone;
+    if (fitted_already != firsts.end()) {
+        alone = (*fitted_already)->fit;
+    } else {
+        const auto same = std::find_if(candidates.begin(), candidates.end(),
+                                       [&](const SampleCandidate& c) { return c.effect == name; });
+        if (same == candidates.end()) return first.passes ? first.candidate.p_value : 1.0;
+        alone = fitted(now_, *same)->fit;
+    }
+    const double p = p_of_gain(second.fit->gain_over(*alone), first.candidate);
+    if (first.passes) return p;
+    const double both = second.fit->gain_over(*now_.fit);
+    return std::max(p, of_several(chi2_tail(2.0 * both, first.candidate.freedom + second.candidate.freedom),
+                                  others * first.candidate.searched * second.candidate.searched));
+}
+
+/// One effect and what explains most beside it: the likeliest random rate, and the likeliest of the others with the
+/// likeliest beside both.
+std::vector<Contest::Account> Contest::sets_from(const Shared& first, const std::vector<Shared>& firsts,
+                                                 const std::vector<SampleCandidate>& candidates) const {
+    // That there are so many others to choose from.
+    const double choice = std::log(effects_on_samples);
+    std::vector<Account> found;
+    const SampleState with_first = beside(now_, *first);
+    const auto seconds = contenders(with_first, screened(with_first, Wanted::slow));
+    for (const bool random : {false, true}) {
+        const auto second = std::find_if(seconds.begin(), seconds.end(), [&](const Shared& c) {
+            return is_slow(c->candidate.effect) && is_random_rate(c->candidate.effect) == random;
+        });
+        if (second == seconds.end()) continue;
+        const double p = p_beside(*first, **second, firsts, candidates);
+        if (!passes_on_samples(p)) continue;
+        const double merit = first->merit + (*second)->merit - choice;
+        found.push_back({{first, *second}, merit, p});
+        if (random || is_random_rate(first->candidate.effect)) continue;
+        const SampleState with_both = beside(with_first, **second);
+        for (const Shared& third : contenders(with_both, screened(with_both, Wanted::slow))) {
+            if (!is_slow(third->candidate.effect) || is_random_rate(third->candidate.effect)) continue;
+            found.push_back({{first, *second, third}, merit + third->merit - choice, p});
+            break;
+        }
+    }
+    return found;
+}
+
+/// One effect at a time may explain less than a random rate, or a view, where several of the library together explain
+/// more; and one may hide another. The first need not pass alone, if it does beside the second.
+std::vector<Contest::Account> Contest::sets(const std::vector<Shared>& all,
+                                            const std::vector<SampleCandidate>& candidates) const {
+    constexpr std::size_t starts = 4;
+    std::vector<Shared> firsts;
+    bool random = false;
+    for (const Shared& contender : all) {
+        if (!is_slow(contender->candidate.effect)) continue;
+        // One random rate can stand for another.
+        if (is_random_rate(contender->candidate.effect) && std::exchange(random, true)) continue;
+        firsts.push_back(contender);
+    }
+    for (const SampleCandidate& candidate : candidates) {
+        const bool known = std::any_of(all.begin(), all.end(),
+                                       [&](const Shared& c) { return c->candidate.effect == candidate.effect; });
+        if (known || !is_slow(candidate.effect) || is_random_rate(candidate.effect)) continue;
+        if (candidate.p_value < worth_looking) firsts.push_back(fitted(now_, candidate));
+    }
+    std::sort(firsts.begin(), firsts.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
+    if (firsts.size() > starts + (random ? 1 : 0)) firsts.resize(starts + (random ? 1 : 0));
+    std::vector<std::vector<Account>> found(firsts.size());
+    oneapi::tbb::parallel_for(std::size_t{0}, firsts.size(),
+                              [&](std::size_t k) { found[k] = sets_from(firsts[k], firsts, candidates); });
+    std::vector<Account> accounts;
+    for (auto& some : found) std::move(some.begin(), some.end(), std::back_inserter(accounts));
+    return accounts;
+}
+
+/// The views of the residual that explain most, each fitted with the noise anew.
+std::vector<Contest::Rival> Contest::rivals() const {
+    constexpr std::size_t looked_at = 4;
+    auto views = view_samples(*now_.fit, lattice_arcsec_);
+    std::erase_if(views, [](const View& view) { return view.test.merit < closure::tie; });
+    std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
+    if (views.size() > looked_at) {
+        // Jumps are looked at in any case: a random rate can follow them, and no other view says what they are.
+        const auto jumps = std::find_if(views.begin() + looked_at, views.end(), [](const View& v) { return v.jumps; });
+        if (jumps != views.end()) std::swap(views[looked_at - 1], *jumps);
+        views.resize(looked_at);
+    }
+    std::vector<Rival> found;
+    for (const View& view : views) {
+        Rival rival{view.test.merit, 0.0, view.test.where, view.jumps, view.test.view == repeating_variance};
+        if (view.columns) {
+            rival.merit = refitted_merit(*now_.fit, view);
+            rival.coefficients = static_cast<double>(view.columns().size());
+        }
+        found.push_back(rival);
+    }
+    return found;
+}
+
+/// What an account must explain: where a view does more, the account is only what comes nearest to something that the
+/// library does not have. What a view must have more than an effect to be taken for the truth is off it.
+double Contest::bar(const Account& account, const std::vector<Rival>& rivals, std::size_t rows) {
+    const bool random = account.random();
+    double most = 0.0;
+    for (const Rival& rival : rivals) {
+        double merit = rival.merit;
+        if (rival.repeats && account.has("resampling")) {
+            // What resampling does to the variance it does to the correlations too: by half as much again, and more.
+            constexpr double of_variance_alone = 1.3;
+            most = std::max(most, of_variance_alone * merit);
+            continue;
+        }
+        // Several effects are chosen from many: against what follows another column of the record they get nothing for
+        // being of the library. A course in time follows all of them.
+        double more = account.members.size() > 1 && rival.where != Where::time ? 0.0 : -closure::tie;
+        if (random && rival.where == Where::time && !rival.jumps) {
+            // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
+            // course in time (Schwarz 1978).
+            merit -= rival.coefficients * (0.5 * std::log(static_cast<double>(rows)) - 1.0);
+        } else if (random) {
+            // What follows jumps, or another column of the record, a random rate can follow nearly as well. The course
+            // of jumps is searched stretch by stretch and loses a part of what they explain.
+            more = rival.jumps ? std::max(closure::tie, 0.1 * account.merit) : closure::tie;
+        } else if (rival.jumps && account.members.size() > 1) {
+            more = closure::tie;
+        }
+        most = std::max(most, merit + more);
+    }
+    return most;
+}
+
+/// Whether two effects of different kinds explain different things: one is needed beside the other as well. Such may
+/// have the same merit, and are no answer in each other's place.
+bool Contest::beside_each_other(const SampleContender& a, const SampleContender& b) const {
+    const auto kind = [](const std::string& effect) { return is_slow(effect) ? 0 : is_line(effect) ? 1 : 2; };
+    if (kind(a.candidate.effect) == kind(b.candidate.effect)) return false;
+    for (const auto& [with, without] : {std::pair{&a, &b}, std::pair{&b, &a}}) {
+        std::vector<std::vector<double>> added;
+        for (const SampleColumn& column : with->fit->model().columns) {
+            if (column.step != now_.step) continue;
+            added.push_back(column.of_rate ? without->fit->as_taken(*column.series) : *column.series);
+        }
+        if (!added.empty()) return 0.5 * without->fit->score(added).chi2 > closure::tie;
+    }
+    const SampleContender& random = is_random_rate(a.candidate.effect) ? a : b;
+    const SampleContender& other = is_random_rate(a.candidate.effect) ? b : a;
+    if (!is_random_rate(random.candidate.effect)) return false;
+    SampleModel model = other.fit->model();
+    const SampleModel& rates = random.fit->model();
+    model.walk = rates.walk;
+    model.flicker = rates.flicker;
+    model.flicker_deg_h = rates.flicker_deg_h;
+    model.noise.walk_arcsec2_s3 = rates.noise.walk_arcsec2_s3;
+    model.noise.terms = rates.noise.terms;
+    const SampleFit both(series_, std::move(model), rows_, SampleFit::Noise::near);
+    return both.gain_over(*other.fit) > closure::tie;
+}
+
+/// All that explains as much without the first is tied to it. Where others are added next, one of these is tied to each
+/// of them instead.
+void Contest::tie(const Account& best, const std::vector<Account>& as_likely, SampleChoice& choice) {
+    const std::string& effect = choice.chosen->candidate.effect;
+    const auto add = [](std::vector<std::string>& names, const std::string& name) {
+        if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    };
+    choice.confounded_with = choice.chosen->candidate.confounded;
+    for (const Shared& member : best.members) {
+        if (member->candidate.effect != effect) choice.of_partners.push_back({member->candidate.effect, {}});
+    }
+    for (const Account& other : as_likely) {
+        if (other.has(effect)) {
+            // The same with another drift, which may go by other names.
+            if (other.members.size() > 1) continue;
+            for (const std::string& name : other.members.front()->candidate.confounded) {
+                add(choice.confounded_with, name);
+            }
+            continue;
+        }
+        std::vector<std::string> instead;
+        for (const Shared& member : other.members) {
+            if (!best.has(member->candidate.effect)) instead.push_back(member->candidate.effect);
+        }
+        for (auto& [partner, names] : choice.of_partners) {
+            if (other.has(partner) || instead.size() < 2) continue;
+            add(names, instead.back());
+            instead.pop_back();
+        }
+        for (const std::string& name : instead) add(choice.confounded_with, name);
+    }
+}
+
+SampleChoice Contest::choose() {
+    const auto candidates = screened(now_, Wanted::all);
+    const auto all = contenders(now_, candidates);
+    std::vector<Account> accounts;
+    for (const Shared& contender : all) {
+        accounts.push_back({{contender}, contender->merit, contender->candidate.p_value});
+    }
+    std::vector<Rival> against;
+    if (!all.empty()) against = rivals();
+    const auto holds = [&](const Account& account) { return account.merit > bar(account, against, series_.size()); };
+    const bool led = !all.empty() && holds(accounts.front());
+    // Where a view explains more than the likeliest effect, several must be far better than that.
+    double least = led || all.empty() ? 0.0 : accounts.front().merit + closure::tie;
+    if (!led || is_slow(all.front()->candidate.effect)) {
+        for (Account& account : sets(all, candidates)) accounts.push_back(std::move(account));
+        if (all.empty() && !accounts.empty()) against = rivals();
+    }
+    std::stable_sort(accounts.begin(), accounts.end(),
+                     [](const Account& a, const Account& b) { return a.merit > b.merit; });
+    // The fewest effects of those that explain as much as any.
+    const Account* best = nullptr;
+    for (const Account& account : accounts) {
+        if (!(account.merit > least) || !holds(account)) continue;
+        if (best == nullptr) least = std::max(least, account.merit - closure::tie);
+        if (best == nullptr || account.members.size() < best->members.size()) best = &account;
+    }
+    if (best == nullptr) return {};
+    std::vector<Account> as_likely;
+    for (const Account& account : accounts) {
+        if (account.merit > least) as_likely.push_back(account);
+    }
+    SampleChoice choice;
+    // Of several, what most of those as likely have in them.
+    std::ptrdiff_t most = -1;
+    for (const Shared& member : best->members) {
+        const std::string& effect = member->candidate.effect;
+        const auto same = std::find_if(candidates.begin(), candidates.end(),
+                                       [&](const SampleCandidate& c) { return c.effect == effect; });
+        if (member != best->members.front() && same == candidates.end()) continue;
+        const auto in = std::count_if(as_likely.begin(), as_likely.end(),
+                                      [&](const Account& account) { return account.has(effect); });
+        if (in <= most) continue;
+        most = in;
+        const bool first = member == best->members.front();
+        choice.chosen = first ? member : fitted(now_, *same);
+        choice.p_value = first ? best->p_value : member->candidate.p_value;
+    }
+    std::erase_if(as_likely, [&](const Account& account) {
+        return account.members.size() == 1 && beside_each_other(*choice.chosen, *account.members.front());
+    });
+    tie(*best, as_likely, choice);
+    const double from_hz = choice.chosen->fit->model().noise.from_hz;
+    for (const Account& account : as_likely) {
+        const double hz = account.members.front()->fit->model().noise.from_hz;
+        if (choice.chosen->candidate.effect != "resampling" || !account.has("resampling")) continue;
+        if (std::abs(hz - from_hz) > 1e-3 * series_.rate_hz) choice.other_hz.push_back(hz);
+    }
+    return choice;
+}
+
+}  // namespace
+
+SampleChoice choose_on_samples(const record::Declared& declared, const SampleSeries& series, const Rows& rows,
+                               const SampleState& now, double lattice_arcsec) {
+    return Contest(declared, series, rows, now, lattice_arcsec).choose();
+}
+
+}  // namespace ringlock::closure
