@@ -63,6 +63,17 @@ Columns harmonic(const TurnFit& fit, int k, bool kicks) {
     return columns;
 }
 
+/// The ellipse that is in the model is known from radii, as well as phases would tell it: amplitudes of the first two
+/// harmonics, to which it shifts the reading, have that error besides their own.
+void doubt_ellipse(const TurnFit& fit, TurnFit::Score& score) {
+    if (fit.parameters().find("readout_ellipse") == nullptr || score.rank != 4) return;
+    const auto counted = static_cast<double>(std::count(fit.rows().begin(), fit.rows().end(), 1));
+    const double sd = fit.model().series().radius_sd_rad;
+    Eigen::MatrixXd covariance = score.covariance;
+    covariance.diagonal().head(2).array() += 2.0 * sd * sd / counted;
+    score.chi2 = score.value.dot(covariance.ldlt().solve(score.value));
+}
+
 void test_phase(const TurnFit& fit, std::vector<View>& views) {
     constexpr int harmonics = 6;
     for (const bool kicks : {true, false}) {
@@ -71,7 +82,8 @@ void test_phase(const TurnFit& fit, std::vector<View>& views) {
         double cost = 0.0;
         int at = 0;
         for (int k = 1; k <= harmonics; ++k) {
-            const auto score = fit.score(harmonic(fit, k, kicks));
+            auto score = fit.score(harmonic(fit, k, kicks));
+            if (!kicks && k <= 2) doubt_ellipse(fit, score);
             const double p = chi2_tail(score.chi2, score.rank);
             if (at > 0 && p >= least) continue;
             least = p;

@@ -109,7 +109,9 @@ bool follows_column(const View& view) {
 ///
 /// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do, who
 /// are kicks of first order only. Injected noise of a radian leaves nothing of that.
-bool something_else(const TurnFit& fit, const Choice& choice) {
+///
+/// Gives the most that such a view explains.
+std::optional<double> something_else(const TurnFit& fit, const Choice& choice) {
     constexpr std::size_t looked_at = 4;
     constexpr double first_order = 0.02;
     constexpr double noise_of_column = 0.1;
@@ -117,9 +119,10 @@ bool something_else(const TurnFit& fit, const Choice& choice) {
     std::erase_if(views, [](const View& view) { return !view.columns || view.test.merit < tie; });
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
     if (views.size() > looked_at) views.resize(looked_at);
-    return std::any_of(views.begin(), views.end(), [&](const View& view) {
+    std::optional<double> most;
+    for (const View& view : views) {
         const double merit = refitted_merit(fit, view);
-        return std::all_of(choice.held.begin(), choice.held.end(), [&](const Held& held) {
+        const bool beats_all = std::all_of(choice.held.begin(), choice.held.end(), [&](const Held& held) {
             const bool in_step =
                 view.test.where == Where::phase && held.effect->adds_angle() && fit.parameters().injected_sd_rad < 1.0;
             if (in_step) return merit > std::min(held.merit - tie, (1.0 - first_order) * held.merit);
@@ -129,7 +132,19 @@ bool something_else(const TurnFit& fit, const Choice& choice) {
             const double least = std::min(held.merit - tie, (1.0 - noise_of_column) * held.merit);
             return merit > (follows_column(view) ? least : view.jumps ? held.merit - tie : held.merit + tie);
         });
-    });
+        if (beats_all) most = std::max(merit, most.value_or(merit));
+    }
+    return most;
+}
+
+/// Two effects of the library may look like something else where either is looked at alone: whether one beside the
+/// chosen one makes up for what a view explains.
+bool two_explain(const record::Record& record, const Rows& rows, const Choice& choice, double merit_of_view) {
+    constexpr std::size_t looked_at = 3;
+    const Contest beside = hold_contest(record, *choice.chosen->fitted, rows, looked_at, Among::not_random);
+    if (beside.side || beside.contenders.empty() || !passes(beside.contenders.front().p_value)) return false;
+    const double second_choice = std::log(static_cast<double>(effects::registry().size()));
+    return choice.chosen->merit + beside.contenders.front().merit - second_choice > merit_of_view;
 }
 
 /// Tests of what the model has left; where structure lies, if any passes the level.
@@ -174,12 +189,23 @@ void read_shape_again(const record::Record& record, const Rows& rows, std::share
     }
 }
 
+bool is_shape(const effects::Effect& effect) {
+    return effect.name() == "dither_asymmetry" || effect.name() == "dither_second_harmonic";
+}
+
 /// Effects that stood in for the one added last are no longer needed beside it.
 void drop_needless(const record::Record& record, const Rows& rows, std::shared_ptr<Fitted>& now,
                    std::vector<Step>& steps) {
     for (std::size_t k = steps.size(); k-- > 0;) {
         const effects::Effect* effect = effects::find(steps[k].effect);
-        if (told_by_other_columns(*effect)) continue;
+        const bool shape = is_shape(*effect);
+        if (!shape && told_by_other_columns(*effect)) continue;
+        if (shape) {
+            const auto told = screen_side_channels(*record.turns, *now->fit, now->joined, true);
+            const auto same =
+                std::find_if(told.begin(), told.end(), [&](const Candidate& c) { return c.effect == effect; });
+            if (same == told.end() || passes(same->p_value)) continue;
+        }
         TurnParameters without = now->fit->parameters();
         std::erase_if(without.effects, [&](const ActiveEffect& active) { return active.effect == effect; });
         std::shared_ptr<Fitted> fitted;
@@ -188,7 +214,8 @@ void drop_needless(const record::Record& record, const Rows& rows, std::shared_p
         } catch (const RunError&) {
             continue;  // no motion of a gyro with such parameters can be followed
         }
-        if (passes(p_of_gain(now->fit->log_likelihood() - fitted->fit->log_likelihood(), *effect))) continue;
+        const double gain = now->fit->log_likelihood() - fitted->fit->log_likelihood();
+        if (!shape && passes(p_of_gain(gain, *effect))) continue;
         now = fitted;
         steps.erase(steps.begin() + static_cast<std::ptrdiff_t>(k));
     }
@@ -285,7 +312,10 @@ Closure close_turns(const record::Record& record) {
         const Choice choice = choose(record, contest, rows);
         if (choice.chosen == nullptr) break;
         const Contender& best = *choice.chosen;
-        if (!contest.side && something_else(*now->fit, choice)) break;
+        if (!contest.side) {
+            const auto view = something_else(*now->fit, choice);
+            if (view && !two_explain(record, rows, choice, *view)) break;
+        }
         Step step;
         step.effect = std::string(best.candidate.effect->name());
         step.p_value = choice.p_value;
