@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -119,6 +120,69 @@ TEST(TurnLoop, InjectedNoiseOfAFiftiethOfTheDitherIsFitted) {
     print("much noise", closure);
     EXPECT_EQ(closure.verdict, Verdict::nothing_missing);
     EXPECT_NEAR(closure.heldout_after, truth.injected_noise_rad, 0.3);
+}
+
+/// Each moves what tells of others: times of turns, accelerations, readings and kicks.
+TEST(TurnLoop, EvidentEffectsAreNamedAndNoOther) {
+    struct Evident {
+        std::set<std::string> named;
+        Truth truth;
+    };
+    const auto device = [](double scale_factor_arcsec, double dither_hz, double dither_deg_s, double threshold_deg_h) {
+        Truth truth;
+        truth.scale_factor_arcsec = scale_factor_arcsec;
+        truth.dither_frequency_hz = dither_hz;
+        truth.dither_peak_rate_deg_s = dither_deg_s;
+        truth.lockin_threshold_deg_h = threshold_deg_h;
+        truth.readout_noise = 0.002;
+        truth.bias_deg_h = -23.9;
+        truth.turns = 8000;
+        return truth;
+    };
+    std::vector<Evident> records_of;
+    const auto add = [&](std::set<std::string> named, const Truth& truth) {
+        records_of.push_back({std::move(named), truth});
+        records_of.back().truth.seed = 500 + records_of.size();
+        return &records_of.back().truth;
+    };
+    records_of.reserve(8);
+    Truth* truth = add({"dither_asymmetry", "bias_step"}, device(2.43, 90.0, 100.0, 30.0));
+    truth->injected_noise_rad = 1.0;
+    truth->input_rate_deg_h = 100.0;
+    truth->dither_asymmetry = 0.005;
+    truth->rates.bias_step = {3.0, 17.8};
+    truth = add({"dither_asymmetry"}, device(1.2, 200.0, 100.0, 100.0));
+    truth->injected_noise_rad = 1.0;
+    truth->input_rate_deg_h = -5000.0;
+    truth->dither_asymmetry = 0.005;
+    truth = add({"dither_second_harmonic", "detector_phase_offset"}, device(2.43, 124.7, 100.0, 300.0));
+    truth->injected_noise_rad = 1.0;
+    truth->dither_second_harmonic = {0.01, 0.8};
+    truth->detector_phase_offset_rad = 0.8;
+    truth = add({"detector_phase_offset", "lockin_turn_asymmetry"}, device(1.2, 124.7, 100.0, 600.0));
+    truth->input_rate_deg_h = -5000.0;
+    truth->detector_phase_offset_rad = 0.5;
+    truth->lockin_turn_asymmetry = 0.2;
+    truth->turns = 3000;
+    truth = add({"readout_ellipse", "base_vibration"}, device(0.7, 124.7, 250.0, 100.0));
+    truth->readout_ellipse.gain = 0.03;
+    truth->readout_ellipse.offset_sin = 0.02;
+    truth->rates.base_vibration = {7.3, 5.0, 0.5};
+    truth = add({"bias_step"}, device(0.5, 200.0, 50.0, 60.0));
+    truth->injected_noise_rad = 6.0;
+    truth->rates.bias_step = {3.0, 8.0};
+
+    std::vector<Truth> truths;
+    for (const Evident& evident : records_of) truths.push_back(evident.truth);
+    const auto records = generate(truths);
+    for (std::size_t k = 0; k < records.size(); ++k) {
+        const Closure closure = close_loop(records[k]);
+        print("evident", closure);
+        std::set<std::string> named;
+        for (const auto& step : closure.steps) named.insert(step.effect);
+        EXPECT_EQ(closure.verdict, Verdict::closed) << k;
+        EXPECT_EQ(named, records_of[k].named) << k;
+    }
 }
 
 TEST(TurnLoop, RecordsThatCannotBeFollowedAreRefused) {
