@@ -102,21 +102,41 @@ void test_phase(const TurnFit& fit, std::vector<View>& views) {
     }
 }
 
-/// Gain of the Kalman filter of a walk read with noise (Harvey 1989, section 4.1), whose variances the covariances of
-/// its steps tell.
-double gain_of_walk(const std::vector<double>& series) {
-    double variance = 0.0;
-    double next = 0.0;
-    const std::size_t n = series.size() - 2;  // the last swing is not known
-    for (std::size_t i = 1; i < n; ++i) {
-        const double step = series[i] - series[i - 1];
-        variance += step * step / static_cast<double>(n);
-        next += step * (series[i + 1] - series[i]) / static_cast<double>(n);
+/// Amplitude of the dither at the turns over its mean: second differences of the phases, in which no rate is, the
+/// lock-in's kicks taken off. The first and the last repeat their neighbours'.
+std::vector<double> amplitude_at_turns(const TurnFit& fit) {
+    const auto& series = fit.model().series();
+    const auto& foretold = fit.prediction().phase_rad;
+    const auto& phase = fit.model().phase_rad();
+    const std::size_t n = series.size();
+    std::vector<double> amplitude(n, 1.0);
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+        double second = 0.0;
+        for (const std::size_t k : {i - 1, i, i, i + 1}) second += (k == i ? 1.0 : -1.0) * (phase[k] - foretold[k]);
+        amplitude[i] = -0.25 * series.direction[i] * second / series.amplitude_rad;
     }
-    const double read = std::max(-next, 0.0);
-    // What is less than four standard errors may be none.
-    const double seen = variance + 2.0 * next - 4.0 * std::sqrt(6.0 / static_cast<double>(n)) * variance;
-    const double walk = std::max(seen, 0.0);
+    amplitude[0] = amplitude[1];
+    amplitude[n - 1] = amplitude[n - 2];
+    return amplitude;
+}
+
+/// Gain of the Kalman filter of a walk read with noise (Harvey 1989, section 4.1): variances by how differences grow
+/// with their lag, beyond what neighbours share.
+double gain_of_walk(const std::vector<double>& series) {
+    constexpr std::size_t lag = 8;
+    const std::size_t n = series.size();
+    double squares[3] = {};
+    const auto of_lag = [&](std::size_t k, std::size_t i) { return std::pow(series[i + k] - series[i], 2); };
+    for (std::size_t i = 0; i + 2 * lag < n; ++i) {
+        const double grown = of_lag(2 * lag, i) - of_lag(lag, i);
+        squares[0] += of_lag(lag, i) / static_cast<double>(n);
+        squares[1] += grown / static_cast<double>(n);
+        squares[2] += grown * grown / static_cast<double>(n);
+    }
+    // What is less than four standard errors may be none; sums of so many lags share what they have.
+    const double error = std::sqrt(squares[2] * 2.0 * lag / static_cast<double>(n));
+    const double walk = std::max(squares[1] - 4.0 * error, 0.0) / lag;
+    const double read = std::max(0.5 * (squares[0] - lag * walk), 0.0);
     return std::clamp(2.0 * walk / (walk + std::sqrt(walk * walk + 4.0 * walk * read) + 1e-300), 1.0 / 200.0, 0.5);
 }
 
@@ -151,16 +171,17 @@ void test_rates(const TurnFit& fit, std::vector<View>& views) {
                 {integral(fit, series.input_rate_deg_h), integral(fit, square), integral(fit, cube)});
     }
     // The amplitude of the cycles before, what the residual itself has done to it staying out.
-    const double memory = gain_of_walk(series.swing);
+    const auto at_turn = std::make_shared<const std::vector<double>>(amplitude_at_turns(fit));
+    const double memory = gain_of_walk(*at_turn);
     const auto stretch = static_cast<std::ptrdiff_t>(std::min<std::size_t>(n - 1, std::lround(2.0 / memory)));
     const auto mean_of = [&](auto first) {
         return std::accumulate(first, first + stretch, 0.0) / static_cast<double>(stretch);
     };
     std::vector<double> amplitude(n);
-    double mean = mean_of(series.swing.begin());
+    double mean = mean_of(at_turn->begin());
     for (std::size_t i = 0; i < n; ++i) {
         amplitude[i] = mean - 1.0;
-        if (i > 0) mean += memory * (series.swing[i - 1] - mean);
+        if (i > 1) mean += memory * ((*at_turn)[i - 2] - mean);
     }
     const auto angles = [&fit](std::vector<double> change) {
         const double scale = std::max(largest(change), 1e-12);
@@ -174,11 +195,11 @@ void test_rates(const TurnFit& fit, std::vector<View>& views) {
     against(Where::amplitude, "rates that follow the dither's amplitude and its square", angles(amplitude));
     if (!views.empty() && views.back().test.where == Where::amplitude) {
         // What it explains, once it is known to explain something: with the cycles after as well.
-        views.back().columns = [&series, amplitude, angles, memory, n, last = mean_of(series.swing.rbegin() + 1)] {
+        views.back().columns = [at_turn, amplitude, angles, memory, n, last = mean_of(at_turn->rbegin())] {
             std::vector<double> change = amplitude;
             double after = last;
             for (std::size_t i = n; i-- > 0;) {
-                if (i + 1 < n) after += memory * (series.swing[i] - after);
+                if (i + 1 < n) after += memory * ((*at_turn)[i] - after);
                 change[i] = 0.5 * (change[i] + after - 1.0);
             }
             return angles(change);

@@ -49,7 +49,7 @@ Score heldout(const TurnFit& fit) {
 /// stretches and its correlation (Newey and West, Econometrica 55, 1987, 703), as an input that moves leaves some.
 Estimate dither_frequency(const TurnFit& fit) {
     constexpr std::size_t stretches = 40;
-    const auto turn_s = fit.model().predict(fit.parameters()).turn_s;
+    const auto& turn_s = fit.prediction().turn_s;
     const double interval_s = fit.model().series().interval_s;
     std::vector<double> at;
     std::vector<double> late_s;
@@ -137,12 +137,17 @@ std::optional<double> something_else(const TurnFit& fit, const Choice& choice) {
     return most;
 }
 
-/// Two effects of the library may look like something else where either is looked at alone: whether one beside the
-/// chosen one makes up for what a view explains.
+/// Two effects of the coupling may look like something else where either is looked at alone: whether one beside the
+/// chosen one makes up for what a view explains. Rates by twos could follow nearly anything.
 bool two_explain(const record::Record& record, const Rows& rows, const Choice& choice, double merit_of_view) {
     constexpr std::size_t looked_at = 3;
+    const auto of_coupling = [](const Contender& contender) {
+        return !contender.candidate.effect->adds_angle() && !is_random_rate(*contender.candidate.effect);
+    };
+    if (!of_coupling(*choice.chosen)) return false;
     const Contest beside = hold_contest(record, *choice.chosen->fitted, rows, looked_at, Among::not_random);
     if (beside.side || beside.contenders.empty() || !passes(beside.contenders.front().p_value)) return false;
+    if (!of_coupling(beside.contenders.front())) return false;
     const double second_choice = std::log(static_cast<double>(effects::registry().size()));
     return choice.chosen->merit + beside.contenders.front().merit - second_choice > merit_of_view;
 }

@@ -60,6 +60,7 @@ class TurnFit {
 
     const TurnModel& model() const { return *model_; }
     const TurnParameters& parameters() const { return parameters_; }
+    const TurnModel::Prediction& prediction() const { return prediction_; }
     /// Base parameters and those of effects, with standard errors.
     std::vector<Estimate> estimates() const;
     /// Of the phases that count and of the radii of the quadrature.
