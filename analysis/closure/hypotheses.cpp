@@ -173,10 +173,11 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
     const double bin_hz = 1.0 / (static_cast<double>(padded) * fit.model().series().interval_s);
     // Slower than three periods in the record is drift; next to half the turns' rate it is the dither's amplitude.
     const auto lowest = static_cast<std::size_t>(3.0 * static_cast<double>(padded) / static_cast<double>(n)) + 1;
+    const auto amplitude = static_cast<std::size_t>(fit.model().series().amplitude_band_hz() / bin_hz) + 1;
     // What else the model could do of a line the spectrum does not know: the highest peaks are looked at closely.
     constexpr std::size_t looked_at = 8;
     std::vector<std::size_t> peaks;
-    for (std::size_t k = lowest; k < padded / 2 - lowest; ++k) {
+    for (std::size_t k = lowest; k + amplitude < padded / 2; ++k) {
         if (std::norm(out[k]) >= std::norm(out[k - 1]) && std::norm(out[k]) > std::norm(out[k + 1])) peaks.push_back(k);
     }
     std::sort(peaks.begin(), peaks.end(),

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <optional>
 
+#include "analysis/closure/amplitude_swings.hpp"
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decision.hpp"
 #include "analysis/closure/side_channels.hpp"
@@ -20,6 +21,9 @@ namespace {
 
 /// Of ten blocks, three are only reported.
 constexpr BlockRoles roles{1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
+
+/// What is left below is of sums of so many rounded numbers, here and where the record was made.
+constexpr double numerics_rad = 1e-6;
 
 struct Score {
     double error = 0.0;
@@ -312,9 +316,18 @@ Closure close_turns(const record::Record& record) {
     std::string partner;  // of the effect that was added last
 
     // What stood in for another is dropped again, so that there may be more rounds than steps.
-    for (std::size_t round = 0; round < 2 * most_steps && closure.steps.size() < most_steps; ++round) {
+    for (std::size_t round = 0; round < 3 * most_steps && closure.steps.size() < most_steps; ++round) {
+        if (heldout(*now->fit).error < numerics_rad) break;
         const Contest contest = hold_contest(record, *now, rows, most_contenders);
         const Choice choice = choose(record, contest, rows);
+        if (!contest.side && now->series.all_phases_come) {
+            const auto swinging = find_amplitude_swing(record, *now, rows);
+            if (swinging && (choice.chosen == nullptr || swinging->merit > choice.held.front().merit - tie)) {
+                now = swinging->fitted;
+                if (closure.steps.empty()) closure.heldout_before = heldout(*now->fit).error;
+                continue;
+            }
+        }
         if (choice.chosen == nullptr) break;
         const Contender& best = *choice.chosen;
         if (!contest.side) {
@@ -348,7 +361,12 @@ Closure close_turns(const record::Record& record) {
         closure.steps.push_back(std::move(step));
     }
 
-    test_what_is_left(*now->fit, closure);
+    if (heldout(*now->fit).error < numerics_rad) {
+        closure.notes.push_back(fmt::format(
+            "what the model leaves is below {:g} rad, where numbers are rounded: it is not tested", numerics_rad));
+    } else {
+        test_what_is_left(*now->fit, closure);
+    }
     const bool on_random = earlier && std::any_of(closure.steps.begin(), closure.steps.end(), [&](const Step& step) {
                                return step.effect == earlier->effect || is_random_rate(*effects::find(step.effect));
                            });
@@ -362,6 +380,9 @@ Closure close_turns(const record::Record& record) {
         const auto same = std::find_if(closure.tests.begin(), closure.tests.end(),
                                        [&](const ResidualTest& test) { return test.view == told.view; });
         closure.unexplained = same == closure.tests.end() ? told : *same;
+    }
+    for (const AmplitudeSwing& swing : now->fit->parameters().swings) {
+        closure.notes.push_back(note_on(swing, now->series));
     }
     closure.log_likelihood_gain = now->fit->log_likelihood() - base_log_likelihood;
     take_residual(turns, *now, closure);

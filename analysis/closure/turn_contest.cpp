@@ -130,6 +130,7 @@ std::shared_ptr<Fitted> fit_with(const record::Record& record, const Fitted& now
         // Without it the rest may have gone far astray: anew, too, from where another has led or from the start.
         TurnParameters anew = alike != nullptr ? alike->fit->parameters() : TurnParameters{};
         anew.effects = start.effects;
+        anew.swings = start.swings;
         fit_from(anew);
     }
     // The score says how large it would be were all linear: too far away, maybe.

@@ -11,8 +11,9 @@ namespace ringlock::closure {
 
 namespace {
 
-constexpr std::size_t drift_terms = 4;   // polynomials of the dither's amplitude
-constexpr std::size_t base_columns = 2;  // bias and threshold, after the nuisances
+constexpr std::size_t drift_terms = 4;    // polynomials of the dither's amplitude
+constexpr std::size_t swing_columns = 3;  // of a swing of the amplitude: two amplitudes and the frequency
+constexpr std::size_t base_columns = 2;   // bias and threshold, after the nuisances
 
 /// Legendre polynomial of that degree at x.
 double legendre(std::size_t degree, double x) {
@@ -51,6 +52,20 @@ Regressor difference(TurnModel::Prediction with, const TurnModel::Prediction& wi
         of.kick[i] = (of.kick[i] - without.frame.kick_slope[i]) / per;
     }
     return of;
+}
+
+std::array<std::vector<double>, 3> amplitude_by(const AmplitudeSwing& swing, const TurnSeries& series) {
+    std::array<std::vector<double>, 3> by;
+    for (auto& column : by) column.resize(series.size());
+    for (std::size_t i = 0; i < series.size(); ++i) {
+        const double turned = units::two_pi * series.time_s[i];
+        const double cosine = -series.direction[i] * std::cos(turned * swing.hz);
+        const double sine = -series.direction[i] * std::sin(turned * swing.hz);
+        by[0][i] = cosine;
+        by[1][i] = sine;
+        by[2][i] = turned * (swing.sine_rad * cosine - swing.cosine_rad * sine);
+    }
+    return by;
 }
 
 TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows, Effects effects)
@@ -103,6 +118,11 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
         }
         all.push_back({"", "amplitude", std::move(drift)});
     }
+    for (const AmplitudeSwing& swing : parameters_.swings) {
+        for (std::vector<double>& by : amplitude_by(swing, model_->series())) {
+            all.push_back({"", "swing", std::move(by)});
+        }
+    }
     const auto change = [&](TurnParameters& p, double& value, double step) {
         const double here = value;
         const auto by = [&](double moved) {
@@ -146,9 +166,9 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
     return all;
 }
 
-std::size_t TurnFit::solved() const {
-    return effects_ == Effects::held ? nuisance_.size() + base_columns : columns_.size();
-}
+std::size_t TurnFit::nuisances() const { return nuisance_.size() + swing_columns * parameters_.swings.size(); }
+
+std::size_t TurnFit::solved() const { return effects_ == Effects::held ? nuisances() + base_columns : columns_.size(); }
 
 /// Offset and amplitude, which the start knows nothing of, by the noise that it knows.
 void TurnFit::fit_nuisances() {
@@ -269,8 +289,14 @@ double TurnFit::slope_of_objective(const Regressor& of, double step) const {
 void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) const {
     constexpr double part = 0.1;
     const double duration_s = model_->series().time_s.back();
+    const auto bound = [&](Eigen::Index k, double limit) {
+        normal(k, k) += 1.0 / (limit * limit * scale(k) * scale(k));
+    };
+    for (std::size_t s = 1; s <= parameters_.swings.size(); ++s) {
+        bound(static_cast<Eigen::Index>(nuisance_.size() + s * swing_columns - 1), part / duration_s);
+    }
     if (effects_ == Effects::held) return;
-    auto k = static_cast<Eigen::Index>(nuisance_.size() + base_columns);
+    auto k = static_cast<Eigen::Index>(nuisances() + base_columns);
     for (const ActiveEffect& active : parameters_.effects) {
         for (const effects::Parameter& parameter : active.effect->parameters()) {
             if (!fitted_in_phase(*active.effect, parameter.role)) continue;
@@ -278,7 +304,7 @@ void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) c
                                  : parameter.role == effects::Role::frequency ? part / duration_s
                                  : parameter.role == effects::Role::phase     ? part * units::two_pi
                                                                               : 0.0;
-            if (limit > 0.0) normal(k, k) += 1.0 / (limit * limit * scale(k) * scale(k));
+            if (limit > 0.0) bound(k, limit);
             ++k;
         }
     }
@@ -287,6 +313,9 @@ void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) c
 void TurnFit::take(const Eigen::VectorXd& step) {
     Eigen::Index k = 0;
     for (double& value : nuisance_) value += step(k++);
+    for (AmplitudeSwing& swing : parameters_.swings) {
+        for (double* value : {&swing.cosine_rad, &swing.sine_rad, &swing.hz}) *value += step(k++);
+    }
     parameters_.bias_deg_h += step(k++);
     parameters_.threshold_deg_h = std::max(0.0, parameters_.threshold_deg_h + step(k++));
     if (effects_ == Effects::held) return;
@@ -304,6 +333,12 @@ void TurnFit::set_rest(const TurnModel::Prediction& prediction) {
     for (std::size_t i = 0; i < rest_.size(); ++i) {
         rest_[i] = model_->phase_rad()[i] - prediction.phase_rad[i];
         for (std::size_t k = 0; k < nuisance_.size(); ++k) rest_[i] -= nuisance_[k] * columns_[k].of.series[i];
+    }
+    for (const AmplitudeSwing& swing : parameters_.swings) {
+        const auto by = amplitude_by(swing, model_->series());
+        for (std::size_t i = 0; i < rest_.size(); ++i) {
+            rest_[i] -= swing.cosine_rad * by[0][i] + swing.sine_rad * by[1][i];
+        }
     }
 }
 
@@ -331,7 +366,7 @@ TurnFit::Belief TurnFit::belief_of(const TurnParameters& parameters) const {
 /// A gyro that is locked shows its bias and its threshold together only: beside so weak a belief that no other record
 /// feels it, they would be without bounds.
 void TurnFit::add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, Eigen::VectorXd* right) const {
-    const auto bias = static_cast<Eigen::Index>(nuisance_.size());
+    const auto bias = static_cast<Eigen::Index>(nuisances());
     const auto believe = [&](Eigen::Index k, double off, double sd) {
         normal(k, k) += 1.0 / (sd * sd * scale(k) * scale(k));
         if (right != nullptr) (*right)(k) += off / (sd * scale(k));
@@ -376,7 +411,7 @@ std::vector<Estimate> TurnFit::estimates() const {
     const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(x.cols(), x.cols()));
     TurnParameters found = parameters_;
     std::vector<Estimate> estimates;
-    for (std::size_t k = nuisance_.size(); k < columns_.size(); ++k) {
+    for (std::size_t k = nuisances(); k < columns_.size(); ++k) {
         Estimate estimate{columns_[k].effect, columns_[k].name, 0.0, 0.0};
         const auto index = static_cast<Eigen::Index>(k);
         estimate.sd = std::sqrt(std::max(covariance(index, index), 0.0)) / scale(index);
@@ -402,8 +437,8 @@ std::vector<Estimate> TurnFit::estimates() const {
             }
         }
         if (!frequency || !phase) continue;
-        const auto f = static_cast<Eigen::Index>(nuisance_.size() + *frequency);
-        const auto p = static_cast<Eigen::Index>(nuisance_.size() + *phase);
+        const auto f = static_cast<Eigen::Index>(nuisances() + *frequency);
+        const auto p = static_cast<Eigen::Index>(nuisances() + *phase);
         const double turned = units::two_pi * start_s;
         estimates[*phase].value =
             std::remainder(estimates[*phase].value - turned * estimates[*frequency].value, units::two_pi);

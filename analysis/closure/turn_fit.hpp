@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Dense>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -30,6 +31,9 @@ struct Regressor {
 
 /// How much further one model's phases are than another's, over `per`.
 Regressor difference(TurnModel::Prediction with, const TurnModel::Prediction& without, double per);
+
+/// What a swing of the amplitude adds to the phases, by its cosine, its sine and its frequency [rad/Hz].
+std::array<std::vector<double>, 3> amplitude_by(const AmplitudeSwing& swing, const TurnSeries& series);
 
 /// A parameter as fitted; of the base model where `effect` is empty.
 struct Estimate {
@@ -153,14 +157,15 @@ class TurnFit {
     std::vector<double> objectives(const TurnFrame& frame, const std::vector<TurnParameters>& parameters,
                                    const std::vector<double>& rest) const;
 
-    /// How many of the columns, which those of effects come last of, are solved for.
+    /// Columns come in this order: nuisances, base parameters, those of effects; how many are solved for.
+    std::size_t nuisances() const;
     std::size_t solved() const;
 
     const TurnModel* model_;
     TurnParameters parameters_;
     Rows rows_;
     Effects effects_;
-    std::vector<double> nuisance_;      ///< offset, amplitude and its drift
+    std::vector<double> nuisance_;      ///< offset, amplitude and its drift; swings are among the parameters
     TurnModel::Prediction prediction_;  ///< of the parameters as they are
     std::vector<double> rest_;          ///< phases less all that is deterministic
     std::vector<Column> columns_;

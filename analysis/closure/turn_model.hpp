@@ -23,6 +23,11 @@ struct ActiveEffect {
     effects::Values values;
 };
 
+/// The dither's amplitude going up and down: what that adds to the phase at the turns, positive at maxima.
+struct AmplitudeSwing {
+    double hz, cosine_rad, sine_rad;
+};
+
 /// Everything that the phases of a turn record depend on.
 struct TurnParameters {
     double bias_deg_h = 0.0;
@@ -30,6 +35,7 @@ struct TurnParameters {
     double injected_sd_rad = 0.0;  ///< noise of the dither at the turns
     double wander_sd_rad = 0.0;    ///< what the dither's amplitude gains from turn to turn
     double readout_sd_rad = 0.0;
+    std::vector<AmplitudeSwing> swings;
     std::vector<ActiveEffect> effects;
 
     ActiveEffect* find(std::string_view effect);

@@ -56,6 +56,9 @@ struct TurnSeries {
     double relative_rate(double rate_deg_h) const {
         return units::two_pi / setup.scale_factor_arcsec * rate_deg_h * interval_s / (units::pi * amplitude_rad);
     }
+    /// What comes so near the dither's frequency is its amplitude: no vibration of the base could do it without moving
+    /// the dither as much. Beside what drifts in fewer than three periods.
+    double amplitude_band_hz() const { return std::max(0.01 * 0.5 / interval_s, 3.0 / time_s.back()); }
     /// Integral of the input rate from the first turn on to each of these times [arcsec], exact between the rows of the
     /// reference. Fastest where each time is near the last.
     std::vector<double> input_angles_arcsec(std::span<const double> times_s) const;

@@ -104,6 +104,49 @@ TEST(TurnLoop, AStrongRotationIsNoShapeOfTheDither) {
 
 /// Where the dither swings little, injected noise is a part of it that matters: the fit must not end where a threshold
 /// of zero explains all, beside which the true one is likelier by thousands.
+TEST(TurnLoop, ASwingOfTheAmplitudeIsTheDithersOwn) {
+    std::vector<Truth> truths;
+    for (const double period_s : {0.9, 11.0}) {
+        Truth truth;
+        truth.readout_noise = 0.005;
+        truth.bias_deg_h = 15.0;
+        truth.wander.swing = 1e-3;
+        truth.wander.swing_period_s = period_s;
+        truth.turns = 6000;
+        truth.seed = 60 + truths.size();
+        truths.push_back(truth);
+    }
+    const auto records = generate(truths);
+    for (std::size_t k = 0; k < records.size(); ++k) {
+        const Closure closure = close_loop(records[k]);
+        print("amplitude swings", closure);
+        EXPECT_EQ(closure.verdict, Verdict::nothing_missing) << k;
+        EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("amplitude swings by 0.001 of itself"))) << k;
+        EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", truths[k].lockin_threshold_deg_h), 4.0) << k;
+    }
+}
+
+TEST(TurnLoop, RoundingIsNoEffect) {
+    Truth truth;
+    truth.readout_noise = 0.0;
+    truth.turns = 3000;
+    truth.bias_deg_h = 15.0;
+    Truth second = truth;
+    second.lockin_second_harmonic = {0.1, 1.0};
+    const auto records = generate(std::vector<Truth>{truth, second});
+    const Closure plain = close_loop(records[0]);
+    print("without noise", plain);
+    EXPECT_EQ(plain.verdict, Verdict::nothing_missing);
+    EXPECT_LT(plain.heldout_after, 1e-9);
+    EXPECT_THAT(plain.notes, testing::Contains(testing::HasSubstr("not tested")));
+    const Closure closed = close_loop(records[1]);
+    print("second harmonic without noise", closed);
+    EXPECT_EQ(closed.verdict, Verdict::closed);
+    ASSERT_EQ(closed.steps.size(), 1U);
+    EXPECT_EQ(closed.steps[0].effect, "lockin_second_harmonic");
+    EXPECT_LT(closed.heldout_after, 1e-6);
+}
+
 TEST(TurnLoop, InjectedNoiseOfAFiftiethOfTheDitherIsFitted) {
     Truth truth;
     truth.scale_factor_arcsec = 1.2;
