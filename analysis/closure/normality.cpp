@@ -9,8 +9,45 @@
 
 namespace ringlock::closure {
 
+namespace {
+
+/// Of the fourth moment over the square of the second, and how many standard errors that is: Anscombe and Glynn
+/// (Biometrika 70, 227, 1983).
+struct Excess {
+    double kurtosis, z;
+};
+Excess excess_of(const std::vector<double>& values) {
+    const auto count = static_cast<double>(values.size());
+    double second = 0.0;
+    double fourth = 0.0;
+    for (const double s : values) second += s * s / count;
+    for (const double s : values) fourth += s * s * s * s / count;
+    const double kurtosis = fourth / (second * second) - 3.0;
+    const double mean = -6.0 / (count + 1.0);
+    const double variance =
+        24.0 * count * (count - 2.0) * (count - 3.0) / ((count + 1.0) * (count + 1.0) * (count + 3.0) * (count + 5.0));
+    const double x = (kurtosis - mean) / std::sqrt(variance);
+    const double skew = 6.0 * (count * count - 5.0 * count + 2.0) / ((count + 7.0) * (count + 9.0)) *
+                        std::sqrt(6.0 * (count + 3.0) * (count + 5.0) / (count * (count - 2.0) * (count - 3.0)));
+    const double a = 6.0 + 8.0 / skew * (2.0 / skew + std::sqrt(1.0 + 4.0 / (skew * skew)));
+    const double inner = (1.0 - 2.0 / a) / (1.0 + x * std::sqrt(2.0 / (a - 4.0)));
+    return {kurtosis, ((1.0 - 2.0 / (9.0 * a)) - std::cbrt(inner)) / std::sqrt(2.0 / (9.0 * a))};
+}
+
+}  // namespace
+
+bool is_of_even_density(const std::vector<double>& innovations, const Rows& rows) {
+    constexpr double beyond_doubt = 1e-6;
+    std::vector<double> counted;
+    for (std::size_t i = 0; i < innovations.size(); ++i) {
+        if (rows[i]) counted.push_back(innovations[i]);
+    }
+    const auto [kurtosis, z] = excess_of(counted);
+    return kurtosis < 0.0 && chi2_tail(z * z, 1) < beyond_doubt;
+}
+
 std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovations, const Rows& rows,
-                                           std::size_t shortest) {
+                                           std::size_t shortest, std::size_t shortest_bounded) {
     const std::size_t n = innovations.size();
     double least = 1.0;
     std::size_t at = 0;
@@ -29,24 +66,10 @@ std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovation
             if (all) sums.push_back(sum);
         }
         if (sums.size() < 200) break;
-        const auto count = static_cast<double>(sums.size());
-        double second = 0.0;
-        double fourth = 0.0;
-        for (const double s : sums) second += s * s / count;
-        for (const double s : sums) fourth += s * s * s * s / count;
-        const double kurtosis = fourth / (second * second) - 3.0;
-        // Anscombe and Glynn (Biometrika 70, 227, 1983)
-        const double mean = -6.0 / (count + 1.0);
-        const double variance = 24.0 * count * (count - 2.0) * (count - 3.0) /
-                                ((count + 1.0) * (count + 1.0) * (count + 3.0) * (count + 5.0));
-        const double x = (kurtosis - mean) / std::sqrt(variance);
-        const double skew = 6.0 * (count * count - 5.0 * count + 2.0) / ((count + 7.0) * (count + 9.0)) *
-                            std::sqrt(6.0 * (count + 3.0) * (count + 5.0) / (count * (count - 2.0) * (count - 3.0)));
-        const double a = 6.0 + 8.0 / skew * (2.0 / skew + std::sqrt(1.0 + 4.0 / (skew * skew)));
-        const double inner = (1.0 - 2.0 / a) / (1.0 + x * std::sqrt(2.0 / (a - 4.0)));
-        const double z = ((1.0 - 2.0 / (9.0 * a)) - std::cbrt(inner)) / std::sqrt(2.0 / (9.0 * a));
+        const auto [kurtosis, z] = excess_of(sums);
         const double p = chi2_tail(z * z, 1);
         tried += 1.0;
+        if (m < shortest_bounded && kurtosis < 0.0) continue;
         if (p < least) {
             least = p;
             at = m;

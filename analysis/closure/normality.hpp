@@ -7,10 +7,13 @@
 /// Whether innovations are normal, as those of every model here are.
 namespace ringlock::closure {
 
-/// Fourth moments of sums of `shortest` innovations and of longer ones: what is normal stays so. None where there are
-/// too few.
+/// Fourth moments of sums of `shortest` innovations and of longer ones: what is normal stays so. Sums of fewer than
+/// `shortest_bounded` may have less: a noise of even density, say, which is no structure. None where there are too few.
 std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovations, const Rows& rows,
-                                           std::size_t shortest);
+                                           std::size_t shortest, std::size_t shortest_bounded = 1);
+
+/// Whether they are, beyond doubt, flatter than normal ones, as injected noise between bounds is.
+bool is_of_even_density(const std::vector<double>& innovations, const Rows& rows);
 
 /// A rate that wanders moves by little at a time; jumps betray themselves by the size of what follows them (Harvey and
 /// Koopman, J. Business and Economic Statistics 10, 377, 1992). `response`: what the filter makes of a step of the rate

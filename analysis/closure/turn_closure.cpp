@@ -7,9 +7,10 @@
 #include <numeric>
 #include <optional>
 
-#include "analysis/closure/amplitude_swings.hpp"
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/dither_amplitude.hpp"
+#include "analysis/closure/normality.hpp"
 #include "analysis/closure/side_channels.hpp"
 #include "analysis/closure/turn_contest.hpp"
 #include "engine/core/error.hpp"
@@ -321,9 +322,10 @@ Closure close_turns(const record::Record& record) {
         const Contest contest = hold_contest(record, *now, rows, most_contenders);
         const Choice choice = choose(record, contest, rows);
         if (!contest.side && now->series.all_phases_come) {
-            const auto swinging = find_amplitude_swing(record, *now, rows);
-            if (swinging && (choice.chosen == nullptr || swinging->merit > choice.held.front().merit - tie)) {
-                now = swinging->fitted;
+            auto amplitude = find_amplitude_swing(record, *now, rows);
+            if (!amplitude) amplitude = find_amplitude_memory(record, *now, rows);
+            if (amplitude && (choice.chosen == nullptr || amplitude->merit > choice.held.front().merit - tie)) {
+                now = amplitude->fitted;
                 if (closure.steps.empty()) closure.heldout_before = heldout(*now->fit).error;
                 continue;
             }
@@ -381,9 +383,13 @@ Closure close_turns(const record::Record& record) {
                                        [&](const ResidualTest& test) { return test.view == told.view; });
         closure.unexplained = same == closure.tests.end() ? told : *same;
     }
-    for (const AmplitudeSwing& swing : now->fit->parameters().swings) {
-        closure.notes.push_back(note_on(swing, now->series));
+    if (is_of_even_density(now->fit->innovations(), now->fit->rows())) {
+        closure.notes.push_back(
+            "the injected noise is flatter than a normal one: what is read at harmonics of the phase, and the size of "
+            "the "
+            "residual over it, are not tested");
     }
+    for (std::string& note : notes_on_amplitude(*now)) closure.notes.push_back(std::move(note));
     closure.log_likelihood_gain = now->fit->log_likelihood() - base_log_likelihood;
     take_residual(turns, *now, closure);
     take_figures(turns, *fit_record(record, now->fit->parameters(), Rows(turns.size(), 1)), closure);

@@ -131,6 +131,7 @@ std::shared_ptr<Fitted> fit_with(const record::Record& record, const Fitted& now
         TurnParameters anew = alike != nullptr ? alike->fit->parameters() : TurnParameters{};
         anew.effects = start.effects;
         anew.swings = start.swings;
+        anew.wander_forgets = start.wander_forgets;
         fit_from(anew);
     }
     // The score says how large it would be were all linear: too far away, maybe.

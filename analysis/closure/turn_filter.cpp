@@ -52,7 +52,7 @@ class Follower {
     /// On to the next turn: what it gains by this innovation.
     HWY_INLINE void step(const Row& gain, V innovation) {
         x_[0] = x_[0] + gain[0] * innovation;
-        x_[1] = x_[1] + gain[1] * innovation;
+        x_[1] = decay_[1] * x_[1] + gain[1] * innovation;
         for (std::size_t s = 2; s < states; ++s) {
             x_[0] = x_[0] + gain_s_[s] * x_[s];
             x_[s] = decay_[s] * x_[s] + gain[s] * innovation;
@@ -92,6 +92,7 @@ class Belief {
         const V kick = set(d_, kick_slope);
         for (std::size_t s = 0; s < states; ++s) gain[s] = p_[0][s] + sign * p_[1][s];
         f = larger(d_, gain[0] + sign * gain[1] + injected_ + through * through * readout_, set(d_, 1e-30));
+        gain[1] = gain[1] * decay_[1];
         for (std::size_t s = 2; s < states; ++s) {
             gain[0] = gain[0] + gain_s_[s] * gain[s];
             gain[s] = gain[s] * decay_[s];

@@ -18,12 +18,13 @@ namespace ringlock::closure {
 
 namespace {
 
-constexpr double no_noise = 1e-9;             // rad: far below what shows
+constexpr double no_noise = 1e-9;  // rad: far below what shows
+constexpr const char* forgets_name = "amplitude_correlation_s";
 constexpr double least_radius_sd_rad = 1e-7;  // below: a radius that shows no noise tells nothing of the phase's
 
 double square(double value) { return value * value; }
 
-/// A standard deviation of the model that the likelihood decides.
+/// A standard deviation of the model that the likelihood decides, or another positive number of its noise.
 struct Knob {
     std::string effect, name;
     double* value;
@@ -34,6 +35,7 @@ std::vector<Knob> knobs(TurnParameters& p, bool of_effects = true) {
     std::vector<Knob> all{{"", "injected_noise_rad", &p.injected_sd_rad},
                           {"", "amplitude_wander_rad", &p.wander_sd_rad},
                           {"", "readout_noise_rad", &p.readout_sd_rad}};
+    if (p.wander_forgets > 0.0) all.push_back({"", forgets_name, &p.wander_forgets});
     if (!of_effects) return all;
     for (ActiveEffect& active : p.effects) {
         for (const effects::Parameter& parameter : active.effect->parameters()) {
@@ -322,6 +324,10 @@ void TurnFit::add_noise_estimates(std::vector<Estimate>& estimates) const {
             sd = of_variance < variance ? 0.5 * of_variance / value : std::sqrt(variance + of_variance) - value;
         }
         estimates.push_back({turned[k].effect, turned[k].name, value, sd});
+        if (turned[k].name != forgets_name) continue;
+        Estimate& time = estimates.back();
+        time.value = model_->series().interval_s / value;
+        time.sd = time.value * sd / value;
     }
 }
 

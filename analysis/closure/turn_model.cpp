@@ -260,6 +260,7 @@ TurnNoise TurnModel::noise(const TurnParameters& parameters) const {
     noise.injected_rad2 = parameters.injected_sd_rad * parameters.injected_sd_rad;
     noise.readout_rad2 = parameters.readout_sd_rad * parameters.readout_sd_rad;
     noise.wander_rad2 = parameters.wander_sd_rad * parameters.wander_sd_rad;
+    noise.wander_forgets = parameters.wander_forgets;
     const double c = units::two_pi / series_.setup.scale_factor_arcsec;
     for (const ActiveEffect& active : parameters.effects) {
         const effects::RateNoise rate = active.effect->rate_noise(active.values);

@@ -34,6 +34,7 @@ struct TurnParameters {
     double threshold_deg_h = 0.0;
     double injected_sd_rad = 0.0;  ///< noise of the dither at the turns
     double wander_sd_rad = 0.0;    ///< what the dither's amplitude gains from turn to turn
+    double wander_forgets = 0.0;   ///< interval over correlation time of that; 0: it walks
     double readout_sd_rad = 0.0;
     std::vector<AmplitudeSwing> swings;
     std::vector<ActiveEffect> effects;

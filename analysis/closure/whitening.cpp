@@ -36,6 +36,10 @@ std::vector<State> states_of(const TurnNoise& noise, bool walks, double dt) {
     std::vector<State> states(2);
     states[0].noise = noise.white_rad2_per_s * dt;
     states[1].noise = noise.wander_rad2;
+    if (noise.wander_forgets > 0.0) {
+        states[1].decay = std::exp(-noise.wander_forgets);
+        states[1].start = noise.wander_rad2 / -std::expm1(-2.0 * noise.wander_forgets);
+    }
     for (const PhaseRateTerm& term : noise.rates) {
         const State state = rate_state(term, dt, states[0]);
         states.push_back(state);

@@ -17,13 +17,14 @@ struct PhaseRateTerm {
 ///
 ///     psi_n = a_n + before_n(psi_n) + s m_n + w_n,            z_n = psi_n + v_n,
 ///     a_{n+1} = a_n + kick_n(psi_n) + (rates over the interval),
-///     m_{n+1} = m_n + ...:
+///     m_{n+1} = exp(-forgets) m_n + ...:
 ///
 /// w is the injected noise, v the readout's, m the wander of the dither's amplitude.
 struct TurnNoise {
     double injected_rad2 = 0.0;     ///< variance of w
     double readout_rad2 = 0.0;      ///< variance of v
     double wander_rad2 = 0.0;       ///< variance that m gains from turn to turn
+    double wander_forgets = 0.0;    ///< m is exp(-this) of itself a turn later: a resonator's amplitude; 0: a walk
     double white_rad2_per_s = 0.0;  ///< variance that white rate noise adds to a
     double walk_rad2_per_s3 = 0.0;  ///< variance a second of a rate that walks [(rad/s)^2/s]
     std::vector<PhaseRateTerm> rates;

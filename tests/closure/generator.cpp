@@ -103,6 +103,9 @@ Drive::Drive(const Truth& truth) {
     Random noise(truth.seed, Purpose::injected_noise);
     Random walk(truth.seed, Purpose::wander_walk);
     Random correlated(truth.seed, Purpose::wander_correlated);
+    const auto injected = [&] {
+        return truth.injected_noise_even == 0.0 ? noise.normal() : std::sqrt(3.0) * (2.0 * noise.uniform() - 1.0);
+    };
     const AmplitudeWander& wander = truth.wander;
     const double decay = wander.correlation_s > 0.0 ? std::exp(-0.5 * period / wander.correlation_s) : 0.0;
     std::vector<double> angle(halves + 1);
@@ -111,7 +114,7 @@ Drive::Drive(const Truth& truth) {
     for (std::size_t j = 0; j <= halves; ++j) {
         const double relative = walked + remembered + wander.drift_per_s * turn_s[j] +
                                 wander.swing * std::sin(two_pi * turn_s[j] / wander.swing_period_s);
-        angle[j] = -direction(j) * nominal * (1.0 + relative) + truth.injected_noise_rad * noise.normal();
+        angle[j] = -direction(j) * nominal * (1.0 + relative) + truth.injected_noise_rad * injected();
         walked += wander.walk_per_turn * walk.normal();
         remembered = decay * remembered + wander.rms * std::sqrt(1.0 - decay * decay) * correlated.normal();
     }

@@ -73,7 +73,8 @@ struct Truth {
     std::uint64_t seed = 1;
 
     // Nuisances
-    double injected_noise_rad = 0.0;  ///< rms of the dither angle at each turn, independent, in optical phase
+    double injected_noise_rad = 0.0;   ///< rms of the dither angle at each turn, independent, in optical phase
+    double injected_noise_even = 0.0;  ///< other than zero: of even density between bounds, not normal
     AmplitudeWander wander;
     double readout_noise = 0.0;  ///< rms on sin and on cos, relative to the amplitude of the fringe
     double clock_hz = 0.0;       ///< turns and pulses fall on the tick before them; 0: times are exact

@@ -31,6 +31,7 @@ constexpr Key<Truth> turn_numbers[] = {
     RINGLOCK_KEY(Truth, "bias_deg_h", bias_deg_h),
     RINGLOCK_KEY(Truth, "initial_phase_rad", initial_phase_rad),
     RINGLOCK_KEY(Truth, "injected_noise_rad", injected_noise_rad),
+    RINGLOCK_KEY(Truth, "injected_noise_even", injected_noise_even),
     RINGLOCK_KEY(Truth, "wander.walk_per_turn", wander.walk_per_turn),
     RINGLOCK_KEY(Truth, "wander.rms", wander.rms),
     RINGLOCK_KEY(Truth, "wander.correlation_s", wander.correlation_s),

@@ -126,6 +126,41 @@ TEST(TurnLoop, ASwingOfTheAmplitudeIsTheDithersOwn) {
     }
 }
 
+TEST(TurnLoop, AResonatorsAmplitudeIsTheDithersOwn) {
+    std::vector<Truth> truths;
+    for (const double injected_rad : {0.0, 1.0}) {
+        Truth truth;
+        truth.readout_noise = 0.005;
+        truth.bias_deg_h = 15.0;
+        truth.injected_noise_rad = injected_rad;
+        truth.wander.rms = 1e-3;
+        truth.wander.correlation_s = 0.03;
+        truth.turns = 6000;
+        truth.seed = 70 + truths.size();
+        truths.push_back(truth);
+    }
+    const auto records = generate(truths);
+    for (std::size_t k = 0; k < records.size(); ++k) {
+        const Closure closure = close_loop(records[k]);
+        print("amplitude of a resonator", closure);
+        EXPECT_EQ(closure.verdict, Verdict::nothing_missing) << k;
+        EXPECT_LT(deviation(closure.base, "amplitude_correlation_s", truths[k].wander.correlation_s), 4.0) << k;
+        EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", truths[k].lockin_threshold_deg_h), 4.0) << k;
+    }
+}
+
+TEST(TurnLoop, InjectedNoiseNeedNotBeNormal) {
+    Truth truth;
+    truth.readout_noise = 0.005;
+    truth.injected_noise_rad = 3.0;
+    truth.injected_noise_even = 1.0;
+    truth.turns = 8000;
+    const Closure closure = close_loop(generate(std::vector<Truth>{truth})[0]);
+    print("noise of even density", closure);
+    EXPECT_EQ(closure.verdict, Verdict::nothing_missing);
+    EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", truth.lockin_threshold_deg_h), 4.0);
+}
+
 TEST(TurnLoop, RoundingIsNoEffect) {
     Truth truth;
     truth.readout_noise = 0.0;

@@ -1,4 +1,4 @@
-#include "analysis/closure/amplitude_swings.hpp"
+#include "analysis/closure/dither_amplitude.hpp"
 
 #include <fmt/format.h>
 
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "analysis/closure/chance.hpp"
+#include "analysis/closure/decision.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::closure {
@@ -49,7 +50,7 @@ std::vector<double> highest_peaks(const TurnFit& fit, double band_hz) {
 
 }  // namespace
 
-std::optional<Swinging> find_amplitude_swing(const record::Record& record, const Fitted& now, const Rows& rows) {
+std::optional<AmplitudeModel> find_amplitude_swing(const record::Record& record, const Fitted& now, const Rows& rows) {
     constexpr std::size_t most = 6;
     const TurnFit& fit = *now.fit;
     const TurnSeries& series = now.series;
@@ -69,7 +70,7 @@ std::optional<Swinging> find_amplitude_swing(const record::Record& record, const
     const double places = std::max(1.0, 1.5 * 2.0 * band_hz * series.time_s.back());
     if (!passes(of_several(chi2_tail(chi2, 2), places))) return std::nullopt;
     with.swings.push_back(swing);
-    Swinging found;
+    AmplitudeModel found;
     try {
         found.fitted = fit_record(record, with, rows);
     } catch (const RunError&) {
@@ -81,12 +82,50 @@ std::optional<Swinging> find_amplitude_swing(const record::Record& record, const
     return found;
 }
 
-std::string note_on(const AmplitudeSwing& swing, const TurnSeries& series) {
-    return fmt::format(
-        "the dither's amplitude swings by {:.2g} of itself at {:.4g} Hz, which the model follows; a vibration of "
-        "the base at {:.6g} Hz would look the same",
-        std::hypot(swing.cosine_rad, swing.sine_rad) / series.amplitude_rad, std::abs(swing.hz),
-        0.5 / series.interval_s - std::abs(swing.hz));
+std::optional<AmplitudeModel> find_amplitude_memory(const record::Record& record, const Fitted& now, const Rows& rows) {
+    constexpr double worth_looking = 1e-3;
+    const TurnFit& fit = *now.fit;
+    if (fit.parameters().wander_forgets > 0.0) return std::nullopt;
+    if (correlations_of(fit.innovations(), rows).test(Where::amplitude, "").p_value > worth_looking)
+        return std::nullopt;
+    AmplitudeModel found;
+    for (const double forgets : {0.3, 0.03, 0.003}) {
+        TurnParameters with = fit.parameters();
+        with.wander_forgets = forgets;
+        // Of the white noise, too, a part may have been what is forgotten.
+        with.wander_sd_rad = std::max(with.wander_sd_rad, 0.5 * std::sqrt(forgets) * with.injected_sd_rad);
+        try {
+            auto fitted = fit_record(record, with, rows);
+            const double best = found.fitted ? found.fitted->fit->log_likelihood() : fit.log_likelihood();
+            if (fitted->fit->log_likelihood() > best) found.fitted = std::move(fitted);
+        } catch (const RunError&) {
+            // no motion of a gyro with such parameters can be followed
+        }
+    }
+    if (!found.fitted) return std::nullopt;
+    const double gain = found.fitted->fit->log_likelihood() - fit.log_likelihood();
+    if (!passes(chi2_tail(2.0 * gain, 1))) return std::nullopt;
+    found.merit = gain - cost_of_amplitudes(gain, 1);
+    return found;
+}
+
+std::vector<std::string> notes_on_amplitude(const Fitted& fitted) {
+    const TurnSeries& series = fitted.series;
+    std::vector<std::string> notes;
+    for (const AmplitudeSwing& swing : fitted.fit->parameters().swings) {
+        notes.push_back(fmt::format(
+            "the dither's amplitude swings by {:.2g} of itself at {:.4g} Hz, which the model follows; a vibration of "
+            "the base at {:.6g} Hz would look the same",
+            std::hypot(swing.cosine_rad, swing.sine_rad) / series.amplitude_rad, std::abs(swing.hz),
+            0.5 / series.interval_s - std::abs(swing.hz)));
+    }
+    if (fitted.fit->parameters().wander_forgets > 0.0) {
+        notes.push_back(
+            fmt::format("the wander of the dither's amplitude is forgotten within {:.3g} s, as by a resonator that "
+                        "noise drives; closed.toml has a walk of the same steps in its place",
+                        series.interval_s / fitted.fit->parameters().wander_forgets));
+    }
+    return notes;
 }
 
 }  // namespace ringlock::closure
