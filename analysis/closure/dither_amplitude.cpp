@@ -115,7 +115,7 @@ std::vector<std::string> notes_on_amplitude(const Fitted& fitted) {
     for (const AmplitudeSwing& swing : fitted.fit->parameters().swings) {
         notes.push_back(fmt::format(
             "the dither's amplitude swings by {:.2g} of itself at {:.4g} Hz, which the model follows; a vibration of "
-            "the base at {:.6g} Hz would look the same",
+            "the base at {:.6g} Hz would look the same; closed.toml is without it",
             std::hypot(swing.cosine_rad, swing.sine_rad) / series.amplitude_rad, std::abs(swing.hz),
             0.5 / series.interval_s - std::abs(swing.hz)));
     }

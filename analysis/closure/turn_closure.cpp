@@ -316,7 +316,7 @@ Closure close_turns(const record::Record& record) {
     std::optional<Earlier> earlier;
     std::string partner;  // of the effect that was added last
 
-    // What stood in for another is dropped again, so that there may be more rounds than steps.
+    // What stood in for another is dropped again, and what is the dither's own is no step: more rounds than steps.
     for (std::size_t round = 0; round < 3 * most_steps && closure.steps.size() < most_steps; ++round) {
         if (heldout(*now->fit).error < numerics_rad) break;
         const Contest contest = hold_contest(record, *now, rows, most_contenders);

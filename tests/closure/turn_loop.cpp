@@ -266,21 +266,20 @@ TEST(TurnLoop, RecordsThatCannotBeFollowedAreRefused) {
     truth.dither_peak_rate_deg_s = 50.0;
     truth.input_rate_deg_h = 100000.0;
     truth.turns = 1000;
-    EXPECT_THAT(
-        [&] {
-            close_loop(generate({&truth, 1}).front());
-        },
-        testing::ThrowsMessage<InputError>(testing::HasSubstr("% of the dither's peak rate")));
+    const auto expect_refused = [&](const char* why) {
+        EXPECT_THAT(
+            [&] {
+                close_loop(generate({&truth, 1}).front());
+            },
+            testing::ThrowsMessage<InputError>(testing::HasSubstr(why)));
+    };
+    expect_refused("% of the dither's peak rate");
     truth.input_rate_deg_h = 0.0;
     truth.lockin_threshold_deg_h = 600.0;
     truth.scale_factor_arcsec = 2.0;
     truth.dither_frequency_hz = 600.3;
     truth.dither_peak_rate_deg_s = 20.0;
-    EXPECT_THAT(
-        [&] {
-            close_loop(generate({&truth, 1}).front());
-        },
-        testing::ThrowsMessage<InputError>(testing::HasSubstr("half cycles of so few fringes")));
+    expect_refused("half cycles of so few fringes");
 }
 
 TEST(TurnLoop, ALockedGyroIsNoRiddle) {
