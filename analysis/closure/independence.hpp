@@ -30,6 +30,8 @@ struct View {
     std::function<std::vector<Regressor>()> columns = {};  ///< none where nothing regresses
     double largest = std::numeric_limits<double>::infinity();  ///< coefficient that makes sense
     bool jumps = false;  ///< random rates can follow it nearly as well as it can be said
+    /// Merit where it is fitted anew otherwise than by a regression, if it is.
+    std::function<double()> refitted = {};
 };
 
 /// Gain of the log-likelihood by the regression, the noise fitted anew beside it and its coefficients integrated out,

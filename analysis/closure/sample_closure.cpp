@@ -380,6 +380,7 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
     for (const ActiveEffect& active : effects) {
         if (active.effect->name() == "resampling") from_hz = active.values.at("from_hz");
     }
+    if (from_hz > 0.0) model = resampled_from(*now_.fit, from_hz).model;
     for (const ActiveEffect& active : effects) {
         const std::string effect(active.effect->name());
         const int k = next_step_++;
@@ -402,9 +403,6 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
             }
             if (!series_.witnesses.empty()) add_motion(model, series_, told.witness, k);
         } else if (effect == "resampling") {
-            model.noise.from_hz = active.values.at("from_hz");
-            model.noise.blur_arcsec = 1e-3 * now_.fit->sd(0);
-            model.noise.digits_arcsec = 1e-6 * now_.fit->sd(0);
             noise = SampleFit::Noise::free;
         } else if (effect == "rate_random_walk") {
             model.walk = true;

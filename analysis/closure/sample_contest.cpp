@@ -71,7 +71,7 @@ class Contest {
                                    const std::vector<SampleCandidate>& candidates) const;
     double p_beside(const SampleContender& first, const SampleContender& second, const std::vector<Shared>& firsts,
                     const std::vector<SampleCandidate>& candidates) const;
-    std::vector<Rival> rivals() const;
+    std::vector<Rival> rivals(bool resampled) const;
     static double bar(const Account& account, const std::vector<Rival>& rivals, std::size_t rows);
     bool beside_each_other(const SampleContender& a, const SampleContender& b) const;
     static void tie(const Account& best, const std::vector<Account>& as_likely, SampleChoice& choice);
@@ -212,8 +212,9 @@ std::vector<Contest::Account> Contest::sets(const std::vector<Shared>& all,
     return accounts;
 }
 
-/// The views of the residual that explain most, each fitted with the noise anew.
-std::vector<Contest::Rival> Contest::rivals() const {
+/// The views of the residual that explain most, each fitted with the noise anew; where the record may be resampled, a
+/// variance that repeats as well.
+std::vector<Contest::Rival> Contest::rivals(bool resampled) const {
     constexpr std::size_t looked_at = 4;
     auto views = view_samples(*now_.fit, lattice_arcsec_);
     std::erase_if(views, [](const View& view) { return view.test.merit < closure::tie; });
@@ -231,6 +232,7 @@ std::vector<Contest::Rival> Contest::rivals() const {
             rival.merit = refitted_merit(*now_.fit, view);
             rival.coefficients = static_cast<double>(view.columns().size());
         }
+        if (view.refitted && resampled) rival.merit = std::max(rival.merit, view.refitted());
         found.push_back(rival);
     }
     return found;
@@ -244,9 +246,11 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
     for (const Rival& rival : rivals) {
         double merit = rival.merit;
         if (rival.repeats && account.has("resampling")) {
-            // What resampling does to the variance it does to the correlations too: by half as much again, and more.
-            constexpr double of_variance_alone = 1.3;
-            most = std::max(most, of_variance_alone * merit);
+            // On straight lines the variance swings by half, no more and no less. What they are blurred by makes that
+            // less, as any other swing may be.
+            constexpr double little = 0.3;
+            const SampleNoise& noise = account.members.front()->fit->model().noise;
+            most = std::max(most, noise.blur_arcsec < little * noise.angle_arcsec ? merit : merit + closure::tie);
             continue;
         }
         // Several effects are chosen from many: against what follows another column of the record they get nothing for
@@ -336,14 +340,16 @@ SampleChoice Contest::choose() {
         accounts.push_back({{contender}, contender->merit, contender->candidate.p_value});
     }
     std::vector<Rival> against;
-    if (!all.empty()) against = rivals();
+    const bool resampled =
+        std::any_of(all.begin(), all.end(), [](const Shared& c) { return c->candidate.effect == "resampling"; });
+    if (!all.empty()) against = rivals(resampled);
     const auto holds = [&](const Account& account) { return account.merit > bar(account, against, series_.size()); };
     const bool led = !all.empty() && holds(accounts.front());
     // Where a view explains more than the likeliest effect, several must be far better than that.
     double least = led || all.empty() ? 0.0 : accounts.front().merit + closure::tie;
     if (!led || is_slow(all.front()->candidate.effect)) {
         for (Account& account : sets(all, candidates)) accounts.push_back(std::move(account));
-        if (all.empty() && !accounts.empty()) against = rivals();
+        if (all.empty() && !accounts.empty()) against = rivals(false);
     }
     std::stable_sort(accounts.begin(), accounts.end(),
                      [](const Account& a, const Account& b) { return a.merit > b.merit; });

@@ -92,6 +92,10 @@ void SampleFilter::set_up(const SampleNoise& noise, double interval_s) {
     } else {
         h_[0] = 1.0;
         for (const int resonance : resonances) h_[resonance] = 1.0;
+        swings_ = noise.swing_hz > 0.0;
+        swing_by_row_ = units::two_pi * noise.swing_hz * interval_s;
+        swing_cos_ = noise.swing_cos;
+        swing_sin_ = noise.swing_sin;
     }
     for (int i = 0; i < n_; ++i) {
         auto& terms = nonzero_[i];
@@ -169,6 +173,10 @@ void SampleFilter::run(std::size_t rows, Row&& row) const {
             for (int i = 0; i < D; ++i) ph[i] += p[j][i] * h[j];
         }
         double s = floor_;
+        if (swings_) {
+            const double phase = swing_by_row_ * static_cast<double>(r);
+            s *= std::exp(swing_cos_ * std::cos(phase) + swing_sin_ * std::sin(phase));
+        }
         for (int i = 0; i < D; ++i) s += h[i] * ph[i];
         Line gain;
         for (int i = 0; i < D; ++i) gain[i] = ph[i] / s;
@@ -214,9 +222,21 @@ SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double in
             if (resampled_) {
                 ticks_.push_back(static_cast<std::uint8_t>(ticks));
                 share_.push_back(share);
-                return true;
             }
-            return !settled(gain);
+            return resampled_ || swings_ || !settled(gain);
+        });
+        if (!resampled_) return;
+        // What the digits are, nobody knows: rows count that would be as uncertain with others.
+        constexpr double more = 1.5;
+        constexpr double same = 1.02;
+        SampleNoise coarser = noise;
+        coarser.digits_arcsec *= more;
+        SampleFilter beside;
+        beside.set_up(coarser, interval_s);
+        beside.run<D>(rows, [&](int, double, double variance, const std::array<double, D>&) {
+            const double before = sd_[of_digits_.size()];
+            of_digits_.push_back(variance > same * before * before ? 1 : 0);
+            return true;
         });
     });
 }
@@ -294,7 +314,7 @@ double SampleFilter::minus_log_likelihood(const SampleNoise& noise, double inter
                           take(ticks, share, variance, gain);
                           kept = gain;
                           variance_kept = variance;
-                          return filter.resampled_ || !settled(gain);
+                          return filter.resampled_ || filter.swings_ || !settled(gain);
                       });
         while (k < increments.size()) take(1, 0.0, variance_kept, kept);
     });

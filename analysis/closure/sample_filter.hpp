@@ -21,6 +21,8 @@ struct SampleNoise {
         double arcsec, hz, width_hz;
     };
     std::vector<Resonance> resonances = {};
+    /// The variance of the readings' errors goes up and down at that frequency: its logarithm by cos, and by sin.
+    double swing_hz = 0.0, swing_cos = 0.0, swing_sin = 0.0;
     double from_hz = 0.0;        ///< taken at that rate and interpolated; 0: not
     double blur_arcsec = 0.0;    ///< rms of what interpolated readings are off the straight line
     double digits_arcsec = 0.0;  ///< the least of it: what the values are written to
@@ -38,7 +40,10 @@ class SampleFilter {
     std::vector<double> apply(std::span<const double> increments) const;
     double sd(std::size_t row) const { return sd_[std::min(row, sd_.size() - 1)]; }
     /// Rows that those before them settle but for their digits: where a record has more samples than it was made of.
-    bool settled(std::size_t row) const { return resampled_ && sd(row) < 0.03 * largest_sd_; }
+    /// Where what those say of the source grows from one interval to the next, the digits do as well.
+    bool settled(std::size_t row) const {
+        return resampled_ && (sd(row) < 0.03 * largest_sd_ || of_digits_[std::min(row, of_digits_.size() - 1)] != 0);
+    }
     /// Minus the log-likelihood of the rows that count, but for a constant, in one pass that keeps nothing.
     static double minus_log_likelihood(const SampleNoise& noise, double interval_s, std::span<const double> increments,
                                        std::span<const std::uint8_t> rows);
@@ -61,6 +66,8 @@ class SampleFilter {
 
     int n_ = 0;
     bool resampled_ = false;
+    bool swings_ = false;
+    double swing_by_row_ = 0.0, swing_cos_ = 0.0, swing_sin_ = 0.0;
     double floor_ = 0.0;  ///< variance of the measurement itself
     double ratio_ = 0.0;  ///< resampled: source intervals a row
     double first_place_ = 0.0;
@@ -70,7 +77,8 @@ class SampleFilter {
     std::vector<double> gain_;  ///< until they stay the same
     std::vector<double> sd_;
     double largest_sd_ = 0.0;
-    std::vector<std::uint8_t> ticks_;  ///< resampled: source samples passed before each row
+    std::vector<std::uint8_t> of_digits_;  ///< resampled: rows whose variance the digits are a part of
+    std::vector<std::uint8_t> ticks_;      ///< resampled: source samples passed before each row
     std::vector<double> share_;
 };
 

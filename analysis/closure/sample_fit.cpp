@@ -67,7 +67,8 @@ std::vector<double> smallest(const std::function<double(const std::vector<double
 struct Free {
     double* value;
     bool logarithmic;
-    double scale = 1.0;  ///< of its steps
+    double scale = 1.0;      ///< of its steps
+    bool of_source = false;  ///< where a resampled record's source takes its samples
 };
 
 std::vector<Free> knobs(SampleModel& model) {
@@ -82,10 +83,14 @@ std::vector<Free> knobs(SampleModel& model) {
         all.push_back({&resonance.hz, true, std::min(1.0, resonance.width_hz / resonance.hz)});
         all.push_back({&resonance.width_hz, true});
     }
+    if (model.noise.swing_hz > 0.0) {
+        all.push_back({&model.noise.swing_cos, false});
+        all.push_back({&model.noise.swing_sin, false});
+    }
     if (model.noise.from_hz > 0.0) {
-        all.push_back({&model.noise.from_phase, false});
-        all.push_back({&model.from_shift, false});
-        all.push_back({&model.noise.blur_arcsec, true});
+        all.push_back({&model.noise.from_phase, false, 1.0, true});
+        all.push_back({&model.from_shift, false, 1.0, true});
+        all.push_back({&model.noise.blur_arcsec, true, 1.0, true});
     }
     return all;
 }
@@ -174,7 +179,8 @@ void SampleFit::take_off() {
         for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= known[i];
     }
     if (!model_.motion.empty()) {
-        for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= model_.motion[i];
+        const auto motion = as_taken(model_.motion);
+        for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= motion[i];
     }
     for (const SampleColumn& column : model_.columns) {
         const auto& c = column.of_rate ? as_taken(*column.series) : *column.series;
@@ -182,9 +188,9 @@ void SampleFit::take_off() {
     }
 }
 
-double SampleFit::evaluate(const SampleModel& model, std::span<const double> rest) const {
+double SampleFit::evaluate(const SampleModel& model, std::span<const double> rest, const Rows& rows) const {
     check_interrupt();
-    const double value = SampleFilter::minus_log_likelihood(model.noise, series_->interval_s, rest, *rows_);
+    const double value = SampleFilter::minus_log_likelihood(model.noise, series_->interval_s, rest, rows);
     return std::isfinite(value) ? value : 1e300;
 }
 
@@ -219,7 +225,7 @@ SampleModel SampleFit::at(const std::vector<double>& x) const {
 /// Of the likelihood, with Fisher's information: sum over the rows of (dS/S)(dS/S)'/2 + (dr)(dr)'/S, r the innovations
 /// and S their variances (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter", 1989, section
 /// 3.4.5).
-SampleFit::Slope SampleFit::slope(const std::vector<double>& x) const {
+SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows, const std::vector<bool>& held) const {
     constexpr double step = 1e-4;
     const std::size_t n = rest_.size();
     const auto m = static_cast<Eigen::Index>(x.size());
@@ -230,19 +236,20 @@ SampleFit::Slope SampleFit::slope(const std::vector<double>& x) const {
     slope.gradient = Eigen::VectorXd::Zero(m);
     slope.information = Eigen::MatrixXd::Zero(m, m);
     for (std::size_t i = 0; i < n; ++i) {
-        if ((*rows_)[i]) slope.value += 0.5 * e[i] * e[i] + std::log(filter.sd(i));
+        if (rows[i]) slope.value += 0.5 * e[i] * e[i] + std::log(filter.sd(i));
     }
     // d log(sd) and d(innovation) of each knob
     std::vector<std::vector<float>> log_sd(x.size(), std::vector<float>(n, 0.0F));
     std::vector<std::vector<float>> moved(x.size(), std::vector<float>(n, 0.0F));
     for (std::size_t j = 0; j < x.size(); ++j) {
+        if (!held.empty() && held[j]) continue;
         auto beside = x;
         beside[j] += step;
         const SampleFilter other(at(beside).noise, n, series_->interval_s);
         const auto f = other.apply(rest_);
         double gradient = 0.0;
         for (std::size_t i = 0; i < n; ++i) {
-            if (!(*rows_)[i]) continue;
+            if (!rows[i]) continue;
             const double of_log = std::log(other.sd(i) / filter.sd(i)) / step;
             const double of_e = (f[i] - e[i]) / step;
             gradient += e[i] * of_e + of_log;
@@ -269,12 +276,12 @@ SampleFit::Slope SampleFit::slope(const std::vector<double>& x) const {
 }
 
 /// Fisher's scoring, damped (Levenberg and Marquardt): steps by the information where the likelihood rises.
-void SampleFit::score_noise(std::vector<double>& x) const {
+void SampleFit::score_noise(std::vector<double>& x, const Rows& rows, const std::vector<bool>& held) const {
     constexpr int most_rounds = 25;
     constexpr double longest = 1.5;
     constexpr double enough = 2e-3;  // of the log-likelihood
     double damping = 1e-3;
-    Slope now = slope(x);
+    Slope now = slope(x, rows, held);
     for (int round = 0; round < most_rounds && damping < 1e7; ++round) {
         bool better = false;
         double gained = 0.0;
@@ -289,7 +296,7 @@ void SampleFit::score_noise(std::vector<double>& x) const {
             if (-now.gradient.dot(step) < enough) return;
             auto next = x;
             for (std::size_t i = 0; i < x.size(); ++i) next[i] += step(static_cast<Eigen::Index>(i));
-            const double value = evaluate(at(next), rest_);
+            const double value = evaluate(at(next), rest_, rows);
             if (value < now.value) {
                 better = true;
                 gained = now.value - value;
@@ -300,7 +307,7 @@ void SampleFit::score_noise(std::vector<double>& x) const {
             }
         }
         if (!better || gained < enough) return;
-        now = slope(x);
+        now = slope(x, rows, held);
     }
 }
 
@@ -324,7 +331,7 @@ void SampleFit::fit_noise() {
         const std::size_t part = std::min<std::size_t>(n, resampled ? 15000 : 20000);
         const int evaluations = 30 * static_cast<int>(start.size());
         const auto on_part = [&](const std::vector<double>& x) {
-            return evaluate(at(x), std::span<const double>(rest_.data(), part));
+            return evaluate(at(x), std::span<const double>(rest_.data(), part), *rows_);
         };
         double value = on_part(start);
         for (int i = 0; i < 3; ++i) {
@@ -334,7 +341,17 @@ void SampleFit::fit_noise() {
             value = now;
         }
     }
-    score_noise(start);
+    score_noise(start, *rows_, {});
+    if (resampled) {
+        // Rows that are settled to their digits say how exactly the source's times are known, so well that numbers are
+        // rounded there by more than the noise tells elsewhere.
+        filter_ = std::make_shared<SampleFilter>(at(start).noise, n, series_->interval_s);
+        std::vector<bool> held;
+        for (const Free& knob : knobs(model_)) held.push_back(knob.of_source);
+        auto told = start;
+        score_noise(told, telling_by(*filter_), held);
+        if (evaluate(at(told), rest_, *rows_) < evaluate(at(start), rest_, *rows_)) start = std::move(told);
+    }
     model_ = at(start);
     filter_ = std::make_shared<SampleFilter>(model_.noise, n, series_->interval_s);
 }
@@ -346,7 +363,21 @@ SampleModel SampleFit::noise_errors() const {
     const auto own = knobs(values);
     for (const Free& knob : own)
         x.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
-    const Eigen::MatrixXd information = slope(x).information;
+    std::vector<bool> of_source;
+    for (const Free& knob : own) of_source.push_back(knob.of_source);
+    Eigen::MatrixXd information = slope(x, telling_, {}).information;
+    if (model_.noise.from_hz > 0.0) {
+        // The source's times are told by the rows that tell nothing else.
+        const Eigen::MatrixXd by_all = slope(x, *rows_, {}).information;
+        for (std::size_t a = 0; a < x.size(); ++a) {
+            for (std::size_t b = 0; b < x.size(); ++b) {
+                const auto i = static_cast<Eigen::Index>(a);
+                const auto j = static_cast<Eigen::Index>(b);
+                if (of_source[a] != of_source[b]) information(i, j) = 0.0;
+                if (of_source[a] && of_source[b]) information(i, j) = by_all(i, j);
+            }
+        }
+    }
     Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-12).cwiseSqrt();
     Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * information * scale.cwiseInverse().asDiagonal();
     // What the record does not tell at all must not spoil what it tells.
@@ -368,13 +399,18 @@ SampleModel SampleFit::noise_errors() const {
     return errors;
 }
 
+Rows SampleFit::telling_by(const SampleFilter& filter) const {
+    Rows telling = *rows_;
+    for (std::size_t i = 0; i < telling.size(); ++i) {
+        if (filter.settled(i)) telling[i] = 0;
+    }
+    return telling;
+}
+
 void SampleFit::fit_columns() {
     // rest + columns = what was measured; a correction to each value.
     take_off();
-    telling_ = *rows_;
-    for (std::size_t i = 0; i < telling_.size(); ++i) {
-        if (filter_->settled(i)) telling_[i] = 0;
-    }
+    telling_ = telling_by(*filter_);
     whitened_.clear();
     for (const SampleColumn& column : model_.columns) {
         whitened_.push_back(filter_->apply(column.of_rate ? as_taken(*column.series) : *column.series));

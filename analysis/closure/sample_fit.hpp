@@ -92,10 +92,11 @@ class SampleFit {
     };
     Eigen::MatrixXd normal_with(const std::vector<std::vector<double>>& series, Eigen::VectorXd& right) const;
     void take_off();
-    double evaluate(const SampleModel& model, std::span<const double> rest) const;
+    double evaluate(const SampleModel& model, std::span<const double> rest, const Rows& rows) const;
     SampleModel at(const std::vector<double>& knobs) const;
-    Slope slope(const std::vector<double>& knobs) const;
-    void score_noise(std::vector<double>& knobs) const;
+    Rows telling_by(const SampleFilter& filter) const;
+    Slope slope(const std::vector<double>& knobs, const Rows& rows, const std::vector<bool>& held) const;
+    void score_noise(std::vector<double>& knobs, const Rows& rows, const std::vector<bool>& held) const;
     void fit_noise();
     void fit_columns();
     void finish();

@@ -292,45 +292,19 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
     if (now.model().noise.from_hz > 0.0) return;
     const FoundCycle cycle = find_cycle(now.innovations(), in.rows, in.series.rate_hz);
     if (!(cycle.p_value < level_of_effects)) return;
-    // Rates whose distance from a multiple of the record's is that frequency, by likelihood on a part of the record.
+    // Rates whose distance from a multiple of the record's is that frequency
     const double rate = in.series.rate_hz;
-    const std::size_t part = std::min<std::size_t>(in.series.size(), 20000);
-    struct Found {
-        double value;
-        SampleModel model;
-    };
-    std::vector<Found> found;
+    std::vector<Resampled> found;
     for (int m = 0; m <= 4; ++m) {
         for (const int sign : {-1, 1}) {
             const double from = m * rate + sign * cycle.frequency_hz;
             if (from < 0.3 * rate || from > 4.5 * rate || std::abs(from - rate) < 1e-9 * rate) continue;
-            Found best{-1e300, {}};
-            for (int place = 0; place < 8; ++place) {
-                SampleModel model = now.model();
-                model.noise.from_hz = from;
-                model.noise.from_phase = 0.125 * place;
-                model.noise.blur_arcsec = 0.2 * now.sd(0);
-                model.noise.digits_arcsec = 1e-6 * now.sd(0);
-                const SampleFilter filter(model.noise, part, in.series.interval_s);
-                const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
-                // The scale free, all else as it is.
-                double squares = 0.0;
-                double logs = 0.0;
-                double count = 0.0;
-                for (std::size_t i = 0; i < part; ++i) {
-                    if (!in.rows[i]) continue;
-                    squares += e[i] * e[i];
-                    logs += std::log(filter.sd(i));
-                    count += 1.0;
-                }
-                const double value = -0.5 * count * std::log(squares / count) - logs;
-                if (value > best.value) best = {value, model};
-            }
-            found.push_back(std::move(best));
+            found.push_back(resampled_from(now, from));
         }
     }
     // What interpolation does to the share of the noises is not in these: the best few are fitted in full.
-    std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.value > b.value; });
+    std::sort(found.begin(), found.end(),
+              [](const Resampled& a, const Resampled& b) { return a.log_likelihood > b.log_likelihood; });
     constexpr std::size_t looked_at = 3;
     for (std::size_t k = 0; k < std::min(looked_at, found.size()); ++k) {
         out.push_back({.effect = "resampling",
@@ -350,7 +324,9 @@ void screen_weak_motion(const SampleFit& now, const SampleContext& in, std::vect
     std::size_t at = 0;
     int rank = 0;
     for (std::size_t w = 0; w < in.series.witnesses.size(); ++w) {
-        const auto score = now.score(motion_columns(in.series.witnesses[w].second));
+        auto columns = motion_columns(in.series.witnesses[w].second);
+        for (auto& column : columns) column = now.as_taken(column);
+        const auto score = now.score(columns);
         if (score.chi2 <= best) continue;
         best = score.chi2;
         rank = score.rank;
@@ -402,6 +378,35 @@ void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector
 }
 
 }  // namespace
+
+Resampled resampled_from(const SampleFit& now, double from_hz) {
+    constexpr int places = 8;
+    const SampleSeries& series = now.series();
+    const std::size_t part = std::min<std::size_t>(series.size(), 20000);
+    Resampled best{{}, -std::numeric_limits<double>::infinity()};
+    for (int place = 0; place < places; ++place) {
+        SampleModel model = now.model();
+        model.noise.from_hz = from_hz;
+        model.noise.from_phase = static_cast<double>(place) / places;
+        model.noise.blur_arcsec = 0.2 * now.sd(0);
+        model.noise.digits_arcsec = 1e-6 * now.sd(0);
+        const SampleFilter filter(model.noise, part, series.interval_s);
+        const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
+        // The scale free, all else as it is.
+        double squares = 0.0;
+        double logs = 0.0;
+        double count = 0.0;
+        for (std::size_t i = 0; i < part; ++i) {
+            if (!now.rows()[i]) continue;
+            squares += e[i] * e[i];
+            logs += std::log(filter.sd(i));
+            count += 1.0;
+        }
+        const double value = -0.5 * count * std::log(squares / count) - logs;
+        if (value > best.log_likelihood) best = {std::move(model), value};
+    }
+    return best;
+}
 
 Alias alias(double hz, double rate_hz, double from_hz) {
     Alias seen{hz};
@@ -465,6 +470,7 @@ void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witn
     for (std::size_t c = 0; c < 2; ++c) {
         model.columns.push_back({"case_motion", c == 0 ? "in_phase" : "quadrature", shared(std::move(columns[c]))});
         model.columns.back().step = step;
+        model.columns.back().of_rate = true;
     }
 }
 

@@ -58,6 +58,14 @@ struct Alias {
 /// In samples of that rate, taken at `from_hz` and interpolated where that is not zero.
 Alias alias(double hz, double rate_hz, double from_hz = 0.0);
 
+/// The model as of samples taken at another rate and interpolated, from where in the source's interval the likelihood
+/// likes best on a part of the record, its scale left free.
+struct Resampled {
+    SampleModel model;
+    double log_likelihood = 0.0;
+};
+Resampled resampled_from(const SampleFit& now, double from_hz);
+
 /// The effects that samples can tell of and that the fit does not have yet, held against what it has left.
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in);
 

@@ -184,6 +184,43 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
     return found;
 }
 
+namespace {
+
+/// What the filter makes of a witness that is up to `lags` late or early. The filter of a resampled record changes from
+/// row to row: there each lag goes through it by itself, as the source would have taken it.
+class WitnessAtLags {
+   public:
+    WitnessAtLags(const SampleFit& fit, const std::vector<double>& witness, int lags)
+        : lags_(lags), each_(fit.model().noise.from_hz > 0.0) {
+        if (!each_) {
+            same_ = fit.filter().apply(witness);
+            return;
+        }
+        const auto n = static_cast<std::ptrdiff_t>(witness.size());
+        for (int l = 0; l <= 2 * lags; ++l) {
+            std::vector<double> late(witness.size(), 0.0);
+            for (std::ptrdiff_t i = 0; i < n; ++i) {
+                const std::ptrdiff_t j = i + lags - l;
+                if (j >= 0 && j < n) late[static_cast<std::size_t>(i)] = witness[static_cast<std::size_t>(j)];
+            }
+            const auto white = fit.filter().apply(fit.as_taken(late));
+            of_lag_.emplace_back(white.begin(), white.end());
+        }
+    }
+    double at(std::size_t row, int lag) const {
+        if (each_) return static_cast<double>(of_lag_[static_cast<std::size_t>(lag)][row]);
+        return same_[row + static_cast<std::size_t>(lags_) - static_cast<std::size_t>(lag)];
+    }
+
+   private:
+    int lags_;
+    bool each_;
+    std::vector<double> same_;
+    std::vector<std::vector<float>> of_lag_;  ///< of many: half as large
+};
+
+}  // namespace
+
 WitnessMotion fit_witness(const SampleFit& fit, const std::vector<double>& witness) {
     const std::size_t n = witness.size();
     const int lags = witness_lags(fit.series().rate_hz);
@@ -191,7 +228,7 @@ WitnessMotion fit_witness(const SampleFit& fit, const std::vector<double>& witne
     const double mean = std::accumulate(witness.begin(), witness.end(), 0.0) / static_cast<double>(n);
     std::vector<double> centred(n);
     for (std::size_t i = 0; i < n; ++i) centred[i] = witness[i] - mean;
-    const auto white = fit.filter().apply(centred);
+    const WitnessAtLags white(fit, centred, lags);
     const auto& e = fit.innovations();
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(taps, taps);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(taps);
@@ -204,9 +241,8 @@ WitnessMotion fit_witness(const SampleFit& fit, const std::vector<double>& witne
         filled = 0;
     };
     for (std::size_t i = static_cast<std::size_t>(lags); i + static_cast<std::size_t>(lags) < n; ++i) {
-        if (!fit.rows()[i]) continue;
-        for (int l = 0; l < taps; ++l)
-            block(filled, l) = white[i + static_cast<std::size_t>(lags) - static_cast<std::size_t>(l)];
+        if (!fit.telling()[i]) continue;
+        for (int l = 0; l < taps; ++l) block(filled, l) = white.at(i, l);
         target(filled++) = e[i];
         if (filled == block.rows()) flush();
     }

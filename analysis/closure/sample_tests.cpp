@@ -101,35 +101,50 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     views.push_back(std::move(view));
 }
 
-/// Gain of the log-likelihood by a variance that goes up and down at that frequency, by itself: its logarithm is
-/// a cos + b sin, fitted by Newton's method. What resampling does to the variance it does to the correlations too.
-double gain_of_variance(const SampleFit& fit, double hz) {
+/// A variance that goes up and down at a frequency.
+struct Swing {
+    double cos = 0.0, sin = 0.0;  ///< of its logarithm
+    double gain = 0.0;            ///< of the log-likelihood
+};
+
+/// Of the innovations: fitted by Newton's method.
+Swing swing_of_variance(const SampleFit& fit, double hz) {
     const auto& e = fit.innovations();
     const auto phase = line_phase(e.size(), fit.series().rate_hz, hz, 0.0);
-    double a = 0.0;
-    double b = 0.0;
+    Swing swing;
     double mean = 0.0;
-    double gain = 0.0;
     for (int round = 0; round < 8; ++round) {
         Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();
         Eigen::Vector3d slope = Eigen::Vector3d::Zero();
-        gain = 0.0;
+        swing.gain = 0.0;
         for (std::size_t i = 0; i < e.size(); ++i) {
             if (!fit.telling()[i]) continue;
             const Eigen::Vector3d x(1.0, std::cos(phase[i]), std::sin(phase[i]));
-            const double log_variance = mean * x(0) + a * x(1) + b * x(2);
+            const double log_variance = mean * x(0) + swing.cos * x(1) + swing.sin * x(2);
             const double ratio = e[i] * e[i] * std::exp(-log_variance);
-            gain += 0.5 * (e[i] * e[i] - ratio - log_variance);
+            swing.gain += 0.5 * (e[i] * e[i] - ratio - log_variance);
             slope += 0.5 * (ratio - 1.0) * x;
             curvature += 0.5 * x * x.transpose();
         }
         const Eigen::Vector3d step = curvature.ldlt().solve(slope);
         mean += step(0);
-        a += step(1);
-        b += step(2);
+        swing.cos += step(1);
+        swing.sin += step(2);
         if (step.norm() < 1e-5) break;
     }
-    return gain;
+    return swing;
+}
+
+/// Gain where it is the readings' errors whose variance does: the noise fitted anew with it. An innovation has the
+/// errors of the readings before as well, and shows less.
+double gain_of_swinging_errors(const SampleFit& fit, double hz, const Swing& seen) {
+    SampleModel model = fit.model();
+    const auto phase = line_phase(1, fit.series().rate_hz, hz, 0.0)[0];
+    // From the phase of the innovations to one that begins with the record.
+    model.noise.swing_hz = hz;
+    model.noise.swing_cos = seen.cos * std::cos(phase) + seen.sin * std::sin(phase);
+    model.noise.swing_sin = seen.sin * std::cos(phase) - seen.cos * std::sin(phase);
+    return SampleFit(fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near).gain_over(fit);
 }
 
 void test_size(const SampleFit& fit, Views& views) {
@@ -168,9 +183,13 @@ void test_size(const SampleFit& fit, Views& views) {
         {{Where::time, "place in the record modulo 2 to 16", of_several(least, 30.0), fmt::format("modulo {}", at)}});
     const FoundCycle cycle = find_cycle(e, rows, fit.series().rate_hz);
     const double cost = 2.0 + std::log(cycle.searched);
-    views.push_back(
-        {{Where::time, std::string(repeating_variance), cycle.p_value,
-          fmt::format("{:.6g} times a second", cycle.frequency_hz), gain_of_variance(fit, cycle.frequency_hz) - cost}});
+    const Swing swing = swing_of_variance(fit, cycle.frequency_hz);
+    View view{{Where::time, std::string(repeating_variance), cycle.p_value,
+               fmt::format("{:.6g} times a second", cycle.frequency_hz), swing.gain - cost}};
+    view.refitted = [&fit, hz = cycle.frequency_hz, swing, cost] {
+        return gain_of_swinging_errors(fit, hz, swing) - cost;
+    };
+    views.push_back(std::move(view));
 }
 
 void test_rates(const SampleFit& fit, Views& views) {

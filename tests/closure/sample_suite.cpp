@@ -316,7 +316,11 @@ Outcome judge(const SampleCase& of, const record::Record& record) {
         if (estimate.name == "phase_rad") difference = std::remainder(difference, units::two_pi);
         return estimate.sd > 0.0 ? difference / estimate.sd : std::numeric_limits<double>::quiet_NaN();
     };
+    // The base model beside an effect that is not there is another.
+    const bool same = std::all_of(closure.steps.begin(), closure.steps.end(),
+                                  [&](const auto& step) { return has(step.effect.c_str()); });
     for (const Estimate& estimate : closure.base) {
+        if (!same) break;
         const auto value = base.find(estimate.name);
         if (value == base.end()) continue;
         outcome.deviations.push_back({estimate.name, estimate.value, estimate.sd, off(estimate, value->second)});

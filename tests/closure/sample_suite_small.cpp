@@ -75,25 +75,6 @@ TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
     EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::time);
 }
 
-// Resampled from below, a third of the samples follow from the others: their rounding was taken for innovations.
-TEST(ClosureSampleSuite, ClosesWhatWasTakenAtALowerRate) {
-    for (const double from_hz : {61.8, 83.1}) {
-        SampleTruth truth;
-        truth.size = 10000;
-        truth.seed = 5;
-        truth.white_angle_arcsec = 0.3;
-        truth.rates.quantum_noise_deg_rt_h = 0.01;
-        truth.resampling.from_hz = from_hz;
-        const auto found = ringlock::closure::close_samples(generate_samples(truth));
-        EXPECT_EQ(found.verdict, ringlock::closure::Verdict::closed);
-        ASSERT_EQ(found.steps.size(), 1U);
-        EXPECT_EQ(found.steps[0].effect, "resampling");
-        EXPECT_NEAR(found.steps[0].parameters[0].value, from_hz, 1e-6);
-        // The noise is that of the samples as they were taken: four standard errors
-        EXPECT_NEAR(found.base[1].value, 0.3, 4.0 * found.base[1].sd);
-    }
-}
-
 // A gyro that moves by rates that are known has nothing missing, and a scale factor's error is one of them alone.
 TEST(ClosureSampleSuite, KnownInputIsNoStructure) {
     SampleTruth truth;
@@ -144,25 +125,6 @@ TEST(ClosureSampleSuite, TwoEffectsThatHideEachOtherAreNamed) {
         EXPECT_TRUE(step.effect == "bias_ramp" || step.effect == "scale_factor_error") << step.effect;
     }
     EXPECT_GT(found.log_likelihood_gain, 20.0);
-}
-
-// What a resampled record's source was given, it has on the straight lines between the source's times.
-TEST(ClosureSampleSuite, KnownInputIsResampledToo) {
-    SampleTruth truth;
-    truth.size = 10000;
-    truth.seed = 5;
-    truth.white_angle_arcsec = 0.2;
-    truth.rates.quantum_noise_deg_rt_h = 0.01;
-    truth.input_profile_deg_h = {{0.0, 30.0, 31.0, 65.0, 66.0, 100.0}, {200.0, 200.0, -300.0, -300.0, 50.0, 50.0}};
-    truth.scale_factor_error = 0.01;
-    truth.resampling.from_hz = 77.3;
-    const auto found = ringlock::closure::close_samples(generate_samples(truth));
-    EXPECT_EQ(found.verdict, ringlock::closure::Verdict::closed);
-    ASSERT_EQ(found.steps.size(), 2U);
-    EXPECT_EQ(found.steps[0].effect, "resampling");
-    EXPECT_EQ(found.steps[1].effect, "scale_factor_error");
-    const auto& relative = found.steps[1].parameters.at(0);
-    EXPECT_NEAR(relative.value, 0.01, 4.0 * relative.sd);
 }
 
 // The largest standardised difference of means before and after, over all places but 0.6 % at either end: by

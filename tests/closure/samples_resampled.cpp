@@ -1,0 +1,122 @@
+// Records that were taken at another rate and interpolated to their own, which the closed loop reads.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "analysis/closure/closure.hpp"
+#include "tests/closure/samples.hpp"
+
+namespace ringlock::test::closure {
+namespace {
+
+using ringlock::closure::close_samples;
+using ringlock::closure::Closure;
+using ringlock::closure::Verdict;
+
+/// Five minutes of a gyro whose readings have 0.3 arcsec of noise, taken at that rate; 0: at that of the record.
+SampleTruth taken_at(double from_hz, std::uint64_t seed) {
+    SampleTruth truth;
+    truth.size = 30000;
+    truth.seed = seed;
+    truth.white_angle_arcsec = 0.3;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.resampling.from_hz = from_hz;
+    return truth;
+}
+
+void expect_only_resampling(const Closure& found) {
+    EXPECT_EQ(found.verdict, Verdict::closed);
+    ASSERT_EQ(found.steps.size(), 1U);
+    EXPECT_EQ(found.steps[0].effect, "resampling");
+    // The noise is that of the samples as they were taken: four standard errors
+    EXPECT_NEAR(found.base[1].value, 0.3, 4.0 * found.base[1].sd);
+    EXPECT_NEAR(found.base[2].value, 0.01, 4.0 * found.base[2].sd);
+}
+
+// Resampled from below, a third of the samples follow from the others: their rounding was taken for innovations.
+TEST(ResampledRecords, ClosesWhatWasTakenAtALowerRate) {
+    for (const double from_hz : {61.8, 83.1}) {
+        SampleTruth truth;
+        truth.size = 10000;
+        truth.seed = 5;
+        truth.white_angle_arcsec = 0.3;
+        truth.rates.quantum_noise_deg_rt_h = 0.01;
+        truth.resampling.from_hz = from_hz;
+        const auto found = close_samples(generate_samples(truth));
+        EXPECT_EQ(found.verdict, Verdict::closed);
+        ASSERT_EQ(found.steps.size(), 1U);
+        EXPECT_EQ(found.steps[0].effect, "resampling");
+        EXPECT_NEAR(found.steps[0].parameters[0].value, from_hz, 1e-6);
+        // The noise is that of the samples as they were taken: four standard errors
+        EXPECT_NEAR(found.base[1].value, 0.3, 4.0 * found.base[1].sd);
+    }
+}
+
+// Just below the record's rate a small error of one reading grows from interval to interval, and what digits would do
+// grows with it. The rows that they reach are no structure.
+TEST(ResampledRecords, DigitsThatGrowAreNoStructure) {
+    const Closure found = close_samples(generate_samples(taken_at(95.81, 7)));
+    expect_only_resampling(found);
+    EXPECT_NEAR(found.steps[0].parameters[0].value, 95.81, 1e-6);
+}
+
+// Near twice the record's rate readings share nothing: the variance alone says that they are interpolated, and how far
+// the rate is from a multiple of the record's.
+TEST(ResampledRecords, AreToldByTheirVarianceAlone) {
+    const Closure found = close_samples(generate_samples(taken_at(186.87, 8)));
+    expect_only_resampling(found);
+    const double from_hz = found.steps[0].parameters[0].value;
+    EXPECT_NEAR(std::abs(from_hz - 100.0 * std::round(0.01 * from_hz)), 13.13, 1e-3);
+}
+
+// By how much a variance swings tells whether interpolation may do that.
+TEST(ResampledRecords, OtherVariancesThatRepeatAreNoResampling) {
+    for (const double depth : {0.2, 0.4}) {
+        SampleTruth truth = taken_at(0.0, 9);
+        truth.noise_modulation = {depth, 0.0763};
+        const Closure found = close_samples(generate_samples(truth));
+        EXPECT_EQ(found.verdict, Verdict::unexplained) << depth;
+        EXPECT_TRUE(found.steps.empty()) << depth;
+        ASSERT_TRUE(found.unexplained);
+        EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::time);
+    }
+}
+
+// A motion of the case is on the source's straight lines like all else: taken off as the witness has it, at the
+// record's own times, it would break them.
+TEST(ResampledRecords, MotionIsResampledToo) {
+    SampleTruth truth = taken_at(59.44, 3);
+    truth.accelerometers = true;
+    truth.case_motion.witness = "accel_x";
+    truth.case_motion.coherence = 0.65;
+    truth.case_motion.rms_arcsec = 0.2;
+    truth.case_motion.centre_hz = 11.9;
+    truth.case_motion.width_hz = 0.9;
+    const Closure found = close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, Verdict::closed);
+    ASSERT_EQ(found.steps.size(), 2U);
+    EXPECT_EQ(found.steps[0].effect, "resampling");
+    EXPECT_EQ(found.steps[1].effect, "case_motion");
+}
+
+// What a resampled record's source was given, it has on the straight lines between the source's times.
+TEST(ResampledRecords, KnownInputIsResampledToo) {
+    SampleTruth truth;
+    truth.size = 10000;
+    truth.seed = 5;
+    truth.white_angle_arcsec = 0.2;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.input_profile_deg_h = {{0.0, 30.0, 31.0, 65.0, 66.0, 100.0}, {200.0, 200.0, -300.0, -300.0, 50.0, 50.0}};
+    truth.scale_factor_error = 0.01;
+    truth.resampling.from_hz = 77.3;
+    const auto found = close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, Verdict::closed);
+    ASSERT_EQ(found.steps.size(), 2U);
+    EXPECT_EQ(found.steps[0].effect, "resampling");
+    EXPECT_EQ(found.steps[1].effect, "scale_factor_error");
+    const auto& relative = found.steps[1].parameters.at(0);
+    EXPECT_NEAR(relative.value, 0.01, 4.0 * relative.sd);
+}
+
+}  // namespace
+}  // namespace ringlock::test::closure
