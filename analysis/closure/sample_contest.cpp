@@ -345,18 +345,25 @@ SampleChoice Contest::choose() {
     if (!all.empty()) against = rivals(resampled);
     const auto holds = [&](const Account& account) { return account.merit > bar(account, against, series_.size()); };
     const bool led = !all.empty() && holds(accounts.front());
-    // Where a view explains more than the likeliest effect, several must be far better than that.
-    double least = led || all.empty() ? 0.0 : accounts.front().merit + closure::tie;
+    const double leader = all.empty() ? 0.0 : accounts.front().merit;
     if (!led || is_slow(all.front()->candidate.effect)) {
         for (Account& account : sets(all, candidates)) accounts.push_back(std::move(account));
         if (all.empty() && !accounts.empty()) against = rivals(false);
     }
     std::stable_sort(accounts.begin(), accounts.end(),
                      [](const Account& a, const Account& b) { return a.merit > b.merit; });
+    // Where a view explains more than the likeliest effect, another must be as likely and explain more than any view by
+    // far, and several must be far better than it.
+    const auto may_be = [&](const Account& account) {
+        if (led || all.empty()) return holds(account);
+        if (account.members.size() > 1) return account.merit > leader + closure::tie && holds(account);
+        return account.merit > std::max(leader - closure::tie, bar(account, against, series_.size()) + closure::tie);
+    };
     // The fewest effects of those that explain as much as any.
     const Account* best = nullptr;
+    double least = 0.0;
     for (const Account& account : accounts) {
-        if (!(account.merit > least) || !holds(account)) continue;
+        if (!(account.merit > least) || !may_be(account)) continue;
         if (best == nullptr) least = std::max(least, account.merit - closure::tie);
         if (best == nullptr || account.members.size() < best->members.size()) best = &account;
     }
