@@ -1,0 +1,219 @@
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include "analysis/closure/chance.hpp"
+#include "analysis/closure/normality.hpp"
+#include "analysis/closure/sample_lines.hpp"
+#include "analysis/closure/sample_search.hpp"
+#include "analysis/closure/sample_views.hpp"
+#include "analysis/closure/two_levels.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+void test_rates(const SampleFit& fit, Views& views) {
+    const SampleSeries& series = fit.series();
+    const std::size_t n = series.size();
+    const auto against = [&](Where where, std::string view, Columns columns) {
+        Columns taken;
+        for (const auto& column : columns) taken.push_back(fit.as_taken(column));
+        const auto score = fit.score(taken);
+        if (score.rank == 0) return;
+        const double cost = score.rank;
+        views.push_back(
+            {{where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
+             cost,
+             [columns = std::make_shared<const Columns>(std::move(columns))] { return regressors(*columns); }});
+    };
+    if (!series.temperature_change_k.empty()) {
+        const auto& t = series.temperature_change_k;
+        std::vector<double> square(n);
+        std::vector<double> slope(n, 0.0);
+        const std::size_t apart = std::max<std::size_t>(1, n / 200);
+        for (std::size_t i = 0; i < n; ++i) {
+            square[i] = t[i] * t[i];
+            const std::size_t a = i > apart ? i - apart : 0;
+            const std::size_t b = std::min(n - 1, i + apart);
+            slope[i] = (t[b] - t[a]) / static_cast<double>(b - a);
+        }
+        against(Where::temperature, "rates that follow temperature, its square and its slope", {t, square, slope});
+    }
+    if (!series.input_rate_deg_h.empty()) {
+        const auto& x = series.input_rate_deg_h;
+        const auto [low, high] = std::minmax_element(x.begin(), x.end());
+        if (*high > *low) {
+            const double most = std::max(std::abs(*high), std::abs(*low));
+            std::vector<double> one(n), square(n), cube(n);
+            for (std::size_t i = 0; i < n; ++i) {
+                one[i] = x[i] / most;
+                square[i] = one[i] * one[i];
+                cube[i] = one[i] * square[i];
+            }
+            against(Where::rate, "rates that follow the input rate, its square and its cube", {one, square, cube});
+        }
+    }
+    std::vector<std::vector<double>> powers;
+    for (int k = 1; k <= 6; ++k) {
+        std::vector<double> rate(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            rate[i] = std::cos(
+                k * std::acos(std::clamp(2.0 * static_cast<double>(i) / static_cast<double>(n - 1) - 1.0, -1.0, 1.0)));
+        }
+        powers.push_back(std::move(rate));
+    }
+    against(Where::time, "rates that are polynomials of time", std::move(powers));
+    std::vector<double> roots;
+    double best = 0.0;
+    std::size_t at = 0;
+    constexpr std::size_t places = 40;
+    const auto step_at = [n](std::size_t row) {
+        std::vector<double> step(n, 0.0);
+        std::fill(step.begin() + static_cast<std::ptrdiff_t>(row), step.end(), 1.0);
+        return step;
+    };
+    for (std::size_t k = 1; k < places; ++k) {
+        const auto score = fit.score({fit.as_taken(step_at(n * k / places))});
+        const double root = score.rank > 0 ? std::copysign(std::sqrt(score.chi2), score.value[0]) : 0.0;
+        roots.push_back(root);
+        if (std::abs(root) > best) {
+            best = std::abs(root);
+            at = n * k / places;
+        }
+    }
+    const double cost = 2.0 + std::log(davies_places(best * best, roots));
+    views.push_back({{Where::time, "steps of the rate", davies_bound(best * best, roots),
+                      fmt::format("at {:.6g} s", series.time_s[at]), 0.5 * best * best - cost},
+                     cost,
+                     [step_at, at] { return regressors({step_at(at)}); }});
+}
+
+/// A rate of one where the shape of stretches is, of zero elsewhere, with the jumps moved to where they explain most.
+std::vector<double> two_level_rate(const SampleFit& fit, const Eigen::VectorXd& shape) {
+    const std::size_t n = fit.series().size();
+    const auto stretches = static_cast<std::size_t>(shape.size());
+    std::vector<std::size_t> jumps;
+    for (Eigen::Index k = 1; k < shape.size(); ++k) {
+        if (shape(k) != shape(k - 1)) jumps.push_back(n * static_cast<std::size_t>(k) / stretches);
+    }
+    const auto rate = [&] {
+        std::vector<double> out(n);
+        std::size_t next = 0;
+        double on = shape(0);
+        for (std::size_t i = 0; i < n; ++i) {
+            for (; next < jumps.size() && jumps[next] <= i; ++next) on = 1.0 - on;
+            out[i] = on;
+        }
+        return out;
+    };
+    double best = fit.score({fit.as_taken(rate())}).chi2;
+    const std::size_t length = std::max<std::size_t>(1, n / stretches);
+    for (std::size_t step = length / 2; step > length / 50; step /= 2) {
+        for (std::size_t& jump : jumps) {
+            for (const bool later : {false, true}) {
+                const std::size_t from = jump;
+                jump = later ? std::min(n, jump + step) : jump - std::min(jump, step);
+                const double chi2 =
+                    std::is_sorted(jumps.begin(), jumps.end()) ? fit.score({fit.as_taken(rate())}).chi2 : 0.0;
+                if (chi2 > best) {
+                    best = chi2;
+                } else {
+                    jump = from;
+                }
+            }
+        }
+    }
+    return rate();
+}
+
+/// Rates of stretches of the record, for a rate that jumps to and fro.
+void test_levels(const SampleFit& fit, Views& views) {
+    constexpr std::size_t stretches = 120;
+    const std::size_t n = fit.series().size();
+    // The filter forgets: of each stretch's series only what is not negligible.
+    struct Response {
+        std::size_t from = 0;
+        std::vector<float> values;
+    };
+    std::vector<Response> responses(stretches);
+    const auto& own = fit.whitened();
+    const auto m = static_cast<Eigen::Index>(own.size());
+    const auto k = static_cast<Eigen::Index>(stretches);
+    Eigen::MatrixXd cross(m, k);
+    Eigen::VectorXd right(k);
+    for (std::size_t s = 0; s < stretches; ++s) {
+        std::vector<double> column(n, 0.0);
+        std::fill(column.begin() + static_cast<std::ptrdiff_t>(n * s / stretches),
+                  column.begin() + static_cast<std::ptrdiff_t>(n * (s + 1) / stretches), fit.series().interval_s);
+        column = fit.filter().apply(fit.as_taken(column));
+        double most = 0.0;
+        for (const double x : column) most = std::max(most, std::abs(x));
+        std::size_t last = n;
+        while (last > 0 && std::abs(column[last - 1]) < 1e-5 * most) --last;
+        // Of a resampled record it begins with the source's interval before.
+        responses[s].from = n * s / stretches - std::min<std::size_t>(n * s / stretches, 4);
+        double sum = 0.0;
+        for (std::size_t i = responses[s].from; i < last; ++i) {
+            if (!fit.telling()[i]) column[i] = 0.0;
+            responses[s].values.push_back(static_cast<float>(column[i]));
+            sum += column[i] * fit.innovations()[i];
+        }
+        right(static_cast<Eigen::Index>(s)) = sum;
+        for (Eigen::Index c = 0; c < m; ++c) {
+            double product = 0.0;
+            const auto& w = own[static_cast<std::size_t>(c)];
+            for (std::size_t i = responses[s].from; i < last; ++i) product += column[i] * w[i];
+            cross(c, static_cast<Eigen::Index>(s)) = product;
+        }
+    }
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(k, k);
+    for (std::size_t a = 0; a < stretches; ++a) {
+        for (std::size_t b = a; b < stretches; ++b) {
+            const Response& x = responses[a];
+            const Response& y = responses[b];
+            const std::size_t last = std::min(x.from + x.values.size(), y.from + y.values.size());
+            double sum = 0.0;
+            for (std::size_t i = y.from; i < last; ++i)
+                sum += static_cast<double>(x.values[i - x.from]) * static_cast<double>(y.values[i - y.from]);
+            normal(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) = sum;
+            normal(static_cast<Eigen::Index>(b), static_cast<Eigen::Index>(a)) = sum;
+        }
+    }
+    normal -= cross.transpose() * fit.covariance() * cross;
+    const TwoLevels found = two_levels(normal, right);
+    // Jumps do not wait for the end of a stretch.
+    constexpr double of_places = 2.0;
+    const double cost = found.cost + of_places * found.changes;
+    views.push_back({{Where::time, "a rate that jumps between two levels", found.p_value,
+                      fmt::format("{} jumps", found.changes), found.merit},
+                     cost,
+                     [&fit, found] { return regressors({two_level_rate(fit, found.shape)}); },
+                     std::numeric_limits<double>::infinity(),
+                     true});
+}
+
+void test_jumps(const SampleFit& fit, Views& views) {
+    if (!fit.model().walk && !fit.model().flicker) return;
+    const std::size_t n = fit.innovations().size();
+    std::vector<double> step(n, 0.0);
+    std::fill(step.begin() + static_cast<std::ptrdiff_t>(n / 2), step.end(), fit.series().interval_s);
+    if (const auto test = jumps_of_rate(fit.innovations(), fit.rows(), fit.filter().apply(step))) {
+        views.push_back({*test});
+    }
+}
+
+}  // namespace
+
+void view_rates(const SampleFit& fit, Views& views) {
+    test_rates(fit, views);
+    test_levels(fit, views);
+    test_jumps(fit, views);
+}
+
+}  // namespace ringlock::closure
