@@ -218,25 +218,11 @@ SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double in
         run<D>(rows, [&](int ticks, double share, double variance, const std::array<double, D>& gain) {
             gain_.insert(gain_.end(), gain.begin(), gain.end());
             sd_.push_back(std::sqrt(variance));
-            largest_sd_ = std::max(largest_sd_, sd_.back());
             if (resampled_) {
                 ticks_.push_back(static_cast<std::uint8_t>(ticks));
                 share_.push_back(share);
             }
             return resampled_ || swings_ || !settled(gain);
-        });
-        if (!resampled_) return;
-        // What the digits are, nobody knows: rows count that would be as uncertain with others.
-        constexpr double more = 1.5;
-        constexpr double same = 1.02;
-        SampleNoise coarser = noise;
-        coarser.digits_arcsec *= more;
-        SampleFilter beside;
-        beside.set_up(coarser, interval_s);
-        beside.run<D>(rows, [&](int, double, double variance, const std::array<double, D>&) {
-            const double before = sd_[of_digits_.size()];
-            of_digits_.push_back(variance > same * before * before ? 1 : 0);
-            return true;
         });
     });
 }

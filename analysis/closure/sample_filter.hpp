@@ -39,11 +39,6 @@ class SampleFilter {
     /// Innovations over their standard deviations. Linear in the increments.
     std::vector<double> apply(std::span<const double> increments) const;
     double sd(std::size_t row) const { return sd_[std::min(row, sd_.size() - 1)]; }
-    /// Rows that those before them settle but for their digits: where a record has more samples than it was made of.
-    /// Where what those say of the source grows from one interval to the next, the digits do as well.
-    bool settled(std::size_t row) const {
-        return resampled_ && (sd(row) < 0.03 * largest_sd_ || of_digits_[std::min(row, of_digits_.size() - 1)] != 0);
-    }
     /// Minus the log-likelihood of the rows that count, but for a constant, in one pass that keeps nothing.
     static double minus_log_likelihood(const SampleNoise& noise, double interval_s, std::span<const double> increments,
                                        std::span<const std::uint8_t> rows);
@@ -76,9 +71,7 @@ class SampleFilter {
     std::array<Terms, most> nonzero_{};
     std::vector<double> gain_;  ///< until they stay the same
     std::vector<double> sd_;
-    double largest_sd_ = 0.0;
-    std::vector<std::uint8_t> of_digits_;  ///< resampled: rows whose variance the digits are a part of
-    std::vector<std::uint8_t> ticks_;      ///< resampled: source samples passed before each row
+    std::vector<std::uint8_t> ticks_;  ///< resampled: source samples passed before each row
     std::vector<double> share_;
 };
 

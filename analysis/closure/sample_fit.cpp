@@ -132,7 +132,7 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
         model_.noise.angle_arcsec = std::sqrt(angle);
         model_.noise.rate_arcsec_rt_s = std::sqrt((white - 2.0 * angle) * series.rate_hz);
     }
-    filter_ = std::make_shared<SampleFilter>(model_.noise, series.size(), series.interval_s);
+    filter_by(model_.noise);
     take_off();
     if (noise != Noise::held) {
         fit_columns();
@@ -345,15 +345,15 @@ void SampleFit::fit_noise() {
     if (resampled) {
         // Rows that are settled to their digits say how exactly the source's times are known, so well that numbers are
         // rounded there by more than the noise tells elsewhere.
-        filter_ = std::make_shared<SampleFilter>(at(start).noise, n, series_->interval_s);
+        filter_by(at(start).noise);
         std::vector<bool> held;
         for (const Free& knob : knobs(model_)) held.push_back(knob.of_source);
         auto told = start;
-        score_noise(told, telling_by(*filter_), held);
+        score_noise(told, telling_, held);
         if (evaluate(at(told), rest_, *rows_) < evaluate(at(start), rest_, *rows_)) start = std::move(told);
     }
     model_ = at(start);
-    filter_ = std::make_shared<SampleFilter>(model_.noise, n, series_->interval_s);
+    filter_by(model_.noise);
 }
 
 SampleModel SampleFit::noise_errors() const {
@@ -399,18 +399,34 @@ SampleModel SampleFit::noise_errors() const {
     return errors;
 }
 
-Rows SampleFit::telling_by(const SampleFilter& filter) const {
-    Rows telling = *rows_;
-    for (std::size_t i = 0; i < telling.size(); ++i) {
-        if (filter.settled(i)) telling[i] = 0;
+void SampleFit::filter_by(const SampleNoise& noise) {
+    filter_ = std::make_shared<SampleFilter>(noise, series_->size(), series_->interval_s);
+    find_settled(noise);
+}
+
+/// What the digits are, nobody knows: rows tell of the rest that would be as uncertain with others.
+void SampleFit::find_settled(SampleNoise noise) {
+    constexpr double small = 0.03;
+    constexpr double coarser = 1.5;
+    constexpr double more = 1.01;
+    const std::size_t n = series_->size();
+    settled_.assign(n, 0);
+    telling_ = *rows_;
+    if (!(noise.from_hz > 0.0)) return;
+    noise.digits_arcsec *= coarser;
+    const SampleFilter beside(noise, n, series_->interval_s);
+    double largest = 0.0;
+    for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, sd(i));
+    for (std::size_t i = 0; i < n; ++i) {
+        if (sd(i) > small * largest && beside.sd(i) < more * sd(i)) continue;
+        settled_[i] = 1;
+        telling_[i] = 0;
     }
-    return telling;
 }
 
 void SampleFit::fit_columns() {
     // rest + columns = what was measured; a correction to each value.
     take_off();
-    telling_ = telling_by(*filter_);
     whitened_.clear();
     for (const SampleColumn& column : model_.columns) {
         whitened_.push_back(filter_->apply(column.of_rate ? as_taken(*column.series) : *column.series));

@@ -49,7 +49,10 @@ class SampleFit {
     const SampleSeries& series() const { return *series_; }
     const SampleModel& model() const { return model_; }
     const Rows& rows() const { return *rows_; }
-    /// Those of them that are not settled by the rows before them.
+    /// Whether those before it settle a row but for its digits: where a record has more samples than it was made of.
+    /// Where what those say of the source grows from one interval to the next, the digits do as well.
+    bool settled(std::size_t row) const { return settled_[row] != 0; }
+    /// Rows that count and are not settled.
     const Rows& telling() const { return telling_; }
     /// What the filter makes of the columns.
     const std::vector<std::vector<double>>& whitened() const { return whitened_; }
@@ -94,7 +97,8 @@ class SampleFit {
     void take_off();
     double evaluate(const SampleModel& model, std::span<const double> rest, const Rows& rows) const;
     SampleModel at(const std::vector<double>& knobs) const;
-    Rows telling_by(const SampleFilter& filter) const;
+    void filter_by(const SampleNoise& noise);
+    void find_settled(SampleNoise noise);
     Slope slope(const std::vector<double>& knobs, const Rows& rows, const std::vector<bool>& held) const;
     void score_noise(std::vector<double>& knobs, const Rows& rows, const std::vector<bool>& held) const;
     void fit_noise();
@@ -111,6 +115,7 @@ class SampleFit {
     std::vector<std::vector<double>> whitened_;  ///< columns
     double log_likelihood_ = 0.0;
     Eigen::MatrixXd covariance_;
+    Rows settled_;
     Rows telling_;
 };
 

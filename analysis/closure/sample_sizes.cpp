@@ -148,7 +148,7 @@ Disturbed find_disturbed(const SampleFit& fit) {
         double squares = 0.0;
         double count = 0.0;
         for (std::size_t i = w * length; i < (w + 1) * length; ++i) {
-            if (fit.filter().settled(i)) continue;
+            if (fit.settled(i)) continue;
             sum += e[i];
             squares += e[i] * e[i];
             count += 1.0;
