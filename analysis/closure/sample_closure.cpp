@@ -14,6 +14,8 @@
 #include "analysis/closure/sample_fit.hpp"
 #include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_screen.hpp"
+#include "analysis/closure/sample_search.hpp"
+#include "analysis/closure/sample_steps.hpp"
 #include "analysis/closure/sample_series.hpp"
 #include "analysis/closure/sample_tests.hpp"
 #include "engine/core/units.hpp"
@@ -74,6 +76,9 @@ double line_hz(const SampleModel& model, bool wanders) {
     return wanders ? model.noise.resonances.back().hz : model.columns[model.columns.size() - 2].hz;
 }
 
+/// Of a record; where it is more, that is what the record is like.
+constexpr double most_disturbed = 0.6;
+
 class Loop {
    public:
     explicit Loop(const record::Record& record)
@@ -94,7 +99,10 @@ class Loop {
     };
     double lattice_step() const { return series_.counted ? 0.25 * series_.scale_factor_arcsec : lattice_.step_arcsec; }
     std::vector<double> chosen_increments() const;
+    Rows all_rows() const;
     void begin(Closure& closure);
+    void close(Closure& closure);
+    bool restore();
     void take_lattice(Closure& closure);
     void take(const SampleChoice& choice, Closure& closure);
     void take_back_lines(Closure& closure);
@@ -113,16 +121,31 @@ class Loop {
     double used_step_ = 0.0;            ///< of the lattice in the model
     double base_log_likelihood_ = 0.0;  ///< of the rows that choose
     State now_;
+    std::optional<State> earlier_;  ///< before the first random rate
     int next_step_ = 0;
 };
+
+/// What a witness tells at lags, it does not tell at the ends of the record; and a filter that begins with what is not
+/// foretold takes a while to forget it.
+Rows Loop::all_rows() const {
+    Rows all(series_.size(), 1);
+    if (series_.witnesses.empty()) return all;
+    const std::size_t ends =
+        std::min(4 * static_cast<std::size_t>(witness_lags(series_.rate_hz)), series_.size() / 20);
+    for (std::size_t i = 0; i < ends; ++i) all[i] = all[all.size() - 1 - i] = 0;
+    return all;
+}
 
 void Loop::begin(Closure& closure) {
     closure.unit = "arcsec";
     closure.level = level;
-    rows_ = chosen_;
+    whole_ = all_rows();
+    rows_.resize(chosen_.size());
     reported_.resize(chosen_.size());
-    for (std::size_t i = 0; i < chosen_.size(); ++i) reported_[i] = chosen_[i] ? 0 : 1;
-    whole_.assign(chosen_.size(), 1);
+    for (std::size_t i = 0; i < chosen_.size(); ++i) {
+        rows_[i] = whole_[i] && chosen_[i] ? 1 : 0;
+        reported_[i] = whole_[i] && !chosen_[i] ? 1 : 0;
+    }
     if (series_.scale_factor_assumed) {
         closure.notes.push_back(fmt::format(
             "the record declares no scale factor; {:g} arcsec per fringe assumed, with which all rates scale",
@@ -134,10 +157,13 @@ void Loop::begin(Closure& closure) {
                         "of the ends of their intervals",
                         series_.input_late_s));
     }
+    now_ = {};
+    next_step_ = 0;
     now_.fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
     closure.heldout_before = heldout(*now_.fit, reported_, 0.0).error;
-    disturbed_ = find_disturbed(*now_.fit);
-    if (disturbed_.share > 0.0 && disturbed_.share < 0.6) {
+    if (disturbed_.rows.empty()) disturbed_ = find_disturbed(*now_.fit, whole_);
+    if (disturbed_.share >= most_disturbed) disturbed_.rows.assign(disturbed_.rows.size(), 0);
+    if (disturbed_.share > 0.0 && disturbed_.share < most_disturbed) {
         const double with = closure.heldout_before;
         for (std::size_t i = 0; i < rows_.size(); ++i) {
             if (!disturbed_.rows[i]) continue;
@@ -232,7 +258,7 @@ void Loop::drop_needless() {
 void Loop::test_what_is_left(Closure& closure) const {
     constexpr std::size_t looked_at = 4;
     auto views = view_samples(*now_.fit, lattice_step());
-    const Disturbed still = find_disturbed(*now_.fit);
+    const Disturbed still = find_disturbed(*now_.fit, whole_);
     views.push_back(
         {{Where::time, fmt::format("stretches of {:.3g} s far larger than the others", still.length_s),
           still.share > 0.0 ? still.p_value : 1.0,
@@ -276,8 +302,8 @@ void Loop::finish(Closure& closure) {
         for (const double x : series_.input_rate_deg_h) input += x / static_cast<double>(series_.size());
     }
     closure.mean_input_rate_deg_h = input;
-    const SampleFit whole =
-        refine_lines(series_, SampleFit(series_, now_.fit->model(), whole_, SampleFit::Noise::near), whole_);
+    SampleFit whole(series_, now_.fit->model(), whole_, SampleFit::Noise::near);
+    whole = refine_steps(refine_lines(series_, std::move(whole), whole_), whole_);
     SampleFigures figures = figures_of(whole, now_.told, record_.declared);
     closure.base = std::move(figures.base);
     closure.steps = std::move(now_.steps);
@@ -288,27 +314,61 @@ void Loop::finish(Closure& closure) {
     closure.verdict = verdict_of(closure);
 }
 
+/// An effect that has come into the model may be what seemed to disturb a part of the record: whether any of that part
+/// is to be looked at again.
+bool Loop::restore() {
+    constexpr double little = 0.05;
+    if (disturbed_.share == 0.0) return false;
+    // With all that is there, as a place in it may be known by nothing else.
+    const Rows all = all_rows();
+    SampleFit whole(series_, now_.fit->model(), all, SampleFit::Noise::held);
+    whole = refine_steps(std::move(whole), all);
+    const Disturbed still = find_disturbed(whole, all);
+    double before = 0.0;
+    double left = 0.0;
+    Disturbed less = still;
+    for (std::size_t i = 0; i < less.rows.size(); ++i) {
+        less.rows[i] = disturbed_.rows[i] && still.rows[i] ? 1 : 0;
+        before += disturbed_.rows[i];
+        left += less.rows[i];
+    }
+    if (!(left < (1.0 - little) * before)) return false;
+    less.share = left / static_cast<double>(less.rows.size());
+    disturbed_ = std::move(less);
+    return true;
+}
+
 Closure Loop::run() {
+    constexpr int most_looks = 3;
     Closure closure;
-    begin(closure);
-    take_lattice(closure);
-    std::optional<State> earlier;  // before the first random rate
-    while (now_.steps.size() < most_steps) {
-        const SampleChoice choice =
-            choose_on_samples(record_.declared, series_, rows_, {now_.fit, now_.lines_hz, next_step_}, lattice_step());
-        if (!choice.chosen) break;
-        if (!earlier && is_random_rate(choice.chosen->candidate.effect)) earlier = now_;
-        take(choice, closure);
+    for (int look = 0; look < most_looks; ++look) {
+        closure = {};
+        close(closure);
+        if (!restore()) break;
     }
     test_what_is_left(closure);
-    if (earlier && closure.unexplained) {
+    if (earlier_ && closure.unexplained) {
         // A rate is left that is none of the library's: the random one has only come nearest to it.
-        now_ = std::move(*earlier);
+        now_ = std::move(*earlier_);
         test_what_is_left(closure);
     }
     take_back_lines(closure);
     finish(closure);
     return closure;
+}
+
+/// Adds what earns its place, until nothing does.
+void Loop::close(Closure& closure) {
+    begin(closure);
+    take_lattice(closure);
+    earlier_.reset();
+    while (now_.steps.size() < most_steps) {
+        const SampleChoice choice =
+            choose_on_samples(record_.declared, {now_.fit, now_.lines_hz, next_step_}, whole_, lattice_step());
+        if (!choice.chosen) break;
+        if (!earlier_ && is_random_rate(choice.chosen->candidate.effect)) earlier_ = now_;
+        take(choice, closure);
+    }
 }
 
 /// Adds an effect to the model.
@@ -331,12 +391,14 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     const Score before = heldout(*now_.fit, reported_, used_step_);
     now_.fit = best.fit;
     drop_needless();
+    now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
     const Score after = heldout(*now_.fit, reported_, used_step_);
     step.heldout_error_before = before.error;
     step.heldout_error_after = after.error;
     step.heldout_log_score_gain = after.log_score - before.log_score;
     if (is_line(effect)) {
-        now_.lines_hz.push_back(line_hz(now_.fit->model(), best.candidate.wanders));
+        const double hz = line_hz(now_.fit->model(), best.candidate.wanders);
+        now_.lines_hz.push_back(alias(hz, series_.rate_hz).hz);
         if (best.candidate.wanders) {
             closure.notes.push_back(
                 fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "
@@ -389,7 +451,7 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
             lattice_ = find_lattice(chosen_increments());
             used_step_ = lattice_.printed_arcsec;
         } else if (is_line(effect)) {
-            const Alias shown = alias(active.values.at("frequency_hz"), series_.rate_hz, from_hz);
+            const Alias shown = alias(active.values.at("frequency_hz"), from_hz > 0.0 ? from_hz : series_.rate_hz);
             SampleLine line{shown.hz};
             if (effect == "dither_residue") {
                 line.drift_hz_per_s = (shown.folded ? -1.0 : 1.0) * active.values.at("drift_hz_per_s");

@@ -9,6 +9,7 @@
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/sample_steps.hpp"
 #include "analysis/closure/sample_tests.hpp"
 
 namespace ringlock::closure {
@@ -16,8 +17,6 @@ namespace ringlock::closure {
 bool passes_on_samples(double p_value) { return p_value * effects_on_samples < level_of_effects; }
 
 bool is_random_rate(const std::string& effect) { return effect == "rate_random_walk" || effect == "bias_instability"; }
-
-bool is_line(const std::string& effect) { return effect == "dither_residue" || effect == "base_vibration"; }
 
 namespace {
 
@@ -35,9 +34,13 @@ double p_of_gain(double gain, const SampleCandidate& candidate) {
 /// The contest on one state of the model.
 class Contest {
    public:
-    Contest(const record::Declared& declared, const SampleSeries& series, const Rows& rows, const SampleState& now,
-            double lattice_arcsec)
-        : declared_(declared), series_(series), rows_(rows), now_(now), lattice_arcsec_(lattice_arcsec) {}
+    Contest(const record::Declared& declared, const SampleState& now, const Rows& known, double lattice_arcsec)
+        : declared_(declared),
+          series_(now.fit->series()),
+          rows_(now.fit->rows()),
+          known_(known),
+          now_(now),
+          lattice_arcsec_(lattice_arcsec) {}
 
     SampleChoice choose();
 
@@ -79,6 +82,7 @@ class Contest {
     const record::Declared& declared_;
     const SampleSeries& series_;
     const Rows& rows_;
+    const Rows& known_;
     const SampleState& now_;
     double lattice_arcsec_;
 };
@@ -101,7 +105,13 @@ std::vector<SampleCandidate> Contest::screened(const SampleState& state, Wanted 
 
 Contest::Shared Contest::fitted(const SampleState& state, SampleCandidate candidate) const {
     auto contender = std::make_shared<SampleContender>();
-    contender->fit = std::make_shared<SampleFit>(series_, candidate.model, rows_, candidate.noise);
+    SampleFit fit(series_, candidate.model, rows_, candidate.noise);
+    // Places were found by the noise as it was, which a large effect was a part of.
+    constexpr double large = 50.0;
+    if (candidate.effect == "bias_step" && fit.gain_over(*state.fit) > large) {
+        fit = refine_steps(place_in_gaps(std::move(fit), rows_, known_), rows_);
+    }
+    contender->fit = std::make_shared<SampleFit>(std::move(fit));
     const double gain = contender->fit->gain_over(*state.fit);
     contender->merit = gain - std::log(candidate.places.value_or(candidate.searched)) - candidate.parameters;
     // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
@@ -281,7 +291,7 @@ bool Contest::beside_each_other(const SampleContender& a, const SampleContender&
         std::vector<std::vector<double>> added;
         for (const SampleColumn& column : with->fit->model().columns) {
             if (column.step != now_.step) continue;
-            added.push_back(column.of_rate ? without->fit->as_taken(*column.series) : *column.series);
+            added.push_back(without->fit->taken(column));
         }
         if (!added.empty()) return 0.5 * without->fit->score(added).chi2 > closure::tie;
     }
@@ -403,9 +413,9 @@ SampleChoice Contest::choose() {
 
 }  // namespace
 
-SampleChoice choose_on_samples(const record::Declared& declared, const SampleSeries& series, const Rows& rows,
-                               const SampleState& now, double lattice_arcsec) {
-    return Contest(declared, series, rows, now, lattice_arcsec).choose();
+SampleChoice choose_on_samples(const record::Declared& declared, const SampleState& now, const Rows& known,
+                               double lattice_arcsec) {
+    return Contest(declared, now, known, lattice_arcsec).choose();
 }
 
 }  // namespace ringlock::closure

@@ -18,7 +18,6 @@ bool passes_on_samples(double p_value);
 
 /// A random rate can follow whatever the library does not have, more or less.
 bool is_random_rate(const std::string& effect);
-bool is_line(const std::string& effect);
 
 /// A model of the samples, with what is looked for next.
 struct SampleState {
@@ -47,8 +46,9 @@ struct SampleChoice {
 
 /// The likeliest effect, or the first of the likeliest two or three, with all that are as likely tied to it. None where
 /// nothing of the library passes, or where a view of the residual explains more.
+/// \param known           rows that are no part of the choice, but say where between those that are a step is
 /// \param lattice_arcsec  steps of the values
-SampleChoice choose_on_samples(const record::Declared& declared, const SampleSeries& series, const Rows& rows,
-                               const SampleState& now, double lattice_arcsec);
+SampleChoice choose_on_samples(const record::Declared& declared, const SampleState& now, const Rows& known,
+                               double lattice_arcsec);
 
 }  // namespace ringlock::closure

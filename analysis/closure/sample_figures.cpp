@@ -12,6 +12,7 @@
 #include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_screen.hpp"
 #include "analysis/closure/sample_search.hpp"
+#include "analysis/closure/sample_steps.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -26,24 +27,27 @@ double middle_of(const SampleSeries& series) {
            0.5 * static_cast<double>(series.size() - 1) * series.interval_s;
 }
 
-/// Frequency at which a declared dither, or a harmonic of it, shows as this line; the line's own where there is none.
+/// Frequency at which a declared dither, or a harmonic of it, is read as this line; the line's own where there is none.
 struct Unaliased {
     double hz;
-    double drift_sign;
+    double drift_sign = 1.0;
+    double from_hz_times = 0.0;  ///< that the source's rate is in it
 };
 Unaliased unaliased(double hz, const SampleFit& fit, const record::Declared& declared) {
-    if (!declared.dither_frequency_hz) return {hz, 1.0};
+    if (!declared.dither_frequency_hz) return {hz};
+    const double from_hz = fit.model().noise.from_hz;
     for (int h = 1; h <= 3; ++h) {
         const double of_dither = h * *declared.dither_frequency_hz;
-        const Alias shown = alias(of_dither, fit.series().rate_hz, fit.model().noise.from_hz);
+        const Alias shown = alias(of_dither, from_hz > 0.0 ? from_hz : fit.series().rate_hz);
         if (std::abs(shown.hz - hz) >= declared_to * of_dither) continue;
         const double sign = shown.folded ? -1.0 : 1.0;
-        return {of_dither + sign * (hz - shown.hz), sign};
+        return {of_dither + sign * (hz - shown.hz), sign, from_hz > 0.0 ? std::round(of_dither / from_hz) : 0.0};
     }
-    return {hz, 1.0};
+    return {hz};
 }
 
-void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared& declared, std::vector<Estimate>& all) {
+void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared& declared, double from_hz_sd,
+               std::vector<Estimate>& all) {
     const SampleSeries& series = fit.series();
     const auto& columns = fit.model().columns;
     const SampleColumn& column = columns[cosine];
@@ -51,7 +55,7 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     const SampleLine line{column.hz, column.drift_hz_per_s, column.drifts};
     const double a = column.value;
     const double b = columns[cosine + 1].value;
-    const auto slopes = line_slopes(series.size(), series.rate_hz, line, a, b);
+    const auto slopes = line_slopes(fit, line, a, b);
     const Eigen::MatrixXd joint = fit.joint_covariance(slopes);
     const auto of_a = static_cast<Eigen::Index>(cosine);
     const auto of_hz = static_cast<Eigen::Index>(columns.size());
@@ -60,9 +64,9 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     const Eigen::Vector2d along(a / amplitude, b / amplitude);
     const double amplitude_sd = std::sqrt(std::max(0.0, along.dot(joint.block<2, 2>(of_a, of_a) * along)));
     const Unaliased real = unaliased(line.hz, fit, declared);
-    const double hz = effect == "dither_residue" ? real.hz : line.hz;
-    all.push_back({effect, "frequency_hz", hz, std::sqrt(std::max(0.0, joint(of_hz, of_hz)))});
+    const double hz_sd = std::sqrt(std::max(0.0, joint(of_hz, of_hz)));
     if (effect == "dither_residue") {
+        all.push_back({effect, "frequency_hz", real.hz, std::hypot(hz_sd, real.from_hz_times * from_hz_sd)});
         const double drift = line.drifts ? real.drift_sign * line.drift_hz_per_s : 0.0;
         // Where none is needed it is held at zero; the error says what of it would not show.
         double sd = 0.0;
@@ -71,7 +75,7 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
         } else {
             SampleLine drifting = line;
             drifting.drifts = true;
-            const auto more = fit.joint_covariance(line_slopes(series.size(), series.rate_hz, drifting, a, b));
+            const auto more = fit.joint_covariance(line_slopes(fit, drifting, a, b));
             sd = std::sqrt(std::max(0.0, more(of_hz + 1, of_hz + 1)));
         }
         all.push_back({effect, "drift_hz_per_s", drift, sd});
@@ -79,13 +83,15 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
         all.push_back({effect, "amplitude_arcsec", amplitude / gain, amplitude_sd / gain});
         return;
     }
+    all.push_back({effect, "frequency_hz", line.hz, hz_sd});
     // Increments are those of a rate integrated over each interval.
-    const double gain = std::abs(std::sin(units::pi * line.hz * series.interval_s)) / (units::pi * line.hz);
-    all.push_back({effect, "rate_deg_h", amplitude / gain, amplitude_sd / gain});
+    const double gain = std::sin(units::pi * line.hz * series.interval_s) / (units::pi * line.hz);
+    all.push_back({effect, "rate_deg_h", amplitude / std::abs(gain), amplitude_sd / std::abs(gain)});
     // a cos + b sin = A sin(phase + 2 pi f (t + middle)), t from the middle
     const double middle_s = middle_of(series);
     const double turns = line.hz * middle_s;
-    const double phase = std::atan2(a, b) - units::two_pi * (turns - std::floor(turns));
+    const double sign = std::copysign(1.0, gain);
+    const double phase = std::atan2(sign * a, sign * b) - units::two_pi * (turns - std::floor(turns));
     Eigen::VectorXd by = Eigen::VectorXd::Zero(joint.rows());
     by(of_a) = b / (amplitude * amplitude);
     by(of_a + 1) = -a / (amplitude * amplitude);
@@ -99,12 +105,11 @@ Estimate time_of_step(const SampleFit& fit, std::size_t at) {
     const SampleSeries& series = fit.series();
     const std::size_t n = series.size();
     const SampleColumn& column = fit.model().columns[at];
-    std::size_t row = 0;
-    while (row + 1 < n && (*column.series)[row] == 0.0) ++row;
+    const std::size_t row = row_of_step(column);
     SampleModel model = fit.model();
     model.columns.erase(model.columns.begin() + static_cast<std::ptrdiff_t>(at));
     const SampleFit without(series, std::move(model), fit.rows(), SampleFit::Noise::held);
-    const auto chi2_at = [&](std::size_t place) { return without.score({*step_column(series, place).series}).chi2; };
+    const auto chi2_at = [&](std::size_t place) { return std::pow(root_of_step(without, place), 2); };
     const double top = chi2_at(row);
     // So far to either side that the likelihood is gone, then evenly
     std::size_t reach = 1;
@@ -217,7 +222,7 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<SampleStep>& st
             const SampleColumn& column = model.columns[k];
             if (column.step != step.step || column.effect != effect || column.name == "sine") continue;
             if (column.name == "cosine") {
-                take_line(fit, k, declared, all);
+                take_line(fit, k, declared, errors.noise.from_hz, all);
                 continue;
             }
             all.push_back({effect, column.name, column.value, column.sd});
@@ -245,7 +250,8 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<SampleStep>& st
             const auto& line = model.noise.resonances[k];
             const auto& sd = errors.noise.resonances[k];
             const Unaliased real = unaliased(line.hz, fit, declared);
-            all.push_back({effect, "frequency_hz", real.hz, sd.hz});
+            all.push_back(
+                {effect, "frequency_hz", real.hz, std::hypot(sd.hz, real.from_hz_times * errors.noise.from_hz)});
             all.push_back(
                 {effect, "amplitude_arcsec", std::numbers::sqrt2 * line.arcsec, std::numbers::sqrt2 * sd.arcsec});
             all.push_back({effect, "wander_hz", line.width_hz, sd.width_hz});

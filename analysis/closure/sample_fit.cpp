@@ -95,6 +95,13 @@ std::vector<Free> knobs(SampleModel& model) {
     return all;
 }
 
+std::vector<double> places_of(SampleModel model) {
+    std::vector<double> places;
+    for (const Free& knob : knobs(model))
+        places.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
+    return places;
+}
+
 }  // namespace
 
 std::vector<SampleNoise::Term> flicker_terms(double deg_h, double shortest_s, double longest_s) {
@@ -115,22 +122,11 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
     if (model_.columns.empty()) {
         model_.columns.push_back(
             {"", "mean_rate_deg_h", std::make_shared<std::vector<double>>(series.size(), series.interval_s)});
-        model_.columns.back().of_rate = true;
         take_off();
         double mean = 0.0;
         for (const double x : rest_) mean += x / static_cast<double>(series.size());
         model_.columns[0].value = mean * series.rate_hz;
-        double white = 0.0;
-        double next = 0.0;
-        for (std::size_t i = 1; i < series.size(); ++i) {
-            const double a = rest_[i - 1] - mean;
-            const double b = rest_[i] - mean;
-            white += b * b / static_cast<double>(series.size());
-            next += a * b / static_cast<double>(series.size());
-        }
-        const double angle = std::clamp(-next, 1e-3 * white, 0.499 * white);
-        model_.noise.angle_arcsec = std::sqrt(angle);
-        model_.noise.rate_arcsec_rt_s = std::sqrt((white - 2.0 * angle) * series.rate_hz);
+        take_whites(model_.noise);
     }
     filter_by(model_.noise);
     take_off();
@@ -144,27 +140,44 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
 
 std::vector<double> SampleFit::as_taken(const std::vector<double>& increments) const {
     if (!(model_.noise.from_hz > 0.0)) return increments;
-    const std::size_t n = increments.size();
-    std::vector<double> angle(n + 1, 0.0);
-    for (std::size_t i = 0; i < n; ++i) angle[i + 1] = angle[i] + increments[i];
-    const double ratio = model_.noise.from_hz * series_->interval_s;
-    const double first = model_.noise.from_phase;
-    const auto reading = [&](double tick) {
-        const double row = (tick - first) / ratio;
-        const auto i = static_cast<std::size_t>(std::clamp(row, 0.0, static_cast<double>(n - 1)));
-        return angle[i] + (row - static_cast<double>(i)) * (angle[i + 1] - angle[i]);
-    };
-    std::vector<double> taken(n);
-    double before = 0.0;
-    for (std::size_t i = 0; i <= n; ++i) {
-        const double place = first + ratio * static_cast<double>(i);
-        const double tick = std::floor(place);
-        const double from = reading(tick);
-        const double now = from + (place - tick) * (reading(tick + 1.0) - from);
-        if (i > 0) taken[i - 1] = now - before;
-        before = now;
+    return closure::as_taken(source(), increments, series_->interval_s);
+}
+
+std::vector<std::vector<double>> SampleFit::line(double hz, double drift_hz_per_s) const {
+    if (!(model_.noise.from_hz > 0.0)) return line_columns(series_->size(), series_->rate_hz, hz, drift_hz_per_s);
+    return line_as_taken(source(), series_->size(), series_->rate_hz, hz, drift_hz_per_s);
+}
+
+std::vector<double> SampleFit::taken(const SampleColumn& column) const {
+    if (column.as_recorded || !(model_.noise.from_hz > 0.0)) return *column.series;
+    if (column.hz == 0.0) return as_taken(*column.series);
+    return line(column.hz, column.drift_hz_per_s)[column.name == "cosine" ? 0 : 1];
+}
+
+/// The white noises by the variance of the rest and the covariance of neighbours, as if there were no others.
+void SampleFit::take_whites(SampleNoise& noise) const {
+    const Rows& rows = *rows_;
+    double sum = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 0; i < rest_.size(); ++i) {
+        if (!rows[i]) continue;
+        sum += rest_[i];
+        count += 1.0;
     }
-    return taken;
+    const double mean = sum / std::max(count, 1.0);
+    double white = 0.0;
+    double next = 0.0;
+    double pairs = 0.0;
+    for (std::size_t i = 1; i < rest_.size(); ++i) {
+        if (!rows[i - 1] || !rows[i]) continue;
+        white += (rest_[i] - mean) * (rest_[i] - mean);
+        next += (rest_[i - 1] - mean) * (rest_[i] - mean);
+        pairs += 1.0;
+    }
+    white /= std::max(pairs, 1.0);
+    const double angle = std::clamp(-next / std::max(pairs, 1.0), 1e-3 * white, 0.499 * white);
+    noise.angle_arcsec = std::sqrt(angle);
+    noise.rate_arcsec_rt_s = std::sqrt((white - 2.0 * angle) * series_->rate_hz);
 }
 
 void SampleFit::take_off() {
@@ -183,7 +196,7 @@ void SampleFit::take_off() {
         for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= motion[i];
     }
     for (const SampleColumn& column : model_.columns) {
-        const auto& c = column.of_rate ? as_taken(*column.series) : *column.series;
+        const auto c = taken(column);
         for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= column.value * c[i];
     }
 }
@@ -207,8 +220,8 @@ SampleModel SampleFit::at(const std::vector<double>& x) const {
             resonance.hz = model.noise.resonances[k - 1].hz;
             resonance.width_hz = 3.0 * model.noise.resonances[k - 1].width_hz;
         }
-        if (resonance.hz > 0.5 * series_->rate_hz || resonance.width_hz > 3.0 * series_->rate_hz)
-            resonance.arcsec = 0.0;
+        const double rate_hz = model.noise.from_hz > 0.0 ? model.noise.from_hz : series_->rate_hz;
+        if (resonance.hz > 0.5 * rate_hz || resonance.width_hz > 3.0 * rate_hz) resonance.arcsec = 0.0;
     }
     if (model.noise.from_hz > 0.0) {
         // About the middle of the record, so that rate and place are told apart.
@@ -319,12 +332,17 @@ void SampleFit::fit_noise() {
     if (model_.noise.rate_arcsec_rt_s * std::sqrt(series_->interval_s) < 1e-4 * scale) {
         model_.noise.rate_arcsec_rt_s = 1e-2 * scale / std::sqrt(series_->interval_s);
     }
-    std::vector<double> start;
-    for (const Free& knob : knobs(model_))
-        start.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
+    std::vector<double> start = places_of(model_);
     const std::size_t n = rest_.size();
     const bool resampled = model_.noise.from_hz > 0.0;
     const bool narrow = !model_.resonances.empty();
+    if (!resampled) {
+        // What has just come into the model may have been most of the noise: far from there the likelihood is flat.
+        SampleModel anew = model_;
+        take_whites(anew.noise);
+        auto other = places_of(anew);
+        if (evaluate(at(other), rest_, *rows_) < evaluate(at(start), rest_, *rows_)) start = std::move(other);
+    }
     if (!searched_ && (resampled || narrow)) {
         // The likelihood may have several tops: by a simplex on a part of the record first, from where it stopped until
         // that gains nothing, for it may have fallen flat.
@@ -429,7 +447,7 @@ void SampleFit::fit_columns() {
     take_off();
     whitened_.clear();
     for (const SampleColumn& column : model_.columns) {
-        whitened_.push_back(filter_->apply(column.of_rate ? as_taken(*column.series) : *column.series));
+        whitened_.push_back(filter_->apply(taken(column)));
     }
     const auto e = filter_->apply(rest_);
     const auto m = static_cast<Eigen::Index>(whitened_.size());

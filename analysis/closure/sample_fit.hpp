@@ -6,6 +6,7 @@
 
 #include "analysis/closure/sample_filter.hpp"
 #include "analysis/closure/sample_series.hpp"
+#include "analysis/closure/sample_source.hpp"
 #include "analysis/closure/turn_fit.hpp"
 
 namespace ringlock::closure {
@@ -16,9 +17,10 @@ struct SampleColumn {
     std::shared_ptr<const std::vector<double>> series;
     double value = 0.0;
     double sd = 0.0;
-    int step = -1;         ///< of the loop that added it
-    bool of_rate = false;  ///< a rate that is there at all times: a resampled record has it as it was taken
-    /// Of a line's cosine, which its sine follows: frequency in the middle of the record.
+    int step = -1;             ///< of the loop that added it
+    bool as_recorded = false;  ///< and no further what a resampled record's source makes of it
+    /// Of a line's cosine and of the sine that follows it: frequency in the middle of the record; 0: no line. It may be
+    /// any up to half of the rate at which the readings were taken.
     double hz = 0.0, drift_hz_per_s = 0.0;
     bool drifts = false;
 };
@@ -68,6 +70,10 @@ class SampleFit {
     /// Increments of an angle that the record's source takes at its own times: on the straight lines between these,
     /// where the record is resampled. Rows that those before them settle know it to their digits.
     std::vector<double> as_taken(const std::vector<double>& increments) const;
+    /// Cosine and sine of a line, as the record has them.
+    std::vector<std::vector<double>> line(double hz, double drift_hz_per_s) const;
+    /// Of a column.
+    std::vector<double> taken(const SampleColumn& column) const;
     /// Increments less all that is deterministic.
     const std::vector<double>& rest() const { return rest_; }
     /// Standard errors of the noise, by Fisher's information of the rows that count: a model that holds them in the
@@ -94,7 +100,9 @@ class SampleFit {
         Eigen::MatrixXd information;
     };
     Eigen::MatrixXd normal_with(const std::vector<std::vector<double>>& series, Eigen::VectorXd& right) const;
+    SampleSource source() const { return {model_.noise.from_hz, model_.noise.from_phase}; }
     void take_off();
+    void take_whites(SampleNoise& noise) const;
     double evaluate(const SampleModel& model, std::span<const double> rest, const Rows& rows) const;
     SampleModel at(const std::vector<double>& knobs) const;
     void filter_by(const SampleNoise& noise);

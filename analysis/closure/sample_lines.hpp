@@ -1,7 +1,9 @@
 #pragma once
+#include <string>
 #include <vector>
 
 #include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_line_search.hpp"
 
 /// Lines in samples, their frequency and drift fitted as closely as their amplitudes are.
 namespace ringlock::closure {
@@ -13,14 +15,22 @@ struct SampleLine {
     double chi2 = 0.0;  ///< that its two amplitudes explain
 };
 
-std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, double hz, double drift_hz_per_s);
+bool is_line(const std::string& effect);
 
-/// What a change of the frequency and, where it drifts, of the drift adds to a line of those amplitudes.
-std::vector<std::vector<double>> line_slopes(std::size_t size, double rate_hz, const SampleLine& line, double a,
-                                             double b);
+/// What a change of the frequency and, where it drifts, of the drift adds to a line of those amplitudes, as the record
+/// has it.
+std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const SampleLine& line, double a, double b);
 
-/// By Gauss and Newton from a first estimate, in the rows that count, beside a model that does not have the line.
-SampleLine refine_line(const SampleFit& fit, SampleLine line);
+/// The columns of a line, of which the cosine's is that one.
+void set_line(SampleModel& model, std::size_t cosine, const SampleSeries& series, const SampleLine& line);
+
+/// By Gauss and Newton from where a line shows in the innovations, in the rows that count, beside a model that does not
+/// have the line. Of a resampled record, what its source has there.
+SampleLine refine_line(const SampleFit& fit, const SampleLine& shown);
+
+/// Whether the power that stands out in pieces of the innovations is that of a line which does not keep its phase: it is
+/// still there when the line that explains most has been taken off. The innovations are zero where they do not count.
+bool scatters(const SampleFit& fit, std::vector<double> innovations, const FoundLines& found, const SampleLine& line);
 
 /// The same for all lines of a model, which is fitted anew with them.
 SampleFit refine_lines(const SampleSeries& series, SampleFit fit, const Rows& rows);

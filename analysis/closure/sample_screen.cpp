@@ -12,6 +12,7 @@
 #include "analysis/closure/sample_line_search.hpp"
 #include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_search.hpp"
+#include "analysis/closure/sample_steps.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
 
@@ -27,7 +28,7 @@ SampleColumn rate_column(const SampleSeries& series, std::string effect, std::st
                          const std::function<double(std::size_t)>& rate) {
     std::vector<double> values(series.size());
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = rate(i) * series.interval_s;
-    return {.effect = std::move(effect), .name = std::move(name), .series = shared(std::move(values)), .of_rate = true};
+    return {.effect = std::move(effect), .name = std::move(name), .series = shared(std::move(values))};
 }
 
 bool has(const SampleModel& model, std::string_view effect) {
@@ -70,15 +71,10 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     std::vector<double> roots;
     double best = 0.0;
     std::size_t at = 0;
-    const auto root_at = [&](std::size_t row) {
-        std::vector<double> step(n, 0.0);
-        std::fill(step.begin() + static_cast<std::ptrdiff_t>(row), step.end(), in.series.interval_s);
-        const auto score = now.score({now.as_taken(step)});
-        return score.rank == 0 ? 0.0 : std::copysign(std::sqrt(worth * score.chi2), score.value[0]);
-    };
+    const double root_of_worth = std::sqrt(worth);
     constexpr std::size_t places = 80;
     for (std::size_t k = 1; k < places; ++k) {
-        const double root = root_at(n * k / places);
+        const double root = root_of_worth * root_of_step(now, n * k / places);
         roots.push_back(root);
         if (std::abs(root) > best) {
             best = std::abs(root);
@@ -89,15 +85,8 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     if (p > 0.01) return;
     double as_good = 0.0;
     for (const double root : roots) as_good += std::exp(0.5 * (root * root - best * best));
-    for (std::size_t d = n / places / 2; d > 0; d /= 2) {
-        for (const std::size_t row : {at > d ? at - d : at, std::min(n - 1, at + d)}) {
-            const double root = std::abs(root_at(row));
-            if (root > best) {
-                best = root;
-                at = row;
-            }
-        }
-    }
+    at = refine_place(now, at, n / places / 2);
+    best = root_of_worth * std::abs(root_of_step(now, at));
     SampleCandidate c{.effect = "bias_step",
                       .model = model,
                       .p_value = p,
@@ -249,8 +238,9 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
             now, {.hz = line.frequency_hz, .drift_hz_per_s = drifts ? line.drift_hz_per_s : 0.0, .drifts = drifts});
     };
     if (likeliest.p_value < worth_looking) {
-        const double most = std::max(refined(likeliest, false).chi2, refined(likeliest, true).chi2);
-        if (lines.scattered > 1.5 * most + 60.0) {
+        const SampleLine still = refined(likeliest, false);
+        const SampleLine drifting = refined(likeliest, true);
+        if (scatters(now, e, lines, drifting.chi2 > still.chi2 ? drifting : still)) {
             // Slow ones are what a base does as well.
             const bool declared = near_declared(now, in, likeliest.frequency_hz);
             if (!declared && likeliest.frequency_hz <= fast_hz) return;
@@ -288,6 +278,42 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
     }
 }
 
+/// The lines that the model has, at those frequencies of a source that explain most of the record.
+SampleModel with_lines_of_source(const SampleFit& now, SampleModel model) {
+    const auto fitted = [&](const SampleModel& m) {
+        return SampleFit(now.series(), m, now.rows(), SampleFit::Noise::held).log_likelihood();
+    };
+    // One line after another, each tried wherever it may be.
+    const auto choose = [&](double shown_hz, const auto& put) {
+        const auto all = of_source(shown_hz, now.series().rate_hz, model.noise.from_hz);
+        double most = -std::numeric_limits<double>::infinity();
+        SampleModel best;
+        for (const Alias& of : all) {
+            SampleModel there = model;
+            put(there, of);
+            const double value = all.size() > 1 ? fitted(there) : 0.0;
+            if (value < most) continue;
+            most = value;
+            best = std::move(there);
+        }
+        model = std::move(best);
+    };
+    for (std::size_t k = 0; k + 1 < model.columns.size(); ++k) {
+        if (model.columns[k].name != "cosine") continue;
+        const SampleColumn line = model.columns[k];
+        choose(line.hz, [&](SampleModel& there, const Alias& of) {
+            const double drift_hz_per_s = of.folded ? -line.drift_hz_per_s : line.drift_hz_per_s;
+            set_line(there, k, now.series(), {of.hz, drift_hz_per_s, line.drifts});
+        });
+    }
+    for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+        if (!is_line(model.resonances[k])) continue;
+        choose(model.noise.resonances[k].hz,
+               [k](SampleModel& there, const Alias& of) { there.noise.resonances[k].hz = of.hz; });
+    }
+    return model;
+}
+
 void screen_resampling(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
     if (now.model().noise.from_hz > 0.0) return;
     const FoundCycle cycle = find_cycle(now.innovations(), in.rows, in.series.rate_hz);
@@ -308,7 +334,7 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
     constexpr std::size_t looked_at = 3;
     for (std::size_t k = 0; k < std::min(looked_at, found.size()); ++k) {
         out.push_back({.effect = "resampling",
-                       .model = found[k].model,
+                       .model = with_lines_of_source(now, std::move(found[k].model)),
                        .p_value = cycle.p_value,
                        .searched = cycle.searched,
                        .parameters = 2,
@@ -408,16 +434,6 @@ Resampled resampled_from(const SampleFit& now, double from_hz) {
     return best;
 }
 
-Alias alias(double hz, double rate_hz, double from_hz) {
-    Alias seen{hz};
-    for (const double rate : {from_hz, rate_hz}) {
-        if (!(rate > 0.0)) continue;
-        const double off = seen.hz - std::round(seen.hz / rate) * rate;
-        seen = {std::abs(off), seen.folded != (off < 0.0)};
-    }
-    return seen;
-}
-
 std::vector<SampleColumn> rate_columns(const SampleSeries& series) {
     std::vector<SampleColumn> columns;
     columns.push_back(rate_column(series, "bias_ramp", "deg_h_per_h", [&](std::size_t i) {
@@ -437,22 +453,13 @@ std::vector<SampleColumn> rate_columns(const SampleSeries& series) {
     return columns;
 }
 
-SampleColumn step_column(const SampleSeries& series, std::size_t row) {
-    return rate_column(series, "bias_step", "step_deg_h", [&](std::size_t i) { return i >= row ? 1.0 : 0.0; });
-}
-
 void add_line(SampleModel& model, const SampleSeries& series, const SampleLine& line, const std::string& effect,
               int step) {
-    auto columns = line_columns(series.size(), series.rate_hz, line.hz, line.drift_hz_per_s);
-    SampleColumn cosine{effect, "cosine", shared(std::move(columns[0]))};
-    cosine.step = step;
-    cosine.hz = line.hz;
-    cosine.drift_hz_per_s = line.drift_hz_per_s;
-    cosine.drifts = line.drifts;
-    SampleColumn sine{effect, "sine", shared(std::move(columns[1]))};
-    sine.step = step;
-    model.columns.push_back(std::move(cosine));
-    model.columns.push_back(std::move(sine));
+    for (const char* name : {"cosine", "sine"}) {
+        model.columns.push_back({effect, name, nullptr});
+        model.columns.back().step = step;
+    }
+    set_line(model, model.columns.size() - 2, series, line);
 }
 
 std::vector<std::vector<double>> motion_columns(const std::vector<double>& witness) {
@@ -470,7 +477,6 @@ void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witn
     for (std::size_t c = 0; c < 2; ++c) {
         model.columns.push_back({"case_motion", c == 0 ? "in_phase" : "quadrature", shared(std::move(columns[c]))});
         model.columns.back().step = step;
-        model.columns.back().of_rate = true;
     }
 }
 

@@ -39,7 +39,6 @@ struct SampleContext {
 
 /// Rates in proportion to one number that the record can tell of: time, temperature, input rate.
 std::vector<SampleColumn> rate_columns(const SampleSeries& series);
-SampleColumn step_column(const SampleSeries& series, std::size_t row);
 void add_line(SampleModel& model, const SampleSeries& series, const SampleLine& line, const std::string& effect,
               int step);
 /// What a motion in proportion to a witness adds to the increments, and the same a quarter of a cycle later.
@@ -50,14 +49,6 @@ inline constexpr double declared_to = 0.002;
 /// Of itself a second, a dither drifts so much at most: springs of steel soften by 2.5e-4 a kelvin, the resonance
 /// by half of that, while a gyro warms up by a kelvin a minute.
 inline constexpr double dither_drift_per_s = 2e-6;
-/// Where a frequency shows in samples, and whether it goes down there as it goes up.
-struct Alias {
-    double hz = 0.0;
-    bool folded = false;
-};
-/// In samples of that rate, taken at `from_hz` and interpolated where that is not zero.
-Alias alias(double hz, double rate_hz, double from_hz = 0.0);
-
 /// The model as of samples taken at another rate and interpolated, from where in the source's interval the likelihood
 /// likes best on a part of the record, its scale left free.
 struct Resampled {

@@ -136,7 +136,7 @@ void view_sizes(const SampleFit& fit, double lattice_arcsec, Views& views) {
     test_distribution(fit, lattice_arcsec, views);
 }
 
-Disturbed find_disturbed(const SampleFit& fit) {
+Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
     const auto& e = fit.innovations();
     const std::size_t n = e.size();
     const std::size_t length = std::max<std::size_t>(50, n / 500);
@@ -148,7 +148,7 @@ Disturbed find_disturbed(const SampleFit& fit) {
         double squares = 0.0;
         double count = 0.0;
         for (std::size_t i = w * length; i < (w + 1) * length; ++i) {
-            if (fit.settled(i)) continue;
+            if (!rows[i] || fit.settled(i)) continue;
             sum += e[i];
             squares += e[i] * e[i];
             count += 1.0;

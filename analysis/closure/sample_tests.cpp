@@ -78,20 +78,23 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     const double cost = 3.0 + std::log(line.searched);
     // A line whose power is scattered explains as much as follows it from stretch to stretch.
     const double gain = 0.5 * std::max(line.chi2, lines.scattered);
-    const bool coherent = line.chi2 >= lines.scattered;
     double p = line.p_value;
-    if (coherent && p < 0.01) {
-        // The level about a line is itself a random number: what the regression says counts as well.
+    bool coherent = line.chi2 >= lines.scattered;
+    if (p < 0.01) {
         const SampleLine refined =
             refine_line(fit, {line.frequency_hz, line.drift_hz_per_s, line.drift_hz_per_s != 0.0});
-        p = std::max(p, of_several(chi2_tail(refined.chi2, 2), line.searched));
+        coherent = !scatters(fit, e, lines, refined);
+        // The level about a line is itself a random number: what the regression says counts as well.
+        if (coherent) p = std::max(p, of_several(chi2_tail(refined.chi2, 2), line.searched));
     }
     View view{{Where::frequency, "lines, still and drifting", p,
                fmt::format("at {:.6g} Hz", coherent ? line.frequency_hz : lines.scattered_hz), gain - cost},
               cost};
     if (coherent) {
-        view.columns = [n, rate_hz = fit.series().rate_hz, line] {
-            return regressors(line_columns(n, rate_hz, line.frequency_hz, line.drift_hz_per_s));
+        view.columns = [&fit, line] {
+            const Alias of = of_source(line.frequency_hz, fit.series().rate_hz, fit.model().noise.from_hz).front();
+            const double drift_hz_per_s = of.folded ? -line.drift_hz_per_s : line.drift_hz_per_s;
+            return regressors(fit.line(of.hz, drift_hz_per_s));
         };
     }
     views.push_back(std::move(view));
@@ -101,9 +104,8 @@ void test_spectrum(const SampleFit& fit, Views& views) {
 double line_over_time(const SampleFit& fit, std::size_t cosine) {
     constexpr std::size_t stretches = 20;
     const std::size_t n = fit.innovations().size();
-    const auto& columns = fit.model().columns;
-    const auto x = fit.filter().apply(*columns[cosine].series);
-    const auto y = fit.filter().apply(*columns[cosine + 1].series);
+    const auto& x = fit.whitened()[cosine];
+    const auto& y = fit.whitened()[cosine + 1];
     double chi2 = 0.0;
     int freedom = -2;
     for (std::size_t s = 0; s < stretches; ++s) {
@@ -155,7 +157,7 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
     const FoundLine line = left.likeliest();
     constexpr double near_hz = 1.0;
     const double hz = line.chi2 >= left.scattered ? line.frequency_hz : left.scattered_hz;
-    least.beside = line.p_value < level_of_residual && std::abs(hz - least.hz) < near_hz;
+    least.beside = line.p_value < level_of_residual && std::abs(hz - alias(least.hz, fit.series().rate_hz).hz) < near_hz;
     return least;
 }
 
@@ -164,7 +166,7 @@ double refitted_merit(const SampleFit& fit, const View& view, double of_a_coeffi
     const auto columns = view.columns();
     for (const auto& column : columns) {
         model.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(column.series)});
-        model.columns.back().of_rate = view.test.where != Where::frequency;
+        model.columns.back().as_recorded = view.test.where == Where::frequency;
     }
     const SampleFit with(fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near);
     return with.gain_over(fit) - view.cost - of_a_coefficient * static_cast<double>(columns.size());

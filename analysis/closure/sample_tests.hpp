@@ -16,7 +16,8 @@ struct Disturbed {
     double length_s = 0.0;  ///< of a stretch
     double p_value = 1.0;   ///< of the worst, if the residual were normal
 };
-Disturbed find_disturbed(const SampleFit& fit);
+/// \param rows  that are looked at
+Disturbed find_disturbed(const SampleFit& fit, const Rows& rows);
 
 /// The view of a variance that goes up and down evenly.
 inline constexpr std::string_view repeating_variance = "variance and covariance that repeat";

@@ -52,6 +52,14 @@ std::vector<SampleCase> all_cases(const Command& command) {
                 add(Kind::pair, 2.0, {effects[a], effects[b]});
         }
     }
+    // What is evident must be named as surely: a loop made for what hardly shows may break there.
+    for (const double multiple : {6.0, 30.0, 150.0}) {
+        for (std::size_t k = 0; k < command.scaled(4); ++k) {
+            for (const std::string& effect : effects) {
+                if (has_size(effect)) add(Kind::single, multiple, {effect});
+            }
+        }
+    }
     for (SampleCase& of : foreign_sample_cases(command.scaled(10))) cases.push_back(std::move(of));
     std::erase_if(cases, [&](const SampleCase& of) { return !command.wants(of.kind); });
     return cases;

@@ -84,7 +84,7 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
     row("single effects at twice their limit, named right", count(kind(Kind::single, 2.0), is(Judged::right)));
     row("... ties that hold the truth", count(kind(Kind::single, 2.0), is(Judged::tie)));
     missed_though_shown(Kind::single, 2.0);
-    for (const double multiple : {6.0, 30.0}) {
+    for (const double multiple : {6.0, 30.0, 150.0}) {
         const auto of = kind(Kind::single, multiple);
         if (std::none_of(truths.begin(), truths.end(), of)) continue;
         row(fmt::format("single effects at {:g} times their limit, named right", multiple).c_str(),

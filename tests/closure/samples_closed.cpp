@@ -136,6 +136,35 @@ TEST(SampleClosure, NamesSlowRates) {
     only_step(closed(truth), "rate_random_walk");
 }
 
+// What is evident is named as surely as what hardly shows, though the noise that the base model takes it for is far from
+// the one that is left.
+TEST(SampleClosure, NamesWhatIsStrong) {
+    const auto short_record = [] {
+        SampleTruth truth = usual();
+        truth.size = 20000;
+        return truth;
+    };
+    SampleTruth truth = short_record();
+    truth.dither_residue = {437.3, 0.0, 20.0, 0.0};
+    EXPECT_NEAR(value_of(only_step(closed(truth), "dither_residue"), "amplitude_arcsec"), 20.0, 0.03);
+    truth = short_record();
+    truth.rates.base_vibration = {0.74, 100.0, 0.0};
+    EXPECT_NEAR(value_of(only_step(closed(truth), "base_vibration"), "rate_deg_h"), 100.0, 1.0);
+    // In blocks that are fitted, and in one that is not
+    for (const double time_s : {81.0, 92.0}) {
+        truth = short_record();
+        truth.rates.bias_step = {150.0, time_s};
+        const auto found = closed(truth);
+        EXPECT_NEAR(value_of(only_step(found, "bias_step"), "time_s"), time_s, 0.03);
+        EXPECT_LT(found.heldout_after, 1.01 * found.noise_floor);
+    }
+    truth = short_record();
+    truth.case_motion.rms_arcsec = 10.0;
+    truth.case_motion.coherence = 0.7;
+    truth.case_motion.centre_hz = 1.4;
+    only_step(closed(truth), "case_motion");
+}
+
 TEST(SampleClosure, DoesNotNameWhatTheLibraryDoesNotHave) {
     SampleTruth truth = usual();
     truth.jumping_line = {12.0, 2.0, 6.0, 300.0};

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 #include "analysis/closure/closure.hpp"
 #include "tests/closure/samples.hpp"
@@ -11,6 +13,8 @@ namespace {
 
 using ringlock::closure::close_samples;
 using ringlock::closure::Closure;
+using ringlock::closure::Estimate;
+using ringlock::closure::Step;
 using ringlock::closure::Verdict;
 
 /// A gyro whose readings have 0.3 arcsec of noise, taken at that rate; 0: at that of the record.
@@ -102,6 +106,40 @@ TEST(ResampledRecords, KnownInputIsResampledToo) {
     EXPECT_EQ(found.steps[1].effect, "scale_factor_error");
     const auto& relative = found.steps[1].parameters.at(0);
     EXPECT_NEAR(relative.value, 0.01, 4.0 * relative.sd);
+}
+
+const Estimate& named(const Closure& found, const std::string& effect, const std::string& parameter) {
+    for (const Step& step : found.steps) {
+        if (step.effect != effect) continue;
+        for (const Estimate& estimate : step.parameters) {
+            if (estimate.name == parameter) return estimate;
+        }
+    }
+    throw std::runtime_error("no " + parameter + " of " + effect);
+}
+
+// Of a line the record has the straight lines between the source's readings: it is weaker there, and has others beside
+// it. Where the source is faster it may be above half the record's rate, and shows below; found first or last.
+TEST(ResampledRecords, LinesAreThoseOfTheSource) {
+    constexpr double dither_hz = 430.0;
+    struct Case {
+        double from_hz, amplitude_arcsec;
+    };
+    for (const Case& of : {Case{81.0, 0.04}, Case{125.3, 0.04}, Case{125.3, 0.5}}) {
+        SCOPED_TRACE(testing::Message() << of.from_hz << " Hz, " << of.amplitude_arcsec << " arcsec");
+        SampleTruth truth = taken_at(of.from_hz, 6);
+        truth.declared.emplace().dither_frequency_hz = dither_hz;
+        truth.dither_residue = {430.11, 0.0, of.amplitude_arcsec, 0.4};
+        const Closure found = close_samples(generate_samples(truth));
+        EXPECT_EQ(found.verdict, Verdict::closed);
+        ASSERT_EQ(found.steps.size(), 2U);
+        const Estimate from_hz = named(found, "resampling", "from_hz");
+        EXPECT_NEAR(from_hz.value, of.from_hz, 4.0 * from_hz.sd);
+        const Estimate amplitude = named(found, "dither_residue", "amplitude_arcsec");
+        EXPECT_NEAR(amplitude.value, of.amplitude_arcsec, 4.0 * amplitude.sd);
+        const Estimate hz = named(found, "dither_residue", "frequency_hz");
+        EXPECT_NEAR(hz.value, 430.11, 4.0 * hz.sd);
+    }
 }
 
 }  // namespace

@@ -1,0 +1,100 @@
+#include "analysis/closure/sample_source.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/closure/sample_line_search.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// Differences of an angle at the ends of the record's intervals, on straight lines between the source's readings.
+template <class Reading>
+std::vector<double> between_readings(const SampleSource& source, std::size_t size, double interval_s,
+                                     const Reading& reading) {
+    const double ratio = source.from_hz * interval_s;
+    std::vector<double> taken(size);
+    double tick = std::floor(source.from_phase);
+    double from = reading(tick);
+    double to = reading(tick + 1.0);
+    double before = 0.0;
+    for (std::size_t i = 0; i <= size; ++i) {
+        const double place = source.from_phase + ratio * static_cast<double>(i);
+        if (const double at = std::floor(place); at != tick) {
+            from = at == tick + 1.0 ? to : reading(at);
+            to = reading(at + 1.0);
+            tick = at;
+        }
+        const double now = from + (place - tick) * (to - from);
+        if (i > 0) taken[i - 1] = now - before;
+        before = now;
+    }
+    return taken;
+}
+
+}  // namespace
+
+std::vector<double> as_taken(const SampleSource& source, const std::vector<double>& increments, double interval_s) {
+    const std::size_t n = increments.size();
+    std::vector<double> angle(n + 1, 0.0);
+    for (std::size_t i = 0; i < n; ++i) angle[i + 1] = angle[i] + increments[i];
+    const double ratio = source.from_hz * interval_s;
+    return between_readings(source, n, interval_s, [&](double tick) {
+        const double row = (tick - source.from_phase) / ratio;
+        const auto i = static_cast<std::size_t>(std::clamp(row, 0.0, static_cast<double>(n - 1)));
+        return angle[i] + (row - static_cast<double>(i)) * (angle[i + 1] - angle[i]);
+    });
+}
+
+std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, double hz, double drift_hz_per_s) {
+    const auto phase = line_phase(size, rate_hz, hz, drift_hz_per_s);
+    std::vector<std::vector<double>> columns(2, std::vector<double>(size));
+    for (std::size_t i = 0; i < size; ++i) {
+        columns[0][i] = std::cos(phase[i]);
+        columns[1][i] = std::sin(phase[i]);
+    }
+    return columns;
+}
+
+std::vector<std::vector<double>> line_as_taken(const SampleSource& source, std::size_t size, double rate_hz, double hz,
+                                               double drift_hz_per_s) {
+    // An angle of sin(phase)/(2 sin(pi f/rate)) has increments of cos(phase).
+    const double gain = 2.0 * std::sin(units::pi * hz / rate_hz);
+    const auto phase = [&](double tick) {
+        const double t = (tick - source.from_phase) / source.from_hz - 0.5 * static_cast<double>(size) / rate_hz;
+        const double turns = hz * t + 0.5 * drift_hz_per_s * t * t;
+        return units::two_pi * (turns - std::floor(turns));
+    };
+    return {between_readings(source, size, 1.0 / rate_hz, [&](double tick) { return std::sin(phase(tick)) / gain; }),
+            between_readings(source, size, 1.0 / rate_hz, [&](double tick) { return -std::cos(phase(tick)) / gain; })};
+}
+
+Alias alias(double hz, double rate_hz) {
+    const double off = hz - std::round(hz / rate_hz) * rate_hz;
+    return {std::abs(off), off < 0.0};
+}
+
+Alias alias(double hz, double rate_hz, double from_hz) {
+    if (!(from_hz > 0.0)) return alias(hz, rate_hz);
+    const Alias read = alias(hz, from_hz);
+    const Alias seen = alias(read.hz, rate_hz);
+    return {seen.hz, read.folded != seen.folded};
+}
+
+std::vector<Alias> of_source(double shown_hz, double rate_hz, double from_hz) {
+    if (!(from_hz > 0.0)) return {{shown_hz, false}};
+    std::vector<Alias> all;
+    for (int m = 0; m * rate_hz <= 0.5 * from_hz + shown_hz; ++m) {
+        for (const int sign : {-1, 1}) {
+            const double hz = m * rate_hz + sign * shown_hz;
+            if (hz > 0.0 && hz <= 0.5 * from_hz) all.push_back({hz, sign < 0});
+        }
+    }
+    // Of a slower source a line shows above half its rate as well, if less.
+    if (all.empty()) all.push_back(alias(shown_hz, from_hz));
+    return all;
+}
+
+}  // namespace ringlock::closure
