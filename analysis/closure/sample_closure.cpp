@@ -13,6 +13,8 @@
 #include "analysis/closure/sample_figures.hpp"
 #include "analysis/closure/sample_fit.hpp"
 #include "analysis/closure/sample_lines.hpp"
+#include "analysis/closure/sample_rounded.hpp"
+#include "analysis/closure/sample_score.hpp"
 #include "analysis/closure/sample_screen.hpp"
 #include "analysis/closure/sample_search.hpp"
 #include "analysis/closure/sample_steps.hpp"
@@ -28,49 +30,6 @@ namespace {
 /// Of ten blocks, three are only reported.
 constexpr BlockRoles roles{1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
 
-struct Score {
-    double error = 0.0;
-    double log_score = 0.0;
-    double floor = 0.0;
-};
-
-/// One-step predictions of the rows that are only reported. With a lattice the prediction is a distribution on it.
-Score heldout(const SampleFit& fit, const Rows& reported, double lattice) {
-    Score score;
-    double count = 0.0;
-    for (std::size_t i = 0; i < reported.size(); ++i) {
-        if (!reported[i] || fit.settled(i)) continue;
-        const double sd = fit.sd(i);
-        double e = fit.innovations()[i] * sd;
-        score.log_score -= 0.5 * e * e / (sd * sd) + std::log(sd) + 0.5 * std::log(units::two_pi);
-        score.floor += sd * sd;
-        if (lattice > 0.02 * sd) {
-            const double x = fit.series().increment[i];
-            const double predicted = x - e;
-            const auto reach = static_cast<int>(std::ceil(6.0 * sd / lattice)) + 1;
-            const double middle = std::round(predicted / lattice);
-            double sum = 0.0;
-            double mean = 0.0;
-            for (int m = -reach; m <= reach; ++m) {
-                const double value = (middle + m) * lattice;
-                const double z = (value - predicted) / sd;
-                const double w = std::exp(-0.5 * z * z);
-                sum += w;
-                mean += w * value;
-            }
-            e = x - mean / sum;
-            // Of the step about each value, the density's share.
-            score.log_score -= std::log(sum * lattice / (sd * std::sqrt(units::two_pi)));
-        }
-        score.error += e * e;
-        count += 1.0;
-    }
-    count = std::max(count, 1.0);
-    score.error = std::sqrt(score.error / count);
-    score.floor = std::sqrt(score.floor / count);
-    return score;
-}
-
 /// Of the line that was added last.
 double line_hz(const SampleModel& model, bool wanders) {
     return wanders ? model.noise.resonances.back().hz : model.columns[model.columns.size() - 2].hz;
@@ -82,7 +41,10 @@ constexpr double most_disturbed = 0.6;
 class Loop {
    public:
     explicit Loop(const record::Record& record)
-        : record_(record), series_(prepare_samples(record)), chosen_(by_blocks(series_.size(), roles)) {}
+        : record_(record),
+          series_(prepare_samples(record)),
+          rounded_(series_),
+          chosen_(by_blocks(series_.size(), roles)) {}
 
     Closure run();
     Closure fit(const std::vector<ActiveEffect>& effects);
@@ -97,7 +59,12 @@ class Loop {
         /// What is added after another that was chosen with it is as confounded.
         std::vector<std::pair<std::string, std::vector<std::string>>> of_partners;
     };
-    double lattice_step() const { return series_.counted ? 0.25 * series_.scale_factor_arcsec : lattice_.step_arcsec; }
+    /// Of values as they are looked at: those that were drawn are in none that could be seen.
+    double lattice_step() const {
+        if (rounded_.drawn()) return 1e-9 * rounded_.step_arcsec();
+        return counted_step() > 0.0 ? counted_step() : lattice_.step_arcsec;
+    }
+    double counted_step() const { return series_.counted ? 0.25 * series_.scale_factor_arcsec : 0.0; }
     std::vector<double> chosen_increments() const;
     Rows all_rows() const;
     void begin(Closure& closure);
@@ -110,8 +77,13 @@ class Loop {
     void test_what_is_left(Closure& closure) const;
     void finish(Closure& closure);
 
+    void find_coarse_steps(Closure& closure);
+    SampleScore score() const;
+    SampleFigures figures();
+
     const record::Record& record_;
     SampleSeries series_;
+    RoundedSamples rounded_;
     Rows chosen_;
     Rows rows_;  ///< chosen and not disturbed
     Rows reported_;
@@ -125,13 +97,11 @@ class Loop {
     int next_step_ = 0;
 };
 
-/// What a witness tells at lags, it does not tell at the ends of the record; and a filter that begins with what is not
-/// foretold takes a while to forget it.
+/// What a witness tells at lags, it does not tell at the ends of the record.
 Rows Loop::all_rows() const {
     Rows all(series_.size(), 1);
     if (series_.witnesses.empty()) return all;
-    const std::size_t ends =
-        std::min(4 * static_cast<std::size_t>(witness_lags(series_.rate_hz)), series_.size() / 20);
+    const std::size_t ends = std::min(static_cast<std::size_t>(witness_lags(series_.rate_hz)), series_.size() / 20);
     for (std::size_t i = 0; i < ends; ++i) all[i] = all[all.size() - 1 - i] = 0;
     return all;
 }
@@ -140,6 +110,7 @@ void Loop::begin(Closure& closure) {
     closure.unit = "arcsec";
     closure.level = level;
     whole_ = all_rows();
+    rounded_.restore();
     rows_.resize(chosen_.size());
     reported_.resize(chosen_.size());
     for (std::size_t i = 0; i < chosen_.size(); ++i) {
@@ -160,7 +131,7 @@ void Loop::begin(Closure& closure) {
     now_ = {};
     next_step_ = 0;
     now_.fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
-    closure.heldout_before = heldout(*now_.fit, reported_, 0.0).error;
+    closure.heldout_before = score_of(*now_.fit, reported_, 0.0).error;
     if (disturbed_.rows.empty()) disturbed_ = find_disturbed(*now_.fit, whole_);
     if (disturbed_.share >= most_disturbed) disturbed_.rows.assign(disturbed_.rows.size(), 0);
     if (disturbed_.share > 0.0 && disturbed_.share < most_disturbed) {
@@ -174,7 +145,7 @@ void Loop::begin(Closure& closure) {
             "{:.1f} % of the record is disturbed, up to {:.3g} times the usual variance, most at {:.6g} s; nothing is "
             "fitted to it, held-out errors leave it out ({:.6g} arcsec before with it)",
             100.0 * disturbed_.share, disturbed_.worst, disturbed_.at_s, with));
-        closure.heldout_before = heldout(*now_.fit, reported_, 0.0).error;
+        closure.heldout_before = score_of(*now_.fit, reported_, 0.0).error;
     }
     base_log_likelihood_ = now_.fit->log_likelihood();
 }
@@ -190,9 +161,10 @@ std::vector<double> Loop::chosen_increments() const {
 
 void Loop::take_lattice(Closure& closure) {
     if (series_.counted) {
-        closure.notes.push_back(
-            fmt::format("counts are whole by their kind: steps of {:.6g} arcsec are no missing effect",
-                        0.25 * series_.scale_factor_arcsec));
+        closure.notes.push_back(fmt::format(
+            "counts are whole by their kind: steps of {:.6g} arcsec are no missing effect", counted_step()));
+        find_coarse_steps(closure);
+        if (rounded_.drawn()) closure.heldout_before = score().error;
         return;
     }
     lattice_ = find_lattice(chosen_increments());
@@ -215,16 +187,37 @@ void Loop::take_lattice(Closure& closure) {
     Step taken;
     taken.effect = "count_quantization";
     taken.p_value = lattice_.p_value;
-    const Score before = heldout(*now_.fit, reported_, 0.0);
+    const SampleScore before = score_of(*now_.fit, reported_, 0.0);
     // Blurred steps are not where the values are: the digits are.
     used_step_ = blurred ? lattice_.printed_arcsec : step;
-    const Score after = heldout(*now_.fit, reported_, used_step_);
+    find_coarse_steps(closure);
+    const SampleScore after = score();
     taken.heldout_error_before = before.error;
     taken.heldout_error_after = after.error;
     taken.heldout_log_score_gain = after.log_score - before.log_score;
     taken.parameters.push_back({"count_quantization", "step_arcsec", step, lattice_.step_sd_arcsec});
     now_.steps.push_back(std::move(taken));
     now_.told.push_back({"count_quantization", next_step_++});
+}
+
+/// Steps whose rounding follows the angle.
+void Loop::find_coarse_steps(Closure& closure) {
+    const bool blurred = lattice_.step_arcsec > 1.5 * lattice_.printed_arcsec;
+    const double step = series_.counted ? counted_step() : blurred ? 0.0 : lattice_.step_arcsec;
+    if (!RoundedSamples::show(*now_.fit, step)) return;
+    if (auto drawn = rounded_.begin(*now_.fit, step)) {
+        now_.fit = std::move(drawn);
+        base_log_likelihood_ = score().log_likelihood;
+        return;
+    }
+    closure.notes.push_back(
+        fmt::format("steps of {:.6g} arcsec are so large beside the noise that what they hide cannot be drawn: their "
+                    "rounding is left in the residual",
+                    step));
+}
+
+SampleScore Loop::score() const {
+    return rounded_.drawn() ? rounded_.score_of(*now_.fit, reported_) : score_of(*now_.fit, reported_, used_step_);
 }
 
 /// Effects that stood in for the one added last are no longer needed beside it.
@@ -286,10 +279,10 @@ void Loop::test_what_is_left(Closure& closure) const {
 
 /// What is reported: errors of the blocks held out, parameters of a last fit to the whole record.
 void Loop::finish(Closure& closure) {
-    const Score last = heldout(*now_.fit, reported_, used_step_);
+    const SampleScore last = score();
     closure.heldout_after = last.error;
     closure.noise_floor = last.floor;
-    closure.log_likelihood_gain = now_.fit->log_likelihood() - base_log_likelihood_;
+    closure.log_likelihood_gain = last.log_likelihood - base_log_likelihood_;
     closure.residual.time_s = series_.time_s;
     for (std::size_t i = 0; i < series_.size(); ++i) {
         closure.residual.innovation.push_back(now_.fit->innovations()[i] * now_.fit->sd(i));
@@ -302,9 +295,7 @@ void Loop::finish(Closure& closure) {
         for (const double x : series_.input_rate_deg_h) input += x / static_cast<double>(series_.size());
     }
     closure.mean_input_rate_deg_h = input;
-    SampleFit whole(series_, now_.fit->model(), whole_, SampleFit::Noise::near);
-    whole = refine_steps(refine_lines(series_, std::move(whole), whole_), whole_);
-    SampleFigures figures = figures_of(whole, now_.told, record_.declared);
+    SampleFigures figures = this->figures();
     closure.base = std::move(figures.base);
     closure.steps = std::move(now_.steps);
     for (std::size_t k = 0; k < closure.steps.size(); ++k) {
@@ -336,6 +327,15 @@ bool Loop::restore() {
     less.share = left / static_cast<double>(less.rows.size());
     disturbed_ = std::move(less);
     return true;
+}
+
+/// Of a fit to the whole record.
+SampleFigures Loop::figures() {
+    const auto of = [&](const SampleFit& fit) {
+        return figures_of(refine_steps(refine_lines(series_, fit, whole_), whole_), now_.told, record_.declared);
+    };
+    const SampleFit whole(series_, now_.fit->model(), whole_, SampleFit::Noise::near);
+    return rounded_.drawn() ? rounded_.figures_of(whole, of) : of(whole);
 }
 
 Closure Loop::run() {
@@ -372,6 +372,7 @@ void Loop::close(Closure& closure) {
 }
 
 /// Adds an effect to the model.
+constexpr int draws_of_step = 4;
 void Loop::take(const SampleChoice& choice, Closure& closure) {
     const SampleContender& best = *choice.chosen;
     const std::string effect = best.candidate.effect;
@@ -388,11 +389,12 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     }
     now_.of_partners.insert(now_.of_partners.end(), choice.of_partners.begin(), choice.of_partners.end());
     if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
-    const Score before = heldout(*now_.fit, reported_, used_step_);
+    const SampleScore before = score();
     now_.fit = best.fit;
     drop_needless();
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
-    const Score after = heldout(*now_.fit, reported_, used_step_);
+    if (rounded_.drawn()) now_.fit = rounded_.draw(now_.fit, draws_of_step);
+    const SampleScore after = score();
     step.heldout_error_before = before.error;
     step.heldout_error_after = after.error;
     step.heldout_log_score_gain = after.log_score - before.log_score;
@@ -493,6 +495,7 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
         }
     }
     now_.fit = std::make_shared<SampleFit>(series_, std::move(model), rows_, noise);
+    if (series_.counted || used_step_ > 0.0) find_coarse_steps(closure);
     finish(closure);
     return closure;
 }

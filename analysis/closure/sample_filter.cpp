@@ -227,6 +227,28 @@ SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double in
     });
 }
 
+void SampleFilter::begin(double reading, State& x) const {
+    x.fill(0.0);
+    x[0] = reading;
+}
+
+double SampleFilter::foretell(State& x) const {
+    State next{};
+    double reading = 0.0;
+    for (int i = 0; i < n_; ++i) {
+        const Terms& terms = nonzero_[i];
+        for (int k = 0; k < terms.count; ++k) next[i] += f_[i][terms.at[k]] * x[terms.at[k]];
+        reading += h_[i] * next[i];
+    }
+    x = next;
+    return reading;
+}
+
+void SampleFilter::take(std::size_t row, double innovation, State& x) const {
+    const double* gain = gain_.data() + std::min(row, sd_.size() - 1) * static_cast<std::size_t>(n_);
+    for (int i = 0; i < n_; ++i) x[i] += gain[i] * innovation;
+}
+
 std::vector<double> SampleFilter::apply(std::span<const double> increments) const {
     std::vector<double> out(increments.size());
     for_states(n_, [&](auto d) {

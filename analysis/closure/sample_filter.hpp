@@ -44,9 +44,15 @@ class SampleFilter {
                                        std::span<const std::uint8_t> rows);
 
     static constexpr int most = 16;
+    using Vector = std::array<double, most>;
+
+    /// The filter step by step, for readings of the angle that are not known beforehand; not of a resampled record.
+    using State = Vector;
+    void begin(double reading, State& x) const;
+    double foretell(State& x) const;  ///< of the next reading
+    void take(std::size_t row, double innovation, State& x) const;
 
    private:
-    using Vector = std::array<double, most>;
     using Matrix = std::array<Vector, most>;
     struct Terms {
         int count = 0;

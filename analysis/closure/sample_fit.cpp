@@ -180,25 +180,27 @@ void SampleFit::take_whites(SampleNoise& noise) const {
     noise.rate_arcsec_rt_s = std::sqrt((white - 2.0 * angle) * series_->rate_hz);
 }
 
-void SampleFit::take_off() {
-    rest_ = series_->increment;
+std::vector<double> SampleFit::determined() const {
+    std::vector<double> sum(series_->size(), 0.0);
+    const auto add = [&](double value, const std::vector<double>& series) {
+        for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += value * series[i];
+    };
     if (!series_->input_rate_deg_h.empty()) {
         // What is known of the input but for its mean, which belongs to the mean rate.
         const auto& input = series_->input_rate_deg_h;
         const double mean = std::accumulate(input.begin(), input.end(), 0.0) / static_cast<double>(input.size());
-        std::vector<double> known(rest_.size());
+        std::vector<double> known(sum.size());
         for (std::size_t i = 0; i < known.size(); ++i) known[i] = (input[i] - mean) * series_->interval_s;
-        known = as_taken(known);
-        for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= known[i];
+        add(1.0, as_taken(known));
     }
-    if (!model_.motion.empty()) {
-        const auto motion = as_taken(model_.motion);
-        for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= motion[i];
-    }
-    for (const SampleColumn& column : model_.columns) {
-        const auto c = taken(column);
-        for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] -= column.value * c[i];
-    }
+    if (!model_.motion.empty()) add(1.0, as_taken(model_.motion));
+    for (const SampleColumn& column : model_.columns) add(column.value, taken(column));
+    return sum;
+}
+
+void SampleFit::take_off() {
+    rest_ = determined();
+    for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] = series_->increment[i] - rest_[i];
 }
 
 double SampleFit::evaluate(const SampleModel& model, std::span<const double> rest, const Rows& rows) const {

@@ -74,7 +74,9 @@ class SampleFit {
     std::vector<std::vector<double>> line(double hz, double drift_hz_per_s) const;
     /// Of a column.
     std::vector<double> taken(const SampleColumn& column) const;
-    /// Increments less all that is deterministic.
+    /// Increments by all that is deterministic in the model.
+    std::vector<double> determined() const;
+    /// Increments less that.
     const std::vector<double>& rest() const { return rest_; }
     /// Standard errors of the noise, by Fisher's information of the rows that count: a model that holds them in the
     /// places of what they belong to. Columns are known independently of the noise and have theirs.

@@ -72,7 +72,7 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     double best = 0.0;
     std::size_t at = 0;
     const double root_of_worth = std::sqrt(worth);
-    constexpr std::size_t places = 80;
+    constexpr std::size_t places = places_of_a_step;
     for (std::size_t k = 1; k < places; ++k) {
         const double root = root_of_worth * root_of_step(now, n * k / places);
         roots.push_back(root);

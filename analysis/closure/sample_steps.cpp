@@ -19,10 +19,12 @@ double root_of_step(const SampleFit& fit, std::size_t row) {
 }
 
 std::size_t refine_place(const SampleFit& without, std::size_t row, std::size_t reach) {
-    const std::size_t last = without.series().size() - 2;
+    // Nearer to an end a step can hardly be told from how the record begins, or ends.
+    const std::size_t first = std::max<std::size_t>(1, without.series().size() / places_of_a_step);
+    const std::size_t last = without.series().size() - 1 - first;
     double best = std::abs(root_of_step(without, row));
     for (std::size_t d = reach; d > 0; d /= 2) {
-        for (const std::size_t at : {row > d ? row - d : 1, std::min(last, row + d)}) {
+        for (const std::size_t at : {std::max(first, row - std::min(row, d)), std::min(last, row + d)}) {
             const double root = std::abs(root_of_step(without, at));
             if (root <= best) continue;
             best = root;
@@ -61,7 +63,7 @@ SampleFit refine_steps(SampleFit fit, const Rows& rows) {
         for (std::size_t k = 0; k < fit.model().columns.size(); ++k) {
             if (fit.model().columns[k].effect != "bias_step") continue;
             const std::size_t row = row_of_step(fit.model().columns[k]);
-            const std::size_t at = refine_place(without_column(fit, k, rows), row, fit.series().size() / 160);
+            const std::size_t at = refine_place(without_column(fit, k, rows), row, fit.series().size() / (2 * places_of_a_step));
             if (at == row) continue;
             moved = true;
             fit = with_place(fit, k, at, rows);

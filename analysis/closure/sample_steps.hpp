@@ -11,6 +11,9 @@ std::size_t row_of_step(const SampleColumn& step);
 /// What a step at that row explains, its sign that of the step.
 double root_of_step(const SampleFit& fit, std::size_t row);
 
+/// Of which a record is searched for a step before the likeliest is refined.
+inline constexpr std::size_t places_of_a_step = 80;
+
 /// The row near that one at which a step explains most: within so many rows, by halves of that. The model has no step.
 std::size_t refine_place(const SampleFit& without, std::size_t row, std::size_t reach);
 

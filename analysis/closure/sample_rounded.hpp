@@ -1,0 +1,51 @@
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "analysis/closure/sample_figures.hpp"
+#include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_score.hpp"
+
+namespace ringlock::closure {
+
+/// The increments of a record as they were measured, and in their place, where they come in steps whose rounding shows
+/// the angle, increments that are drawn from them: all that fits and tests then sees noise that is normal.
+class RoundedSamples {
+   public:
+    explicit RoundedSamples(SampleSeries& series) : series_(series), measured_(series.increment) {}
+
+    /// Those that were measured.
+    void restore();
+    bool drawn() const { return step_ > 0.0; }
+    double step_arcsec() const { return step_; }
+    /// Whether such steps show the angle beside what is left of the fit's noise without their variance.
+    static bool show(const SampleFit& fit, double step_arcsec);
+    /// Draws them: the fit to what was drawn. None where what the steps hide cannot be drawn; they are as measured then.
+    std::shared_ptr<SampleFit> begin(const SampleFit& fit, double step_arcsec);
+    /// The same, drawn by another model: what was rounded is drawn by it and the model fitted to that, a stochastic
+    /// approximation of the likeliest (Celeux and Diebolt, Comput. Stat. Q. 2, 73, 1985).
+    std::shared_ptr<SampleFit> draw(std::shared_ptr<SampleFit> fit, int rounds);
+    /// Of the measured increments.
+    SampleScore score_of(const SampleFit& fit, const Rows& reported) const;
+    /// The mean of several, each of increments that were drawn with white noises as the draw before leaves them open;
+    /// what they are apart counted (Rubin, "Multiple Imputation for Nonresponse in Surveys", 1987, equation 3.1.5).
+    SampleFigures figures_of(const SampleFit& fit, const std::function<SampleFigures(const SampleFit&)>& figures);
+
+   private:
+    static constexpr double times_along = 1.4;
+    struct Parabola {
+        double slope, bend;  ///< a power of these times
+    };
+    Parabola along(const SampleFit& fit, double SampleNoise::* noise) const;
+    std::shared_ptr<SampleFit> with_likeliest_readings(const SampleFit& fit) const;
+    bool foretells_as_said(const SampleFit& fit) const;
+
+    SampleSeries& series_;
+    const std::vector<double> measured_;
+    double step_ = 0.0;
+    std::uint64_t draws_ = 0;
+};
+
+}  // namespace ringlock::closure

@@ -1,0 +1,135 @@
+// Records whose values come in steps that are large beside their noise, which the closed loop reads.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+
+#include "analysis/closure/closure.hpp"
+#include "analysis/closure/sample_score.hpp"
+#include "analysis/closure/sample_unrounding.hpp"
+#include "tests/closure/samples.hpp"
+
+namespace ringlock::test::closure {
+namespace {
+
+using ringlock::closure::close_samples;
+using ringlock::closure::Closure;
+using ringlock::closure::Rows;
+using ringlock::closure::SampleFit;
+using ringlock::closure::SampleModel;
+using ringlock::closure::SampleSeries;
+using ringlock::closure::Verdict;
+
+constexpr double step_arcsec = 0.5;
+
+/// Quarter counts of half an arcsec, of a gyro whose readings have so much noise.
+SampleTruth counted(double white_angle_arcsec, std::uint64_t seed = 1) {
+    SampleTruth truth;
+    truth.size = 15000;
+    truth.seed = seed;
+    truth.kind = record::SampleKind::quarter_count;
+    truth.scale_factor_arcsec = 4.0 * step_arcsec;
+    truth.white_angle_arcsec = white_angle_arcsec;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.mean_rate_deg_h = 10.0;
+    return truth;
+}
+
+/// The model that is true of them.
+SampleFit true_fit(const SampleTruth& truth, const SampleSeries& series, const Rows& rows) {
+    const SampleFit base(series, SampleModel{}, rows);
+    SampleModel model = base.model();
+    model.noise.angle_arcsec = truth.white_angle_arcsec;
+    model.noise.rate_arcsec_rt_s = 60.0 * truth.rates.quantum_noise_deg_rt_h;
+    return {series, std::move(model), rows, SampleFit::Noise::held};
+}
+
+TEST(RoundedReadings, AreDrawnWithinTheirStepsAsNormalAsTheirModel) {
+    const SampleTruth truth = counted(0.1);
+    SampleSeries series = ringlock::closure::prepare_samples(generate_samples(truth));
+    const Rows rows(series.size(), 1);
+    const std::vector<double> rounded = series.increment;
+    const SampleFit fit = true_fit(truth, series, rows);
+    series.increment = ringlock::closure::unround(fit, rounded, step_arcsec, 1);
+    double off = 0.0;
+    double least = 0.0;
+    double most = 0.0;
+    for (std::size_t i = 0; i < rounded.size(); ++i) {
+        off += series.increment[i] - rounded[i];
+        least = std::min(least, off);
+        most = std::max(most, off);
+    }
+    EXPECT_LT(most - least, step_arcsec * (1.0 + 1e-6));
+    const SampleFit drawn = true_fit(truth, series, rows);
+    double square = 0.0;
+    double next = 0.0;
+    for (std::size_t i = 1; i < series.size(); ++i) {
+        square += drawn.innovations()[i] * drawn.innovations()[i];
+        next += drawn.innovations()[i] * drawn.innovations()[i - 1];
+    }
+    const auto n = static_cast<double>(series.size());
+    EXPECT_NEAR(square / n, 1.0, 4.0 * std::sqrt(2.0 / n));
+    EXPECT_NEAR(next / n, 0.0, 4.0 / std::sqrt(n));
+}
+
+// What is foretold of each count has the spread that it says, and makes the counts more probable than the noise of
+// rounding that does not follow the angle.
+TEST(RoundedReadings, AreForetoldWithTheSpreadThatIsSaid) {
+    const SampleTruth truth = counted(0.05);
+    const SampleSeries series = ringlock::closure::prepare_samples(generate_samples(truth));
+    const Rows rows(series.size(), 1);
+    const SampleFit fit = true_fit(truth, series, rows);
+    const auto foretold = ringlock::closure::foretell_rounded(fit, series.increment, step_arcsec);
+    double squares = 0.0;
+    double variance = 0.0;
+    double log_probability = 0.0;
+    for (std::size_t i = 0; i < series.size(); ++i) {
+        squares += std::pow(series.increment[i] - foretold.mean[i], 2);
+        variance += foretold.variance[i];
+        log_probability += foretold.log_probability[i] - std::log(step_arcsec);
+    }
+    const SampleFit linear(series, SampleModel{}, rows);
+    EXPECT_NEAR(squares / variance, 1.0, 0.08);
+    EXPECT_GT(log_probability, score_of(linear, rows, step_arcsec).log_score + 50.0);
+}
+
+TEST(RoundedRecords, CountsBesideLittleNoiseAreNoStructure) {
+    for (const double noise : {0.1, 0.05, 0.0}) {
+        SCOPED_TRACE(noise);
+        const Closure found = close_samples(generate_samples(counted(noise)));
+        EXPECT_EQ(found.verdict, Verdict::nothing_missing);
+        EXPECT_NEAR(found.base[0].value, 10.0, 4.0 * found.base[0].sd);
+        EXPECT_NEAR(found.base[2].value, 0.01, 4.0 * found.base[2].sd);
+        if (noise > 0.0) {
+            EXPECT_NEAR(found.base[1].value, noise, 4.0 * found.base[1].sd);
+        }
+        EXPECT_NEAR(found.heldout_after, found.noise_floor, 0.05 * found.noise_floor);
+    }
+}
+
+TEST(RoundedRecords, EffectsShowThroughTheSteps) {
+    SampleTruth truth = counted(0.1, 3);
+    truth.rates.bias_step = {6.0, 70.0};
+    const Closure found = close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, Verdict::closed);
+    ASSERT_EQ(found.steps.size(), 1U);
+    EXPECT_EQ(found.steps[0].effect, "bias_step");
+    EXPECT_NEAR(found.steps[0].parameters[0].value, 6.0, 4.0 * found.steps[0].parameters[0].sd);
+    EXPECT_LT(found.heldout_after, found.heldout_before);
+}
+
+// Steps that nobody declared are an effect, which takes its rounding with it.
+TEST(RoundedRecords, LargeStepsAreNamedAndLeaveNothing) {
+    SampleTruth truth = counted(0.3);
+    truth.kind = record::SampleKind::angle_increment_arcsec;
+    truth.count_quantization_arcsec = 1.5;
+    const Closure found = close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, Verdict::closed);
+    ASSERT_EQ(found.steps.size(), 1U);
+    EXPECT_EQ(found.steps[0].effect, "count_quantization");
+    EXPECT_LT(found.heldout_after, found.heldout_before);
+    EXPECT_NEAR(found.base[1].value, 0.3, 4.0 * found.base[1].sd);
+}
+
+}  // namespace
+}  // namespace ringlock::test::closure
