@@ -71,7 +71,8 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
     }
     // What is fitted as white noise of the angle has that of the steps in it.
     const double white = value_of(closure.base, "white_angle_arcsec", 0.0);
-    const double angle_arcsec = std::sqrt(std::max(0.0, white * white - step_arcsec * step_arcsec / 12.0));
+    const double rounding = closure.rounding_in_noise ? step_arcsec * step_arcsec / 12.0 : 0.0;
+    const double angle_arcsec = std::sqrt(std::max(0.0, white * white - rounding));
     // A phase whose noise is a twentieth of a radian is normal to a thousandth.
     constexpr double noise_rad = 0.05;
     if (angle_arcsec > 1e-6) {

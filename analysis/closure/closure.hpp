@@ -50,6 +50,7 @@ struct Closure {
     std::vector<std::string> notes;      ///< what was assumed
     double level = 0.0;                  ///< probability of any false alarm
     double mean_input_rate_deg_h = 0.0;  ///< known input, of which the bias is free
+    bool rounding_in_noise = true;       ///< of samples: the white noise of the angle has that of its steps in it
     Residual residual;
 };
 

@@ -208,6 +208,10 @@ void Loop::find_coarse_steps(Closure& closure) {
     if (auto drawn = rounded_.begin(*now_.fit, step)) {
         now_.fit = std::move(drawn);
         base_log_likelihood_ = score().log_likelihood;
+        closure.notes.push_back(fmt::format(
+            "steps of {:.6g} arcsec are large beside the noise, and their rounding follows the angle: what was rounded is "
+            "drawn by the model, and white_angle_arcsec is the noise before it was rounded",
+            step));
         return;
     }
     closure.notes.push_back(
@@ -296,6 +300,7 @@ void Loop::finish(Closure& closure) {
     }
     closure.mean_input_rate_deg_h = input;
     SampleFigures figures = this->figures();
+    closure.rounding_in_noise = !rounded_.drawn();
     closure.base = std::move(figures.base);
     closure.steps = std::move(now_.steps);
     for (std::size_t k = 0; k < closure.steps.size(); ++k) {
