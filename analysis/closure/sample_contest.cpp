@@ -124,15 +124,16 @@ Contest::Shared Contest::fitted(const SampleState& state, SampleCandidate candid
 /// it is, which may have swallowed a slow rate: of these more are looked at.
 std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
                                                  std::vector<SampleCandidate> candidates) const {
-    std::vector<Shared> all;
-    for (SampleCandidate& candidate : candidates) {
+    std::erase_if(candidates, [](const SampleCandidate& candidate) {
         const bool worth =
             (is_slow(candidate.effect) || is_line(candidate.effect)) && candidate.p_value < worth_looking;
-        if (!passes_on_samples(candidate.p_value) && !worth) continue;
-        if (all.size() >= most_contenders + 2) break;
-        Shared contender = fitted(state, std::move(candidate));
-        if (contender->passes) all.push_back(std::move(contender));
-    }
+        return !passes_on_samples(candidate.p_value) && !worth;
+    });
+    std::vector<Shared> all(candidates.size());
+    oneapi::tbb::parallel_for(std::size_t{0}, all.size(),
+                              [&](std::size_t k) { all[k] = fitted(state, std::move(candidates[k])); });
+    std::erase_if(all, [](const Shared& contender) { return !contender->passes; });
+    if (all.size() > most_contenders + 2) all.resize(most_contenders + 2);
     std::sort(all.begin(), all.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
     return all;
 }
