@@ -167,7 +167,7 @@ void Loop::take_lattice(Closure& closure) {
         if (rounded_.drawn()) closure.heldout_before = score().error;
         return;
     }
-    lattice_ = find_lattice(chosen_increments());
+    lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
     if (lattice_.step_arcsec == 0.0) return;
     const double step = lattice_.step_arcsec;
     const double sd = now_.fit->sd(series_.size() / 2);
@@ -455,7 +455,7 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
         const int k = next_step_++;
         SampleStep told{effect, k};
         if (effect == "count_quantization") {
-            lattice_ = find_lattice(chosen_increments());
+            lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
             used_step_ = lattice_.printed_arcsec;
         } else if (is_line(effect)) {
             const Alias shown = alias(active.values.at("frequency_hz"), from_hz > 0.0 ? from_hz : series_.rate_hz);

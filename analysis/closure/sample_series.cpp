@@ -118,7 +118,7 @@ SampleSeries prepare_samples(const record::Record& record) {
     return series;
 }
 
-Lattice find_lattice(const std::vector<double>& increments) {
+Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
     Lattice lattice;
     std::vector<double> sorted = increments;
     std::sort(sorted.begin(), sorted.end());
@@ -172,7 +172,7 @@ Lattice find_lattice(const std::vector<double>& increments) {
     }
     const double quartile = 0.5 * (sorted[n * 7 / 8] - sorted[n / 8]);  // 1.15 sigma
     for (const auto& [x, w] : weights) second += std::min(x * x, 9.0 * quartile * quartile + 1e-300) * w / count;
-    const double sigma = std::sqrt(second);
+    const double sigma = std::min(std::sqrt(second), sd_arcsec);
     const auto characteristic = [&](double u) {
         std::complex<double> sum = 0.0;
         for (const auto& [x, w] : weights) sum += w * std::polar(1.0, units::two_pi * u * x);

@@ -35,6 +35,7 @@ struct Lattice {
     double p_value = 1.0;
     double step_sd_arcsec = 0.0;  ///< standard error of the step
 };
-Lattice find_lattice(const std::vector<double>& increments);
+/// \param sd_arcsec  of what one increment does not tell of the next: rates that the record dwells at are no steps
+Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec);
 
 }  // namespace ringlock::closure

@@ -85,6 +85,15 @@ TEST(SampleClosure, NamesWhatTheDataChainDid) {
     EXPECT_NEAR(value_of(only_step(closed(truth), "resampling"), "from_hz"), 123.4, 2e-3);
 }
 
+// A distribution of rates with several tops has a characteristic function that looks like a coarser step.
+TEST(SampleClosure, RatesThatARecordDwellsAtAreNoSteps) {
+    SampleTruth truth = usual();
+    truth.size = 10000;
+    truth.count_quantization_arcsec = 0.25;
+    truth.input_profile_deg_h = {{0.0, 45.0, 46.0, 90.0, 91.0, 101.0}, {330.0, 330.0, -330.0, -330.0, 165.0, 165.0}};
+    EXPECT_NEAR(value_of(only_step(closed(truth), "count_quantization"), "step_arcsec"), 0.25, 1e-6);
+}
+
 TEST(SampleClosure, NamesADitherThatDrifts) {
     SampleTruth truth = usual();
     truth.dither_residue = {437.3, 1e-4, 0.05, 0.0};
