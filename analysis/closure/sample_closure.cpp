@@ -91,6 +91,7 @@ class Loop {
     Disturbed disturbed_;
     Lattice lattice_;
     double used_step_ = 0.0;            ///< of the lattice in the model
+    std::shared_ptr<SampleFit> base_;
     double base_log_likelihood_ = 0.0;  ///< of the rows that choose
     State now_;
     std::optional<State> earlier_;  ///< before the first random rate
@@ -147,7 +148,8 @@ void Loop::begin(Closure& closure) {
             100.0 * disturbed_.share, disturbed_.worst, disturbed_.at_s, with));
         closure.heldout_before = score_of(*now_.fit, reported_, 0.0).error;
     }
-    base_log_likelihood_ = now_.fit->log_likelihood();
+    base_ = now_.fit;
+    base_log_likelihood_ = base_->log_likelihood();
 }
 
 /// Values that nothing is held out of: steps are chosen like any other effect.
@@ -207,17 +209,19 @@ void Loop::find_coarse_steps(Closure& closure) {
     if (!RoundedSamples::show(*now_.fit, step)) return;
     if (auto drawn = rounded_.begin(*now_.fit, step)) {
         now_.fit = std::move(drawn);
-        base_log_likelihood_ = score().log_likelihood;
+        base_log_likelihood_ = rounded_.score_of(now_.steps.size() < 2 ? *now_.fit : *base_, reported_).log_likelihood;
         closure.notes.push_back(fmt::format(
             "steps of {:.6g} arcsec are large beside the noise, and their rounding follows the angle: what was rounded is "
             "drawn by the model, and white_angle_arcsec is the noise before it was rounded",
             step));
         return;
     }
-    closure.notes.push_back(
+    const std::string note =
         fmt::format("steps of {:.6g} arcsec are so large beside the noise that what they hide cannot be drawn: their "
                     "rounding is left in the residual",
-                    step));
+                    step);
+    auto& notes = closure.notes;
+    if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
 }
 
 SampleScore Loop::score() const {
@@ -398,7 +402,12 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     now_.fit = best.fit;
     drop_needless();
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
-    if (rounded_.drawn()) now_.fit = rounded_.draw(now_.fit, draws_of_step);
+    if (rounded_.drawn()) {
+        now_.fit = rounded_.draw(now_.fit, draws_of_step);
+    } else if (series_.counted || used_step_ > 0.0) {
+        // What has been taken off may have been what the rounding was small beside.
+        find_coarse_steps(closure);
+    }
     const SampleScore after = score();
     step.heldout_error_before = before.error;
     step.heldout_error_after = after.error;

@@ -78,7 +78,6 @@ std::vector<Free> knobs(SampleModel& model) {
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
         auto& resonance = model.noise.resonances[k];
         all.push_back({&resonance.arcsec, true});
-        if (k > 0 && model.resonances[k] == model.resonances[k - 1]) continue;
         // A wandering line is narrow: its frequency is known to its width.
         all.push_back({&resonance.hz, true, std::min(1.0, resonance.width_hz / resonance.hz)});
         all.push_back({&resonance.width_hz, true});
@@ -218,10 +217,6 @@ SampleModel SampleFit::at(const std::vector<double>& x) const {
         *free[i].value = free[i].logarithmic ? std::exp(x[i] * free[i].scale) : x[i];
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
         auto& resonance = model.noise.resonances[k];
-        if (k > 0 && model.resonances[k] == model.resonances[k - 1]) {
-            resonance.hz = model.noise.resonances[k - 1].hz;
-            resonance.width_hz = 3.0 * model.noise.resonances[k - 1].width_hz;
-        }
         const double rate_hz = model.noise.from_hz > 0.0 ? model.noise.from_hz : series_->rate_hz;
         if (resonance.hz > 0.5 * rate_hz || resonance.width_hz > 3.0 * rate_hz) resonance.arcsec = 0.0;
     }

@@ -32,8 +32,7 @@ struct SampleModel {
     std::vector<SampleColumn> columns;  ///< the mean rate first
     std::vector<double> motion;         ///< of the case, by its witness: taken off the increments; empty: none
     double from_shift = 0.0;            ///< of from_hz, in tenths of a cycle over the record, while it is fitted
-    /// Whose resonances the noise has, in their order. The second of one effect has the first's frequency and three
-    /// times its width.
+    /// Whose resonances the noise has, in their order.
     std::vector<std::string> resonances;
     std::vector<int> resonance_steps;  ///< of the loop that added each
     bool walk = false;

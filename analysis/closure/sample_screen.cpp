@@ -385,11 +385,12 @@ void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector
                       .parameters = 2 * witness.lags + 1,
                       .freedom = 2 * witness.lags + 1};
     c.model.motion = motion.increments;
-    // What the witness does not tell moves like what it tells; its own noise hides the edges of that.
+    // What the witness does not tell moves like what it tells; its own noise hides the edges of that, which are wider.
     const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
     c.model.noise.resonances.push_back(
         {untold, std::max(motion.centre_hz, 0.01), std::max(0.5 * motion.centre_hz, 0.01)});
-    c.model.noise.resonances.push_back({0.3 * untold, 1.0, 1.0});
+    c.model.noise.resonances.push_back(
+        {0.3 * untold, std::max(motion.centre_hz, 0.01), 3.0 * std::max(0.5 * motion.centre_hz, 0.01)});
     c.model.resonances.insert(c.model.resonances.end(), 2, "case_motion");
     c.model.resonance_steps.insert(c.model.resonance_steps.end(), 2, in.step);
     // Once more with what is left as the noise.

@@ -174,6 +174,11 @@ TEST(SampleClosure, NamesWhatIsStrong) {
     truth.case_motion.coherence = 0.7;
     truth.case_motion.centre_hz = 1.4;
     only_step(closed(truth), "case_motion");
+    // What the witness does not tell of it has a spectrum of its own, which shows in a longer record.
+    truth = usual();
+    truth.white_angle_arcsec = 0.2;
+    truth.case_motion.rms_arcsec = 1.5;
+    only_step(closed(truth), "case_motion");
 }
 
 TEST(SampleClosure, DoesNotNameWhatTheLibraryDoesNotHave) {
