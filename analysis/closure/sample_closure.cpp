@@ -17,8 +17,8 @@
 #include "analysis/closure/sample_score.hpp"
 #include "analysis/closure/sample_screen.hpp"
 #include "analysis/closure/sample_search.hpp"
-#include "analysis/closure/sample_steps.hpp"
 #include "analysis/closure/sample_series.hpp"
+#include "analysis/closure/sample_steps.hpp"
 #include "analysis/closure/sample_tests.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
@@ -37,6 +37,9 @@ double line_hz(const SampleModel& model, bool wanders) {
 
 /// Of a record; where it is more, that is what the record is like.
 constexpr double most_disturbed = 0.6;
+
+/// Of increments that were rounded, after every step.
+constexpr int draws_of_step = 4;
 
 class Loop {
    public:
@@ -78,7 +81,7 @@ class Loop {
     void finish(Closure& closure);
 
     void find_coarse_steps(Closure& closure);
-    SampleScore score() const;
+    SampleScore score(const SampleFit& fit) const;
     SampleFigures figures();
 
     const record::Record& record_;
@@ -92,7 +95,6 @@ class Loop {
     Lattice lattice_;
     double used_step_ = 0.0;            ///< of the lattice in the model
     std::shared_ptr<SampleFit> base_;
-    double base_log_likelihood_ = 0.0;  ///< of the rows that choose
     State now_;
     std::optional<State> earlier_;  ///< before the first random rate
     int next_step_ = 0;
@@ -149,7 +151,6 @@ void Loop::begin(Closure& closure) {
         closure.heldout_before = score_of(*now_.fit, reported_, 0.0).error;
     }
     base_ = now_.fit;
-    base_log_likelihood_ = base_->log_likelihood();
 }
 
 /// Values that nothing is held out of: steps are chosen like any other effect.
@@ -166,7 +167,7 @@ void Loop::take_lattice(Closure& closure) {
         closure.notes.push_back(fmt::format(
             "counts are whole by their kind: steps of {:.6g} arcsec are no missing effect", counted_step()));
         find_coarse_steps(closure);
-        if (rounded_.drawn()) closure.heldout_before = score().error;
+        if (rounded_.drawn()) closure.heldout_before = score(*now_.fit).error;
         return;
     }
     lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
@@ -193,7 +194,7 @@ void Loop::take_lattice(Closure& closure) {
     // Blurred steps are not where the values are: the digits are.
     used_step_ = blurred ? lattice_.printed_arcsec : step;
     find_coarse_steps(closure);
-    const SampleScore after = score();
+    const SampleScore after = score(*now_.fit);
     taken.heldout_error_before = before.error;
     taken.heldout_error_after = after.error;
     taken.heldout_log_score_gain = after.log_score - before.log_score;
@@ -209,7 +210,6 @@ void Loop::find_coarse_steps(Closure& closure) {
     if (!RoundedSamples::show(*now_.fit, step)) return;
     if (auto drawn = rounded_.begin(*now_.fit, step)) {
         now_.fit = std::move(drawn);
-        base_log_likelihood_ = rounded_.score_of(now_.steps.size() < 2 ? *now_.fit : *base_, reported_).log_likelihood;
         closure.notes.push_back(fmt::format(
             "steps of {:.6g} arcsec are large beside the noise, and their rounding follows the angle: what was rounded is "
             "drawn by the model, and white_angle_arcsec is the noise before it was rounded",
@@ -224,8 +224,8 @@ void Loop::find_coarse_steps(Closure& closure) {
     if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
 }
 
-SampleScore Loop::score() const {
-    return rounded_.drawn() ? rounded_.score_of(*now_.fit, reported_) : score_of(*now_.fit, reported_, used_step_);
+SampleScore Loop::score(const SampleFit& fit) const {
+    return rounded_.drawn() ? rounded_.score_of(fit, reported_) : score_of(fit, reported_, used_step_);
 }
 
 /// Effects that stood in for the one added last are no longer needed beside it.
@@ -287,10 +287,10 @@ void Loop::test_what_is_left(Closure& closure) const {
 
 /// What is reported: errors of the blocks held out, parameters of a last fit to the whole record.
 void Loop::finish(Closure& closure) {
-    const SampleScore last = score();
+    const SampleScore last = score(*now_.fit);
     closure.heldout_after = last.error;
     closure.noise_floor = last.floor;
-    closure.log_likelihood_gain = last.log_likelihood - base_log_likelihood_;
+    closure.log_likelihood_gain = last.log_likelihood - score(*base_).log_likelihood;
     closure.residual.time_s = series_.time_s;
     for (std::size_t i = 0; i < series_.size(); ++i) {
         closure.residual.innovation.push_back(now_.fit->innovations()[i] * now_.fit->sd(i));
@@ -341,7 +341,7 @@ bool Loop::restore() {
 /// Of a fit to the whole record.
 SampleFigures Loop::figures() {
     const auto of = [&](const SampleFit& fit) {
-        return figures_of(refine_steps(refine_lines(series_, fit, whole_), whole_), now_.told, record_.declared);
+        return figures_of(refine_steps(refine_lines(fit, whole_), whole_), now_.told, record_.declared);
     };
     const SampleFit whole(series_, now_.fit->model(), whole_, SampleFit::Noise::near);
     return rounded_.drawn() ? rounded_.figures_of(whole, of) : of(whole);
@@ -359,6 +359,8 @@ Closure Loop::run() {
     if (earlier_ && closure.unexplained) {
         // A rate is left that is none of the library's: the random one has only come nearest to it.
         now_ = std::move(*earlier_);
+        // It was fitted to what was drawn then.
+        if (rounded_.drawn()) now_.fit = rounded_.draw(now_.fit, draws_of_step);
         test_what_is_left(closure);
     }
     take_back_lines(closure);
@@ -381,7 +383,6 @@ void Loop::close(Closure& closure) {
 }
 
 /// Adds an effect to the model.
-constexpr int draws_of_step = 4;
 void Loop::take(const SampleChoice& choice, Closure& closure) {
     const SampleContender& best = *choice.chosen;
     const std::string effect = best.candidate.effect;
@@ -398,7 +399,7 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     }
     now_.of_partners.insert(now_.of_partners.end(), choice.of_partners.begin(), choice.of_partners.end());
     if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
-    const SampleScore before = score();
+    const SampleScore before = score(*now_.fit);
     now_.fit = best.fit;
     drop_needless();
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
@@ -408,7 +409,7 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
         // What has been taken off may have been what the rounding was small beside.
         find_coarse_steps(closure);
     }
-    const SampleScore after = score();
+    const SampleScore after = score(*now_.fit);
     step.heldout_error_before = before.error;
     step.heldout_error_after = after.error;
     step.heldout_log_score_gain = after.log_score - before.log_score;

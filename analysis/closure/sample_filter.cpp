@@ -1,6 +1,7 @@
 #include "analysis/closure/sample_filter.hpp"
 
 #include <cmath>
+#include <numeric>
 #include <type_traits>
 #include <utility>
 
@@ -233,15 +234,8 @@ void SampleFilter::begin(double reading, State& x) const {
 }
 
 double SampleFilter::foretell(State& x) const {
-    State next{};
-    double reading = 0.0;
-    for (int i = 0; i < n_; ++i) {
-        const Terms& terms = nonzero_[i];
-        for (int k = 0; k < terms.count; ++k) next[i] += f_[i][terms.at[k]] * x[terms.at[k]];
-        reading += h_[i] * next[i];
-    }
-    x = next;
-    return reading;
+    advance<most>(*this, x);
+    return std::inner_product(h_.begin(), h_.begin() + n_, x.begin(), 0.0);
 }
 
 void SampleFilter::take(std::size_t row, double innovation, State& x) const {

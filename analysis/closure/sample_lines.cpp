@@ -98,7 +98,8 @@ bool scatters(const SampleFit& fit, std::vector<double> innovations, const Found
     return same && left.scattered > found.scattered / 3.0 + much;
 }
 
-SampleFit refine_lines(const SampleSeries& series, SampleFit fit, const Rows& rows) {
+SampleFit refine_lines(SampleFit fit, const Rows& rows) {
+    const SampleSeries& series = fit.series();
     const double duration_s = series.interval_s * static_cast<double>(series.size());
     for (int round = 0; round < 2; ++round) {
         SampleModel model = fit.model();

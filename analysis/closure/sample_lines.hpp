@@ -33,6 +33,6 @@ SampleLine refine_line(const SampleFit& fit, const SampleLine& shown);
 bool scatters(const SampleFit& fit, std::vector<double> innovations, const FoundLines& found, const SampleLine& line);
 
 /// The same for all lines of a model, which is fitted anew with them.
-SampleFit refine_lines(const SampleSeries& series, SampleFit fit, const Rows& rows);
+SampleFit refine_lines(SampleFit fit, const Rows& rows);
 
 }  // namespace ringlock::closure
