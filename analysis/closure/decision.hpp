@@ -20,11 +20,9 @@ inline constexpr double tie = 4.0;
 inline constexpr std::size_t most_steps = 8;
 inline constexpr std::size_t most_contenders = 5;
 
-/// What each of ten blocks in a row is for.
-using BlockRoles = std::array<std::uint8_t, 10>;
-
-/// The record cut into 40 contiguous blocks: the role of each row.
-Rows by_blocks(std::size_t rows, const BlockRoles& roles);
+/// The rows that effects are chosen by and parameters fitted to. The record is cut into 40 contiguous blocks; one of ten
+/// in a row does not count, so that what is foretold of it can be reported.
+Rows rows_that_choose(std::size_t rows);
 
 /// What would tell two effects apart that this record cannot.
 std::string experiment_for(const std::string& effect, const std::vector<std::string>& others);

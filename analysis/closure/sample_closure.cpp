@@ -27,9 +27,6 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Of ten blocks, three are only reported.
-constexpr BlockRoles roles{1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
-
 /// Of the line that was added last.
 double line_hz(const SampleModel& model, bool wanders) {
     return wanders ? model.noise.resonances.back().hz : model.columns[model.columns.size() - 2].hz;
@@ -47,7 +44,7 @@ class Loop {
         : record_(record),
           series_(prepare_samples(record)),
           rounded_(series_),
-          chosen_(by_blocks(series_.size(), roles)) {}
+          chosen_(rows_that_choose(series_.size())) {}
 
     Closure run();
     Closure fit(const std::vector<ActiveEffect>& effects);
@@ -100,12 +97,16 @@ class Loop {
     int next_step_ = 0;
 };
 
-/// What a witness tells at lags, it does not tell at the ends of the record.
+/// What a witness tells at lags, it does not tell at the ends of the record; what it left untold at the start, a narrow
+/// motion remembers for longer.
 Rows Loop::all_rows() const {
+    constexpr std::size_t remembered = 4;
     Rows all(series_.size(), 1);
     if (series_.witnesses.empty()) return all;
-    const std::size_t ends = std::min(static_cast<std::size_t>(witness_lags(series_.rate_hz)), series_.size() / 20);
-    for (std::size_t i = 0; i < ends; ++i) all[i] = all[all.size() - 1 - i] = 0;
+    const auto lags = static_cast<std::size_t>(witness_lags(series_.rate_hz));
+    const std::size_t most = all.size() / 20;
+    std::fill_n(all.begin(), std::min(remembered * lags, most), 0);
+    std::fill_n(all.rbegin(), std::min(lags, most), 0);
     return all;
 }
 

@@ -20,9 +20,6 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Of ten blocks, three are only reported.
-constexpr BlockRoles roles{1, 1, 0, 1, 1, 0, 1, 1, 0, 1};
-
 /// What is left below is of sums of so many rounded numbers, here and where the record was made.
 constexpr double numerics_rad = 1e-6;
 
@@ -292,7 +289,7 @@ Closure close_turns(const record::Record& record) {
     closure.unit = "rad";
     closure.level = level;
     const record::Turns& turns = *record.turns;
-    const Rows rows = by_blocks(turns.size(), roles);
+    const Rows rows = rows_that_choose(turns.size());
     auto now = fit_base(record, rows);
     if (!now->series.scale_factor_declared) {
         closure.notes.push_back(
@@ -425,7 +422,7 @@ Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>&
     TurnParameters start;
     start.effects = since_first_turn(effects, record);
     const auto whole = fit_record(record, start, Rows(turns.size(), 1));
-    const Rows rows = by_blocks(turns.size(), roles);
+    const Rows rows = rows_that_choose(turns.size());
     const auto train = fit_record(record, whole->fit->parameters(), rows);
     closure.log_likelihood_gain = train->fit->log_likelihood() - fit_record(record, {}, rows)->fit->log_likelihood();
     for (const ActiveEffect& active : effects) closure.steps.emplace_back().effect = std::string(active.effect->name());

@@ -27,7 +27,7 @@ using namespace ringlock::test::closure;
 
 // Sizes of single effects, of the detection limit.
 constexpr double near_the_limit[] = {1.0, 2.0};
-constexpr double evident[] = {6.0, 30.0};
+constexpr double evident[] = {6.0, 30.0, 150.0};
 
 /// Whether a gyro in that condition shows the effect at all.
 bool shows(const std::string& effect, const Condition& condition) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "analysis/closure/chance.hpp"
+#include "analysis/closure/decision.hpp"
 #include "analysis/closure/turn_fit.hpp"
 #include "analysis/closure/turn_kicks.hpp"
 #include "analysis/closure/whitening.hpp"
@@ -309,6 +310,22 @@ TEST(JoinedPhase, CountAndQuadratureMayDifferByAQuarterAtItsEdge) {
     for (std::size_t i = 0; i < truth.size(); ++i) {
         const double off = lost.phase_rad[i] - truth[i] - (lost.phase_rad[0] - truth[0]);
         EXPECT_NEAR(off, 0.0, 0.1) << i;
+    }
+}
+
+TEST(HeldOutRows, AreATenthInFourBlocks) {
+    for (const std::size_t size : {1600U, 16000U, 184718U}) {
+        const auto chooses = rows_that_choose(size);
+        ASSERT_EQ(chooses.size(), size);
+        std::size_t reported = 0;
+        std::size_t blocks = 0;
+        for (std::size_t i = 0; i < size; ++i) {
+            reported += chooses[i] ? 0 : 1;
+            blocks += i > 0 && chooses[i - 1] && !chooses[i] ? 1 : 0;
+        }
+        EXPECT_NEAR(static_cast<double>(reported), 0.1 * static_cast<double>(size), 4.0);
+        EXPECT_EQ(blocks, 4U);
+        EXPECT_TRUE(chooses.front() && chooses.back());
     }
 }
 

@@ -7,6 +7,7 @@
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/sample_score.hpp"
 #include "analysis/closure/sample_unrounding.hpp"
+#include "tests/closure/heldout.hpp"
 #include "tests/closure/samples.hpp"
 
 namespace ringlock::test::closure {
@@ -103,7 +104,7 @@ TEST(RoundedRecords, CountsBesideLittleNoiseAreNoStructure) {
         if (noise > 0.0) {
             EXPECT_NEAR(found.base[1].value, noise, 4.0 * found.base[1].sd);
         }
-        EXPECT_NEAR(found.heldout_after, found.noise_floor, 0.05 * found.noise_floor);
+        expect_errors_of_the_noise(found);
     }
 }
 

@@ -15,6 +15,7 @@
 #include "engine/scenario/check.hpp"
 #include "engine/scenario/scenario.hpp"
 #include "tests/closure/generator.hpp"
+#include "tests/closure/heldout.hpp"
 #include "tests/closure/plain_gyro.hpp"
 
 namespace ringlock::test::closure {
@@ -67,8 +68,7 @@ TEST(TurnLoop, NothingIsMissingWhereNothingIs) {
             EXPECT_EQ(closure.verdict, Verdict::nothing_missing);
             EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", 300.0), 4.0);
             EXPECT_LT(deviation(closure.base, "bias_deg_h", 0.0), 4.0);
-            // The 3000 held-out turns scatter by 1.3 % themselves.
-            EXPECT_NEAR(closure.heldout_after / closure.noise_floor, 1.0, 0.06);
+            expect_errors_of_the_noise(closure);
         }
     }
 }
@@ -365,8 +365,7 @@ TEST_P(TurnLoopFinds, TheEffectThatIsMissing) {
     for (const auto& [name, value] : single.values) {
         EXPECT_LT(deviation(closure.steps[0].parameters, name, value), 4.0) << name;
     }
-    // As good as the noise lets it be: 4800 held-out turns scatter by 1 %.
-    EXPECT_NEAR(closure.heldout_after / closure.noise_floor, 1.0, 0.05);
+    expect_errors_of_the_noise(closure);
 }
 
 INSTANTIATE_TEST_SUITE_P(Effects, TurnLoopFinds,
