@@ -20,8 +20,8 @@ inline constexpr double tie = 4.0;
 inline constexpr std::size_t most_steps = 8;
 inline constexpr std::size_t most_contenders = 5;
 
-/// The rows that effects are chosen by and parameters fitted to. The record is cut into 40 contiguous blocks; one of ten
-/// in a row does not count, so that what is foretold of it can be reported.
+/// The rows that effects are chosen by and parameters fitted to. The record is cut into 40 contiguous blocks; one of
+/// ten in a row does not count, so that what is foretold of it can be reported.
 Rows rows_that_choose(std::size_t rows);
 
 /// What would tell two effects apart that this record cannot.

@@ -90,7 +90,7 @@ class Loop {
     Rows whole_;
     Disturbed disturbed_;
     Lattice lattice_;
-    double used_step_ = 0.0;            ///< of the lattice in the model
+    double used_step_ = 0.0;  ///< of the lattice in the model
     std::shared_ptr<SampleFit> base_;
     State now_;
     std::optional<State> earlier_;  ///< before the first random rate
@@ -211,16 +211,17 @@ void Loop::find_coarse_steps(Closure& closure) {
     if (!RoundedSamples::show(*now_.fit, step)) return;
     if (auto drawn = rounded_.begin(*now_.fit, step)) {
         now_.fit = std::move(drawn);
-        closure.notes.push_back(fmt::format(
-            "steps of {:.6g} arcsec are large beside the noise, and their rounding follows the angle: what was rounded is "
-            "drawn by the model, and white_angle_arcsec is the noise before it was rounded",
-            step));
+        closure.notes.push_back(
+            fmt::format("steps of {:.6g} arcsec are large beside the noise, and their rounding follows the angle: what "
+                        "was rounded is "
+                        "drawn by the model, and white_angle_arcsec is the noise before it was rounded",
+                        step));
         return;
     }
-    const std::string note =
-        fmt::format("steps of {:.6g} arcsec are so large beside the noise that what they hide cannot be drawn: their "
-                    "rounding is left in the residual",
-                    step);
+    const std::string note = fmt::format(
+        "steps of {:.6g} arcsec are so large beside the noise that what they hide cannot be drawn: their "
+        "rounding is left in the residual",
+        step);
     auto& notes = closure.notes;
     if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
 }

@@ -42,19 +42,18 @@ gyro::Setup TurnModel::setup(const TurnParameters& parameters) const {
     return setup;
 }
 
-std::vector<double> TurnModel::dither_swings(const Kicks& kicks) const {
+std::vector<double> TurnModel::dither_swings(const Kicks& kicks, const std::vector<double>& rate_deg_h) const {
     const std::size_t n = series_.size();
     std::vector<double> swing(n, 1.0);
     double sums[2] = {};
     double counts[2] = {};
     const auto over = [&](std::size_t i) {
-        return swing_over_dither(series_.relative_rate(series_.mean_rate_deg_h + series_.input_rate_deg_h[i]));
+        return swing_over_dither(series_.relative_rate(series_.mean_rate_deg_h + rate_deg_h[i]));
     };
     for (std::size_t i = 0; i + 1 < n; ++i) {
         // Were the lock-in left in it, kicks would depend on their own size.
         const double lockin = kicks[i].after_rad + kicks[i + 1].before_rad;
-        const double rotation =
-            units::two_pi / series_.setup.scale_factor_arcsec * series_.interval_s * series_.input_rate_deg_h[i];
+        const double rotation = units::two_pi / series_.setup.scale_factor_arcsec * series_.interval_s * rate_deg_h[i];
         swing[i] = series_.direction[i] * (phase_rad_[i + 1] - phase_rad_[i] - lockin - rotation) / over(i);
         const std::size_t side = series_.direction[i] > 0 ? 0 : 1;
         sums[side] += swing[i];
@@ -111,18 +110,21 @@ std::shared_ptr<const TurnModel::Kicks> TurnModel::kicks(gyro::Setup setup) cons
         const auto found = std::find_if(met_.begin(), met_.end(), [&](const auto& met) { return met.first == setup; });
         if (found != met_.end()) return found->second;
     }
-    const auto [lowest, highest] =
-        std::minmax_element(series_.input_rate_deg_h.begin(), series_.input_rate_deg_h.end());
-    const KicksOverRates of(setup, setup.input_rate_deg_h + *lowest, setup.input_rate_deg_h + *highest);
-    Kicks kicks(series_.size());
-    for (std::size_t i = 0; i < kicks.size(); ++i) {
-        kicks[i] = of.at(series_.direction[i], turned_[i], setup.input_rate_deg_h + series_.input_rate_deg_h[i]);
-    }
-    const auto shared = std::make_shared<const Kicks>(std::move(kicks));
+    const auto shared = std::make_shared<const Kicks>(kicks_at(setup, series_.input_rate_deg_h));
     const std::lock_guard lock(meeting_);
     met_.emplace_front(setup, shared);
     if (met_.size() > kept) met_.pop_back();
     return shared;
+}
+
+TurnModel::Kicks TurnModel::kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h) const {
+    const auto [lowest, highest] = std::minmax_element(rate_deg_h.begin(), rate_deg_h.end());
+    const KicksOverRates of(setup, setup.input_rate_deg_h + *lowest, setup.input_rate_deg_h + *highest);
+    Kicks kicks(series_.size());
+    for (std::size_t i = 0; i < kicks.size(); ++i) {
+        kicks[i] = of.at(series_.direction[i], turned_[i], setup.input_rate_deg_h + rate_deg_h[i]);
+    }
+    return kicks;
 }
 
 std::vector<double> TurnModel::added_rad(const Prediction& prediction, const effects::Effect& effect,
@@ -176,23 +178,22 @@ std::vector<effects::Interval> TurnModel::intervals(const std::vector<double>& t
     return all;
 }
 
-bool TurnModel::add_rates(const TurnParameters& parameters, const std::vector<effects::Interval>& intervals,
-                          std::vector<double>& rate_deg_h) {
-    bool any = false;
-    std::vector<double> added_deg_h(intervals.size());
+std::vector<double> TurnModel::added_rates_deg_h(const TurnParameters& parameters,
+                                                 const std::vector<double>& turn_s) const {
+    std::vector<double> added_deg_h;
+    const double moment_s = 0.05 * series_.interval_s;
     for (const ActiveEffect& active : parameters.effects) {
         if (!active.effect->adds_angle()) continue;
-        any = true;
-        for (std::size_t i = 1; i < intervals.size(); ++i) {
-            added_deg_h[i] += active.effect->added_angle_arcsec(active.values, intervals[i]) / intervals[i].duration_s;
+        added_deg_h.resize(turn_s.size());
+        for (std::size_t i = 0; i < turn_s.size(); ++i) {
+            const double change_k = temperature_change_k(i);
+            const double input_deg_h = series_.input_rate_deg_h[i];
+            const effects::Interval about{
+                turn_s[i] - 0.5 * moment_s, moment_s, {change_k, change_k}, {input_deg_h, input_deg_h}};
+            added_deg_h[i] += active.effect->added_angle_arcsec(active.values, about) / moment_s;
         }
     }
-    if (!any) return false;
-    added_deg_h[0] = added_deg_h[1];
-    for (std::size_t i = 0; i < intervals.size(); ++i) {
-        rate_deg_h[i] += 0.5 * (added_deg_h[i] + added_deg_h[std::min(i + 1, intervals.size() - 1)]);
-    }
-    return true;
+    return added_deg_h;
 }
 
 TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const {
@@ -207,9 +208,8 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     frame.kick_slope.resize(n);
     prediction.phase_rad.resize(n);
     const double c = device.phase_per_arcsec;
-    const std::shared_ptr<const Kicks> shared_kicks = kicks(device_setup);
-    const Kicks& kick_of = *shared_kicks;
-    const std::vector<double> swing = dither_swings(kick_of);
+    std::shared_ptr<const Kicks> kick_of = kicks(device_setup);
+    std::vector<double> swing = dither_swings(*kick_of, series_.input_rate_deg_h);
     std::vector<double> factors(n, 1.0);
     for (std::size_t i = 0; i < n; ++i) {
         for (const ActiveEffect& active : parameters.effects) {
@@ -221,7 +221,21 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     prediction.turn_s = dither_turns(rate_deg_h, factors, swing, device);
     std::vector<double> turn_s = smooth(prediction.turn_s);
     prediction.intervals = intervals(turn_s);
-    if (add_rates(parameters, prediction.intervals, rate_deg_h)) {
+    if (const auto added_deg_h = added_rates_deg_h(parameters, turn_s); !added_deg_h.empty()) {
+        double most_deg_h = 0.0;
+        std::vector<double> beside_bias_deg_h = series_.input_rate_deg_h;
+        for (std::size_t i = 0; i < n; ++i) {
+            rate_deg_h[i] += added_deg_h[i];
+            beside_bias_deg_h[i] += added_deg_h[i];
+            most_deg_h = std::max(most_deg_h, std::abs(added_deg_h[i]));
+        }
+        // How far zero-rate points move in the time within which the phase turns: what of a kick that changes.
+        constexpr double felt = 1e-3;
+        const double acceleration_rad_s2 = device.half_cycle(1, series_.amplitude_rad).end_acceleration_rad_s2();
+        if (c * most_deg_h > felt * std::sqrt(acceleration_rad_s2)) {
+            kick_of = std::make_shared<const Kicks>(kicks_at(device_setup, beside_bias_deg_h));
+            swing = dither_swings(*kick_of, beside_bias_deg_h);
+        }
         prediction.turn_s = dither_turns(rate_deg_h, factors, swing, device);
         turn_s = smooth(prediction.turn_s);
         prediction.intervals = intervals(turn_s);
@@ -231,7 +245,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     double angle_arcsec = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
         // Kicks go with the root of one over the acceleration, which goes with the swing of that half cycle.
-        const TurnKicks::Kick& kick = kick_of[i];
+        const TurnKicks::Kick& kick = (*kick_of)[i];
         const double before = factors[i] / std::sqrt(swing[i > 0 ? i - 1 : i]);
         const double after = factors[i] / std::sqrt(swing[i]);
         const std::size_t last = i > 0 ? i - 1 : 0;

@@ -75,6 +75,8 @@ class TurnModel {
     using Kicks = std::vector<TurnKicks::Kick>;
     /// Kicks at the turns of a gyro of that setup, whose rate is that and the input's.
     std::shared_ptr<const Kicks> kicks(gyro::Setup setup) const;
+    /// The same with such a rate at each turn.
+    Kicks kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h) const;
 
     double temperature_change_k(std::size_t turn) const;
     /// When the dither turned, from when the phase did, at these rates: the phase stands still where the dither's own
@@ -84,13 +86,12 @@ class TurnModel {
                                      const gyro::Device& device) const;
     /// Half cycles that end at the turns.
     std::vector<effects::Interval> intervals(const std::vector<double>& turn_s) const;
-    /// Those that effects add at the turns; says whether any does.
-    static bool add_rates(const TurnParameters& parameters, const std::vector<effects::Interval>& intervals,
-                          std::vector<double>& rate_deg_h);
+    /// Those that effects add while the dither turns; none where no effect does.
+    std::vector<double> added_rates_deg_h(const TurnParameters& parameters, const std::vector<double>& turn_s) const;
     /// Times of the dither's turns by a resonator that drifts slowly.
     std::vector<double> smooth(const std::vector<double>& turn_s) const;
-    /// Swing of the dither after each turn over the mean one of its sign.
-    std::vector<double> dither_swings(const Kicks& kicks) const;
+    /// Swing of the dither after each turn over the mean one of its sign; with such rates at the turns beside the mean.
+    std::vector<double> dither_swings(const Kicks& kicks, const std::vector<double>& rate_deg_h) const;
 
     const TurnSeries& series_;
     const std::vector<double>& phase_rad_;

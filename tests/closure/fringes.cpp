@@ -165,7 +165,8 @@ struct Device {
     V second_sine, second_cosine, third_sine, third_cosine;  // ratios included
     V turn_asymmetry;
     V dither_ratio, dither_sine, dither_cosine;
-    V stiffness;  // bound of |F'|
+    V line, line_w;  // of the phase rate
+    V stiffness;     // bound of |F'|
     V phase_step;
 };
 RINGLOCK_INLINE Device device_of(const LaneDevice& from, const Accuracy& accuracy) {
@@ -183,6 +184,9 @@ RINGLOCK_INLINE Device device_of(const LaneDevice& from, const Accuracy& accurac
     d.turn_asymmetry = load(from.turn_asymmetry);
     d.dither_ratio = load(from.dither_ratio);
     sine_cosine(load(from.dither_phase_rad), d.dither_sine, d.dither_cosine);
+    d.line = load(from.line_rad_s);
+    d.line_w = load(from.line_w_rad_s);
+    d.line_w = d.line_w > 0.0 ? d.line_w : all(1.0);
     d.stiffness = (1.0 + 2.0 * magnitude(second) + 3.0 * magnitude(third)) * (1.0 + magnitude(d.turn_asymmetry));
     // The n-th harmonic of ratio r has errors r n^10 times those of the first.
     for (std::size_t i = 0; i < lanes; ++i) {
@@ -195,17 +199,20 @@ RINGLOCK_INLINE Device device_of(const LaneDevice& from, const Accuracy& accurac
 
 struct Side {
     V amplitude, w, rate, b;
+    V line_phase;
 };
 RINGLOCK_INLINE Side side_of(const LaneHalf& half) {
-    return {load(half.amplitude_rad), pi / load(half.duration_s), load(half.rate_rad_s), load(half.b_rad_s)};
+    return {load(half.amplitude_rad), pi / load(half.duration_s), load(half.rate_rad_s), load(half.b_rad_s),
+            load(half.line_phase_rad)};
 }
 RINGLOCK_INLINE Side choose(const M& first, const Side& x, const Side& y) {
-    return {first ? x.amplitude : y.amplitude, first ? x.w : y.w, first ? x.rate : y.rate, first ? x.b : y.b};
+    return {first ? x.amplitude : y.amplitude, first ? x.w : y.w, first ? x.rate : y.rate, first ? x.b : y.b,
+            x.line_phase};
 }
 
-/// Drive at a time from the turn: sine and cosine of w u and of 2 w u + f, the plain phase gained, and g.
+/// Drive at a time from the turn: sine and cosine of w u, of 2 w u + f and of v u + l, the plain phase gained, and g.
 struct Place {
-    V s, c, s2, c2;
+    V s, c, s2, c2, line_s, line_c;
     V phase, rate;
 };
 template <bool extras>
@@ -221,6 +228,11 @@ RINGLOCK_INLINE Place place_at(const Device& d, const Side& side, double directi
         at.c2 = cosine2 * d.dither_cosine - sine2 * d.dither_sine;
         at.phase += 0.5 * side.amplitude * d.dither_ratio * (d.dither_cosine - at.c2);
         at.rate += side.amplitude * side.w * d.dither_ratio * at.s2;
+        V start_s, start_c;
+        sine_cosine(side.line_phase, start_s, start_c);
+        sine_cosine(d.line_w * u + side.line_phase, at.line_s, at.line_c);
+        at.phase += d.line / d.line_w * (start_c - at.line_c);
+        at.rate += d.line * at.line_s;
     }
     return at;
 }
@@ -248,6 +260,13 @@ RINGLOCK_INLINE V coupling_rate(const Device& d, const Side& side, double direct
     }
 }
 
+/// Sine and 1 - cosine of the little that a step turns.
+RINGLOCK_INLINE void of_small(const V& z, V& sine, V& versine) {
+    const V zz = z * z;
+    sine = z * (1.0 - zz * (1.0 / 6.0) * (1.0 - zz * (1.0 / 20.0) * (1.0 - zz * (1.0 / 42.0))));
+    versine = 0.5 * zz * (1.0 - zz * (1.0 / 12.0) * (1.0 - zz * (1.0 / 30.0) * (1.0 - zz * (1.0 / 56.0))));
+}
+
 /// delta after a step h from a place where the phase is psi.
 template <bool extras>
 RINGLOCK_INLINE V step_gain(const Device& d, const Side& side, double direction, const Place& at, const V& psi,
@@ -257,14 +276,15 @@ RINGLOCK_INLINE V step_gain(const Device& d, const Side& side, double direction,
     V phase[nodes], b[nodes], gained[nodes];
     for (std::size_t i = 0; i < nodes; ++i) {
         const V t = collocation.c[i] * h;
-        const V z = side.w * t;
-        const V zz = z * z;
-        const V sz = z * (1.0 - zz * (1.0 / 6.0) * (1.0 - zz * (1.0 / 20.0) * (1.0 - zz * (1.0 / 42.0))));
-        const V vz = 0.5 * zz * (1.0 - zz * (1.0 / 12.0) * (1.0 - zz * (1.0 / 30.0) * (1.0 - zz * (1.0 / 56.0))));
+        V sz, vz;
+        of_small(side.w * t, sz, vz);
         phase[i] = base + side.rate * t + side.amplitude * direction * (at.c * vz + at.s * sz);
         b[i] = side.b * h;
         if constexpr (extras) {
             phase[i] += side.amplitude * d.dither_ratio * (at.c2 * sz * sz + at.s2 * sz * (1.0 - vz));
+            V line_sz, line_vz;
+            of_small(d.line_w * t, line_sz, line_vz);
+            phase[i] += d.line / d.line_w * (at.line_c * line_vz + at.line_s * line_sz);
             b[i] *= 1.0 + d.turn_asymmetry * direction * (at.c * (1.0 - vz) - at.s * sz);
         }
         gained[i] = all(0.0);
@@ -337,7 +357,7 @@ RINGLOCK_INLINE void solution_at(const Device& d, const Side& before, const Side
     const Side side = choose(u > 0.0, after, before);
     const V distance = magnitude(u);
     const V a = side.amplitude * side.w * side.w;
-    const V advance = (magnitude(side.rate) + 0.5 * a * distance) * distance;
+    const V advance = (magnitude(side.rate) + magnitude(d.line) + 0.5 * a * distance) * distance;
     const V pieces_near = distance * root_of(a) / accuracy.turn_step;
     const V pieces_far = advance / (0.6 * d.phase_step);
     const V wanted = pieces_near > pieces_far ? pieces_near : pieces_far;
@@ -388,7 +408,10 @@ RINGLOCK_INLINE bool find(const LaneDevice& device, const LaneHalf& half_before,
         solution_at<extras>(d, before, after, s, start, accuracy, u == 0.0 ? tiny : u, gain, rate);
         const Place at = place_at<extras>(d, side, s, u);
         V slope = side.amplitude * side.w * side.w * at.c;  // of the upright rate; b F' psi' vanishes with psi'
-        if constexpr (extras) slope += 2.0 * s * side.amplitude * side.w * side.w * d.dither_ratio * at.c2;
+        if constexpr (extras) {
+            slope +=
+                2.0 * s * side.amplitude * side.w * side.w * d.dither_ratio * at.c2 + s * d.line * d.line_w * at.line_c;
+        }
         const V upright = s * rate;
         V change = -upright / (slope > 0.0 ? slope : all(1.0));
         change = slope > 0.0 ? change : (upright < 0.0 ? most : -most);

@@ -10,9 +10,10 @@
 /// c(t) the cosine of the dither's phase, 1 at minima and -1 at maxima. Along the half cycle that follows a turn of
 /// direction s (+1 a minimum, -1 a maximum), u the time since the turn and w = pi/duration,
 ///
-///     g = R + A w (s sin(w u) + h sin(2 w u + f)).
+///     g = R + A w (s sin(w u) + h sin(2 w u + f)) + L sin(v u + l).
 ///
-/// The same expression holds before the turn, u < 0, with A, w, R and b of the half cycle that ends there.
+/// The same expression holds before the turn, u < 0, with A, w, R and b of the half cycle that ends there; l is the line's phase at
+/// the turn.
 ///
 /// Method: the plain phase P(u), the integral of g, is elementary; delta = psi - psi(turn) - P obeys delta' = b F and
 /// is integrated by Gauss-Legendre collocation with five nodes (order 10), the implicit equations solved by fixed-point
@@ -37,6 +38,7 @@ struct alignas(64) LaneDevice {
     Lanes third_ratio{}, third_phase_rad{};
     Lanes turn_asymmetry{};
     Lanes dither_ratio{}, dither_phase_rad{};  ///< second harmonic of the dither rate
+    Lanes line_rad_s{}, line_w_rad_s{};        ///< L and v
     bool extras = false;                       ///< whether any of these but the coupling phase is in use
 };
 
@@ -46,6 +48,7 @@ struct alignas(64) LaneHalf {
     Lanes duration_s{};
     Lanes rate_rad_s{};
     Lanes b_rad_s{};
+    Lanes line_phase_rad{};  ///< at the turn that is looked at
 };
 
 /// What happens around a turn of the dither; times and phases count from there.

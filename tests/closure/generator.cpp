@@ -80,6 +80,8 @@ struct Drive {
 
     std::vector<double> turn_s;
     std::vector<double> amplitude_rad, duration_s, rate_rad_s, b_rad_s;
+    std::vector<double> line_phase_rad;  ///< where the half cycle begins
+    std::vector<double> line_rad;        ///< what it adds over it
 };
 
 Drive::Drive(const Truth& truth) {
@@ -124,9 +126,20 @@ Drive::Drive(const Truth& truth) {
         if (!(amplitude_rad[j] > 0.0)) refuse("noise or wander of the dither is as large as its amplitude");
     }
 
-    rate_rad_s = mean_rates(truth.rates, truth.seed, turn_s);
+    // The line goes on within half cycles; the rest is their mean.
+    RateTruth without_line = truth.rates;
+    without_line.base_vibration = {};
+    rate_rad_s = mean_rates(without_line, truth.seed, turn_s);
+    line_phase_rad.resize(halves);
+    line_rad.resize(halves);
     b_rad_s.resize(halves);
     for (std::size_t j = 0; j < halves; ++j) {
+        const RateLine& line = truth.rates.base_vibration;
+        if (line.rate_deg_h != 0.0) {
+            const double turns = line.frequency_hz * turn_s[j];
+            line_phase_rad[j] = two_pi * (turns - std::floor(turns)) + line.phase_rad;
+            line_rad[j] = phase_per_arcsec * mean_of(line, turn_s[j], turn_s[j + 1]) * (turn_s[j + 1] - turn_s[j]);
+        }
         double input = truth.input_rate_deg_h;
         if (!truth.input_profile_deg_h.empty())
             input += track_mean(truth.input_profile_deg_h, turn_s[j], turn_s[j + 1]);
@@ -226,7 +239,8 @@ class Instrument {
 
 bool has_extras(const Truth& truth) {
     return truth.lockin_second_harmonic.ratio != 0.0 || truth.lockin_third_harmonic.ratio != 0.0 ||
-           truth.lockin_turn_asymmetry != 0.0 || truth.dither_second_harmonic.ratio != 0.0;
+           truth.lockin_turn_asymmetry != 0.0 || truth.dither_second_harmonic.ratio != 0.0 ||
+           truth.rates.base_vibration.rate_deg_h != 0.0;
 }
 
 void describe(const Truth& truth, const Drive& drive, record::Record& record) {
@@ -293,9 +307,13 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
         device.turn_asymmetry[lane] = truth.lockin_turn_asymmetry;
         device.dither_ratio[lane] = truth.dither_second_harmonic.ratio;
         device.dither_phase_rad[lane] = truth.dither_second_harmonic.phase_rad;
+        device.line_rad_s[lane] = two_pi / truth.scale_factor_arcsec * truth.rates.base_vibration.rate_deg_h;
+        device.line_w_rad_s[lane] = two_pi * truth.rates.base_vibration.frequency_hz;
     }
 
     LaneHalf before, after;
+    Lanes line_rad{};  // of the half cycle that was filled last
+    Lanes mean_rate{};
     Lanes start{};
     Lanes delta{};
     LaneExtremum extremum;
@@ -311,6 +329,8 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
             half.duration_s[lane] = drive.duration_s[k];
             half.rate_rad_s[lane] = drive.rate_rad_s[k];
             half.b_rad_s[lane] = drive.b_rad_s[k];
+            half.line_phase_rad[lane] = drive.line_phase_rad[k];
+            line_rad[lane] = drive.line_rad[k];
         }
     };
     const auto phases_now = [&] {
@@ -323,7 +343,8 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
         phases_now();
         integrate_half(device, before, Drive::direction(turn - 1), start, accuracy, delta);
         for (std::size_t lane = 0; lane < which.size(); ++lane) {
-            const double swing = before.rate_rad_s[lane] * before.duration_s[lane] +
+            mean_rate[lane] = before.rate_rad_s[lane] + line_rad[lane] / before.duration_s[lane];
+            const double swing = mean_rate[lane] * before.duration_s[lane] +
                                  2.0 * Drive::direction(turn - 1) * before.amplitude_rad[lane];
             phases[lane].add(swing);
             phases[lane].add(delta[lane]);
@@ -332,6 +353,7 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
         }
         phases_now();
         fill(turn, after);
+        before.line_phase_rad = after.line_phase_rad;
         find_extremum(device, before, after, Drive::direction(turn), start, accuracy, extremum);
         for (std::size_t lane = 0; lane < which.size(); ++lane) {
             if (turn > truth_of(lane).turns) continue;
@@ -345,7 +367,7 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
             trajectory.zero_rate_phase_rad.push_back(at_extremum.rest_rad());
             trajectory.plain_rad.push_back(plain[lane]);
             trajectory.amplitude_rad.push_back(before.amplitude_rad[lane]);
-            trajectory.rate_rad_s.push_back(before.rate_rad_s[lane]);
+            trajectory.rate_rad_s.push_back(mean_rate[lane]);
             trajectory.b_rad_s.push_back(before.b_rad_s[lane]);
         }
         std::swap(before, after);

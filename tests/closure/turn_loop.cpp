@@ -111,6 +111,24 @@ TEST(TurnLoop, AStrongRotationIsNoShapeOfTheDither) {
     }
 }
 
+/// Three times the lock-in threshold: zero-rate points go to and fro with it, by a fifth of the time within which the
+/// phase turns, and kicks with them.
+TEST(TurnLoop, AStrongLineTakesTheZeroRatePointsAlong) {
+    Truth truth;
+    truth.readout_noise = 0.005;
+    truth.bias_deg_h = 15.0;
+    truth.rates.base_vibration = {59.567, 911.0, 0.6};
+    truth.turns = 3000;
+    truth.seed = 80;
+    const Closure closure = close_loop(generate({&truth, 1}).front());
+    print("strong line", closure);
+    EXPECT_EQ(closure.verdict, Verdict::closed);
+    ASSERT_EQ(closure.steps.size(), 1U);
+    EXPECT_EQ(closure.steps[0].effect, "base_vibration");
+    EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", truth.lockin_threshold_deg_h), 4.0);
+    EXPECT_LT(deviation(closure.base, "bias_deg_h", truth.bias_deg_h), 4.0);
+}
+
 TEST(TurnLoop, ASwingOfTheAmplitudeIsTheDithersOwn) {
     std::vector<Truth> truths;
     for (const double period_s : {0.9, 11.0}) {
