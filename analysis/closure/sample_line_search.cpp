@@ -298,7 +298,9 @@ double places_of_drift(double chi2, double cycles, double drift_cycles) {
 FoundLine FoundLines::likeliest() const {
     FoundLine best = still;
     for (const FoundLine& other : {slow, tracked}) {
-        if (other.p_value < best.p_value) best = other;
+        // Of strong lines no p is left to compare.
+        const bool as_rare = other.p_value == best.p_value && other.chi2 > best.chi2;
+        if (other.p_value < best.p_value || as_rare) best = other;
     }
     constexpr double kinds = 3.0;
     best.searched *= kinds;

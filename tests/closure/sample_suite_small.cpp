@@ -180,6 +180,22 @@ TEST(SampleLines, CountTheirSearches) {
     }
 }
 
+// Where every p-value is nothing in double precision, it is the power that tells: fifteen cycles of drift, not the lobe
+// of it that is strongest without.
+TEST(SampleLines, OfStrongOnesTheStrongestIsTheLikeliest) {
+    constexpr double rate_hz = 100.0;
+    constexpr double drift_hz_per_s = 1.66e-4;
+    std::mt19937_64 random(4);
+    std::normal_distribution<double> normal;
+    std::vector<double> values(30000);
+    const auto phase = ringlock::closure::line_phase(values.size(), rate_hz, 37.56, drift_hz_per_s);
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = normal(random) + 5.0 * std::cos(phase[i]);
+    const auto lines = ringlock::closure::find_lines(values, rate_hz);
+    ASSERT_EQ(lines.still.p_value, 0.0);
+    const double a_cycle = std::pow(rate_hz / static_cast<double>(values.size()), 2);
+    EXPECT_NEAR(lines.likeliest().drift_hz_per_s, drift_hz_per_s, 1.1 * a_cycle);
+}
+
 // The filter's likelihood is that of the increments' covariance matrix: here by its Cholesky factor.
 TEST(SampleFilter, LikelihoodIsThatOfTheCovariance) {
     using ringlock::closure::SampleFilter;
