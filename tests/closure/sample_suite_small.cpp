@@ -99,7 +99,7 @@ TEST(ClosureSampleSuite, ADeclaredDitherNeedsLess) {
     truth.seed = 11;
     truth.white_angle_arcsec = 0.1;
     truth.rates.quantum_noise_deg_rt_h = 0.02;
-    truth.dither_residue = {437.3, 0.0, 0.0092, 1.0};
+    truth.dither_residue = {437.3, 0.0, 0.0075, 1.0};
     EXPECT_EQ(ringlock::closure::close_samples(generate_samples(truth)).verdict,
               ringlock::closure::Verdict::nothing_missing);
     truth.declared.emplace().dither_frequency_hz = 437.0;
