@@ -357,6 +357,7 @@ SampleChoice Contest::choose() {
     const auto holds = [&](const Account& account) { return account.merit > bar(account, against, series_.size()); };
     const bool led = !all.empty() && holds(accounts.front());
     const double leader = all.empty() ? 0.0 : accounts.front().merit;
+    const bool random_leads = !all.empty() && accounts.front().random();
     if (!led || is_slow(all.front()->candidate.effect)) {
         for (Account& account : sets(all, candidates)) accounts.push_back(std::move(account));
         if (all.empty() && !accounts.empty()) against = rivals(false);
@@ -367,7 +368,11 @@ SampleChoice Contest::choose() {
     // far, and several must be far better than it.
     const auto may_be = [&](const Account& account) {
         if (led || all.empty()) return holds(account);
-        if (account.members.size() > 1) return account.merit > leader + closure::tie && holds(account);
+        if (account.members.size() > 1) {
+            // A random rate that does not hold comes near to whatever there is.
+            const double more = random_leads && !account.random() ? 0.0 : closure::tie;
+            return account.merit > leader + more && holds(account);
+        }
         return account.merit > std::max(leader - closure::tie, bar(account, against, series_.size()) + closure::tie);
     };
     // The fewest effects of those that explain as much as any.
