@@ -318,7 +318,10 @@ Closure close_turns(const record::Record& record) {
         if (heldout(*now->fit).error < numerics_rad) break;
         const Contest contest = hold_contest(record, *now, rows, most_contenders);
         const Choice choice = choose(record, contest, rows);
-        if (!contest.side && now->series.all_phases_come) {
+        // A locked gyro's lock-in takes amplitudes up, unless noise is injected.
+        const TurnParameters& found = now->fit->parameters();
+        const bool shows = now->series.all_phases_come || found.injected_sd_rad > found.readout_sd_rad;
+        if (!contest.side && shows) {
             auto amplitude = find_amplitude_swing(record, *now, rows);
             if (!amplitude) amplitude = find_amplitude_memory(record, *now, rows);
             if (amplitude && (choice.chosen == nullptr || amplitude->merit > choice.held.front().merit - tie)) {

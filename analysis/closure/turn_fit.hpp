@@ -126,6 +126,7 @@ class TurnFit {
     void climb();
     void fit_noise();
     void try_other_noise();
+    void try_wander();
     void try_from(const TurnParameters& other);
     TurnParameters with_noise_of(const TurnFrame& frame, const TurnParameters& start,
                                  const std::vector<double>& rest) const;

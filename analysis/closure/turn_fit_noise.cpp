@@ -120,12 +120,26 @@ void quiet_solver() {
 
 }  // namespace
 
+/// Beside what is injected: where the fit of the phases has begun with the wander's share in the lock-in's, its noise
+/// has gone to nothing, where no slope of its logarithm leads back.
+void TurnFit::try_wander() {
+    if (parameters_.wander_sd_rad > 10.0 * no_noise) return;
+    std::vector<TurnParameters> grid;
+    for (double share = 0.5; share > 1e-4; share *= 0.25) {
+        grid.push_back(parameters_);
+        grid.back().wander_sd_rad = share * parameters_.injected_sd_rad;
+    }
+    const std::vector<double> values = objectives(prediction_.frame, grid, rest_);
+    const auto least = std::min_element(values.begin(), values.end());
+    if (*least < objective(parameters_, rest_)) try_from(grid[static_cast<std::size_t>(least - values.begin())]);
+}
+
 /// The likelihood can have two summits: a small noise, or none at all, where what it does to the phases is foretold by
 /// their course. Of the one that is not stood on. What is larger than the readout's noise shows itself, and behind it
 /// there is no course.
 void TurnFit::try_other_noise() {
     const double readout = parameters_.readout_sd_rad;
-    if (parameters_.injected_sd_rad > readout) return;
+    if (parameters_.injected_sd_rad > readout) return try_wander();
     for (const bool injected : {true, false}) {
         const auto own = [injected](TurnParameters& p) -> double& {
             return injected ? p.injected_sd_rad : p.wander_sd_rad;
