@@ -12,30 +12,58 @@ namespace {
 
 using effects::Effect;
 
+constexpr std::size_t stretches = 120;
+
+/// Where a stretch begins. Whole cycles, so that parities weigh alike.
+std::size_t begin_of(std::size_t stretch, std::size_t turns) {
+    return stretch == stretches ? turns : (turns * stretch / stretches) & ~std::size_t{1};
+}
+
+/// Rate that the phases have beyond what is foretold of them, stretch by stretch: that of a random process, or of what
+/// is not in the model yet [rad/s].
+std::vector<double> rate_left(const TurnFit& fit, const TurnModel::Prediction& prediction) {
+    const auto& series = fit.model().series();
+    const std::size_t n = series.size();
+    std::vector<double> rate(n, 0.0);
+    for (std::size_t s = 0; s < stretches; ++s) {
+        const std::size_t begin = begin_of(s, n);
+        const std::size_t end = begin_of(s + 1, n);
+        if (end < begin + 8) continue;
+        // Beside an offset and another amplitude of the dither.
+        Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+        Eigen::Vector3d right = Eigen::Vector3d::Zero();
+        for (std::size_t i = begin; i < end; ++i) {
+            const Eigen::Vector3d row{series.time_s[i] - series.time_s[begin], 1.0,
+                                      static_cast<double>(series.direction[i])};
+            normal += row * row.transpose();
+            right += row * (fit.model().phase_rad()[i] - prediction.phase_rad[i]);
+        }
+        const Eigen::Vector3d found = normal.ldlt().solve(right);
+        std::fill(rate.begin() + static_cast<std::ptrdiff_t>(begin), rate.begin() + static_cast<std::ptrdiff_t>(end),
+                  found(0));
+    }
+    return rate;
+}
+
 /// Mean and standard error of a series over the turns that count, from its means over stretches. Negative weights mark
 /// turns without a value.
 BlockMean block_mean(const std::vector<double>& series, const std::vector<std::uint8_t>& valid, const Rows& rows,
                      double floor) {
-    constexpr std::size_t stretches = 120;
     const std::size_t n = series.size();
     BlockMean mean;
-    std::size_t begin = 0;
     double sum = 0.0;
     double squares = 0.0;
     double k = 0.0;
-    for (std::size_t s = 1; s <= stretches; ++s) {
-        // Whole cycles, so that parities weigh alike.
-        const std::size_t end = s == stretches ? n : (n * s / stretches) & ~std::size_t{1};
+    for (std::size_t s = 0; s < stretches; ++s) {
         double total = 0.0;
         std::size_t count = 0;
         bool counts = true;
-        for (std::size_t i = begin; i < end; ++i) {
+        for (std::size_t i = begin_of(s, n); i < begin_of(s + 1, n); ++i) {
             counts = counts && rows[i];
             if (!valid[i]) continue;
             total += series[i];
             ++count;
         }
-        begin = end;
         if (count < 4) continue;
         const double value = total / static_cast<double>(count);
         mean.of_stretch.push_back(value);
@@ -224,11 +252,13 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     const auto& series = fit.model().series();
     const std::size_t n = series.size();
     const auto prediction = fit.model().predict(fit.parameters());
+    const std::vector<double> left_rad_s = rate_left(fit, prediction);
     std::vector<double> late(n, 0.0);
     std::vector<std::uint8_t> valid(n, 0);
     for (std::size_t i = 1; i + 1 < n; ++i) {
         const double second = prediction.turn_s[i - 1] - 2.0 * prediction.turn_s[i] + prediction.turn_s[i + 1];
-        late[i] = -0.25 * series.direction[i] * second;
+        // Such a rate moves the points where the phase stands still as any other does.
+        late[i] = -0.25 * series.direction[i] * second + left_rad_s[i] / series.acceleration_rad_s2;
         valid[i] = 1;
     }
     // Clocks that find the zero-rate point from pulses do not follow the lock-in's shift of it all the way.
@@ -237,7 +267,8 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     // follow, and what they would not of a rotation: middles between pulses lie off by w^2 t^2/6 of the shift.
     double mean_share = 0.0;
     const auto share_at = [&](std::size_t i) {
-        return series.relative_rate(fit.parameters().bias_deg_h + series.input_rate_deg_h[i]);
+        return series.relative_rate(fit.parameters().bias_deg_h + series.input_rate_deg_h[i]) +
+               left_rad_s[i] / (series.amplitude_rad * units::pi / series.interval_s);
     };
     for (std::size_t i = 0; i < n; ++i) mean_share += share_at(i) / static_cast<double>(n);
     const double w = units::pi / series.interval_s;
@@ -289,6 +320,9 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
 
 RadiusFold radius_fold(const record::Turns& turns, const Rows& rows) {
     RadiusFold fold;
+    double amplitude = 0.0;  // of the cosine, in which offsets are told
+    for (std::size_t i = 0; i < turns.size(); ++i) amplitude += std::hypot(turns.sine[i], turns.cosine[i]);
+    amplitude /= static_cast<double>(turns.size());
     // Gauss and Newton: radius - 1 = gain sin^2 + offset_sin sin + offset_cos cos - orthogonality sin cos + (scale).
     for (int pass = 0; pass < 8; ++pass) {
         Eigen::Matrix<double, 5, 5> normal = Eigen::Matrix<double, 5, 5>::Zero();
@@ -299,12 +333,9 @@ RadiusFold radius_fold(const record::Turns& turns, const Rows& rows) {
         std::vector<double> radius(turns.size());
         std::vector<double> angle(turns.size());
         const gyro::Ellipse& e = fold.ellipse;
-        double mean = 0.0;
-        for (std::size_t i = 0; i < turns.size(); ++i) mean += std::hypot(turns.sine[i], turns.cosine[i]);
-        mean /= static_cast<double>(turns.size());
         for (std::size_t i = 0; i < turns.size(); ++i) {
-            const double s = (turns.sine[i] / mean - e.offset_sin) / (1.0 + e.gain);
-            double c = turns.cosine[i] / mean - e.offset_cos;
+            const double s = (turns.sine[i] / amplitude - e.offset_sin) / (1.0 + e.gain);
+            double c = turns.cosine[i] / amplitude - e.offset_cos;
             c = (c + s * std::sin(e.orthogonality_rad)) / std::cos(e.orthogonality_rad);
             radius[i] = std::hypot(s, c);
             angle[i] = std::atan2(s, c);
@@ -332,6 +363,7 @@ RadiusFold radius_fold(const record::Turns& turns, const Rows& rows) {
             const double with = squares - step.dot(right);
             fold.chi2 = (without - with) / variance;
         }
+        amplitude *= scale;
         fold.ellipse.gain += step(0);
         fold.ellipse.offset_sin += step(1);
         fold.ellipse.offset_cos += step(2);

@@ -86,18 +86,19 @@ class Belief {
 
     /// On to the next turn: the variance of the innovation, one over it, and what the states gain by an innovation
     /// that is given in units of that variance.
-    HWY_INLINE void step(double sign_of, double before_slope, double kick_slope, Row& gain, V& f, V& over) {
-        const V sign = set(d_, sign_of);
-        const V through = set(d_, 1.0 - before_slope);
-        const V kick = set(d_, kick_slope);
+    HWY_INLINE void step(const TurnFrame& frame, std::size_t turn, Row& gain, V& f, V& over) {
+        const V sign = set(d_, frame.sign[turn]);
+        const V through = set(d_, 1.0 - frame.before_slope[turn]);
+        const V kick = set(d_, frame.kick_slope[turn]);
+        const V readout = readout_ * set(d_, frame.readout_at(turn));
         for (std::size_t s = 0; s < states; ++s) gain[s] = p_[0][s] + sign * p_[1][s];
-        f = larger(d_, gain[0] + sign * gain[1] + injected_ + through * through * readout_, set(d_, 1e-30));
+        f = larger(d_, gain[0] + sign * gain[1] + injected_ + through * through * readout, set(d_, 1e-30));
         gain[1] = gain[1] * decay_[1];
         for (std::size_t s = 2; s < states; ++s) {
             gain[0] = gain[0] + gain_s_[s] * gain[s];
             gain[s] = gain[s] * decay_[s];
         }
-        gain[0] = gain[0] - kick * through * readout_;
+        gain[0] = gain[0] - kick * through * readout;
         // P <- T P T' + Q - gain gain'/f
         Row angle = p_[0];
         for (std::size_t s = 2; s < states; ++s) {
@@ -116,7 +117,7 @@ class Belief {
         for (std::size_t j = 1; j < states; ++j) {
             p_[0][j] = p_[j][0] = angle[j] * decay_[j] + with_angle_[j] - share * gain[j];
         }
-        p_[0][0] = angle[0] + added_[0] + kick * kick * readout_ - share * gain[0];
+        p_[0][0] = angle[0] + added_[0] + kick * kick * readout - share * gain[0];
     }
 
    private:
@@ -133,7 +134,7 @@ void gains_with(const TurnFrame& frame, const FilterNoises& noises, double* gain
     for (std::size_t i = 0; i < frame.sign.size(); ++i) {
         double f = 0.0;
         double over = 0.0;
-        belief.step(frame.sign[i], frame.before_slope[i], frame.kick_slope[i], gain, f, over);
+        belief.step(frame, i, gain, f, over);
         for (std::size_t s = 0; s < states; ++s) gains[i * states + s] = gain[s] * over;
         sd[i] = std::sqrt(f);
     }
@@ -173,7 +174,7 @@ void likelihoods_with(Tag d, const TurnFrame& frame, const FilterNoises& noises,
     for (std::size_t i = 0; i < frame.sign.size(); ++i) {
         V f, over;
         const V innovation = follower.innovation(series[i], frame.sign[i]);
-        belief.step(frame.sign[i], frame.before_slope[i], frame.kick_slope[i], gain, f, over);
+        belief.step(frame, i, gain, f, over);
         const V scaled = innovation * over;
         if (counts[i] != 0) {
             sum = sum + innovation * scaled;

@@ -206,6 +206,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     frame.sign.resize(n);
     frame.before_slope.resize(n);
     frame.kick_slope.resize(n);
+    frame.readout = series_.readout;
     prediction.phase_rad.resize(n);
     const double c = device.phase_per_arcsec;
     std::shared_ptr<const Kicks> kick_of = kicks(device_setup);

@@ -61,7 +61,7 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
         c = turns.cosine[i] / scale - ellipse.offset_cos;
         c = (c + s * std::sin(ellipse.orthogonality_rad)) / std::cos(ellipse.orthogonality_rad);
     };
-    for (int pass = 0; pass < 3; ++pass) {
+    for (int pass = 0; pass < 8; ++pass) {
         for (std::size_t i = 0; i < n; ++i) {
             double s = 0.0;
             double c = 0.0;
@@ -82,7 +82,21 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
         squares += r * r;
         ++counted;
     }
-    joined.readout_sd_rad = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(counted, 1)));
+    // What makes a circle of an ellipse makes the noise of the detectors an ellipse.
+    double of_radius = 1.0;
+    if (!(ellipse == gyro::Ellipse{})) {
+        const double tangent = std::tan(ellipse.orthogonality_rad);
+        const double of_cosine = 1.0 / std::pow(std::cos(ellipse.orthogonality_rad), 2);
+        const double of_sine = 1.0 / std::pow(1.0 + ellipse.gain, 2);
+        of_radius = 0.0;
+        for (const double psi : angle) {
+            const double s = std::sin(psi);
+            const double c = std::cos(psi);
+            joined.readout.push_back(std::pow(c - s * tangent, 2) * of_sine + s * s * of_cosine);
+            of_radius += (std::pow(s + c * tangent, 2) * of_sine + c * c * of_cosine) / static_cast<double>(n);
+        }
+    }
+    joined.readout_sd_rad = std::sqrt(squares / (of_radius * static_cast<double>(std::max<std::size_t>(counted, 1))));
 
     std::vector<double> off(n);  // quadrature less middle of the counted quarter, in quarters of (-2, 2]
     for (std::size_t i = 0; i < n; ++i) {
@@ -175,6 +189,7 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
     const record::Declared& declared = record.declared;
     gyro::Setup& setup = series.setup;
     series.radius_sd_rad = joined.readout_sd_rad;
+    series.readout = joined.readout;
     series.scale_factor_declared = declared.scale_factor_arcsec.has_value();
     setup.scale_factor_arcsec = declared.scale_factor_arcsec.value_or(setup.scale_factor_arcsec);
     setup.lockin_threshold_deg_h = declared.lockin_threshold_deg_h.value_or(setup.lockin_threshold_deg_h);

@@ -15,7 +15,8 @@ struct JoinedPhase {
     std::vector<double> phase_rad;
     std::vector<std::int64_t> miscounts;  ///< quarters that the counter has been off by since the first turn
     std::vector<std::size_t> miscounted;  ///< turns at which that changed
-    double readout_sd_rad = 0.0;          ///< of the phase, from the scatter of the quadrature's radius
+    double readout_sd_rad = 0.0;          ///< of the detectors over their amplitude, from the scatter of the radius
+    std::vector<double> readout = {};     ///< variance of the phase's noise over that; none: 1 at all turns
 };
 
 /// Joins count and quadrature of the turns. The quadrature's phase, made round by `ellipse`, is taken on the branch
@@ -42,7 +43,8 @@ struct TurnSeries {
     double interval_s = 0.0;
     double amplitude_rad = 0.0;  ///< of the dither: half the mean swing but for what the rotation adds to it
     double acceleration_rad_s2 = 0.0;
-    double radius_sd_rad = 0.0;                ///< of the quadrature, over its mean
+    double radius_sd_rad = 0.0;                ///< of the quadrature, over its mean, as of a circle
+    std::vector<double> readout;               ///< variance of the phase's noise over the detectors'; none: 1
     std::vector<double> temperature_change_k;  ///< since the first turn; empty where unknown
     double mean_rate_deg_h = 0.0;              ///< of the output, less the input's
     std::vector<double> input_rate_deg_h;      ///< as referenced or declared, zero where neither

@@ -6,7 +6,7 @@ namespace ringlock::effects {
 namespace {
 
 constexpr std::array parameters_of = {
-    Parameter{"deg_h_per_h", 0.0, -1000.0, 1000.0, Role::size, "slope R of the rate"},
+    Parameter{"deg_h_per_h", 0.0, -1e5, 1e5, Role::size, "slope R of the rate"},
 };
 
 class BiasRamp final : public Effect {
