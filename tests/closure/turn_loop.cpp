@@ -309,6 +309,106 @@ TEST(TurnLoop, ALockedGyroIsNoRiddle) {
     EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("locked")));
 }
 
+/// A gyro of 1.6 arcsec a fringe that a rate of a degree an hour leaves locked.
+Truth locked_by_strong_coupling() {
+    Truth truth;
+    truth.scale_factor_arcsec = 1.6;
+    truth.dither_frequency_hz = 233.7;
+    truth.dither_peak_rate_deg_s = 68.0;
+    truth.lockin_threshold_deg_h = 800.0;
+    truth.readout_noise = 0.001;
+    truth.bias_deg_h = -1.5;
+    truth.turns = 10000;
+    truth.seed = 7007;
+    return truth;
+}
+
+// What the lock-in adds on the way to a turn goes with the noise there: sizes follow phases by more than they do.
+TEST(TurnLoop, InjectedNoiseInALockedGyroIsNoStructure) {
+    for (const double injected : {0.5, 1.5}) {
+        Truth truth = locked_by_strong_coupling();
+        truth.injected_noise_rad = injected;
+        const Closure closure = close_loop(generate({&truth, 1}).front());
+        print("locked, with noise", closure);
+        EXPECT_EQ(closure.verdict, Verdict::nothing_missing);
+        EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", 800.0), 4.0);
+    }
+}
+
+TEST(TurnLoop, AWanderingAmplitudeOfALockedGyroIsTheDithersOwn) {
+    Truth truth = locked_by_strong_coupling();
+    truth.injected_noise_rad = 0.5;
+    truth.wander.rms = 3e-4;
+    truth.wander.correlation_s = 0.1;
+    const Closure closure = close_loop(generate({&truth, 1}).front());
+    print("locked, amplitude wanders", closure);
+    EXPECT_EQ(closure.verdict, Verdict::nothing_missing);
+}
+
+// The rate of a walk moves zero-rate points as any rate does: minima one way, maxima the other.
+TEST(TurnLoop, ARateThatWalksIsNoShapeOfTheDither) {
+    Truth truth;
+    truth.scale_factor_arcsec = 2.0;
+    truth.dither_frequency_hz = 436.0;
+    truth.dither_peak_rate_deg_s = 47.0;
+    truth.lockin_threshold_deg_h = 42.6;
+    truth.readout_noise = 0.01;
+    truth.rates.rate_random_walk_deg_h_rt_h = 222.0;
+    truth.turns = 6000;
+    truth.seed = 20010;
+    const Closure closure = close_loop(generate({&truth, 1}).front());
+    print("walk", closure);
+    ASSERT_EQ(closure.steps.size(), 1U);
+    EXPECT_EQ(closure.steps[0].effect, "rate_random_walk");
+    EXPECT_EQ(closure.verdict, Verdict::closed);
+}
+
+TEST(TurnLoop, ASteepRampLeadsTheFitBack) {
+    Truth truth;
+    truth.scale_factor_arcsec = 1.6;
+    truth.dither_frequency_hz = 497.9;
+    truth.dither_peak_rate_deg_s = 68.5;
+    truth.lockin_threshold_deg_h = 141.0;
+    truth.readout_noise = 0.005;
+    truth.bias_deg_h = 35.0;
+    truth.rates.bias_ramp_deg_h_per_h = 4000.0;
+    truth.turns = 8000;
+    truth.seed = 20016;
+    const Closure closure = close_loop(generate({&truth, 1}).front());
+    print("steep ramp", closure);
+    ASSERT_EQ(closure.steps.size(), 1U);
+    EXPECT_EQ(closure.steps[0].effect, "bias_ramp");
+    EXPECT_TRUE(closure.steps[0].confounded_with.empty());
+    EXPECT_LT(deviation(closure.steps[0].parameters, "deg_h_per_h", 4000.0), 4.0);
+    EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", 141.0), 4.0);
+}
+
+// Its offsets are in units of the fringe, not of the mean radius, and the noise that is left is no longer round.
+TEST(TurnLoop, AnEllipseOfASixthIsMadeRound) {
+    Truth truth;
+    truth.scale_factor_arcsec = 1.2;
+    truth.dither_frequency_hz = 168.3;
+    truth.dither_peak_rate_deg_s = 288.0;
+    truth.lockin_threshold_deg_h = 542.0;
+    truth.readout_noise = 0.01;
+    truth.bias_deg_h = 19.0;
+    truth.turns = 8000;
+    truth.seed = 20000;
+    truth.readout_ellipse.gain = 0.176;
+    truth.readout_ellipse.offset_sin = 0.095;
+    truth.readout_ellipse.orthogonality_rad = 0.1;
+    const Closure closure = close_loop(generate({&truth, 1}).front());
+    print("ellipse", closure);
+    EXPECT_EQ(closure.verdict, Verdict::closed);
+    ASSERT_EQ(closure.steps.size(), 1U);
+    EXPECT_EQ(closure.steps[0].effect, "readout_ellipse");
+    EXPECT_LT(deviation(closure.steps[0].parameters, "gain", 0.176), 4.0);
+    EXPECT_LT(deviation(closure.steps[0].parameters, "offset_sin", 0.095), 4.0);
+    EXPECT_LT(deviation(closure.steps[0].parameters, "offset_cos", 0.0), 4.0);
+    EXPECT_LT(deviation(closure.steps[0].parameters, "orthogonality_rad", 0.1), 4.0);
+    EXPECT_LT(deviation(closure.base, "readout_noise_rad", 0.01), 4.0);
+}
+
 /// How far the thresholds of so many locked gyros come out, squared and summed, in standard errors; by how fast they
 /// lock. All that the lock-in does before a turn follows from the very phase that is read there.
 double squares_of_locked_gyros(int gyros, std::uint64_t seed) {
