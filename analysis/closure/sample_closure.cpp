@@ -213,8 +213,7 @@ void Loop::find_coarse_steps(Closure& closure) {
         now_.fit = std::move(drawn);
         closure.notes.push_back(
             fmt::format("steps of {:.6g} arcsec are large beside the noise, and their rounding follows the angle: what "
-                        "was rounded is "
-                        "drawn by the model, and white_angle_arcsec is the noise before it was rounded",
+                        "was rounded is drawn by the model, and white_angle_arcsec is the noise before it was rounded",
                         step));
         return;
     }

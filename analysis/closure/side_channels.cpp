@@ -251,6 +251,7 @@ std::optional<TurnParameters> shape_read_again(const record::Turns& turns, const
 DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     const auto& series = fit.model().series();
     const std::size_t n = series.size();
+    const double w = units::pi / series.interval_s;
     const auto prediction = fit.model().predict(fit.parameters());
     const std::vector<double> left_rad_s = rate_left(fit, prediction);
     std::vector<double> late(n, 0.0);
@@ -268,10 +269,9 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     double mean_share = 0.0;
     const auto share_at = [&](std::size_t i) {
         return series.relative_rate(fit.parameters().bias_deg_h + series.input_rate_deg_h[i]) +
-               left_rad_s[i] / (series.amplitude_rad * units::pi / series.interval_s);
+               left_rad_s[i] / (series.amplitude_rad * w);
     };
     for (std::size_t i = 0; i < n; ++i) mean_share += share_at(i) / static_cast<double>(n);
-    const double w = units::pi / series.interval_s;
     const double least_s =
         std::hypot(5e-8 * series.interval_s, 0.05 * followed_s, mean_share / (series.amplitude_rad * w));
     DitherShape shape{block_mean(late, valid, fit.rows(), least_s), {}, {}};

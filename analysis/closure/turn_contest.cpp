@@ -126,7 +126,8 @@ std::shared_ptr<Fitted> fit_with(const record::Record& record, const Fitted& now
                              !told_by_other_columns(*candidate.effect);
     if (of_coupling) fit_from(with_share(0.01));
     if (!of_coupling || !gained(0.25 * candidate.chi2)) fit_from(start);
-    const bool strong_rate = candidate.effect->adds_angle() && candidate.chi2 > 400.0;
+    constexpr double strong = 400.0;  // chi-squared
+    const bool strong_rate = candidate.effect->adds_angle() && candidate.chi2 > strong;
     if (is_random_rate(*candidate.effect) || on_phase(*candidate.effect) || strong_rate) {
         // Without it the rest may have gone far astray: anew, too, from where another has led or from the start.
         TurnParameters anew = alike != nullptr ? alike->fit->parameters() : TurnParameters{};

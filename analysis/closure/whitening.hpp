@@ -36,7 +36,7 @@ struct TurnFrame {
     std::vector<double> sign;          ///< -1 at minima, 1 at maxima
     std::vector<double> before_slope;  ///< derivative of what the lock-in adds before the turn to its phase
     std::vector<double> kick_slope;    ///< of all that it adds at the turn
-    std::vector<double> readout;       ///< variance of the readout's noise over the mean one; none: 1 at all turns
+    std::vector<double> readout;       ///< variance of v over `readout_rad2`; none: 1 at all turns
 
     double readout_at(std::size_t turn) const { return readout.empty() ? 1.0 : readout[turn]; }
 };

@@ -26,4 +26,11 @@ inline void inject(scenario::Scenario& scenario, double noise_rad) {
     }
 }
 
+/// Such a gyro, with so much noise or none.
+inline scenario::Scenario gyro(double turns, std::uint64_t seed, double injected_rad) {
+    scenario::Scenario scenario = plain_gyro(turns, seed);
+    inject(scenario, injected_rad);
+    return scenario;
+}
+
 }  // namespace ringlock::test::closure

@@ -1,0 +1,148 @@
+#include "analysis/closure/size_over_phase.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <boost/math/special_functions/erf.hpp>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "analysis/closure/chance.hpp"
+#include "analysis/closure/decision.hpp"
+#include "analysis/closure/turn_kicks.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// The normal deviate that is as rare as an innovation of that size over its standard deviation: a few phases that
+/// hardly ever come weigh too much for squares.
+double size_deviate(double size) {
+    const double rarity = std::erfc(size / std::numbers::sqrt2);
+    return std::numbers::sqrt2 * boost::math::erfc_inv(2.0 * std::clamp(rarity, 1e-300, 1.0 - 1e-15));
+}
+
+/// The size that has that deviate.
+double size_of(double deviate) {
+    return std::numbers::sqrt2 * boost::math::erfc_inv(0.5 * std::erfc(deviate / std::numbers::sqrt2));
+}
+
+/// Cosine and sine of a phase and of its double.
+using Harmonics = Eigen::Vector4d;
+Harmonics harmonics_of(double phase_rad) {
+    return {std::cos(phase_rad), std::sin(phase_rad), std::cos(2.0 * phase_rad), std::sin(2.0 * phase_rad)};
+}
+
+/// An innovation is a part of the phase that comes of it: where phases are foretold alike turn after turn, sizes follow
+/// the phase even if nothing is missing. Means of harmonics of the phase psi times the size's deviate, with
+///
+///     psi = foretold + sd (normal innovation) + before(psi),
+///
+/// the last what the lock-in adds before the turn.
+class SizeByPhase {
+   public:
+    SizeByPhase(const TurnKicks& kicks, int direction, double sd_rad) {
+        constexpr double end = 5.0;
+        const int points = static_cast<int>(std::ceil(2.0 * end * std::max(2.0, 2.0 * sd_rad)));
+        const double step = 2.0 * end / points;
+        mean_.fill(Harmonics::Zero());
+        for (int k = 0; k <= points; ++k) {
+            const double deviate = k * step - end;
+            const double weight = 0.5 * deviate * step * std::exp(-0.5 * deviate * deviate) / std::sqrt(units::two_pi);
+            const double size_rad = sd_rad * size_of(deviate);
+            for (std::size_t j = 0; j < phases; ++j) {
+                for (const double innovation_rad : {size_rad, -size_rad}) {
+                    mean_[j] += weight * harmonics_of(solve(kicks, direction, foretold(j) + innovation_rad));
+                }
+            }
+        }
+    }
+    Harmonics at(double foretold_rad) const {
+        const double fringes = foretold_rad / units::two_pi;
+        const double x = (fringes - std::floor(fringes)) * phases;
+        const auto j = static_cast<std::size_t>(x);
+        const double share = x - static_cast<double>(j);
+        return (1.0 - share) * mean_[j % phases] + share * mean_[(j + 1) % phases];
+    }
+
+   private:
+    static constexpr std::size_t phases = 256;
+    static double foretold(std::size_t j) { return units::two_pi * static_cast<double>(j) / phases; }
+    /// psi - before(psi) = plain, by Newton's method; lock-in so strong that this has several solutions was turned
+    /// away.
+    static double solve(const TurnKicks& kicks, int direction, double plain_rad) {
+        double psi = plain_rad;
+        for (int k = 0; k < 8; ++k) {
+            const TurnKicks::Kick kick = kicks.at(direction, psi);
+            psi -= (psi - kick.before_rad - plain_rad) / (1.0 - kick.before_slope);
+        }
+        return psi;
+    }
+
+    std::array<Harmonics, phases> mean_;
+};
+
+}  // namespace
+
+ResidualTest size_over_phase(const TurnFit& fit) {
+    const auto& e = fit.innovations();
+    const auto& rows = fit.rows();
+    const std::size_t n = e.size();
+    const double sd = std::sqrt(squares_of(e, rows).mean);
+    const auto& phase = fit.model().phase_rad();
+    const auto& series = fit.model().series();
+    gyro::Setup setup = fit.model().setup(fit.parameters());
+    for (const double rate_deg_h : series.input_rate_deg_h) {
+        setup.input_rate_deg_h += rate_deg_h / static_cast<double>(n);
+    }
+    const TurnKicks kicks(setup);
+    std::vector<double> size(n);
+    std::vector<double> sd_rad(n);  // without what the lock-in adds before the turn
+    std::vector<double> foretold(n);
+    double mean_size = 0.0;
+    double mean_sd_rad = 0.0;
+    double counted = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!rows[i]) continue;
+        size[i] = size_deviate(std::abs(e[i]) / sd);
+        const TurnKicks::Kick kick = kicks.at(series.direction[i], phase[i]);
+        sd_rad[i] = fit.sd_rad()[i] * std::abs(1.0 - fit.prediction().frame.before_slope[i]);
+        foretold[i] = phase[i] - kick.before_rad - sd_rad[i] * e[i];
+        mean_size += size[i];
+        mean_sd_rad += sd_rad[i];
+        counted += 1.0;
+    }
+    mean_size /= counted;
+    mean_sd_rad /= counted;
+    const SizeByPhase at_minima(kicks, 1, mean_sd_rad);
+    const SizeByPhase at_maxima(kicks, -1, mean_sd_rad);
+    const Eigen::Index columns = 8;
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(columns);
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(columns, columns);
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!rows[i]) continue;
+        const int direction = series.direction[i];
+        const Harmonics more =
+            harmonics_of(phase[i]) * (size[i] - mean_size) - (direction > 0 ? at_minima : at_maxima).at(foretold[i]);
+        Eigen::VectorXd row(columns);
+        row << more, static_cast<double>(direction) * more;
+        right += row;
+        covariance += row * row.transpose();
+    }
+    // What only the first turns of a locked gyro have tells nothing of the others.
+    constexpr double enough = 1e-3;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
+    double folded = 0.0;
+    int freedom = 0;
+    for (Eigen::Index k = 0; k < columns; ++k) {
+        if (axes.eigenvalues()(k) < enough * axes.eigenvalues().maxCoeff()) continue;
+        const double along = axes.eigenvectors().col(k).dot(right);
+        folded += along * along / axes.eigenvalues()(k);
+        ++freedom;
+    }
+    return {Where::phase, "size of the residual over the turn's phase", chi2_tail(folded, freedom), ""};
+}
+
+}  // namespace ringlock::closure
