@@ -44,7 +44,9 @@ double largest(const std::vector<double>& values) {
 Columns harmonic(const TurnFit& fit, int k, bool kicks) {
     const auto& model = fit.model();
     const std::size_t n = model.series().size();
-    Columns columns(4, Regressor(std::vector<double>(n), std::vector<double>(n), std::vector<double>(n)));
+    const NoiseShape* shape = fit.parameters().shape.get();
+    const std::vector<double> zeros(n);
+    Columns columns(4, Regressor(zeros, zeros, zeros, shape != nullptr ? zeros : std::vector<double>()));
     const double share = kicks ? 0.5 : 1.0;  // half a kick comes before the turn
     double sums[4] = {};
     for (std::size_t i = 0; i < n; ++i) {
@@ -58,6 +60,10 @@ Columns harmonic(const TurnFit& fit, int k, bool kicks) {
             columns[c].kick[i] = kicks ? slopes[c] : 0.0;
             sums[c] += values[c];
         }
+        if (shape == nullptr) continue;
+        const std::complex<double> left = share * shape->at(i)[static_cast<std::size_t>(k - 1)];
+        const double lefts[4] = {left.real(), left.imag(), d * left.real(), d * left.imag()};
+        for (std::size_t c = 0; c < 4; ++c) columns[c].left[i] = lefts[c];
     }
     return columns;
 }
@@ -76,10 +82,10 @@ void doubt_ellipse(const TurnFit& fit, TurnFit::Score& score) {
 void test_phase(const TurnFit& fit, std::vector<View>& views) {
     constexpr int harmonics = 6;
     // The innovation is a part of the phase that is read: what they have to do with each other where nothing is missing
-    // is known of normal ones (Stein, Annals of Statistics 9, 1981, 1135).
-    const bool normal = !is_of_even_density(fit.innovations(), fit.rows());
+    // is known of normal ones (Stein, Annals of Statistics 9, 1981, 1135) and of those whose shape is.
+    const bool known = fit.parameters().shape || !is_of_even_density(fit.innovations(), fit.rows());
     for (const bool kicks : {true, false}) {
-        if (!kicks && !normal) continue;
+        if (!kicks && !known) continue;
         double least = 1.0;
         double most = 0.0;
         double cost = 0.0;

@@ -16,7 +16,7 @@ namespace {
 struct Excess {
     double kurtosis, z;
 };
-Excess excess_of(const std::vector<double>& values) {
+Excess excess_of(std::span<const double> values) {
     const auto count = static_cast<double>(values.size());
     double second = 0.0;
     double fourth = 0.0;
@@ -36,14 +36,18 @@ Excess excess_of(const std::vector<double>& values) {
 
 }  // namespace
 
-bool is_of_even_density(const std::vector<double>& innovations, const Rows& rows) {
+bool is_of_even_density(std::span<const double> innovations) {
     constexpr double beyond_doubt = 1e-6;
+    const auto [kurtosis, z] = excess_of(innovations);
+    return kurtosis < 0.0 && chi2_tail(z * z, 1) < beyond_doubt;
+}
+
+bool is_of_even_density(const std::vector<double>& innovations, const Rows& rows) {
     std::vector<double> counted;
     for (std::size_t i = 0; i < innovations.size(); ++i) {
         if (rows[i]) counted.push_back(innovations[i]);
     }
-    const auto [kurtosis, z] = excess_of(counted);
-    return kurtosis < 0.0 && chi2_tail(z * z, 1) < beyond_doubt;
+    return is_of_even_density(counted);
 }
 
 std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovations, const Rows& rows,

@@ -1,5 +1,6 @@
 #pragma once
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "analysis/closure/independence.hpp"
@@ -13,6 +14,7 @@ std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovation
                                            std::size_t shortest, std::size_t shortest_bounded = 1);
 
 /// Whether they are, beyond doubt, flatter than normal ones, as injected noise between bounds is.
+bool is_of_even_density(std::span<const double> innovations);
 bool is_of_even_density(const std::vector<double>& innovations, const Rows& rows);
 
 /// A rate that wanders moves by little at a time; jumps betray themselves by the size of what follows them (Harvey and

@@ -54,7 +54,7 @@ class SizeByPhase {
             const double size_rad = sd_rad * size_of(deviate);
             for (std::size_t j = 0; j < phases; ++j) {
                 for (const double innovation_rad : {size_rad, -size_rad}) {
-                    mean_[j] += weight * harmonics_of(solve(kicks, direction, foretold(j) + innovation_rad));
+                    mean_[j] += weight * harmonics_of(kicks.phase_after(direction, foretold(j) + innovation_rad));
                 }
             }
         }
@@ -70,16 +70,6 @@ class SizeByPhase {
    private:
     static constexpr std::size_t phases = 256;
     static double foretold(std::size_t j) { return units::two_pi * static_cast<double>(j) / phases; }
-    /// psi - before(psi) = plain, by Newton's method; lock-in so strong that this has several solutions was turned
-    /// away.
-    static double solve(const TurnKicks& kicks, int direction, double plain_rad) {
-        double psi = plain_rad;
-        for (int k = 0; k < 8; ++k) {
-            const TurnKicks::Kick kick = kicks.at(direction, psi);
-            psi -= (psi - kick.before_rad - plain_rad) / (1.0 - kick.before_slope);
-        }
-        return psi;
-    }
 
     std::array<Harmonics, phases> mean_;
 };

@@ -385,9 +385,7 @@ Closure close_turns(const record::Record& record) {
     }
     if (is_of_even_density(now->fit->innovations(), now->fit->rows())) {
         closure.notes.push_back(
-            "the injected noise is flatter than a normal one: what is read at harmonics of the phase, and the size of "
-            "the "
-            "residual over it, are not tested");
+            "the injected noise is flatter than a normal one: the size of the residual over the phase is not tested");
     }
     for (std::string& note : notes_on_amplitude(*now)) closure.notes.push_back(std::move(note));
     closure.log_likelihood_gain = now->fit->log_likelihood() - base_log_likelihood;

@@ -42,14 +42,17 @@ void Regressor::take(double value, std::vector<double>& rest, TurnFrame& frame) 
     for (std::size_t i = 0; i < series.size(); ++i) rest[i] -= value * series[i];
     for (std::size_t i = 0; i < slope.size(); ++i) frame.before_slope[i] += value * slope[i];
     for (std::size_t i = 0; i < kick.size(); ++i) frame.kick_slope[i] += value * kick[i];
+    for (std::size_t i = 0; i < left.size(); ++i) frame.shape_left[i] += value * left[i];
 }
 
 Regressor difference(TurnModel::Prediction with, const TurnModel::Prediction& without, double per) {
-    Regressor of(std::move(with.phase_rad), std::move(with.frame.before_slope), std::move(with.frame.kick_slope));
+    Regressor of(std::move(with.phase_rad), std::move(with.frame.before_slope), std::move(with.frame.kick_slope),
+                 std::move(with.frame.shape_left));
     for (std::size_t i = 0; i < of.series.size(); ++i) {
         of.series[i] = (of.series[i] - without.phase_rad[i]) / per;
         of.slope[i] = (of.slope[i] - without.frame.before_slope[i]) / per;
         of.kick[i] = (of.kick[i] - without.frame.kick_slope[i]) / per;
+        of.left[i] = (of.left[i] - without.frame.shape_left[i]) / per;
     }
     return of;
 }
@@ -78,6 +81,7 @@ TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows,
     fit_noise();
     climb();
     try_other_noise();
+    shape_noise();
     finish();
 }
 
@@ -456,6 +460,9 @@ Eigen::VectorXd TurnFit::counted(const Whitening& whitening, const TurnFrame& fr
     const std::size_t n = rows_.size();
     for (std::size_t i = 0; i < regressor.slope.size(); ++i) {
         if (rows_[i]) column(static_cast<Eigen::Index>(n + i)) = regressor.slope[i] / (1.0 - frame.before_slope[i]);
+    }
+    for (std::size_t i = 0; i < regressor.left.size(); ++i) {
+        if (rows_[i]) column(static_cast<Eigen::Index>(n + i)) += regressor.left[i];
     }
     return column;
 }

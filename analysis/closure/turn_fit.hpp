@@ -18,12 +18,16 @@ using Rows = std::vector<std::uint8_t>;
 ///
 /// Some of that follows from the very phase that it is added to: what the lock-in does before a turn, what is read at
 /// it. Its derivative by that phase, turn after turn, is the slope; empty where nothing does. Such a series goes with
-/// the innovations even where nothing is missing, which the likelihood's |1 - before'| makes up for. `kick` is the
-/// derivative of all that the turn adds to those after it.
+/// the innovations even where nothing is missing, which the likelihood's |1 - before'| makes up for, and `left` where
+/// the noise has a shape (NoiseShape). `kick` is the derivative of all that the turn adds to those after it.
 struct Regressor {
-    Regressor(std::vector<double> of_series, std::vector<double> of_slope = {}, std::vector<double> of_kick = {})
-        : series(std::move(of_series)), slope(std::move(of_slope)), kick(std::move(of_kick)) {}
-    std::vector<double> series, slope, kick;
+    Regressor(std::vector<double> of_series, std::vector<double> of_slope = {}, std::vector<double> of_kick = {},
+              std::vector<double> of_left = {})
+        : series(std::move(of_series)),
+          slope(std::move(of_slope)),
+          kick(std::move(of_kick)),
+          left(std::move(of_left)) {}
+    std::vector<double> series, slope, kick, left;
 
     /// Takes so much of it from a rest, and adds it to the frame.
     void take(double value, std::vector<double>& rest, TurnFrame& frame) const;
@@ -128,6 +132,7 @@ class TurnFit {
     void try_other_noise();
     void try_wander();
     void try_from(const TurnParameters& other);
+    void shape_noise();
     TurnParameters with_noise_of(const TurnFrame& frame, const TurnParameters& start,
                                  const std::vector<double>& rest) const;
     /// The series whitened, rows that do not count zero, and the rows of |1 - before'| below.

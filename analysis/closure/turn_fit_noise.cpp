@@ -202,6 +202,9 @@ std::vector<double> TurnFit::objectives(const TurnFrame& frame, const std::vecto
     std::vector<TurnNoise> noises;
     for (const TurnParameters& p : parameters) noises.push_back(model_->noise(p));
     std::vector<double> sums = Whitening::minus_log_likelihoods(frame, noises, rest, rows_);
+    double left = 0.0;
+    for (std::size_t i = 0; i < frame.shape_left.size(); ++i) left += rows_[i] ? frame.shape_left[i] : 0.0;
+    for (double& sum : sums) sum += left;
     // The radius of the quadrature has the noise of the phase: as many degrees of freedom again.
     const double radius = model_->series().radius_sd_rad;
     for (std::size_t k = 0; k < sums.size() && radius > least_radius_sd_rad; ++k) {
@@ -215,6 +218,35 @@ std::vector<double> TurnFit::objectives(const TurnFrame& frame, const std::vecto
 double TurnFit::objective(const TurnFrame& frame, const TurnParameters& parameters,
                           const std::vector<double>& rest) const {
     return objectives(frame, {parameters}, rest).front();
+}
+
+/// By what normal noise leaves, where the lock-in is not quite right yet: more than once.
+void TurnFit::shape_noise() {
+    constexpr int passes = 3;
+    if (parameters_.shape) return;
+    const auto& series = model_->series();
+    for (int pass = 0; pass < passes; ++pass) {
+        gyro::Setup setup = model_->setup(parameters_);
+        for (const double rate_deg_h : series.input_rate_deg_h) {
+            setup.input_rate_deg_h += rate_deg_h / static_cast<double>(series.size());
+        }
+        const TurnKicks kicks(setup);
+        const Innovations now(prediction_.frame, model_->noise(parameters_), rest_);
+        std::vector<double> counted_rad;
+        std::vector<double> foretold_rad(rest_.size());
+        for (std::size_t i = 0; i < rest_.size(); ++i) {
+            const double innovation_rad = now.white[i] * now.sd_rad[i];
+            const double psi = model_->phase_rad()[i];
+            foretold_rad[i] = psi - kicks.at(series.direction[i], psi).before_rad - innovation_rad;
+            if (rows_[i]) counted_rad.push_back(innovation_rad);
+        }
+        const auto shape = NoiseShape::of(counted_rad, kicks, series.direction, foretold_rad);
+        if (!shape) return;
+        parameters_.shape = shape;
+        prediction_ = model_->predict(parameters_);
+        moved_ = true;
+        climb();
+    }
 }
 
 void TurnFit::fit_noise() {

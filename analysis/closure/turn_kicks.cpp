@@ -242,11 +242,20 @@ double TurnKicks::turn_rate_rad_s(int direction, Complex turned) const {
     return c[0].real() + (c[1] * turned).real() + (c[2] * turned * turned).real();
 }
 
-TurnKicks::Kick TurnKicks::at(int direction, Complex turned) const {
-    return at(direction, turned, kinked_ && direction * turn_rate_rad_s(direction, turned) < 0.0);
+TurnKicks::Kick TurnKicks::at(int direction, Complex turned, const Weights* weights) const {
+    return at(direction, turned, kinked_ && direction * turn_rate_rad_s(direction, turned) < 0.0, weights);
 }
 
-TurnKicks::Kick TurnKicks::at(int direction, Complex turned, bool late) const {
+double TurnKicks::phase_after(int direction, double plain_rad) const {
+    double psi = plain_rad;
+    for (int k = 0; k < 8; ++k) {
+        const Kick kick = at(direction, psi);
+        psi -= (psi - kick.before_rad - plain_rad) / (1.0 - kick.before_slope);
+    }
+    return psi;
+}
+
+TurnKicks::Kick TurnKicks::at(int direction, Complex turned, bool late, const Weights* weights) const {
     const Sides& sides = series_[direction > 0 ? 0 : 1][late ? 1 : 0];
     const auto sum = [&](const Series& c, double& value, double& slope) {
         // In parts: the product of std::complex looks for infinities.
@@ -271,6 +280,10 @@ TurnKicks::Kick TurnKicks::at(int direction, Complex turned, bool late) const {
     Kick kick{};
     sum(sides[0], kick.before_rad, kick.before_slope);
     sum(sides[1], kick.after_rad, kick.after_slope);
+    for (std::size_t k = 1; k <= terms_ && weights != nullptr; ++k) {
+        const Complex weight = (*weights)[k - 1];
+        kick.before_weighted += sides[0][k].real() * weight.real() - sides[0][k].imag() * weight.imag();
+    }
     return kick;
 }
 
@@ -298,7 +311,8 @@ KicksOverRates::KicksOverRates(const gyro::Setup& setup, double lowest_deg_h, do
     }
 }
 
-TurnKicks::Kick KicksOverRates::at(int direction, Complex turned, double rate_deg_h) const {
+TurnKicks::Kick KicksOverRates::at(int direction, Complex turned, double rate_deg_h,
+                                   const TurnKicks::Weights* weights) const {
     const double x = reach_deg_h_ == 0.0 ? 0.0 : (rate_deg_h - middle_deg_h_) / reach_deg_h_;
     bool late = false;
     if (by_power_.front().kinked_) {
@@ -306,11 +320,12 @@ TurnKicks::Kick KicksOverRates::at(int direction, Complex turned, double rate_de
         if (by_power_.size() > 1) rate_rad_s += x * by_power_[1].turn_rate_rad_s(direction, turned);
         late = direction * rate_rad_s < 0.0;
     }
-    TurnKicks::Kick sum = by_power_.back().at(direction, turned, late);
+    TurnKicks::Kick sum = by_power_.back().at(direction, turned, late, weights);
     for (std::size_t k = by_power_.size() - 1; k-- > 0;) {
-        const TurnKicks::Kick next = by_power_[k].at(direction, turned, late);
+        const TurnKicks::Kick next = by_power_[k].at(direction, turned, late, weights);
         sum = {next.before_rad + x * sum.before_rad, next.after_rad + x * sum.after_rad,
-               next.before_slope + x * sum.before_slope, next.after_slope + x * sum.after_slope};
+               next.before_slope + x * sum.before_slope, next.after_slope + x * sum.after_slope,
+               next.before_weighted + x * sum.before_weighted};
     }
     return sum;
 }

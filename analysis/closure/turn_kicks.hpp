@@ -25,15 +25,21 @@ class TurnKicks {
     struct Kick {
         double before_rad, after_rad;
         double before_slope, after_slope;  ///< derivatives to the phase
+        double before_weighted;            ///< before, each harmonic by a weight in place of itself; else 0
     };
+    static constexpr std::size_t harmonics = 12;
+    /// One for each exp(i k phase), k = 1, 2, ..
+    using Weights = std::array<std::complex<double>, harmonics>;
     /// `direction`: +1 at a minimum, -1 at a maximum.
     Kick at(int direction, double phase_rad) const { return at(direction, std::polar(1.0, phase_rad)); }
     /// The same from exp(i phase).
-    Kick at(int direction, std::complex<double> turned) const;
+    Kick at(int direction, std::complex<double> turned, const Weights* weights = nullptr) const;
+    /// The phase that comes of `plain_rad` by what the lock-in adds before the turn, by Newton's method; lock-in so
+    /// strong that there are several has been turned away.
+    double phase_after(int direction, double plain_rad) const;
 
    private:
     friend class KicksOverRates;
-    static constexpr std::size_t harmonics = 12;
     using Series = std::array<std::complex<double>, harmonics + 1>;  ///< value = Re sum_k c_k exp(i k psi)
     using Sides = std::array<Series, 2>;                             ///< before, after
 
@@ -41,7 +47,7 @@ class TurnKicks {
     void count_terms();
     /// Of the phase, where the dither turns.
     double turn_rate_rad_s(int direction, std::complex<double> turned) const;
-    Kick at(int direction, std::complex<double> turned, bool late) const;
+    Kick at(int direction, std::complex<double> turned, bool late, const Weights* weights) const;
 
     std::array<std::array<Sides, 2>, 2> series_{};  ///< [minimum, maximum][zero rate before the dither's turn, after]
     std::array<std::array<std::complex<double>, 3>, 2> turn_rate_{};  ///< Fourier series, likewise
@@ -54,7 +60,8 @@ class KicksOverRates {
    public:
     KicksOverRates(const gyro::Setup& setup, double lowest_deg_h, double highest_deg_h);
     /// At this rate, in place of the setup's.
-    TurnKicks::Kick at(int direction, std::complex<double> turned, double rate_deg_h) const;
+    TurnKicks::Kick at(int direction, std::complex<double> turned, double rate_deg_h,
+                       const TurnKicks::Weights* weights = nullptr) const;
 
    private:
     double middle_deg_h_, reach_deg_h_;

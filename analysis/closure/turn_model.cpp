@@ -101,28 +101,31 @@ std::vector<double> TurnModel::smooth(const std::vector<double>& turn_s) const {
     return smoothed;
 }
 
-std::shared_ptr<const TurnModel::Kicks> TurnModel::kicks(gyro::Setup setup) const {
+std::shared_ptr<const TurnModel::Kicks> TurnModel::kicks(gyro::Setup setup, const Shape& shape) const {
     constexpr std::size_t kept = 8;
     setup.ellipse = {};
     setup.missed_count_probability = 0.0;
     {
         const std::lock_guard lock(meeting_);
-        const auto found = std::find_if(met_.begin(), met_.end(), [&](const auto& met) { return met.first == setup; });
-        if (found != met_.end()) return found->second;
+        const auto found = std::find_if(met_.begin(), met_.end(),
+                                        [&](const Met& met) { return met.setup == setup && met.shape == shape; });
+        if (found != met_.end()) return found->kicks;
     }
-    const auto shared = std::make_shared<const Kicks>(kicks_at(setup, series_.input_rate_deg_h));
+    const auto shared = std::make_shared<const Kicks>(kicks_at(setup, series_.input_rate_deg_h, shape));
     const std::lock_guard lock(meeting_);
-    met_.emplace_front(setup, shared);
+    met_.push_front({setup, shape, shared});
     if (met_.size() > kept) met_.pop_back();
     return shared;
 }
 
-TurnModel::Kicks TurnModel::kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h) const {
+TurnModel::Kicks TurnModel::kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h,
+                                     const Shape& shape) const {
     const auto [lowest, highest] = std::minmax_element(rate_deg_h.begin(), rate_deg_h.end());
     const KicksOverRates of(setup, setup.input_rate_deg_h + *lowest, setup.input_rate_deg_h + *highest);
     Kicks kicks(series_.size());
     for (std::size_t i = 0; i < kicks.size(); ++i) {
-        kicks[i] = of.at(series_.direction[i], turned_[i], setup.input_rate_deg_h + rate_deg_h[i]);
+        kicks[i] = of.at(series_.direction[i], turned_[i], setup.input_rate_deg_h + rate_deg_h[i],
+                         shape ? &shape->at(i) : nullptr);
     }
     return kicks;
 }
@@ -206,10 +209,11 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     frame.sign.resize(n);
     frame.before_slope.resize(n);
     frame.kick_slope.resize(n);
+    frame.shape_left.resize(n);
     frame.readout = series_.readout;
     prediction.phase_rad.resize(n);
     const double c = device.phase_per_arcsec;
-    std::shared_ptr<const Kicks> kick_of = kicks(device_setup);
+    std::shared_ptr<const Kicks> kick_of = kicks(device_setup, parameters.shape);
     std::vector<double> swing = dither_swings(*kick_of, series_.input_rate_deg_h);
     std::vector<double> factors(n, 1.0);
     for (std::size_t i = 0; i < n; ++i) {
@@ -234,7 +238,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         constexpr double felt = 1e-3;
         const double acceleration_rad_s2 = device.half_cycle(1, series_.amplitude_rad).end_acceleration_rad_s2();
         if (c * most_deg_h > felt * std::sqrt(acceleration_rad_s2)) {
-            kick_of = std::make_shared<const Kicks>(kicks_at(device_setup, beside_bias_deg_h));
+            kick_of = std::make_shared<const Kicks>(kicks_at(device_setup, beside_bias_deg_h, parameters.shape));
             swing = dither_swings(*kick_of, beside_bias_deg_h);
         }
         prediction.turn_s = dither_turns(rate_deg_h, factors, swing, device);
@@ -262,6 +266,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         lockin += before * kick.before_rad + after * kick.after_rad;
         frame.sign[i] = -series_.direction[i];
         frame.before_slope[i] = before * kick.before_slope;
+        frame.shape_left[i] = before * kick.before_weighted;
         if (!(std::abs(frame.before_slope[i]) < 1.0)) {
             throw RunError("lock-in so strong that a turn's phase does not tell the phase without it");
         }

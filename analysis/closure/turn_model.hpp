@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/closure/noise_shape.hpp"
 #include "analysis/closure/turn_kicks.hpp"
 #include "analysis/closure/turn_series.hpp"
 #include "analysis/closure/whitening.hpp"
@@ -36,6 +37,7 @@ struct TurnParameters {
     double wander_sd_rad = 0.0;    ///< what the dither's amplitude gains from turn to turn
     double wander_forgets = 0.0;   ///< interval over correlation time of that; 0: it walks
     double readout_sd_rad = 0.0;
+    std::shared_ptr<const NoiseShape> shape = {};  ///< of the injected noise, where that is flatter than a normal one
     std::vector<AmplitudeSwing> swings;
     std::vector<ActiveEffect> effects;
 
@@ -73,10 +75,11 @@ class TurnModel {
 
    private:
     using Kicks = std::vector<TurnKicks::Kick>;
+    using Shape = std::shared_ptr<const NoiseShape>;
     /// Kicks at the turns of a gyro of that setup, whose rate is that and the input's.
-    std::shared_ptr<const Kicks> kicks(gyro::Setup setup) const;
+    std::shared_ptr<const Kicks> kicks(gyro::Setup setup, const Shape& shape) const;
     /// The same with such a rate at each turn.
-    Kicks kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h) const;
+    Kicks kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h, const Shape& shape) const;
 
     double temperature_change_k(std::size_t turn) const;
     /// When the dither turned, from when the phase did, at these rates: the phase stands still where the dither's own
@@ -96,8 +99,12 @@ class TurnModel {
     const TurnSeries& series_;
     const std::vector<double>& phase_rad_;
     std::vector<std::complex<double>> turned_;  ///< exp(i phase)
-    /// Setups met last and their kicks, the latest first.
-    mutable std::deque<std::pair<gyro::Setup, std::shared_ptr<const Kicks>>> met_;
+    struct Met {
+        gyro::Setup setup;
+        Shape shape;
+        std::shared_ptr<const Kicks> kicks;
+    };
+    mutable std::deque<Met> met_;  ///< the latest first
     mutable std::mutex meeting_;
 };
 

@@ -36,6 +36,7 @@ struct TurnFrame {
     std::vector<double> sign;          ///< -1 at minima, 1 at maxima
     std::vector<double> before_slope;  ///< derivative of what the lock-in adds before the turn to its phase
     std::vector<double> kick_slope;    ///< of all that it adds at the turn
+    std::vector<double> shape_left;    ///< what |1 - before'| leaves of injected noise that is not normal (NoiseShape)
     std::vector<double> readout;       ///< variance of v over `readout_rad2`; none: 1 at all turns
 
     double readout_at(std::size_t turn) const { return readout.empty() ? 1.0 : readout[turn]; }

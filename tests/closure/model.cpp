@@ -3,11 +3,13 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <complex>
 #include <random>
 #include <string>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/noise_shape.hpp"
 #include "analysis/closure/turn_fit.hpp"
 #include "analysis/closure/turn_kicks.hpp"
 #include "analysis/closure/whitening.hpp"
@@ -353,6 +355,62 @@ TEST(Chance, AmplitudesAreIntegratedOutWithTheirLikeliestVariance) {
         }
     }
     EXPECT_EQ(cost_of_amplitudes(7.0, 0), 0.0);
+}
+
+TEST(NoiseShape, IsWhatTheJacobianLeavesOfEvenNoise) {
+    std::mt19937_64 random(5);
+    const double bound = 1.7;
+    std::uniform_real_distribution<double> even(-bound, bound);
+    std::vector<double> innovations(20000);
+    for (double& v : innovations) v = even(random);
+    const std::vector<int> direction{1, -1, 1, -1};
+    const std::vector<double> foretold{0.3, -2.0, 7.0, 1.234};
+    // Without lock-in in closed form, by the mean square bound^2 / 3.
+    const auto plain = NoiseShape::of(innovations, TurnKicks(), direction, foretold);
+    ASSERT_NE(plain, nullptr);
+    for (std::size_t i = 0; i < foretold.size(); ++i) {
+        for (int k = 1; k <= 4; ++k) {
+            const double h = k * bound;
+            const double with_noise = 3.0 * (std::sin(h) - h * std::cos(h)) / (h * h * bound);
+            const std::complex<double> left =
+                std::complex<double>(0.0, with_noise - std::sin(h) / bound) * std::polar(1.0, k * foretold[i]);
+            EXPECT_LT(std::abs(plain->at(i)[static_cast<std::size_t>(k - 1)] - left), 0.02) << k;
+        }
+    }
+    // With it, by chance.
+    gyro::Setup setup;
+    setup.lockin_threshold_deg_h = 1500.0;
+    setup.dither_frequency_hz = 124.68;
+    setup.dither_peak_rate_deg_s = 109.1;
+    const TurnKicks kicks(setup);
+    const auto locked = NoiseShape::of(innovations, kicks, direction, foretold);
+    for (std::size_t i = 0; i < foretold.size(); ++i) {
+        std::complex<double> left[2] = {};
+        constexpr int draws = 200000;
+        for (int draw = 0; draw < draws; ++draw) {
+            const double v = even(random);
+            const double psi = kicks.phase_after(direction[i], foretold[i] + v);
+            const auto kick = kicks.at(direction[i], psi);
+            EXPECT_NEAR(psi, foretold[i] + v + kick.before_rad, 1e-12);
+            for (int k = 1; k <= 2; ++k) {
+                left[k - 1] += std::polar(1.0, k * psi) *
+                               std::complex<double>(3.0 * v / (bound * bound), -k / (1.0 - kick.before_slope)) /
+                               static_cast<double>(draws);
+            }
+        }
+        for (std::size_t k = 0; k < 2; ++k) {
+            EXPECT_LT(std::abs(locked->at(i)[k] - left[k]), 0.02);
+            EXPECT_GT(std::abs(locked->at(i)[k] - plain->at(i)[k]), 0.02);  // which the lock-in changes
+        }
+    }
+}
+
+TEST(NoiseShape, IsNoneOfNormalNoise) {
+    std::mt19937_64 random(6);
+    std::normal_distribution<double> normal;
+    std::vector<double> innovations(20000);
+    for (double& v : innovations) v = normal(random);
+    EXPECT_EQ(NoiseShape::of(innovations, TurnKicks(), {}, {}), nullptr);
 }
 
 }  // namespace

@@ -25,23 +25,53 @@ TEST(TurnLoop, ALockedGyroIsNoRiddle) {
     EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("locked")));
 }
 
+/// What is answered for locked gyros with so much injected noise, of each by the others' side.
+std::vector<Closure> close_noisy(const Truth& locked, const std::vector<double>& injected_rad) {
+    std::vector<Truth> truths;
+    for (const double injected : injected_rad) {
+        truths.push_back(locked);
+        truths.back().injected_noise_rad = injected;
+    }
+    std::vector<Closure> answers;
+    for (const auto& record : generate(truths)) {
+        answers.push_back(close_loop(record));
+        print("locked, with noise", answers.back());
+    }
+    return answers;
+}
+
 // What the lock-in adds on the way to a turn goes with the noise there: sizes follow phases by more than they do.
 TEST(TurnLoop, InjectedNoiseInALockedGyroIsNoStructure) {
-    for (const double injected : {0.5, 1.5}) {
-        Truth truth;
-        truth.scale_factor_arcsec = 1.6;
-        truth.dither_frequency_hz = 233.7;
-        truth.dither_peak_rate_deg_s = 68.0;
-        truth.lockin_threshold_deg_h = 800.0;
-        truth.readout_noise = 0.001;
-        truth.bias_deg_h = -1.5;
-        truth.turns = 10000;
-        truth.seed = 7007;
-        truth.injected_noise_rad = injected;
-        const Closure closure = close_loop(generate({&truth, 1}).front());
-        print("locked, with noise", closure);
+    Truth truth;
+    truth.scale_factor_arcsec = 1.6;
+    truth.dither_frequency_hz = 233.7;
+    truth.dither_peak_rate_deg_s = 68.0;
+    truth.lockin_threshold_deg_h = 800.0;
+    truth.readout_noise = 0.001;
+    truth.bias_deg_h = -1.5;
+    truth.turns = 10000;
+    truth.seed = 7007;
+    for (const Closure& closure : close_noisy(truth, {0.5, 1.5})) {
         EXPECT_EQ(closure.verdict, Verdict::nothing_missing);
         EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", 800.0), 4.0);
+    }
+}
+
+// Noise between bounds goes with the lock-in before the turn otherwise than a normal one does.
+TEST(TurnLoop, NoiseOfEvenDensityInALockedGyroIsNoStructure) {
+    Truth truth;
+    truth.scale_factor_arcsec = 1.6;
+    truth.dither_frequency_hz = 105.497;
+    truth.dither_peak_rate_deg_s = 192.28;
+    truth.lockin_threshold_deg_h = 1216.9;
+    truth.readout_noise = 0.003;
+    truth.bias_deg_h = -0.482;
+    truth.turns = 8000;
+    truth.seed = 1;
+    truth.injected_noise_even = 1.0;
+    for (const Closure& closure : close_noisy(truth, {0.5, 1.0})) {
+        EXPECT_EQ(closure.verdict, Verdict::nothing_missing);
+        EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", 1216.9), 3.0);
     }
 }
 
