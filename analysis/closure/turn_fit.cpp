@@ -99,13 +99,15 @@ TurnFit::TurnFit(const TurnFit& of, TurnParameters parameters)
 }
 
 void TurnFit::climb() {
-    constexpr int most = 6;
+    constexpr int most = 24;
+    constexpr int soon = 6;
     constexpr double gained = 0.01;
+    constexpr double well = 1.0;  // worth going on where the way is long
     for (int round = 0; round < most; ++round) {
         const double before = objective(parameters_, rest_);
         fit_deterministic(4);
         fit_noise();
-        if (before - objective(parameters_, rest_) < gained) break;
+        if (before - objective(parameters_, rest_) < (round < soon ? gained : well)) break;
     }
 }
 
@@ -287,9 +289,8 @@ double TurnFit::slope_of_objective(const Regressor& of, double step) const {
     return (at(-step) - at(step)) / (2.0 * step);
 }
 
-/// Times move by a part of the record at once, frequencies by a part of a period over it and phases by a part of a
-/// turn, others as far as they will: a time between turns that count hardly shows in those that do, nor does a phase
-/// of what is next to nothing.
+/// Times move by a part of the record at once, frequencies by a part of a period over it and a phase that has no size
+/// by a part of a turn, others as far as they will: a time between turns that count hardly shows in those that do.
 void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) const {
     constexpr double part = 0.1;
     const double duration_s = model_->series().time_s.back();
@@ -300,13 +301,17 @@ void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) c
         bound(static_cast<Eigen::Index>(nuisance_.size() + s * swing_columns - 1), part / duration_s);
     }
     if (effects_ == Effects::held) return;
+    constexpr double far = 1e3;  // rad
     auto k = static_cast<Eigen::Index>(nuisances() + base_columns);
     for (const ActiveEffect& active : parameters_.effects) {
-        for (const effects::Parameter& parameter : active.effect->parameters()) {
+        const auto all = active.effect->parameters();
+        const bool has_size = std::any_of(all.begin(), all.end(),
+                                          [](const auto& p) { return p.role == effects::Role::size; });
+        for (const effects::Parameter& parameter : all) {
             if (!fitted_in_phase(*active.effect, parameter.role)) continue;
             const double limit = parameter.role == effects::Role::time        ? part * duration_s
                                  : parameter.role == effects::Role::frequency ? part / duration_s
-                                 : parameter.role == effects::Role::phase     ? part * units::two_pi
+                                 : parameter.role == effects::Role::phase     ? (has_size ? far : part * units::two_pi)
                                                                               : 0.0;
             if (limit > 0.0) bound(k, limit);
             ++k;
@@ -324,10 +329,35 @@ void TurnFit::take(const Eigen::VectorXd& step) {
     parameters_.threshold_deg_h = std::max(0.0, parameters_.threshold_deg_h + step(k++));
     if (effects_ == Effects::held) return;
     for (ActiveEffect& active : parameters_.effects) {
+        double* size = nullptr;
+        double* phase = nullptr;
+        double size_step = 0.0;
+        double phase_step = 0.0;
+        const effects::Parameter* of_size = nullptr;
         for (const effects::Parameter& parameter : active.effect->parameters()) {
             if (!fitted_in_phase(*active.effect, parameter.role)) continue;
             double& value = active.values.at(std::string(parameter.name));
-            value = std::clamp(value + step(k++), parameter.min, parameter.max);
+            if (parameter.role == effects::Role::phase) {
+                phase = &value;
+                phase_step = step(k++);
+            } else if (parameter.role == effects::Role::size) {
+                size = &value;
+                of_size = &parameter;
+                size_step = step(k++);
+            } else {
+                value = std::clamp(value + step(k++), parameter.min, parameter.max);
+            }
+        }
+        if (phase != nullptr && size != nullptr) {
+            // Straight on in the plane of both: of what is next to nothing the phase may turn far.
+            const double along = *size + size_step;
+            const double across = *size * phase_step;
+            *phase = std::remainder(*phase + std::atan2(across, along), units::two_pi);
+            *size = std::min(std::hypot(along, across), of_size->max);
+        } else if (phase != nullptr) {
+            *phase = std::remainder(*phase + phase_step, units::two_pi);
+        } else if (size != nullptr) {
+            *size = std::clamp(*size + size_step, of_size->min, of_size->max);
         }
     }
 }

@@ -19,7 +19,10 @@ TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right
     const auto level = [&](Eigen::Index k) { return high[static_cast<std::size_t>(k)]; };
     Eigen::VectorXd shape = Eigen::VectorXd::Zero(n);
     TwoLevels best;
-    while (true) {
+    // Beyond these what is gained is rounding, which could be had for ever.
+    constexpr double gained = 1e-6;  // of the merit
+    const Eigen::Index most_steps = 4 * n;
+    for (Eigen::Index taken = 0; taken < most_steps; ++taken) {
         const Eigen::VectorXd pull = normal * shape;
         const double squares = shape.dot(pull);
         const double product = shape.dot(right);
@@ -50,7 +53,7 @@ TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right
                 to = b;
             }
         }
-        if (step.merit <= best.merit) break;
+        if (step.merit <= best.merit + gained * std::abs(best.merit)) break;
         best = step;
         for (Eigen::Index k = from; k <= to; ++k) {
             high[static_cast<std::size_t>(k)] ^= 1;

@@ -29,6 +29,8 @@ using namespace ringlock::test::closure;
 constexpr double near_the_limit[] = {1.0, 2.0};
 constexpr double evident[] = {6.0, 30.0, 150.0};
 
+constexpr double of_other_gyros = 6.0;
+
 /// Whether a gyro in that condition shows the effect at all.
 bool shows(const std::string& effect, const Condition& condition) {
     return effect != "scale_factor_error" || condition.moving;
@@ -82,6 +84,24 @@ int main(int argc, char** argv) {
         }
         for (const double multiple : evident) singles(multiple, 4);
     }
+    if (command.wants(Kind::other)) {
+        const auto seeded = [&] {
+            Case of{.kind = Kind::other, .truth = {}, .condition = &other_gyro};
+            of.seed = 1000 + cases.size();
+            return of;
+        };
+        for (std::size_t k = 0; k < command.scaled(60); ++k) add(seeded());
+        for (std::size_t k = 0; k < command.scaled(3); ++k) {
+            for (const std::string& effect : effects) {
+                if (!shows(effect, other_gyro)) continue;
+                Case of = seeded();
+                of.multiple = of_other_gyros;
+                of.truth.push_back(
+                    draw(effect, of.multiple * start_size(effect), 7 * cases.size(), duration_s(of)));
+                add(std::move(of));
+            }
+        }
+    }
     if (command.wants(Kind::foreign)) {
         for (Case& of : foreign_cases(command.scaled(12))) cases.push_back(std::move(of));
     }
@@ -98,7 +118,7 @@ int main(int argc, char** argv) {
         std::vector<char> settled(count, 1);
         oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t k) {
             Case& of = cases[first + k];
-            if (of.kind != Kind::single && of.kind != Kind::pair) return;
+            if (of.multiple == 0.0) return;
             try {
                 settled[k] = settle(of) ? 1 : 0;
                 if (!settled[k]) fmt::print(stderr, "record {} cannot show {}\n", of.seed, of.truth_text());

@@ -35,7 +35,7 @@ double quantile(std::vector<double> values, double at) {
     return values[static_cast<std::size_t>(at * static_cast<double>(values.size() - 1))];
 }
 
-bool of_library(Kind kind) { return kind == Kind::single || kind == Kind::pair; }
+bool of_library(Kind kind) { return kind == Kind::single || kind == Kind::pair || kind == Kind::other; }
 
 bool settled(const Outcome& o) { return o.judged == Judged::right || o.judged == Judged::tie; }
 
@@ -97,6 +97,14 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
     missed_though_shown(Kind::pair, 2.0);
     row("effects outside the library, `unexplained` with the right place",
         count(kind(Kind::foreign, 0.0), is(Judged::right)));
+    const auto other = [&](bool null) {
+        return [=](const TableRow& of) { return of.kind == Kind::other && (of.multiple == 0.0) == null; };
+    };
+    if (std::any_of(truths.begin(), truths.end(), other(false))) {
+        row("other gyros: nulls called `nothing_missing`", count(other(true), is(Judged::right)));
+        row("... effects at 6 times their limit, named right", count(other(false), is(Judged::right)));
+        row("... ties that hold the truth", count(other(false), is(Judged::tie)));
+    }
     const auto all = [](const TableRow&) { return true; };
     row("a wrong name with confidence, over all records", count(all, is(Judged::wrong)));
     row("... or in the steps of an `unexplained` one", count(all, [](const Outcome& o) { return o.false_name; }));
@@ -217,9 +225,9 @@ Command command_of(int argc, char** argv, const char* program) {
         }
     }
     const bool known = command.wants(Kind::null) || command.wants(Kind::single) || command.wants(Kind::pair) ||
-                       command.wants(Kind::foreign);
+                       command.wants(Kind::foreign) || command.wants(Kind::other);
     if (wrong || command.folder.empty() || !known || !(command.share > 0.0 && command.share <= 1.0)) {
-        fmt::print(stderr, "usage: {} FOLDER [--share S] [--only null|single|pair|foreign] [--seed N]\n", program);
+        fmt::print(stderr, "usage: {} FOLDER [--share S] [--only null|single|pair|foreign|other] [--seed N]\n", program);
         std::exit(2);
     }
     std::filesystem::create_directories(command.folder);

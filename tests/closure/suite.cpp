@@ -6,6 +6,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <chrono>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <random>
 #include <set>
@@ -14,6 +15,7 @@
 #include "analysis/instrument/simulate.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
+#include "engine/gyro/theory.hpp"
 #include "tests/closure/generator.hpp"
 #include "tests/closure/keys.hpp"
 #include "tests/closure/plain_gyro.hpp"
@@ -30,8 +32,10 @@ using ringlock::closure::Where;
 const std::vector<Condition> conditions = {
     {"quiet", 0.0, false}, {"injected", 3.0, false}, {"moving", 0.0, true}, {"moving, injected", 3.0, true}};
 
+const Condition other_gyro = {"another gyro", 0.0, false, true};
+
 const char* name_of(Kind kind) {
-    constexpr const char* names[] = {"null", "single", "pair", "foreign"};
+    constexpr const char* names[] = {"null", "single", "pair", "foreign", "other"};
     return names[static_cast<std::size_t>(kind)];
 }
 
@@ -48,8 +52,7 @@ std::string Case::truth_text() const {
 
 namespace {
 
-constexpr double declared_threshold_deg_h = 300.0;
-constexpr double readout_noise = 0.005;
+constexpr double nominal_threshold_deg_h = 300.0;
 constexpr double temperature_swing_k = 1.0;
 constexpr double temperature_interval_s = 0.1;  // between rows the temperature is taken for linear
 constexpr double walk_relative_rt_s = 1e-5;
@@ -57,16 +60,52 @@ constexpr double drift_relative_per_h = 0.01;
 
 /// Truths of the gyro itself, by the seed.
 struct Device {
-    double threshold_deg_h, peak_rate_deg_s, rate_deg_h, duration_s;
+    double threshold_deg_h, peak_rate_deg_s, rate_deg_h;
+    double declared_threshold_deg_h = nominal_threshold_deg_h;
+    double injected_rad = 0.0;
+    double readout_noise = 0.005;
+    double scale_factor_arcsec = Truth{}.scale_factor_arcsec;
+    double dither_frequency_hz = Truth{}.dither_frequency_hz;
+    double duration_s = 0.0;
     std::vector<double> profile_time_s = {};
     std::vector<double> profile_rate_deg_h = {};
 };
 
+/// Kicks up to this are those of gyros that are built.
+void draw_other(Device& d, std::mt19937_64& random) {
+    constexpr double largest_kick_rad = 0.4;
+    constexpr double least_fringes = 110.0;  // in a half cycle, for the turn map
+    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
+    const auto one_of = [&](std::initializer_list<double> all) {
+        return all.begin()[std::uniform_int_distribution<std::size_t>(0, all.size() - 1)(random)];
+    };
+    gyro::Setup setup;
+    do {
+        setup.scale_factor_arcsec = one_of({0.3, 0.5, 0.8, 1.2, 2.0, 3.0});
+        setup.dither_frequency_hz = even(110.0, 600.0);
+        setup.dither_peak_rate_deg_s = even(40.0, 300.0);
+        setup.lockin_threshold_deg_h = even(40.0, 1500.0);
+    } while (gyro::turn_kick_rad(setup) > largest_kick_rad ||
+             units::arcsec_per_deg * setup.dither_peak_rate_deg_s <
+                 least_fringes * units::pi * setup.scale_factor_arcsec * setup.dither_frequency_hz);
+    d.scale_factor_arcsec = setup.scale_factor_arcsec;
+    d.dither_frequency_hz = setup.dither_frequency_hz;
+    d.peak_rate_deg_s = setup.dither_peak_rate_deg_s;
+    d.threshold_deg_h = setup.lockin_threshold_deg_h;
+    d.declared_threshold_deg_h = d.threshold_deg_h * between(0.7, 1.3);
+    d.readout_noise = one_of({0.001, 0.005, 0.02});
+    d.injected_rad = one_of({0.0, 0.0, 0.5, 1.5, 3.0});
+    if (between(0.0, 1.0) < 1.0 / 3.0) d.rate_deg_h = between(-1.0, 1.0);  // at rest, its bias alone
+}
+
 Device device_of(const Case& of) {
     std::mt19937_64 random(of.seed);
     const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
-    Device d{declared_threshold_deg_h * between(0.8, 1.2), 109.1 * between(0.9, 1.1), between(-100.0, 100.0), 0.0};
-    d.duration_s = 0.5 * static_cast<double>(of.turns) / Truth{}.dither_frequency_hz;
+    Device d{nominal_threshold_deg_h * between(0.8, 1.2), 109.1 * between(0.9, 1.1), between(-100.0, 100.0)};
+    d.injected_rad = of.condition->injected_rad;
+    if (of.condition->other_gyro) draw_other(d, random);
+    d.duration_s = 0.5 * static_cast<double>(of.turns) / d.dither_frequency_hz;
     if (of.condition->moving) {
         d.rate_deg_h = 0.0;
         double time_s = 0.0;
@@ -87,10 +126,13 @@ Device device_of(const Case& of) {
 
 record::Record by_map(const Case& of, const Device& device) {
     scenario::Scenario scenario = plain_gyro(static_cast<double>(of.turns), of.seed + (of.noise << 32));
-    inject(scenario, of.condition->injected_rad);
+    inject(scenario, device.injected_rad);
+    scenario.gyro.scale_factor_arcsec = device.scale_factor_arcsec;
+    scenario.dither.frequency_hz = device.dither_frequency_hz;
+    scenario.ensemble.duration_s = device.duration_s;
     scenario.gyro.lockin_threshold_deg_h = device.threshold_deg_h;
     scenario.dither.peak_rate_deg_s = device.peak_rate_deg_s;
-    scenario.readout.detector_noise_relative = readout_noise;
+    scenario.readout.detector_noise_relative = device.readout_noise;
     scenario.input.rate_deg_h = scenario.input.sweep_stop_deg_h = device.rate_deg_h;
     if (of.condition->moving) {
         scenario.dither.amplitude_wander_relative_rt_s = walk_relative_rt_s;
@@ -105,7 +147,7 @@ record::Record by_map(const Case& of, const Device& device) {
         for (const auto& [name, value] : added.values) scenario.effects.at(added.effect).at(name) = value;
     }
     record::Record record = instrument::simulate_record(scenario);
-    record.declared.lockin_threshold_deg_h = declared_threshold_deg_h;
+    record.declared.lockin_threshold_deg_h = device.declared_threshold_deg_h;
     return record;
 }
 
@@ -115,8 +157,10 @@ Truth truth_of(const Case& of, const Device& device) {
     truth.seed = of.seed;
     truth.lockin_threshold_deg_h = device.threshold_deg_h;
     truth.dither_peak_rate_deg_s = device.peak_rate_deg_s;
-    truth.readout_noise = readout_noise;
-    truth.injected_noise_rad = of.condition->injected_rad;
+    truth.readout_noise = device.readout_noise;
+    truth.injected_noise_rad = device.injected_rad;
+    truth.scale_factor_arcsec = device.scale_factor_arcsec;
+    truth.dither_frequency_hz = device.dither_frequency_hz;
     std::mt19937_64 random(of.seed + 1);
     truth.initial_phase_rad = std::uniform_real_distribution<double>(0.0, units::two_pi)(random);
     truth.input_rate_deg_h = device.rate_deg_h;
@@ -173,10 +217,12 @@ std::vector<record::Record> make(std::span<const Case> cases) {
     auto generated = generate(truths);
     for (std::size_t k = 0; k < direct.size(); ++k) {
         records[direct[k]] = std::move(generated[k]);
-        records[direct[k]].declared.lockin_threshold_deg_h = declared_threshold_deg_h;
+        records[direct[k]].declared.lockin_threshold_deg_h = device_of(cases[direct[k]]).declared_threshold_deg_h;
     }
     return records;
 }
+
+double duration_s(const Case& of) { return device_of(of).duration_s; }
 
 std::vector<std::string> effects_on_turns() {
     std::vector<std::string> names;
@@ -397,9 +443,9 @@ Outcome judge(const Case& of, const record::Record& record) {
     const std::map<std::string, double> base_truth = {
         {"bias_deg_h", 0.0},
         {"lockin_threshold_deg_h", device.threshold_deg_h},
-        {"injected_noise_rad", of.condition->injected_rad},
-        {"readout_noise_rad", readout_noise},
-        {"dither_frequency_hz", Truth{}.dither_frequency_hz},
+        {"injected_noise_rad", device.injected_rad},
+        {"readout_noise_rad", device.readout_noise},
+        {"dither_frequency_hz", device.dither_frequency_hz},
     };
     for (const Estimate& estimate : closure.base) {
         const auto truth = base_truth.find(estimate.name);

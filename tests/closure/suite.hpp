@@ -25,10 +25,12 @@ struct Condition {
     const char* name;
     double injected_rad;
     bool moving;  ///< input rates of either sign, and a dither whose amplitude drifts and walks
+    bool other_gyro = false;  ///< of another scale factor, dither and readout, one in three locked; noise as drawn
 };
 extern const std::vector<Condition> conditions;
+extern const Condition other_gyro;
 
-enum class Kind { null, single, pair, foreign };
+enum class Kind { null, single, pair, foreign, other };
 const char* name_of(Kind kind);
 
 struct Case {
@@ -48,6 +50,9 @@ struct Case {
 /// The records of cases, those of the generator in one go. Threshold, amplitude and rate of the gyro differ from seed
 /// to seed; declared is the nominal threshold.
 std::vector<record::Record> make(std::span<const Case> cases);
+
+/// How long the record of a case is.
+double duration_s(const Case& of);
 
 /// Where a random parameter of an effect stands in a case of that seed: frequencies, phases and times are drawn, the
 /// size is `size`.

@@ -166,32 +166,36 @@ TEST(TurnLoop, AnEllipseOfASixthIsMadeRound) {
 }
 
 /// How far the thresholds of so many locked gyros come out, squared and summed, in standard errors; by how fast they
-/// lock. All that the lock-in does before a turn follows from the very phase that is read there.
-double squares_of_locked_gyros(int gyros, std::uint64_t seed) {
+/// lock. All that the lock-in does before a turn follows from the very phase that is read there. So many of the records
+/// may show something by chance, at a level of 0.3 % each.
+double squares_of_locked_gyros(int gyros, std::uint64_t seed, int by_chance) {
     double squares = 0.0;
+    int shown = 0;
     for (int k = 0; k < gyros; ++k) {
         scenario::Scenario scenario = gyro(6000, seed + static_cast<std::uint64_t>(k), 0.0);
         scenario.input.rate_deg_h = scenario.input.sweep_stop_deg_h = 0.1 * (k % 12) - 0.5;
         const Closure closure = close_loop(instrument::simulate_record(scenario));
-        EXPECT_EQ(closure.verdict, Verdict::nothing_missing)
-            << k << (closure.unexplained ? closure.unexplained->description() : "");
-        if (closure.verdict != Verdict::nothing_missing) print("locked", closure);
+        if (closure.verdict != Verdict::nothing_missing) {
+            print("locked", closure);
+            ++shown;
+        }
         const double off = deviation(closure.base, "lockin_threshold_deg_h", 300.0);
         EXPECT_LT(off, 4.0) << k;
         squares += off * off;
     }
+    EXPECT_LE(shown, by_chance);
     std::printf("threshold of %d locked gyros: rms %.2f standard errors\n", gyros, std::sqrt(squares / gyros));
     return squares;
 }
 
 TEST(TurnLoop, ALockedGyroTellsItsThresholdWithAnHonestError) {
     // Chi-squared of twelve: one in 2000 is above 34.
-    EXPECT_LT(squares_of_locked_gyros(12, 300), 34.0);
+    EXPECT_LT(squares_of_locked_gyros(12, 300, 0), 34.0);
 }
 
 TEST(LongTurnLoop, LockedGyrosTellTheirThresholdsWithHonestErrors) {
-    // Chi-squared of 120: one in 2000 is above 178.
-    EXPECT_LT(squares_of_locked_gyros(120, 700), 178.0);
+    // Chi-squared of 120: one in 2000 is above 178. Three records or more by chance: one in 180.
+    EXPECT_LT(squares_of_locked_gyros(120, 700, 2), 178.0);
 }
 
 }  // namespace
