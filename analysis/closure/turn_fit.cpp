@@ -419,6 +419,7 @@ void TurnFit::finish() {
     sd_rad_ = whitening_->sd_rad();
     for (std::size_t i = 0; i < n; ++i) sd_rad_[i] /= std::abs(1.0 - prediction_.frame.before_slope[i]);
     log_likelihood_ = -objective(parameters_, rest_);
+    if (!std::isfinite(log_likelihood_)) throw RunError("the likelihood of these phases is no number");
     // Orthonormal basis, for scores.
     Eigen::VectorXd scale;
     const Eigen::HouseholderQR<Eigen::MatrixXd> qr(whitened_columns(scale));

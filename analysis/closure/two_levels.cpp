@@ -47,13 +47,13 @@ TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right
                 const double chi2 = new_product * new_product / new_squares;
                 const double cost = of_levels + changes * place;
                 const double merit = 0.5 * chi2 - cost;
-                if (merit <= step.merit) continue;
+                if (!(merit > step.merit)) continue;
                 step = {chi2, changes, merit, cost};
                 from = a;
                 to = b;
             }
         }
-        if (step.merit <= best.merit + gained * std::abs(best.merit)) break;
+        if (!(step.merit > best.merit + gained * std::abs(best.merit))) break;
         best = step;
         for (Eigen::Index k = from; k <= to; ++k) {
             high[static_cast<std::size_t>(k)] ^= 1;

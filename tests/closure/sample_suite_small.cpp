@@ -60,6 +60,18 @@ TEST(ClosureSampleSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
     }
 }
 
+// A step and a ramp that both hold against every view, beside a random rate that does not and yet is likelier.
+TEST(ClosureSampleSuite, ARandomRateThatDoesNotHoldIsInNobodysWay) {
+    const auto warm = std::find_if(sample_conditions.begin(), sample_conditions.end(),
+                                   [](const SampleCondition& c) { return std::string(c.name) == "warm"; });
+    ASSERT_NE(warm, sample_conditions.end());
+    SampleCase of{.kind = Kind::pair, .truth = {}, .multiple = 2.0, .condition = &*warm, .seed = 20442};
+    of.truth = {{"bias_step", {{"step_deg_h", -4.1735}, {"time_s", 136.0}}}, {"bias_ramp", {{"deg_h_per_h", -86.258}}}};
+    const Outcome outcome = judged(of);
+    EXPECT_TRUE(outcome.judged == Judged::right || outcome.judged == Judged::tie)
+        << outcome.verdict << " " << outcome.named;
+}
+
 // A bias of two states, 3 deg/h apart, was called bias_instability.
 TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
     SampleTruth truth;

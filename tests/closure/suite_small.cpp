@@ -171,5 +171,18 @@ TEST(TwoLevels, SeesNoJumpsInNoise) {
     EXPECT_EQ(found.p_value, 1.0);
 }
 
+TEST(TwoLevels, EndsWhateverItIsGiven) {
+    const Eigen::Index n = 60;
+    const Eigen::VectorXd ones = Eigen::VectorXd::Ones(n);
+    const auto of_nothing = ringlock::closure::two_levels(Eigen::MatrixXd::Identity(n, n), ones * std::nan(""));
+    EXPECT_EQ(of_nothing.changes, 0);
+    EXPECT_EQ(of_nothing.p_value, 1.0);
+    // Stretches that show next to nothing beside what is asked of them: all that is gained is rounding.
+    const Eigen::VectorXd along = Eigen::VectorXd::LinSpaced(n, -1.0, 1.0);
+    Eigen::VectorXd rate(n);
+    for (Eigen::Index k = 0; k < n; ++k) rate(k) = 1e9 * std::sin(7.0 * static_cast<double>(k * k));
+    EXPECT_TRUE(std::isfinite(ringlock::closure::two_levels(along * along.transpose(), rate).p_value));
+}
+
 }  // namespace
 }  // namespace ringlock::test::closure

@@ -194,7 +194,7 @@ TEST(TurnLoop, ALockedGyroTellsItsThresholdWithAnHonestError) {
 }
 
 TEST(LongTurnLoop, LockedGyrosTellTheirThresholdsWithHonestErrors) {
-    // Chi-squared of 120: one in 2000 is above 178. Three records or more by chance: one in 180.
+    // Chi-squared of 120: one in 2000 is above 178. Three records or more by chance: one in 170.
     EXPECT_LT(squares_of_locked_gyros(120, 700, 2), 178.0);
 }
 
