@@ -109,10 +109,12 @@ std::shared_ptr<Fitted> fit_with(const record::Record& record, const Fitted& now
         } catch (const RunError&) {
         }
     };
+    // Some effects are a phase and nothing else.
+    const bool has_size = count_of(*candidate.effect, {effects::Role::size}) > 0;
     const auto with_share = [&](double share) {
         TurnParameters from = start;
         for (const effects::Parameter& parameter : candidate.effect->parameters()) {
-            if (parameter.role == effects::Role::size) {
+            if (parameter.role == (has_size ? effects::Role::size : effects::Role::phase)) {
                 from.effects.back().values.at(std::string(parameter.name)) *= share;
             }
         }

@@ -326,6 +326,7 @@ void TurnFit::take(const Eigen::VectorXd& step) {
         for (double* value : {&swing.cosine_rad, &swing.sine_rad, &swing.hz}) *value += step(k++);
     }
     parameters_.bias_deg_h += step(k++);
+    const double threshold_from = parameters_.threshold_deg_h;
     parameters_.threshold_deg_h = std::max(0.0, parameters_.threshold_deg_h + step(k++));
     if (effects_ == Effects::held) return;
     for (ActiveEffect& active : parameters_.effects) {
@@ -355,7 +356,11 @@ void TurnFit::take(const Eigen::VectorXd& step) {
             *phase = std::remainder(*phase + std::atan2(across, along), units::two_pi);
             *size = std::min(std::hypot(along, across), of_size->max);
         } else if (phase != nullptr) {
-            *phase = std::remainder(*phase + phase_step, units::two_pi);
+            // The coupling's own: its size is the threshold.
+            double& threshold = parameters_.threshold_deg_h;
+            const double across = threshold_from * phase_step;
+            *phase = std::remainder(*phase + std::atan2(across, threshold), units::two_pi);
+            threshold = std::hypot(threshold, across);
         } else if (size != nullptr) {
             *size = std::clamp(*size + size_step, of_size->min, of_size->max);
         }

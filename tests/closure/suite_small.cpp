@@ -89,6 +89,23 @@ TEST(ClosureSuite, SizesFollowPhasesThatAreForetoldAlike) {
     EXPECT_LT(product, 1.0);
 }
 
+// In a locked gyro bias, threshold and the coupling's phase move together, as do the amplitudes of its harmonics.
+TEST(ClosureSuite, ADetectorsPhaseIsFoundAlongWithTheThreshold) {
+    Case of{.kind = Kind::single, .truth = {}, .multiple = 2.0, .condition = &conditions[0], .seed = 1037};
+    of.truth = {{"detector_phase_offset", {{"phase_rad", 0.25677}}}};
+    const Outcome outcome = judged({of}).front();
+    EXPECT_EQ(outcome.judged, Judged::tie) << outcome.verdict << " " << outcome.named;
+    EXPECT_EQ(outcome.named, "detector_phase_offset~lockin_second_harmonic");
+}
+
+TEST(LongClosureSuite, ASecondHarmonicIsFollowedToItsSummit) {
+    Case of{.kind = Kind::single, .truth = {}, .multiple = 6.0, .condition = &conditions[0], .direct = true};
+    of.seed = 1792;
+    of.truth = {{"lockin_second_harmonic", {{"ratio", 0.025017}, {"phase_rad", 0.44522}}}};
+    const Outcome outcome = judged({of}).front();
+    EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named;
+}
+
 class OutsideTheLibrary : public testing::TestWithParam<std::size_t> {};
 
 TEST_P(OutsideTheLibrary, NothingHasItsName) {
