@@ -102,7 +102,7 @@ void TurnFit::climb() {
     constexpr int most = 24;
     constexpr int soon = 6;
     constexpr double gained = 0.01;
-    constexpr double well = 1.0;  // worth going on where the way is long
+    constexpr double well = 10.0;  // worth going on where the way is long
     for (int round = 0; round < most; ++round) {
         const double before = objective(parameters_, rest_);
         fit_deterministic(4);
