@@ -36,6 +36,11 @@ bool fitted_in_phase(const effects::Effect& effect, effects::Role role) {
            !told_by_other_columns(effect);
 }
 
+bool has_phase(const effects::Effect& effect) {
+    const auto all = effect.parameters();
+    return std::any_of(all.begin(), all.end(), [](const auto& p) { return p.role == effects::Role::phase; });
+}
+
 }  // namespace
 
 void Regressor::take(double value, std::vector<double>& rest, TurnFrame& frame) const {
@@ -330,39 +335,30 @@ void TurnFit::take(const Eigen::VectorXd& step) {
     parameters_.threshold_deg_h = std::max(0.0, parameters_.threshold_deg_h + step(k++));
     if (effects_ == Effects::held) return;
     for (ActiveEffect& active : parameters_.effects) {
+        // The one that a phase turns; what is a phase and no more turns the coupling, whose size is the threshold.
         double* size = nullptr;
-        double* phase = nullptr;
-        double size_step = 0.0;
-        double phase_step = 0.0;
-        const effects::Parameter* of_size = nullptr;
+        double size_from = 0.0;
+        double most = 0.0;
         for (const effects::Parameter& parameter : active.effect->parameters()) {
             if (!fitted_in_phase(*active.effect, parameter.role)) continue;
             double& value = active.values.at(std::string(parameter.name));
+            const double by = step(k++);
             if (parameter.role == effects::Role::phase) {
-                phase = &value;
-                phase_step = step(k++);
-            } else if (parameter.role == effects::Role::size) {
-                size = &value;
-                of_size = &parameter;
-                size_step = step(k++);
-            } else {
-                value = std::clamp(value + step(k++), parameter.min, parameter.max);
+                double& along = size != nullptr ? *size : parameters_.threshold_deg_h;
+                // Straight on in the plane of both: of what is next to nothing the phase may turn far.
+                const double across = (size != nullptr ? size_from : threshold_from) * by;
+                value = std::remainder(value + std::atan2(across, along), units::two_pi);
+                along = std::hypot(along, across);
+                if (size != nullptr) along = std::min(along, most);
+                continue;
             }
-        }
-        if (phase != nullptr && size != nullptr) {
-            // Straight on in the plane of both: of what is next to nothing the phase may turn far.
-            const double along = *size + size_step;
-            const double across = *size * phase_step;
-            *phase = std::remainder(*phase + std::atan2(across, along), units::two_pi);
-            *size = std::min(std::hypot(along, across), of_size->max);
-        } else if (phase != nullptr) {
-            // The coupling's own: its size is the threshold.
-            double& threshold = parameters_.threshold_deg_h;
-            const double across = threshold_from * phase_step;
-            *phase = std::remainder(*phase + std::atan2(across, threshold), units::two_pi);
-            threshold = std::hypot(threshold, across);
-        } else if (size != nullptr) {
-            *size = std::clamp(*size + size_step, of_size->min, of_size->max);
+            if (parameter.role == effects::Role::size) {
+                size = &value;
+                size_from = value;
+                most = parameter.max;
+            }
+            const bool turned = parameter.role == effects::Role::size && has_phase(*active.effect);
+            value = turned ? value + by : std::clamp(value + by, parameter.min, parameter.max);
         }
     }
 }

@@ -25,7 +25,7 @@ TEST(TurnLoop, ALockedGyroIsNoRiddle) {
     EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("locked")));
 }
 
-/// What is answered for locked gyros with so much injected noise, of each by the others' side.
+/// What is answered for a locked gyro with so much injected noise, for each; made side by side.
 std::vector<Closure> close_noisy(const Truth& locked, const std::vector<double>& injected_rad) {
     std::vector<Truth> truths;
     for (const double injected : injected_rad) {
