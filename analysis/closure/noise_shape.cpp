@@ -1,9 +1,11 @@
 #include "analysis/closure/noise_shape.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "analysis/closure/normality.hpp"
+#include "analysis/closure/phase_table.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -29,47 +31,29 @@ std::vector<double> sizes_of(std::span<const double> innovations_rad) {
     return sizes;
 }
 
+using Lefts = Eigen::Array<Complex, TurnKicks::harmonics, 1>;
+
 /// Over the phases that may be foretold.
-class Table {
-   public:
-    Table(const TurnKicks& kicks, int direction, std::span<const double> sizes_rad) {
-        double variance = 0.0;
-        for (const double size : sizes_rad) variance += size * size / static_cast<double>(sizes_rad.size());
-        const double weight = 0.5 / static_cast<double>(sizes_rad.size());
-        for (std::size_t j = 0; j < phases; ++j) {
-            NoiseShape::Left& left = left_[j];
-            left.fill(0.0);
-            const double foretold_rad = units::two_pi * static_cast<double>(j) / phases;
-            for (const double size : sizes_rad) {
-                for (const double v : {size, -size}) {
-                    const double psi = kicks.phase_after(direction, foretold_rad + v);
-                    const Complex turned = std::polar(1.0, psi);
-                    const double through = 1.0 - kicks.at(direction, turned).before_slope;
-                    Complex harmonic = 1.0;
-                    for (std::size_t k = 1; k <= left.size(); ++k) {
-                        harmonic *= turned;
-                        left[k - 1] += weight * harmonic * Complex(v / variance, -static_cast<double>(k) / through);
-                    }
+PhaseTable<Lefts> left_by_phase(const TurnKicks& kicks, int direction, std::span<const double> sizes_rad) {
+    double variance = 0.0;
+    for (const double size : sizes_rad) variance += size * size / static_cast<double>(sizes_rad.size());
+    const double weight = 0.5 / static_cast<double>(sizes_rad.size());
+    return PhaseTable<Lefts>([&](double foretold_rad) {
+        Lefts left = Lefts::Zero();
+        for (const double size : sizes_rad) {
+            for (const double v : {size, -size}) {
+                const Complex turned = std::polar(1.0, kicks.phase_after(direction, foretold_rad + v));
+                const double through = 1.0 - kicks.at(direction, turned).before_slope;
+                Complex harmonic = weight;
+                for (Eigen::Index k = 0; k < left.size(); ++k) {
+                    harmonic *= turned;
+                    left(k) += harmonic * Complex(v / variance, -static_cast<double>(k + 1) / through);
                 }
             }
         }
-    }
-    NoiseShape::Left at(double foretold_rad) const {
-        const double fringes = foretold_rad / units::two_pi;
-        const double x = (fringes - std::floor(fringes)) * phases;
-        const auto j = static_cast<std::size_t>(x);
-        const double share = x - static_cast<double>(j);
-        NoiseShape::Left left;
-        for (std::size_t k = 0; k < left.size(); ++k) {
-            left[k] = (1.0 - share) * left_[j % phases][k] + share * left_[(j + 1) % phases][k];
-        }
         return left;
-    }
-
-   private:
-    static constexpr std::size_t phases = 256;
-    std::array<NoiseShape::Left, phases> left_;
-};
+    });
+}
 
 }  // namespace
 
@@ -78,11 +62,12 @@ std::shared_ptr<const NoiseShape> NoiseShape::of(std::span<const double> counted
                                                  std::span<const double> foretold_rad) {
     if (!is_of_even_density(counted_rad)) return nullptr;
     const std::vector<double> sizes = sizes_of(counted_rad);
-    const Table at_minima(kicks, 1, sizes);
-    const Table at_maxima(kicks, -1, sizes);
+    const PhaseTable<Lefts> at_minima = left_by_phase(kicks, 1, sizes);
+    const PhaseTable<Lefts> at_maxima = left_by_phase(kicks, -1, sizes);
     auto shape = std::make_shared<NoiseShape>();
     for (std::size_t i = 0; i < foretold_rad.size(); ++i) {
-        shape->left_.push_back((direction[i] > 0 ? at_minima : at_maxima).at(foretold_rad[i]));
+        const Lefts left = (direction[i] > 0 ? at_minima : at_maxima).at(foretold_rad[i]);
+        std::copy(left.begin(), left.end(), shape->left_.emplace_back().begin());
     }
     return shape;
 }

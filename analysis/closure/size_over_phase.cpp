@@ -2,7 +2,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <boost/math/special_functions/erf.hpp>
 #include <cmath>
 #include <numbers>
@@ -10,6 +9,7 @@
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/phase_table.hpp"
 #include "analysis/closure/turn_kicks.hpp"
 #include "engine/core/units.hpp"
 
@@ -41,38 +41,23 @@ Harmonics harmonics_of(double phase_rad) {
 ///     psi = foretold + sd (normal innovation) + before(psi),
 ///
 /// the last what the lock-in adds before the turn.
-class SizeByPhase {
-   public:
-    SizeByPhase(const TurnKicks& kicks, int direction, double sd_rad) {
-        constexpr double end = 5.0;
-        const int points = static_cast<int>(std::ceil(2.0 * end * std::max(2.0, 2.0 * sd_rad)));
-        const double step = 2.0 * end / points;
-        mean_.fill(Harmonics::Zero());
+PhaseTable<Harmonics> size_by_phase(const TurnKicks& kicks, int direction, double sd_rad) {
+    constexpr double end = 5.0;
+    const int points = static_cast<int>(std::ceil(2.0 * end * std::max(2.0, 2.0 * sd_rad)));
+    const double step = 2.0 * end / points;
+    return PhaseTable<Harmonics>([&](double foretold_rad) {
+        Harmonics mean = Harmonics::Zero();
         for (int k = 0; k <= points; ++k) {
             const double deviate = k * step - end;
             const double weight = 0.5 * deviate * step * std::exp(-0.5 * deviate * deviate) / std::sqrt(units::two_pi);
             const double size_rad = sd_rad * size_of(deviate);
-            for (std::size_t j = 0; j < phases; ++j) {
-                for (const double innovation_rad : {size_rad, -size_rad}) {
-                    mean_[j] += weight * harmonics_of(kicks.phase_after(direction, foretold(j) + innovation_rad));
-                }
+            for (const double innovation_rad : {size_rad, -size_rad}) {
+                mean += weight * harmonics_of(kicks.phase_after(direction, foretold_rad + innovation_rad));
             }
         }
-    }
-    Harmonics at(double foretold_rad) const {
-        const double fringes = foretold_rad / units::two_pi;
-        const double x = (fringes - std::floor(fringes)) * phases;
-        const auto j = static_cast<std::size_t>(x);
-        const double share = x - static_cast<double>(j);
-        return (1.0 - share) * mean_[j % phases] + share * mean_[(j + 1) % phases];
-    }
-
-   private:
-    static constexpr std::size_t phases = 256;
-    static double foretold(std::size_t j) { return units::two_pi * static_cast<double>(j) / phases; }
-
-    std::array<Harmonics, phases> mean_;
-};
+        return mean;
+    });
+}
 
 }  // namespace
 
@@ -83,11 +68,7 @@ ResidualTest size_over_phase(const TurnFit& fit) {
     const double sd = std::sqrt(squares_of(e, rows).mean);
     const auto& phase = fit.model().phase_rad();
     const auto& series = fit.model().series();
-    gyro::Setup setup = fit.model().setup(fit.parameters());
-    for (const double rate_deg_h : series.input_rate_deg_h) {
-        setup.input_rate_deg_h += rate_deg_h / static_cast<double>(n);
-    }
-    const TurnKicks kicks(setup);
+    const TurnKicks kicks = fit.model().mean_kicks(fit.parameters());
     std::vector<double> size(n);
     std::vector<double> sd_rad(n);  // without what the lock-in adds before the turn
     std::vector<double> foretold(n);
@@ -106,8 +87,8 @@ ResidualTest size_over_phase(const TurnFit& fit) {
     }
     mean_size /= counted;
     mean_sd_rad /= counted;
-    const SizeByPhase at_minima(kicks, 1, mean_sd_rad);
-    const SizeByPhase at_maxima(kicks, -1, mean_sd_rad);
+    const PhaseTable<Harmonics> at_minima = size_by_phase(kicks, 1, mean_sd_rad);
+    const PhaseTable<Harmonics> at_maxima = size_by_phase(kicks, -1, mean_sd_rad);
     const Eigen::Index columns = 8;
     Eigen::VectorXd right = Eigen::VectorXd::Zero(columns);
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(columns, columns);

@@ -226,11 +226,7 @@ void TurnFit::shape_noise() {
     if (parameters_.shape) return;
     const auto& series = model_->series();
     for (int pass = 0; pass < passes; ++pass) {
-        gyro::Setup setup = model_->setup(parameters_);
-        for (const double rate_deg_h : series.input_rate_deg_h) {
-            setup.input_rate_deg_h += rate_deg_h / static_cast<double>(series.size());
-        }
-        const TurnKicks kicks(setup);
+        const TurnKicks kicks = model_->mean_kicks(parameters_);
         const Innovations now(prediction_.frame, model_->noise(parameters_), rest_);
         std::vector<double> counted_rad;
         std::vector<double> foretold_rad(rest_.size());

@@ -42,6 +42,14 @@ gyro::Setup TurnModel::setup(const TurnParameters& parameters) const {
     return setup;
 }
 
+TurnKicks TurnModel::mean_kicks(const TurnParameters& parameters) const {
+    gyro::Setup at = setup(parameters);
+    for (const double rate_deg_h : series_.input_rate_deg_h) {
+        at.input_rate_deg_h += rate_deg_h / static_cast<double>(series_.size());
+    }
+    return TurnKicks(at);
+}
+
 std::vector<double> TurnModel::dither_swings(const Kicks& kicks, const std::vector<double>& rate_deg_h) const {
     const std::size_t n = series_.size();
     std::vector<double> swing(n, 1.0);

@@ -69,6 +69,8 @@ class TurnModel {
                                   const effects::Values& values) const;
     TurnNoise noise(const TurnParameters& parameters) const;
     gyro::Setup setup(const TurnParameters& parameters) const;
+    /// Kicks at the mean input rate.
+    TurnKicks mean_kicks(const TurnParameters& parameters) const;
 
     const TurnSeries& series() const { return series_; }
     const std::vector<double>& phase_rad() const { return phase_rad_; }
