@@ -143,8 +143,9 @@ std::vector<double> TurnModel::added_rad(const Prediction& prediction, const eff
     const double c = units::two_pi / series_.setup.scale_factor_arcsec;
     std::vector<double> phase(series_.size());
     double angle_arcsec = 0.0;
+    const effects::AddedAngle added_arcsec = effect.added_angle(values);
     for (std::size_t i = 0; i < phase.size(); ++i) {
-        angle_arcsec += effect.added_angle_arcsec(values, prediction.intervals[i]);
+        angle_arcsec += added_arcsec(prediction.intervals[i]);
         phase[i] = c * angle_arcsec;
     }
     return phase;
@@ -196,12 +197,13 @@ std::vector<double> TurnModel::added_rates_deg_h(const TurnParameters& parameter
     for (const ActiveEffect& active : parameters.effects) {
         if (!active.effect->adds_angle()) continue;
         added_deg_h.resize(turn_s.size());
+        const effects::AddedAngle added_arcsec = active.effect->added_angle(active.values);
         for (std::size_t i = 0; i < turn_s.size(); ++i) {
             const double change_k = temperature_change_k(i);
             const double input_deg_h = series_.input_rate_deg_h[i];
             const effects::Interval about{
                 turn_s[i] - 0.5 * moment_s, moment_s, {change_k, change_k}, {input_deg_h, input_deg_h}};
-            added_deg_h[i] += active.effect->added_angle_arcsec(active.values, about) / moment_s;
+            added_deg_h[i] += added_arcsec(about) / moment_s;
         }
     }
     return added_deg_h;
@@ -254,6 +256,10 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         prediction.intervals = intervals(turn_s);
     }
     const std::vector<double> input_arcsec = series_.input_angles_arcsec(turn_s);
+    std::vector<effects::AddedAngle> added_arcsec;
+    for (const ActiveEffect& active : parameters.effects) {
+        if (active.effect->adds_angle()) added_arcsec.push_back(active.effect->added_angle(active.values));
+    }
     double lockin = 0.0;
     double angle_arcsec = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
@@ -264,11 +270,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         const std::size_t last = i > 0 ? i - 1 : 0;
         const effects::Interval& interval = prediction.intervals[i];
         angle_arcsec += interval.duration_s * parameters.bias_deg_h + (input_arcsec[i] - input_arcsec[last]);
-        for (const ActiveEffect& active : parameters.effects) {
-            if (active.effect->adds_angle()) {
-                angle_arcsec += active.effect->added_angle_arcsec(active.values, interval);
-            }
-        }
+        for (const effects::AddedAngle& added : added_arcsec) angle_arcsec += added(interval);
 
         prediction.phase_rad[i] = lockin + before * kick.before_rad + c * angle_arcsec;
         lockin += before * kick.before_rad + after * kick.after_rad;

@@ -25,12 +25,14 @@ class BaseVibration final : public Effect {
     bool adds_angle() const override { return true; }
     /// A difference of cosines would lose digits late in a long run; the product over the middle of the interval does
     /// not.
-    double added_angle_arcsec(const Values& values, const Interval& at) const override {
-        const double frequency_hz = values.at("frequency_hz");
-        const double turns = frequency_hz * (at.start_s + 0.5 * at.duration_s);
-        const double half_angle = units::pi * frequency_hz * at.duration_s;
-        return values.at("rate_deg_h") / (units::pi * frequency_hz) * std::sin(half_angle) *
-               std::sin(units::two_pi * (turns - std::floor(turns)) + values.at("phase_rad"));
+    AddedAngle added_angle(const Values& values) const override {
+        return [frequency_hz = values.at("frequency_hz"), rate_deg_h = values.at("rate_deg_h"),
+                phase_rad = values.at("phase_rad")](const Interval& at) {
+            const double turns = frequency_hz * (at.start_s + 0.5 * at.duration_s);
+            const double half_angle = units::pi * frequency_hz * at.duration_s;
+            return rate_deg_h / (units::pi * frequency_hz) * std::sin(half_angle) *
+                   std::sin(units::two_pi * (turns - std::floor(turns)) + phase_rad);
+        };
     }
 };
 

@@ -19,9 +19,10 @@ class BiasRamp final : public Effect {
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("deg_h_per_h") != 0.0; }
     bool adds_angle() const override { return true; }
-    double added_angle_arcsec(const Values& values, const Interval& at) const override {
-        const double slope_arcsec_s2 = values.at("deg_h_per_h") / 3600.0;
-        return slope_arcsec_s2 * (at.start_s + 0.5 * at.duration_s) * at.duration_s;
+    AddedAngle added_angle(const Values& values) const override {
+        return [slope_arcsec_s2 = values.at("deg_h_per_h") / 3600.0](const Interval& at) {
+            return slope_arcsec_s2 * (at.start_s + 0.5 * at.duration_s) * at.duration_s;
+        };
     }
 };
 

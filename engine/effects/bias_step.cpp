@@ -19,9 +19,10 @@ class BiasStep final : public Effect {
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("step_deg_h") != 0.0; }
     bool adds_angle() const override { return true; }
-    double added_angle_arcsec(const Values& values, const Interval& at) const override {
-        return values.at("step_deg_h") *
-               std::clamp(at.start_s + at.duration_s - values.at("time_s"), 0.0, at.duration_s);
+    AddedAngle added_angle(const Values& values) const override {
+        return [step_deg_h = values.at("step_deg_h"), time_s = values.at("time_s")](const Interval& at) {
+            return step_deg_h * std::clamp(at.start_s + at.duration_s - time_s, 0.0, at.duration_s);
+        };
     }
 };
 

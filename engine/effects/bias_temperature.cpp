@@ -22,9 +22,11 @@ class BiasTemperature final : public Effect {
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("deg_h_per_k") != 0.0; }
     bool adds_angle() const override { return true; }
-    double added_angle_arcsec(const Values& values, const Interval& at) const override {
-        const double mean_change_k = 0.5 * (at.temperature_change_k[0] + at.temperature_change_k[1]);
-        return values.at("deg_h_per_k") * mean_change_k * at.duration_s;
+    AddedAngle added_angle(const Values& values) const override {
+        return [deg_h_per_k = values.at("deg_h_per_k")](const Interval& at) {
+            const double mean_change_k = 0.5 * (at.temperature_change_k[0] + at.temperature_change_k[1]);
+            return deg_h_per_k * mean_change_k * at.duration_s;
+        };
     }
 };
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
@@ -47,6 +48,9 @@ struct Interval {
     double temperature_change_k[2] = {0.0, 0.0};  ///< temperature less that at the start
     double input_rate_deg_h[2] = {0.0, 0.0};      ///< of the case, the dither apart
 };
+
+/// Rotation [arcsec] over an interval.
+using AddedAngle = std::function<double(const Interval&)>;
 
 /// A stationary random rate of exponential autocorrelation, variance exp(-|t|/time).
 struct GaussMarkov {
@@ -134,11 +138,12 @@ class Effect {
     virtual void configure(const Values& /*values*/, gyro::Setup& /*setup*/) const {}
     /// What the lock-in threshold is multiplied by when the temperature has changed by so much since the start.
     virtual double threshold_factor(const Values& /*values*/, double /*temperature_change_k*/) const { return 1.0; }
-    /// True where added_angle_arcsec() is not always zero.
+    /// True where added_angle() is not always zero.
     virtual bool adds_angle() const { return false; }
-    /// Rotation [arcsec] that the effect adds to the output over the interval, chance apart; angles of intervals that
-    /// follow each other add up.
-    virtual double added_angle_arcsec(const Values& /*values*/, const Interval& /*interval*/) const { return 0.0; }
+    /// Rotation that the effect adds to the output, chance apart; angles of intervals that follow each other add up.
+    virtual AddedAngle added_angle(const Values& /*values*/) const {
+        return [](const Interval&) { return 0.0; };
+    }
     /// The random rate that rate_process() draws from.
     virtual RateNoise rate_noise(const Values& /*values*/) const { return {}; }
     /// A random rate for one gyro, or null where the effect has none.

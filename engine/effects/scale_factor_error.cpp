@@ -24,9 +24,11 @@ class ScaleFactorError final : public Effect {
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("relative") != 0.0; }
     bool adds_angle() const override { return true; }
-    double added_angle_arcsec(const Values& values, const Interval& at) const override {
-        const double mean_rate_arcsec_s = 0.5 * (at.input_rate_deg_h[0] + at.input_rate_deg_h[1]);
-        return values.at("relative") * mean_rate_arcsec_s * at.duration_s;
+    AddedAngle added_angle(const Values& values) const override {
+        return [relative = values.at("relative")](const Interval& at) {
+            const double mean_rate_arcsec_s = 0.5 * (at.input_rate_deg_h[0] + at.input_rate_deg_h[1]);
+            return relative * mean_rate_arcsec_s * at.duration_s;
+        };
     }
 };
 

@@ -10,8 +10,7 @@ class AddedAngles final : public effects::LaneRateProcess {
    public:
     AddedAngles(const effects::Effect& effect, const effects::Values& values, const scenario::Scenario& scenario,
                 const std::vector<gyro::Setup>& setups)
-        : effect_(effect),
-          values_(values),
+        : added_angle_arcsec_(effect.added_angle(values)),
           scenario_(scenario),
           setups_(setups),
           temperature_varies_(scenario::temperature_varies(scenario.environment)) {}
@@ -29,14 +28,13 @@ class AddedAngles final : public effects::LaneRateProcess {
                         at.temperature_change_k[end] = scenario::temperature_change_k(scenario_.environment, time_s);
                     }
                 }
-                angle_arcsec[i][lane] += effect_.added_angle_arcsec(values_, at);
+                angle_arcsec[i][lane] += added_angle_arcsec_(at);
             }
         }
     }
 
    private:
-    const effects::Effect& effect_;
-    effects::Values values_;
+    effects::AddedAngle added_angle_arcsec_;
     scenario::Scenario scenario_;
     std::vector<gyro::Setup> setups_;
     bool temperature_varies_;

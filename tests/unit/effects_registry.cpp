@@ -55,7 +55,7 @@ TEST(EffectRegistry, AnEffectAtItsDefaultsAddsNoAngle) {
             EXPECT_EQ(process->angle_arcsec(0.0, 10.0), 0.0) << effect->name();
         }
         const Interval warm{0.0, 10.0, {1.0, 2.0}, {15.0, 30.0}};
-        EXPECT_EQ(effect->added_angle_arcsec(defaults_of(*effect), warm), 0.0) << effect->name();
+        EXPECT_EQ(effect->added_angle(defaults_of(*effect))(warm), 0.0) << effect->name();
         EXPECT_EQ(angle_variance_arcsec2(effect->rate_noise(defaults_of(*effect)), 10.0), 0.0) << effect->name();
     }
 }
