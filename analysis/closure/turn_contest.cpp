@@ -95,55 +95,84 @@ std::vector<Candidate> worth_a_fit(std::vector<Candidate> candidates, double lar
     return candidates;
 }
 
-/// All parameters of the model with it; none where no motion of a gyro with such parameters can be followed. `alike` is
-/// a model that has another random rate in its place, where there is one.
-std::shared_ptr<Fitted> fit_with(const record::Record& record, const Fitted& now, const Candidate& candidate,
-                                 const Rows& rows, const Fitted* alike = nullptr) {
-    TurnParameters start = now.fit->parameters();
-    start.effects.push_back({candidate.effect, candidate.values});
-    std::shared_ptr<Fitted> best;
-    const auto fit_from = [&](const TurnParameters& from) {
+/// Fits of the model with one effect more, all parameters anew, from several places; the likeliest counts.
+class Fits {
+   public:
+    Fits(const record::Record& record, const Fitted& now, const Candidate& candidate, const Rows& rows)
+        : record_(record),
+          now_(now),
+          candidate_(candidate),
+          rows_(rows),
+          start_(now.fit->parameters()),
+          strong_rate_(candidate.effect->adds_angle() && candidate.chi2 > 400.0) {
+        start_.effects.push_back({candidate.effect, candidate.values});
+    }
+
+    /// From what the score says. `alike` is a model that has another random rate in its place, where there is one.
+    void begin(const Fitted* alike) {
+        // Coupling, threshold and bias move together: from next to nothing the first step takes all of them along.
+        const effects::Effect& effect = *candidate_.effect;
+        const bool of_coupling = !effect.adds_angle() && !is_random_rate(effect) && !told_by_other_columns(effect);
+        if (of_coupling) from(with_share(0.01));
+        if (!of_coupling || !gained(0.25 * candidate_.chi2)) from(start_);
+        // Without it the rest may have gone far astray.
+        if (is_random_rate(effect) || on_phase(effect) || (strong_rate_ && !gained(0.25 * candidate_.chi2))) {
+            anew(alike);
+        }
+        // The score says how large it would be were all linear: too far away, maybe.
+        const int shorter = told_by_other_columns(effect) ? 0 : 4;
+        double share = 1.0;
+        for (int k = 0; k < shorter && !gained(0.0); ++k) from(with_share(share *= 0.1));
+    }
+
+    /// What is strong may have led the rest astray without having to come back for most of its gain.
+    void again_if_strong() {
+        if (strong_rate_ && !anew_) anew(nullptr);
+    }
+
+    /// None where no motion of a gyro with such parameters can be followed.
+    const std::shared_ptr<Fitted>& best() const { return best_; }
+
+   private:
+    void from(const TurnParameters& start) {
         try {
-            auto fitted = fit_record(record, from, rows);
-            if (!best || fitted->fit->log_likelihood() > best->fit->log_likelihood()) best = std::move(fitted);
+            auto fitted = fit_record(record_, start, rows_);
+            if (!best_ || fitted->fit->log_likelihood() > best_->fit->log_likelihood()) best_ = std::move(fitted);
         } catch (const RunError&) {
         }
-    };
-    // Some effects are a phase and nothing else.
-    const bool has_size = count_of(*candidate.effect, {effects::Role::size}) > 0;
-    const auto with_share = [&](double share) {
-        TurnParameters from = start;
-        for (const effects::Parameter& parameter : candidate.effect->parameters()) {
+    }
+    void anew(const Fitted* alike) {
+        anew_ = true;
+        TurnParameters parameters = alike != nullptr ? alike->fit->parameters() : TurnParameters{};
+        parameters.effects = start_.effects;
+        parameters.swings = start_.swings;
+        parameters.wander_forgets = start_.wander_forgets;
+        from(parameters);
+    }
+    TurnParameters with_share(double share) const {
+        // Some effects are a phase and nothing else.
+        const bool has_size = count_of(*candidate_.effect, {effects::Role::size}) > 0;
+        TurnParameters parameters = start_;
+        for (const effects::Parameter& parameter : candidate_.effect->parameters()) {
             if (parameter.role == (has_size ? effects::Role::size : effects::Role::phase)) {
-                from.effects.back().values.at(std::string(parameter.name)) *= share;
+                parameters.effects.back().values.at(std::string(parameter.name)) *= share;
             }
         }
-        return from;
-    };
-    const auto gained = [&](double least) {
-        return best && best->fit->log_likelihood() - now.fit->log_likelihood() >= least;
-    };
-    // Coupling, threshold and bias move together: from next to nothing the first step takes all of them along.
-    const bool of_coupling = !candidate.effect->adds_angle() && !is_random_rate(*candidate.effect) &&
-                             !told_by_other_columns(*candidate.effect);
-    if (of_coupling) fit_from(with_share(0.01));
-    if (!of_coupling || !gained(0.25 * candidate.chi2)) fit_from(start);
-    constexpr double strong = 400.0;  // chi-squared
-    const bool strong_rate = candidate.effect->adds_angle() && candidate.chi2 > strong;
-    if (is_random_rate(*candidate.effect) || on_phase(*candidate.effect) || strong_rate) {
-        // Without it the rest may have gone far astray: anew, too, from where another has led or from the start.
-        TurnParameters anew = alike != nullptr ? alike->fit->parameters() : TurnParameters{};
-        anew.effects = start.effects;
-        anew.swings = start.swings;
-        anew.wander_forgets = start.wander_forgets;
-        fit_from(anew);
+        return parameters;
     }
-    // The score says how large it would be were all linear: too far away, maybe.
-    const int shorter = told_by_other_columns(*candidate.effect) ? 0 : 4;
-    double share = 1.0;
-    for (int k = 0; k < shorter && !gained(0.0); ++k) fit_from(with_share(share *= 0.1));
-    return best;
-}
+    bool gained(double least) const {
+        return best_ && best_->fit->log_likelihood() - now_.fit->log_likelihood() >= least;
+    }
+
+    const record::Record& record_;
+    const Fitted& now_;
+    const Candidate& candidate_;
+    const Rows& rows_;
+    TurnParameters start_;
+    bool strong_rate_;
+    bool anew_ = false;
+    std::shared_ptr<Fitted> best_;
+};
 
 double gain_of(const Fitted& fitted, const Fitted& without) {
     return fitted.fit->log_likelihood() - without.fit->log_likelihood();
@@ -201,7 +230,8 @@ double p_of_gain(double gain, const effects::Effect& effect) { return chi2_tail(
 
 bool passes(double p_value) { return p_value < level_of_one_effect(); }
 
-Contest hold_contest(const record::Record& record, const Fitted& now, const Rows& rows, std::size_t most, Among among) {
+Contest hold_contest(const record::Record& record, const Fitted& now, const Rows& rows, std::size_t most, Among among,
+                     double matters) {
     constexpr double worth_looking = 0.1;
     Contest contest;
     auto candidates =
@@ -222,21 +252,26 @@ Contest hold_contest(const record::Record& record, const Fitted& now, const Rows
         }
         candidates = worth_a_fit(std::move(candidates), worth_looking, most);
     }
+    std::vector<Fits> fits;
     std::vector<Contender> contenders(candidates.size());
     std::vector<std::size_t> random;
     for (std::size_t k = 0; k < candidates.size(); ++k) {
         if (is_random_rate(*candidates[k].effect)) random.push_back(k);
+        fits.emplace_back(record, now, candidates[k], rows);
     }
-    const auto fit_contender = [&](std::size_t k, const Fitted* alike) {
+    const auto judge = [&](std::size_t k) {
+        const Candidate& candidate = candidates[k];
         Contender& contender = contenders[k];
-        contender.fitted = fit_with(record, now, candidates[k], rows, alike);
-        contender.candidate = std::move(candidates[k]);
+        contender.fitted = fits[k].best();
         if (!contender.fitted) return;
-        const Candidate& candidate = contender.candidate;
         contender.merit = contest.side
                               ? promise_of(candidate)
                               : merit_of(gain_of(*contender.fitted, now), *contender.fitted, *candidate.effect);
         contender.p_value = contest.side ? candidate.p_value : p_of(*contender.fitted, now, candidate);
+    };
+    const auto fit_contender = [&](std::size_t k, const Fitted* alike) {
+        fits[k].begin(alike);
+        judge(k);
     };
     // The likeliest random rate goes before the others.
     oneapi::tbb::parallel_for(std::size_t{0}, contenders.size(), [&](std::size_t k) {
@@ -247,6 +282,16 @@ Contest hold_contest(const record::Record& record, const Fitted& now, const Rows
             fit_contender(random[k], contenders[random.front()].fitted.get());
         });
     }
+    constexpr double nearly = 0.9;  // of the most that any explains
+    for (const Contender& contender : contenders) {
+        if (contender.fitted) matters = std::max(matters, contender.merit);
+    }
+    oneapi::tbb::parallel_for(std::size_t{0}, contenders.size(), [&](std::size_t k) {
+        if (!contenders[k].fitted || contenders[k].merit < nearly * matters) return;
+        fits[k].again_if_strong();
+        judge(k);
+    });
+    for (std::size_t k = 0; k < contenders.size(); ++k) contenders[k].candidate = std::move(candidates[k]);
     std::erase_if(contenders, [](const Contender& contender) { return !contender.fitted; });
     std::sort(contenders.begin(), contenders.end(),
               [](const Contender& a, const Contender& b) { return a.merit > b.merit; });
@@ -303,7 +348,8 @@ std::vector<Account> pairs(const record::Record& record, const std::vector<Conte
     std::vector<Contest> beside(firsts.size());
     oneapi::tbb::parallel_for(std::size_t{0}, firsts.size() + of_random.size(), [&](std::size_t k) {
         if (k < firsts.size()) {
-            beside[k] = hold_contest(record, *firsts[k]->fitted, rows, tried_second, Among::not_random);
+            beside[k] = hold_contest(record, *firsts[k]->fitted, rows, tried_second, Among::not_random,
+                                     contenders.front().merit - firsts[k]->merit);
             return;
         }
         Pair& pair = of_random[k - firsts.size()];

@@ -40,14 +40,15 @@ struct Contender {
     double p_value = 1.0;  ///< of such a gain by chance, its search counted
 };
 
-/// Those that might explain something, no more than so many beside random rates, the likeliest first.
+/// Those that might explain something, no more than so many beside random rates, the likeliest first. Less than about
+/// `matters` of merit makes no difference, so that it need not be told exactly.
 struct Contest {
     std::vector<Contender> contenders;
     bool side = false;  ///< told by other columns than the phase
 };
 enum class Among { all, not_random };
 Contest hold_contest(const record::Record& record, const Fitted& now, const Rows& rows, std::size_t most,
-                     Among among = Among::all);
+                     Among among = Among::all, double matters = 0.0);
 
 /// An effect with the merit of what it is part of: itself or a pair.
 struct Held {
