@@ -329,6 +329,16 @@ void SampleFit::fit_noise() {
     if (model_.noise.rate_arcsec_rt_s * std::sqrt(series_->interval_s) < 1e-4 * scale) {
         model_.noise.rate_arcsec_rt_s = 1e-2 * scale / std::sqrt(series_->interval_s);
     }
+    // So does a part of what a witness leaves of a motion: a line beside it may have had no use for it.
+    auto& resonances = model_.noise.resonances;
+    for (std::size_t k = 1; k < resonances.size(); ++k) {
+        const bool of_one_motion = model_.resonances[k] == "case_motion" && model_.resonances[k - 1] == "case_motion";
+        if (of_one_motion && resonances[k].arcsec < 1e-2 * resonances[k - 1].arcsec) {
+            resonances[k] = resonances[k - 1];
+            resonances[k].arcsec *= 0.3;
+            resonances[k].width_hz *= 3.0;
+        }
+    }
     std::vector<double> start = places_of(model_);
     const std::size_t n = rest_.size();
     const bool resampled = model_.noise.from_hz > 0.0;

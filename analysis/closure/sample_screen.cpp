@@ -314,10 +314,33 @@ SampleModel with_lines_of_source(const SampleFit& now, SampleModel model) {
     return model;
 }
 
+/// The model as of readings of that source.
+SampleModel as_of(const SampleFit& now, const SampleSource& source) {
+    SampleModel model = now.model();
+    model.noise.from_hz = source.from_hz;
+    model.noise.from_phase = source.from_phase;
+    model.noise.blur_arcsec = 0.2 * now.sd(0);
+    model.noise.digits_arcsec = 1e-6 * now.sd(0);
+    return model;
+}
+
 void screen_resampling(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
     if (now.model().noise.from_hz > 0.0) return;
     const FoundCycle cycle = find_cycle(now.innovations(), in.rows, in.series.rate_hz);
     if (!(cycle.p_value < level_of_effects)) return;
+    const auto offer = [&](SampleModel model) {
+        out.push_back({.effect = "resampling",
+                       .model = with_lines_of_source(now, std::move(model)),
+                       .p_value = cycle.p_value,
+                       .searched = cycle.searched,
+                       .parameters = 2,
+                       .freedom = 2,
+                       .noise = SampleFit::Noise::free});
+    };
+    if (const auto source = find_straight_lines(in.series.increment, in.series.rate_hz)) {
+        for (SampleModel& model : resampled_from(now, *source)) offer(std::move(model));
+        return;
+    }
     // Rates whose distance from a multiple of the record's is that frequency
     const double rate = in.series.rate_hz;
     std::vector<Resampled> found;
@@ -332,15 +355,7 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
     std::sort(found.begin(), found.end(),
               [](const Resampled& a, const Resampled& b) { return a.log_likelihood > b.log_likelihood; });
     constexpr std::size_t looked_at = 3;
-    for (std::size_t k = 0; k < std::min(looked_at, found.size()); ++k) {
-        out.push_back({.effect = "resampling",
-                       .model = with_lines_of_source(now, std::move(found[k].model)),
-                       .p_value = cycle.p_value,
-                       .searched = cycle.searched,
-                       .parameters = 2,
-                       .freedom = 2,
-                       .noise = SampleFit::Noise::free});
-    }
+    for (std::size_t k = 0; k < std::min(looked_at, found.size()); ++k) offer(std::move(found[k].model));
 }
 
 /// A motion that is the witness's and turned by a quarter of a cycle, slow drifts left out: two numbers tell of weak
@@ -412,11 +427,7 @@ Resampled resampled_from(const SampleFit& now, double from_hz) {
     const std::size_t part = std::min<std::size_t>(series.size(), 20000);
     Resampled best{{}, -std::numeric_limits<double>::infinity()};
     for (int place = 0; place < places; ++place) {
-        SampleModel model = now.model();
-        model.noise.from_hz = from_hz;
-        model.noise.from_phase = static_cast<double>(place) / places;
-        model.noise.blur_arcsec = 0.2 * now.sd(0);
-        model.noise.digits_arcsec = 1e-6 * now.sd(0);
+        SampleModel model = as_of(now, {from_hz, static_cast<double>(place) / places});
         const SampleFilter filter(model.noise, part, series.interval_s);
         const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
         // The scale free, all else as it is.
@@ -433,6 +444,20 @@ Resampled resampled_from(const SampleFit& now, double from_hz) {
         if (value > best.log_likelihood) best = {std::move(model), value};
     }
     return best;
+}
+
+std::vector<SampleModel> resampled_from(const SampleFit& now, const SampleSource& source) {
+    SampleModel model = as_of(now, source);
+    // Where the readings lie is known exactly.
+    model.noise.blur_arcsec = 1e-3 * now.sd(0);
+    // On the line between two readings an increment is a part of what they differ by.
+    SampleModel of_readings = model;
+    double squares = 0.0;
+    for (const double x : now.rest()) squares += x * x;
+    const double part = std::min(1.0, source.from_hz * now.series().interval_s);
+    of_readings.noise.angle_arcsec = std::sqrt(0.5 * squares / static_cast<double>(now.series().size())) / part;
+    of_readings.noise.rate_arcsec_rt_s = 0.05 * of_readings.noise.angle_arcsec * std::sqrt(source.from_hz);
+    return {std::move(model), std::move(of_readings)};
 }
 
 std::vector<SampleColumn> rate_columns(const SampleSeries& series) {

@@ -56,6 +56,9 @@ struct Resampled {
     double log_likelihood = 0.0;
 };
 Resampled resampled_from(const SampleFit& now, double from_hz);
+/// The same where the source's readings lie, with the noise as it is and as errors of readings: what is interpolated
+/// looks as if it were rates.
+std::vector<SampleModel> resampled_from(const SampleFit& now, const SampleSource& source);
 
 /// The effects that samples can tell of and that the fit does not have yet, held against what it has left.
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in);

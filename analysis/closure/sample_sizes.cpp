@@ -120,8 +120,13 @@ void test_distribution(const SampleFit& fit, double lattice_arcsec, Views& views
         const double high = *std::max_element(x.begin(), x.end());
         const double low = *std::min_element(x.begin(), x.end());
         const double tolerance = 1e-9 * (high - low);
-        const auto ties =
-            std::count_if(x.begin(), x.end(), [&](double v) { return v > high - tolerance || v < low + tolerance; });
+        // On one straight line between two readings of a source all are the same.
+        const bool on_lines = fit.model().noise.from_hz > 0.0;
+        int ties = 0;
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            if (on_lines && i > 0 && std::abs(x[i] - x[i - 1]) <= tolerance) continue;
+            ties += x[i] > high - tolerance || x[i] < low + tolerance ? 1 : 0;
+        }
         if (ties > 4) {
             views.push_back(
                 {{Where::amplitude, "values at the end of their range", 0.0, fmt::format("{} of them", ties)}});
@@ -139,9 +144,14 @@ void view_sizes(const SampleFit& fit, double lattice_arcsec, Views& views) {
 Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
     const auto& e = fit.innovations();
     const std::size_t n = e.size();
-    const std::size_t length = std::max<std::size_t>(50, n / 500);
+    // Of rows that tell something: of a record with many to every reading of its source these are few.
+    std::size_t telling = 0;
+    for (std::size_t i = 0; i < n; ++i) telling += rows[i] && !fit.settled(i) ? 1 : 0;
+    constexpr std::size_t fewest = 50;
+    const std::size_t length = std::min(n, std::max(fewest * n / std::max<std::size_t>(telling, 1), n / 500));
     const std::size_t windows = n / length;
     std::vector<double> power(windows, 0.0);
+    std::vector<double> freedom(windows, 0.0);
     for (std::size_t w = 0; w < windows; ++w) {
         // About their mean: a rate that is another than elsewhere disturbs nothing.
         double sum = 0.0;
@@ -153,7 +163,9 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
             squares += e[i] * e[i];
             count += 1.0;
         }
-        if (count > 1.0) power[w] = (squares - sum * sum / count) / (count - 1.0);
+        if (count < 2.0) continue;
+        freedom[w] = count - 1.0;
+        power[w] = (squares - sum * sum / count) / freedom[w];
     }
     auto sorted = power;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(windows / 2);
@@ -165,7 +177,8 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
     double count = 0.0;
     for (std::size_t w = 0; w < windows; ++w) {
         const double ratio = power[w] / usual;
-        const double p = of_several(chi2_tail(ratio * static_cast<double>(length), static_cast<int>(length)),
+        if (freedom[w] == 0.0) continue;
+        const double p = of_several(chi2_tail(ratio * freedom[w], static_cast<int>(freedom[w])),
                                     static_cast<double>(windows));
         if (ratio > disturbed.worst) {
             disturbed.worst = ratio;

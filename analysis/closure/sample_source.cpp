@@ -36,6 +36,51 @@ std::vector<double> between_readings(const SampleSource& source, std::size_t siz
 
 }  // namespace
 
+std::optional<SampleSource> find_straight_lines(const std::vector<double>& increments, double rate_hz) {
+    constexpr double same = 1e-7;    // of what increments differ by
+    constexpr std::size_t few = 30;  // readings
+    constexpr double clock = 1e-3;   // rms of their times, of an interval of the record
+    const auto [low, high] = std::minmax_element(increments.begin(), increments.end());
+    const double tolerance = same * (*high - *low);
+    const auto line_goes_on = [&](std::size_t i) { return std::abs(increments[i] - increments[i - 1]) <= tolerance; };
+    // Times of readings, in intervals of the record, where one turn lies between two lines.
+    std::vector<double> turns;
+    for (std::size_t i = 2; i + 2 < increments.size(); ++i) {
+        if (!line_goes_on(i - 1) || line_goes_on(i) || line_goes_on(i + 1) || !line_goes_on(i + 2)) continue;
+        const double before = increments[i - 1];
+        const double after = increments[i + 1];
+        const double share = (increments[i] - after) / (before - after);
+        if (share > 0.0 && share < 1.0) turns.push_back(static_cast<double>(i) + share);
+    }
+    if (turns.size() < few) return std::nullopt;
+    std::vector<double> apart;
+    for (std::size_t k = 1; k < turns.size(); ++k) apart.push_back(turns[k] - turns[k - 1]);
+    // The shortest, but for a few by chance, is one interval of the source.
+    const auto shortest = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 20);
+    std::nth_element(apart.begin(), shortest, apart.end());
+    double period = *shortest;
+    double start = turns.front();
+    double sum_k = 0.0, sum_t = 0.0, sum_kk = 0.0, sum_kt = 0.0, count = 0.0, number = 0.0;
+    for (std::size_t j = 0; j < turns.size(); ++j) {
+        if (j > 0) number += std::round((turns[j] - turns[j - 1]) / period);
+        const double t = turns[j] - turns.front();
+        sum_k += number;
+        sum_t += t;
+        sum_kk += number * number;
+        sum_kt += number * t;
+        count += 1.0;
+        const double spread = sum_kk - sum_k * sum_k / count;
+        if (j == 0 || !(spread > 0.0)) continue;
+        period = (sum_kt - sum_k * sum_t / count) / spread;
+        start = turns.front() + (sum_t - period * sum_k) / count;
+    }
+    double squares = 0.0;
+    for (const double turn : turns) squares += std::pow(std::remainder(turn - start, period), 2);
+    if (!(squares < clock * clock * count)) return std::nullopt;
+    const double phase = -start / period;
+    return SampleSource{rate_hz / period, phase - std::floor(phase)};
+}
+
 std::vector<double> as_taken(const SampleSource& source, const std::vector<double>& increments, double interval_s) {
     const std::size_t n = increments.size();
     std::vector<double> angle(n + 1, 0.0);

@@ -182,6 +182,29 @@ TEST(SampleClosure, NamesWhatIsStrong) {
     only_step(closed(truth), "case_motion");
 }
 
+// One jump is a step of the library's, and nothing that a random walk would have to be held back for.
+TEST(SampleClosure, AWalkThatLooksLikeAStepIsNamed) {
+    SampleTruth truth = usual(37);
+    truth.size = 15000;
+    truth.mean_rate_deg_h = 12.0;
+    truth.white_angle_arcsec = 0.062;
+    truth.rates.rate_random_walk_deg_h_rt_h = 20.0;
+    only_step(closed(truth), "rate_random_walk");
+}
+
+// A line takes for itself what the noise has for a part of the motion; when it is named, that part has to come back.
+TEST(LongSampleClosure, AMotionAndALineAreNamed) {
+    SampleTruth truth = usual();
+    truth.white_angle_arcsec = 0.2;
+    truth.case_motion.rms_arcsec = 1.5;
+    truth.dither_residue = {38.0, 0.0, 0.2, 0.0};
+    const auto found = closed(truth);
+    EXPECT_EQ(found.verdict, closure::Verdict::closed) << (found.unexplained ? found.unexplained->description() : "");
+    ASSERT_EQ(found.steps.size(), 2U);
+    EXPECT_EQ(found.steps[0].effect, "case_motion");
+    EXPECT_EQ(found.steps[1].effect, "dither_residue");
+}
+
 TEST(SampleClosure, DoesNotNameWhatTheLibraryDoesNotHave) {
     SampleTruth truth = usual();
     truth.jumping_line = {12.0, 2.0, 6.0, 300.0};

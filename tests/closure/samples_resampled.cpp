@@ -6,6 +6,7 @@
 #include <string>
 
 #include "analysis/closure/closure.hpp"
+#include "analysis/closure/sample_source.hpp"
 #include "tests/closure/samples.hpp"
 
 namespace ringlock::test::closure {
@@ -14,6 +15,7 @@ namespace {
 using ringlock::closure::close_samples;
 using ringlock::closure::Closure;
 using ringlock::closure::Estimate;
+using ringlock::closure::find_straight_lines;
 using ringlock::closure::Step;
 using ringlock::closure::Verdict;
 
@@ -43,6 +45,25 @@ TEST(ResampledRecords, ClosesWhatWasTakenAtALowerRate) {
         const Closure found = close_samples(generate_samples(taken_at(from_hz, 5, 10000)));
         expect_only_resampling(found);
         EXPECT_NEAR(found.steps[0].parameters[0].value, from_hz, 1e-6);
+    }
+}
+
+// From less than two fifths of the record's rate neighbours lie on one straight line and are the same, which tells the source's
+// clock exactly; largest values come several times, and a stretch has few readings.
+TEST(ResampledRecords, OfSlowSourcesHaveStraightLines) {
+    for (const double from_hz : {5.1, 12.3, 23.7, 31.9, 39.1}) {
+        const SampleTruth truth = taken_at(from_hz, 4, 6000);
+        const record::Record record = generate_samples(truth);
+        const auto source = find_straight_lines(record.samples->values, truth.rate_hz);
+        ASSERT_TRUE(source) << from_hz;
+        EXPECT_NEAR(source->from_hz, from_hz, 1e-8 * from_hz);
+        const Closure found = close_samples(record);
+        expect_only_resampling(found);
+        EXPECT_NEAR(found.steps[0].parameters[0].value, from_hz, 1e-6) << from_hz;
+    }
+    for (const double from_hz : {0.0, 45.2, 61.8}) {
+        const SampleTruth truth = taken_at(from_hz, 4, 6000);
+        EXPECT_FALSE(find_straight_lines(generate_samples(truth).samples->values, truth.rate_hz)) << from_hz;
     }
 }
 
