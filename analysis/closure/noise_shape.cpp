@@ -58,8 +58,7 @@ PhaseTable<Lefts> left_by_phase(const TurnKicks& kicks, int direction, std::span
 }  // namespace
 
 std::shared_ptr<const NoiseShape> NoiseShape::of(std::span<const double> counted_rad, const TurnKicks& kicks,
-                                                 std::span<const int> direction,
-                                                 std::span<const double> foretold_rad) {
+                                                 std::span<const int> direction, std::span<const double> foretold_rad) {
     if (!is_of_even_density(counted_rad)) return nullptr;
     const std::vector<double> sizes = sizes_of(counted_rad);
     const PhaseTable<Lefts> at_minima = left_by_phase(kicks, 1, sizes);

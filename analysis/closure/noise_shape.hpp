@@ -12,10 +12,10 @@ namespace ringlock::closure {
 
 /// What injected noise that is flatter than a normal one, as between bounds, changes in the likelihood.
 ///
-/// A turn's innovation v, of variance s^2, is a part of the phase psi that comes of it, and what the lock-in adds before
-/// the turn follows that phase: v goes with it where nothing is missing. The likelihood's |1 - before'| makes up for
-/// that in the mean where v is normal (Stein, Annals of Statistics 9, 1135, 1981). Else it leaves, of exp(i k psi) in
-/// what is added,
+/// A turn's innovation v, of variance s^2, is a part of the phase psi that comes of it, and what the lock-in adds
+/// before the turn follows that phase: v goes with it where nothing is missing. The likelihood's |1 - before'| makes up
+/// for that in the mean where v is normal (Stein, Annals of Statistics 9, 1135, 1981). Else it leaves, of exp(i k psi)
+/// in what is added,
 ///
 ///     E[(v / s^2 - i k / (1 - before'(psi))) exp(i k psi)],     psi = foretold + v + before(psi),
 ///

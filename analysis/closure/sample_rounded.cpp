@@ -52,7 +52,7 @@ std::shared_ptr<SampleFit> RoundedSamples::draw(std::shared_ptr<SampleFit> fit, 
 }
 
 /// Log-likelihood of the rounded increments by the model, with one of its noises that many times less and more.
-RoundedSamples::Parabola RoundedSamples::along(const SampleFit& fit, double SampleNoise::* noise) const {
+RoundedSamples::Parabola RoundedSamples::along(const SampleFit& fit, double SampleNoise::*noise) const {
     const auto likelihood = [&](double times) {
         SampleModel model = fit.model();
         model.noise.*noise *= times;

@@ -22,7 +22,8 @@ class RoundedSamples {
     double step_arcsec() const { return step_; }
     /// Whether such steps show the angle beside what is left of the fit's noise without their variance.
     static bool show(const SampleFit& fit, double step_arcsec);
-    /// Draws them: the fit to what was drawn. None where what the steps hide cannot be drawn; they are as measured then.
+    /// Draws them: the fit to what was drawn. None where what the steps hide cannot be drawn; they are as measured
+    /// then.
     std::shared_ptr<SampleFit> begin(const SampleFit& fit, double step_arcsec);
     /// The same, drawn by another model: what was rounded is drawn by it and the model fitted to that, a stochastic
     /// approximation of the likeliest (Celeux and Diebolt, Comput. Stat. Q. 2, 73, 1985).
@@ -38,7 +39,7 @@ class RoundedSamples {
     struct Parabola {
         double slope, bend;  ///< a power of these times
     };
-    Parabola along(const SampleFit& fit, double SampleNoise::* noise) const;
+    Parabola along(const SampleFit& fit, double SampleNoise::*noise) const;
     std::shared_ptr<SampleFit> with_likeliest_readings(const SampleFit& fit) const;
     bool foretells_as_said(const SampleFit& fit) const;
 

@@ -178,8 +178,8 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
     for (std::size_t w = 0; w < windows; ++w) {
         const double ratio = power[w] / usual;
         if (freedom[w] == 0.0) continue;
-        const double p = of_several(chi2_tail(ratio * freedom[w], static_cast<int>(freedom[w])),
-                                    static_cast<double>(windows));
+        const double p =
+            of_several(chi2_tail(ratio * freedom[w], static_cast<int>(freedom[w])), static_cast<double>(windows));
         if (ratio > disturbed.worst) {
             disturbed.worst = ratio;
             disturbed.at_s = fit.series().time_s[w * length];

@@ -34,12 +34,41 @@ std::vector<double> between_readings(const SampleSource& source, std::size_t siz
     return taken;
 }
 
+struct Clock {
+    double start, period;
+};
+
+/// Of a clock that ticks at all these times, and at others, with about that period; none where there is none.
+std::optional<Clock> clock_of(const std::vector<double>& times, double period) {
+    constexpr double exact = 1e-3;  // rms
+    double start = times.front();
+    double number = 0.0;
+    double count = 0.0, sum_k = 0.0, sum_t = 0.0, sum_kk = 0.0, sum_kt = 0.0;
+    for (std::size_t j = 0; j < times.size(); ++j) {
+        if (j > 0) number += std::round((times[j] - times[j - 1]) / period);
+        const double t = times[j] - times.front();
+        count += 1.0;
+        sum_k += number;
+        sum_t += t;
+        sum_kk += number * number;
+        sum_kt += number * t;
+        const double spread = sum_kk - sum_k * sum_k / count;
+        if (!(spread > 0.0)) continue;
+        period = (sum_kt - sum_k * sum_t / count) / spread;
+        start = times.front() + (sum_t - period * sum_k) / count;
+    }
+    double squares = 0.0;
+    for (const double time : times) squares += std::pow(std::remainder(time - start, period), 2);
+    if (!(squares < exact * exact * count)) return std::nullopt;
+    return Clock{start, period};
+}
+
 }  // namespace
 
 std::optional<SampleSource> find_straight_lines(const std::vector<double>& increments, double rate_hz) {
-    constexpr double same = 1e-7;    // of what increments differ by
-    constexpr std::size_t few = 30;  // readings
-    constexpr double clock = 1e-3;   // rms of their times, of an interval of the record
+    constexpr double same = 1e-7;          // of what increments differ by
+    constexpr std::size_t few = 20;        // readings
+    constexpr double shortest_period = 2;  // so that lines have whole intervals
     const auto [low, high] = std::minmax_element(increments.begin(), increments.end());
     const double tolerance = same * (*high - *low);
     const auto line_goes_on = [&](std::size_t i) { return std::abs(increments[i] - increments[i - 1]) <= tolerance; };
@@ -55,30 +84,16 @@ std::optional<SampleSource> find_straight_lines(const std::vector<double>& incre
     if (turns.size() < few) return std::nullopt;
     std::vector<double> apart;
     for (std::size_t k = 1; k < turns.size(); ++k) apart.push_back(turns[k] - turns[k - 1]);
-    // The shortest, but for a few by chance, is one interval of the source.
+    // The shortest, but for a few by chance, is one interval of the source or, where few turns can be told, some.
     const auto shortest = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 20);
     std::nth_element(apart.begin(), shortest, apart.end());
-    double period = *shortest;
-    double start = turns.front();
-    double sum_k = 0.0, sum_t = 0.0, sum_kk = 0.0, sum_kt = 0.0, count = 0.0, number = 0.0;
-    for (std::size_t j = 0; j < turns.size(); ++j) {
-        if (j > 0) number += std::round((turns[j] - turns[j - 1]) / period);
-        const double t = turns[j] - turns.front();
-        sum_k += number;
-        sum_t += t;
-        sum_kk += number * number;
-        sum_kt += number * t;
-        count += 1.0;
-        const double spread = sum_kk - sum_k * sum_k / count;
-        if (j == 0 || !(spread > 0.0)) continue;
-        period = (sum_kt - sum_k * sum_t / count) / spread;
-        start = turns.front() + (sum_t - period * sum_k) / count;
+    for (double some = 1.0; *shortest / some >= shortest_period; some += 1.0) {
+        if (const auto clock = clock_of(turns, *shortest / some)) {
+            const double phase = -clock->start / clock->period;
+            return SampleSource{rate_hz / clock->period, phase - std::floor(phase)};
+        }
     }
-    double squares = 0.0;
-    for (const double turn : turns) squares += std::pow(std::remainder(turn - start, period), 2);
-    if (!(squares < clock * clock * count)) return std::nullopt;
-    const double phase = -start / period;
-    return SampleSource{rate_hz / period, phase - std::floor(phase)};
+    return std::nullopt;
 }
 
 std::vector<double> as_taken(const SampleSource& source, const std::vector<double>& increments, double interval_s) {

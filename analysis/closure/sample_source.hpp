@@ -11,9 +11,9 @@ struct SampleSource {
     double from_phase = 0.0;  ///< of the record's begin, between two of the source's readings; of their distance
 };
 
-/// The source of a record that has at least five intervals to every two of its source: neighbours on one straight line
-/// are the same, and where the angle turns between two lines says when its reading was taken. None where these are not
-/// the times of a clock, or are few, as in a record that was not resampled or whose values are coarse.
+/// The source of a record that has more than five intervals to every two of its source: neighbours on one straight
+/// line are the same, and where the angle turns between two lines says when its reading was taken. None where these are
+/// not the times of a clock, or are few, as in a record that was not resampled or whose values are coarse.
 std::optional<SampleSource> find_straight_lines(const std::vector<double>& increments, double rate_hz);
 
 /// Increments of the record, of an angle that has these between the same times.

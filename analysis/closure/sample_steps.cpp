@@ -63,7 +63,8 @@ SampleFit refine_steps(SampleFit fit, const Rows& rows) {
         for (std::size_t k = 0; k < fit.model().columns.size(); ++k) {
             if (fit.model().columns[k].effect != "bias_step") continue;
             const std::size_t row = row_of_step(fit.model().columns[k]);
-            const std::size_t at = refine_place(without_column(fit, k, rows), row, fit.series().size() / (2 * places_of_a_step));
+            const std::size_t at =
+                refine_place(without_column(fit, k, rows), row, fit.series().size() / (2 * places_of_a_step));
             if (at == row) continue;
             moved = true;
             fit = with_place(fit, k, at, rows);

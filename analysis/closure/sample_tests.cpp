@@ -157,7 +157,8 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
     const FoundLine line = left.likeliest();
     constexpr double near_hz = 1.0;
     const double hz = line.chi2 >= left.scattered ? line.frequency_hz : left.scattered_hz;
-    least.beside = line.p_value < level_of_residual && std::abs(hz - alias(least.hz, fit.series().rate_hz).hz) < near_hz;
+    least.beside =
+        line.p_value < level_of_residual && std::abs(hz - alias(least.hz, fit.series().rate_hz).hz) < near_hz;
     return least;
 }
 

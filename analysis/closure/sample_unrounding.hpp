@@ -4,7 +4,8 @@
 
 #include "analysis/closure/sample_fit.hpp"
 
-/// Readings in steps that are not small beside their noise. Their rounding is no noise of its own: it follows the angle.
+/// Readings in steps that are not small beside their noise. Their rounding is no noise of its own: it follows the
+/// angle.
 namespace ringlock::closure {
 
 /// What increments may have been before they were rounded, drawn: by a mixture of Kalman filters (Chen and Liu, J. R.
@@ -21,8 +22,9 @@ struct Foretold {
 };
 Foretold foretell_rounded(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec);
 
-/// Whether steps are so large that their rounding shows the angle: the first harmonic of the rounding, of which noise of
-/// that standard deviation leaves exp(-2 pi^2 sd^2/step^2) (Widrow and Kollar, "Quantization Noise", 2008, chapter 5).
+/// Whether steps are so large that their rounding shows the angle: the first harmonic of the rounding, of which noise
+/// of that standard deviation leaves exp(-2 pi^2 sd^2/step^2) (Widrow and Kollar, "Quantization Noise", 2008, chapter
+/// 5).
 bool rounding_shows(double step_arcsec, double sd_arcsec);
 
 }  // namespace ringlock::closure

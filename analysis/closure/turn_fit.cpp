@@ -310,8 +310,8 @@ void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) c
     auto k = static_cast<Eigen::Index>(nuisances() + base_columns);
     for (const ActiveEffect& active : parameters_.effects) {
         const auto all = active.effect->parameters();
-        const bool has_size = std::any_of(all.begin(), all.end(),
-                                          [](const auto& p) { return p.role == effects::Role::size; });
+        const bool has_size =
+            std::any_of(all.begin(), all.end(), [](const auto& p) { return p.role == effects::Role::size; });
         for (const effects::Parameter& parameter : all) {
             if (!fitted_in_phase(*active.effect, parameter.role)) continue;
             const double limit = parameter.role == effects::Role::time        ? part * duration_s

@@ -96,8 +96,7 @@ int main(int argc, char** argv) {
                 if (!shows(effect, other_gyro)) continue;
                 Case of = seeded();
                 of.multiple = of_other_gyros;
-                of.truth.push_back(
-                    draw(effect, of.multiple * start_size(effect), 7 * cases.size(), duration_s(of)));
+                of.truth.push_back(draw(effect, of.multiple * start_size(effect), 7 * cases.size(), duration_s(of)));
                 add(std::move(of));
             }
         }

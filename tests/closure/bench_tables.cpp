@@ -227,7 +227,8 @@ Command command_of(int argc, char** argv, const char* program) {
     const bool known = command.wants(Kind::null) || command.wants(Kind::single) || command.wants(Kind::pair) ||
                        command.wants(Kind::foreign) || command.wants(Kind::other);
     if (wrong || command.folder.empty() || !known || !(command.share > 0.0 && command.share <= 1.0)) {
-        fmt::print(stderr, "usage: {} FOLDER [--share S] [--only null|single|pair|foreign|other] [--seed N]\n", program);
+        fmt::print(stderr, "usage: {} FOLDER [--share S] [--only null|single|pair|foreign|other] [--seed N]\n",
+                   program);
         std::exit(2);
     }
     std::filesystem::create_directories(command.folder);

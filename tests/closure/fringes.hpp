@@ -12,8 +12,8 @@
 ///
 ///     g = R + A w (s sin(w u) + h sin(2 w u + f)) + L sin(v u + l).
 ///
-/// The same expression holds before the turn, u < 0, with A, w, R and b of the half cycle that ends there; l is the line's phase at
-/// the turn.
+/// The same expression holds before the turn, u < 0, with A, w, R and b of the half cycle that ends there; l is the
+/// line's phase at the turn.
 ///
 /// Method: the plain phase P(u), the integral of g, is elementary; delta = psi - psi(turn) - P obeys delta' = b F and
 /// is integrated by Gauss-Legendre collocation with five nodes (order 10), the implicit equations solved by fixed-point

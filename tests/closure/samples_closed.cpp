@@ -148,8 +148,8 @@ TEST(SampleClosure, NamesSlowRates) {
     only_step(closed(truth), "rate_random_walk");
 }
 
-// What is evident is named as surely as what hardly shows, though the noise that the base model takes it for is far from
-// the one that is left.
+// What is evident is named as surely as what hardly shows, though the noise that the base model takes it for is far
+// from the one that is left.
 TEST(SampleClosure, NamesWhatIsStrong) {
     const auto short_record = [] {
         SampleTruth truth = usual();

@@ -48,8 +48,8 @@ TEST(ResampledRecords, ClosesWhatWasTakenAtALowerRate) {
     }
 }
 
-// From less than two fifths of the record's rate neighbours lie on one straight line and are the same, which tells the source's
-// clock exactly; largest values come several times, and a stretch has few readings.
+// From less than two fifths of the record's rate neighbours lie on one straight line and are the same, which tells
+// the source's clock exactly; largest values come several times, and a stretch has few readings.
 TEST(ResampledRecords, OfSlowSourcesHaveStraightLines) {
     for (const double from_hz : {5.1, 12.3, 23.7, 31.9, 39.1}) {
         const SampleTruth truth = taken_at(from_hz, 4, 6000);

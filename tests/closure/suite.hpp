@@ -24,7 +24,7 @@ struct Added {
 struct Condition {
     const char* name;
     double injected_rad;
-    bool moving;  ///< input rates of either sign, and a dither whose amplitude drifts and walks
+    bool moving;              ///< input rates of either sign, and a dither whose amplitude drifts and walks
     bool other_gyro = false;  ///< of another scale factor, dither and readout, one in three locked; noise as drawn
 };
 extern const std::vector<Condition> conditions;

@@ -121,8 +121,8 @@ TEST(BaseVibration, IsTheIntegralOfTheLine) {
     const double w = 2.0 * std::numbers::pi * f;
     for (const auto& [start, duration] : {std::pair{0.0, 0.004}, {0.004, 0.011}, {0.015, 1.0}}) {
         const double expected = 5.0 / w * (std::cos(w * start + phase) - std::cos(w * (start + duration) + phase));
-        EXPECT_NEAR(find("base_vibration")->added_angle(values)({.start_s = start, .duration_s = duration}),
-                    expected, 1e-14);
+        EXPECT_NEAR(find("base_vibration")->added_angle(values)({.start_s = start, .duration_s = duration}), expected,
+                    1e-14);
     }
 }
 
