@@ -460,7 +460,7 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
     for (const ActiveEffect& active : effects) {
         if (active.effect->name() == "resampling") from_hz = active.values.at("from_hz");
     }
-    if (from_hz > 0.0) model = resampled_from(*now_.fit, from_hz).model;
+    if (from_hz > 0.0) model = resampled_from(*now_.fit, from_hz);
     for (const ActiveEffect& active : effects) {
         const std::string effect(active.effect->name());
         const int k = next_step_++;

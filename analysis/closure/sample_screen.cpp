@@ -314,14 +314,55 @@ SampleModel with_lines_of_source(const SampleFit& now, SampleModel model) {
     return model;
 }
 
+/// What is interpolated looks as if it were rates.
+enum class Errors { as_they_are, of_readings };
+
 /// The model as of readings of that source.
-SampleModel as_of(const SampleFit& now, const SampleSource& source) {
+SampleModel as_of(const SampleFit& now, const SampleSource& source, Errors errors = Errors::as_they_are) {
     SampleModel model = now.model();
     model.noise.from_hz = source.from_hz;
     model.noise.from_phase = source.from_phase;
     model.noise.blur_arcsec = 0.2 * now.sd(0);
     model.noise.digits_arcsec = 1e-6 * now.sd(0);
+    if (errors == Errors::of_readings) {
+        // On the line between two readings an increment is a part of what they differ by.
+        double squares = 0.0;
+        for (const double x : now.rest()) squares += x * x;
+        const double part = std::min(1.0, source.from_hz * now.series().interval_s);
+        model.noise.angle_arcsec = std::sqrt(0.5 * squares / static_cast<double>(now.series().size())) / part;
+        model.noise.rate_arcsec_rt_s = 0.05 * model.noise.angle_arcsec * std::sqrt(source.from_hz);
+    }
     return model;
+}
+
+struct Resampled {
+    SampleModel model;
+    double log_likelihood = 0.0;
+};
+
+/// From where in the source's interval the likelihood likes best on a part of the record, its scale left free.
+Resampled best_placed(const SampleFit& now, double from_hz, Errors errors) {
+    constexpr int places = 8;
+    const SampleSeries& series = now.series();
+    const std::size_t part = std::min<std::size_t>(series.size(), 20000);
+    Resampled best{{}, -std::numeric_limits<double>::infinity()};
+    for (int place = 0; place < places; ++place) {
+        SampleModel model = as_of(now, {from_hz, static_cast<double>(place) / places}, errors);
+        const SampleFilter filter(model.noise, part, series.interval_s);
+        const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
+        double squares = 0.0;
+        double logs = 0.0;
+        double count = 0.0;
+        for (std::size_t i = 0; i < part; ++i) {
+            if (!now.rows()[i]) continue;
+            squares += e[i] * e[i];
+            logs += std::log(filter.sd(i));
+            count += 1.0;
+        }
+        const double value = -0.5 * count * std::log(squares / count) - logs;
+        if (value > best.log_likelihood) best = {std::move(model), value};
+    }
+    return best;
 }
 
 void screen_resampling(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
@@ -338,7 +379,12 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
                        .noise = SampleFit::Noise::free});
     };
     if (const auto source = find_straight_lines(in.series.increment, in.series.rate_hz)) {
-        for (SampleModel& model : resampled_from(now, *source)) offer(std::move(model));
+        for (const Errors errors : {Errors::as_they_are, Errors::of_readings}) {
+            SampleModel model = as_of(now, *source, errors);
+            // Where the readings lie is known exactly.
+            model.noise.blur_arcsec = 1e-3 * now.sd(0);
+            offer(std::move(model));
+        }
         return;
     }
     // Rates whose distance from a multiple of the record's is that frequency
@@ -348,13 +394,14 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
         for (const int sign : {-1, 1}) {
             const double from = m * rate + sign * cycle.frequency_hz;
             if (from < 0.3 * rate || from > 4.5 * rate || std::abs(from - rate) < 1e-9 * rate) continue;
-            found.push_back(resampled_from(now, from));
+            found.push_back(best_placed(now, from, Errors::as_they_are));
         }
     }
     // What interpolation does to the share of the noises is not in these: the best few are fitted in full.
     std::sort(found.begin(), found.end(),
               [](const Resampled& a, const Resampled& b) { return a.log_likelihood > b.log_likelihood; });
     constexpr std::size_t looked_at = 3;
+    if (!found.empty()) offer(best_placed(now, found.front().model.noise.from_hz, Errors::of_readings).model);
     for (std::size_t k = 0; k < std::min(looked_at, found.size()); ++k) offer(std::move(found[k].model));
 }
 
@@ -421,43 +468,8 @@ void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector
 
 }  // namespace
 
-Resampled resampled_from(const SampleFit& now, double from_hz) {
-    constexpr int places = 8;
-    const SampleSeries& series = now.series();
-    const std::size_t part = std::min<std::size_t>(series.size(), 20000);
-    Resampled best{{}, -std::numeric_limits<double>::infinity()};
-    for (int place = 0; place < places; ++place) {
-        SampleModel model = as_of(now, {from_hz, static_cast<double>(place) / places});
-        const SampleFilter filter(model.noise, part, series.interval_s);
-        const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
-        // The scale free, all else as it is.
-        double squares = 0.0;
-        double logs = 0.0;
-        double count = 0.0;
-        for (std::size_t i = 0; i < part; ++i) {
-            if (!now.rows()[i]) continue;
-            squares += e[i] * e[i];
-            logs += std::log(filter.sd(i));
-            count += 1.0;
-        }
-        const double value = -0.5 * count * std::log(squares / count) - logs;
-        if (value > best.log_likelihood) best = {std::move(model), value};
-    }
-    return best;
-}
-
-std::vector<SampleModel> resampled_from(const SampleFit& now, const SampleSource& source) {
-    SampleModel model = as_of(now, source);
-    // Where the readings lie is known exactly.
-    model.noise.blur_arcsec = 1e-3 * now.sd(0);
-    // On the line between two readings an increment is a part of what they differ by.
-    SampleModel of_readings = model;
-    double squares = 0.0;
-    for (const double x : now.rest()) squares += x * x;
-    const double part = std::min(1.0, source.from_hz * now.series().interval_s);
-    of_readings.noise.angle_arcsec = std::sqrt(0.5 * squares / static_cast<double>(now.series().size())) / part;
-    of_readings.noise.rate_arcsec_rt_s = 0.05 * of_readings.noise.angle_arcsec * std::sqrt(source.from_hz);
-    return {std::move(model), std::move(of_readings)};
+SampleModel resampled_from(const SampleFit& now, double from_hz) {
+    return best_placed(now, from_hz, Errors::as_they_are).model;
 }
 
 std::vector<SampleColumn> rate_columns(const SampleSeries& series) {

@@ -50,15 +50,8 @@ inline constexpr double declared_to = 0.002;
 /// by half of that, while a gyro warms up by a kelvin a minute.
 inline constexpr double dither_drift_per_s = 2e-6;
 /// The model as of samples taken at another rate and interpolated, from where in the source's interval the likelihood
-/// likes best on a part of the record, its scale left free.
-struct Resampled {
-    SampleModel model;
-    double log_likelihood = 0.0;
-};
-Resampled resampled_from(const SampleFit& now, double from_hz);
-/// The same where the source's readings lie, with the noise as it is and as errors of readings: what is interpolated
-/// looks as if it were rates.
-std::vector<SampleModel> resampled_from(const SampleFit& now, const SampleSource& source);
+/// likes best.
+SampleModel resampled_from(const SampleFit& now, double from_hz);
 
 /// The effects that samples can tell of and that the fit does not have yet, held against what it has left.
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in);
