@@ -318,7 +318,7 @@ SampleModel with_lines_of_source(const SampleFit& now, SampleModel model) {
 enum class Errors { as_they_are, of_readings };
 
 /// The model as of readings of that source.
-SampleModel as_of(const SampleFit& now, const SampleSource& source, Errors errors = Errors::as_they_are) {
+SampleModel as_of(const SampleFit& now, const SampleSource& source, Errors errors) {
     SampleModel model = now.model();
     model.noise.from_hz = source.from_hz;
     model.noise.from_phase = source.from_phase;

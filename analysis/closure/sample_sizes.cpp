@@ -167,8 +167,13 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
         freedom[w] = count - 1.0;
         power[w] = (squares - sum * sum / count) / freedom[w];
     }
-    auto sorted = power;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(windows / 2);
+    // Of those that have rows that count.
+    std::vector<double> sorted;
+    for (std::size_t w = 0; w < windows; ++w) {
+        if (freedom[w] > 0.0) sorted.push_back(power[w]);
+    }
+    if (sorted.empty()) sorted.push_back(0.0);
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
     const double usual = std::max(*middle, 1e-300);
     Disturbed disturbed;
@@ -176,8 +181,8 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
     disturbed.length_s = static_cast<double>(length) * fit.series().interval_s;
     double count = 0.0;
     for (std::size_t w = 0; w < windows; ++w) {
-        const double ratio = power[w] / usual;
         if (freedom[w] == 0.0) continue;
+        const double ratio = power[w] / usual;
         const double p =
             of_several(chi2_tail(ratio * freedom[w], static_cast<int>(freedom[w])), static_cast<double>(windows));
         if (ratio > disturbed.worst) {

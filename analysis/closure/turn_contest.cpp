@@ -104,7 +104,7 @@ class Fits {
           candidate_(candidate),
           rows_(rows),
           start_(now.fit->parameters()),
-          strong_rate_(candidate.effect->adds_angle() && candidate.chi2 > 400.0) {
+          strong_rate_(candidate.effect->adds_angle() && candidate.chi2 > strong) {
         start_.effects.push_back({candidate.effect, candidate.values});
     }
 
@@ -163,6 +163,8 @@ class Fits {
     bool gained(double least) const {
         return best_ && best_->fit->log_likelihood() - now_.fit->log_likelihood() >= least;
     }
+
+    static constexpr double strong = 400.0;  // chi-squared
 
     const record::Record& record_;
     const Fitted& now_;
