@@ -40,6 +40,10 @@ double places_of_step(double chi2, double share_at_ends) {
     return std::max(1.0, p / chi2_tail(b * b, 1));
 }
 
+double places_of_frequency(double chi2, double cycles) {
+    return std::max(1.0, std::sqrt(units::pi / 3.0) * cycles * std::sqrt(0.5 * std::max(chi2, 0.0)));
+}
+
 double davies_bound(double chi2, const std::vector<double>& roots) {
     return std::min(1.0, chi2_tail(chi2, 1) * davies_places(chi2, roots));
 }

@@ -28,6 +28,11 @@ double cost_of_amplitudes(double gain, int amplitudes);
 /// 1011) over that of one place.
 double places_of_step(double chi2, double share_at_ends);
 
+/// The same for a line at that chi-squared of its two amplitudes, over so many cycles a record of frequency: the
+/// expected number of crossings of a chi-squared process (Davies 1987; Baluev, Mon. Not. R. Astron. Soc. 385, 2008,
+/// 1279), over the probability at one place.
+double places_of_frequency(double chi2, double cycles);
+
 /// The bound over the probability of one place: how many independent ones the search is worth.
 double davies_places(double chi2, const std::vector<double>& roots);
 

@@ -203,8 +203,7 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
     for (const std::size_t peak : peaks) score_at(static_cast<double>(peak) * bin_hz, candidate);
     const double centre = candidate.values.at(name_of(frequency));
     for (const double off : {-1.0, -0.5, 0.5, 1.0}) score_at(centre + off * bin_hz, candidate);
-    // Between the Fourier frequencies there is more to find: half as many again (Quinn & Hannan 2001, section 3).
-    candidate.searched = 0.75 * static_cast<double>(n) * 2.0;
+    candidate.searched = places_of_frequency(candidate.chi2, 0.5 * static_cast<double>(n));
     candidate.p_value = of_several(chi2_tail(candidate.chi2, 2), candidate.searched);
     return candidate;
 }

@@ -284,10 +284,6 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
 
 }  // namespace
 
-double places_of_frequency(double chi2, double cycles) {
-    return std::max(1.0, std::sqrt(units::pi / 3.0) * cycles * std::sqrt(0.5 * chi2));
-}
-
 double places_of_drift(double chi2, double cycles, double drift_cycles) {
     // With unit variance about the best phase the slopes by frequency and drift have the variances (2 pi)^2 T^2/12 and
     // pi^2 T^4/180; the field's density is (chi2 - 1) exp(-chi2/2)/(2 pi).

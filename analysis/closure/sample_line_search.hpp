@@ -45,12 +45,9 @@ struct NarrowLines {
 NarrowLines find_lines_in(const std::vector<double>& values, double rate_hz, const LineBand& band,
                           const std::vector<double>& known_hz = {}, double width_hz = 0.0);
 
-/// How many independent places a search is worth at that chi-squared of two amplitudes: the expected number of
-/// crossings of a chi-squared process over so many cycles a record of frequency (Davies 1987; Baluev, Mon. Not. R.
-/// Astron. Soc. 385, 2008, 1279), over the probability at one place.
-double places_of_frequency(double chi2, double cycles);
-/// Over frequencies and drifts, these in cycles: drift times the square of the record's length, both signs together.
-/// The Euler characteristic of a chi-squared field above that level (Worsley, Adv. Appl. Prob. 26, 1994, 13).
+/// How many independent places a search is worth at that chi-squared of two amplitudes, over frequencies and drifts,
+/// these in cycles: drift times the square of the record's length, both signs together. The Euler characteristic of a
+/// chi-squared field above that level (Worsley, Adv. Appl. Prob. 26, 1994, 13).
 double places_of_drift(double chi2, double cycles, double drift_cycles);
 
 /// The angle 2 pi (f t + d t^2/2) of a line at each sample, t from the middle.

@@ -181,7 +181,12 @@ double gain_of(const Fitted& fitted, const Fitted& without) {
 }
 
 double p_of(const Fitted& fitted, const Fitted& without, const Candidate& candidate) {
-    return of_several(p_of_gain(gain_of(fitted, without), *candidate.effect), candidate.searched);
+    // Times and frequencies are what was searched. A search is worth more the higher it goes, as the root of it.
+    using effects::Role;
+    const double chi2 = 2.0 * std::max(0.0, gain_of(fitted, without));
+    const int amplitudes = count_of(*candidate.effect, {Role::size, Role::phase, Role::deviation, Role::probability});
+    const double higher = std::sqrt(std::max(1.0, chi2 / std::max(candidate.chi2, 1e-300)));
+    return of_several(chi2_tail(chi2, amplitudes), candidate.searched > 1.0 ? candidate.searched * higher : 1.0);
 }
 
 /// The noise of the dither at the turns by how neighbouring swings of one sign differ, which have four of its values in

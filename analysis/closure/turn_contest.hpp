@@ -27,7 +27,7 @@ std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParam
 /// Random rates can follow whatever the library does not have, more or less.
 bool is_random_rate(const effects::Effect& effect);
 
-/// Probability of so large a gain of the log-likelihood by chance, for one place of a search.
+/// Probability of so large a gain of the log-likelihood by chance, by all parameters of the effect.
 double p_of_gain(double gain, const effects::Effect& effect);
 /// Whether that is rare enough for one of all effects of the library.
 bool passes(double p_value);
