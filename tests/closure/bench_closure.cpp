@@ -1,16 +1,19 @@
 // Hundreds of records with known truth, which the closed loop reads blind.
 //
-//   bench_closure FOLDER [--share S] [--only KIND] [--seed N]
+//   bench_closure FOLDER [--share S] [--only KIND] [--seed N] [--series N]
 //
 // FOLDER gets records.csv (a row a record), deviations.csv (estimates less truth, in standard errors), confusion.csv
 // and the tables of the page: figures.md, misses.md, confusion.md, calibration.md. A share S of 0.1 makes a tenth of
-// the records; with a seed only that record is made, and kept as record.h5. tools/closure puts the tables into the
-// page.
+// the records; with a seed only that record is made, and kept as record.h5. Another series has records of the same
+// kinds that no other has. tools/closure puts the tables into the page.
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
+#include <iterator>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -30,6 +33,7 @@ constexpr double near_the_limit[] = {1.0, 2.0};
 constexpr double evident[] = {6.0, 30.0, 150.0};
 
 constexpr double of_other_gyros = 6.0;
+constexpr double of_several[] = {5.0, 10.0, 30.0};
 
 /// Whether a gyro in that condition shows the effect at all.
 bool shows(const std::string& effect, const Condition& condition) {
@@ -43,8 +47,10 @@ int main(int argc, char** argv) {
     const std::vector<std::string> effects = effects_on_turns();
 
     std::vector<Case> cases;
+    const std::uint64_t first_seed = seeds_of_series * command.series + 1000;
+    const std::uint64_t first_draw = seeds_of_series * command.series;
     const auto add = [&](Case of) {
-        of.seed = 1000 + cases.size();
+        of.seed = first_seed + cases.size();
         of.direct = of.direct || cases.size() % 8 == 0;
         cases.push_back(std::move(of));
     };
@@ -56,7 +62,7 @@ int main(int argc, char** argv) {
     if (command.wants(Kind::single) || command.wants(Kind::pair)) {
         std::size_t turn = 0;
         const auto pick = [&](const std::string& effect, double multiple, Case& of) {
-            of.truth.push_back(draw(effect, multiple * start_size(effect), 7 * cases.size() + turn,
+            of.truth.push_back(draw(effect, multiple * start_size(effect), first_draw + 7 * cases.size() + turn,
                                     static_cast<double>(of.turns) / (2.0 * 124.68)));
         };
         const auto singles = [&](double multiple, double each) {
@@ -84,25 +90,41 @@ int main(int argc, char** argv) {
         }
         for (const double multiple : evident) singles(multiple, 4);
     }
+    const auto another = [&](Kind kind, double multiple, std::initializer_list<std::string> in) {
+        Case of{.kind = kind, .truth = {}, .multiple = multiple, .condition = &other_gyro};
+        of.seed = first_seed + cases.size();
+        const double length_s = duration_s(of);
+        for (const std::string& effect : in) {
+            of.truth.push_back(
+                draw(effect, multiple * start_size(effect), first_draw + 7 * cases.size() + of.truth.size(), length_s));
+        }
+        add(std::move(of));
+    };
     if (command.wants(Kind::other)) {
-        const auto seeded = [&] {
-            Case of{.kind = Kind::other, .truth = {}, .condition = &other_gyro};
-            of.seed = 1000 + cases.size();
-            return of;
-        };
-        for (std::size_t k = 0; k < command.scaled(60); ++k) add(seeded());
+        for (std::size_t k = 0; k < command.scaled(60); ++k) another(Kind::other, 0.0, {});
         for (std::size_t k = 0; k < command.scaled(3); ++k) {
             for (const std::string& effect : effects) {
-                if (!shows(effect, other_gyro)) continue;
-                Case of = seeded();
-                of.multiple = of_other_gyros;
-                of.truth.push_back(draw(effect, of.multiple * start_size(effect), 7 * cases.size(), duration_s(of)));
-                add(std::move(of));
+                if (shows(effect, other_gyro)) another(Kind::other, of_other_gyros, {effect});
+            }
+        }
+    }
+    if (command.wants(Kind::several)) {
+        std::vector<std::string> shown;
+        std::copy_if(effects.begin(), effects.end(), std::back_inserter(shown),
+                     [](const std::string& effect) { return shows(effect, other_gyro); });
+        std::mt19937_64 random(first_seed);
+        for (std::size_t k = 0; k < command.scaled(72); ++k) {
+            std::shuffle(shown.begin(), shown.end(), random);
+            const double multiple = of_several[k % std::size(of_several)];
+            if (k % 2 == 0) {
+                another(Kind::several, multiple, {shown[0], shown[1]});
+            } else {
+                another(Kind::several, multiple, {shown[0], shown[1], shown[2]});
             }
         }
     }
     if (command.wants(Kind::foreign)) {
-        for (Case& of : foreign_cases(command.scaled(12))) cases.push_back(std::move(of));
+        for (Case& of : foreign_cases(command.scaled(12), command.series)) cases.push_back(std::move(of));
     }
 
     std::erase_if(cases,

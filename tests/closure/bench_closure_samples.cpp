@@ -1,6 +1,6 @@
 // Hundreds of records of uniform samples with known truth, which the closed loop reads blind.
 //
-//   bench_closure_samples FOLDER [--share S] [--only KIND] [--seed N]
+//   bench_closure_samples FOLDER [--share S] [--only KIND] [--seed N] [--series N]
 //
 // FOLDER gets records.csv (a row a record), deviations.csv (estimates less truth, in standard errors), confusion.csv
 // and the tables of the page: figures.md, misses.md, confusion.md, calibration.md. A share S of 0.1 makes a tenth of
@@ -9,7 +9,10 @@
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -20,11 +23,13 @@ namespace {
 
 using namespace ringlock::test::closure;
 
+constexpr double of_several[] = {5.0, 10.0, 30.0};
+
 std::vector<SampleCase> all_cases(const Command& command) {
     const std::vector<std::string> effects = effects_on_samples();
     std::vector<SampleCase> cases;
     std::size_t turn = 0;
-    std::uint64_t seed = 20000;
+    std::uint64_t seed = seeds_of_series * command.series + 20000;
     const auto add = [&](Kind kind, double multiple, const std::vector<std::string>& in) {
         SampleCase of{.kind = kind, .truth = {}, .multiple = multiple, .condition = nullptr, .seed = seed++};
         for (std::size_t tried = 0; tried < sample_conditions.size() && of.condition == nullptr; ++tried) {
@@ -60,7 +65,15 @@ std::vector<SampleCase> all_cases(const Command& command) {
             }
         }
     }
-    for (SampleCase& of : foreign_sample_cases(command.scaled(10))) cases.push_back(std::move(of));
+    std::vector<std::string> sized;
+    std::copy_if(effects.begin(), effects.end(), std::back_inserter(sized), has_size);
+    std::mt19937_64 random(seed);
+    for (std::size_t k = 0; k < command.scaled(72); ++k) {
+        std::shuffle(sized.begin(), sized.end(), random);
+        const double multiple = of_several[k % std::size(of_several)];
+        add(Kind::several, multiple, {sized.begin(), sized.begin() + (k % 2 == 0 ? 2 : 3)});
+    }
+    for (SampleCase& of : foreign_sample_cases(command.scaled(10), command.series)) cases.push_back(std::move(of));
     std::erase_if(cases, [&](const SampleCase& of) { return !command.wants(of.kind); });
     return cases;
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>
+#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -19,23 +20,15 @@ namespace {
 
 using Binomial = boost::math::binomial_distribution<>;
 
-/// "k of n, share (95 % interval)", Clopper and Pearson.
-std::string share_of(std::size_t count, std::size_t of) {
-    if (of == 0) return "none";
-    const auto n = static_cast<double>(of);
-    const auto k = static_cast<double>(count);
-    const double lo = Binomial::find_lower_bound_on_p(n, k, 0.025);
-    const double hi = Binomial::find_upper_bound_on_p(n, k, 0.025);
-    return fmt::format("{} of {}, {:.1f} % ({:.1f} .. {:.1f})", count, of, 100.0 * k / n, 100.0 * lo, 100.0 * hi);
-}
-
 double quantile(std::vector<double> values, double at) {
     if (values.empty()) return std::nan("");
     std::sort(values.begin(), values.end());
     return values[static_cast<std::size_t>(at * static_cast<double>(values.size() - 1))];
 }
 
-bool of_library(Kind kind) { return kind == Kind::single || kind == Kind::pair || kind == Kind::other; }
+bool of_library(Kind kind) {
+    return kind == Kind::single || kind == Kind::pair || kind == Kind::other || kind == Kind::several;
+}
 
 bool settled(const Outcome& o) { return o.judged == Judged::right || o.judged == Judged::tie; }
 
@@ -46,6 +39,48 @@ std::string answer_of(const Outcome& o) {
     std::string answer = o.verdict == "unexplained" ? "unexplained, " + o.where : o.named;
     if (o.verdict == "unexplained" && !o.named.empty()) answer += ", after " + o.named;
     return answer.empty() ? "nothing_missing" : answer;
+}
+
+/// What benches of turns and of samples have in common, to be added up.
+struct Totals {
+    struct Share {
+        std::size_t count = 0, of = 0;
+        void add(bool counts) {
+            ++of;
+            if (counts) ++count;
+        }
+    };
+    Share nulls_right, foreign_right, wrong, false_names, within_two;
+};
+
+Totals totals_of(const std::vector<TableRow>& truths, const Outcomes& outcomes) {
+    Totals totals;
+    for (std::size_t k = 0; k < truths.size(); ++k) {
+        if (!outcomes[k]) continue;
+        const Outcome& o = *outcomes[k];
+        const bool right = o.judged == Judged::right;
+        if (truths[k].truth == "nothing") totals.nulls_right.add(right);
+        if (truths[k].kind == Kind::foreign) totals.foreign_right.add(right);
+        totals.wrong.add(o.judged == Judged::wrong);
+        totals.false_names.add(o.false_name);
+        for (const auto& d : o.deviations) {
+            if (std::isfinite(d.standard_errors)) totals.within_two.add(std::abs(d.standard_errors) <= 2.0);
+        }
+    }
+    return totals;
+}
+
+void write_totals(std::ostream& out, const std::vector<TableRow>& truths, const Outcomes& outcomes) {
+    const Totals totals = totals_of(truths, outcomes);
+    fmt::print(out, "figure,count,of\n");
+    const auto row = [&](const char* figure, const Totals::Share& share) {
+        fmt::print(out, "{},{},{}\n", figure, share.count, share.of);
+    };
+    row("nulls called `nothing_missing`", totals.nulls_right);
+    row("effects outside the library called `unexplained` with the right place", totals.foreign_right);
+    row("a wrong name with confidence", totals.wrong);
+    row("... or in the steps of an `unexplained` record", totals.false_names);
+    row("estimates within two standard errors", totals.within_two);
 }
 
 /// How often what came out.
@@ -105,26 +140,28 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
         row("... effects at 6 times their limit, named right", count(other(false), is(Judged::right)));
         row("... ties that hold the truth", count(other(false), is(Judged::tie)));
     }
-    const auto all = [](const TableRow&) { return true; };
-    row("a wrong name with confidence, over all records", count(all, is(Judged::wrong)));
-    row("... or in the steps of an `unexplained` one", count(all, [](const Outcome& o) { return o.false_name; }));
+    if (std::any_of(truths.begin(), truths.end(), kind(Kind::several, 0.0))) {
+        const auto several = kind(Kind::several, 0.0);
+        row("other gyros with two or three effects of 5 to 30 times their limits, all named",
+            count(several, is(Judged::right)));
+        row("... ties that hold the truth", count(several, is(Judged::tie)));
+        row("... not all of them", count(several, is(Judged::missed)));
+        row("... `unexplained`", count(several, is(Judged::unexplained)));
+    }
+    const Totals totals = totals_of(truths, outcomes);
+    row("a wrong name with confidence, over all records", share_of(totals.wrong.count, totals.wrong.of));
+    row("... upper 95 % limit, one-sided", limit_of(totals.wrong.count, totals.wrong.of));
+    row("... or in the steps of an `unexplained` one", share_of(totals.false_names.count, totals.false_names.of));
     std::vector<double> ratios;
     std::vector<double> seconds;
-    std::size_t within = 0;
-    std::size_t estimates = 0;
     for (const auto& o : outcomes) {
         if (!o) continue;
         seconds.push_back(o->seconds);
         if (std::isfinite(o->oracle)) ratios.push_back(o->after / o->oracle);
-        for (const auto& d : o->deviations) {
-            if (!std::isfinite(d.standard_errors)) continue;
-            ++estimates;
-            if (std::abs(d.standard_errors) <= 2.0) ++within;
-        }
     }
     row("held-out error after closing over the oracle's: median, 99 % of records, worst",
         fmt::format("{:.4f}, {:.4f}, {:.4f}", quantile(ratios, 0.5), quantile(ratios, 0.99), quantile(ratios, 1.0)));
-    row("estimates within two standard errors", share_of(within, estimates));
+    row("estimates within two standard errors", share_of(totals.within_two.count, totals.within_two.of));
     row(fmt::format("time of a record of {}, one of two cores busy with another: median, worst", record_length).c_str(),
         fmt::format("{:.1f} s, {:.1f} s", quantile(seconds, 0.5), quantile(seconds, 1.0)));
 }
@@ -134,7 +171,7 @@ void write_confusion(std::ostream& out, std::ostream& matrix, const std::vector<
                      const Outcomes& outcomes) {
     std::map<std::pair<std::string, double>, std::map<std::string, int>> taken;
     for (std::size_t k = 0; k < truths.size(); ++k) {
-        if (!outcomes[k] || truths[k].kind == Kind::pair) continue;
+        if (!outcomes[k] || truths[k].kind == Kind::pair || truths[k].kind == Kind::several) continue;
         const Outcome& o = *outcomes[k];
         ++taken[{truths[k].truth, truths[k].multiple}][answer_of(o)];
     }
@@ -205,6 +242,21 @@ void write_calibration(std::ostream& out, const Outcomes& outcomes) {
 
 }  // namespace
 
+std::string share_of(std::size_t count, std::size_t of) {
+    if (of == 0) return "none";
+    const auto n = static_cast<double>(of);
+    const auto k = static_cast<double>(count);
+    const double lo = Binomial::find_lower_bound_on_p(n, k, 0.025);
+    const double hi = Binomial::find_upper_bound_on_p(n, k, 0.025);
+    return fmt::format("{} of {}, {:.1f} % ({:.1f} .. {:.1f})", count, of, 100.0 * k / n, 100.0 * lo, 100.0 * hi);
+}
+
+std::string limit_of(std::size_t count, std::size_t of) {
+    if (of == 0) return "none";
+    const double limit = Binomial::find_upper_bound_on_p(static_cast<double>(of), static_cast<double>(count), 0.05);
+    return fmt::format("{:.2f} %", 100.0 * limit);
+}
+
 std::size_t Command::scaled(double count) const { return static_cast<std::size_t>(std::ceil(share * count)); }
 
 Command command_of(int argc, char** argv, const char* program) {
@@ -219,16 +271,22 @@ Command command_of(int argc, char** argv, const char* program) {
             command.only = argv[++k];
         } else if (argument == "--seed" && followed) {
             command.seed = argv[++k];
+        } else if (argument == "--series" && followed) {
+            const std::string_view text = argv[++k];
+            const auto end = std::from_chars(text.data(), text.data() + text.size(), command.series);
+            wrong = wrong || end.ec != std::errc() || end.ptr != text.data() + text.size();
         } else {
             wrong = wrong || argument.starts_with("-") || !command.folder.empty();
             command.folder = argument;
         }
     }
     const bool known = command.wants(Kind::null) || command.wants(Kind::single) || command.wants(Kind::pair) ||
-                       command.wants(Kind::foreign) || command.wants(Kind::other);
+                       command.wants(Kind::foreign) || command.wants(Kind::other) || command.wants(Kind::several);
     if (wrong || command.folder.empty() || !known || !(command.share > 0.0 && command.share <= 1.0)) {
-        fmt::print(stderr, "usage: {} FOLDER [--share S] [--only null|single|pair|foreign|other] [--seed N]\n",
-                   program);
+        fmt::print(
+            stderr,
+            "usage: {} FOLDER [--share S] [--only null|single|pair|foreign|other|several] [--seed N] [--series N]\n",
+            program);
         std::exit(2);
     }
     std::filesystem::create_directories(command.folder);
@@ -285,10 +343,12 @@ void Tables::write() const {
     std::ofstream figures(folder_ + "/figures.md");
     std::ofstream confusion(folder_ + "/confusion.md");
     std::ofstream matrix(folder_ + "/confusion.csv");
+    std::ofstream totals(folder_ + "/totals.csv");
     std::ofstream misses(folder_ + "/misses.md");
     std::ofstream calibration(folder_ + "/calibration.md");
     write_figures(figures, truths_, outcomes_, record_length_);
     write_confusion(confusion, matrix, truths_, outcomes_);
+    write_totals(totals, truths_, outcomes_);
     write_misses(misses, truths_, outcomes_);
     write_calibration(calibration, outcomes_);
 }

@@ -13,9 +13,10 @@ namespace ringlock::test::closure {
 /// What the command line of a bench says.
 struct Command {
     std::string folder;
-    double share = 1.0;  ///< of the records
-    std::string only;    ///< one kind of them, by name
-    std::string seed;    ///< the one record of that seed
+    double share = 1.0;        ///< of the records
+    std::string only;          ///< one kind of them, by name
+    std::string seed;          ///< the one record of that seed
+    std::uint64_t series = 0;  ///< each has records of its own
 
     bool wants(Kind kind) const { return only.empty() || only == name_of(kind); }
     std::size_t scaled(double count) const;
@@ -33,6 +34,11 @@ struct TableRow {
     std::string values;
     std::string expected;  ///< where, of what the library does not have
 };
+/// "k of n, share (95 % interval)", Clopper and Pearson.
+std::string share_of(std::size_t count, std::size_t of);
+/// "upper 95 % limit", one-sided, of the same kind.
+std::string limit_of(std::size_t count, std::size_t of);
+
 std::string values_of(const std::vector<Added>& truth);
 
 using Outcomes = std::vector<std::optional<Outcome>>;

@@ -248,9 +248,9 @@ void settle(SampleCase& of) {
     }
 }
 
-std::vector<SampleCase> foreign_sample_cases(std::size_t each) {
+std::vector<SampleCase> foreign_sample_cases(std::size_t each, std::uint64_t series) {
     std::vector<SampleCase> cases;
-    std::mt19937_64 random(78);
+    std::mt19937_64 random(78 + series);
     const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
     // From what shows itself well to what is evident: sizes are even in their logarithms.
     const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
@@ -259,7 +259,7 @@ std::vector<SampleCase> foreign_sample_cases(std::size_t each) {
             SampleCase of;
             of.kind = Kind::foreign;
             of.condition = &sample_conditions[condition];
-            of.seed = 60000 + cases.size();
+            of.seed = seeds_of_series * series + 60000 + cases.size();
             of.where = where;
             of.truth = {std::move(added)};
             cases.push_back(std::move(of));

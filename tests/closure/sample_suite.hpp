@@ -55,7 +55,7 @@ void settle(SampleCase& of);
 bool has_size(const std::string& effect);
 
 /// Cases of effects that the library does not have.
-std::vector<SampleCase> foreign_sample_cases(std::size_t each);
+std::vector<SampleCase> foreign_sample_cases(std::size_t each, std::uint64_t series = 0);
 
 Outcome judge(const SampleCase& of, const record::Record& record);
 

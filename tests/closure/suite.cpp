@@ -35,7 +35,7 @@ const std::vector<Condition> conditions = {
 const Condition other_gyro = {"another gyro", 0.0, false, true};
 
 const char* name_of(Kind kind) {
-    constexpr const char* names[] = {"null", "single", "pair", "foreign", "other"};
+    constexpr const char* names[] = {"null", "single", "pair", "foreign", "other", "several"};
     return names[static_cast<std::size_t>(kind)];
 }
 
@@ -327,9 +327,9 @@ bool settle(Case& of) {
     return within;
 }
 
-std::vector<Case> foreign_cases(std::size_t each) {
+std::vector<Case> foreign_cases(std::size_t each, std::uint64_t series) {
     std::vector<Case> cases;
-    std::mt19937_64 random(77);
+    std::mt19937_64 random(77 + series);
     const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
     for (std::size_t k = 0; k < each; ++k) {
         const auto add = [&](std::size_t condition, Where where, Added added) {
@@ -337,7 +337,7 @@ std::vector<Case> foreign_cases(std::size_t each) {
             of.kind = Kind::foreign;
             of.condition = &conditions[condition];
             of.direct = true;
-            of.seed = 50000 + cases.size();
+            of.seed = seeds_of_series * series + 50000 + cases.size();
             of.where = where;
             of.truth = {std::move(added)};
             cases.push_back(std::move(of));

@@ -30,7 +30,10 @@ struct Condition {
 extern const std::vector<Condition> conditions;
 extern const Condition other_gyro;
 
-enum class Kind { null, single, pair, foreign, other };
+/// Seeds of one series of records are apart from those of another by this.
+constexpr std::uint64_t seeds_of_series = 1'000'000;
+
+enum class Kind { null, single, pair, foreign, other, several };
 const char* name_of(Kind kind);
 
 struct Case {
@@ -69,8 +72,8 @@ double start_size(const std::string& effect);
 /// are only a start. False where the record would not show one of them within the effect's bounds.
 bool settle(Case& of);
 
-/// Cases of effects that the library does not have.
-std::vector<Case> foreign_cases(std::size_t each);
+/// Cases of effects that the library does not have; others for every series.
+std::vector<Case> foreign_cases(std::size_t each, std::uint64_t series = 0);
 
 enum class Judged {
     right,        ///< nothing missing in a null; all effects named, no other; unexplained with the right place
