@@ -139,17 +139,16 @@ std::optional<double> something_else(const TurnFit& fit, const Choice& choice) {
     return most;
 }
 
-/// Two effects of the coupling may look like something else where either is looked at alone: whether one beside the
-/// chosen one makes up for what a view explains. Rates by twos could follow nearly anything.
+/// Two effects, one of the coupling, may look like something else where either is looked at alone: whether one beside
+/// the chosen one makes up for what a view explains. Rates by twos could follow nearly anything.
 bool two_explain(const record::Record& record, const Rows& rows, const Choice& choice, double merit_of_view) {
     constexpr std::size_t looked_at = 3;
     const auto of_coupling = [](const Contender& contender) {
         return !contender.candidate.effect->adds_angle() && !is_random_rate(*contender.candidate.effect);
     };
-    if (!of_coupling(*choice.chosen)) return false;
     const Contest beside = hold_contest(record, *choice.chosen->fitted, rows, looked_at, Among::not_random);
     if (beside.side || beside.contenders.empty() || !passes(beside.contenders.front().p_value)) return false;
-    if (!of_coupling(beside.contenders.front())) return false;
+    if (!of_coupling(*choice.chosen) && !of_coupling(beside.contenders.front())) return false;
     const double second_choice = std::log(static_cast<double>(effects::registry().size()));
     return choice.chosen->merit + beside.contenders.front().merit - second_choice > merit_of_view;
 }
@@ -311,7 +310,7 @@ Closure close_turns(const record::Record& record) {
         std::string effect;
     };
     std::optional<Earlier> earlier;
-    std::string partner;  // of the effect that was added last
+    std::vector<std::string> partners;  // of the effects that were added last, still to come
 
     // What stood in for another is dropped again, and what is the dither's own is no step: more rounds than steps.
     for (std::size_t round = 0; round < 3 * most_steps && closure.steps.size() < most_steps; ++round) {
@@ -340,16 +339,22 @@ Closure close_turns(const record::Record& record) {
         step.effect = std::string(best.candidate.effect->name());
         step.p_value = choice.p_value;
         step.confounded_with = choice.confounded_with;
-        if (step.effect == partner) {
-            // What explains as much as both did without this one.
+        const auto expected = std::find(partners.begin(), partners.end(), step.effect);
+        if (expected != partners.end()) {
+            partners.erase(expected);
+            // What explains as much as all of them did without this one.
             for (const std::string& name : closure.steps.back().confounded_with) {
                 auto& named = step.confounded_with;
                 if (name != step.effect && std::find(named.begin(), named.end(), name) == named.end()) {
                     named.push_back(name);
                 }
             }
+        } else {
+            partners.clear();
         }
-        partner = choice.partner;
+        for (const std::string& name : choice.partners) {
+            if (std::find(partners.begin(), partners.end(), name) == partners.end()) partners.push_back(name);
+        }
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
         if (!earlier && choice.on_random) earlier = {now, closure.steps, step.effect};
         const Score before = heldout(*now->fit);

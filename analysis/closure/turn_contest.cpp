@@ -308,31 +308,55 @@ Contest hold_contest(const record::Record& record, const Fitted& now, const Rows
 
 namespace {
 
-/// What may explain a record: an effect, or one with another that is added next.
+/// What may explain a record: an effect, or one with others that are added next.
 struct Account {
-    const Contender* first;
-    const effects::Effect* second = nullptr;
+    const Contender* first = nullptr;
+    std::vector<Candidate> others = {};
+    std::shared_ptr<Fitted> fitted = {};
     double merit = 0.0;
-    double p_value = 1.0;  ///< of the first, beside the second
+    double p_value = 1.0;  ///< of the first, beside the others
 
-    bool has(const effects::Effect* effect) const { return first->candidate.effect == effect || second == effect; }
+    bool has(const effects::Effect* effect) const {
+        return first->candidate.effect == effect ||
+               std::any_of(others.begin(), others.end(), [&](const Candidate& c) { return c.effect == effect; });
+    }
+    bool has_all_of(const Account& other) const {
+        return has(other.first->candidate.effect) &&
+               std::all_of(other.others.begin(), other.others.end(), [&](const Candidate& c) { return has(c.effect); });
+    }
+    long random_rates() const {
+        return std::count_if(others.begin(), others.end(),
+                             [](const Candidate& c) { return is_random_rate(*c.effect); }) +
+               (is_random_rate(*first->candidate.effect) ? 1 : 0);
+    }
 };
+
+/// What the choice of one effect more among all costs.
+double cost_of_choice() { return std::log(static_cast<double>(effects::registry().size())); }
+
+/// The model with some effects, or none where no motion of a gyro with such parameters can be followed.
+std::shared_ptr<Fitted> fit_or_none(const record::Record& record, const TurnParameters& start, const Rows& rows) {
+    try {
+        return fit_record(record, start, rows);
+    } catch (const RunError&) {
+        return nullptr;
+    }
+}
 
 /// The likeliest of either kind with what explains most beside it, and random rates by twos; each needed beside the
 /// other.
 std::vector<Account> pairs(const record::Record& record, const std::vector<Contender>& contenders, const Rows& rows) {
     constexpr std::size_t tried_first = 3;
     constexpr std::size_t tried_second = 2;
-    const double second_choice = std::log(static_cast<double>(effects::registry().size()));
     std::vector<Account> accounts;
-    const auto add = [&](const Contender& first, const Fitted& both, const Candidate& second) {
+    const auto add = [&](const Contender& first, const std::shared_ptr<Fitted>& both, const Candidate& second) {
         const auto alone = std::find_if(contenders.begin(), contenders.end(),
                                         [&](const Contender& c) { return c.candidate.effect == second.effect; });
         double p_value = first.p_value;
-        if (alone != contenders.end()) p_value = p_of(both, *alone->fitted, first.candidate);
-        if (!passes(p_value) || !passes(p_of(both, *first.fitted, second))) return;
-        const double merit = merit_of(gain_of(both, *first.fitted), both, *second.effect);
-        accounts.push_back({&first, second.effect, first.merit + merit - second_choice, p_value});
+        if (alone != contenders.end()) p_value = p_of(*both, *alone->fitted, first.candidate);
+        if (!passes(p_value) || !passes(p_of(*both, *first.fitted, second))) return;
+        const double merit = merit_of(gain_of(*both, *first.fitted), *both, *second.effect);
+        accounts.push_back({&first, {second}, both, first.merit + merit - cost_of_choice(), p_value});
     };
     std::vector<const Contender*> firsts;
     std::vector<const Contender*> random;
@@ -362,19 +386,59 @@ std::vector<Account> pairs(const record::Record& record, const std::vector<Conte
         Pair& pair = of_random[k - firsts.size()];
         TurnParameters start = pair.first->fitted->fit->parameters();
         start.effects.push_back(*pair.second->fitted->fit->parameters().find(pair.second->candidate.effect->name()));
-        try {
-            pair.both = fit_record(record, start, rows);
-        } catch (const RunError&) {
-            // no motion of a gyro with such parameters can be followed
-        }
+        pair.both = fit_or_none(record, start, rows);
     });
     for (std::size_t k = 0; k < firsts.size(); ++k) {
         for (const Contender& other : beside[k].contenders) {
-            if (!beside[k].side) add(*firsts[k], *other.fitted, other.candidate);
+            if (!beside[k].side) add(*firsts[k], other.fitted, other.candidate);
         }
     }
     for (const Pair& pair : of_random) {
-        if (pair.both) add(*pair.first, *pair.both, pair.second->candidate);
+        if (pair.both) add(*pair.first, pair.both, pair.second->candidate);
+    }
+    return accounts;
+}
+
+/// The likeliest pairs that random rates have not followed alone, with a third: so random a rate can also follow three
+/// others at once, and beside another random one hide what jumps. Those that do as well as the best account, each
+/// effect needed beside the others. `pairs` are sorted.
+std::vector<Account> triples(const record::Record& record, const std::vector<Account>& pairs, double best,
+                             const Rows& rows) {
+    constexpr std::size_t tried_third = 2;
+    std::vector<const Account*> extended;
+    for (const long random : {0L, 1L}) {
+        const auto likeliest = std::find_if(pairs.begin(), pairs.end(), [&](const Account& pair) {
+            return pair.others.size() == 1 && pair.random_rates() == random;
+        });
+        if (likeliest != pairs.end()) extended.push_back(&*likeliest);
+    }
+    std::vector<std::vector<Account>> found(extended.size());
+    oneapi::tbb::parallel_for(std::size_t{0}, extended.size(), [&](std::size_t k) {
+        const Account& pair = *extended[k];
+        const Contest contest = hold_contest(record, *pair.fitted, rows, tried_third, Among::all, best - pair.merit);
+        if (contest.side) return;
+        for (const Contender& third : contest.contenders) {
+            const double merit = pair.merit + third.merit - cost_of_choice();
+            if (!(merit > best - tie) || !passes(third.p_value)) continue;
+            const auto p_beside = [&](const Candidate& candidate) {
+                TurnParameters without = third.fitted->fit->parameters();
+                std::erase_if(without.effects,
+                              [&](const ActiveEffect& active) { return active.effect == candidate.effect; });
+                const auto fitted = fit_or_none(record, without, rows);
+                return fitted ? p_of(*third.fitted, *fitted, candidate) : 1.0;
+            };
+            const double p_value = p_beside(pair.first->candidate);
+            if (!passes(p_value) || !passes(p_beside(pair.others.front()))) continue;
+            found[k].push_back({pair.first, {pair.others.front(), third.candidate}, third.fitted, merit, p_value});
+        }
+    });
+    std::vector<Account> accounts;
+    for (std::vector<Account>& some : found) {
+        for (Account& account : some) {
+            const bool known = std::any_of(accounts.begin(), accounts.end(),
+                                           [&](const Account& other) { return other.has_all_of(account); });
+            if (!known) accounts.push_back(std::move(account));
+        }
     }
     return accounts;
 }
@@ -387,46 +451,58 @@ Choice choose(const record::Record& record, const Contest& contest, const Rows& 
     if (contenders.empty() || !passes(contenders.front().p_value)) return choice;
     std::vector<Account> accounts;
     for (const Contender& contender : contenders) {
-        accounts.push_back({&contender, nullptr, contender.merit, contender.p_value});
+        accounts.push_back({&contender, {}, contender.fitted, contender.merit, contender.p_value});
     }
+    const auto sort = [&] {
+        std::stable_sort(accounts.begin(), accounts.end(),
+                         [](const Account& a, const Account& b) { return a.merit > b.merit; });
+    };
     if (!contest.side && is_random_rate(*contenders.front().candidate.effect)) {
-        for (const Account& pair : pairs(record, contenders, rows)) accounts.push_back(pair);
+        for (Account& pair : pairs(record, contenders, rows)) accounts.push_back(std::move(pair));
+        sort();
+        for (Account& triple : triples(record, accounts, accounts.front().merit, rows)) {
+            accounts.push_back(std::move(triple));
+        }
     }
-    std::stable_sort(accounts.begin(), accounts.end(),
-                     [](const Account& a, const Account& b) { return a.merit > b.merit; });
-    const Account& best = accounts.front();
-    std::erase_if(accounts, [&, least = best.merit - tie](const Account& a) { return !(a.merit > least); });
+    sort();
+    const Account best = accounts.front();
+    std::erase_if(accounts, [&](const Account& a) { return !(a.merit > best.merit - tie); });
 
-    // Of a pair, what more of those as likely have in them.
-    choice.chosen = accounts.front().first;
-    choice.p_value = accounts.front().p_value;
-    const effects::Effect* partner = accounts.front().second;
+    // Of several, what more of those as likely have in them.
+    choice.chosen = best.first;
+    choice.p_value = best.p_value;
     const auto in_how_many = [&](const effects::Effect* effect) {
         return std::count_if(accounts.begin(), accounts.end(), [&](const Account& a) { return a.has(effect); });
     };
-    if (partner != nullptr && in_how_many(partner) > in_how_many(choice.chosen->candidate.effect)) {
+    for (const Candidate& candidate : best.others) {
+        if (in_how_many(candidate.effect) <= in_how_many(choice.chosen->candidate.effect)) continue;
         const auto other = std::find_if(contenders.begin(), contenders.end(), [&](const Contender& c) {
-            return c.candidate.effect == partner && passes(c.p_value);
+            return c.candidate.effect == candidate.effect && passes(c.p_value);
         });
-        if (other != contenders.end()) {
-            partner = std::exchange(choice.chosen, &*other)->candidate.effect;
-            choice.p_value = other->p_value;
-        }
+        if (other == contenders.end()) continue;
+        choice.chosen = &*other;
+        choice.p_value = other->p_value;
     }
     const effects::Effect* chosen = choice.chosen->candidate.effect;
-    choice.held.push_back({chosen, accounts.front().merit});
-    if (partner != nullptr) choice.partner = partner->name();
-    choice.on_random = is_random_rate(*chosen) || (partner != nullptr && is_random_rate(*partner));
+    choice.held.push_back({chosen, best.merit});
+    choice.on_random = best.random_rates() > 0;
+    const auto partner = [&](const effects::Effect* effect) {
+        if (effect != chosen) choice.partners.emplace_back(effect->name());
+    };
+    partner(best.first->candidate.effect);
+    for (const Candidate& candidate : best.others) partner(candidate.effect);
     for (const Account& account : accounts) {
         if (account.has(chosen)) continue;
-        for (const effects::Effect* effect : {account.first->candidate.effect, account.second}) {
-            if (effect == nullptr || effect == partner) continue;
+        const auto tied = [&](const effects::Effect* effect) {
+            if (best.has(effect)) return;
             const auto known = std::find_if(choice.held.begin(), choice.held.end(),
                                             [&](const Held& held) { return held.effect == effect; });
-            if (known != choice.held.end()) continue;
+            if (known != choice.held.end()) return;
             choice.held.push_back({effect, account.merit});
             choice.confounded_with.emplace_back(effect->name());
-        }
+        };
+        tied(account.first->candidate.effect);
+        for (const Candidate& candidate : account.others) tied(candidate.effect);
     }
     return choice;
 }

@@ -50,7 +50,7 @@ enum class Among { all, not_random };
 Contest hold_contest(const record::Record& record, const Fitted& now, const Rows& rows, std::size_t most,
                      Among among = Among::all, double matters = 0.0);
 
-/// An effect with the merit of what it is part of: itself or a pair.
+/// An effect with the merit of what it is part of: itself or several.
 struct Held {
     const effects::Effect* effect = nullptr;
     double merit = 0.0;
@@ -63,11 +63,11 @@ struct Choice {
     std::vector<Held> held;  ///< it and all that explain about as much
     bool on_random = false;  ///< it is a random rate, or was chosen with one beside it
     std::vector<std::string> confounded_with;
-    std::string partner = {};  ///< what explains the rest, where two were chosen together; as confounded as the first
+    std::vector<std::string> partners = {};  ///< what explains the rest, where several were chosen together
 };
 
-/// The likeliest where it passes, with all that are as likely tied to it. A random rate can follow two others at once:
-/// where one is the likeliest, pairs are tried before anything is taken.
+/// The likeliest where it passes, with all that are as likely tied to it. A random rate can follow two or three others
+/// at once: where one is the likeliest, sets are tried before anything is taken.
 Choice choose(const record::Record& record, const Contest& contest, const Rows& rows);
 
 }  // namespace ringlock::closure

@@ -287,45 +287,73 @@ TurnKicks::Kick TurnKicks::at(int direction, Complex turned, bool late, const We
     return kick;
 }
 
-KicksOverRates::KicksOverRates(const gyro::Setup& setup, double lowest_deg_h, double highest_deg_h)
-    : middle_deg_h_(0.5 * (lowest_deg_h + highest_deg_h)), reach_deg_h_(0.5 * (highest_deg_h - lowest_deg_h)) {
+namespace {
+
+/// Where exact values are taken on [-1, 1] (Chebyshev), and what of each goes to each power.
+struct Nodes {
+    explicit Nodes(int count) : at(static_cast<std::size_t>(count)) {
+        Eigen::MatrixXd powers(count, count);
+        for (Eigen::Index j = 0; j < count; ++j) {
+            const double x =
+                count == 1 ? 0.0 : -std::cos(units::pi * static_cast<double>(j) / static_cast<double>(count - 1));
+            at[static_cast<std::size_t>(j)] = x;
+            for (Eigen::Index k = 0; k < count; ++k) powers(j, k) = std::pow(x, static_cast<double>(k));
+        }
+        weights = powers.inverse();
+    }
+    double weight(std::size_t power, std::size_t node) const {
+        return weights(static_cast<Eigen::Index>(power), static_cast<Eigen::Index>(node));
+    }
+    std::vector<double> at;
+    Eigen::MatrixXd weights;
+};
+
+}  // namespace
+
+KicksOverRange::KicksOverRange(const gyro::Setup& setup, Range rate_deg_h, Range threshold)
+    : rate_deg_h_(rate_deg_h), threshold_(threshold) {
     const gyro::Device device(setup);
     // How far zero-rate points move, in the time within which the phase turns.
-    const double moves = device.phase_per_arcsec * reach_deg_h_ /
+    const double moves = device.phase_per_arcsec * rate_deg_h_.reach /
                          std::sqrt(device.half_cycle(1, device.dither_amplitude_rad).end_acceleration_rad_s2());
-    const Eigen::Index nodes = reach_deg_h_ == 0.0 ? 1 : moves < 0.03 ? 3 : moves < 0.3 ? 5 : moves < 1.0 ? 9 : 17;
-    Eigen::MatrixXd powers(nodes, nodes);
-    std::vector<TurnKicks> exact;
-    for (Eigen::Index j = 0; j < nodes; ++j) {
-        const double x =
-            nodes == 1 ? 0.0 : -std::cos(units::pi * static_cast<double>(j) / static_cast<double>(nodes - 1));
-        for (Eigen::Index k = 0; k < nodes; ++k) powers(j, k) = std::pow(x, static_cast<double>(k));
-        gyro::Setup at = setup;
-        at.input_rate_deg_h = middle_deg_h_ + x * reach_deg_h_;
-        exact.emplace_back(at);
-    }
-    const Eigen::MatrixXd weights = powers.inverse();
-    for (Eigen::Index k = 0; k < nodes; ++k) {
-        TurnKicks& sum = by_power_.emplace_back();
-        for (Eigen::Index j = 0; j < nodes; ++j) sum.add(weights(k, j), exact[static_cast<std::size_t>(j)]);
+    const Nodes rates(rate_deg_h_.reach == 0.0 ? 1 : moves < 0.03 ? 3 : moves < 0.3 ? 5 : moves < 1.0 ? 9 : 17);
+    const double changes = threshold_.reach / threshold_.middle;
+    const Nodes thresholds(changes == 0.0 ? 1 : changes < 0.003 ? 2 : changes < 0.05 ? 3 : 5);
+    by_power_.assign(thresholds.at.size(), std::vector<TurnKicks>(rates.at.size()));
+    for (std::size_t t = 0; t < thresholds.at.size(); ++t) {
+        for (std::size_t r = 0; r < rates.at.size(); ++r) {
+            gyro::Setup at = setup;
+            at.input_rate_deg_h = rate_deg_h_.middle + rates.at[r] * rate_deg_h_.reach;
+            at.lockin_threshold_deg_h *= threshold_.middle + thresholds.at[t] * threshold_.reach;
+            const TurnKicks exact(at);
+            for (std::size_t p = 0; p < by_power_.size(); ++p) {
+                for (std::size_t q = 0; q < by_power_[p].size(); ++q) {
+                    by_power_[p][q].add(thresholds.weight(p, t) * rates.weight(q, r), exact);
+                }
+            }
+        }
     }
 }
 
-TurnKicks::Kick KicksOverRates::at(int direction, Complex turned, double rate_deg_h,
+TurnKicks::Kick KicksOverRange::at(int direction, Complex turned, double rate_deg_h, double threshold,
                                    const TurnKicks::Weights* weights) const {
-    const double x = reach_deg_h_ == 0.0 ? 0.0 : (rate_deg_h - middle_deg_h_) / reach_deg_h_;
+    const double x = rate_deg_h_.of(rate_deg_h);
+    const double y = threshold_.of(threshold);
     bool late = false;
-    if (by_power_.front().kinked_) {
-        double rate_rad_s = by_power_.front().turn_rate_rad_s(direction, turned);
-        if (by_power_.size() > 1) rate_rad_s += x * by_power_[1].turn_rate_rad_s(direction, turned);
+    if (by_power_.front().front().kinked_) {
+        // Linear in both, but for their product that is none.
+        double rate_rad_s = by_power_[0][0].turn_rate_rad_s(direction, turned);
+        if (by_power_[0].size() > 1) rate_rad_s += x * by_power_[0][1].turn_rate_rad_s(direction, turned);
+        if (by_power_.size() > 1) rate_rad_s += y * by_power_[1][0].turn_rate_rad_s(direction, turned);
         late = direction * rate_rad_s < 0.0;
     }
-    TurnKicks::Kick sum = by_power_.back().at(direction, turned, late, weights);
-    for (std::size_t k = by_power_.size() - 1; k-- > 0;) {
-        const TurnKicks::Kick next = by_power_[k].at(direction, turned, late, weights);
-        sum = {next.before_rad + x * sum.before_rad, next.after_rad + x * sum.after_rad,
-               next.before_slope + x * sum.before_slope, next.after_slope + x * sum.after_slope,
-               next.before_weighted + x * sum.before_weighted};
+    TurnKicks::Kick sum{};
+    for (std::size_t p = by_power_.size(); p-- > 0;) {
+        TurnKicks::Kick over_rates{};
+        for (std::size_t q = by_power_[p].size(); q-- > 0;) {
+            over_rates = by_power_[p][q].at(direction, turned, late, weights).plus(x, over_rates);
+        }
+        sum = over_rates.plus(y, sum);
     }
     return sum;
 }

@@ -26,6 +26,12 @@ class TurnKicks {
         double before_rad, after_rad;
         double before_slope, after_slope;  ///< derivatives to the phase
         double before_weighted;            ///< before, each harmonic by a weight in place of itself; else 0
+
+        Kick plus(double times, const Kick& other) const {
+            return {before_rad + times * other.before_rad, after_rad + times * other.after_rad,
+                    before_slope + times * other.before_slope, after_slope + times * other.after_slope,
+                    before_weighted + times * other.before_weighted};
+        }
     };
     static constexpr std::size_t harmonics = 12;
     /// One for each exp(i k phase), k = 1, 2, ..
@@ -39,7 +45,7 @@ class TurnKicks {
     double phase_after(int direction, double plain_rad) const;
 
    private:
-    friend class KicksOverRates;
+    friend class KicksOverRange;
     using Series = std::array<std::complex<double>, harmonics + 1>;  ///< value = Re sum_k c_k exp(i k psi)
     using Sides = std::array<Series, 2>;                             ///< before, after
 
@@ -55,17 +61,29 @@ class TurnKicks {
     std::size_t terms_ = 0;                                           ///< harmonics that matter
 };
 
-/// Kicks of a gyro whose input rate changes: between these rates by polynomials through a few that are exact.
-class KicksOverRates {
+/// Kicks of a gyro whose input rate and threshold change: between a few rates and thresholds that are exact, by
+/// polynomials through them.
+class KicksOverRange {
    public:
-    KicksOverRates(const gyro::Setup& setup, double lowest_deg_h, double highest_deg_h);
-    /// At this rate, in place of the setup's.
-    TurnKicks::Kick at(int direction, std::complex<double> turned, double rate_deg_h,
+    struct Range {
+        double lowest, highest;
+    };
+    /// `threshold`: by what factor it differs from the setup's.
+    KicksOverRange(const gyro::Setup& setup, Range rate_deg_h, Range threshold = {1.0, 1.0});
+    /// At this rate, in place of the setup's, and the setup's threshold times this.
+    TurnKicks::Kick at(int direction, std::complex<double> turned, double rate_deg_h, double threshold = 1.0,
                        const TurnKicks::Weights* weights = nullptr) const;
 
    private:
-    double middle_deg_h_, reach_deg_h_;
-    std::vector<TurnKicks> by_power_;  ///< of the rate, scaled to [-1, 1]
+    /// Onto [-1, 1].
+    struct Scale {
+        explicit Scale(Range range)
+            : middle(0.5 * (range.lowest + range.highest)), reach(0.5 * (range.highest - range.lowest)) {}
+        double of(double value) const { return reach == 0.0 ? 0.0 : (value - middle) / reach; }
+        double middle, reach;
+    };
+    Scale rate_deg_h_, threshold_;
+    std::vector<std::vector<TurnKicks>> by_power_;  ///< [of the threshold][of the rate], both scaled
 };
 
 }  // namespace ringlock::closure

@@ -119,7 +119,8 @@ std::shared_ptr<const TurnModel::Kicks> TurnModel::kicks(gyro::Setup setup, cons
                                         [&](const Met& met) { return met.setup == setup && met.shape == shape; });
         if (found != met_.end()) return found->kicks;
     }
-    const auto shared = std::make_shared<const Kicks>(kicks_at(setup, series_.input_rate_deg_h, shape));
+    const auto shared = std::make_shared<const Kicks>(
+        kicks_at(setup, series_.input_rate_deg_h, std::vector<double>(series_.size(), 1.0), shape));
     const std::lock_guard lock(meeting_);
     met_.push_front({setup, shape, shared});
     if (met_.size() > kept) met_.pop_back();
@@ -127,12 +128,14 @@ std::shared_ptr<const TurnModel::Kicks> TurnModel::kicks(gyro::Setup setup, cons
 }
 
 TurnModel::Kicks TurnModel::kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h,
-                                     const Shape& shape) const {
-    const auto [lowest, highest] = std::minmax_element(rate_deg_h.begin(), rate_deg_h.end());
-    const KicksOverRates of(setup, setup.input_rate_deg_h + *lowest, setup.input_rate_deg_h + *highest);
+                                     const std::vector<double>& threshold_factors, const Shape& shape) const {
+    const auto [slowest, fastest] = std::minmax_element(rate_deg_h.begin(), rate_deg_h.end());
+    const auto [least, most] = std::minmax_element(threshold_factors.begin(), threshold_factors.end());
+    const KicksOverRange of(setup, {setup.input_rate_deg_h + *slowest, setup.input_rate_deg_h + *fastest},
+                            {*least, *most});
     Kicks kicks(series_.size());
     for (std::size_t i = 0; i < kicks.size(); ++i) {
-        kicks[i] = of.at(series_.direction[i], turned_[i], setup.input_rate_deg_h + rate_deg_h[i],
+        kicks[i] = of.at(series_.direction[i], turned_[i], setup.input_rate_deg_h + rate_deg_h[i], threshold_factors[i],
                          shape ? &shape->at(i) : nullptr);
     }
     return kicks;
@@ -223,14 +226,18 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     frame.readout = series_.readout;
     prediction.phase_rad.resize(n);
     const double c = device.phase_per_arcsec;
-    std::shared_ptr<const Kicks> kick_of = kicks(device_setup, parameters.shape);
-    std::vector<double> swing = dither_swings(*kick_of, series_.input_rate_deg_h);
     std::vector<double> factors(n, 1.0);
     for (std::size_t i = 0; i < n; ++i) {
         for (const ActiveEffect& active : parameters.effects) {
             factors[i] *= active.effect->threshold_factor(active.values, temperature_change_k(i));
         }
     }
+    const bool one_threshold = std::all_of(factors.begin(), factors.end(), [](double factor) { return factor == 1.0; });
+    std::shared_ptr<const Kicks> kick_of =
+        one_threshold ? kicks(device_setup, parameters.shape)
+                      : std::make_shared<const Kicks>(
+                            kicks_at(device_setup, series_.input_rate_deg_h, factors, parameters.shape));
+    std::vector<double> swing = dither_swings(*kick_of, series_.input_rate_deg_h);
     std::vector<double> rate_deg_h(n);
     for (std::size_t i = 0; i < n; ++i) rate_deg_h[i] = parameters.bias_deg_h + series_.input_rate_deg_h[i];
     prediction.turn_s = dither_turns(rate_deg_h, factors, swing, device);
@@ -248,7 +255,8 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         constexpr double felt = 1e-3;
         const double acceleration_rad_s2 = device.half_cycle(1, series_.amplitude_rad).end_acceleration_rad_s2();
         if (c * most_deg_h > felt * std::sqrt(acceleration_rad_s2)) {
-            kick_of = std::make_shared<const Kicks>(kicks_at(device_setup, beside_bias_deg_h, parameters.shape));
+            kick_of =
+                std::make_shared<const Kicks>(kicks_at(device_setup, beside_bias_deg_h, factors, parameters.shape));
             swing = dither_swings(*kick_of, beside_bias_deg_h);
         }
         prediction.turn_s = dither_turns(rate_deg_h, factors, swing, device);
@@ -265,8 +273,8 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     for (std::size_t i = 0; i < n; ++i) {
         // Kicks go with the root of one over the acceleration, which goes with the swing of that half cycle.
         const TurnKicks::Kick& kick = (*kick_of)[i];
-        const double before = factors[i] / std::sqrt(swing[i > 0 ? i - 1 : i]);
-        const double after = factors[i] / std::sqrt(swing[i]);
+        const double before = 1.0 / std::sqrt(swing[i > 0 ? i - 1 : i]);
+        const double after = 1.0 / std::sqrt(swing[i]);
         const std::size_t last = i > 0 ? i - 1 : 0;
         const effects::Interval& interval = prediction.intervals[i];
         angle_arcsec += interval.duration_s * parameters.bias_deg_h + (input_arcsec[i] - input_arcsec[last]);

@@ -80,8 +80,9 @@ class TurnModel {
     using Shape = std::shared_ptr<const NoiseShape>;
     /// Kicks at the turns of a gyro of that setup, whose rate is that and the input's.
     std::shared_ptr<const Kicks> kicks(gyro::Setup setup, const Shape& shape) const;
-    /// The same with such a rate at each turn.
-    Kicks kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h, const Shape& shape) const;
+    /// The same with such a rate at each turn, and the threshold by such factors.
+    Kicks kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h,
+                   const std::vector<double>& threshold_factors, const Shape& shape) const;
 
     double temperature_change_k(std::size_t turn) const;
     /// When the dither turned, from when the phase did, at these rates: the phase stands still where the dither's own

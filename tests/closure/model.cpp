@@ -146,7 +146,7 @@ TEST(TurnKicks, AreInterpolatedBetweenRates) {
             // Its kink wanders with the rate.
             if (with == "an asymmetric dither" && reach_deg_h > 5000.0) continue;
             gyro::Setup setup = kicked(with);
-            const KicksOverRates kicks(setup, 40.0 - reach_deg_h, 40.0 + reach_deg_h);
+            const KicksOverRange kicks(setup, {40.0 - reach_deg_h, 40.0 + reach_deg_h});
             double worst_rad = 0.0;
             for (const double share : {-0.95, -0.5, 0.1, 0.35, 0.8}) {
                 setup.input_rate_deg_h = 40.0 + share * reach_deg_h;
@@ -163,6 +163,37 @@ TEST(TurnKicks, AreInterpolatedBetweenRates) {
             std::printf("rates within %g deg/h, with %s: largest error of half a kick %.2g rad\n", reach_deg_h,
                         with.c_str(), worst_rad);
             EXPECT_LT(worst_rad, 1e-8) << reach_deg_h;
+        }
+    }
+}
+
+TEST(TurnKicks, AreInterpolatedBetweenThresholds) {
+    for (const std::string& with : kinds) {
+        for (const double reach : {0.0, 1e-3, 0.01, 0.04, 0.2}) {
+            const gyro::Setup nominal = kicked(with);
+            const KicksOverRange kicks(nominal, {0.0, 80.0}, {1.05 - reach, 1.05 + reach});
+            double worst = 0.0;
+            double largest_rad = 0.0;
+            for (const double share : {-0.95, -0.5, 0.1, 0.8}) {
+                const double factor = 1.05 + share * reach;
+                gyro::Setup setup = nominal;
+                setup.lockin_threshold_deg_h *= factor;
+                setup.input_rate_deg_h = 25.0;
+                const TurnKicks exact(setup);
+                for (const int direction : {1, -1}) {
+                    for (double psi = 0.0; psi < units::two_pi; psi += 0.1) {
+                        const TurnKicks::Kick one = exact.at(direction, psi);
+                        const TurnKicks::Kick other =
+                            kicks.at(direction, std::polar(1.0, psi), setup.input_rate_deg_h, factor);
+                        largest_rad = std::max(largest_rad, std::abs(one.before_rad));
+                        worst = std::max({worst, std::abs(one.before_rad - other.before_rad),
+                                          std::abs(one.after_rad - other.after_rad)});
+                    }
+                }
+            }
+            std::printf("thresholds within %g, with %s: largest error of half a kick %.2g of %.2g rad\n", reach,
+                        with.c_str(), worst, largest_rad);
+            EXPECT_LT(worst, 1e-6 * largest_rad) << reach;
         }
     }
 }
