@@ -106,6 +106,38 @@ TEST(LongClosureSuite, ASecondHarmonicIsFollowedToItsSummit) {
     EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named;
 }
 
+TEST(LongClosureSuite, ThreeSlowEffectsAreNoRandomWalk) {
+    // A random walk follows them better than any two of them do.
+    Case of{.kind = Kind::several, .truth = {}, .multiple = 10.0, .condition = &other_gyro, .seed = 1055};
+    of.truth = {{"bias_step", {{"step_deg_h", -0.14406}, {"time_s", 6.7773}}},
+                {"bias_temperature", {{"deg_h_per_k", -0.05246}}},
+                {"bias_ramp", {{"deg_h_per_h", -67.082}}}};
+    const Outcome outcome = judged({of}).front();
+    EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named;
+}
+
+TEST(LongClosureSuite, AStepHidesBesideTwoRandomRates) {
+    // With both of them in the model nothing of it is left but a jump.
+    Case of{.kind = Kind::several, .truth = {}, .multiple = 10.0, .condition = &other_gyro, .seed = 1037};
+    of.truth = {{"bias_instability", {{"deg_h", 0.0052609}}},
+                {"rate_random_walk", {{"deg_h_rt_h", 0.60336}}},
+                {"bias_step", {{"step_deg_h", -0.035429}, {"time_s", 9.0143}}}};
+    const Outcome outcome = judged({of}).front();
+    EXPECT_TRUE(outcome.judged == Judged::right || outcome.judged == Judged::tie)
+        << outcome.verdict << " " << outcome.named;
+}
+
+TEST(LongClosureSuite, ALineAndASecondHarmonicAreNotSomethingElse) {
+    // Of either alone kicks at harmonics of the phase explain more.
+    Case of{.kind = Kind::several, .truth = {}, .multiple = 5.0, .condition = &other_gyro, .seed = 1001039};
+    of.truth = {{"rate_random_walk", {{"deg_h_rt_h", 0.022854}}},
+                {"lockin_second_harmonic", {{"ratio", 0.0069212}, {"phase_rad", 0.18909}}},
+                {"base_vibration", {{"frequency_hz", 0.50646}, {"rate_deg_h", 0.00035372}, {"phase_rad", 2.3743}}}};
+    const Outcome outcome = judged({of}).front();
+    EXPECT_TRUE(outcome.judged == Judged::right || outcome.judged == Judged::tie)
+        << outcome.verdict << " " << outcome.named;
+}
+
 class OutsideTheLibrary : public testing::TestWithParam<std::size_t> {};
 
 TEST_P(OutsideTheLibrary, NothingHasItsName) {

@@ -75,6 +75,29 @@ TEST(TurnLoop, NoiseOfEvenDensityInALockedGyroIsNoStructure) {
     }
 }
 
+// Kicks of a locked gyro go with more than the first power of its threshold.
+TEST(TurnLoop, AThresholdThatSwingsByASixthIsFollowed) {
+    Truth truth;
+    truth.scale_factor_arcsec = 2.0;
+    truth.dither_frequency_hz = 285.0;
+    truth.dither_peak_rate_deg_s = 116.0;
+    truth.lockin_threshold_deg_h = 1400.0;
+    truth.readout_noise = 0.005;
+    truth.bias_deg_h = 0.5;
+    truth.turns = 8000;
+    truth.seed = 1;
+    truth.temperature.swing_k = 1.0;
+    truth.temperature.period_s = 6.0;
+    truth.temperature.interval_s = 0.05;
+    truth.lockin_temperature_per_k = 0.16;
+    const Closure closure = close_loop(generate({&truth, 1}).front());
+    print("locked, its threshold follows the temperature", closure);
+    EXPECT_EQ(closure.verdict, Verdict::closed);
+    ASSERT_EQ(closure.steps.size(), 1U);
+    EXPECT_EQ(closure.steps[0].effect, "lockin_temperature");
+    EXPECT_LT(deviation(closure.steps[0].parameters, "relative_per_k", 0.16), 3.0);
+}
+
 // Beside injected noise the first fit may have given the lock-in what the amplitude did.
 TEST(LongTurnLoop, AWanderingAmplitudeOfALockedGyroIsTheDithersOwn) {
     for (const double correlation_s : {1.0, 0.1}) {
