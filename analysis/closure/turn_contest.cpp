@@ -401,16 +401,20 @@ std::vector<Account> pairs(const record::Record& record, const std::vector<Conte
 
 /// The likeliest pairs that random rates have not followed alone, with a third: so random a rate can also follow three
 /// others at once, and beside another random one hide what jumps. Those that do as well as the best account, each
-/// effect needed beside the others. `pairs` are sorted.
-std::vector<Account> triples(const record::Record& record, const std::vector<Account>& pairs, double best,
-                             const Rows& rows) {
+/// effect needed beside the others. `accounts` are sorted.
+std::vector<Account> triples(const record::Record& record, const std::vector<Account>& accounts, const Rows& rows) {
     constexpr std::size_t tried_third = 2;
+    constexpr double most_of_it = 0.75;  // without which one more hardly makes up for the rest
+    const double best = accounts.front().merit;
     std::vector<const Account*> extended;
     for (const long random : {0L, 1L}) {
-        const auto likeliest = std::find_if(pairs.begin(), pairs.end(), [&](const Account& pair) {
-            return pair.others.size() == 1 && pair.random_rates() == random;
+        const auto likeliest = std::find_if(accounts.begin(), accounts.end(), [&](const Account& account) {
+            return account.others.size() == 1 && account.random_rates() == random;
         });
-        if (likeliest != pairs.end()) extended.push_back(&*likeliest);
+        if (likeliest == accounts.end()) continue;
+        // Beside one random rate what a pair leaves is found when that has been added, but for what another one hides.
+        const bool may_win = random == 0 ? likeliest->merit > most_of_it * best : !accounts.front().others.empty();
+        if (may_win) extended.push_back(&*likeliest);
     }
     std::vector<std::vector<Account>> found(extended.size());
     oneapi::tbb::parallel_for(std::size_t{0}, extended.size(), [&](std::size_t k) {
@@ -432,15 +436,15 @@ std::vector<Account> triples(const record::Record& record, const std::vector<Acc
             found[k].push_back({pair.first, {pair.others.front(), third.candidate}, third.fitted, merit, p_value});
         }
     });
-    std::vector<Account> accounts;
+    std::vector<Account> all;
     for (std::vector<Account>& some : found) {
         for (Account& account : some) {
-            const bool known = std::any_of(accounts.begin(), accounts.end(),
-                                           [&](const Account& other) { return other.has_all_of(account); });
-            if (!known) accounts.push_back(std::move(account));
+            const bool known =
+                std::any_of(all.begin(), all.end(), [&](const Account& other) { return other.has_all_of(account); });
+            if (!known) all.push_back(std::move(account));
         }
     }
-    return accounts;
+    return all;
 }
 
 }  // namespace
@@ -460,7 +464,7 @@ Choice choose(const record::Record& record, const Contest& contest, const Rows& 
     if (!contest.side && is_random_rate(*contenders.front().candidate.effect)) {
         for (Account& pair : pairs(record, contenders, rows)) accounts.push_back(std::move(pair));
         sort();
-        for (Account& triple : triples(record, accounts, accounts.front().merit, rows)) {
+        for (Account& triple : triples(record, accounts, rows)) {
             accounts.push_back(std::move(triple));
         }
     }
