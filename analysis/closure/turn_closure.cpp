@@ -149,8 +149,7 @@ bool two_explain(const record::Record& record, const Rows& rows, const Choice& c
     const Contest beside = hold_contest(record, *choice.chosen->fitted, rows, looked_at, Among::not_random);
     if (beside.side || beside.contenders.empty() || !passes(beside.contenders.front().p_value)) return false;
     if (!of_coupling(*choice.chosen) && !of_coupling(beside.contenders.front())) return false;
-    const double second_choice = std::log(static_cast<double>(effects::registry().size()));
-    return choice.chosen->merit + beside.contenders.front().merit - second_choice > merit_of_view;
+    return choice.chosen->merit + beside.contenders.front().merit - cost_of_choice() > merit_of_view;
 }
 
 /// Tests of what the model has left; where structure lies, if any passes the level.
@@ -187,11 +186,9 @@ void read_shape_again(const record::Record& record, const Rows& rows, std::share
     for (int pass = 0; pass < most; ++pass) {
         const auto told = shape_read_again(*record.turns, *now->fit);
         if (!told) return;
-        try {
-            now = fit_record(record, *told, rows);
-        } catch (const RunError&) {
-            return;  // no motion of a gyro with such parameters can be followed
-        }
+        auto fitted = fit_or_none(record, *told, rows);
+        if (!fitted) return;
+        now = std::move(fitted);
     }
 }
 
@@ -214,12 +211,8 @@ void drop_needless(const record::Record& record, const Rows& rows, std::shared_p
         }
         TurnParameters without = now->fit->parameters();
         std::erase_if(without.effects, [&](const ActiveEffect& active) { return active.effect == effect; });
-        std::shared_ptr<Fitted> fitted;
-        try {
-            fitted = fit_record(record, without, rows);
-        } catch (const RunError&) {
-            continue;  // no motion of a gyro with such parameters can be followed
-        }
+        const auto fitted = fit_or_none(record, without, rows);
+        if (!fitted) continue;
         const double gain = now->fit->log_likelihood() - fitted->fit->log_likelihood();
         if (!shape && passes(p_of_gain(gain, *effect))) continue;
         now = fitted;

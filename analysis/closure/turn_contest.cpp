@@ -135,11 +135,9 @@ class Fits {
 
    private:
     void from(const TurnParameters& start) {
-        try {
-            auto fitted = fit_record(record_, start, rows_);
-            if (!best_ || fitted->fit->log_likelihood() > best_->fit->log_likelihood()) best_ = std::move(fitted);
-        } catch (const RunError&) {
-        }
+        auto fitted = fit_or_none(record_, start, rows_);
+        if (!fitted) return;
+        if (!best_ || fitted->fit->log_likelihood() > best_->fit->log_likelihood()) best_ = std::move(fitted);
     }
     void anew(const Fitted* alike) {
         anew_ = true;
@@ -226,6 +224,16 @@ std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParam
     if (other->log_likelihood() > fitted->fit->log_likelihood()) fitted->fit = std::move(other);
     return fitted;
 }
+
+std::shared_ptr<Fitted> fit_or_none(const record::Record& record, const TurnParameters& start, const Rows& rows) {
+    try {
+        return fit_record(record, start, rows);
+    } catch (const RunError&) {
+        return nullptr;
+    }
+}
+
+double cost_of_choice() { return std::log(static_cast<double>(effects::registry().size())); }
 
 bool is_random_rate(const effects::Effect& effect) {
     const auto parameters = effect.parameters();
@@ -330,18 +338,6 @@ struct Account {
                (is_random_rate(*first->candidate.effect) ? 1 : 0);
     }
 };
-
-/// What the choice of one effect more among all costs.
-double cost_of_choice() { return std::log(static_cast<double>(effects::registry().size())); }
-
-/// The model with some effects, or none where no motion of a gyro with such parameters can be followed.
-std::shared_ptr<Fitted> fit_or_none(const record::Record& record, const TurnParameters& start, const Rows& rows) {
-    try {
-        return fit_record(record, start, rows);
-    } catch (const RunError&) {
-        return nullptr;
-    }
-}
 
 /// The likeliest of either kind with what explains most beside it, and random rates by twos; each needed beside the
 /// other.

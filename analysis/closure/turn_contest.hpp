@@ -24,6 +24,12 @@ struct Fitted {
 std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParameters& start, const Rows& rows,
                                    TurnFit::Effects effects = TurnFit::Effects::fitted);
 
+/// The same from parameters that have noise, or none where no motion of a gyro with such parameters can be followed.
+std::shared_ptr<Fitted> fit_or_none(const record::Record& record, const TurnParameters& start, const Rows& rows);
+
+/// What the choice of one effect more among all of the library costs [nats].
+double cost_of_choice();
+
 /// Random rates can follow whatever the library does not have, more or less.
 bool is_random_rate(const effects::Effect& effect);
 
