@@ -195,6 +195,16 @@ double injected_by_swings(const TurnSeries& series) {
     return series.amplitude_rad * std::sqrt(squares / static_cast<double>(series.size()));
 }
 
+/// About the phases that the first fit tells (the iterated Kalman smoother: Bell, SIAM Journal on Optimization 4, 1994,
+/// 626). One pass is enough: another moves them by what is not linear in what the first was wrong by.
+void linearise_again(Fitted& fitted, const Rows& rows, TurnFit::Effects effects) {
+    auto reading_error_rad = fitted.fit->reading_error_rad();
+    if (reading_error_rad.empty()) return;
+    auto model = std::make_unique<TurnModel>(fitted.series, fitted.joined.phase_rad, std::move(reading_error_rad));
+    fitted.fit = std::make_unique<TurnFit>(*model, fitted.fit->parameters(), rows, effects);
+    fitted.model = std::move(model);
+}
+
 }  // namespace
 
 std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParameters& start, const Rows& rows,
@@ -216,12 +226,15 @@ std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParam
         parameters.threshold_deg_h = fitted->series.setup.lockin_threshold_deg_h;
     }
     fitted->fit = std::make_unique<TurnFit>(*fitted->model, parameters, rows, effects);
-    if (!from_nothing) return fitted;
-    // Where noise is injected the swings say how much: a fit that is not told may end beside a summit.
-    parameters.injected_sd_rad = injected_by_swings(fitted->series);
-    if (parameters.injected_sd_rad < parameters.readout_sd_rad) return fitted;
-    auto other = std::make_unique<TurnFit>(*fitted->model, parameters, rows, effects);
-    if (other->log_likelihood() > fitted->fit->log_likelihood()) fitted->fit = std::move(other);
+    if (from_nothing) {
+        // Where noise is injected the swings say how much: a fit that is not told may end beside a summit.
+        parameters.injected_sd_rad = injected_by_swings(fitted->series);
+        if (parameters.injected_sd_rad > parameters.readout_sd_rad) {
+            auto other = std::make_unique<TurnFit>(*fitted->model, parameters, rows, effects);
+            if (other->log_likelihood() > fitted->fit->log_likelihood()) fitted->fit = std::move(other);
+        }
+    }
+    linearise_again(*fitted, rows, effects);
     return fitted;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "engine/core/error.hpp"
@@ -409,6 +410,19 @@ void TurnFit::add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, 
     const Belief belief = belief_of(parameters_);
     believe(bias, belief.bias, belief.bias_sd_deg_h);
     believe(bias + 1, belief.threshold, belief.threshold_sd_deg_h);
+}
+
+std::vector<double> TurnFit::reading_error_rad() const {
+    // About the phase that was read a kick has kick' v, of which the part of v matters that is not known, and
+    // kick'' v^2 / 2, of which all but the mean does: variances of left kick'^2 and R^2 kick''^2 / 2.
+    constexpr double matters = 0.01;
+    const double readout_rad2 = parameters_.readout_sd_rad * parameters_.readout_sd_rad;
+    if (parameters_.injected_sd_rad > parameters_.readout_sd_rad) return {};
+    auto [mean_rad, variance_rad2] = whitening_->reading_errors(rest_);
+    const double left =
+        std::accumulate(variance_rad2.begin(), variance_rad2.end(), 0.0) / static_cast<double>(variance_rad2.size());
+    if (left * matters > 0.5 * readout_rad2 * readout_rad2) mean_rad.clear();
+    return mean_rad;
 }
 
 void TurnFit::finish() {

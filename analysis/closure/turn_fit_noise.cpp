@@ -222,8 +222,7 @@ double TurnFit::objective(const TurnFrame& frame, const TurnParameters& paramete
 
 /// By what normal noise leaves, where the lock-in is not quite right yet: more than once.
 void TurnFit::shape_noise() {
-    constexpr int passes = 3;
-    if (parameters_.shape) return;
+    const int passes = parameters_.shape ? 1 : 3;
     const auto& series = model_->series();
     for (int pass = 0; pass < passes; ++pass) {
         const TurnKicks kicks = model_->mean_kicks(parameters_);
@@ -236,9 +235,10 @@ void TurnFit::shape_noise() {
             foretold_rad[i] = psi - kicks.at(series.direction[i], psi).before_rad - innovation_rad;
             if (rows_[i]) counted_rad.push_back(innovation_rad);
         }
-        const auto shape = NoiseShape::of(counted_rad, kicks, series.direction, foretold_rad);
-        if (!shape) return;
-        parameters_.shape = shape;
+        auto shape = NoiseShape::of(counted_rad, kicks, series.direction, foretold_rad);
+        // One that is given may be of what another model left.
+        if (!shape && !parameters_.shape) return;
+        parameters_.shape = std::move(shape);
         prediction_ = model_->predict(parameters_);
         moved_ = true;
         climb();

@@ -257,7 +257,7 @@ double TurnKicks::phase_after(int direction, double plain_rad) const {
 
 TurnKicks::Kick TurnKicks::at(int direction, Complex turned, bool late, const Weights* weights) const {
     const Sides& sides = series_[direction > 0 ? 0 : 1][late ? 1 : 0];
-    const auto sum = [&](const Series& c, double& value, double& slope) {
+    const auto sum = [&](const Series& c, double& value, double& slope, double& curvature) {
         // In parts: the product of std::complex looks for infinities.
         const double re = turned.real();
         const double im = turned.imag();
@@ -265,6 +265,8 @@ TurnKicks::Kick TurnKicks::at(int direction, Complex turned, bool late, const We
         double v_im = 0.0;
         double s_re = 0.0;
         double s_im = 0.0;
+        double t_re = 0.0;
+        double t_im = 0.0;
         for (std::size_t k = terms_; k >= 1; --k) {
             const auto order = static_cast<double>(k);
             const double v = v_re * re - v_im * im + c[k].real();
@@ -273,13 +275,17 @@ TurnKicks::Kick TurnKicks::at(int direction, Complex turned, bool late, const We
             const double s = s_re * re - s_im * im + order * c[k].real();
             s_im = s_re * im + s_im * re + order * c[k].imag();
             s_re = s;
+            const double t = t_re * re - t_im * im + order * order * c[k].real();
+            t_im = t_re * im + t_im * re + order * order * c[k].imag();
+            t_re = t;
         }
         value = c[0].real() + v_re * re - v_im * im;
         slope = -(s_re * im + s_im * re);
+        curvature = -(t_re * re - t_im * im);
     };
     Kick kick{};
-    sum(sides[0], kick.before_rad, kick.before_slope);
-    sum(sides[1], kick.after_rad, kick.after_slope);
+    sum(sides[0], kick.before_rad, kick.before_slope, kick.before_curvature);
+    sum(sides[1], kick.after_rad, kick.after_slope, kick.after_curvature);
     for (std::size_t k = 1; k <= terms_ && weights != nullptr; ++k) {
         const Complex weight = (*weights)[k - 1];
         kick.before_weighted += sides[0][k].real() * weight.real() - sides[0][k].imag() * weight.imag();

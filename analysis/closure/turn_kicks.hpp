@@ -24,12 +24,14 @@ class TurnKicks {
 
     struct Kick {
         double before_rad, after_rad;
-        double before_slope, after_slope;  ///< derivatives to the phase
-        double before_weighted;            ///< before, each harmonic by a weight in place of itself; else 0
+        double before_slope, after_slope;          ///< derivatives to the phase
+        double before_curvature, after_curvature;  ///< second ones
+        double before_weighted;                    ///< before, each harmonic by a weight in place of itself; else 0
 
         Kick plus(double times, const Kick& other) const {
             return {before_rad + times * other.before_rad, after_rad + times * other.after_rad,
                     before_slope + times * other.before_slope, after_slope + times * other.after_slope,
+                    before_curvature + times * other.before_curvature, after_curvature + times * other.after_curvature,
                     before_weighted + times * other.before_weighted};
         }
     };

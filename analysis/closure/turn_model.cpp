@@ -34,6 +34,14 @@ bool told_by_other_columns(const effects::Effect& effect) {
            setup.missed_count_probability != plain.missed_count_probability;
 }
 
+TurnModel::TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad,
+                     std::vector<double> reading_error_rad)
+    : series_(series), phase_rad_(phase_rad), reading_error_rad_(std::move(reading_error_rad)) {
+    for (std::size_t i = 0; i < phase_rad.size(); ++i) {
+        turned_.push_back(std::polar(1.0, phase_rad[i] - (reading_error_rad_.empty() ? 0.0 : reading_error_rad_[i])));
+    }
+}
+
 gyro::Setup TurnModel::setup(const TurnParameters& parameters) const {
     gyro::Setup setup = series_.setup;
     setup.lockin_threshold_deg_h = parameters.threshold_deg_h;
@@ -275,13 +283,27 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         const TurnKicks::Kick& kick = (*kick_of)[i];
         const double before = 1.0 / std::sqrt(swing[i > 0 ? i - 1 : i]);
         const double after = 1.0 / std::sqrt(swing[i]);
+        // Where the reading's error is known, straight lines from there to what was read; else the mean over what it
+        // may be: the filter knows of the slope only.
+        double before_rad = kick.before_rad;
+        double after_rad = kick.after_rad;
+        if (reading_error_rad_.empty()) {
+            const double read_rad2 = parameters.readout_sd_rad * parameters.readout_sd_rad * frame.readout_at(i);
+            before_rad += 0.5 * read_rad2 * kick.before_curvature;
+            after_rad += 0.5 * read_rad2 * kick.after_curvature;
+        } else {
+            before_rad += reading_error_rad_[i] * kick.before_slope;
+            after_rad += reading_error_rad_[i] * kick.after_slope;
+        }
+        before_rad *= before;
+        after_rad *= after;
         const std::size_t last = i > 0 ? i - 1 : 0;
         const effects::Interval& interval = prediction.intervals[i];
         angle_arcsec += interval.duration_s * parameters.bias_deg_h + (input_arcsec[i] - input_arcsec[last]);
         for (const effects::AddedAngle& added : added_arcsec) angle_arcsec += added(interval);
 
-        prediction.phase_rad[i] = lockin + before * kick.before_rad + c * angle_arcsec;
-        lockin += before * kick.before_rad + after * kick.after_rad;
+        prediction.phase_rad[i] = lockin + before_rad + c * angle_arcsec;
+        lockin += before_rad + after_rad;
         frame.sign[i] = -series_.direction[i];
         frame.before_slope[i] = before * kick.before_slope;
         frame.shape_left[i] = before * kick.before_weighted;

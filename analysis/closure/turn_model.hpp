@@ -52,10 +52,10 @@ bool told_by_other_columns(const effects::Effect& effect);
 /// The phases that parameters foretell for the turns of a record, chance apart.
 class TurnModel {
    public:
-    /// Both are kept by reference.
-    TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad) : series_(series), phase_rad_(phase_rad) {
-        for (const double psi : phase_rad) turned_.push_back(std::polar(1.0, psi));
-    }
+    /// Series and phases are kept by reference. What the lock-in adds is taken for linear in the phase about the one
+    /// that was read, or about that less the reading's errors, where they are known.
+    TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad,
+              std::vector<double> reading_error_rad = {});
 
     struct Prediction {
         std::vector<double> phase_rad;  ///< but for offset and dither
@@ -101,6 +101,7 @@ class TurnModel {
 
     const TurnSeries& series_;
     const std::vector<double>& phase_rad_;
+    std::vector<double> reading_error_rad_;
     std::vector<std::complex<double>> turned_;  ///< exp(i phase)
     struct Met {
         gyro::Setup setup;

@@ -2,6 +2,7 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -107,6 +108,46 @@ std::vector<double> Whitening::apply(std::span<const double> series) const {
     std::vector<double> out(series.size());
     filter_innovations(frame_, noises_, gains_, sd_, series, out);
     return out;
+}
+
+Whitening::ReadingErrors Whitening::reading_errors(std::span<const double> series) const {
+    constexpr int most = FilterNoises::most_states;
+    using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most, 1>;
+    using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most, most>;
+    const auto states = static_cast<Eigen::Index>(noises_.states);
+    Matrix step = Matrix::Identity(states, states);
+    for (Eigen::Index s = 1; s < states; ++s) {
+        const std::size_t at = static_cast<std::size_t>(s) * noises_.row;
+        step(s, s) = noises_.decay[at];
+        if (s > 1) step(0, s) = noises_.gain_s[at];
+    }
+    const std::vector<double> innovations = apply(series);
+    ReadingErrors errors;
+    errors.mean_rad.resize(series.size());
+    errors.variance_rad2.resize(series.size());
+    // What the turns after say of the state there, and how well.
+    Vector after = Vector::Zero(states);
+    Matrix weight = Matrix::Zero(states, states);
+    Vector seen = Vector::Zero(states);
+    seen(0) = 1.0;
+    for (std::size_t i = series.size(); i-- > 0;) {
+        seen(1) = frame_.sign[i];
+        const Eigen::Map<const Vector> gain(&gains_[i * noises_.states], states);
+        const double readout = noises_.readout_rad2.front() * frame_.readout_at(i);
+        const double through = 1.0 - frame_.before_slope[i];
+        const double kick = frame_.kick_slope[i];
+        const double over = 1.0 / (sd_[i] * sd_[i]);
+        const double told = innovations[i] / sd_[i] - gain.dot(after);
+        const Vector weighed = weight * gain;
+        errors.mean_rad[i] = readout * (through * told - kick * after(0));
+        errors.variance_rad2[i] =
+            readout - readout * readout * (through * through * (over + gain.dot(weighed)) + kick * kick * weight(0, 0) +
+                                           2.0 * through * kick * weighed(0));
+        const Matrix on = step - gain * seen.transpose();
+        after = (seen * told + step.transpose() * after).eval();
+        weight = (over * seen * seen.transpose() + on.transpose() * weight * on).eval();
+    }
+    return errors;
 }
 
 }  // namespace ringlock::closure

@@ -65,6 +65,12 @@ class Whitening {
 
     /// Innovations over their standard deviations. Linear in `series`: columns of a regression go the same way.
     std::vector<double> apply(std::span<const double> series) const;
+    /// What the reading added to each phase, by all phases that leave this series (Durbin and Koopman, "Time Series
+    /// Analysis by State Space Methods", 2nd ed. 2012, section 4.5), and its variance that is left, both turn by turn.
+    struct ReadingErrors {
+        std::vector<double> mean_rad, variance_rad2;
+    };
+    ReadingErrors reading_errors(std::span<const double> series) const;
     /// Standard deviation of each innovation [rad].
     const std::vector<double>& sd_rad() const { return sd_; }
 

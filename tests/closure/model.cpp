@@ -266,28 +266,57 @@ Eigen::MatrixXd covariance(const TurnFrame& frame, const TurnNoise& noise) {
     return c;
 }
 
-TEST(Whitening, IsTheCholeskyFactorOfTheCovariance) {
-    constexpr std::size_t n = 40;
-    std::mt19937_64 random(3);
-    std::normal_distribution<double> normal;
-    TurnFrame frame;
-    frame.interval_s = 0.004;
-    for (std::size_t i = 0; i < n; ++i) {
-        frame.sign.push_back(i % 2 == 0 ? -1.0 : 1.0);
-        frame.before_slope.push_back(0.07 * normal(random));
-        frame.kick_slope.push_back(0.15 * normal(random));
+/// A few turns, each noise of the filter's at work.
+struct NoisyTurns {
+    static constexpr std::size_t n = 40;
+    NoisyTurns() : series(n) {
+        std::mt19937_64 random(3);
+        std::normal_distribution<double> normal;
+        frame.interval_s = 0.004;
+        for (std::size_t i = 0; i < n; ++i) {
+            frame.sign.push_back(i % 2 == 0 ? -1.0 : 1.0);
+            frame.before_slope.push_back(0.07 * normal(random));
+            frame.kick_slope.push_back(0.15 * normal(random));
+        }
+        noise.injected_rad2 = 0.3;
+        noise.readout_rad2 = 0.2;
+        noise.wander_rad2 = 0.05;
+        noise.white_rad2_per_s = 3.0;
+        noise.walk_rad2_per_s3 = 900.0;
+        noise.rates = {{0.01, 80.0}, {0.5, 20.0}};
+        for (double& value : series) value = normal(random);
     }
+    TurnFrame frame;
     TurnNoise noise;
-    noise.injected_rad2 = 0.3;
-    noise.readout_rad2 = 0.2;
-    noise.wander_rad2 = 0.05;
-    noise.white_rad2_per_s = 3.0;
-    noise.walk_rad2_per_s3 = 900.0;
-    noise.rates = {{0.01, 80.0}, {0.5, 20.0}};
+    std::vector<double> series;
+};
+
+TEST(Whitening, TellsTheReadingsErrorsByAllPhases) {
+    constexpr auto n = static_cast<Eigen::Index>(NoisyTurns::n);
+    const NoisyTurns turns;
+    const double readout_rad2 = turns.noise.readout_rad2;
+    Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(n, n);  // covariance of errors (rows) and phases
+    for (Eigen::Index j = 0; j < n; ++j) {
+        shared(j, j) = readout_rad2 * (1.0 - turns.frame.before_slope[static_cast<std::size_t>(j)]);
+        for (Eigen::Index i = j + 1; i < n; ++i) {
+            shared(j, i) = -readout_rad2 * turns.frame.kick_slope[static_cast<std::size_t>(j)];
+        }
+    }
+    const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance(turns.frame, turns.noise));
+    const Eigen::VectorXd mean = shared * cholesky.solve(Eigen::Map<const Eigen::VectorXd>(turns.series.data(), n));
+    const Eigen::VectorXd told = (shared * cholesky.solve(shared.transpose())).diagonal();
+    const auto errors = Whitening(turns.frame, turns.noise).reading_errors(turns.series);
+    for (Eigen::Index i = 0; i < n; ++i) {
+        EXPECT_NEAR(errors.mean_rad[static_cast<std::size_t>(i)], mean(i), 1e-9) << i;
+        EXPECT_NEAR(errors.variance_rad2[static_cast<std::size_t>(i)], readout_rad2 - told(i), 1e-9) << i;
+    }
+}
+
+TEST(Whitening, IsTheCholeskyFactorOfTheCovariance) {
+    constexpr std::size_t n = NoisyTurns::n;
+    const auto [frame, noise, series] = NoisyTurns();
     const Whitening whitening(frame, noise);
     const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance(frame, noise));
-    std::vector<double> series(n);
-    for (double& value : series) value = normal(random);
     const Eigen::VectorXd expected =
         cholesky.matrixL().solve(Eigen::Map<const Eigen::VectorXd>(series.data(), static_cast<Eigen::Index>(n)));
     const auto white = whitening.apply(series);

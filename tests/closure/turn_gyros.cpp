@@ -76,26 +76,78 @@ TEST(TurnLoop, NoiseOfEvenDensityInALockedGyroIsNoStructure) {
 }
 
 // Kicks of a locked gyro go with more than the first power of its threshold.
-TEST(TurnLoop, AThresholdThatSwingsByASixthIsFollowed) {
+/// In step, its threshold going up and down by a sixth.
+Truth swinging_threshold() {
     Truth truth;
     truth.scale_factor_arcsec = 2.0;
     truth.dither_frequency_hz = 285.0;
     truth.dither_peak_rate_deg_s = 116.0;
     truth.lockin_threshold_deg_h = 1400.0;
-    truth.readout_noise = 0.005;
-    truth.bias_deg_h = 0.5;
     truth.turns = 8000;
     truth.seed = 1;
     truth.temperature.swing_k = 1.0;
     truth.temperature.period_s = 6.0;
     truth.temperature.interval_s = 0.05;
     truth.lockin_temperature_per_k = 0.16;
-    const Closure closure = close_loop(generate({&truth, 1}).front());
-    print("locked, its threshold follows the temperature", closure);
+    return truth;
+}
+
+/// The loop's answer names this effect alone, near its true value.
+void expect_alone(const Closure& closure, const std::string& effect, const std::string& parameter, double value) {
     EXPECT_EQ(closure.verdict, Verdict::closed);
     ASSERT_EQ(closure.steps.size(), 1U);
-    EXPECT_EQ(closure.steps[0].effect, "lockin_temperature");
-    EXPECT_LT(deviation(closure.steps[0].parameters, "relative_per_k", 0.16), 3.0);
+    EXPECT_EQ(closure.steps[0].effect, effect);
+    EXPECT_LT(deviation(closure.steps[0].parameters, parameter, value), 3.0);
+}
+
+TEST(TurnLoop, AThresholdThatSwingsByASixthIsFollowed) {
+    Truth truth = swinging_threshold();
+    truth.readout_noise = 0.005;
+    truth.bias_deg_h = 0.5;
+    const Closure closure = close_loop(generate({&truth, 1}).front());
+    print("locked, its threshold follows the temperature", closure);
+    expect_alone(closure, "lockin_temperature", "relative_per_k", 0.16);
+}
+
+// Before the swing is in the model what it leaves is flatter than normal noise: no shape of the noise beside it.
+TEST(TurnLoop, TheShapeOfTheNoiseIsReadAnewBesideAnEffect) {
+    Truth truth = swinging_threshold();
+    truth.readout_noise = 0.02;
+    truth.input_rate_deg_h = 40.0;
+    const Closure closure = close_loop(generate({&truth, 1}).front());
+    print("in step now and then", closure);
+    expect_alone(closure, "lockin_temperature", "relative_per_k", 0.16);
+}
+
+/// Without injected noise, read with errors of 2 %.
+Truth coarsely_read(std::uint64_t seed) {
+    Truth truth;
+    truth.scale_factor_arcsec = 0.8;
+    truth.dither_frequency_hz = 209.173;
+    truth.dither_peak_rate_deg_s = 49.5325;
+    truth.lockin_threshold_deg_h = 485.0;
+    truth.readout_noise = 0.02;
+    truth.turns = 12000;
+    truth.seed = seed;
+    return truth;
+}
+
+// What a kick makes of the reading's error is not linear in it, and adds up: about the phases that were read each of
+// these had a step of the bias as well.
+TEST(TurnLoop, CoarseReadingsAreNoStep) {
+    Truth plain = coarsely_read(104);
+    plain.input_rate_deg_h = 71.3;
+    const Closure closure = close_loop(generate({&plain, 1}).front());
+    print("read coarsely", closure);
+    EXPECT_EQ(closure.verdict, Verdict::nothing_missing);
+    for (const std::uint64_t seed : {117U, 129U}) {
+        Truth truth = coarsely_read(seed);
+        truth.input_rate_deg_h = 64.8654;
+        truth.rates.bias_ramp_deg_h_per_h = 0.558;
+        const Closure ramp = close_loop(generate({&truth, 1}).front());
+        print("read coarsely, with a ramp", ramp);
+        expect_alone(ramp, "bias_ramp", "deg_h_per_h", 0.558);
+    }
 }
 
 // Beside injected noise the first fit may have given the lock-in what the amplitude did.
