@@ -410,8 +410,8 @@ void test_normality(const TurnFit& fit, std::vector<View>& views) {
     const auto& time = fit.model().series().time_s;
     std::vector<double> ramp(time.size());
     for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - time[time.size() / 2]);
-    if (const auto test = jumps_of_rate(fit.innovations(), fit.rows(), fit.whitened_alone(ramp))) {
-        views.push_back({*test});
+    if (const auto jump = largest_jump(fit.innovations(), fit.rows(), fit.whitened_alone(ramp))) {
+        views.emplace_back().test = test_of(*jump);
     }
 }
 

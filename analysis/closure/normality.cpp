@@ -85,36 +85,42 @@ std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovation
                         fmt::format("excess {:.3g} of sums of {}", excess, at)};
 }
 
-std::optional<ResidualTest> jumps_of_rate(const std::vector<double>& innovations, const Rows& rows,
-                                          const std::vector<double>& response) {
+std::optional<Jump> largest_jump(const std::vector<double>& innovations, const Rows& rows,
+                                 const std::vector<double>& response) {
+    constexpr double least_places = 40.0;
     const std::size_t n = innovations.size();
     const std::size_t middle = n / 2;
     double all = 0.0;
     for (std::size_t i = middle; i < n; ++i) all += response[i] * response[i];
-    std::size_t length = 0;
+    Jump jump;
     double part = 0.0;
-    while (part < 0.9 * all && middle + length < n) {
-        part += response[middle + length] * response[middle + length];
-        ++length;
+    while (part < 0.9 * all && middle + jump.length < n) {
+        part += response[middle + jump.length] * response[middle + jump.length];
+        ++jump.length;
     }
-    const std::size_t stride = std::max<std::size_t>(1, length / 16);
-    std::vector<double> sizes;
-    for (std::size_t a = 0; a + length <= n; a += stride) {
+    const std::size_t stride = std::max<std::size_t>(1, jump.length / 16);
+    for (std::size_t a = 0; a + jump.length <= n; a += stride) {
         double sum = 0.0;
         double weight = 0.0;
-        for (std::size_t i = 0; i < length; ++i) {
+        for (std::size_t i = 0; i < jump.length; ++i) {
             if (!rows[a + i]) continue;
             const double h = response[middle + i];
             sum += h * innovations[a + i];
             weight += h * h;
         }
-        if (weight > 0.3 * part) sizes.push_back(sum * sum / weight);
+        if (!(weight > 0.3 * part)) continue;
+        jump.places += 1.0;
+        if (sum * sum / weight <= jump.chi2) continue;
+        jump.chi2 = sum * sum / weight;
+        jump.row = a;
     }
-    if (sizes.size() < 40) return std::nullopt;
-    const double most = *std::max_element(sizes.begin(), sizes.end());
-    return ResidualTest{Where::time, "jumps of a rate that wanders",
-                        of_several(chi2_tail(most, 1), static_cast<double>(sizes.size())),
-                        fmt::format("{:.1f} standard errors", std::sqrt(most))};
+    if (jump.places < least_places) return std::nullopt;
+    return jump;
+}
+
+ResidualTest test_of(const Jump& jump) {
+    return {Where::time, "jumps of a rate that wanders", of_several(chi2_tail(jump.chi2, 1), jump.places),
+            fmt::format("{:.1f} standard errors", std::sqrt(jump.chi2))};
 }
 
 }  // namespace ringlock::closure

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
@@ -17,10 +18,20 @@ std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovation
 bool is_of_even_density(std::span<const double> innovations);
 bool is_of_even_density(const std::vector<double>& innovations, const Rows& rows);
 
+/// The step of the rate that innovations show most of, where a step is forgotten soon.
+struct Jump {
+    std::size_t row = 0;
+    double chi2 = 0.0;
+    double places = 0.0;     ///< that were looked at
+    std::size_t length = 0;  ///< rows in which most of a step shows
+};
+/// `response`: what the filter makes of a step of the rate in the middle of the record. None where there are too few
+/// places.
+std::optional<Jump> largest_jump(const std::vector<double>& innovations, const Rows& rows,
+                                 const std::vector<double>& response);
+
 /// A rate that wanders moves by little at a time; jumps betray themselves by the size of what follows them (Harvey and
-/// Koopman, J. Business and Economic Statistics 10, 377, 1992). `response`: what the filter makes of a step of the rate
-/// in the middle of the record.
-std::optional<ResidualTest> jumps_of_rate(const std::vector<double>& innovations, const Rows& rows,
-                                          const std::vector<double>& response);
+/// Koopman, J. Business and Economic Statistics 10, 377, 1992).
+ResidualTest test_of(const Jump& jump);
 
 }  // namespace ringlock::closure

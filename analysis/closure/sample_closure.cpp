@@ -69,6 +69,9 @@ class Loop {
     Rows all_rows() const;
     void begin(Closure& closure);
     void close(Closure& closure);
+    void add_all(Closure& closure, bool random_rates);
+    void begin_again(const State& at);
+    void go_without_random(Closure& closure);
     bool restore();
     void take_lattice(Closure& closure);
     void take(const SampleChoice& choice, Closure& closure);
@@ -357,26 +360,44 @@ Closure Loop::run() {
         if (!restore()) break;
     }
     test_what_is_left(closure);
-    if (earlier_ && closure.unexplained) {
-        // A rate is left that is none of the library's: the random one has only come nearest to it.
-        now_ = std::move(*earlier_);
-        // It was fitted to what was drawn then.
-        if (rounded_.drawn()) now_.fit = rounded_.draw(now_.fit, draws_of_step);
-        test_what_is_left(closure);
-    }
+    if (earlier_ && closure.unexplained) go_without_random(closure);
     take_back_lines(closure);
     finish(closure);
     return closure;
 }
 
-/// Adds what earns its place, until nothing does.
+void Loop::begin_again(const State& at) {
+    now_ = at;
+    // It was fitted to what was drawn then.
+    if (rounded_.drawn()) now_.fit = rounded_.draw(now_.fit, draws_of_step);
+}
+
+/// A rate is left that the random one has only come nearest to: several of the library together, if they leave nothing
+/// and are likelier; else none of it.
+void Loop::go_without_random(Closure& closure) {
+    const std::shared_ptr<SampleFit> followed = now_.fit;
+    const std::vector<std::string> notes = closure.notes;
+    begin_again(*earlier_);
+    add_all(closure, false);
+    test_what_is_left(closure);
+    if (!closure.unexplained && now_.fit->gain_over(*followed) > 0.0) return;
+    closure.notes = notes;
+    begin_again(*earlier_);
+    test_what_is_left(closure);
+}
+
 void Loop::close(Closure& closure) {
     begin(closure);
     take_lattice(closure);
     earlier_.reset();
+    add_all(closure, true);
+}
+
+/// Adds what earns its place, until nothing does.
+void Loop::add_all(Closure& closure, bool random_rates) {
     while (now_.steps.size() < most_steps) {
-        const SampleChoice choice =
-            choose_on_samples(record_.declared, {now_.fit, now_.lines_hz, next_step_}, whole_, lattice_step());
+        const SampleChoice choice = choose_on_samples(
+            record_.declared, {now_.fit, now_.lines_hz, next_step_, random_rates}, whole_, lattice_step());
         if (!choice.chosen) break;
         if (!earlier_ && is_random_rate(choice.chosen->candidate.effect)) earlier_ = now_;
         take(choice, closure);

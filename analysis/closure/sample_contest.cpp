@@ -67,6 +67,8 @@ class Contest {
 
     std::vector<SampleCandidate> screened(const SampleState& state, Wanted wanted) const;
     Shared fitted(const SampleState& state, SampleCandidate candidate) const;
+    Shared judged(const SampleState& state, SampleCandidate candidate, SampleFit fit) const;
+    Shared placed(Shared first, const SampleModel& all) const;
     std::vector<Shared> contenders(const SampleState& state, std::vector<SampleCandidate> candidates) const;
     SampleState beside(const SampleState& state, const SampleContender& contender) const;
     std::vector<Account> sets(const std::vector<Shared>& all, const std::vector<SampleCandidate>& candidates) const;
@@ -99,18 +101,29 @@ bool Contest::Account::random() const {
 std::vector<SampleCandidate> Contest::screened(const SampleState& state, Wanted wanted) const {
     auto candidates =
         screen_samples(*state.fit, {declared_, series_, rows_, state.lines_hz, state.step, wanted == Wanted::slow});
+    if (!state.random_rates) {
+        std::erase_if(candidates, [](const SampleCandidate& c) { return is_random_rate(c.effect); });
+    }
     std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
     return candidates;
 }
 
 Contest::Shared Contest::fitted(const SampleState& state, SampleCandidate candidate) const {
-    auto contender = std::make_shared<SampleContender>();
     SampleFit fit(series_, candidate.model, rows_, candidate.noise);
-    // Places were found by the noise as it was, which a large effect was a part of.
+    // Places were found by the noise as it was, which a large effect was a part of, and without that effect.
     constexpr double large = 50.0;
-    if (candidate.effect == "bias_step" && fit.gain_over(*state.fit) > large) {
+    const auto& columns = fit.model().columns;
+    const bool steps = std::any_of(columns.begin(), columns.end(), [&](const SampleColumn& column) {
+        return column.effect == "bias_step" && column.step >= now_.step;
+    });
+    if (steps && fit.gain_over(*state.fit) > large) {
         fit = refine_steps(place_in_gaps(std::move(fit), rows_, known_), rows_);
     }
+    return judged(state, std::move(candidate), std::move(fit));
+}
+
+Contest::Shared Contest::judged(const SampleState& state, SampleCandidate candidate, SampleFit fit) const {
+    auto contender = std::make_shared<SampleContender>();
     contender->fit = std::make_shared<SampleFit>(std::move(fit));
     const double gain = contender->fit->gain_over(*state.fit);
     contender->merit = gain - std::log(candidate.places.value_or(candidate.searched)) - candidate.parameters;
@@ -118,6 +131,18 @@ Contest::Shared Contest::fitted(const SampleState& state, SampleCandidate candid
     contender->passes = contender->merit > 0.0 && passes_on_samples(p_of_gain(gain, candidate));
     contender->candidate = std::move(candidate);
     return contender;
+}
+
+/// A step alone is elsewhere than beside what is added next: it is taken where it will be.
+Contest::Shared Contest::placed(Shared first, const SampleModel& all) const {
+    if (first->candidate.effect != "bias_step") return first;
+    const auto own = [&](const SampleColumn& column) { return column.effect == "bias_step"; };
+    SampleModel model = first->fit->model();
+    const auto step = std::find_if(model.columns.begin(), model.columns.end(), own);
+    const auto there = std::find_if(all.columns.begin(), all.columns.end(), own);
+    if (step == model.columns.end() || there == all.columns.end()) return first;
+    step->series = there->series;
+    return judged(now_, first->candidate, SampleFit(series_, std::move(model), rows_, SampleFit::Noise::near));
 }
 
 /// What the screening lets pass, each fitted in full, and still passes; the likeliest first. Scores are of the noise as
@@ -139,7 +164,7 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
 }
 
 SampleState Contest::beside(const SampleState& state, const SampleContender& contender) const {
-    return {contender.fit, state.lines_hz, state.step + 1};
+    return {contender.fit, state.lines_hz, state.step + 1, state.random_rates};
 }
 
 /// Probability of what the first gains over the second alone; of both, where only the two of them show anything.
@@ -404,6 +429,7 @@ SampleChoice Contest::choose() {
         choice.chosen = first ? member : fitted(now_, *same);
         choice.p_value = first ? best->p_value : member->candidate.p_value;
     }
+    if (best->members.size() > 1) choice.chosen = placed(choice.chosen, best->members.back()->fit->model());
     std::erase_if(as_likely, [&](const Account& account) {
         return account.members.size() == 1 && beside_each_other(*choice.chosen, *account.members.front());
     });

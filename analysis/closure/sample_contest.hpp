@@ -24,6 +24,7 @@ struct SampleState {
     std::shared_ptr<SampleFit> fit;
     std::vector<double> lines_hz = {};  ///< that are in the model
     int step = 0;                       ///< that an effect added to it would be
+    bool random_rates = true;           ///< may be added
 };
 
 /// An effect fitted in full.

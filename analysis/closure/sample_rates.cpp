@@ -11,6 +11,7 @@
 #include "analysis/closure/normality.hpp"
 #include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_search.hpp"
+#include "analysis/closure/sample_steps.hpp"
 #include "analysis/closure/sample_views.hpp"
 #include "analysis/closure/two_levels.hpp"
 
@@ -199,12 +200,8 @@ void test_levels(const SampleFit& fit, Views& views) {
 }
 
 void test_jumps(const SampleFit& fit, Views& views) {
-    if (!fit.model().walk && !fit.model().flicker) return;
-    const std::size_t n = fit.innovations().size();
-    std::vector<double> step(n, 0.0);
-    std::fill(step.begin() + static_cast<std::ptrdiff_t>(n / 2), step.end(), fit.series().interval_s);
-    if (const auto test = jumps_of_rate(fit.innovations(), fit.rows(), fit.filter().apply(step))) {
-        views.push_back({*test});
+    if (const auto jump = jump_beside_random(fit)) {
+        views.emplace_back().test = test_of(*jump);
     }
 }
 

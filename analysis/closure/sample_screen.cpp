@@ -81,17 +81,28 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
             at = n * k / places;
         }
     }
-    const double p = davies_bound(best * best, roots);
-    if (p > 0.01) return;
     double as_good = 0.0;
     for (const double root : roots) as_good += std::exp(0.5 * (root * root - best * best));
-    at = refine_place(now, at, n / places / 2);
-    best = root_of_worth * std::abs(root_of_step(now, at));
     SampleCandidate c{.effect = "bias_step",
                       .model = model,
-                      .p_value = p,
-                      .searched = places_of_step(best * best, 0.5 / static_cast<double>(places)),
+                      .p_value = davies_bound(best * best, roots),
                       .places = static_cast<double>(places) / as_good};
+    at = refine_place(now, at, n / places / 2);
+    best = root_of_worth * std::abs(root_of_step(now, at));
+    c.searched = places_of_step(best * best, 0.5 / static_cast<double>(places));
+    // One that is forgotten within less than there is between these places shows at its own only.
+    const auto jump = jump_beside_random(now);
+    if (jump && jump->length < n / places) {
+        const std::size_t place = refine_place(now, jump->row, jump->length);
+        const double root = root_of_worth * std::abs(root_of_step(now, place));
+        if (root > best) {
+            at = place;
+            c.searched = jump->places;
+            c.places = jump->places;
+            c.p_value = of_several(chi2_tail(root * root, 1), jump->places);
+        }
+    }
+    if (c.p_value > 0.01) return;
     c.model.columns.push_back(step_column(in.series, at));
     c.model.columns.back().step = in.step;
     out.push_back(std::move(c));

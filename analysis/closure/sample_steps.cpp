@@ -18,6 +18,12 @@ double root_of_step(const SampleFit& fit, std::size_t row) {
     return score.rank == 0 ? 0.0 : std::copysign(std::sqrt(score.chi2), score.value[0]);
 }
 
+std::optional<Jump> jump_beside_random(const SampleFit& fit) {
+    if (!fit.model().walk && !fit.model().flicker) return std::nullopt;
+    const SampleColumn step = step_column(fit.series(), fit.series().size() / 2);
+    return largest_jump(fit.innovations(), fit.rows(), fit.filter().apply(*step.series));
+}
+
 std::size_t refine_place(const SampleFit& without, std::size_t row, std::size_t reach) {
     // Nearer to an end a step can hardly be told from how the record begins, or ends.
     const std::size_t first = std::max<std::size_t>(1, without.series().size() / places_of_a_step);

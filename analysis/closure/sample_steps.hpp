@@ -1,4 +1,7 @@
 #pragma once
+#include <optional>
+
+#include "analysis/closure/normality.hpp"
 #include "analysis/closure/sample_fit.hpp"
 
 /// Steps of the rate, and where in the record they are.
@@ -13,6 +16,9 @@ double root_of_step(const SampleFit& fit, std::size_t row);
 
 /// Of which a record is searched for a step before the likeliest is refined.
 inline constexpr std::size_t places_of_a_step = 80;
+
+/// The largest of the innovations' own, where the model has a random rate, beside which a step is forgotten soon.
+std::optional<Jump> jump_beside_random(const SampleFit& fit);
 
 /// The row near that one at which a step explains most: within so many rows, by halves of that. The model has no step.
 std::size_t refine_place(const SampleFit& without, std::size_t row, std::size_t reach);
