@@ -20,6 +20,11 @@ namespace {
 
 Outcome judged(const SampleCase& of) { return judge(of, make(of)); }
 
+const SampleCondition* condition(const std::string& name) {
+    return &*std::find_if(sample_conditions.begin(), sample_conditions.end(),
+                          [&](const SampleCondition& c) { return c.name == name; });
+}
+
 TEST(ClosureSampleSuite, NamesNothingInRecordsWithoutAnything) {
     std::uint64_t seed = 400;
     for (const SampleCondition& condition : sample_conditions) {
@@ -62,14 +67,45 @@ TEST(ClosureSampleSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
 
 // A step and a ramp that both hold against every view, beside a random rate that does not and yet is likelier.
 TEST(ClosureSampleSuite, ARandomRateThatDoesNotHoldIsInNobodysWay) {
-    const auto warm = std::find_if(sample_conditions.begin(), sample_conditions.end(),
-                                   [](const SampleCondition& c) { return std::string(c.name) == "warm"; });
-    ASSERT_NE(warm, sample_conditions.end());
-    SampleCase of{.kind = Kind::pair, .truth = {}, .multiple = 2.0, .condition = &*warm, .seed = 20442};
+    SampleCase of{.kind = Kind::pair, .truth = {}, .multiple = 2.0, .condition = condition("warm"), .seed = 20442};
     of.truth = {{"bias_step", {{"step_deg_h", -4.1735}, {"time_s", 136.0}}}, {"bias_ramp", {{"deg_h_per_h", -86.258}}}};
     const Outcome outcome = judged(of);
     EXPECT_TRUE(outcome.judged == Judged::right || outcome.judged == Judged::tie)
         << outcome.verdict << " " << outcome.named;
+}
+
+/// Several effects, all of which the loop names or ties with others.
+void expect_all_named(const std::string& under, std::uint64_t seed, const std::vector<Added>& truth) {
+    const SampleCase of{
+        .kind = Kind::several, .truth = truth, .multiple = 10.0, .condition = condition(under), .seed = seed};
+    const Outcome outcome = judged(of);
+    EXPECT_TRUE(outcome.judged == Judged::right || outcome.judged == Judged::tie)
+        << outcome.verdict << " " << outcome.named << " " << outcome.where;
+    EXPECT_NEAR(outcome.after / outcome.oracle, 1.0, 1e-3);
+}
+
+// Where the step explains most alone it is not: with ramp and scale factor's error it explained less there than a
+// random rate.
+TEST(LongClosureSampleSuite, AStepIsPlacedBesideWhatIsAddedWithIt) {
+    expect_all_named("moving, warm", 20650,
+                     {{"bias_ramp", {{"deg_h_per_h", -82.369}}},
+                      {"bias_step", {{"step_deg_h", -4.7639}, {"time_s", 229.69}}},
+                      {"scale_factor_error", {{"relative", -0.013201}}}});
+}
+
+// Beside so strong a walk a step is forgotten within less than there is between the places that are searched at first.
+TEST(LongClosureSampleSuite, AStepBesideAStrongWalkIsFound) {
+    expect_all_named("angles, dither declared", 20587,
+                     {{"rate_random_walk", {{"deg_h_rt_h", 59.581}}},
+                      {"bias_step", {{"step_deg_h", -16.551}, {"time_s", 155.6}}}});
+}
+
+// A random rate follows all three better than the likeliest two; what it leaves is a line and more.
+TEST(LongClosureSampleSuite, WhatARandomRateDoesNotFollowIsTriedWithoutOne) {
+    expect_all_named("fine digits, accelerometers", 20606,
+                     {{"base_vibration", {{"frequency_hz", 0.79619}, {"phase_rad", -0.4207}, {"rate_deg_h", 12.189}}},
+                      {"bias_ramp", {{"deg_h_per_h", 609.06}}},
+                      {"bias_step", {{"step_deg_h", 31.2}, {"time_s", 98.433}}}});
 }
 
 // A bias of two states, 3 deg/h apart, was called bias_instability.
