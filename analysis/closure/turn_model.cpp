@@ -284,11 +284,11 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         const double before = 1.0 / std::sqrt(swing[i > 0 ? i - 1 : i]);
         const double after = 1.0 / std::sqrt(swing[i]);
         // Where the reading's error is known, straight lines from there to what was read; else the mean over what it
-        // may be: the filter knows of the slope only.
+        // may be, by the radii, which no fit changes: the filter knows of the slope only.
         double before_rad = kick.before_rad;
         double after_rad = kick.after_rad;
         if (reading_error_rad_.empty()) {
-            const double read_rad2 = parameters.readout_sd_rad * parameters.readout_sd_rad * frame.readout_at(i);
+            const double read_rad2 = series_.radius_sd_rad * series_.radius_sd_rad * frame.readout_at(i);
             before_rad += 0.5 * read_rad2 * kick.before_curvature;
             after_rad += 0.5 * read_rad2 * kick.after_curvature;
         } else {
