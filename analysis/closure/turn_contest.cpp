@@ -198,9 +198,9 @@ double injected_by_swings(const TurnSeries& series) {
 /// About the phases that the first fit tells (the iterated Kalman smoother: Bell, SIAM Journal on Optimization 4, 1994,
 /// 626). One pass is enough: another moves them by what is not linear in what the first was wrong by.
 void linearise_again(Fitted& fitted, const Rows& rows, TurnFit::Effects effects) {
-    auto reading_error_rad = fitted.fit->reading_error_rad();
-    if (reading_error_rad.empty()) return;
-    auto model = std::make_unique<TurnModel>(fitted.series, fitted.joined.phase_rad, std::move(reading_error_rad));
+    ReadingErrors known = fitted.fit->reading_errors();
+    if (known.mean_rad.empty()) return;
+    auto model = std::make_unique<TurnModel>(fitted.series, fitted.joined.phase_rad, std::move(known));
     fitted.fit = std::make_unique<TurnFit>(*model, fitted.fit->parameters(), rows, effects);
     fitted.model = std::move(model);
 }

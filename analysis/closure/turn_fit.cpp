@@ -412,17 +412,18 @@ void TurnFit::add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, 
     believe(bias + 1, belief.threshold, belief.threshold_sd_deg_h);
 }
 
-std::vector<double> TurnFit::reading_error_rad() const {
+ReadingErrors TurnFit::reading_errors() const {
     // About the phase that was read a kick has kick' v, of which the part of v matters that is not known, and
-    // kick'' v^2 / 2, of which all but the mean does: variances of left kick'^2 and R^2 kick''^2 / 2.
-    constexpr double matters = 0.01;
+    // kick'' v^2 / 2, of which all but the mean does: variances of left kick'^2 and R^2 kick''^2 / 2. Models beside one
+    // another must be linear about the same, or one gains by that alone: long before it can be seen.
+    constexpr double matters = 1e-4;
     const double readout_rad2 = parameters_.readout_sd_rad * parameters_.readout_sd_rad;
     if (parameters_.injected_sd_rad > parameters_.readout_sd_rad) return {};
     auto [mean_rad, variance_rad2] = whitening_->reading_errors(rest_);
-    const double left =
+    const double left_rad2 =
         std::accumulate(variance_rad2.begin(), variance_rad2.end(), 0.0) / static_cast<double>(variance_rad2.size());
-    if (left * matters > 0.5 * readout_rad2 * readout_rad2) mean_rad.clear();
-    return mean_rad;
+    if (left_rad2 * matters > 0.5 * readout_rad2 * readout_rad2) return {};
+    return {std::move(mean_rad), left_rad2};
 }
 
 void TurnFit::finish() {

@@ -66,9 +66,9 @@ class TurnFit {
     /// all of it shows.
     std::unique_ptr<TurnFit> with_less_noise() const;
 
-    /// What the reading added to each phase [rad], where all phases together tell it so well that what the lock-in
-    /// makes of it is linear about it, and not about the phases that were read; else none.
-    std::vector<double> reading_error_rad() const;
+    /// What all phases together tell of the reading's errors, where that is enough for what the lock-in makes of them to
+    /// be linear about it, and not about the phases that were read; else none.
+    ReadingErrors reading_errors() const;
 
     const TurnModel& model() const { return *model_; }
     const TurnParameters& parameters() const { return parameters_; }

@@ -34,11 +34,11 @@ bool told_by_other_columns(const effects::Effect& effect) {
            setup.missed_count_probability != plain.missed_count_probability;
 }
 
-TurnModel::TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad,
-                     std::vector<double> reading_error_rad)
-    : series_(series), phase_rad_(phase_rad), reading_error_rad_(std::move(reading_error_rad)) {
+TurnModel::TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad, ReadingErrors known)
+    : series_(series), phase_rad_(phase_rad), known_(std::move(known)) {
+    if (known_.mean_rad.empty()) known_ = {std::vector<double>(phase_rad.size()), std::pow(series.radius_sd_rad, 2)};
     for (std::size_t i = 0; i < phase_rad.size(); ++i) {
-        turned_.push_back(std::polar(1.0, phase_rad[i] - (reading_error_rad_.empty() ? 0.0 : reading_error_rad_[i])));
+        turned_.push_back(std::polar(1.0, phase_rad[i] - known_.mean_rad[i]));
     }
 }
 
@@ -283,18 +283,13 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         const TurnKicks::Kick& kick = (*kick_of)[i];
         const double before = 1.0 / std::sqrt(swing[i > 0 ? i - 1 : i]);
         const double after = 1.0 / std::sqrt(swing[i]);
-        // Where the reading's error is known, straight lines from there to what was read; else the mean over what it
-        // may be, by the radii, which no fit changes: the filter knows of the slope only.
-        double before_rad = kick.before_rad;
-        double after_rad = kick.after_rad;
-        if (reading_error_rad_.empty()) {
-            const double read_rad2 = series_.radius_sd_rad * series_.radius_sd_rad * frame.readout_at(i);
-            before_rad += 0.5 * read_rad2 * kick.before_curvature;
-            after_rad += 0.5 * read_rad2 * kick.after_curvature;
-        } else {
-            before_rad += reading_error_rad_[i] * kick.before_slope;
-            after_rad += reading_error_rad_[i] * kick.after_slope;
-        }
+        // Straight lines to what was read, of which the filter knows, and the mean over what is not known: that is by the
+        // radii, which no fit changes.
+        const double left_rad2 = known_.left_rad2 * frame.readout_at(i);
+        double before_rad =
+            kick.before_rad + known_.mean_rad[i] * kick.before_slope + 0.5 * left_rad2 * kick.before_curvature;
+        double after_rad =
+            kick.after_rad + known_.mean_rad[i] * kick.after_slope + 0.5 * left_rad2 * kick.after_curvature;
         before_rad *= before;
         after_rad *= after;
         const std::size_t last = i > 0 ? i - 1 : 0;
