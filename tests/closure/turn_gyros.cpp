@@ -75,7 +75,6 @@ TEST(TurnLoop, NoiseOfEvenDensityInALockedGyroIsNoStructure) {
     }
 }
 
-// Kicks of a locked gyro go with more than the first power of its threshold.
 /// In step, its threshold going up and down by a sixth.
 Truth swinging_threshold() {
     Truth truth;
@@ -100,6 +99,7 @@ void expect_alone(const Closure& closure, const std::string& effect, const std::
     EXPECT_LT(deviation(closure.steps[0].parameters, parameter, value), 3.0);
 }
 
+// Kicks of a locked gyro go with more than the first power of its threshold.
 TEST(TurnLoop, AThresholdThatSwingsByASixthIsFollowed) {
     Truth truth = swinging_threshold();
     truth.readout_noise = 0.005;
