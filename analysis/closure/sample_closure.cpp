@@ -56,6 +56,7 @@ class Loop {
         std::vector<Step> steps;
         std::vector<SampleStep> told;  ///< as many
         std::vector<double> lines_hz;
+        std::vector<std::string> notes;  ///< on these steps
         /// What is added after another that was chosen with it is as confounded.
         std::vector<std::pair<std::string, std::vector<std::string>>> of_partners;
     };
@@ -314,7 +315,9 @@ void Loop::finish(Closure& closure) {
     for (std::size_t k = 0; k < closure.steps.size(); ++k) {
         if (closure.steps[k].parameters.empty()) closure.steps[k].parameters = std::move(figures.steps[k]);
     }
-    for (std::string& note : figures.notes) closure.notes.push_back(std::move(note));
+    for (auto* notes : {&now_.notes, &figures.notes}) {
+        for (std::string& note : *notes) closure.notes.push_back(std::move(note));
+    }
     closure.verdict = verdict_of(closure);
 }
 
@@ -376,12 +379,10 @@ void Loop::begin_again(const State& at) {
 /// and are likelier; else none of it.
 void Loop::go_without_random(Closure& closure) {
     const std::shared_ptr<SampleFit> followed = now_.fit;
-    const std::vector<std::string> notes = closure.notes;
     begin_again(*earlier_);
     add_all(closure, false);
     test_what_is_left(closure);
     if (!closure.unexplained && now_.fit->gain_over(*followed) > 0.0) return;
-    closure.notes = notes;
     begin_again(*earlier_);
     test_what_is_left(closure);
 }
@@ -439,7 +440,7 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
         const double hz = line_hz(now_.fit->model(), best.candidate.wanders);
         now_.lines_hz.push_back(alias(hz, series_.rate_hz).hz);
         if (best.candidate.wanders) {
-            closure.notes.push_back(
+            now_.notes.push_back(
                 fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "
                             "samples before as a narrow resonance",
                             now_.lines_hz.back()));
