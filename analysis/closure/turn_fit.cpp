@@ -235,7 +235,7 @@ TurnFit::Equations TurnFit::equations(const Whitening& whitening, bool guessed) 
     for (std::size_t k = 0; k < count && !guessed; ++k) {
         if (columns_[k].of.slope.empty()) continue;
         const auto index = static_cast<Eigen::Index>(k);
-        right(index) = slope_of_objective(columns_[k].of, 1e-3 / scale(index)) / scale(index);
+        right(index) = slope_of_objective(prediction_.frame, rest_, columns_[k].of, 1e-3 / scale(index)) / scale(index);
     }
     add_priors(scale, normal, &right);
     hold_back(scale, normal);
@@ -285,12 +285,13 @@ bool TurnFit::go_down(const Equations& equations, const Whitening* guessed) {
 }
 
 /// Of the likelihood, with all that the filter's gains and variances make of it.
-double TurnFit::slope_of_objective(const Regressor& of, double step) const {
+double TurnFit::slope_of_objective(const TurnFrame& frame, const std::vector<double>& rest, const Regressor& of,
+                                   double step) const {
     const auto at = [&](double value) {
-        TurnFrame frame = prediction_.frame;
-        std::vector<double> rest = rest_;
-        of.take(value, rest, frame);
-        return objective(frame, parameters_, rest);
+        TurnFrame frame_there = frame;
+        std::vector<double> rest_there = rest;
+        of.take(value, rest_there, frame_there);
+        return objective(frame_there, parameters_, rest_there);
     };
     return (at(-step) - at(step)) / (2.0 * step);
 }
@@ -419,11 +420,12 @@ ReadingErrors TurnFit::reading_errors() const {
     constexpr double matters = 1e-4;
     const double readout_rad2 = parameters_.readout_sd_rad * parameters_.readout_sd_rad;
     if (parameters_.injected_sd_rad > parameters_.readout_sd_rad) return {};
-    auto [mean_rad, variance_rad2] = whitening_->reading_errors(rest_);
-    const double left_rad2 =
-        std::accumulate(variance_rad2.begin(), variance_rad2.end(), 0.0) / static_cast<double>(variance_rad2.size());
-    if (left_rad2 * matters > 0.5 * readout_rad2 * readout_rad2) return {};
-    return {std::move(mean_rad), left_rad2};
+    ReadingErrors errors = whitening_->reading_errors(rest_);
+    const auto& left_rad2 = errors.variance_rad2;
+    const double mean_rad2 =
+        std::accumulate(left_rad2.begin(), left_rad2.end(), 0.0) / static_cast<double>(left_rad2.size());
+    if (mean_rad2 * matters > 0.5 * readout_rad2 * readout_rad2) return {};
+    return errors;
 }
 
 void TurnFit::finish() {
@@ -454,12 +456,47 @@ Eigen::MatrixXd TurnFit::whitened_columns(Eigen::VectorXd& scale) const {
     return x;
 }
 
+/// Observed information, in units of the columns' norms. Squares of whitened columns are that but for one thing: what
+/// the lock-in makes of a reading is in the column of a threshold, goes with the very noise of that reading, and is no
+/// information where the variance of the innovation says so as well.
+Eigen::MatrixXd TurnFit::information(Eigen::VectorXd& scale) const {
+    constexpr double part = 0.1;  // of a standard error
+    const Eigen::MatrixXd x = whitened_columns(scale);
+    const Eigen::MatrixXd squares = x.transpose() * x;
+    Eigen::MatrixXd normal = squares;
+    const TurnNoise noise = model_->noise(parameters_);
+    const auto count = static_cast<Eigen::Index>(columns_.size());
+    for (Eigen::Index k = 0; k < count; ++k) {
+        const Regressor& of = columns_[static_cast<std::size_t>(k)].of;
+        if (of.slope.empty()) continue;
+        const auto slopes_at = [&](double value) {
+            TurnFrame frame = prediction_.frame;
+            std::vector<double> rest = rest_;
+            of.take(value, rest, frame);
+            const Whitening whitening(frame, noise);
+            const Eigen::VectorXd y = counted(whitening, rest);
+            Eigen::VectorXd slopes(count);
+            for (Eigen::Index j = 0; j < count; ++j) {
+                const Regressor& by = columns_[static_cast<std::size_t>(j)].of;
+                slopes(j) = by.slope.empty() ? counted(whitening, frame, by).dot(y)
+                                             : slope_of_objective(frame, rest, by, 1e-3 / scale(j));
+            }
+            return Eigen::VectorXd(slopes.cwiseQuotient(scale));
+        };
+        normal.col(k) = (slopes_at(-part / scale(k)) - slopes_at(part / scale(k))) / (2.0 * part);
+        normal.row(k) = normal.col(k).transpose();
+    }
+    add_priors(scale, normal, nullptr);
+    if (normal.ldlt().isPositive()) return normal;
+    normal = squares;  // at the end of a range, or where nothing tells
+    add_priors(scale, normal, nullptr);
+    return normal;
+}
+
 std::vector<Estimate> TurnFit::estimates() const {
     Eigen::VectorXd scale;
-    const Eigen::MatrixXd x = whitened_columns(scale);
-    Eigen::MatrixXd normal = x.transpose() * x;
-    add_priors(scale, normal, nullptr);
-    const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(x.cols(), x.cols()));
+    const Eigen::MatrixXd normal = information(scale);
+    const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
     TurnParameters found = parameters_;
     std::vector<Estimate> estimates;
     for (std::size_t k = nuisances(); k < columns_.size(); ++k) {

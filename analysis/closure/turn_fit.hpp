@@ -148,10 +148,12 @@ class TurnFit {
     void set_rest(const TurnModel::Prediction& prediction);
     double squares_left(const Whitening& whitening) const;
     double objective_at(const TurnModel::Prediction& prediction) const;  ///< with what is believed
-    double slope_of_objective(const Regressor& of, double step) const;
+    double slope_of_objective(const TurnFrame& frame, const std::vector<double>& rest, const Regressor& of,
+                              double step) const;
     std::vector<Column> columns(const TurnModel::Prediction& prediction) const;
     void finish();
     Eigen::MatrixXd whitened_columns(Eigen::VectorXd& scale) const;  ///< of norm one, scale times as long
+    Eigen::MatrixXd information(Eigen::VectorXd& scale) const;       ///< of these, and what is believed
     void add_noise_estimates(std::vector<Estimate>& estimates) const;
     /// How far bias and threshold are from what is believed of them, in standard deviations, and these.
     struct Belief {
