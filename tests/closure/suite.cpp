@@ -10,6 +10,8 @@
 #include <limits>
 #include <random>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "analysis/closure/decision.hpp"
 #include "analysis/instrument/simulate.hpp"
@@ -378,6 +380,39 @@ double gain_asked(const std::vector<std::string>& missing, double library) {
     return std::isfinite(least) ? least : none;
 }
 
+namespace {
+
+/// True effects that no step holds. One that names a true effect holds that or one that it is tied to; where it names
+/// another, all that is tied to that may stand in its place together.
+std::vector<std::string> not_held(const std::set<std::string>& true_effects,
+                                  const std::vector<ringlock::closure::Step>& steps) {
+    const std::vector<std::string> wanted(true_effects.begin(), true_effects.end());
+    std::vector<std::string> least = wanted;
+    std::vector<std::string> lacking;
+    std::vector<bool> taken(steps.size());
+    const auto hold = [&](const auto& self, std::size_t k) -> void {
+        if (k == wanted.size()) {
+            if (lacking.size() < least.size()) least = lacking;
+            return;
+        }
+        for (std::size_t s = 0; s < steps.size(); ++s) {
+            const auto& others = steps[s].confounded_with;
+            const bool among = std::find(others.begin(), others.end(), wanted[k]) != others.end();
+            if (taken[s] || (steps[s].effect != wanted[k] && !among)) continue;
+            taken[s] = true_effects.contains(steps[s].effect);
+            self(self, k + 1);
+            taken[s] = false;
+        }
+        lacking.push_back(wanted[k]);
+        self(self, k + 1);
+        lacking.pop_back();
+    };
+    hold(hold, 0);
+    return least;
+}
+
+}  // namespace
+
 void compare(const Closure& closure, bool foreign, Where where, const std::vector<Added>& truth, Outcome& outcome) {
     outcome.verdict = std::string(name_of(closure.verdict));
     outcome.before = closure.heldout_before;
@@ -386,35 +421,27 @@ void compare(const Closure& closure, bool foreign, Where where, const std::vecto
     outcome.answer_gain = closure.log_likelihood_gain;
     outcome.oracle = std::numeric_limits<double>::quiet_NaN();
     if (closure.unexplained) outcome.where = std::string(name_of(closure.unexplained->where));
-    std::set<std::string> missing;
+    std::set<std::string> true_effects;
     if (!foreign) {
-        for (const Added& added : truth) missing.insert(added.effect);
+        for (const Added& added : truth) true_effects.insert(added.effect);
     }
-    const std::set<std::string> true_effects = missing;
     bool ties = false;
     for (const auto& step : closure.steps) {
         outcome.named += (outcome.named.empty() ? "" : "+") + step.effect;
         for (const std::string& other : step.confounded_with) outcome.named += "~" + other;
-        if (true_effects.contains(step.effect)) {
-            missing.erase(step.effect);
-            ties = ties || !step.confounded_with.empty();
-            continue;
-        }
-        bool tied_to_truth = false;
-        for (const std::string& other : step.confounded_with) {
-            missing.erase(other);
-            tied_to_truth = tied_to_truth || true_effects.contains(other);
-        }
-        ties = ties || tied_to_truth;
-        if (!tied_to_truth) outcome.false_name = true;
+        const bool named = true_effects.contains(step.effect);
+        const bool tied_to_truth = std::any_of(step.confounded_with.begin(), step.confounded_with.end(),
+                                               [&](const std::string& other) { return true_effects.contains(other); });
+        ties = ties || (named ? !step.confounded_with.empty() : tied_to_truth);
+        if (!named && !tied_to_truth) outcome.false_name = true;
     }
-    outcome.missing.assign(missing.begin(), missing.end());
+    outcome.missing = not_held(true_effects, closure.steps);
     if (closure.verdict == Verdict::unexplained) {
         outcome.judged =
             foreign && closure.unexplained->where == where && !outcome.false_name ? Judged::right : Judged::unexplained;
     } else if (outcome.false_name) {
         outcome.judged = Judged::wrong;
-    } else if (foreign || !missing.empty()) {
+    } else if (foreign || !outcome.missing.empty()) {
         outcome.judged = Judged::missed;
     } else {
         outcome.judged = ties ? Judged::tie : Judged::right;

@@ -57,6 +57,35 @@ TEST(ClosureSuite, NamesWhatIsFourTimesItsLimit) {
     }
 }
 
+TEST(ClosureSuite, AnswersAreJudgedStepByStep) {
+    const std::vector<Added> both = {{"dither_residue", {}}, {"base_vibration", {}}};
+    const auto judged_as = [&](std::vector<ringlock::closure::Step> steps, const std::vector<Added>& truth) {
+        ringlock::closure::Closure closure;
+        closure.verdict = ringlock::closure::Verdict::closed;
+        closure.steps = std::move(steps);
+        Outcome outcome;
+        compare(closure, false, ringlock::closure::Where::time, truth, outcome);
+        return outcome;
+    };
+    const auto step = [](const char* effect, std::vector<std::string> others) {
+        ringlock::closure::Step of;
+        of.effect = effect;
+        of.confounded_with = std::move(others);
+        return of;
+    };
+    const auto vibration = step("base_vibration", {"dither_residue"});
+    EXPECT_EQ(judged_as({vibration, vibration}, both).judged, Judged::tie);
+    EXPECT_THAT(judged_as({vibration}, both).missing, testing::ElementsAre("dither_residue"));
+    EXPECT_EQ(judged_as({step("base_vibration", {}), step("dither_residue", {})}, both).judged, Judged::right);
+    EXPECT_EQ(judged_as({vibration, step("base_vibration", {})}, both).judged, Judged::tie);
+    // Two that may stand in place of another together.
+    const auto walk = step("rate_random_walk", {"dither_residue", "base_vibration"});
+    EXPECT_EQ(judged_as({walk}, both).judged, Judged::tie);
+    const Outcome wrong = judged_as({vibration, step("bias_ramp", {})}, both);
+    EXPECT_EQ(wrong.judged, Judged::wrong);
+    EXPECT_TRUE(wrong.false_name);
+}
+
 TEST(ClosureSuite, SizesComeFromTheRecordsInformation) {
     // Information goes with the number of turns, and for a ramp with the fourth power of the time beside it.
     const auto limit = [](std::size_t count) {
