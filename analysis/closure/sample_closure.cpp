@@ -77,6 +77,7 @@ class Loop {
     void take_lattice(Closure& closure);
     void take(const SampleChoice& choice, Closure& closure);
     void take_back_lines(Closure& closure);
+    void move_case(SampleStep& told, SampleFit::Noise noise);
     void drop_needless();
     void test_what_is_left(Closure& closure) const;
     void finish(Closure& closure);
@@ -471,6 +472,18 @@ void Loop::take_back_lines(Closure& closure) {
     }
 }
 
+/// A motion of the case that is known to be there, by two numbers or lag by lag.
+void Loop::move_case(SampleStep& told, SampleFit::Noise noise) {
+    SampleModel model = now_.fit->model();
+    add_motion(model, series_, told.witness, told.step);
+    auto weak = std::make_shared<SampleFit>(series_, std::move(model), rows_, noise);
+    auto strong = std::make_shared<SampleFit>(series_, moved_as(*now_.fit, told.witness, told.step), rows_,
+                                              SampleFit::Noise::near);
+    const double more = 2.0 * witness_lags(series_.rate_hz) - 1.0;
+    told.strong = strong->gain_over(*weak) > more;
+    now_.fit = told.strong ? std::move(strong) : std::move(weak);
+}
+
 /// Whatever is known to be there, at the values given or near them; what is left is not looked at.
 Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
     Closure closure;
@@ -483,6 +496,7 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
         if (active.effect->name() == "resampling") from_hz = active.values.at("from_hz");
     }
     if (from_hz > 0.0) model = resampled_from(*now_.fit, from_hz);
+    std::optional<std::size_t> moved;
     for (const ActiveEffect& active : effects) {
         const std::string effect(active.effect->name());
         const int k = next_step_++;
@@ -503,7 +517,7 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
             for (std::size_t w = 0; w < series_.witnesses.size(); ++w) {
                 if (series_.witnesses[w].first == name) told.witness = w;
             }
-            if (!series_.witnesses.empty()) add_motion(model, series_, told.witness, k);
+            if (!series_.witnesses.empty()) moved = now_.told.size();
         } else if (effect == "resampling") {
             noise = SampleFit::Noise::free;
         } else if (effect == "rate_random_walk") {
@@ -533,6 +547,7 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
         }
     }
     now_.fit = std::make_shared<SampleFit>(series_, std::move(model), rows_, noise);
+    if (moved) move_case(now_.told[*moved], noise);
     if (series_.counted || used_step_ > 0.0) find_coarse_steps(closure);
     finish(closure);
     return closure;

@@ -158,8 +158,8 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
     oneapi::tbb::parallel_for(std::size_t{0}, all.size(),
                               [&](std::size_t k) { all[k] = fitted(state, std::move(candidates[k])); });
     std::erase_if(all, [](const Shared& contender) { return !contender->passes; });
-    if (all.size() > most_contenders + 2) all.resize(most_contenders + 2);
     std::sort(all.begin(), all.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
+    if (all.size() > most_contenders + 2) all.resize(most_contenders + 2);
     return all;
 }
 
@@ -286,7 +286,8 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
             // less, as any other swing may be.
             constexpr double little = 0.3;
             const SampleNoise& noise = account.members.front()->fit->model().noise;
-            most = std::max(most, noise.blur_arcsec < little * noise.angle_arcsec ? merit : merit + closure::tie);
+            merit += noise.blur_arcsec < little * noise.angle_arcsec ? -closure::tie : closure::tie;
+            most = std::max(most, merit);
             continue;
         }
         // Several effects are chosen from many: against what follows another column of the record they get nothing for
@@ -438,7 +439,10 @@ SampleChoice Contest::choose() {
     for (const Account& account : as_likely) {
         const double hz = account.members.front()->fit->model().noise.from_hz;
         if (choice.chosen->candidate.effect != "resampling" || !account.has("resampling")) continue;
-        if (std::abs(hz - from_hz) > 1e-3 * series_.rate_hz) choice.other_hz.push_back(hz);
+        const auto near = [&](double other_hz) { return std::abs(hz - other_hz) < 1e-3 * series_.rate_hz; };
+        if (!near(from_hz) && std::none_of(choice.other_hz.begin(), choice.other_hz.end(), near)) {
+            choice.other_hz.push_back(hz);
+        }
     }
     return choice;
 }

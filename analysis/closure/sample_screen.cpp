@@ -335,6 +335,8 @@ SampleModel as_of(const SampleFit& now, const SampleSource& source, Errors error
     model.noise.from_phase = source.from_phase;
     model.noise.blur_arcsec = 0.2 * now.sd(0);
     model.noise.digits_arcsec = 1e-6 * now.sd(0);
+    // Between two readings the errors of both average out, to two thirds of the variance of one in the mean.
+    if (errors == Errors::as_they_are) model.noise.angle_arcsec *= std::sqrt(1.5);
     if (errors == Errors::of_readings) {
         // On the line between two readings an increment is a part of what they differ by.
         double squares = 0.0;
@@ -351,27 +353,45 @@ struct Resampled {
     double log_likelihood = 0.0;
 };
 
-/// From where in the source's interval the likelihood likes best on a part of the record, its scale left free.
-Resampled best_placed(const SampleFit& now, double from_hz, Errors errors) {
-    constexpr int places = 8;
+/// Of a part of the record, the scale of its noises left free.
+double log_likelihood_of_shape(const SampleFit& now, const SampleNoise& noise) {
     const SampleSeries& series = now.series();
     const std::size_t part = std::min<std::size_t>(series.size(), 20000);
+    const SampleFilter filter(noise, part, series.interval_s);
+    const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
+    double squares = 0.0;
+    double logs = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 0; i < part; ++i) {
+        if (!now.rows()[i]) continue;
+        squares += e[i] * e[i];
+        logs += std::log(filter.sd(i));
+        count += 1.0;
+    }
+    return -0.5 * count * std::log(squares / count) - logs;
+}
+
+/// From where in the source's interval the likelihood likes best, and with what share of errors of readings: what is
+/// interpolated has less of them, and looks like a rate in their place.
+Resampled best_placed(const SampleFit& now, double from_hz, Errors errors) {
+    constexpr int places = 8;
     Resampled best{{}, -std::numeric_limits<double>::infinity()};
-    for (int place = 0; place < places; ++place) {
-        SampleModel model = as_of(now, {from_hz, static_cast<double>(place) / places}, errors);
-        const SampleFilter filter(model.noise, part, series.interval_s);
-        const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
-        double squares = 0.0;
-        double logs = 0.0;
-        double count = 0.0;
-        for (std::size_t i = 0; i < part; ++i) {
-            if (!now.rows()[i]) continue;
-            squares += e[i] * e[i];
-            logs += std::log(filter.sd(i));
-            count += 1.0;
-        }
-        const double value = -0.5 * count * std::log(squares / count) - logs;
+    const auto look_at = [&](SampleModel model) {
+        const double value = log_likelihood_of_shape(now, model.noise);
         if (value > best.log_likelihood) best = {std::move(model), value};
+    };
+    for (int place = 0; place < places; ++place) {
+        look_at(as_of(now, {from_hz, static_cast<double>(place) / places}, errors));
+    }
+    if (errors == Errors::of_readings) return best;
+    constexpr double factor = 1.5;
+    constexpr int most = 10;  // a record's own errors may hardly show beside its rates
+    for (int k = 0; k < most; ++k) {
+        const double before = best.log_likelihood;
+        SampleModel model = best.model;
+        model.noise.angle_arcsec *= factor;
+        look_at(std::move(model));
+        if (!(best.log_likelihood > before)) break;
     }
     return best;
 }
@@ -408,12 +428,17 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
             found.push_back(best_placed(now, from, Errors::as_they_are));
         }
     }
-    // What interpolation does to the share of the noises is not in these: the best few are fitted in full.
+    // That was on a part of the record, with noises that are not fitted: it may be wrong by tens of nats.
     std::sort(found.begin(), found.end(),
               [](const Resampled& a, const Resampled& b) { return a.log_likelihood > b.log_likelihood; });
-    constexpr std::size_t looked_at = 3;
+    constexpr std::size_t least = 3;
+    constexpr std::size_t most = 7;
+    constexpr double as_likely = 40.0;
     if (!found.empty()) offer(best_placed(now, found.front().model.noise.from_hz, Errors::of_readings).model);
-    for (std::size_t k = 0; k < std::min(looked_at, found.size()); ++k) offer(std::move(found[k].model));
+    const double likeliest = found.empty() ? 0.0 : found.front().log_likelihood;
+    for (std::size_t k = 0; k < std::min(most, found.size()); ++k) {
+        if (k < least || found[k].log_likelihood > likeliest - as_likely) offer(std::move(found[k].model));
+    }
 }
 
 /// A motion that is the witness's and turned by a quarter of a cycle, slow drifts left out: two numbers tell of weak
@@ -450,31 +475,14 @@ void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector
     screen_weak_motion(now, in, out);
     const FoundWitness witness = find_witness(now.innovations(), in.rows, in.series);
     if (!(witness.p_value < level_of_effects)) return;
-    const WitnessMotion motion = fit_witness(now, in.series.witnesses[witness.index].second);
-    SampleCandidate c{.effect = "case_motion",
-                      .model = now.model(),
-                      .p_value = witness.p_value,
-                      .searched = static_cast<double>(in.series.witnesses.size()),
-                      .parameters = 2 * witness.lags + 1,
-                      .freedom = 2 * witness.lags + 1};
-    c.model.motion = motion.increments;
-    // What the witness does not tell moves like what it tells; its own noise hides the edges of that, which are wider.
-    const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
-    c.model.noise.resonances.push_back(
-        {untold, std::max(motion.centre_hz, 0.01), std::max(0.5 * motion.centre_hz, 0.01)});
-    c.model.noise.resonances.push_back(
-        {0.3 * untold, std::max(motion.centre_hz, 0.01), 3.0 * std::max(0.5 * motion.centre_hz, 0.01)});
-    c.model.resonances.insert(c.model.resonances.end(), 2, "case_motion");
-    c.model.resonance_steps.insert(c.model.resonance_steps.end(), 2, in.step);
-    // Once more with what is left as the noise.
-    const SampleFit first(in.series, c.model, in.rows);
-    const auto& watched = in.series.witnesses[witness.index].second;
-    c.model = first.model();
-    const WitnessMotion more = fit_witness(first, watched);
-    for (std::size_t i = 0; i < c.model.motion.size(); ++i) c.model.motion[i] += more.increments[i];
-    c.witness = witness.index;
-    c.strong = true;
-    out.push_back(std::move(c));
+    out.push_back({.effect = "case_motion",
+                   .model = moved_as(now, witness.index, in.step),
+                   .p_value = witness.p_value,
+                   .searched = static_cast<double>(in.series.witnesses.size()),
+                   .parameters = 2 * witness.lags + 1,
+                   .freedom = 2 * witness.lags + 1,
+                   .strong = true,
+                   .witness = witness.index});
 }
 
 }  // namespace
@@ -527,6 +535,27 @@ void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witn
         model.columns.push_back({"case_motion", c == 0 ? "in_phase" : "quadrature", shared(std::move(columns[c]))});
         model.columns.back().step = step;
     }
+}
+
+SampleModel moved_as(const SampleFit& now, std::size_t witness, int step) {
+    const auto& watched = now.series().witnesses[witness].second;
+    const WitnessMotion motion = fit_witness(now, watched);
+    SampleModel model = now.model();
+    model.motion = motion.increments;
+    // What the witness does not tell moves like what it tells; its own noise hides the edges of that, which are wider.
+    const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
+    const double centre_hz = std::max(motion.centre_hz, 0.01);
+    const double width_hz = std::max(0.5 * motion.centre_hz, 0.01);
+    model.noise.resonances.push_back({untold, centre_hz, width_hz});
+    model.noise.resonances.push_back({0.3 * untold, centre_hz, 3.0 * width_hz});
+    model.resonances.insert(model.resonances.end(), 2, "case_motion");
+    model.resonance_steps.insert(model.resonance_steps.end(), 2, step);
+    // Once more with what is left as the noise.
+    const SampleFit first(now.series(), std::move(model), now.rows());
+    model = first.model();
+    const WitnessMotion more = fit_witness(first, watched);
+    for (std::size_t i = 0; i < model.motion.size(); ++i) model.motion[i] += more.increments[i];
+    return model;
 }
 
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in) {

@@ -212,30 +212,50 @@ Added draw_on_samples(const std::string& effect, const SampleCase& of) {
     return {effect, {{"relative", 1e-3 * sign}}};
 }
 
+/// The size that has four times its standard error, by the fit to a record that has it at `size`.
+double size_at_limit(const std::string& effect, double size, const Closure& fitted, std::size_t step) {
+    double limit = size;
+    if (effect == "count_quantization") {
+        for (const Estimate& e : fitted.base) {
+            if (e.name == "white_angle_arcsec") limit = std::sqrt(12.0 * 4.0 * 2.0 * e.value * e.sd);
+        }
+        return limit;
+    }
+    for (const Estimate& e : fitted.steps.at(step).parameters) {
+        if (e.name != size_of(effect) || !(e.sd > 0.0) || !std::isfinite(e.sd)) continue;
+        // Of a variance the information hardly depends: its root goes with the root of size times error.
+        limit = is_random(effect) ? std::sqrt(std::abs(size) * 4.0 * e.sd) : 4.0 * e.sd;
+        limit = std::copysign(std::abs(size) * std::clamp(limit / std::abs(size), 0.2, 5.0), size);
+    }
+    return limit;
+}
+
 void settle(SampleCase& of) {
+    // A random rate may by chance do next to nothing in one record: the middle one of three, of other noise.
+    const bool random =
+        std::any_of(of.truth.begin(), of.truth.end(), [](const Added& added) { return is_random(added.effect); });
+    const std::size_t fits = random ? 3 : 1;
     SampleCase at = of;
     for (int round = 0; round < 4; ++round) {
         double moved = 0.0;
-        const Closure closure = ringlock::closure::fit_samples(make(at), known(at.truth));
+        std::vector<Closure> fitted;
+        for (std::size_t j = 0; j < fits; ++j) {
+            SampleCase other = at;
+            other.seed += j * 7919;
+            fitted.push_back(ringlock::closure::fit_samples(make(other), known(other.truth)));
+        }
         for (std::size_t k = 0; k < at.truth.size(); ++k) {
             const std::string& effect = at.truth[k].effect;
             if (!has_size(effect)) continue;
             double& size = at.truth[k].values.at(size_of(effect));
             const double before = size;
-            if (effect == "count_quantization") {
-                for (const Estimate& e : closure.base) {
-                    if (e.name == "white_angle_arcsec") size = std::sqrt(12.0 * 4.0 * 2.0 * e.value * e.sd);
-                }
-            } else if (effect == "case_motion") {
+            if (effect == "case_motion") {
                 if (round == 0) size = limit_of_motion(at, k);
             } else {
-                for (const Estimate& e : closure.steps.at(k).parameters) {
-                    if (e.name != size_of(effect) || !(e.sd > 0.0) || !std::isfinite(e.sd)) continue;
-                    // Of a variance the information hardly depends: its root goes with the root of size times error.
-                    const double limit = is_random(effect) ? std::sqrt(std::abs(size) * 4.0 * e.sd) : 4.0 * e.sd;
-                    size = std::copysign(limit, size);
-                    size = before * std::clamp(size / before, 0.2, 5.0);
-                }
+                std::vector<double> sizes;
+                for (const Closure& closure : fitted) sizes.push_back(size_at_limit(effect, before, closure, k));
+                std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(fits / 2), sizes.end());
+                size = sizes[fits / 2];
             }
             moved = std::max(moved, std::abs(std::log(size / before)));
         }

@@ -1,6 +1,8 @@
 // Records that were taken at another rate and interpolated to their own, which the closed loop reads.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -73,6 +75,32 @@ TEST(ResampledRecords, DigitsThatGrowAreNoStructure) {
     const Closure found = close_samples(generate_samples(taken_at(95.81, 7)));
     expect_only_resampling(found);
     EXPECT_NEAR(found.steps[0].parameters[0].value, 95.81, 1e-6);
+}
+
+/// Whether the answer has that rate, or says that the record cannot tell it from the one it has.
+bool tells(const Closure& found, double from_hz) {
+    if (found.steps.size() != 1 || found.steps[0].effect != "resampling") return false;
+    if (std::abs(found.steps[0].parameters[0].value - from_hz) < 1e-3) return true;
+    const std::string other = fmt::format("a source of {:.6g} Hz", from_hz);
+    return std::any_of(found.notes.begin(), found.notes.end(),
+                       [&](const std::string& note) { return note.starts_with(other); });
+}
+
+// Errors of readings average out where they are interpolated, and what is left of them looks like a rate: with the
+// noises of a record as it is, images of the rate were likelier than the rate, or none explained enough.
+TEST(ResampledRecords, ImagesOfTheRateAreNotTheRate) {
+    struct Source {
+        double hz, rate_noise_deg_rt_h;
+        std::uint64_t seed;
+    };
+    for (const Source& source : {Source{134.33, 0.025, 3}, {157.2, 0.005, 11}, {134.33, 0.04, 11}, {188.1, 0.02, 11}}) {
+        SampleTruth truth = taken_at(source.hz, source.seed);
+        truth.white_angle_arcsec = 0.1;
+        truth.rates.quantum_noise_deg_rt_h = source.rate_noise_deg_rt_h;
+        const Closure found = close_samples(generate_samples(truth));
+        EXPECT_EQ(found.verdict, Verdict::closed) << source.hz;
+        EXPECT_TRUE(tells(found, source.hz)) << source.hz << " " << source.rate_noise_deg_rt_h;
+    }
 }
 
 // Near twice the record's rate readings share nothing: the variance alone says that they are interpolated, and how far
