@@ -78,6 +78,7 @@ class Loop {
     void take(const SampleChoice& choice, Closure& closure);
     void take_back_lines(Closure& closure);
     void move_case(SampleStep& told, SampleFit::Noise noise);
+    void move_anew();
     void drop_needless();
     void test_what_is_left(Closure& closure) const;
     void finish(Closure& closure);
@@ -426,6 +427,7 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     const SampleScore before = score(*now_.fit);
     now_.fit = best.fit;
     drop_needless();
+    move_anew();
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
     if (rounded_.drawn()) {
         now_.fit = rounded_.draw(now_.fit, draws_of_step);
@@ -469,6 +471,21 @@ void Loop::take_back_lines(Closure& closure) {
         now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
         now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
         return;
+    }
+}
+
+/// What a witness told of a motion, and what it left, was told beside the noise as it was, which what has been added
+/// was a part of.
+void Loop::move_anew() {
+    for (SampleStep& told : now_.told) {
+        if (told.effect != "case_motion") continue;
+        const SampleFit still(series_, without_motion(now_.fit->model()), rows_, SampleFit::Noise::held);
+        auto moved = std::make_shared<SampleFit>(series_, moved_as(still, told.witness, told.step), rows_,
+                                                 SampleFit::Noise::near);
+        const double more = told.strong ? 1.0 : 2.0 * witness_lags(series_.rate_hz) - 1.0;
+        if (!(moved->gain_over(*now_.fit) > more)) continue;
+        now_.fit = std::move(moved);
+        told.strong = true;
     }
 }
 

@@ -143,17 +143,7 @@ void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estim
     const SampleSeries& series = fit.series();
     const auto& [name, witness] = series.witnesses[step.witness];
     all.push_back({"case_motion", "witness", static_cast<double>(name.back() - 'x'), 0.0, name});
-    SampleModel without = fit.model();
-    std::erase_if(without.columns, [](const SampleColumn& c) { return c.effect == "case_motion"; });
-    without.motion.clear();
-    for (std::size_t k = without.resonances.size(); k-- > 0;) {
-        if (without.resonances[k] != "case_motion") continue;
-        const auto at = static_cast<std::ptrdiff_t>(k);
-        without.resonances.erase(without.resonances.begin() + at);
-        without.resonance_steps.erase(without.resonance_steps.begin() + at);
-        without.noise.resonances.erase(without.noise.resonances.begin() + at);
-    }
-    const SampleFit bare(series, without, fit.rows(), SampleFit::Noise::near);
+    const SampleFit bare(series, without_motion(fit.model()), fit.rows(), SampleFit::Noise::near);
     const WitnessMotion told = fit_witness(bare, witness);
     SampleModel with = bare.model();
     with.resonances.insert(with.resonances.begin(), "case_motion");

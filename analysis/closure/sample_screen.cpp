@@ -537,6 +537,19 @@ void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witn
     }
 }
 
+SampleModel without_motion(SampleModel model) {
+    std::erase_if(model.columns, [](const SampleColumn& c) { return c.effect == "case_motion"; });
+    model.motion.clear();
+    for (std::size_t k = model.resonances.size(); k-- > 0;) {
+        if (model.resonances[k] != "case_motion") continue;
+        const auto at = static_cast<std::ptrdiff_t>(k);
+        model.resonances.erase(model.resonances.begin() + at);
+        model.resonance_steps.erase(model.resonance_steps.begin() + at);
+        model.noise.resonances.erase(model.noise.resonances.begin() + at);
+    }
+    return model;
+}
+
 SampleModel moved_as(const SampleFit& now, std::size_t witness, int step) {
     const auto& watched = now.series().witnesses[witness].second;
     const WitnessMotion motion = fit_witness(now, watched);
