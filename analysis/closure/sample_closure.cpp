@@ -75,6 +75,7 @@ class Loop {
     void go_without_random(Closure& closure);
     bool restore();
     void take_lattice(Closure& closure);
+    std::shared_ptr<SampleContender> likelier_rounded(const SampleChoice& choice, std::vector<std::string>& tied);
     void take(const SampleChoice& choice, Closure& closure);
     void take_back_lines(Closure& closure);
     void move_case(SampleStep& told, SampleFit::Noise noise);
@@ -407,14 +408,29 @@ void Loop::add_all(Closure& closure, bool random_rates) {
     }
 }
 
+/// What was rounded was drawn by the model without a random rate, and says little of which one it is: the rounded
+/// values say that.
+std::shared_ptr<SampleContender> Loop::likelier_rounded(const SampleChoice& choice, std::vector<std::string>& tied) {
+    if (!rounded_.drawn() || !choice.other_random) return choice.chosen;
+    const auto value = [&](const SampleContender& contender) {
+        return score(*rounded_.draw(contender.fit, draws_of_step)).log_likelihood;
+    };
+    const double gain = value(*choice.other_random) - value(*choice.chosen);
+    const bool other = gain > 0.0;
+    const std::string& instead = (other ? choice.chosen : choice.other_random)->candidate.effect;
+    std::erase(tied, other ? choice.other_random->candidate.effect : instead);
+    if (std::abs(gain) < tie) tied.push_back(instead);
+    return other ? choice.other_random : choice.chosen;
+}
+
 /// Adds an effect to the model.
 void Loop::take(const SampleChoice& choice, Closure& closure) {
-    const SampleContender& best = *choice.chosen;
-    const std::string effect = best.candidate.effect;
     Step step;
-    step.effect = effect;
     step.p_value = choice.p_value;
     step.confounded_with = choice.confounded_with;
+    const SampleContender& best = *likelier_rounded(choice, step.confounded_with);
+    const std::string effect = best.candidate.effect;
+    step.effect = effect;
     for (const auto& [partner, names] : now_.of_partners) {
         if (partner != effect) continue;
         for (const std::string& name : names) {

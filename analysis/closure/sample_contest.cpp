@@ -435,6 +435,12 @@ SampleChoice Contest::choose() {
         return account.members.size() == 1 && beside_each_other(*choice.chosen, *account.members.front());
     });
     tie(*best, as_likely, choice);
+    if (is_random_rate(choice.chosen->candidate.effect)) {
+        const auto other = std::find_if(all.begin(), all.end(), [&](const Shared& c) {
+            return is_random_rate(c->candidate.effect) && c->candidate.effect != choice.chosen->candidate.effect;
+        });
+        if (other != all.end()) choice.other_random = *other;
+    }
     const double from_hz = choice.chosen->fit->model().noise.from_hz;
     for (const Account& account : as_likely) {
         const double hz = account.members.front()->fit->model().noise.from_hz;

@@ -95,9 +95,9 @@ TEST(LongClosureSampleSuite, AStepIsPlacedBesideWhatIsAddedWithIt) {
 
 // Beside so strong a walk a step is forgotten within less than there is between the places that are searched at first.
 TEST(LongClosureSampleSuite, AStepBesideAStrongWalkIsFound) {
-    expect_all_named("angles, dither declared", 20587,
-                     {{"rate_random_walk", {{"deg_h_rt_h", 59.581}}},
-                      {"bias_step", {{"step_deg_h", -16.551}, {"time_s", 155.6}}}});
+    expect_all_named(
+        "angles, dither declared", 20587,
+        {{"rate_random_walk", {{"deg_h_rt_h", 59.581}}}, {"bias_step", {{"step_deg_h", -16.551}, {"time_s", 155.6}}}});
 }
 
 // A random rate follows all three better than the likeliest two; what it leaves is a line and more.
@@ -106,6 +106,26 @@ TEST(LongClosureSampleSuite, WhatARandomRateDoesNotFollowIsTriedWithoutOne) {
                      {{"base_vibration", {{"frequency_hz", 0.79619}, {"phase_rad", -0.4207}, {"rate_deg_h", 12.189}}},
                       {"bias_ramp", {{"deg_h_per_h", 609.06}}},
                       {"bias_step", {{"step_deg_h", 31.2}, {"time_s", 98.433}}}});
+}
+
+// What the witness left of the motion was fitted where the walk was noise: beside the walk it left structure, and
+// nothing but the motion was named.
+TEST(LongClosureSampleSuite, AMotionIsToldAnewBesideAWalk) {
+    expect_all_named("fine digits, accelerometers", 20592,
+                     {{"bias_step", {{"step_deg_h", 5.1547}, {"time_s", 82.778}}},
+                      {"rate_random_walk", {{"deg_h_rt_h", 21.281}}},
+                      {"case_motion",
+                       {{"centre_hz", 2.9523},
+                        {"coherence", 0.89455},
+                        {"rms_arcsec", 0.43175},
+                        {"width_hz", 0.77767},
+                        {"witness", 0.0}}}});
+}
+
+// Drawn by a model without either, what was rounded to steps of eight times the noise was likelier of a walk.
+TEST(LongClosureSampleSuite, AFlickerBeneathLargeStepsIsNoWalk) {
+    expect_all_named("accelerometers", 20623,
+                     {{"count_quantization", {{"step_arcsec", 2.4441}}}, {"bias_instability", {{"deg_h", 2.8212}}}});
 }
 
 // A bias of two states, 3 deg/h apart, was called bias_instability.
