@@ -234,32 +234,33 @@ void settle(SampleCase& of) {
     // A random rate may by chance do next to nothing in one record: the middle one of three, of other noise.
     const bool random =
         std::any_of(of.truth.begin(), of.truth.end(), [](const Added& added) { return is_random(added.effect); });
-    const std::size_t fits = random ? 3 : 1;
+    constexpr int rounds = 4;
+    constexpr std::uint64_t other_noise = 7919;
     SampleCase at = of;
-    for (int round = 0; round < 4; ++round) {
+    std::vector<std::vector<double>> last(of.truth.size());
+    for (int round = 0; round < rounds; ++round) {
         double moved = 0.0;
-        std::vector<Closure> fitted;
-        for (std::size_t j = 0; j < fits; ++j) {
-            SampleCase other = at;
-            other.seed += j * 7919;
-            fitted.push_back(ringlock::closure::fit_samples(make(other), known(other.truth)));
-        }
+        const Closure closure = ringlock::closure::fit_samples(make(at), known(at.truth));
         for (std::size_t k = 0; k < at.truth.size(); ++k) {
             const std::string& effect = at.truth[k].effect;
             if (!has_size(effect)) continue;
             double& size = at.truth[k].values.at(size_of(effect));
             const double before = size;
-            if (effect == "case_motion") {
-                if (round == 0) size = limit_of_motion(at, k);
-            } else {
-                std::vector<double> sizes;
-                for (const Closure& closure : fitted) sizes.push_back(size_at_limit(effect, before, closure, k));
-                std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(fits / 2), sizes.end());
-                size = sizes[fits / 2];
+            if (effect != "case_motion") {
+                size = size_at_limit(effect, before, closure, k);
+            } else if (round == 0) {
+                size = limit_of_motion(at, k);
             }
             moved = std::max(moved, std::abs(std::log(size / before)));
+            if (round > 0) last[k].push_back(size);
         }
-        if (moved < 0.1) break;
+        if (random) at.seed += other_noise;
+        if (!random && moved < 0.1) break;
+    }
+    for (std::size_t k = 0; k < at.truth.size() && random; ++k) {
+        if (last[k].empty()) continue;
+        std::sort(last[k].begin(), last[k].end());
+        at.truth[k].values.at(size_of(at.truth[k].effect)) = last[k][last[k].size() / 2];
     }
     for (std::size_t k = 0; k < of.truth.size(); ++k) {
         if (!has_size(of.truth[k].effect)) continue;
