@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <stdexcept>
 
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
@@ -79,6 +80,7 @@ std::array<std::vector<double>, 3> amplitude_by(const AmplitudeSwing& swing, con
 
 TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows, Effects effects)
     : model_(&model), parameters_(start), rows_(std::move(rows)), effects_(effects), nuisance_(2 + drift_terms, 0.0) {
+    if (rows_.size() != model.series().size()) throw std::logic_error("TurnFit: not as many rows as turns");
     if (parameters_.bias_deg_h == 0.0) parameters_.bias_deg_h = model.series().mean_rate_deg_h;
     prediction_ = model_->predict(parameters_);
     columns_ = columns(prediction_);

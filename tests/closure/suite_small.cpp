@@ -208,7 +208,7 @@ TEST(ClosureSuite, OneSummitOfTheLikelihoodWhateverTheStart) {
                 start.readout_sd_rad = 0.005;
                 start.threshold_deg_h = 300.0;
             }
-            const auto fitted = ringlock::closure::fit_record(record, start, ringlock::closure::Rows(turns, 1));
+            const auto fitted = ringlock::closure::fit_record(record, start, ringlock::closure::Rows(record.turns->size(), 1));
             found.push_back(fitted->fit->log_likelihood());
         }
         const double highest = *std::max_element(found.begin(), found.end());
