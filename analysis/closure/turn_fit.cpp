@@ -422,11 +422,12 @@ ReadingErrors TurnFit::reading_errors() const {
     constexpr double matters = 1e-4;
     const double readout_rad2 = parameters_.readout_sd_rad * parameters_.readout_sd_rad;
     if (parameters_.injected_sd_rad > parameters_.readout_sd_rad) return {};
-    auto [mean_rad, variance_rad2] = whitening_->reading_errors(rest_);
-    const double left_rad2 =
-        std::accumulate(variance_rad2.begin(), variance_rad2.end(), 0.0) / static_cast<double>(variance_rad2.size());
-    if (left_rad2 * matters > 0.5 * readout_rad2 * readout_rad2) return {};
-    return {std::move(mean_rad), left_rad2};
+    ReadingErrors errors = whitening_->reading_errors(rest_);
+    const auto& left_rad2 = errors.variance_rad2;
+    const double mean_rad2 =
+        std::accumulate(left_rad2.begin(), left_rad2.end(), 0.0) / static_cast<double>(left_rad2.size());
+    if (mean_rad2 * matters > 0.5 * readout_rad2 * readout_rad2) return {};
+    return errors;
 }
 
 void TurnFit::finish() {

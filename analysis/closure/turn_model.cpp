@@ -36,7 +36,11 @@ bool told_by_other_columns(const effects::Effect& effect) {
 
 TurnModel::TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad, ReadingErrors known)
     : series_(series), phase_rad_(phase_rad), known_(std::move(known)) {
-    if (known_.mean_rad.empty()) known_ = {std::vector<double>(phase_rad.size()), std::pow(series.radius_sd_rad, 2)};
+    if (known_.mean_rad.empty()) {
+        known_.mean_rad.assign(phase_rad.size(), 0.0);
+        known_.variance_rad2.assign(phase_rad.size(), std::pow(series.radius_sd_rad, 2));
+        for (std::size_t i = 0; i < series.readout.size(); ++i) known_.variance_rad2[i] *= series.readout[i];
+    }
     for (std::size_t i = 0; i < phase_rad.size(); ++i) {
         turned_.push_back(std::polar(1.0, phase_rad[i] - known_.mean_rad[i]));
     }
@@ -283,13 +287,11 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         const TurnKicks::Kick& kick = (*kick_of)[i];
         const double before = 1.0 / std::sqrt(swing[i > 0 ? i - 1 : i]);
         const double after = 1.0 / std::sqrt(swing[i]);
-        // Straight lines to what was read, of which the filter knows, and the mean over what is not known: that is by the
-        // radii, which no fit changes.
-        const double left_rad2 = known_.left_rad2 * frame.readout_at(i);
-        double before_rad =
-            kick.before_rad + known_.mean_rad[i] * kick.before_slope + 0.5 * left_rad2 * kick.before_curvature;
-        double after_rad =
-            kick.after_rad + known_.mean_rad[i] * kick.after_slope + 0.5 * left_rad2 * kick.after_curvature;
+        // Straight lines to what was read, of which the filter knows, and the mean over what is not known.
+        const double error_rad = known_.mean_rad[i];
+        const double half_rad2 = 0.5 * known_.variance_rad2[i];
+        double before_rad = kick.before_rad + error_rad * kick.before_slope + half_rad2 * kick.before_curvature;
+        double after_rad = kick.after_rad + error_rad * kick.after_slope + half_rad2 * kick.after_curvature;
         before_rad *= before;
         after_rad *= after;
         const std::size_t last = i > 0 ? i - 1 : 0;

@@ -49,17 +49,11 @@ struct TurnParameters {
 /// detectors, the counter.
 bool told_by_other_columns(const effects::Effect& effect);
 
-/// What the reading added to each phase, where that is known, and the mean variance that is left of it.
-struct ReadingErrors {
-    std::vector<double> mean_rad;
-    double left_rad2 = 0.0;
-};
-
 /// The phases that parameters foretell for the turns of a record, chance apart.
 class TurnModel {
    public:
     /// Series and phases are kept by reference. What the lock-in adds is taken for linear in the phase about the one
-    /// that was read, or about that less the reading's errors, where they are known.
+    /// that was read, less what is known of the reading's errors; nothing but their scatter by the radii where not given.
     TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad, ReadingErrors known = {});
 
     struct Prediction {

@@ -110,7 +110,7 @@ std::vector<double> Whitening::apply(std::span<const double> series) const {
     return out;
 }
 
-Whitening::ReadingErrors Whitening::reading_errors(std::span<const double> series) const {
+ReadingErrors Whitening::reading_errors(std::span<const double> series) const {
     constexpr int most = FilterNoises::most_states;
     using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most, 1>;
     using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most, most>;

@@ -42,6 +42,12 @@ struct TurnFrame {
     double readout_at(std::size_t turn) const { return readout.empty() ? 1.0 : readout[turn]; }
 };
 
+/// What the reading is thought to have added to each phase, and the variance of what it may have added beside, turn by
+/// turn.
+struct ReadingErrors {
+    std::vector<double> mean_rad, variance_rad2;
+};
+
 /// The Kalman filter that turns phases into innovations, independent and of unit variance where the noise is as said.
 ///
 /// Lock-in is computed from phases that were read, z; what the reading's error v makes of it is in the filter: it
@@ -65,11 +71,8 @@ class Whitening {
 
     /// Innovations over their standard deviations. Linear in `series`: columns of a regression go the same way.
     std::vector<double> apply(std::span<const double> series) const;
-    /// What the reading added to each phase, by all phases that leave this series (Durbin and Koopman, "Time Series
-    /// Analysis by State Space Methods", 2nd ed. 2012, section 4.5), and its variance that is left, both turn by turn.
-    struct ReadingErrors {
-        std::vector<double> mean_rad, variance_rad2;
-    };
+    /// What all phases that leave this series tell of the reading's errors (Durbin and Koopman, "Time Series Analysis by
+    /// State Space Methods", 2nd ed. 2012, section 4.5).
     ReadingErrors reading_errors(std::span<const double> series) const;
     /// Standard deviation of each innovation [rad].
     const std::vector<double>& sd_rad() const { return sd_; }
