@@ -75,7 +75,7 @@ class Loop {
     void go_without_random(Closure& closure);
     bool restore();
     void take_lattice(Closure& closure);
-    std::shared_ptr<SampleContender> likelier_rounded(const SampleChoice& choice, std::vector<std::string>& tied);
+    bool other_is_likelier(const SampleChoice& choice, Step& step);
     void take(const SampleChoice& choice, Closure& closure);
     void take_back_lines(Closure& closure);
     void move_case(SampleStep& told, SampleFit::Noise noise);
@@ -409,18 +409,23 @@ void Loop::add_all(Closure& closure, bool random_rates) {
 }
 
 /// What was rounded was drawn by the model without a random rate, and says little of which one it is: the rounded
-/// values say that.
-std::shared_ptr<SampleContender> Loop::likelier_rounded(const SampleChoice& choice, std::vector<std::string>& tied) {
-    if (!rounded_.drawn() || !choice.other_random) return choice.chosen;
-    const auto value = [&](const SampleContender& contender) {
-        return score(*rounded_.draw(contender.fit, draws_of_step)).log_likelihood;
-    };
-    const double gain = value(*choice.other_random) - value(*choice.chosen);
+/// values say that. Tells whether it is the other one; the fit to what was drawn last is the likelier's.
+bool Loop::other_is_likelier(const SampleChoice& choice, Step& step) {
+    now_.fit = choice.chosen->fit;
+    if (!rounded_.drawn() || !choice.other_random) return false;
+    const auto drawn = rounded_.draw(choice.chosen->fit, draws_of_step);
+    const double without = score(*drawn).log_likelihood;
+    now_.fit = rounded_.draw(choice.other_random->fit, draws_of_step);
+    const double gain = score(*now_.fit).log_likelihood - without;
     const bool other = gain > 0.0;
-    const std::string& instead = (other ? choice.chosen : choice.other_random)->candidate.effect;
-    std::erase(tied, other ? choice.other_random->candidate.effect : instead);
-    if (std::abs(gain) < tie) tied.push_back(instead);
-    return other ? choice.other_random : choice.chosen;
+    if (!other) now_.fit = rounded_.draw(drawn, 1);
+    const SampleCandidate& left = (other ? choice.chosen : choice.other_random)->candidate;
+    const SampleCandidate& taken = (other ? choice.other_random : choice.chosen)->candidate;
+    auto& tied = step.confounded_with;
+    std::erase_if(tied, [&](const std::string& name) { return name == left.effect || name == taken.effect; });
+    if (std::abs(gain) < tie) tied.push_back(left.effect);
+    if (other) step.p_value = taken.p_value;
+    return other;
 }
 
 /// Adds an effect to the model.
@@ -428,7 +433,8 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     Step step;
     step.p_value = choice.p_value;
     step.confounded_with = choice.confounded_with;
-    const SampleContender& best = *likelier_rounded(choice, step.confounded_with);
+    const SampleScore before = score(*now_.fit);
+    const SampleContender& best = other_is_likelier(choice, step) ? *choice.other_random : *choice.chosen;
     const std::string effect = best.candidate.effect;
     step.effect = effect;
     for (const auto& [partner, names] : now_.of_partners) {
@@ -440,8 +446,6 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     }
     now_.of_partners.insert(now_.of_partners.end(), choice.of_partners.begin(), choice.of_partners.end());
     if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
-    const SampleScore before = score(*now_.fit);
-    now_.fit = best.fit;
     drop_needless();
     move_anew();
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));

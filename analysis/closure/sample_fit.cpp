@@ -347,8 +347,25 @@ void SampleFit::fit_noise() {
         // What has just come into the model may have been most of the noise: far from there the likelihood is flat.
         SampleModel anew = model_;
         take_whites(anew.noise);
-        auto other = places_of(anew);
-        if (evaluate(at(other), rest_, *rows_) < evaluate(at(start), rest_, *rows_)) start = std::move(other);
+        double least = evaluate(at(start), rest_, *rows_);
+        const auto try_from = [&](const SampleModel& model) {
+            auto other = places_of(model);
+            const double value = evaluate(at(other), rest_, *rows_);
+            if (!(value < least)) return;
+            least = value;
+            start = std::move(other);
+        };
+        try_from(anew);
+        // Beside a rate that wanders neighbours are alike, and hide what is white: their differences show it.
+        const bool wanders = model_.walk || model_.flicker;
+        double squares = 0.0;
+        for (std::size_t i = 1; i < n; ++i) squares += std::pow(rest_[i] - rest_[i - 1], 2) / static_cast<double>(n);
+        for (const double share : {0.05, 0.5, 0.95}) {
+            if (!wanders) break;
+            anew.noise.angle_arcsec = std::sqrt(share * squares / 6.0);
+            anew.noise.rate_arcsec_rt_s = std::sqrt((1.0 - share) * squares / (2.0 * series_->interval_s));
+            try_from(anew);
+        }
     }
     if (!searched_ && (resampled || narrow)) {
         // The likelihood may have several tops: by a simplex on a part of the record first, from where it stopped until
