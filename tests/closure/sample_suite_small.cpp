@@ -75,13 +75,14 @@ TEST(ClosureSampleSuite, ARandomRateThatDoesNotHoldIsInNobodysWay) {
 }
 
 /// Several effects, all of which the loop names or ties with others.
-void expect_all_named(const std::string& under, std::uint64_t seed, const std::vector<Added>& truth) {
+void expect_all_named(const std::string& under, std::uint64_t seed, const std::vector<Added>& truth,
+                      double off_oracle = 1e-3) {
     const SampleCase of{
         .kind = Kind::several, .truth = truth, .multiple = 10.0, .condition = condition(under), .seed = seed};
     const Outcome outcome = judged(of);
     EXPECT_TRUE(outcome.judged == Judged::right || outcome.judged == Judged::tie)
         << outcome.verdict << " " << outcome.named << " " << outcome.where;
-    EXPECT_NEAR(outcome.after / outcome.oracle, 1.0, 1e-3);
+    EXPECT_NEAR(outcome.after / outcome.oracle, 1.0, off_oracle);
 }
 
 // Where the step explains most alone it is not: with ramp and scale factor's error it explained less there than a
@@ -122,10 +123,12 @@ TEST(LongClosureSampleSuite, AMotionIsToldAnewBesideAWalk) {
                         {"witness", 0.0}}}});
 }
 
-// Drawn by a model without either, what was rounded to steps of eight times the noise was likelier of a walk.
+// Drawn by a model without either, what was rounded to steps of eight times the noise was likelier of a walk. Errors of
+// fits to one draw and to the next are 5e-4 apart (rms of ten), those of loop and oracle so by the root of two.
 TEST(LongClosureSampleSuite, AFlickerBeneathLargeStepsIsNoWalk) {
+    constexpr double of_draws = 4.0 * 5e-4 * 1.4142;
     expect_all_named("accelerometers", 20623,
-                     {{"count_quantization", {{"step_arcsec", 2.4441}}}, {"bias_instability", {{"deg_h", 2.8212}}}});
+                     {{"count_quantization", {{"step_arcsec", 2.4441}}}, {"bias_instability", {{"deg_h", 2.8212}}}}, of_draws);
 }
 
 // A bias of two states, 3 deg/h apart, was called bias_instability.
