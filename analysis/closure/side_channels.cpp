@@ -1,7 +1,10 @@
 #include "analysis/closure/side_channels.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
+#include <utility>
 
 #include "analysis/closure/chance.hpp"
 #include "engine/core/units.hpp"
@@ -83,44 +86,97 @@ BlockMean block_mean(const std::vector<double>& series, const std::vector<std::u
     return mean;
 }
 
-/// Takes away what follows the phase at the turn, minima and maxima each by themselves, but for the means.
-/// Gives the rms of it.
-double free_of_phase(std::vector<double>& series, const std::vector<std::uint8_t>& valid, const TurnFit& fit) {
-    constexpr int harmonics = 4;
-    constexpr int columns = 2 + 4 * harmonics;
-    const auto& turns = fit.model().series();
+/// What follows the phase at a turn, by functions of it: minima and maxima each by themselves, and without its mean
+/// over all phases. Pulses of quarter fringes are what times and accelerations are made of. From one of them to the next
+/// such a function is smooth in the root of the distance to the pulse, to which the time to it goes.
+class PhaseFunctions {
+   public:
+    static constexpr Eigen::Index cells = 4;
+    static constexpr Eigen::Index powers = 5;
+    static constexpr Eigen::Index columns = 2 * cells * powers;
+
+    explicit PhaseFunctions(const TurnFit& fit) {
+        const auto& series = fit.model().series();
+        cell_.reserve(series.size());
+        root_.reserve(series.size());
+        for (std::size_t i = 0; i < series.size(); ++i) {
+            const double quarters = fit.model().phase_rad()[i] / quarter_rad;
+            const double below = std::floor(quarters);
+            const double share = series.direction[i] > 0 ? below + 1.0 - quarters : quarters - below;
+            const auto cell = static_cast<Eigen::Index>(std::fmod(below, 4.0) + 4.0) % 4;
+            cell_.push_back((series.direction[i] > 0 ? 0 : cells * powers) + cell * powers);
+            root_.push_back(std::sqrt(share));
+        }
+    }
+    /// Adds them at a turn, times that, to a row.
+    void add(std::size_t turn, double times, Eigen::Ref<Eigen::VectorXd> row) const {
+        add(cell_[turn], root_[turn], times, row);
+    }
+    /// Mean square over all phases of what has these coefficients: at minima, at maxima.
+    static std::array<double, 2> mean_squares(const Eigen::VectorXd& coefficients) {
+        constexpr int places = 16;  // of a cell
+        std::array<double, 2> sums{};
+        Eigen::VectorXd row(columns);
+        for (Eigen::Index cell = 0; cell < 2 * cells; ++cell) {
+            for (int k = 0; k < places; ++k) {
+                row.setZero();
+                add(cell * powers, std::sqrt((k + 0.5) / places), 1.0, row);
+                const double value = coefficients.dot(row);
+                sums[static_cast<std::size_t>(cell / cells)] += value * value / (cells * places);
+            }
+        }
+        return sums;
+    }
+
+   private:
+    static constexpr double quarter_rad = 0.5 * units::pi;
+
+    static void add(Eigen::Index cell, double root, double times, Eigen::Ref<Eigen::VectorXd> row) {
+        const Eigen::Index of_direction = cell / (cells * powers) * (cells * powers);
+        double power = 1.0;
+        for (Eigen::Index k = 0; k < powers; ++k, power *= root) {
+            row(cell + k) += times * power;
+            // Of a quarter of all phases each, over which the root to the k has a mean of 2/(k + 2).
+            const double mean = 0.5 / static_cast<double>(k + 2);
+            for (Eigen::Index other = 0; other < cells; ++other) row(of_direction + other * powers + k) -= times * mean;
+        }
+    }
+
+    std::vector<Eigen::Index> cell_;  ///< where its functions begin
+    std::vector<double> root_;
+};
+
+/// What follows the phases, by functions of those of these turns beside each, with such weights: coefficients.
+using Beside = std::span<const std::pair<int, double>>;
+Eigen::VectorXd take_phase(std::vector<double>& series, const std::vector<std::uint8_t>& valid, const TurnFit& fit,
+                           const PhaseFunctions& functions, Beside turns) {
+    constexpr Eigen::Index columns = 2 + PhaseFunctions::columns;
     const std::size_t n = series.size();
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(columns);
     Eigen::VectorXd row(columns);
     const auto fill = [&](std::size_t i) {
         row.setZero();
-        const int parity = turns.direction[i] > 0 ? 0 : 1;
-        row(parity) = 1.0;
-        for (int k = 1; k <= harmonics; ++k) {
-            const double angle = k * fit.model().phase_rad()[i];
-            row(2 + 4 * (k - 1) + 2 * parity) = std::cos(angle);
-            row(2 + 4 * (k - 1) + 2 * parity + 1) = std::sin(angle);
+        for (const auto& [offset, weight] : turns) {
+            functions.add(i + static_cast<std::size_t>(offset), weight, row.tail<PhaseFunctions::columns>());
         }
     };
     for (std::size_t i = 0; i < n; ++i) {
         if (!valid[i] || !fit.rows()[i]) continue;
         fill(i);
-        normal += row * row.transpose();
+        // The mean of minima and that of maxima stay.
+        row(fit.model().series().direction[i] > 0 ? 0 : 1) = 1.0;
+        normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
         right += row * series[i];
     }
     normal.diagonal().array() += 1e-9 * normal.trace();
-    const Eigen::VectorXd c = normal.ldlt().solve(right);
-    double squares = 0.0;
+    const Eigen::VectorXd c = normal.selfadjointView<Eigen::Lower>().ldlt().solve(right);
     for (std::size_t i = 0; i < n; ++i) {
         if (!valid[i]) continue;
         fill(i);
-        row(0) = row(1) = 0.0;
-        const double taken = c.dot(row);
-        series[i] -= taken;
-        squares += taken * taken;
+        series[i] -= c.dot(row);
     }
-    return std::sqrt(squares / static_cast<double>(n));
+    return c.tail<PhaseFunctions::columns>();
 }
 
 /// w t of the two pulses of quarter fringes next to a turn.
@@ -263,8 +319,13 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
         valid[i] = 1;
     }
     // Clocks that find the zero-rate point from pulses do not follow the lock-in's shift of it all the way.
-    const double followed_s = free_of_phase(late, valid, fit);
-    // Beneath: what the approximations of turn times leave, 1e-7 of an asymmetry, a twentieth of what they do not
+    const PhaseFunctions functions(fit);
+    const std::array<std::pair<int, double>, 3> neighbours{{{-1, 1.0}, {0, 2.0}, {1, 1.0}}};
+    const Eigen::VectorXd of_late = take_phase(late, valid, fit, functions, neighbours);
+    const auto [at_minima_s2, at_maxima_s2] = PhaseFunctions::mean_squares(of_late);
+    // Of a turn and of both beside it.
+    const double followed_s = std::sqrt(3.0 * (at_minima_s2 + at_maxima_s2));
+    // Beneath: what the approximations of turn times leave, 1e-7 of an asymmetry, a fiftieth of what they do not
     // follow, and what they would not of a rotation: middles between pulses lie off by w^2 t^2/6 of the shift.
     double mean_share = 0.0;
     const auto share_at = [&](std::size_t i) {
@@ -273,7 +334,7 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     };
     for (std::size_t i = 0; i < n; ++i) mean_share += share_at(i) / static_cast<double>(n);
     const double least_s =
-        std::hypot(5e-8 * series.interval_s, 0.05 * followed_s, mean_share / (series.amplitude_rad * w));
+        std::hypot(5e-8 * series.interval_s, 0.02 * followed_s, mean_share / (series.amplitude_rad * w));
     DitherShape shape{block_mean(late, valid, fit.rows(), least_s), {}, {}};
     std::vector<double> sides(n, 0.0);
     std::vector<double> minima(n, 0.0);
@@ -310,10 +371,18 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
         const double least_sides = of_jerk * moved;
         const double least_ratio = 1e-5 + std::max({std::abs(ellipse.gain), std::abs(ellipse.offset_sin),
                                                     std::abs(ellipse.offset_cos), std::abs(ellipse.orthogonality_rad)});
-        free_of_phase(sides, valid, fit);
-        free_of_phase(minima, valid, fit);
+        const std::array<std::pair<int, double>, 1> itself{{{0, 1.0}}};
+        const auto [at_minima, at_maxima] =
+            PhaseFunctions::mean_squares(take_phase(sides, valid, fit, functions, itself));
+        take_phase(minima, valid, fit, functions, itself);
+        // Of second order in the lock-in, the mean over all phases is no longer nothing (docs/closure.md): accelerations
+        // come out too small on both sides.
+        constexpr double second_order = 0.145;
+        const double smaller = second_order * (at_minima - at_maxima);
+        const double least_turns = std::hypot(least_ratio, 0.5 * smaller);
         shape.sides = block_mean(sides, valid, fit.rows(), std::hypot(least_ratio, least_sides));
-        shape.turns = block_mean(minima, valid, fit.rows(), least_ratio);
+        shape.turns = block_mean(minima, valid, fit.rows(), least_turns);
+        shape.turns->value += smaller;
     }
     return shape;
 }

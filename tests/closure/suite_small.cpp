@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/closure/side_channels.hpp"
 #include "analysis/closure/turn_contest.hpp"
 #include "analysis/closure/two_levels.hpp"
 #include "tests/closure/suite.hpp"
@@ -125,6 +126,45 @@ TEST(ClosureSuite, ADetectorsPhaseIsFoundAlongWithTheThreshold) {
     const Outcome outcome = judged({of}).front();
     EXPECT_EQ(outcome.judged, Judged::tie) << outcome.verdict << " " << outcome.named;
     EXPECT_EQ(outcome.named, "detector_phase_offset~lockin_second_harmonic");
+}
+
+/// What the columns beside the phase tell of the dither's shape in the record of a case.
+ringlock::closure::DitherShape shape_of(const Case& of) {
+    const record::Record record = make({&of, 1}).front();
+    const auto fitted = ringlock::closure::fit_record(record, {}, ringlock::closure::Rows(record.turns->size(), 1));
+    return ringlock::closure::dither_shape(*record.turns, *fitted->fit);
+}
+
+// A gyro that moves and whose turns do not meet all phases alike: what times and accelerations follow of the phase, by
+// pulses of quarter fringes, was not all taken away, and a second harmonic was called an asymmetry.
+TEST(ClosureSuite, AShapeOfTheDitherIsNotCalledAnother) {
+    Case of{.kind = Kind::single, .truth = {}, .multiple = 30.0, .condition = &conditions[2], .seed = 1887};
+    of.truth = {{"dither_second_harmonic", {{"ratio", 6.3363e-4}, {"phase_rad", 1.3093}}}};
+    EXPECT_EQ(of.condition->injected_rad, 0.0);
+    EXPECT_TRUE(of.condition->moving);
+    const auto shape = shape_of(of);
+    const double sine = 6.3363e-4 * std::sin(1.3093);
+    EXPECT_NEAR(shape.sides->value, -shape.sides_by_sine * sine, 4.0 * shape.sides->sd);
+    EXPECT_LT(shape.sides->sd, 2e-5);
+    EXPECT_NEAR(shape.turns->value, 6.3363e-4 * std::cos(1.3093), 4.0 * shape.turns->sd);
+    EXPECT_LT(shape.turns->sd, 5e-5);
+    const Outcome outcome = judged({of}).front();
+    EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named;
+}
+
+// A lock-in of which much is at minima makes their accelerations smaller, of second order.
+TEST(ClosureSuite, AStrongLockInIsNoShapeOfTheDither) {
+    Case of{.kind = Kind::several, .truth = {}, .multiple = 5.0, .condition = &other_gyro, .seed = 2092};
+    of.truth = {{"missed_counts", {{"probability_per_turn", 0.0053584}}},
+                {"bias_temperature", {{"deg_h_per_k", 0.062808}}},
+                {"lockin_turn_asymmetry", {{"ratio", 0.085593}}}};
+    const Outcome outcome = judged({of}).front();
+    EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named;
+    // Detectors of 2 % noise: times that do not follow the lock-in all the way were not those of the phase.
+    const Case plain{.kind = Kind::other, .truth = {}, .multiple = 0.0, .condition = &other_gyro, .seed = 1998};
+    const auto shape = shape_of(plain);
+    EXPECT_LT(std::abs(shape.late_s.value), 3.0 * shape.late_s.sd);
+    EXPECT_EQ(judged({plain}).front().verdict, "nothing_missing");
 }
 
 TEST(LongClosureSuite, ASecondHarmonicIsFollowedToItsSummit) {
