@@ -42,7 +42,7 @@ struct SampleChoice {
     std::vector<std::string> confounded_with;
     /// Where it was chosen with others that are added next: what else explains the record as well, by their names.
     std::vector<std::pair<std::string, std::vector<std::string>>> of_partners;
-    std::vector<double> other_hz;  ///< rates that explain a resampled record as well
+    std::vector<double> other_hz;                        ///< rates that explain a resampled record as well
     std::shared_ptr<SampleContender> other_random = {};  ///< the likeliest other random rate, where one is chosen
 };
 

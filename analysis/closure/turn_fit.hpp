@@ -66,8 +66,8 @@ class TurnFit {
     /// all of it shows.
     std::unique_ptr<TurnFit> with_less_noise() const;
 
-    /// What all phases together tell of the reading's errors, where that is enough for what the lock-in makes of them to
-    /// be linear about it, and not about the phases that were read; else none.
+    /// What all phases together tell of the reading's errors, where that is enough for what the lock-in makes of them
+    /// to be linear about it, and not about the phases that were read; else none.
     ReadingErrors reading_errors() const;
 
     const TurnModel& model() const { return *model_; }

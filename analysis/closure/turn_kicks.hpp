@@ -29,9 +29,12 @@ class TurnKicks {
         double before_weighted;                    ///< before, each harmonic by a weight in place of itself; else 0
 
         Kick plus(double times, const Kick& other) const {
-            return {before_rad + times * other.before_rad, after_rad + times * other.after_rad,
-                    before_slope + times * other.before_slope, after_slope + times * other.after_slope,
-                    before_curvature + times * other.before_curvature, after_curvature + times * other.after_curvature,
+            return {before_rad + times * other.before_rad,
+                    after_rad + times * other.after_rad,
+                    before_slope + times * other.before_slope,
+                    after_slope + times * other.after_slope,
+                    before_curvature + times * other.before_curvature,
+                    after_curvature + times * other.after_curvature,
                     before_weighted + times * other.before_weighted};
         }
     };

@@ -53,7 +53,8 @@ bool told_by_other_columns(const effects::Effect& effect);
 class TurnModel {
    public:
     /// Series and phases are kept by reference. What the lock-in adds is taken for linear in the phase about the one
-    /// that was read, less what is known of the reading's errors; nothing but their scatter by the radii where not given.
+    /// that was read, less what is known of the reading's errors; nothing but their scatter by the radii where not
+    /// given.
     TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad, ReadingErrors known = {});
 
     struct Prediction {

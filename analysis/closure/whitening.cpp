@@ -140,9 +140,9 @@ ReadingErrors Whitening::reading_errors(std::span<const double> series) const {
         const double told = innovations[i] / sd_[i] - gain.dot(after);
         const Vector weighed = weight * gain;
         errors.mean_rad[i] = readout * (through * told - kick * after(0));
-        errors.variance_rad2[i] =
-            readout - readout * readout * (through * through * (over + gain.dot(weighed)) + kick * kick * weight(0, 0) +
-                                           2.0 * through * kick * weighed(0));
+        errors.variance_rad2[i] = readout - readout * readout *
+                                                (through * through * (over + gain.dot(weighed)) +
+                                                 kick * kick * weight(0, 0) + 2.0 * through * kick * weighed(0));
         const Matrix on = step - gain * seen.transpose();
         after = (seen * told + step.transpose() * after).eval();
         weight = (over * seen * seen.transpose() + on.transpose() * weight * on).eval();

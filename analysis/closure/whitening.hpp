@@ -71,8 +71,8 @@ class Whitening {
 
     /// Innovations over their standard deviations. Linear in `series`: columns of a regression go the same way.
     std::vector<double> apply(std::span<const double> series) const;
-    /// What all phases that leave this series tell of the reading's errors (Durbin and Koopman, "Time Series Analysis by
-    /// State Space Methods", 2nd ed. 2012, section 4.5).
+    /// What all phases that leave this series tell of the reading's errors (Durbin and Koopman, "Time Series Analysis
+    /// by State Space Methods", 2nd ed. 2012, section 4.5).
     ReadingErrors reading_errors(std::span<const double> series) const;
     /// Standard deviation of each innovation [rad].
     const std::vector<double>& sd_rad() const { return sd_; }

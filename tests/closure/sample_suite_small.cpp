@@ -128,7 +128,8 @@ TEST(LongClosureSampleSuite, AMotionIsToldAnewBesideAWalk) {
 TEST(LongClosureSampleSuite, AFlickerBeneathLargeStepsIsNoWalk) {
     constexpr double of_draws = 4.0 * 5e-4 * 1.4142;
     expect_all_named("accelerometers", 20623,
-                     {{"count_quantization", {{"step_arcsec", 2.4441}}}, {"bias_instability", {{"deg_h", 2.8212}}}}, of_draws);
+                     {{"count_quantization", {{"step_arcsec", 2.4441}}}, {"bias_instability", {{"deg_h", 2.8212}}}},
+                     of_draws);
 }
 
 // A bias of two states, 3 deg/h apart, was called bias_instability.

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/closure/side_channels.hpp"
+#include "analysis/closure/dither_shape.hpp"
 #include "analysis/closure/turn_contest.hpp"
 #include "analysis/closure/two_levels.hpp"
 #include "tests/closure/suite.hpp"
@@ -248,7 +248,8 @@ TEST(ClosureSuite, OneSummitOfTheLikelihoodWhateverTheStart) {
                 start.readout_sd_rad = 0.005;
                 start.threshold_deg_h = 300.0;
             }
-            const auto fitted = ringlock::closure::fit_record(record, start, ringlock::closure::Rows(record.turns->size(), 1));
+            const auto fitted =
+                ringlock::closure::fit_record(record, start, ringlock::closure::Rows(record.turns->size(), 1));
             found.push_back(fitted->fit->log_likelihood());
         }
         const double highest = *std::max_element(found.begin(), found.end());
