@@ -142,8 +142,7 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
     }
     if (std::any_of(truths.begin(), truths.end(), kind(Kind::several, 0.0))) {
         const auto several = kind(Kind::several, 0.0);
-        row("other gyros with two or three effects of 5 to 30 times their limits, all named",
-            count(several, is(Judged::right)));
+        row("two or three effects of 5 to 30 times their limits, all named", count(several, is(Judged::right)));
         row("... ties that hold the truth", count(several, is(Judged::tie)));
         row("... not all of them", count(several, is(Judged::missed)));
         row("... `unexplained`", count(several, is(Judged::unexplained)));
