@@ -17,6 +17,11 @@ inline constexpr double level_of_residual = level - level_of_effects;
 /// Log-likelihoods that are closer tell nothing: a false model gains so much over the true one with a probability of
 /// exp(-4) at most.
 inline constexpr double tie = 4.0;
+/// A rate without a random part may be so much likelier than the random one that made it: all that has been seen of
+/// that was a ramp or a step, whose size is anything, where the other had to be as large as it happened to be.
+/// Simulated (test `RandomRates.MayLookLikeARamp`), a ramp is likelier than a true random walk by 4 in one record of
+/// twenty, by this in two of a thousand at most.
+inline constexpr double tie_with_random = 7.0;
 inline constexpr std::size_t most_steps = 8;
 inline constexpr std::size_t most_contenders = 5;
 

@@ -410,9 +410,12 @@ SampleChoice Contest::choose() {
         if (best == nullptr || account.members.size() < best->members.size()) best = &account;
     }
     if (best == nullptr) return {};
+    const bool slow = best->members.size() == 1 && !best->random() && is_slow(best->members.front()->candidate.effect);
+    const double least_random = slow ? std::max(0.0, best->merit - tie_with_random) : least;
     std::vector<Account> as_likely;
     for (const Account& account : accounts) {
-        if (account.merit > least) as_likely.push_back(account);
+        const bool may_be = account.members.size() == 1 && account.random() && account.merit > least_random;
+        if (account.merit > least || may_be) as_likely.push_back(account);
     }
     SampleChoice choice;
     // Of several, what most of those as likely have in them.

@@ -517,6 +517,15 @@ Choice choose(const record::Record& record, const Contest& contest, const Rows& 
         tied(account.first->candidate.effect);
         for (const Candidate& candidate : account.others) tied(candidate.effect);
     }
+    if (!best.others.empty() || !chosen->adds_angle() || is_random_rate(*chosen)) return choice;
+    for (const Contender& contender : contenders) {
+        const std::string name(contender.candidate.effect->name());
+        auto& tied = choice.confounded_with;
+        if (!is_random_rate(*contender.candidate.effect) || std::find(tied.begin(), tied.end(), name) != tied.end()) {
+            continue;
+        }
+        if (contender.merit > std::max(0.0, best.merit - tie_with_random)) tied.push_back(name);
+    }
     return choice;
 }
 

@@ -1,9 +1,13 @@
 // A small part of the bench of the closed loop (bench_closure.cpp), and what it stands on.
 #include <gmock/gmock.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
+#include <boost/random/mersenne_twister.hpp>
+#include <boost/random/normal_distribution.hpp>
 #include <cmath>
 
+#include "analysis/closure/decision.hpp"
 #include "analysis/closure/dither_shape.hpp"
 #include "analysis/closure/turn_contest.hpp"
 #include "analysis/closure/two_levels.hpp"
@@ -255,6 +259,47 @@ TEST(ClosureSuite, OneSummitOfTheLikelihoodWhateverTheStart) {
         const double highest = *std::max_element(found.begin(), found.end());
         for (const double other : found) EXPECT_NEAR(other, highest, 0.1) << seed;
     }
+}
+
+TEST(RandomRates, MayLookLikeARamp) {
+    // A random walk by its modes, of which the first is nearly a ramp: variances S/k^2 beside noise of one. The ramp
+    // takes the first as it is, the walk is likeliest at some S.
+    constexpr int modes = 40;
+    constexpr int draws = 20000;
+    constexpr double seen = 8.0;  // nats
+    constexpr int sizes = 60;
+    Eigen::MatrixXd taken(sizes, modes);
+    Eigen::VectorXd cost = Eigen::VectorXd::Zero(sizes);
+    for (int s = 0; s < sizes; ++s) {
+        for (int k = 0; k < modes; ++k) {
+            const double variance = 1.0 + std::exp(-3.0 + 0.25 * s) / ((k + 1.0) * (k + 1.0));
+            taken(s, k) = 0.5 * (1.0 - 1.0 / variance);
+            cost(s) += 0.5 * std::log(variance);
+        }
+    }
+    boost::random::mt19937_64 generator(2);
+    boost::random::normal_distribution<double> normal;
+    double most_by_four = 0.0;
+    for (const double size : {10.0, 20.0, 40.0, 80.0, 160.0}) {
+        double shown = 0.0;
+        double by_four = 0.0;
+        double by_more = 0.0;
+        Eigen::VectorXd squares(modes);
+        for (int draw = 0; draw < draws; ++draw) {
+            for (int k = 0; k < modes; ++k) {
+                squares(k) = (1.0 + size / ((k + 1.0) * (k + 1.0))) * std::pow(normal(generator), 2);
+            }
+            const double ramp = 0.5 * squares(0);
+            const double walk = std::max(0.0, (taken * squares - cost).maxCoeff());
+            if (std::max(ramp, walk) < seen) continue;
+            shown += 1.0;
+            by_four += ramp - walk > ringlock::closure::tie ? 1.0 : 0.0;
+            by_more += ramp - walk > ringlock::closure::tie_with_random ? 1.0 : 0.0;
+        }
+        EXPECT_LT(by_more / shown, ringlock::closure::level) << size;
+        most_by_four = std::max(most_by_four, by_four / shown);
+    }
+    EXPECT_NEAR(most_by_four, 0.05, 0.01);
 }
 
 TEST(TwoLevels, FindsTheCourseAndCountsItsJumps) {
