@@ -222,8 +222,6 @@ double TurnFit::objective(const TurnFrame& frame, const TurnParameters& paramete
 
 /// By what normal noise leaves, where the lock-in is not quite right yet: more than once.
 void TurnFit::shape_noise() {
-    // What is less than the readout's has none that could be seen.
-    if (parameters_.injected_sd_rad < parameters_.readout_sd_rad) return;
     const int passes = parameters_.shape ? 1 : 3;
     const auto& series = model_->series();
     for (int pass = 0; pass < passes; ++pass) {

@@ -347,8 +347,11 @@ Outcome judge(const SampleCase& of, const record::Record& record) {
         outcome.deviations.push_back({estimate.name, estimate.value, estimate.sd, off(estimate, value->second)});
     }
     for (const auto& step : closure.steps) {
+        // Which of two steps of one name it is cannot be said.
+        const auto named = std::count_if(closure.steps.begin(), closure.steps.end(),
+                                         [&](const auto& other) { return other.effect == step.effect; });
         for (const Added& added : of.truth) {
-            if (added.effect != step.effect) continue;
+            if (added.effect != step.effect || named > 1) continue;
             for (const Estimate& estimate : step.parameters) {
                 const auto value = added.values.find(estimate.name);
                 if (value == added.values.end() || !estimate.text.empty()) continue;
