@@ -6,6 +6,7 @@
 #include <boost/random/mersenne_twister.hpp>
 #include <boost/random/normal_distribution.hpp>
 #include <cmath>
+#include <numbers>
 
 #include "analysis/closure/decision.hpp"
 #include "analysis/closure/dither_shape.hpp"
@@ -154,6 +155,52 @@ TEST(ClosureSuite, AShapeOfTheDitherIsNotCalledAnother) {
     EXPECT_LT(shape.turns->sd, 5e-5);
     const Outcome outcome = judged({of}).front();
     EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named;
+}
+
+/// Logarithm of the acceleration, over the true one of 1, by the two pulses of quarter fringes on one side of a minimum
+/// where the phase stands still at psi: delta' = t + b (sin(psi + delta) - sin psi), by Runge and Kutta.
+double acceleration_by_pulses(double psi, double b, int side) {
+    constexpr double quarter = 0.5 * std::numbers::pi;
+    const double first = (std::ceil(psi / quarter) - psi / quarter) * quarter;
+    const double step = 1e-3 * side;
+    const auto rate = [&](double t, double delta) { return t + b * (std::sin(psi + delta) - std::sin(psi)); };
+    double t = 0.0;
+    double delta = 0.0;
+    double times[2];
+    for (std::size_t pulse = 0; pulse < 2;) {
+        const double k1 = rate(t, delta);
+        const double k2 = rate(t + 0.5 * step, delta + 0.5 * step * k1);
+        const double k3 = rate(t + 0.5 * step, delta + 0.5 * step * k2);
+        const double next = delta + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rate(t + step, delta + step * k3));
+        const double target = first + static_cast<double>(pulse) * quarter;
+        // Within a step the phase is as good as a parabola.
+        if (next >= target) {
+            const double r = k1 * side;
+            times[pulse++] = std::abs(t) + 2.0 * (target - delta) / (r + std::sqrt(r * r + 2.0 * (target - delta)));
+            continue;
+        }
+        delta = next;
+        t += step;
+    }
+    const double root = std::numbers::sqrt2 * (std::sqrt(first + quarter) - std::sqrt(first)) / (times[1] - times[0]);
+    return 2.0 * std::log(root);
+}
+
+// The 0.145 of dither_shape: turns is half the sum of a quarter of both logarithms over minima, less that over maxima.
+TEST(DitherShape, AccelerationsComeOutTooSmallOfSecondOrder) {
+    for (const double b : {0.1, 0.2}) {
+        constexpr int phases = 64;
+        double both = 0.0;
+        double sides = 0.0;
+        for (int k = 0; k < phases; ++k) {
+            const double psi = (k + 0.5) * 2.0 * std::numbers::pi / phases;
+            const double after = acceleration_by_pulses(psi, b, 1);
+            const double before = acceleration_by_pulses(psi, b, -1);
+            both += 0.5 * 0.25 * (after + before) / phases;
+            sides += std::pow(0.25 * (after - before), 2) / phases;
+        }
+        EXPECT_NEAR(both / sides, -0.145, 0.002) << b;
+    }
 }
 
 // A lock-in of which much is at minima makes their accelerations smaller, of second order.
