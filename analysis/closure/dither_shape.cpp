@@ -46,8 +46,8 @@ std::vector<double> rate_left(const TurnFit& fit, const TurnModel::Prediction& p
     return rate;
 }
 
-/// Mean and standard error of a series over the turns that count, from its means over stretches. Negative weights mark
-/// turns without a value.
+/// Mean and standard error of a series over the turns that count, from its means over stretches; `valid` marks
+/// turns that have a value.
 BlockMean block_mean(const std::vector<double>& series, const std::vector<std::uint8_t>& valid, const Rows& rows,
                      double floor) {
     const std::size_t n = series.size();
@@ -84,6 +84,14 @@ BlockMean block_mean(const std::vector<double>& series, const std::vector<std::u
     return mean;
 }
 
+constexpr double quarter_rad = 0.5 * units::pi;
+
+/// How far the pulses next to a turn are, on both sides of it, in quarters of a fringe.
+double quarters_to_pulse(int direction, double phase_rad) {
+    const double quarters = phase_rad / quarter_rad;
+    return direction > 0 ? std::floor(quarters) + 1.0 - quarters : quarters - std::floor(quarters);
+}
+
 /// What follows the phase at a turn, by functions of it: minima and maxima each by themselves, and without its mean
 /// over all phases. Pulses of quarter fringes are what times and accelerations are made of. From one of them to the
 /// next such a function is smooth in the root of the distance to the pulse, to which the time to it goes.
@@ -98,12 +106,10 @@ class PhaseFunctions {
         cell_.reserve(series.size());
         root_.reserve(series.size());
         for (std::size_t i = 0; i < series.size(); ++i) {
-            const double quarters = fit.model().phase_rad()[i] / quarter_rad;
-            const double below = std::floor(quarters);
-            const double share = series.direction[i] > 0 ? below + 1.0 - quarters : quarters - below;
-            const auto cell = static_cast<Eigen::Index>(std::fmod(below, 4.0) + 4.0) % 4;
+            const double phase_rad = fit.model().phase_rad()[i];
+            const auto cell = static_cast<Eigen::Index>(std::fmod(std::floor(phase_rad / quarter_rad), 4.0) + 4.0) % 4;
             cell_.push_back((series.direction[i] > 0 ? 0 : cells * powers) + cell * powers);
-            root_.push_back(std::sqrt(share));
+            root_.push_back(std::sqrt(quarters_to_pulse(series.direction[i], phase_rad)));
         }
     }
     /// Adds them at a turn, times that, to a row.
@@ -127,8 +133,6 @@ class PhaseFunctions {
     }
 
    private:
-    static constexpr double quarter_rad = 0.5 * units::pi;
-
     static void add(Eigen::Index cell, double root, double times, Eigen::Ref<Eigen::VectorXd> row) {
         const Eigen::Index of_direction = cell / (cells * powers) * (cells * powers);
         double power = 1.0;
@@ -187,10 +191,7 @@ struct PulseAngles {
     double first, second;
 
     PulseAngles(int direction, double phase_rad, double amplitude_rad) {
-        constexpr double quarter_rad = 0.5 * units::pi;
-        const double quarters = phase_rad / quarter_rad;
-        const double first_rad =
-            quarter_rad * (direction > 0 ? std::ceil(quarters) - quarters : quarters - std::floor(quarters));
+        const double first_rad = quarter_rad * quarters_to_pulse(direction, phase_rad);
         first = std::sqrt(2.0 * first_rad / amplitude_rad);
         second = std::sqrt(2.0 * (first_rad + quarter_rad) / amplitude_rad);
     }

@@ -124,7 +124,8 @@ TEST(LongClosureSampleSuite, AMotionIsToldAnewBesideAWalk) {
 }
 
 // Drawn by a model without either, what was rounded to steps of eight times the noise was likelier of a walk. Errors of
-// fits to one draw and to the next are 5e-4 apart (rms of ten), those of loop and oracle so by the root of two.
+// fits to one draw and to the next are 5e-4 apart (rms of ten, by hand), those of loop and oracle so by the root of
+// two.
 TEST(LongClosureSampleSuite, AFlickerBeneathLargeStepsIsNoWalk) {
     constexpr double of_draws = 4.0 * 5e-4 * 1.4142;
     expect_all_named("accelerometers", 20623,
