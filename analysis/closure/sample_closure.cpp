@@ -12,6 +12,7 @@
 #include "analysis/closure/sample_contest.hpp"
 #include "analysis/closure/sample_figures.hpp"
 #include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_known.hpp"
 #include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_rounded.hpp"
 #include "analysis/closure/sample_score.hpp"
@@ -525,66 +526,20 @@ void Loop::move_case(SampleStep& told, SampleFit::Noise noise) {
 Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
     Closure closure;
     begin(closure);
-    SampleModel model = now_.fit->model();
-    const double duration_s = static_cast<double>(series_.size()) * series_.interval_s;
-    SampleFit::Noise noise = SampleFit::Noise::near;
-    double from_hz = 0.0;
-    for (const ActiveEffect& active : effects) {
-        if (active.effect->name() == "resampling") from_hz = active.values.at("from_hz");
+    KnownEffects known = known_effects(*now_.fit, effects);
+    for (const SampleStep& told : known.told) {
+        Step& step = now_.steps.emplace_back();
+        step.effect = told.effect;
+        if (told.effect != "count_quantization") continue;
+        lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
+        used_step_ = lattice_.printed_arcsec;
+        step.parameters.push_back({told.effect, "step_arcsec", lattice_.step_arcsec, lattice_.step_sd_arcsec});
     }
-    if (from_hz > 0.0) model = resampled_from(*now_.fit, from_hz);
-    std::optional<std::size_t> moved;
-    for (const ActiveEffect& active : effects) {
-        const std::string effect(active.effect->name());
-        const int k = next_step_++;
-        SampleStep told{effect, k};
-        if (effect == "count_quantization") {
-            lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
-            used_step_ = lattice_.printed_arcsec;
-        } else if (is_line(effect)) {
-            const Alias shown = alias(active.values.at("frequency_hz"), from_hz > 0.0 ? from_hz : series_.rate_hz);
-            SampleLine line{shown.hz};
-            if (effect == "dither_residue") {
-                line.drift_hz_per_s = (shown.folded ? -1.0 : 1.0) * active.values.at("drift_hz_per_s");
-                line.drifts = line.drift_hz_per_s != 0.0;
-            }
-            add_line(model, series_, line, effect, k);
-        } else if (effect == "case_motion") {
-            const std::string name = std::string("accel_") + "xyz"[std::lround(active.values.at("witness"))];
-            for (std::size_t w = 0; w < series_.witnesses.size(); ++w) {
-                if (series_.witnesses[w].first == name) told.witness = w;
-            }
-            if (!series_.witnesses.empty()) moved = now_.told.size();
-        } else if (effect == "resampling") {
-            noise = SampleFit::Noise::free;
-        } else if (effect == "rate_random_walk") {
-            model.walk = true;
-            model.noise.walk_arcsec2_s3 = std::pow(active.values.at("deg_h_rt_h") / 60.0, 2);
-        } else if (effect == "bias_instability") {
-            model.flicker = true;
-            model.flicker_deg_h = active.values.at("deg_h");
-            model.noise.terms = flicker_terms(model.flicker_deg_h, 4.0 * series_.interval_s, duration_s);
-        } else if (effect == "bias_step") {
-            const double rows = (active.values.at("time_s") - series_.time_s[0] + series_.interval_s) * series_.rate_hz;
-            model.columns.push_back(step_column(
-                series_, static_cast<std::size_t>(std::clamp(rows, 1.0, static_cast<double>(series_.size() - 2)))));
-            model.columns.back().step = k;
-        } else {
-            for (SampleColumn& column : rate_columns(series_)) {
-                if (column.effect != effect) continue;
-                column.step = k;
-                model.columns.push_back(std::move(column));
-            }
-        }
-        now_.steps.emplace_back().effect = effect;
-        now_.told.push_back(told);
-        if (effect == "count_quantization") {
-            now_.steps.back().parameters.push_back(
-                {effect, "step_arcsec", lattice_.step_arcsec, lattice_.step_sd_arcsec});
-        }
+    now_.told = std::move(known.told);
+    now_.fit = std::make_shared<SampleFit>(series_, std::move(known.model), rows_, known.noise);
+    for (SampleStep& told : now_.told) {
+        if (told.effect == "case_motion" && !series_.witnesses.empty()) move_case(told, known.noise);
     }
-    now_.fit = std::make_shared<SampleFit>(series_, std::move(model), rows_, noise);
-    if (moved) move_case(now_.told[*moved], noise);
     if (series_.counted || used_step_ > 0.0) find_coarse_steps(closure);
     finish(closure);
     return closure;
