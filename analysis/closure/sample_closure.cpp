@@ -76,7 +76,7 @@ class Loop {
     void go_without_random(Closure& closure);
     bool restore();
     void take_lattice(Closure& closure);
-    bool other_is_likelier(const SampleChoice& choice, Step& step);
+    const SampleContender& take_likelier(const SampleChoice& choice, Step& step);
     void take(const SampleChoice& choice, Closure& closure);
     void take_back_lines(Closure& closure);
     void move_case(SampleStep& told, SampleFit::Noise noise);
@@ -410,23 +410,24 @@ void Loop::add_all(Closure& closure, bool random_rates) {
 }
 
 /// What was rounded was drawn by the model without a random rate, and says little of which one it is: the rounded
-/// values say that. Tells whether it is the other one; the fit to what was drawn last is the likelier's.
-bool Loop::other_is_likelier(const SampleChoice& choice, Step& step) {
+/// values say that. The likelier is taken, with the fit to what was drawn by it.
+const SampleContender& Loop::take_likelier(const SampleChoice& choice, Step& step) {
     now_.fit = choice.chosen->fit;
-    if (!rounded_.drawn() || !choice.other_random) return false;
+    if (!rounded_.drawn() || !choice.other_random) return *choice.chosen;
     const auto drawn = rounded_.draw(choice.chosen->fit, draws_of_step);
     const double without = score(*drawn).log_likelihood;
     now_.fit = rounded_.draw(choice.other_random->fit, draws_of_step);
     const double gain = score(*now_.fit).log_likelihood - without;
     const bool other = gain > 0.0;
     if (!other) now_.fit = rounded_.draw(drawn, 1);
-    const SampleCandidate& left = (other ? choice.chosen : choice.other_random)->candidate;
-    const SampleCandidate& taken = (other ? choice.other_random : choice.chosen)->candidate;
+    const SampleContender& taken = other ? *choice.other_random : *choice.chosen;
+    const SampleContender& left = other ? *choice.chosen : *choice.other_random;
     auto& tied = step.confounded_with;
-    std::erase_if(tied, [&](const std::string& name) { return name == left.effect || name == taken.effect; });
-    if (std::abs(gain) < tie) tied.push_back(left.effect);
-    if (other) step.p_value = taken.p_value;
-    return other;
+    std::erase_if(
+        tied, [&](const std::string& name) { return name == left.candidate.effect || name == taken.candidate.effect; });
+    if (std::abs(gain) < tie) tied.push_back(left.candidate.effect);
+    if (other) step.p_value = taken.candidate.p_value;
+    return taken;
 }
 
 /// Adds an effect to the model.
@@ -435,7 +436,7 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     step.p_value = choice.p_value;
     step.confounded_with = choice.confounded_with;
     const SampleScore before = score(*now_.fit);
-    const SampleContender& best = other_is_likelier(choice, step) ? *choice.other_random : *choice.chosen;
+    const SampleContender& best = take_likelier(choice, step);
     const std::string effect = best.candidate.effect;
     step.effect = effect;
     for (const auto& [partner, names] : now_.of_partners) {
