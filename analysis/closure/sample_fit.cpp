@@ -129,11 +129,11 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
     }
     filter_by(model_.noise);
     take_off();
-    if (noise != Noise::held) {
+    if (noise == Noise::near || noise == Noise::free) {
         fit_columns();
         fit_noise();
     }
-    fit_columns();
+    fit_columns(noise == Noise::all_held);
     finish();
 }
 
@@ -466,7 +466,8 @@ void SampleFit::find_settled(SampleNoise noise) {
     }
 }
 
-void SampleFit::fit_columns() {
+/// Their values, unless they are held, and the errors of these.
+void SampleFit::fit_columns(bool held) {
     // rest + columns = what was measured; a correction to each value.
     take_off();
     whitened_.clear();
@@ -499,7 +500,7 @@ void SampleFit::fit_columns() {
     const Eigen::MatrixXd covariance = solver.pseudoInverse();
     for (Eigen::Index a = 0; a < m; ++a) {
         auto& column = model_.columns[static_cast<std::size_t>(a)];
-        column.value += correction(a);
+        if (!held) column.value += correction(a);
         column.sd = std::sqrt(std::max(0.0, covariance(a, a))) / scale(a);
     }
     covariance_ = scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();

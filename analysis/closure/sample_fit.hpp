@@ -43,8 +43,8 @@ struct SampleModel {
 /// squares of what the filter makes of them.
 class SampleFit {
    public:
-    /// Noise as it is, from near where it will be, or from anywhere.
-    enum class Noise { held, near, free };
+    /// Noise and columns as they are; noise as it is, from near where it will be, or from anywhere.
+    enum class Noise { all_held, held, near, free };
     SampleFit(const SampleSeries& series, SampleModel model, const Rows& rows, Noise noise = Noise::free);
 
     const SampleSeries& series() const { return *series_; }
@@ -111,7 +111,7 @@ class SampleFit {
     Slope slope(const std::vector<double>& knobs, const Rows& rows, const std::vector<bool>& held) const;
     void score_noise(std::vector<double>& knobs, const Rows& rows, const std::vector<bool>& held) const;
     void fit_noise();
-    void fit_columns();
+    void fit_columns(bool held = false);
     void finish();
 
     const SampleSeries* series_;

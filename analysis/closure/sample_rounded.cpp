@@ -1,12 +1,12 @@
 #include "analysis/closure/sample_rounded.hpp"
 
 #include <algorithm>
-#include <boost/random/mersenne_twister.hpp>
-#include <boost/random/normal_distribution.hpp>
 #include <cmath>
 #include <utility>
 
+#include "analysis/closure/sample_rounded_summit.hpp"
 #include "analysis/closure/sample_unrounding.hpp"
+#include "engine/core/units.hpp"
 
 namespace ringlock::closure {
 
@@ -29,59 +29,52 @@ bool RoundedSamples::show(const SampleFit& fit, double step_arcsec) {
 }
 
 std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double step_arcsec) {
-    constexpr int rounds = 4;
+    constexpr int rounds = 2;
     constexpr int draws = 3;
     constexpr double least = 0.02;
+    constexpr std::size_t first_look = 6000;
+    constexpr int most_looks = 12;
     step_ = step_arcsec;
     SampleModel model = fit.model();
     double& angle = model.noise.angle_arcsec;
     angle = std::sqrt(std::max(angle * angle - variance_of_steps(step_), least * least * step_ * step_));
-    auto now = std::make_shared<SampleFit>(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
-    for (int round = 0; round < rounds; ++round) now = draw(with_likeliest_readings(*now), draws);
-    if (foretells_as_said(*now)) return now;
+    SampleFit now(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
+    // The rate's noise may have grown by what the rounding is on the way from one step to the next.
+    auto drawn = draw_by(towards_summit(now, measured_, step_, first_look, most_looks), fit.rows());
+    for (int round = 0; round < rounds; ++round) drawn = draw(std::move(drawn), draws);
+    if (foretells_as_said(*drawn)) return drawn;
     restore();
     return nullptr;
 }
 
+std::shared_ptr<SampleFit> RoundedSamples::draw_by(const SampleModel& model, const Rows& rows) {
+    const SampleFit by(series_, model, rows, SampleFit::Noise::all_held);
+    series_.increment = unround(by, measured_, step_, ++draws_);
+    return std::make_shared<SampleFit>(series_, model, rows, SampleFit::Noise::near);
+}
+
 std::shared_ptr<SampleFit> RoundedSamples::draw(std::shared_ptr<SampleFit> fit, int rounds) {
-    for (int round = 0; round < rounds; ++round) {
-        series_.increment = unround(*fit, measured_, step_, ++draws_);
-        fit = std::make_shared<SampleFit>(series_, fit->model(), fit->rows(), SampleFit::Noise::near);
-    }
-    return fit;
-}
-
-/// Log-likelihood of the rounded increments by the model, with one of its noises that many times less and more.
-RoundedSamples::Parabola RoundedSamples::along(const SampleFit& fit, double SampleNoise::*noise) const {
-    const auto likelihood = [&](double times) {
-        SampleModel model = fit.model();
-        model.noise.*noise *= times;
-        const SampleFit of(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
-        return score_of(of, of.rows()).log_likelihood;
-    };
-    const double less = likelihood(1.0 / times_along);
-    const double here = likelihood(1.0);
-    const double more = likelihood(times_along);
-    return {0.5 * (more - less), 2.0 * here - less - more};
-}
-
-/// Draws hardly move a noise of the readings that is small beside their steps: it is put where it makes the rounded
-/// increments most probable.
-std::shared_ptr<SampleFit> RoundedSamples::with_likeliest_readings(const SampleFit& fit) const {
-    constexpr double most = 2.0;
-    const Parabola of = along(fit, &SampleNoise::angle_arcsec);
-    const double powers = of.bend > 0.0 ? of.slope / of.bend : std::copysign(most, of.slope);
-    SampleModel model = fit.model();
-    model.noise.angle_arcsec *= std::pow(times_along, std::clamp(powers, -most, most));
-    return std::make_shared<SampleFit>(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
+    for (int round = 0; round < rounds; ++round) fit = draw_by(fit->model(), fit->rows());
+    return draw_by(find_summit(*fit, measured_, step_).model, fit->rows());
 }
 
 /// Whether the rounded increments are off what is foretold of them by as much as that says. Beside steps that are very
 /// large too few of the filters hit the moments at which the angle crosses them.
 bool RoundedSamples::foretells_as_said(const SampleFit& fit) const {
-    constexpr double about = 0.08;
-    const SampleScore score = score_of(fit, fit.rows());
-    return std::abs(score.error / score.floor - 1.0) < about;
+    constexpr double about = 0.16;
+    constexpr double by_chance = 3.0;
+    const Foretold foretold = foretell_rounded(fit, measured_, step_);
+    double off = 0.0;
+    double said = 0.0;
+    double of_squares = 0.0;
+    for (std::size_t i = 0; i < measured_.size(); ++i) {
+        if (!fit.rows()[i]) continue;
+        const double variance = foretold.variance[i];
+        off += std::pow(measured_[i] - foretold.mean[i], 2);
+        said += variance;
+        of_squares += foretold.fourth_moment[i] - variance * variance;
+    }
+    return std::abs(off - said) < about * said + by_chance * std::sqrt(of_squares);
 }
 
 SampleScore RoundedSamples::score_of(const SampleFit& fit, const Rows& reported) const {
@@ -104,24 +97,9 @@ SampleScore RoundedSamples::score_of(const SampleFit& fit, const Rows& reported)
 SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
                                          const std::function<SampleFigures(const SampleFit&)>& figures) {
     constexpr int several = 8;
-    boost::random::mt19937_64 generator(1);
-    boost::random::normal_distribution<double> normal;
-    const auto moved = [&](double value, double sd) {
-        // What is hardly known at all would be anywhere.
-        return value * std::exp(std::min(sd / value, 0.5) * normal(generator));
-    };
+    const RoundedSummit summit = find_summit(fit, measured_, step_);
     std::vector<SampleFigures> all;
-    SampleFit whole = fit;
-    for (int k = 0; k < several; ++k) {
-        SampleModel model = whole.model();
-        const SampleNoise errors = whole.noise_errors().noise;
-        model.noise.angle_arcsec = moved(model.noise.angle_arcsec, errors.angle_arcsec);
-        model.noise.rate_arcsec_rt_s = moved(model.noise.rate_arcsec_rt_s, errors.rate_arcsec_rt_s);
-        const SampleFit by(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
-        series_.increment = unround(by, measured_, step_, ++draws_);
-        whole = SampleFit(series_, whole.model(), fit.rows(), SampleFit::Noise::near);
-        all.push_back(figures(whole));
-    }
+    for (int k = 0; k < several; ++k) all.push_back(figures(*draw_by(summit.model, fit.rows())));
     SampleFigures mean = all.front();
     const auto combine = [&](const auto& of) {
         double sum = 0.0;
@@ -143,13 +121,30 @@ SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
             combine([s, k](SampleFigures& of) -> Estimate& { return of.steps[s][k]; });
         }
     }
-    // Draws that follow one another are alike: the white noises are as uncertain as the likelihood of what was rounded
-    // says.
+    // Draws by one model are less apart than models that would do.
+    const SampleNoise& noise = summit.model.noise;
+    const auto known_to = [&](Estimate& estimate, double value, std::size_t of) {
+        if (!std::isfinite(summit.noise_log_sd[of])) return;
+        estimate.value = value;
+        estimate.sd = std::max(estimate.sd, value * summit.noise_log_sd[of]);
+    };
     for (Estimate& estimate : mean.base) {
-        const bool angle = estimate.name == "white_angle_arcsec";
-        if (!angle && estimate.name != "white_rate_deg_rt_h") continue;
-        const double bend = along(fit, angle ? &SampleNoise::angle_arcsec : &SampleNoise::rate_arcsec_rt_s).bend;
-        if (bend > 0.0) estimate.sd = std::max(estimate.sd, estimate.value * std::log(times_along) / std::sqrt(bend));
+        if (estimate.name == "mean_rate_deg_h") estimate.sd *= summit.column_times.front();
+        if (estimate.name == "white_angle_arcsec") known_to(estimate, noise.angle_arcsec, 0);
+        if (estimate.name == "white_rate_deg_rt_h") {
+            known_to(estimate, noise.rate_arcsec_rt_s * units::deg_rt_h_per_arcsec_rt_s, 1);
+        }
+    }
+    for (std::size_t s = 0; s < mean.steps.size(); ++s) {
+        for (Estimate& estimate : mean.steps[s]) {
+            double times = 1.0;
+            for (std::size_t k = 0; k < summit.column_times.size(); ++k) {
+                if (summit.model.columns[k].effect == estimate.effect) times = std::max(times, summit.column_times[k]);
+            }
+            estimate.sd *= times;
+            if (estimate.effect == "bias_instability") known_to(estimate, summit.model.flicker_deg_h, 2);
+            if (estimate.effect == "rate_random_walk") known_to(estimate, 60.0 * std::sqrt(noise.walk_arcsec2_s3), 2);
+        }
     }
     return mean;
 }

@@ -26,21 +26,18 @@ class RoundedSamples {
     /// then.
     std::shared_ptr<SampleFit> begin(const SampleFit& fit, double step_arcsec);
     /// The same, drawn by another model: what was rounded is drawn by it and the model fitted to that, a stochastic
-    /// approximation of the likeliest (Celeux and Diebolt, Comput. Stat. Q. 2, 73, 1985).
+    /// approximation of the likeliest (Celeux and Diebolt, Comput. Stat. Q. 2, 73, 1985), which is then looked for by
+    /// what was rounded itself.
     std::shared_ptr<SampleFit> draw(std::shared_ptr<SampleFit> fit, int rounds);
     /// Of the measured increments.
     SampleScore score_of(const SampleFit& fit, const Rows& reported) const;
-    /// The mean of several, each of increments that were drawn with white noises as the draw before leaves them open;
-    /// what they are apart counted (Rubin, "Multiple Imputation for Nonresponse in Surveys", 1987, equation 3.1.5).
+    /// The mean of several, each of increments that were drawn by the likeliest model; what they are apart counted
+    /// (Rubin, "Multiple Imputation for Nonresponse in Surveys", 1987, equation 3.1.5), and how sharp the likelihood of
+    /// what was rounded is.
     SampleFigures figures_of(const SampleFit& fit, const std::function<SampleFigures(const SampleFit&)>& figures);
 
    private:
-    static constexpr double times_along = 1.4;
-    struct Parabola {
-        double slope, bend;  ///< a power of these times
-    };
-    Parabola along(const SampleFit& fit, double SampleNoise::*noise) const;
-    std::shared_ptr<SampleFit> with_likeliest_readings(const SampleFit& fit) const;
+    std::shared_ptr<SampleFit> draw_by(const SampleModel& model, const Rows& rows);
     bool foretells_as_said(const SampleFit& fit) const;
 
     SampleSeries& series_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/math/special_functions/erf.hpp>
 #include <boost/random/mersenne_twister.hpp>
+#include <boost/random/normal_distribution.hpp>
 #include <boost/random/uniform_01.hpp>
 #include <cmath>
 #include <limits>
@@ -72,6 +73,7 @@ class Mixture {
     const double step_;
     const std::size_t count_;
     boost::random::mt19937_64 generator_;
+    boost::random::normal_distribution<double> normal_;
     std::vector<double> no_noise_;
     std::size_t row_ = 0;
     double total_ = 0.0;       ///< of the rounded increments
@@ -138,6 +140,7 @@ void Mixture::draw_anew(std::uint8_t* parent) {
 
 void Mixture::go_on() {
     constexpr double impossible = 1e-250;
+    constexpr double far = 6.0;  // beyond that are 2e-9
     const double sd = filter_.sd(row_);
     total_ += rounded_[row_];
     double sum = 0.0;
@@ -145,12 +148,18 @@ void Mixture::go_on() {
     for (std::size_t p = 0; p < count_; ++p) {
         const double low = (total_ - 0.5 * step_ - foretold_[p]) / sd;
         const double high = low + step_ / sd;
-        const Between between(low, high);
-        nearest = std::min(nearest, between.distance());
-        const double z = std::clamp(between.draw(uniform()), low, high);
+        double z = 0.0;
+        if (low < -far && high > far) {
+            nearest = 0.0;
+            z = std::clamp(normal_(generator_), low, high);
+        } else {
+            const Between between(low, high);
+            nearest = std::min(nearest, between.distance());
+            z = std::clamp(between.draw(uniform()), low, high);
+            weight_[p] *= between.probability();
+        }
         filter_.take(row_, z * sd, state_[p]);
         drawn_[(row_ + 1) * count_ + p] = static_cast<float>((foretold_[p] + z * sd - total_) / step_);
-        weight_[p] *= between.probability();
         sum += weight_[p];
     }
     log_probability_ = sum > impossible ? std::log(sum) : -nearest;
@@ -171,8 +180,8 @@ void Mixture::foretell(Foretold& foretold) const {
         return upper_tail((total_ + (m - 0.5) * step_ - foretold_[p]) / sd);
     };
     for (std::size_t p = 0; p < count_; ++p) above[p] = tail(p, first);
+    std::vector<double> probabilities;
     double mean = 0.0;
-    double square = 0.0;
     for (double m = first; m <= last; m += 1.0) {
         double probability = 0.0;
         for (std::size_t p = 0; p < count_; ++p) {
@@ -181,10 +190,18 @@ void Mixture::foretell(Foretold& foretold) const {
             above[p] = next;
         }
         mean += probability * m * step_;
-        square += probability * m * m * step_ * step_;
+        probabilities.push_back(probability);
+    }
+    double variance = 0.0;
+    double fourth = 0.0;
+    for (std::size_t k = 0; k < probabilities.size(); ++k) {
+        const double square = std::pow((first + static_cast<double>(k)) * step_ - mean, 2);
+        variance += probabilities[k] * square;
+        fourth += probabilities[k] * square * square;
     }
     foretold.mean.push_back(mean);
-    foretold.variance.push_back(std::max(0.0, square - mean * mean));
+    foretold.variance.push_back(variance);
+    foretold.fourth_moment.push_back(fourth);
 }
 
 std::vector<double> Mixture::path() {
@@ -220,6 +237,18 @@ Foretold foretell_rounded(const SampleFit& fit, const std::vector<double>& round
         foretold.log_probability.push_back(mixture.log_probability());
     }
     return foretold;
+}
+
+double log_likelihood_of_rounded(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
+                                 std::size_t until) {
+    check_interrupt();
+    Mixture mixture(fit, rounded, step_arcsec, 0);
+    double sum = 0.0;
+    for (std::size_t k = 0; k < std::min(until, rounded.size()); ++k) {
+        mixture.go_on();
+        if (fit.rows()[k]) sum += mixture.log_probability();
+    }
+    return sum;
 }
 
 }  // namespace ringlock::closure

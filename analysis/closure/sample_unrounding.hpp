@@ -18,9 +18,13 @@ std::vector<double> unround(const SampleFit& fit, const std::vector<double>& rou
 
 /// Of each rounded increment, by those before it, as the same filters foretell it.
 struct Foretold {
-    std::vector<double> mean, variance, log_probability;
+    std::vector<double> mean, variance, fourth_moment, log_probability;
 };
 Foretold foretell_rounded(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec);
+
+/// Log-likelihood of the rounded increments up to that row, of those that count in the fit.
+double log_likelihood_of_rounded(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
+                                 std::size_t until);
 
 /// Whether steps are so large that their rounding shows the angle: the first harmonic of the rounding, of which noise
 /// of that standard deviation leaves exp(-2 pi^2 sd^2/step^2) (Widrow and Kollar, "Quantization Noise", 2008, chapter

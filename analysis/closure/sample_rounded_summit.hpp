@@ -1,0 +1,29 @@
+#pragma once
+#include <Eigen/Dense>
+#include <cstddef>
+#include <vector>
+
+#include "analysis/closure/sample_fit.hpp"
+
+/// Where the likelihood of rounded increments is largest, and how sharp it is there. Increments that are drawn within their
+/// steps hardly move a model where the steps hide most of what tells: each fit to them goes a small part of the way.
+namespace ringlock::closure {
+
+struct RoundedSummit {
+    SampleModel model;
+    /// Standard errors of the logarithms of the noises: white angle, white rate, random rate where there is one; not
+    /// finite where the increments say nothing of them.
+    std::vector<double> noise_log_sd;
+    /// Of each column, its standard error over that which it would have were the increments known.
+    std::vector<double> column_times;
+};
+
+/// Noises alone, from afar, by the increments up to that row.
+/// \param rounded  increments, whole multiples of `step_arcsec` [arcsec]
+SampleModel towards_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
+                           std::size_t until, int most_rounds);
+
+/// Noises and columns of a model that is near it.
+RoundedSummit find_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec);
+
+}  // namespace ringlock::closure
