@@ -37,7 +37,7 @@ double line_hz(const SampleModel& model, bool wanders) {
 constexpr double most_disturbed = 0.6;
 
 /// Of increments that were rounded, after every step.
-constexpr int draws_of_step = 4;
+constexpr int draws_of_step = 2;
 
 class Loop {
    public:
@@ -217,20 +217,11 @@ void Loop::find_coarse_steps(Closure& closure) {
     const bool blurred = lattice_.step_arcsec > 1.5 * lattice_.printed_arcsec;
     const double step = series_.counted ? counted_step() : blurred ? 0.0 : lattice_.step_arcsec;
     if (!RoundedSamples::show(*now_.fit, step)) return;
-    if (auto drawn = rounded_.begin(*now_.fit, step)) {
-        now_.fit = std::move(drawn);
-        closure.notes.push_back(
-            fmt::format("steps of {:.6g} arcsec are large beside the noise, and their rounding follows the angle: what "
-                        "was rounded is drawn by the model, and white_angle_arcsec is the noise before it was rounded",
-                        step));
-        return;
-    }
-    const std::string note = fmt::format(
-        "steps of {:.6g} arcsec are so large beside the noise that what they hide cannot be drawn: their "
-        "rounding is left in the residual",
-        step);
-    auto& notes = closure.notes;
-    if (std::find(notes.begin(), notes.end(), note) == notes.end()) notes.push_back(note);
+    now_.fit = rounded_.begin(*now_.fit, step);
+    closure.notes.push_back(
+        fmt::format("steps of {:.6g} arcsec are large beside the noise, and their rounding follows the angle: what "
+                    "was rounded is drawn by the model, and white_angle_arcsec is the noise before it was rounded",
+                    step));
 }
 
 SampleScore Loop::score(const SampleFit& fit) const {
@@ -275,6 +266,7 @@ void Loop::test_what_is_left(Closure& closure) const {
           still.share > 0.0 ? fmt::format("{:.1f} % of the record, most at {:.6g} s, {:.3g} times the usual variance",
                                           100.0 * still.share, still.at_s, still.worst)
                             : ""}});
+    if (rounded_.drawn()) views.push_back({rounded_.test(*now_.fit)});
     closure.tests.clear();
     for (const View& view : views) closure.tests.push_back(view.test);
     closure.unexplained.reset();

@@ -1,9 +1,12 @@
 #include "analysis/closure/sample_rounded.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "analysis/closure/chance.hpp"
 #include "analysis/closure/sample_rounded_summit.hpp"
 #include "analysis/closure/sample_unrounding.hpp"
 #include "engine/core/units.hpp"
@@ -30,7 +33,7 @@ bool RoundedSamples::show(const SampleFit& fit, double step_arcsec) {
 
 std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double step_arcsec) {
     constexpr int rounds = 2;
-    constexpr int draws = 3;
+    constexpr int draws = 2;
     constexpr double least = 0.02;
     constexpr std::size_t first_look = 6000;
     constexpr int most_looks = 12;
@@ -42,9 +45,7 @@ std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double st
     // The rate's noise may have grown by what the rounding is on the way from one step to the next.
     auto drawn = draw_by(towards_summit(now, measured_, step_, first_look, most_looks), fit.rows());
     for (int round = 0; round < rounds; ++round) drawn = draw(std::move(drawn), draws);
-    if (foretells_as_said(*drawn)) return drawn;
-    restore();
-    return nullptr;
+    return drawn;
 }
 
 std::shared_ptr<SampleFit> RoundedSamples::draw_by(const SampleModel& model, const Rows& rows) {
@@ -55,14 +56,13 @@ std::shared_ptr<SampleFit> RoundedSamples::draw_by(const SampleModel& model, con
 
 std::shared_ptr<SampleFit> RoundedSamples::draw(std::shared_ptr<SampleFit> fit, int rounds) {
     for (int round = 0; round < rounds; ++round) fit = draw_by(fit->model(), fit->rows());
-    return draw_by(find_summit(*fit, measured_, step_).model, fit->rows());
+    constexpr int climbs = 2;
+    return draw_by(find_summit(*fit, measured_, step_, climbs).model, fit->rows());
 }
 
-/// Whether the rounded increments are off what is foretold of them by as much as that says. Beside steps that are very
-/// large too few of the filters hit the moments at which the angle crosses them.
-bool RoundedSamples::foretells_as_said(const SampleFit& fit) const {
-    constexpr double about = 0.16;
-    constexpr double by_chance = 3.0;
+ResidualTest RoundedSamples::test(const SampleFit& fit) const {
+    // Beside steps that are very large few of the filters hit the moments at which the angle crosses them.
+    constexpr double of_filters = 0.1;
     const Foretold foretold = foretell_rounded(fit, measured_, step_);
     double off = 0.0;
     double said = 0.0;
@@ -74,7 +74,9 @@ bool RoundedSamples::foretells_as_said(const SampleFit& fit) const {
         said += variance;
         of_squares += foretold.fourth_moment[i] - variance * variance;
     }
-    return std::abs(off - said) < about * said + by_chance * std::sqrt(of_squares);
+    const double z = (std::abs(off - said) - of_filters * said) / std::sqrt(std::max(of_squares, 1e-300));
+    return {Where::amplitude, "rounded increments beside what is foretold of them", z > 0.0 ? chi2_tail(z * z, 1) : 1.0,
+            fmt::format("off by {:.3g} of what is said", std::sqrt(off / std::max(said, 1e-300)))};
 }
 
 SampleScore RoundedSamples::score_of(const SampleFit& fit, const Rows& reported) const {
@@ -97,7 +99,8 @@ SampleScore RoundedSamples::score_of(const SampleFit& fit, const Rows& reported)
 SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
                                          const std::function<SampleFigures(const SampleFit&)>& figures) {
     constexpr int several = 8;
-    const RoundedSummit summit = find_summit(fit, measured_, step_);
+    constexpr int climbs = 4;
+    const RoundedSummit summit = find_summit(fit, measured_, step_, climbs);
     std::vector<SampleFigures> all;
     for (int k = 0; k < several; ++k) all.push_back(figures(*draw_by(summit.model, fit.rows())));
     SampleFigures mean = all.front();

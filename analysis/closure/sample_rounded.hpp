@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "analysis/closure/independence.hpp"
 #include "analysis/closure/sample_figures.hpp"
 #include "analysis/closure/sample_fit.hpp"
 #include "analysis/closure/sample_score.hpp"
@@ -22,13 +23,14 @@ class RoundedSamples {
     double step_arcsec() const { return step_; }
     /// Whether such steps show the angle beside what is left of the fit's noise without their variance.
     static bool show(const SampleFit& fit, double step_arcsec);
-    /// Draws them: the fit to what was drawn. None where what the steps hide cannot be drawn; they are as measured
-    /// then.
+    /// Draws them: the fit to what was drawn.
     std::shared_ptr<SampleFit> begin(const SampleFit& fit, double step_arcsec);
     /// The same, drawn by another model: what was rounded is drawn by it and the model fitted to that, a stochastic
     /// approximation of the likeliest (Celeux and Diebolt, Comput. Stat. Q. 2, 73, 1985), which is then looked for by
     /// what was rounded itself.
     std::shared_ptr<SampleFit> draw(std::shared_ptr<SampleFit> fit, int rounds);
+    /// Whether the measured increments are off what is foretold of them by as much as that says.
+    ResidualTest test(const SampleFit& fit) const;
     /// Of the measured increments.
     SampleScore score_of(const SampleFit& fit, const Rows& reported) const;
     /// The mean of several, each of increments that were drawn by the likeliest model; what they are apart counted
@@ -38,7 +40,6 @@ class RoundedSamples {
 
    private:
     std::shared_ptr<SampleFit> draw_by(const SampleModel& model, const Rows& rows);
-    bool foretells_as_said(const SampleFit& fit) const;
 
     SampleSeries& series_;
     const std::vector<double> measured_;

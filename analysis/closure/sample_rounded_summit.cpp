@@ -1,5 +1,7 @@
 #include "analysis/closure/sample_rounded_summit.hpp"
 
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -25,8 +27,9 @@ class Climb {
     /// All noises by one parabola, no further than `most_powers`; how far.
     double climb_noises();
     const std::vector<double>& noise_log_sd() const { return noise_log_sd_; }
-    /// Columns, each direction that is independent of the others were the increments known.
-    void climb_columns();
+    /// Columns, by one parabola for each direction that would be independent of the others, were the increments known;
+    /// how far, in standard errors.
+    double climb_columns();
     const std::vector<double>& column_times() const { return column_times_; }
 
    private:
@@ -35,6 +38,11 @@ class Climb {
     double at(const SampleModel& model) const {
         const SampleFit of(fit_.series(), model, fit_.rows(), SampleFit::Noise::all_held);
         return log_likelihood_of_rounded(of, rounded_, step_, until_);
+    }
+    std::vector<double> at(const std::vector<SampleModel>& models) const {
+        std::vector<double> values(models.size());
+        oneapi::tbb::parallel_for(std::size_t{0}, models.size(), [&](std::size_t k) { values[k] = at(models[k]); });
+        return values;
     }
     std::size_t noises() const { return model_.walk || model_.flicker ? 3 : 2; }
     SampleModel with_noises(const Eigen::VectorXd& powers) const;
@@ -76,9 +84,15 @@ double Climb::climb_noises() {
     Eigen::VectorXd slope(m);
     Eigen::VectorXd more(m);
     Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(m, m);
+    std::vector<SampleModel> beside;
     for (Eigen::Index i = 0; i < m; ++i) {
-        more(i) = at(with_noises(axis(i)));
-        const double less = at(with_noises(-axis(i)));
+        beside.push_back(with_noises(axis(i)));
+        beside.push_back(with_noises(-axis(i)));
+    }
+    const auto values = at(beside);
+    for (Eigen::Index i = 0; i < m; ++i) {
+        more(i) = values[2 * static_cast<std::size_t>(i)];
+        const double less = values[2 * static_cast<std::size_t>(i) + 1];
         slope(i) = 0.5 * (more(i) - less);
         bend(i, i) = 2.0 * here_ - less - more(i);
         if (std::abs(slope(i)) < off_by && std::abs(bend(i, i)) < 2.0 * off_by) slope(i) = bend(i, i) = 0.0;
@@ -127,43 +141,70 @@ double Climb::climb_noises() {
     return powers.cwiseAbs().maxCoeff();
 }
 
-void Climb::climb_columns() {
+double Climb::climb_columns() {
     constexpr double first_length = 5.0;  // standard errors, were the increments known
     constexpr int doublings = 3;
     constexpr double enough = 20.0;
+    constexpr double reach = 3.0;
     const Eigen::MatrixXd& known = fit_.covariance();
     const Eigen::Index m = known.rows();
     Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of;
     const Eigen::VectorXd scale = known.diagonal().cwiseMax(1e-300).cwiseSqrt();
     of.compute(scale.cwiseInverse().asDiagonal() * known * scale.cwiseInverse().asDiagonal());
+    struct Along {
+        Eigen::VectorXd direction;
+        double length;
+        double slope = 0.0, bend = 0.0;
+    };
     Eigen::MatrixXd rounded = Eigen::MatrixXd::Zero(m, m);
     Eigen::VectorXd moved = Eigen::VectorXd::Zero(m);
+    double furthest = 0.0;
+    std::vector<Along> all;
     for (Eigen::Index j = 0; j < m; ++j) {
         const double variance = of.eigenvalues()(j);
         if (!(variance > 1e-12)) continue;
-        const Eigen::VectorXd direction = std::sqrt(variance) * scale.asDiagonal() * of.eigenvectors().col(j);
-        double length = first_length;
-        double slope = 0.0;
-        double bend = 0.0;
-        for (int k = 0; k <= doublings; ++k, length *= 2.0) {
-            const double more = at(with_columns(length * direction));
-            const double less = at(with_columns(-length * direction));
-            slope = 0.5 * (more - less) / length;
-            bend = (2.0 * here_ - more - less) / (length * length);
-            if (bend * length * length > enough) break;
-        }
-        // Rounding hides, it does not tell.
-        bend = std::min(bend, 1.0);
-        if (!(bend > 0.0)) continue;
-        moved += std::clamp(slope / bend, -length, length) * direction;
-        rounded += direction * direction.transpose() / bend;
+        all.push_back({std::sqrt(variance) * scale.asDiagonal() * of.eigenvectors().col(j), first_length});
     }
-    model_ = with_columns(moved);
-    here_ = at(model_);
+    // Further where the increments say little
+    for (int k = 0; k <= doublings; ++k) {
+        std::vector<Along*> open;
+        std::vector<SampleModel> beside;
+        for (Along& along : all) {
+            if (along.bend * along.length * along.length > enough) continue;
+            if (k > 0) along.length *= 2.0;
+            open.push_back(&along);
+            beside.push_back(with_columns(along.length * along.direction));
+            beside.push_back(with_columns(-along.length * along.direction));
+        }
+        const auto values = at(beside);
+        for (std::size_t i = 0; i < open.size(); ++i) {
+            const double more = values[2 * i];
+            const double less = values[2 * i + 1];
+            open[i]->slope = 0.5 * (more - less) / open[i]->length;
+            open[i]->bend = (2.0 * here_ - more - less) / (open[i]->length * open[i]->length);
+        }
+    }
+    for (const Along& along : all) {
+        // Rounding hides, it does not tell.
+        const double bend = std::min(along.bend, 1.0);
+        if (!(bend > 0.0)) continue;
+        moved += std::clamp(along.slope / bend, -reach * along.length, reach * along.length) * along.direction;
+        furthest = std::max(furthest, std::abs(along.slope) / std::sqrt(bend));
+        rounded += along.direction * along.direction.transpose() / bend;
+    }
+    for (int k = 0; k < 2; ++k, moved *= 0.5) {
+        SampleModel next = with_columns(moved);
+        const double there = at(next);
+        if (there < here_ - off_by) continue;
+        model_ = std::move(next);
+        here_ = there;
+        break;
+    }
     column_times_.clear();
     for (Eigen::Index a = 0; a < m; ++a) {
         column_times_.push_back(std::max(1.0, std::sqrt(rounded(a, a) / std::max(known(a, a), 1e-300))));
     }
+    return furthest;
 }
 
 }  // namespace
@@ -178,10 +219,15 @@ SampleModel towards_summit(const SampleFit& fit, const std::vector<double>& roun
     return climb.model();
 }
 
-RoundedSummit find_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec) {
+RoundedSummit find_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
+                          int most_rounds) {
+    constexpr double little = 0.7;
     Climb climb(fit, rounded, step_arcsec, rounded.size());
-    climb.climb_columns();
-    climb.climb_noises();
+    for (int round = 0; round < most_rounds; ++round) {
+        const double columns = climb.climb_columns();
+        const double noises = climb.climb_noises();
+        if (std::max(columns, noises) < little) break;
+    }
     return {climb.model(), climb.noise_log_sd(), climb.column_times()};
 }
 

@@ -5,8 +5,9 @@
 
 #include "analysis/closure/sample_fit.hpp"
 
-/// Where the likelihood of rounded increments is largest, and how sharp it is there. Increments that are drawn within their
-/// steps hardly move a model where the steps hide most of what tells: each fit to them goes a small part of the way.
+/// Where the likelihood of rounded increments is largest, and how sharp it is there. Increments that are drawn within
+/// their steps hardly move a model where the steps hide most of what tells: each fit to them goes a small part of the
+/// way.
 namespace ringlock::closure {
 
 struct RoundedSummit {
@@ -24,6 +25,7 @@ SampleModel towards_summit(const SampleFit& fit, const std::vector<double>& roun
                            std::size_t until, int most_rounds);
 
 /// Noises and columns of a model that is near it.
-RoundedSummit find_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec);
+RoundedSummit find_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
+                          int most_rounds);
 
 }  // namespace ringlock::closure

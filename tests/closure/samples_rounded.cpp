@@ -3,6 +3,8 @@
 
 #include <cmath>
 #include <cstddef>
+#include <set>
+#include <string>
 
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/sample_score.hpp"
@@ -130,6 +132,47 @@ TEST(RoundedRecords, LargeStepsAreNamedAndLeaveNothing) {
     EXPECT_EQ(found.steps[0].effect, "count_quantization");
     EXPECT_LT(found.heldout_after, found.heldout_before);
     EXPECT_NEAR(found.base[1].value, 0.3, 4.0 * found.base[1].sd);
+}
+
+// Whole counts of a quiet gyro: between two crossings of a step the rounding hides all, and the noise of the values
+// says nothing of that beneath them.
+TEST(RoundedRecords, StepsOfFortyTimesTheNoiseLeaveNothing) {
+    SampleTruth truth = counted(0.02);
+    truth.kind = record::SampleKind::angle_increment_arcsec;
+    truth.count_quantization_arcsec = 1.5;
+    truth.rates.quantum_noise_deg_rt_h = 0.005;
+    const Closure found = close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, Verdict::closed);
+    ASSERT_EQ(found.steps.size(), 1U);
+    EXPECT_EQ(found.steps[0].effect, "count_quantization");
+    EXPECT_NEAR(found.base[0].value, 10.0, 4.0 * found.base[0].sd);
+    EXPECT_NEAR(found.base[2].value, 0.005, 4.0 * found.base[2].sd);
+}
+
+// A line and a walk that the steps hide most of: each is named, and its size climbed to.
+TEST(LongRoundedRecords, EffectsBeneathStepsOfTwentyTimesTheNoiseAreNamed) {
+    SampleTruth truth = counted(0.3, 5);
+    truth.size = 30000;
+    truth.kind = record::SampleKind::angle_increment_arcsec;
+    truth.count_quantization_arcsec = 6.9;
+    truth.rates.rate_random_walk_deg_h_rt_h = 130.0;
+    truth.dither_residue = {44.2, -1.1e-4, 0.35, 2.3};
+    const Closure found = close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, Verdict::closed);
+    ASSERT_EQ(found.steps.size(), 3U);
+    std::set<std::string> named;
+    for (const auto& step : found.steps) named.insert(step.effect);
+    EXPECT_EQ(named, (std::set<std::string>{"count_quantization", "rate_random_walk", "dither_residue"}));
+    for (const auto& step : found.steps) {
+        for (const auto& estimate : step.parameters) {
+            if (estimate.name == "deg_h_rt_h") {
+                EXPECT_NEAR(estimate.value, 130.0, 4.0 * estimate.sd);
+            }
+            if (estimate.name == "amplitude_arcsec") {
+                EXPECT_NEAR(estimate.value, 0.35, 4.0 * estimate.sd);
+            }
+        }
+    }
 }
 
 }  // namespace
