@@ -43,21 +43,63 @@ std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double st
     angle = std::sqrt(std::max(angle * angle - variance_of_steps(step_), least * least * step_ * step_));
     SampleFit now(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
     // The rate's noise may have grown by what the rounding is on the way from one step to the next.
-    auto drawn = draw_by(towards_summit(now, measured_, step_, first_look, most_looks), fit.rows());
+    const SampleModel near = towards_summit(now, measured_, step_, first_look, most_looks).model;
+    auto drawn = draw_by(near, near, fit.rows());
     for (int round = 0; round < rounds; ++round) drawn = draw(std::move(drawn), draws);
     return drawn;
 }
 
-std::shared_ptr<SampleFit> RoundedSamples::draw_by(const SampleModel& model, const Rows& rows) {
-    const SampleFit by(series_, model, rows, SampleFit::Noise::all_held);
+std::shared_ptr<SampleFit> RoundedSamples::draw_by(const SampleModel& drawing, const SampleModel& model,
+                                                   const Rows& rows) {
+    const SampleFit by(series_, drawing, rows, SampleFit::Noise::all_held);
     series_.increment = unround(by, measured_, step_, ++draws_);
     return std::make_shared<SampleFit>(series_, model, rows, SampleFit::Noise::near);
 }
 
 std::shared_ptr<SampleFit> RoundedSamples::draw(std::shared_ptr<SampleFit> fit, int rounds) {
-    for (int round = 0; round < rounds; ++round) fit = draw_by(fit->model(), fit->rows());
+    for (int round = 0; round < rounds; ++round) fit = draw_by(fit->model(), fit->model(), fit->rows());
+    const SampleModel drawing = likeliest(*fit);
+    return draw_by(drawing, drawing.walk ? fit->model() : drawing, fit->rows());
+}
+
+/// By how much the variance of a rate that walks grows, as means of stretches differ from one to the next; zero where
+/// white noise alone may do that.
+double RoundedSamples::wander(const SampleFit& fit) const {
+    constexpr std::size_t stretches = 16;
+    constexpr double by_chance = 2.5;  // 15 degrees of freedom, one in a thousand
+    const std::vector<double> known = fit.determined();
+    const std::size_t length = measured_.size() / stretches;
+    const double length_s = series_.interval_s * static_cast<double>(length);
+    double before = 0.0;
+    double squares = 0.0;
+    for (std::size_t k = 0; k < stretches; ++k) {
+        double sum = 0.0;
+        for (std::size_t i = k * length; i < (k + 1) * length; ++i) sum += measured_[i] - known[i];
+        if (k > 0) squares += std::pow((sum - before) / length_s, 2) / static_cast<double>(stretches - 1);
+        before = sum;
+    }
+    const SampleNoise& noise = fit.model().noise;
+    const double of_readings = noise.angle_arcsec * noise.angle_arcsec + variance_of_steps(step_);
+    const double white =
+        2.0 * noise.rate_arcsec_rt_s * noise.rate_arcsec_rt_s / length_s + 6.0 * of_readings / (length_s * length_s);
+    return squares > by_chance * white ? 1.5 * squares / length_s : 0.0;
+}
+
+/// What the model lacks is drawn as its noise makes it. A slow rate that it lacks is drawn beside a walk, which follows
+/// it, where that is likelier by far.
+SampleModel RoundedSamples::likeliest(const SampleFit& fit) const {
     constexpr int climbs = 2;
-    return draw_by(find_summit(*fit, measured_, step_, climbs).model, fit->rows());
+    constexpr int climbs_from_afar = 6;
+    constexpr double by_far = 12.0;
+    RoundedSummit summit = find_summit(fit, measured_, step_, climbs);
+    const double walk = fit.model().walk || fit.model().flicker ? 0.0 : wander(fit);
+    if (walk == 0.0) return std::move(summit.model);
+    SampleModel beside = summit.model;
+    beside.walk = true;
+    beside.noise.walk_arcsec2_s3 = walk;
+    const SampleFit start(series_, std::move(beside), fit.rows(), SampleFit::Noise::all_held);
+    RoundedSummit wandering = towards_summit(start, measured_, step_, measured_.size(), climbs_from_afar);
+    return std::move(wandering.log_likelihood > summit.log_likelihood + by_far ? wandering.model : summit.model);
 }
 
 ResidualTest RoundedSamples::test(const SampleFit& fit) const {
@@ -102,7 +144,7 @@ SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
     constexpr int climbs = 4;
     const RoundedSummit summit = find_summit(fit, measured_, step_, climbs);
     std::vector<SampleFigures> all;
-    for (int k = 0; k < several; ++k) all.push_back(figures(*draw_by(summit.model, fit.rows())));
+    for (int k = 0; k < several; ++k) all.push_back(figures(*draw_by(summit.model, summit.model, fit.rows())));
     SampleFigures mean = all.front();
     const auto combine = [&](const auto& of) {
         double sum = 0.0;

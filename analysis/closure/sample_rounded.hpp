@@ -39,7 +39,9 @@ class RoundedSamples {
     SampleFigures figures_of(const SampleFit& fit, const std::function<SampleFigures(const SampleFit&)>& figures);
 
    private:
-    std::shared_ptr<SampleFit> draw_by(const SampleModel& model, const Rows& rows);
+    std::shared_ptr<SampleFit> draw_by(const SampleModel& drawing, const SampleModel& model, const Rows& rows);
+    double wander(const SampleFit& fit) const;
+    SampleModel likeliest(const SampleFit& fit) const;
 
     SampleSeries& series_;
     const std::vector<double> measured_;

@@ -23,6 +23,7 @@ class Climb {
         here_ = at(model_);
     }
     const SampleModel& model() const { return model_; }
+    double log_likelihood() const { return here_; }
 
     /// All noises by one parabola, no further than `most_powers`; how far.
     double climb_noises();
@@ -209,14 +210,14 @@ double Climb::climb_columns() {
 
 }  // namespace
 
-SampleModel towards_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
-                           std::size_t until, int most_rounds) {
+RoundedSummit towards_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
+                             std::size_t until, int most_rounds) {
     constexpr double little = 0.3;
     Climb climb(fit, rounded, step_arcsec, until);
     for (int round = 0; round < most_rounds; ++round) {
         if (climb.climb_noises() < little) break;
     }
-    return climb.model();
+    return {climb.model(), climb.log_likelihood(), climb.noise_log_sd(), {}};
 }
 
 RoundedSummit find_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
@@ -228,7 +229,7 @@ RoundedSummit find_summit(const SampleFit& fit, const std::vector<double>& round
         const double noises = climb.climb_noises();
         if (std::max(columns, noises) < little) break;
     }
-    return {climb.model(), climb.noise_log_sd(), climb.column_times()};
+    return {climb.model(), climb.log_likelihood(), climb.noise_log_sd(), climb.column_times()};
 }
 
 }  // namespace ringlock::closure

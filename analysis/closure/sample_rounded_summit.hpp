@@ -12,6 +12,7 @@ namespace ringlock::closure {
 
 struct RoundedSummit {
     SampleModel model;
+    double log_likelihood = 0.0;
     /// Standard errors of the logarithms of the noises: white angle, white rate, random rate where there is one; not
     /// finite where the increments say nothing of them.
     std::vector<double> noise_log_sd;
@@ -19,10 +20,10 @@ struct RoundedSummit {
     std::vector<double> column_times;
 };
 
-/// Noises alone, from afar, by the increments up to that row.
+/// Noises alone, from afar, by the increments up to that row; of columns it says nothing.
 /// \param rounded  increments, whole multiples of `step_arcsec` [arcsec]
-SampleModel towards_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
-                           std::size_t until, int most_rounds);
+RoundedSummit towards_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
+                             std::size_t until, int most_rounds);
 
 /// Noises and columns of a model that is near it.
 RoundedSummit find_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
