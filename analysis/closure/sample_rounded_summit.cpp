@@ -186,9 +186,8 @@ double Climb::climb_columns() {
         }
     }
     for (const Along& along : all) {
-        // Rounding hides, it does not tell.
-        const double bend = std::min(along.bend, 1.0);
-        if (!(bend > 0.0)) continue;
+        // Rounding hides, it does not tell; and what bends less than the likelihood is off by is not seen to bend.
+        const double bend = std::clamp(along.bend, 2.0 * off_by / (along.length * along.length), 1.0);
         moved += std::clamp(along.slope / bend, -reach * along.length, reach * along.length) * along.direction;
         furthest = std::max(furthest, std::abs(along.slope) / std::sqrt(bend));
         rounded += along.direction * along.direction.transpose() / bend;
