@@ -414,8 +414,8 @@ SampleChoice Contest::choose() {
     const double least_random = slow ? std::max(0.0, best->merit - tie_with_random) : least;
     std::vector<Account> as_likely;
     for (const Account& account : accounts) {
-        const bool may_be = account.members.size() == 1 && account.random() && account.merit > least_random;
-        if (account.merit > least || may_be) as_likely.push_back(account);
+        const bool tied_random = account.members.size() == 1 && account.random() && account.merit > least_random;
+        if (account.merit > least || tied_random) as_likely.push_back(account);
     }
     SampleChoice choice;
     // Of several, what most of those as likely have in them.
