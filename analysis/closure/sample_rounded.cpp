@@ -59,7 +59,8 @@ std::shared_ptr<SampleFit> RoundedSamples::draw_by(const SampleModel& drawing, c
 std::shared_ptr<SampleFit> RoundedSamples::draw(std::shared_ptr<SampleFit> fit, int rounds) {
     for (int round = 0; round < rounds; ++round) fit = draw_by(fit->model(), fit->model(), fit->rows());
     const SampleModel drawing = likeliest(*fit);
-    return draw_by(drawing, drawing.walk ? fit->model() : drawing, fit->rows());
+    const bool beside_walk = drawing.walk && !fit->model().walk;
+    return draw_by(drawing, beside_walk ? fit->model() : drawing, fit->rows());
 }
 
 /// By how much the variance of a rate that walks grows, as means of stretches differ from one to the next; zero where

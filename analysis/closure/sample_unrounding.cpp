@@ -55,7 +55,9 @@ namespace {
 
 class Mixture {
    public:
-    Mixture(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec, std::uint64_t seed);
+    enum class Paths { kept, forgotten };
+    Mixture(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec, std::uint64_t seed,
+            Paths paths);
     /// Goes on to the next increment, and draws its reading.
     void go_on();
     /// The increment that comes next.
@@ -64,6 +66,8 @@ class Mixture {
     double log_probability() const { return log_probability_; }
 
    private:
+    /// Of the filters' readings of that row; the same for all where paths are not kept.
+    std::size_t at_row(std::size_t row) const { return drawn_.size() > count_ ? row * count_ : 0; }
     double uniform() { return boost::random::uniform_01<double>()(generator_); }
     void advance();
     void draw_anew(std::uint8_t* parent);
@@ -93,7 +97,8 @@ std::size_t filters_for(double step_over_sd) {
     return count;
 }
 
-Mixture::Mixture(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec, std::uint64_t seed)
+Mixture::Mixture(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec, std::uint64_t seed,
+                 Paths paths)
     : filter_(fit.filter()),
       rounded_(rounded),
       step_(step_arcsec),
@@ -103,8 +108,8 @@ Mixture::Mixture(const SampleFit& fit, const std::vector<double>& rounded, doubl
       state_(count_),
       weight_(count_, 1.0 / static_cast<double>(count_)),
       foretold_(count_),
-      drawn_(count_ * (rounded.size() + 1)),
-      parent_(count_ * (rounded.size() + 1)) {
+      drawn_(count_ * (paths == Paths::kept ? rounded.size() + 1 : 1)),
+      parent_(drawn_.size()) {
     for (std::size_t p = 0; p < count_; ++p) {
         const double first = (static_cast<double>(p) + uniform()) / static_cast<double>(count_) - 0.5;
         drawn_[p] = static_cast<float>(first);
@@ -116,7 +121,7 @@ Mixture::Mixture(const SampleFit& fit, const std::vector<double>& rounded, doubl
 void Mixture::advance() {
     if (row_ == rounded_.size()) return;
     determined_ += no_noise_[row_];
-    draw_anew(parent_.data() + (row_ + 1) * count_);
+    draw_anew(parent_.data() + at_row(row_ + 1));
     for (std::size_t p = 0; p < count_; ++p) foretold_[p] = determined_ + filter_.foretell(state_[p]);
 }
 
@@ -159,7 +164,7 @@ void Mixture::go_on() {
             weight_[p] *= between.probability();
         }
         filter_.take(row_, z * sd, state_[p]);
-        drawn_[(row_ + 1) * count_ + p] = static_cast<float>((foretold_[p] + z * sd - total_) / step_);
+        drawn_[at_row(row_ + 1) + p] = static_cast<float>((foretold_[p] + z * sd - total_) / step_);
         sum += weight_[p];
     }
     log_probability_ = sum > impossible ? std::log(sum) : -nearest;
@@ -222,14 +227,14 @@ std::vector<double> Mixture::path() {
 std::vector<double> unround(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
                             std::uint64_t seed) {
     check_interrupt();
-    Mixture mixture(fit, rounded, step_arcsec, seed);
+    Mixture mixture(fit, rounded, step_arcsec, seed, Mixture::Paths::kept);
     for (std::size_t k = 0; k < rounded.size(); ++k) mixture.go_on();
     return mixture.path();
 }
 
 Foretold foretell_rounded(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec) {
     check_interrupt();
-    Mixture mixture(fit, rounded, step_arcsec, 0);
+    Mixture mixture(fit, rounded, step_arcsec, 0, Mixture::Paths::forgotten);
     Foretold foretold;
     for (std::size_t k = 0; k < rounded.size(); ++k) {
         mixture.foretell(foretold);
@@ -242,7 +247,7 @@ Foretold foretell_rounded(const SampleFit& fit, const std::vector<double>& round
 double log_likelihood_of_rounded(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
                                  std::size_t until) {
     check_interrupt();
-    Mixture mixture(fit, rounded, step_arcsec, 0);
+    Mixture mixture(fit, rounded, step_arcsec, 0, Mixture::Paths::forgotten);
     double sum = 0.0;
     for (std::size_t k = 0; k < std::min(until, rounded.size()); ++k) {
         mixture.go_on();
