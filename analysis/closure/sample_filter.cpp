@@ -1,7 +1,7 @@
 #include "analysis/closure/sample_filter.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <type_traits>
 #include <utility>
 
@@ -228,19 +228,48 @@ SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double in
     });
 }
 
-void SampleFilter::begin(double reading, State& x) const {
-    x.fill(0.0);
-    x[0] = reading;
+SampleFilter::Many::Many(const SampleFilter& filter, std::span<const double> readings)
+    : filter_(filter),
+      count_(readings.size()),
+      x_(static_cast<std::size_t>(filter.n_) * count_, 0.0),
+      next_(x_.size()) {
+    std::copy(readings.begin(), readings.end(), x_.begin());
 }
 
-double SampleFilter::foretell(State& x) const {
-    advance<most>(*this, x);
-    return std::inner_product(h_.begin(), h_.begin() + n_, x.begin(), 0.0);
+void SampleFilter::Many::foretell(std::span<double> readings) {
+    const std::size_t count = count_;
+    std::fill(readings.begin(), readings.end(), 0.0);
+    for (int i = 0; i < filter_.n_; ++i) {
+        double* to = next_.data() + static_cast<std::size_t>(i) * count;
+        const Terms& terms = filter_.nonzero_[i];
+        std::fill_n(to, count, 0.0);
+        for (int k = 0; k < terms.count; ++k) {
+            const double f = filter_.f_[i][terms.at[k]];
+            const double* from = x_.data() + static_cast<std::size_t>(terms.at[k]) * count;
+            for (std::size_t p = 0; p < count; ++p) to[p] += f * from[p];
+        }
+        if (filter_.h_[i] == 0.0) continue;
+        for (std::size_t p = 0; p < count; ++p) readings[p] += filter_.h_[i] * to[p];
+    }
+    x_.swap(next_);
 }
 
-void SampleFilter::take(std::size_t row, double innovation, State& x) const {
-    const double* gain = gain_.data() + std::min(row, sd_.size() - 1) * static_cast<std::size_t>(n_);
-    for (int i = 0; i < n_; ++i) x[i] += gain[i] * innovation;
+void SampleFilter::Many::take(std::size_t row, std::span<const double> innovations) {
+    const auto n = static_cast<std::size_t>(filter_.n_);
+    const double* gain = filter_.gain_.data() + std::min(row, filter_.sd_.size() - 1) * n;
+    for (std::size_t i = 0; i < n; ++i) {
+        double* x = x_.data() + i * count_;
+        for (std::size_t p = 0; p < count_; ++p) x[p] += gain[i] * innovations[p];
+    }
+}
+
+void SampleFilter::Many::continue_from(std::span<const std::uint8_t> others) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(filter_.n_); ++i) {
+        const double* from = x_.data() + i * count_;
+        double* to = next_.data() + i * count_;
+        for (std::size_t p = 0; p < count_; ++p) to[p] = from[others[p]];
+    }
+    x_.swap(next_);
 }
 
 std::vector<double> SampleFilter::apply(std::span<const double> increments) const {

@@ -46,11 +46,23 @@ class SampleFilter {
     static constexpr int most = 16;
     using Vector = std::array<double, most>;
 
-    /// The filter step by step, for readings of the angle that are not known beforehand; not of a resampled record.
-    using State = Vector;
-    void begin(double reading, State& x) const;
-    double foretell(State& x) const;  ///< of the next reading
-    void take(std::size_t row, double innovation, State& x) const;
+    /// Many filters step by step, for readings of the angle that are not known beforehand; not of a resampled record.
+    class Many {
+       public:
+        /// Each begins at a reading.
+        Many(const SampleFilter& filter, std::span<const double> readings);
+        /// Of the next readings.
+        void foretell(std::span<double> readings);
+        void take(std::size_t row, std::span<const double> innovations);
+        /// Each becomes a copy of another.
+        void continue_from(std::span<const std::uint8_t> others);
+
+       private:
+        const SampleFilter& filter_;
+        std::size_t count_;
+        std::vector<double> x_;  ///< state after state of all
+        std::vector<double> next_;
+    };
 
    private:
     using Matrix = std::array<Vector, most>;

@@ -8,7 +8,6 @@
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/sample_rounded_summit.hpp"
-#include "analysis/closure/sample_unrounding.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -43,7 +42,10 @@ std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double st
     angle = std::sqrt(std::max(angle * angle - variance_of_steps(step_), least * least * step_ * step_));
     SampleFit now(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
     // The rate's noise may have grown by what the rounding is on the way from one step to the next.
-    const SampleModel near = towards_summit(now, measured_, step_, first_look, most_looks).model;
+    filters_ = filters_for(step_, now.sd(measured_.size() / 2));
+    const SampleModel near = towards_summit(now, rounded(), first_look, most_looks).model;
+    const SampleFit there(series_, near, fit.rows(), SampleFit::Noise::all_held);
+    filters_ = filters_for(step_, there.sd(measured_.size() / 2));
     auto drawn = draw_by(near, near, fit.rows());
     for (int round = 0; round < rounds; ++round) drawn = draw(std::move(drawn), draws);
     return drawn;
@@ -52,7 +54,7 @@ std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double st
 std::shared_ptr<SampleFit> RoundedSamples::draw_by(const SampleModel& drawing, const SampleModel& model,
                                                    const Rows& rows) {
     const SampleFit by(series_, drawing, rows, SampleFit::Noise::all_held);
-    series_.increment = unround(by, measured_, step_, ++draws_);
+    series_.increment = unround(by, rounded(), ++draws_);
     return std::make_shared<SampleFit>(series_, model, rows, SampleFit::Noise::near);
 }
 
@@ -92,21 +94,21 @@ SampleModel RoundedSamples::likeliest(const SampleFit& fit) const {
     constexpr int climbs = 2;
     constexpr int climbs_from_afar = 6;
     constexpr double by_far = 12.0;
-    RoundedSummit summit = find_summit(fit, measured_, step_, climbs);
+    RoundedSummit summit = find_summit(fit, rounded(), climbs);
     const double walk = fit.model().walk || fit.model().flicker ? 0.0 : wander(fit);
     if (walk == 0.0) return std::move(summit.model);
     SampleModel beside = summit.model;
     beside.walk = true;
     beside.noise.walk_arcsec2_s3 = walk;
     const SampleFit start(series_, std::move(beside), fit.rows(), SampleFit::Noise::all_held);
-    RoundedSummit wandering = towards_summit(start, measured_, step_, measured_.size(), climbs_from_afar);
+    RoundedSummit wandering = towards_summit(start, rounded(), measured_.size(), climbs_from_afar);
     return std::move(wandering.log_likelihood > summit.log_likelihood + by_far ? wandering.model : summit.model);
 }
 
 ResidualTest RoundedSamples::test(const SampleFit& fit) const {
     // Beside steps that are very large few of the filters hit the moments at which the angle crosses them.
     constexpr double of_filters = 0.1;
-    const Foretold foretold = foretell_rounded(fit, measured_, step_);
+    const Foretold foretold = foretell_rounded(fit, rounded());
     double off = 0.0;
     double said = 0.0;
     double of_squares = 0.0;
@@ -123,7 +125,7 @@ ResidualTest RoundedSamples::test(const SampleFit& fit) const {
 }
 
 SampleScore RoundedSamples::score_of(const SampleFit& fit, const Rows& reported) const {
-    const Foretold foretold = foretell_rounded(fit, measured_, step_);
+    const Foretold foretold = foretell_rounded(fit, rounded());
     SampleScore score;
     double count = 0.0;
     for (std::size_t i = 0; i < reported.size(); ++i) {
@@ -143,7 +145,7 @@ SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
                                          const std::function<SampleFigures(const SampleFit&)>& figures) {
     constexpr int several = 8;
     constexpr int climbs = 4;
-    const RoundedSummit summit = find_summit(fit, measured_, step_, climbs);
+    const RoundedSummit summit = find_summit(fit, rounded(), climbs);
     std::vector<SampleFigures> all;
     for (int k = 0; k < several; ++k) all.push_back(figures(*draw_by(summit.model, summit.model, fit.rows())));
     SampleFigures mean = all.front();

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -8,6 +9,7 @@
 #include "analysis/closure/sample_figures.hpp"
 #include "analysis/closure/sample_fit.hpp"
 #include "analysis/closure/sample_score.hpp"
+#include "analysis/closure/sample_unrounding.hpp"
 
 namespace ringlock::closure {
 
@@ -42,10 +44,12 @@ class RoundedSamples {
     std::shared_ptr<SampleFit> draw_by(const SampleModel& drawing, const SampleModel& model, const Rows& rows);
     double wander(const SampleFit& fit) const;
     SampleModel likeliest(const SampleFit& fit) const;
+    RoundedIncrements rounded() const { return {measured_, step_, filters_}; }
 
     SampleSeries& series_;
     const std::vector<double> measured_;
     double step_ = 0.0;
+    std::size_t filters_ = 0;
     std::uint64_t draws_ = 0;
 };
 

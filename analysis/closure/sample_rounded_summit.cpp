@@ -7,25 +7,24 @@
 #include <limits>
 #include <utility>
 
-#include "analysis/closure/sample_unrounding.hpp"
-
 namespace ringlock::closure {
 
 namespace {
 
-/// Log-likelihoods that the filters estimate are off by about as much.
-constexpr double off_by = 3.0;
+/// Differences of the log-likelihoods that the filters estimate are off by about as much.
+constexpr double off_by = 1.0;
 
 class Climb {
    public:
-    Climb(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec, std::size_t until)
-        : fit_(fit), rounded_(rounded), step_(step_arcsec), until_(until), model_(fit.model()) {
+    Climb(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until)
+        : fit_(fit), rounded_(rounded), until_(until), model_(fit.model()) {
         here_ = at(model_);
+        log_length_ = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(noises()), first_log);
     }
     const SampleModel& model() const { return model_; }
     double log_likelihood() const { return here_; }
 
-    /// All noises by one parabola, no further than `most_powers`; how far.
+    /// All noises by one parabola; how far, in standard errors.
     double climb_noises();
     const std::vector<double>& noise_log_sd() const { return noise_log_sd_; }
     /// Columns, by one parabola for each direction that would be independent of the others, were the increments known;
@@ -34,11 +33,11 @@ class Climb {
     const std::vector<double>& column_times() const { return column_times_; }
 
    private:
-    static constexpr double times = 1.4;
+    static constexpr double first_log = 0.33;
 
     double at(const SampleModel& model) const {
         const SampleFit of(fit_.series(), model, fit_.rows(), SampleFit::Noise::all_held);
-        return log_likelihood_of_rounded(of, rounded_, step_, until_);
+        return log_likelihood_of_rounded(of, rounded_, until_);
     }
     std::vector<double> at(const std::vector<SampleModel>& models) const {
         std::vector<double> values(models.size());
@@ -46,27 +45,28 @@ class Climb {
         return values;
     }
     std::size_t noises() const { return model_.walk || model_.flicker ? 3 : 2; }
-    SampleModel with_noises(const Eigen::VectorXd& powers) const;
+    /// Their logarithms moved by so many lengths.
+    SampleModel with_noises(const Eigen::VectorXd& lengths) const;
     SampleModel with_columns(const Eigen::VectorXd& moved) const;
 
     const SampleFit& fit_;
-    const std::vector<double>& rounded_;
-    const double step_;
+    const RoundedIncrements rounded_;
     const std::size_t until_;
     SampleModel model_;
     double here_ = 0.0;
+    Eigen::VectorXd log_length_;
     std::vector<double> noise_log_sd_, column_times_;
 };
 
-SampleModel Climb::with_noises(const Eigen::VectorXd& powers) const {
+SampleModel Climb::with_noises(const Eigen::VectorXd& lengths) const {
+    const Eigen::VectorXd times = lengths.cwiseProduct(log_length_).array().exp();
     SampleModel model = model_;
-    model.noise.angle_arcsec *= std::pow(times, powers(0));
-    model.noise.rate_arcsec_rt_s *= std::pow(times, powers(1));
-    if (powers.size() < 3) return model;
-    const double random = std::pow(times, powers(2));
-    model.noise.walk_arcsec2_s3 *= random * random;
-    model.flicker_deg_h *= random;
-    for (auto& term : model.noise.terms) term.variance_arcsec2_s2 *= random * random;
+    model.noise.angle_arcsec *= times(0);
+    model.noise.rate_arcsec_rt_s *= times(1);
+    if (times.size() < 3) return model;
+    model.noise.walk_arcsec2_s3 *= times(2) * times(2);
+    model.flicker_deg_h *= times(2);
+    for (auto& term : model.noise.terms) term.variance_arcsec2_s2 *= times(2) * times(2);
     return model;
 }
 
@@ -79,7 +79,8 @@ SampleModel Climb::with_columns(const Eigen::VectorXd& moved) const {
 }
 
 double Climb::climb_noises() {
-    constexpr double most_powers = 2.0;
+    constexpr double most = 2.0;         // lengths
+    constexpr double wanted_bend = 8.0;  // of a length
     const auto m = static_cast<Eigen::Index>(noises());
     const auto axis = [m](Eigen::Index i) { return Eigen::VectorXd::Unit(m, i); };
     Eigen::VectorXd slope(m);
@@ -90,6 +91,9 @@ double Climb::climb_noises() {
         beside.push_back(with_noises(axis(i)));
         beside.push_back(with_noises(-axis(i)));
     }
+    for (Eigen::Index i = 0; i < m; ++i) {
+        for (Eigen::Index j = 0; j < i; ++j) beside.push_back(with_noises(axis(i) + axis(j)));
+    }
     const auto values = at(beside);
     for (Eigen::Index i = 0; i < m; ++i) {
         more(i) = values[2 * static_cast<std::size_t>(i)];
@@ -98,54 +102,53 @@ double Climb::climb_noises() {
         bend(i, i) = 2.0 * here_ - less - more(i);
         if (std::abs(slope(i)) < off_by && std::abs(bend(i, i)) < 2.0 * off_by) slope(i) = bend(i, i) = 0.0;
     }
+    auto both = values.begin() + 2 * m;
     for (Eigen::Index i = 0; i < m; ++i) {
-        for (Eigen::Index j = 0; j < i; ++j) {
+        for (Eigen::Index j = 0; j < i; ++j, ++both) {
             if (bend(i, i) <= 0.0 || bend(j, j) <= 0.0) continue;
-            const double both = at(with_noises(axis(i) + axis(j)));
-            const double cross = more(i) + more(j) - here_ - both;
-            const double most = 0.95 * std::sqrt(bend(i, i) * bend(j, j));
-            bend(i, j) = bend(j, i) = std::clamp(cross, -most, most);
+            const double cross = more(i) + more(j) - here_ - *both;
+            const double most_cross = 0.95 * std::sqrt(bend(i, i) * bend(j, j));
+            bend(i, j) = bend(j, i) = std::clamp(cross, -most_cross, most_cross);
         }
     }
-    Eigen::VectorXd powers = Eigen::VectorXd::Zero(m);
+    Eigen::VectorXd lengths = Eigen::VectorXd::Zero(m);
+    Eigen::VectorXd sd = Eigen::VectorXd::Constant(m, std::numeric_limits<double>::infinity());  // lengths
     const Eigen::LLT<Eigen::MatrixXd> peak(bend);
-    noise_log_sd_.assign(static_cast<std::size_t>(m), std::numeric_limits<double>::infinity());
     if (peak.info() == Eigen::Success && bend.diagonal().minCoeff() > 0.0) {
-        powers = peak.solve(slope);
-        const Eigen::MatrixXd covariance = peak.solve(Eigen::MatrixXd::Identity(m, m));
-        for (Eigen::Index i = 0; i < m; ++i) {
-            noise_log_sd_[static_cast<std::size_t>(i)] = std::log(times) * std::sqrt(covariance(i, i));
-        }
+        lengths = peak.solve(slope);
+        sd = peak.solve(Eigen::MatrixXd::Identity(m, m)).diagonal().cwiseSqrt();
     } else {
         for (Eigen::Index i = 0; i < m; ++i) {
             if (slope(i) == 0.0) continue;
-            powers(i) = bend(i, i) > 0.0 ? slope(i) / bend(i, i) : std::copysign(most_powers, slope(i));
-            if (bend(i, i) > 0.0) {
-                noise_log_sd_[static_cast<std::size_t>(i)] = std::log(times) / std::sqrt(bend(i, i));
-            }
+            lengths(i) = bend(i, i) > 0.0 ? slope(i) / bend(i, i) : std::copysign(most, slope(i));
+            if (bend(i, i) > 0.0) sd(i) = 1.0 / std::sqrt(bend(i, i));
         }
     }
-    powers = powers.cwiseMax(-most_powers).cwiseMin(most_powers);
-    SampleModel next = with_noises(powers);
-    const double there = at(next);
+    noise_log_sd_.assign(static_cast<std::size_t>(m), 0.0);
+    Eigen::VectorXd::Map(noise_log_sd_.data(), m) = sd.cwiseProduct(log_length_);
+    lengths = lengths.cwiseMax(-most).cwiseMin(most);
     // No parabola far from the top: half of the way, if that is no worse.
-    if (there < here_ - off_by) {
-        powers *= 0.5;
-        next = with_noises(powers);
-        const double half = at(next);
-        if (half < here_ - off_by) return 0.0;
-        here_ = half;
-    } else {
+    for (int k = 0; k < 2; ++k, lengths *= 0.5) {
+        SampleModel next = with_noises(lengths);
+        const double there = at(next);
+        if (there < here_ - off_by) continue;
+        model_ = std::move(next);
         here_ = there;
+        break;
     }
-    model_ = std::move(next);
-    return powers.cwiseAbs().maxCoeff();
+    double furthest = 0.0;
+    for (Eigen::Index i = 0; i < m; ++i) {
+        furthest = std::max(furthest, std::abs(lengths(i)) / std::min(sd(i), 0.5));
+        if (bend(i, i) > 0.0)
+            log_length_(i) = std::min(log_length_(i) * std::sqrt(wanted_bend / bend(i, i)), first_log);
+    }
+    return furthest;
 }
 
 double Climb::climb_columns() {
-    constexpr double first_length = 5.0;  // standard errors, were the increments known
+    constexpr double first_length = 3.0;  // standard errors, were the increments known
     constexpr int doublings = 3;
-    constexpr double enough = 20.0;
+    constexpr double enough = 5.0;
     constexpr double reach = 3.0;
     const Eigen::MatrixXd& known = fit_.covariance();
     const Eigen::Index m = known.rows();
@@ -209,20 +212,19 @@ double Climb::climb_columns() {
 
 }  // namespace
 
-RoundedSummit towards_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
-                             std::size_t until, int most_rounds) {
-    constexpr double little = 0.3;
-    Climb climb(fit, rounded, step_arcsec, until);
+RoundedSummit towards_summit(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until,
+                             int most_rounds) {
+    constexpr double little = 0.5;
+    Climb climb(fit, rounded, until);
     for (int round = 0; round < most_rounds; ++round) {
         if (climb.climb_noises() < little) break;
     }
     return {climb.model(), climb.log_likelihood(), climb.noise_log_sd(), {}};
 }
 
-RoundedSummit find_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
-                          int most_rounds) {
-    constexpr double little = 0.7;
-    Climb climb(fit, rounded, step_arcsec, rounded.size());
+RoundedSummit find_summit(const SampleFit& fit, const RoundedIncrements& rounded, int most_rounds) {
+    constexpr double little = 0.5;
+    Climb climb(fit, rounded, rounded.arcsec.size());
     for (int round = 0; round < most_rounds; ++round) {
         const double columns = climb.climb_columns();
         const double noises = climb.climb_noises();

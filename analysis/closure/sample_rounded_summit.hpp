@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_unrounding.hpp"
 
 /// Where the likelihood of rounded increments is largest, and how sharp it is there. Increments that are drawn within
 /// their steps hardly move a model where the steps hide most of what tells: each fit to them goes a small part of the
@@ -21,12 +22,10 @@ struct RoundedSummit {
 };
 
 /// Noises alone, from afar, by the increments up to that row; of columns it says nothing.
-/// \param rounded  increments, whole multiples of `step_arcsec` [arcsec]
-RoundedSummit towards_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
-                             std::size_t until, int most_rounds);
+RoundedSummit towards_summit(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until,
+                             int most_rounds);
 
 /// Noises and columns of a model that is near it.
-RoundedSummit find_summit(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
-                          int most_rounds);
+RoundedSummit find_summit(const SampleFit& fit, const RoundedIncrements& rounded, int most_rounds);
 
 }  // namespace ringlock::closure

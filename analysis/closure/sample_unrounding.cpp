@@ -1,15 +1,16 @@
 #include "analysis/closure/sample_unrounding.hpp"
 
+#include <hwy/contrib/sort/vqsort.h>
+
 #include <algorithm>
-#include <boost/math/special_functions/erf.hpp>
 #include <boost/random/mersenne_twister.hpp>
-#include <boost/random/normal_distribution.hpp>
 #include <boost/random/uniform_01.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <numeric>
 
+#include "analysis/closure/normals_between.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
 
@@ -19,31 +20,13 @@ namespace {
 
 double upper_tail(double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); }
 
-/// A normal number between two bounds: its probability, and a draw.
-class Between {
-   public:
-    Between(double low, double high) : turned_(low + high < 0.0) {
-        // The side on which both are small numbers
-        near_ = turned_ ? -high : low;
-        of_near_ = upper_tail(near_);
-        of_far_ = upper_tail(turned_ ? -low : high);
-    }
-    double probability() const { return of_near_ - of_far_; }
-    double draw(double uniform) const {
-        constexpr double least = 1e-300;
-        const double tail = of_far_ + uniform * (of_near_ - of_far_);
-        const double z = tail > least ? std::numbers::sqrt2 * boost::math::erfc_inv(2.0 * tail) : near_;
-        return turned_ ? -z : z;
-    }
-    /// Minus the logarithm of the density at the bound that is nearest.
-    double distance() const { return near_ > 0.0 ? 0.5 * near_ * near_ : 0.0; }
-
-   private:
-    bool turned_;
-    double near_, of_near_, of_far_;
-};
-
 }  // namespace
+
+std::size_t filters_for(double step_arcsec, double sd_arcsec) {
+    std::size_t count = 64;
+    while (count < 256 && static_cast<double>(count) < 16.0 * step_arcsec / sd_arcsec) count *= 2;
+    return count;
+}
 
 bool rounding_shows(double step_arcsec, double sd_arcsec) {
     constexpr double shows = 0.01;
@@ -56,8 +39,7 @@ namespace {
 class Mixture {
    public:
     enum class Paths { kept, forgotten };
-    Mixture(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec, std::uint64_t seed,
-            Paths paths);
+    Mixture(const SampleFit& fit, const RoundedIncrements& rounded, std::uint64_t seed, Paths paths);
     /// Goes on to the next increment, and draws its reading.
     void go_on();
     /// The increment that comes next.
@@ -70,50 +52,59 @@ class Mixture {
     std::size_t at_row(std::size_t row) const { return drawn_.size() > count_ ? row * count_ : 0; }
     double uniform() { return boost::random::uniform_01<double>()(generator_); }
     void advance();
-    void draw_anew(std::uint8_t* parent);
+    void draw_anew();
+    double distance(double width) const;
 
     const SampleFilter& filter_;
-    const std::vector<double>& rounded_;
+    const std::span<const double> rounded_;
     const double step_;
     const std::size_t count_;
     boost::random::mt19937_64 generator_;
-    boost::random::normal_distribution<double> normal_;
     std::vector<double> no_noise_;
     std::size_t row_ = 0;
     double total_ = 0.0;       ///< of the rounded increments
     double determined_ = 0.0;  ///< of what is no noise
     double log_probability_ = 0.0;
-    std::vector<SampleFilter::State> state_;
-    std::vector<double> weight_;
-    std::vector<double> foretold_;      ///< next reading
     std::vector<float> drawn_;          ///< all readings, within their steps
     std::vector<std::uint8_t> parent_;  ///< whom each continued
+    SampleFilter::Many filters_;
+    std::vector<double> weight_;
+    std::vector<double> foretold_;    ///< next reading
+    std::vector<double> innovation_;  ///< of the last reading
+    std::vector<double> low_, share_, probability_;
+    std::vector<std::uint64_t> key_;  ///< place of a filter among all, and in the last byte which it is
+    hwy::Sorter sorter_;
+    std::vector<std::uint8_t> from_;
 };
 
-/// The rarer an angle crosses a step beside its noise, the more must be kept to hit it.
-std::size_t filters_for(double step_over_sd) {
-    std::size_t count = 64;
-    while (count < 256 && static_cast<double>(count) < 16.0 * step_over_sd) count *= 2;
-    return count;
+std::vector<double> within(std::size_t count, double step_arcsec) {
+    std::vector<double> readings(count);
+    for (std::size_t p = 0; p < count; ++p) {
+        readings[p] = ((static_cast<double>(p) + 0.5) / static_cast<double>(count) - 0.5) * step_arcsec;
+    }
+    return readings;
 }
 
-Mixture::Mixture(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec, std::uint64_t seed,
-                 Paths paths)
+Mixture::Mixture(const SampleFit& fit, const RoundedIncrements& rounded, std::uint64_t seed, Paths paths)
     : filter_(fit.filter()),
-      rounded_(rounded),
-      step_(step_arcsec),
-      count_(filters_for(step_arcsec / fit.sd(rounded.size() / 2))),
+      rounded_(rounded.arcsec),
+      step_(rounded.step_arcsec),
+      count_(rounded.filters),
       generator_(seed),
       no_noise_(fit.determined()),
-      state_(count_),
+      drawn_(count_ * (paths == Paths::kept ? rounded_.size() + 1 : 1)),
+      parent_(drawn_.size()),
+      filters_(filter_, within(count_, step_)),
       weight_(count_, 1.0 / static_cast<double>(count_)),
       foretold_(count_),
-      drawn_(count_ * (paths == Paths::kept ? rounded.size() + 1 : 1)),
-      parent_(drawn_.size()) {
+      innovation_(count_),
+      low_(count_),
+      share_(count_),
+      probability_(count_),
+      key_(count_),
+      from_(count_) {
     for (std::size_t p = 0; p < count_; ++p) {
-        const double first = (static_cast<double>(p) + uniform()) / static_cast<double>(count_) - 0.5;
-        drawn_[p] = static_cast<float>(first);
-        filter_.begin(first * step_, state_[p]);
+        drawn_[p] = static_cast<float>((static_cast<double>(p) + 0.5) / static_cast<double>(count_) - 0.5);
     }
     advance();
 }
@@ -121,56 +112,71 @@ Mixture::Mixture(const SampleFit& fit, const std::vector<double>& rounded, doubl
 void Mixture::advance() {
     if (row_ == rounded_.size()) return;
     determined_ += no_noise_[row_];
-    draw_anew(parent_.data() + at_row(row_ + 1));
-    for (std::size_t p = 0; p < count_; ++p) foretold_[p] = determined_ + filter_.foretell(state_[p]);
+    filters_.foretell(foretold_);
+    for (double& reading : foretold_) reading += determined_;
+    draw_anew();
 }
 
-/// Where few of them have most of the weight: evenly along its sum (Kitagawa, J. Comput. Graph. Stat. 5, 1, 1996).
-void Mixture::draw_anew(std::uint8_t* parent) {
-    for (std::size_t p = 0; p < count_; ++p) parent[p] = static_cast<std::uint8_t>(p);
-    const double squares = std::inner_product(weight_.begin(), weight_.end(), weight_.begin(), 0.0);
-    if (squares * static_cast<double>(count_) < 2.0) return;
-    const auto before = state_;
-    double sum = weight_[0];
-    std::size_t from = 0;
+/// Evenly along the sum of the weights (Kitagawa, J. Comput. Graph. Stat. 5, 1, 1996), in the order of what they
+/// foretell and of the same random numbers whatever the model: that makes the likelihood a nearly smooth function of it
+/// (Malik and Pitt, J. Econom. 165, 190, 2011).
+void Mixture::draw_anew() {
+    constexpr double same = 1e-9;
+    constexpr double places = 0x1p54;
     const double start = uniform();
+    std::uint8_t* parent = parent_.data() + at_row(row_ + 1);
+    std::iota(parent, parent + count_, std::uint8_t{0});
+    const auto [least, most] = std::minmax_element(weight_.begin(), weight_.end());
+    if (*most - *least < same * *most) return;
+    const auto [lowest, highest] = std::minmax_element(foretold_.begin(), foretold_.end());
+    const double scale = places / std::max(*highest - *lowest, 1e-300);
+    for (std::size_t p = 0; p < count_; ++p) {
+        key_[p] = static_cast<std::uint64_t>((foretold_[p] - *lowest) * scale) << 8U | p;
+    }
+    sorter_(key_.data(), count_, hwy::SortAscending());
+    const auto at_place = [&](std::size_t k) { return static_cast<std::uint8_t>(key_[k] & 0xFFU); };
+    double sum = weight_[at_place(0)];
+    std::size_t from = 0;
     for (std::size_t p = 0; p < count_; ++p) {
         const double at = (static_cast<double>(p) + start) / static_cast<double>(count_);
-        while (sum < at && from + 1 < count_) sum += weight_[++from];
-        state_[p] = before[from];
-        parent[p] = static_cast<std::uint8_t>(from);
+        while (sum < at && from + 1 < count_) sum += weight_[at_place(++from)];
+        parent[p] = at_place(from);
     }
+    std::copy(parent, parent + count_, from_.begin());
+    filters_.continue_from(from_);
+    for (std::size_t p = 0; p < count_; ++p) innovation_[p] = foretold_[from_[p]];
+    foretold_.swap(innovation_);
     std::fill(weight_.begin(), weight_.end(), 1.0 / static_cast<double>(count_));
 }
 
 void Mixture::go_on() {
     constexpr double impossible = 1e-250;
-    constexpr double far = 6.0;  // beyond that are 2e-9
     const double sd = filter_.sd(row_);
+    const double width = step_ / sd;
     total_ += rounded_[row_];
+    for (std::size_t p = 0; p < count_; ++p) low_[p] = (total_ - 0.5 * step_ - foretold_[p]) / sd;
+    for (double& share : share_) share = uniform();
+    normals_between(low_, width, share_, probability_, innovation_);
     double sum = 0.0;
-    double nearest = std::numeric_limits<double>::infinity();
+    float* drawn = drawn_.data() + at_row(row_ + 1);
     for (std::size_t p = 0; p < count_; ++p) {
-        const double low = (total_ - 0.5 * step_ - foretold_[p]) / sd;
-        const double high = low + step_ / sd;
-        double z = 0.0;
-        if (low < -far && high > far) {
-            nearest = 0.0;
-            z = std::clamp(normal_(generator_), low, high);
-        } else {
-            const Between between(low, high);
-            nearest = std::min(nearest, between.distance());
-            z = std::clamp(between.draw(uniform()), low, high);
-            weight_[p] *= between.probability();
-        }
-        filter_.take(row_, z * sd, state_[p]);
-        drawn_[at_row(row_ + 1) + p] = static_cast<float>((foretold_[p] + z * sd - total_) / step_);
+        drawn[p] = static_cast<float>((innovation_[p] - low_[p]) / width - 0.5);
+        weight_[p] *= probability_[p];
+        innovation_[p] *= sd;
         sum += weight_[p];
     }
-    log_probability_ = sum > impossible ? std::log(sum) : -nearest;
+    filters_.take(row_, innovation_);
+    log_probability_ = sum > impossible ? std::log(sum) : -distance(width);
     for (double& w : weight_) w = sum > impossible ? w / sum : 1.0 / static_cast<double>(count_);
     ++row_;
     advance();
+}
+
+/// Minus the logarithm of the density at the bound that is nearest.
+double Mixture::distance(double width) const {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const double low : low_) nearest = std::min(nearest, std::max({low, -low - width, 0.0}));
+    return 0.5 * nearest * nearest;
 }
 
 void Mixture::foretell(Foretold& foretold) const {
@@ -224,19 +230,18 @@ std::vector<double> Mixture::path() {
 
 }  // namespace
 
-std::vector<double> unround(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
-                            std::uint64_t seed) {
+std::vector<double> unround(const SampleFit& fit, const RoundedIncrements& rounded, std::uint64_t seed) {
     check_interrupt();
-    Mixture mixture(fit, rounded, step_arcsec, seed, Mixture::Paths::kept);
-    for (std::size_t k = 0; k < rounded.size(); ++k) mixture.go_on();
+    Mixture mixture(fit, rounded, seed, Mixture::Paths::kept);
+    for (std::size_t k = 0; k < rounded.arcsec.size(); ++k) mixture.go_on();
     return mixture.path();
 }
 
-Foretold foretell_rounded(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec) {
+Foretold foretell_rounded(const SampleFit& fit, const RoundedIncrements& rounded) {
     check_interrupt();
-    Mixture mixture(fit, rounded, step_arcsec, 0, Mixture::Paths::forgotten);
+    Mixture mixture(fit, rounded, 0, Mixture::Paths::forgotten);
     Foretold foretold;
-    for (std::size_t k = 0; k < rounded.size(); ++k) {
+    for (std::size_t k = 0; k < rounded.arcsec.size(); ++k) {
         mixture.foretell(foretold);
         mixture.go_on();
         foretold.log_probability.push_back(mixture.log_probability());
@@ -244,12 +249,11 @@ Foretold foretell_rounded(const SampleFit& fit, const std::vector<double>& round
     return foretold;
 }
 
-double log_likelihood_of_rounded(const SampleFit& fit, const std::vector<double>& rounded, double step_arcsec,
-                                 std::size_t until) {
+double log_likelihood_of_rounded(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until) {
     check_interrupt();
-    Mixture mixture(fit, rounded, step_arcsec, 0, Mixture::Paths::forgotten);
+    Mixture mixture(fit, rounded, 0, Mixture::Paths::forgotten);
     double sum = 0.0;
-    for (std::size_t k = 0; k < std::min(until, rounded.size()); ++k) {
+    for (std::size_t k = 0; k < std::min(until, rounded.arcsec.size()); ++k) {
         mixture.go_on();
         if (fit.rows()[k]) sum += mixture.log_probability();
     }

@@ -193,6 +193,34 @@ HWY_INLINE V log(D d, V x) {
     return fma(d, k, hn::Set(d, 0x1.62e42fefa39efp-1), log_m);
 }
 
+/// e^x for |x| <= 700, relative error below 4e-16.
+template <class D, class V>
+HWY_INLINE V exp(D d, V x) {
+    // x = k log 2 + r, |r| <= log(2)/2; Taylor series of (e^r - 1 - r)/r^2, whose next term is below 3e-18.
+    static constexpr double of_rest[] = {1.0 / 2,
+                                         1.0 / 6,
+                                         1.0 / 24,
+                                         1.0 / 120,
+                                         1.0 / 720,
+                                         1.0 / 5040,
+                                         1.0 / 40320,
+                                         1.0 / 362880,
+                                         1.0 / 3628800,
+                                         1.0 / 39916800,
+                                         1.0 / 479001600.0,
+                                         1.0 / 6227020800.0,
+                                         1.0 / 87178291200.0};
+    const hn::Rebind<std::uint64_t, D> bits;
+    const V magic = hn::Set(d, 0x1.8p52);
+    const V shifted = fma(d, x, hn::Set(d, 0x1.71547652b82fep+0), magic);
+    const V k = shifted - magic;
+    // log 2 in two parts, the first of few bits
+    const V r = fnma(d, k, hn::Set(d, 0x1.ef35793c76730p-45), fnma(d, k, hn::Set(d, 0x1.62e42fefa3800p-1), x));
+    const V rest = fma(d, r * r, polynomial(d, r, of_rest), r);
+    const auto scale = hn::ShiftLeft<52>(hn::BitCast(bits, shifted)) + hn::Set(bits, 0x3ff0000000000000ULL);
+    return hn::BitCast(d, scale) * (rest + hn::Set(d, 1.0));
+}
+
 }  // namespace ringlock::simd::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -53,7 +53,7 @@ TEST(RoundedReadings, AreDrawnWithinTheirStepsAsNormalAsTheirModel) {
     const Rows rows(series.size(), 1);
     const std::vector<double> rounded = series.increment;
     const SampleFit fit = true_fit(truth, series, rows);
-    series.increment = ringlock::closure::unround(fit, rounded, step_arcsec, 1);
+    series.increment = ringlock::closure::unround(fit, {rounded, step_arcsec, 128}, 1);
     double off = 0.0;
     double least = 0.0;
     double most = 0.0;
@@ -82,7 +82,7 @@ TEST(RoundedReadings, AreForetoldWithTheSpreadThatIsSaid) {
     const SampleSeries series = ringlock::closure::prepare_samples(generate_samples(truth));
     const Rows rows(series.size(), 1);
     const SampleFit fit = true_fit(truth, series, rows);
-    const auto foretold = ringlock::closure::foretell_rounded(fit, series.increment, step_arcsec);
+    const auto foretold = ringlock::closure::foretell_rounded(fit, {series.increment, step_arcsec, 128});
     double squares = 0.0;
     double variance = 0.0;
     double log_probability = 0.0;

@@ -79,6 +79,9 @@ void apply(Operation operation, std::size_t count, const double* a, const double
             case Operation::log:
                 result = sm::log(d, x);
                 break;
+            case Operation::exp:
+                result = sm::exp(d, x);
+                break;
         }
         hn::StoreU(result, d, out + i);
     }

@@ -17,6 +17,7 @@ enum class Operation {
     arg_right,   ///< of a + i b
     arg,         ///< of a + i b
     log,         ///< of a
+    exp,         ///< of a
 };
 
 /// Element by element; an operation of fewer arguments leaves the others alone.

@@ -389,6 +389,26 @@ TEST_F(SimdMath, Logarithm) {
     });
 }
 
+TEST_F(SimdMath, ExponentialIsExact) {
+    Values x;
+    for (int k = -1000; k <= 1000; ++k) add_around(x, 0.34657359027997264 * k, 20);  // where the power of two changes
+    for (int i = -50000; i <= 50000; ++i) x.push_back(i / 50000.0);
+    Random random(111);
+    for (int i = 0; i < 100000; ++i) x.push_back(random.uniform(-700.0, 700.0));
+    for (int i = 0; i < 20000; ++i) x.push_back(random.spread(-60.0, 9.0));
+    on_every_target([&] {
+        const Values power = probe(Operation::exp, x);
+        Worst worst;
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            const long double exact = std::exp(static_cast<long double>(x[i]));
+            worst.add(power[i], exact, x[i], exact);
+        }
+        worst.print("exp, relative");
+        EXPECT_LT(worst.error, 4e-16) << "at " << worst.at;
+        EXPECT_EQ(probe(Operation::exp, {0.0})[0], 1.0);
+    });
+}
+
 TEST_F(SimdMath, EveryInstructionSetHasTheSameBits) {
     const Values fringes = fringe_arguments();
     Values re;
@@ -400,7 +420,9 @@ TEST_F(SimdMath, EveryInstructionSetHasTheSameBits) {
     Random random(110);
     Values slopes;
     Values positive;
+    Values powers;
     for (int i = 0; i < 50000; ++i) {
+        powers.push_back(random.uniform(-700.0, 700.0));
         slopes.push_back(random.uniform(-0.41, 0.41));
         positive.push_back(std::abs(random.spread(-1022.0, 1023.9)));
     }
@@ -414,6 +436,7 @@ TEST_F(SimdMath, EveryInstructionSetHasTheSameBits) {
         results.push_back(probe(Operation::arg_right, right_re, right_im));
         results.push_back(probe(Operation::atan_small, slopes));
         results.push_back(probe(Operation::log, positive));
+        results.push_back(probe(Operation::exp, powers));
         for (std::size_t terms = 2; terms <= 10; ++terms) results.push_back(probe_polynomial(terms, slopes));
         return results;
     };
