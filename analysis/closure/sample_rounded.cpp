@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "analysis/closure/chance.hpp"
-#include "analysis/closure/sample_rounded_summit.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -22,6 +21,8 @@ void RoundedSamples::restore() {
     series_.increment = measured_;
     step_ = 0.0;
     draws_ = 0;
+    summit_.reset();
+    wandering_.reset();
 }
 
 bool RoundedSamples::show(const SampleFit& fit, double step_arcsec) {
@@ -43,10 +44,11 @@ std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double st
     SampleFit now(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
     // The rate's noise may have grown by what the rounding is on the way from one step to the next.
     filters_ = filters_for(step_, now.sd(measured_.size() / 2));
-    const SampleModel near = towards_summit(now, rounded(), first_look, most_looks).model;
-    const SampleFit there(series_, near, fit.rows(), SampleFit::Noise::all_held);
+    summit_ = towards_summit(now, rounded(), first_look, most_looks);
+    wandering_.reset();
+    const SampleFit there(series_, summit_->model, fit.rows(), SampleFit::Noise::all_held);
     filters_ = filters_for(step_, there.sd(measured_.size() / 2));
-    auto drawn = draw_by(near, near, fit.rows());
+    auto drawn = draw_by(summit_->model, summit_->model, fit.rows());
     for (int round = 0; round < rounds; ++round) drawn = draw(std::move(drawn), draws);
     return drawn;
 }
@@ -90,19 +92,25 @@ double RoundedSamples::wander(const SampleFit& fit) const {
 
 /// What the model lacks is drawn as its noise makes it. A slow rate that it lacks is drawn beside a walk, which follows
 /// it, where that is likelier by far.
-SampleModel RoundedSamples::likeliest(const SampleFit& fit) const {
+SampleModel RoundedSamples::likeliest(const SampleFit& fit) {
     constexpr int climbs = 2;
     constexpr int climbs_from_afar = 6;
     constexpr double by_far = 12.0;
-    RoundedSummit summit = find_summit(fit, rounded(), climbs);
+    summit_ = find_summit(fit, rounded(), climbs, near(fit.model()));
     const double walk = fit.model().walk || fit.model().flicker ? 0.0 : wander(fit);
-    if (walk == 0.0) return std::move(summit.model);
-    SampleModel beside = summit.model;
+    if (walk == 0.0) return summit_->model;
+    SampleModel beside = summit_->model;
     beside.walk = true;
     beside.noise.walk_arcsec2_s3 = walk;
     const SampleFit start(series_, std::move(beside), fit.rows(), SampleFit::Noise::all_held);
-    RoundedSummit wandering = towards_summit(start, rounded(), measured_.size(), climbs_from_afar);
-    return std::move(wandering.log_likelihood > summit.log_likelihood + by_far ? wandering.model : summit.model);
+    wandering_ =
+        towards_summit(start, rounded(), measured_.size(), climbs_from_afar, wandering_ ? &*wandering_ : nullptr);
+    return wandering_->log_likelihood > summit_->log_likelihood + by_far ? wandering_->model : summit_->model;
+}
+
+const RoundedSummit* RoundedSamples::near(const SampleModel& model) const {
+    if (model.walk && wandering_ && !(summit_ && summit_->model.walk)) return &*wandering_;
+    return summit_ ? &*summit_ : nullptr;
 }
 
 ResidualTest RoundedSamples::test(const SampleFit& fit) const {
@@ -145,7 +153,8 @@ SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
                                          const std::function<SampleFigures(const SampleFit&)>& figures) {
     constexpr int several = 8;
     constexpr int climbs = 4;
-    const RoundedSummit summit = find_summit(fit, rounded(), climbs);
+    summit_ = find_summit(fit, rounded(), climbs, near(fit.model()));
+    const RoundedSummit& summit = *summit_;
     std::vector<SampleFigures> all;
     for (int k = 0; k < several; ++k) all.push_back(figures(*draw_by(summit.model, summit.model, fit.rows())));
     SampleFigures mean = all.front();

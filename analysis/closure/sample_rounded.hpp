@@ -3,11 +3,13 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "analysis/closure/independence.hpp"
 #include "analysis/closure/sample_figures.hpp"
 #include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_rounded_summit.hpp"
 #include "analysis/closure/sample_score.hpp"
 #include "analysis/closure/sample_unrounding.hpp"
 
@@ -43,7 +45,8 @@ class RoundedSamples {
    private:
     std::shared_ptr<SampleFit> draw_by(const SampleModel& drawing, const SampleModel& model, const Rows& rows);
     double wander(const SampleFit& fit) const;
-    SampleModel likeliest(const SampleFit& fit) const;
+    SampleModel likeliest(const SampleFit& fit);
+    const RoundedSummit* near(const SampleModel& model) const;
     RoundedIncrements rounded() const { return {measured_, step_, filters_}; }
 
     SampleSeries& series_;
@@ -51,6 +54,8 @@ class RoundedSamples {
     double step_ = 0.0;
     std::size_t filters_ = 0;
     std::uint64_t draws_ = 0;
+    std::optional<RoundedSummit> summit_;     ///< that was found last
+    std::optional<RoundedSummit> wandering_;  ///< beside a walk that the model lacks
 };
 
 }  // namespace ringlock::closure

@@ -11,15 +11,17 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Differences of the log-likelihoods that the filters estimate are off by about as much.
-constexpr double off_by = 1.0;
+/// Steps that are no more, in standard errors, are the last.
+constexpr double little = 0.5;
 
 class Climb {
    public:
-    Climb(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until)
+    Climb(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until, const RoundedSummit* near)
         : fit_(fit), rounded_(rounded), until_(until), model_(fit.model()) {
         here_ = at(model_);
         log_length_ = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(noises()), first_log);
+        measure_roughness();
+        if (near != nullptr) begin_near(*near);
     }
     const SampleModel& model() const { return model_; }
     double log_likelihood() const { return here_; }
@@ -34,6 +36,7 @@ class Climb {
 
    private:
     static constexpr double first_log = 0.33;
+    static constexpr double least_off = 0.7;
 
     double at(const SampleModel& model) const {
         const SampleFit of(fit_.series(), model, fit_.rows(), SampleFit::Noise::all_held);
@@ -44,19 +47,59 @@ class Climb {
         oneapi::tbb::parallel_for(std::size_t{0}, models.size(), [&](std::size_t k) { values[k] = at(models[k]); });
         return values;
     }
+    void measure_roughness();
+    void begin_near(const RoundedSummit& summit);
     std::size_t noises() const { return model_.walk || model_.flicker ? 3 : 2; }
     /// Their logarithms moved by so many lengths.
     SampleModel with_noises(const Eigen::VectorXd& lengths) const;
     SampleModel with_columns(const Eigen::VectorXd& moved) const;
+    void climb_to(SampleModel&& model, double log_likelihood) {
+        model_ = std::move(model);
+        here_ = log_likelihood;
+    }
 
     const SampleFit& fit_;
     const RoundedIncrements rounded_;
     const std::size_t until_;
     SampleModel model_;
     double here_ = 0.0;
+    double off_by_ = least_off;  ///< differences of the log-likelihoods, about
+    double wanted_bend_ = 0.0;   ///< of a length
     Eigen::VectorXd log_length_;
     std::vector<double> noise_log_sd_, column_times_;
 };
+
+/// The filters' log-likelihood of nearly the same model is not nearly the same, least of all where many rates walk.
+void Climb::measure_roughness() {
+    constexpr double nothing = 0.005;  // lengths
+    constexpr double most_off = 4.0;
+    constexpr double bends = 8.0;
+    const auto all = Eigen::VectorXd::Constant(log_length_.size(), nothing);
+    const auto values = at({with_noises(all), with_noises(-all)});
+    const double rms = std::sqrt(0.5 * (std::pow(values[0] - here_, 2) + std::pow(values[1] - here_, 2)));
+    off_by_ = std::clamp(1.5 * rms, least_off, most_off);
+    wanted_bend_ = bends * off_by_;
+}
+
+void Climb::begin_near(const RoundedSummit& summit) {
+    constexpr double least_log = 0.02;
+    for (Eigen::Index i = 0; i < log_length_.size(); ++i) {
+        if (static_cast<std::size_t>(i) >= summit.noise_log_sd.size()) break;
+        const double sd = summit.noise_log_sd[static_cast<std::size_t>(i)];
+        log_length_(i) = std::clamp(std::sqrt(wanted_bend_) * sd, least_log, first_log);
+    }
+    const SampleModel& other = summit.model;
+    if (other.walk != model_.walk || other.flicker != model_.flicker) return;
+    if (other.noise.terms.size() != model_.noise.terms.size()) return;
+    SampleModel model = model_;
+    model.noise.angle_arcsec = other.noise.angle_arcsec;
+    model.noise.rate_arcsec_rt_s = other.noise.rate_arcsec_rt_s;
+    model.noise.walk_arcsec2_s3 = other.noise.walk_arcsec2_s3;
+    model.noise.terms = other.noise.terms;
+    model.flicker_deg_h = other.flicker_deg_h;
+    const double there = at(model);
+    if (there > here_) climb_to(std::move(model), there);
+}
 
 SampleModel Climb::with_noises(const Eigen::VectorXd& lengths) const {
     const Eigen::VectorXd times = lengths.cwiseProduct(log_length_).array().exp();
@@ -79,8 +122,10 @@ SampleModel Climb::with_columns(const Eigen::VectorXd& moved) const {
 }
 
 double Climb::climb_noises() {
-    constexpr double most = 2.0;         // lengths
-    constexpr double wanted_bend = 8.0;  // of a length
+    constexpr double most = 2.0;  // lengths
+    constexpr double softest = 0.25;
+    constexpr double of_it = 0.01;
+    constexpr int halvings = 2;
     const auto m = static_cast<Eigen::Index>(noises());
     const auto axis = [m](Eigen::Index i) { return Eigen::VectorXd::Unit(m, i); };
     Eigen::VectorXd slope(m);
@@ -100,7 +145,7 @@ double Climb::climb_noises() {
         const double less = values[2 * static_cast<std::size_t>(i) + 1];
         slope(i) = 0.5 * (more(i) - less);
         bend(i, i) = 2.0 * here_ - less - more(i);
-        if (std::abs(slope(i)) < off_by && std::abs(bend(i, i)) < 2.0 * off_by) slope(i) = bend(i, i) = 0.0;
+        if (std::abs(slope(i)) < off_by_ && std::abs(bend(i, i)) < 2.0 * off_by_) slope(i) = bend(i, i) = 0.0;
     }
     auto both = values.begin() + 2 * m;
     for (Eigen::Index i = 0; i < m; ++i) {
@@ -111,36 +156,38 @@ double Climb::climb_noises() {
             bend(i, j) = bend(j, i) = std::clamp(cross, -most_cross, most_cross);
         }
     }
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(bend);
     Eigen::VectorXd lengths = Eigen::VectorXd::Zero(m);
-    Eigen::VectorXd sd = Eigen::VectorXd::Constant(m, std::numeric_limits<double>::infinity());  // lengths
-    const Eigen::LLT<Eigen::MatrixXd> peak(bend);
-    if (peak.info() == Eigen::Success && bend.diagonal().minCoeff() > 0.0) {
-        lengths = peak.solve(slope);
-        sd = peak.solve(Eigen::MatrixXd::Identity(m, m)).diagonal().cwiseSqrt();
-    } else {
+    Eigen::VectorXd variance = Eigen::VectorXd::Zero(m);  // lengths^2
+    for (Eigen::Index j = 0; j < m; ++j) {
+        const auto along = axes.eigenvectors().col(j);
+        const double bends = axes.eigenvalues()(j);
+        // Where it is no summit that bends, uphill all the same
+        const double stiff = std::max(std::abs(bends), softest);
+        lengths += std::clamp(slope.dot(along) / stiff, -most, most) * along;
         for (Eigen::Index i = 0; i < m; ++i) {
-            if (slope(i) == 0.0) continue;
-            lengths(i) = bend(i, i) > 0.0 ? slope(i) / bend(i, i) : std::copysign(most, slope(i));
-            if (bend(i, i) > 0.0) sd(i) = 1.0 / std::sqrt(bend(i, i));
+            const double share = along(i) * along(i);
+            if (bends > softest) variance(i) += share / bends;
+            if (bends <= softest && share > of_it) variance(i) = std::numeric_limits<double>::infinity();
         }
     }
     noise_log_sd_.assign(static_cast<std::size_t>(m), 0.0);
-    Eigen::VectorXd::Map(noise_log_sd_.data(), m) = sd.cwiseProduct(log_length_);
-    lengths = lengths.cwiseMax(-most).cwiseMin(most);
-    // No parabola far from the top: half of the way, if that is no worse.
-    for (int k = 0; k < 2; ++k, lengths *= 0.5) {
+    Eigen::VectorXd::Map(noise_log_sd_.data(), m) = variance.cwiseSqrt().cwiseProduct(log_length_);
+    double furthest = 0.0;
+    for (int k = 0; k <= halvings; ++k, lengths *= 0.5) {
         SampleModel next = with_noises(lengths);
         const double there = at(next);
-        if (there < here_ - off_by) continue;
-        model_ = std::move(next);
-        here_ = there;
+        if (there < here_ - off_by_) continue;
+        climb_to(std::move(next), there);
+        furthest = lengths.cwiseAbs().cwiseQuotient(variance.cwiseSqrt().cwiseMin(0.5)).maxCoeff();
         break;
     }
-    double furthest = 0.0;
     for (Eigen::Index i = 0; i < m; ++i) {
-        furthest = std::max(furthest, std::abs(lengths(i)) / std::min(sd(i), 0.5));
-        if (bend(i, i) > 0.0)
-            log_length_(i) = std::min(log_length_(i) * std::sqrt(wanted_bend / bend(i, i)), first_log);
+        if (bend(i, i) <= 0.0) continue;
+        const double length = std::min(log_length_(i) * std::sqrt(wanted_bend_ / bend(i, i)), first_log);
+        // A parabola of that many standard errors is none: once more.
+        if (length < 0.4 * log_length_(i)) furthest = std::max(furthest, 1.0);
+        log_length_(i) = length;
     }
     return furthest;
 }
@@ -148,7 +195,7 @@ double Climb::climb_noises() {
 double Climb::climb_columns() {
     constexpr double first_length = 3.0;  // standard errors, were the increments known
     constexpr int doublings = 3;
-    constexpr double enough = 5.0;
+    const double enough = 5.0 * off_by_;
     constexpr double reach = 3.0;
     const Eigen::MatrixXd& known = fit_.covariance();
     const Eigen::Index m = known.rows();
@@ -190,19 +237,19 @@ double Climb::climb_columns() {
     }
     for (const Along& along : all) {
         // Rounding hides, it does not tell; and what bends less than the likelihood is off by is not seen to bend.
-        const double bend = std::clamp(along.bend, 2.0 * off_by / (along.length * along.length), 1.0);
+        const double bend = std::clamp(along.bend, 2.0 * off_by_ / (along.length * along.length), 1.0);
         moved += std::clamp(along.slope / bend, -reach * along.length, reach * along.length) * along.direction;
         furthest = std::max(furthest, std::abs(along.slope) / std::sqrt(bend));
         rounded += along.direction * along.direction.transpose() / bend;
     }
-    for (int k = 0; k < 2; ++k, moved *= 0.5) {
+    bool higher = false;
+    for (int k = 0; k < 3 && !higher; ++k, moved *= 0.5) {
         SampleModel next = with_columns(moved);
         const double there = at(next);
-        if (there < here_ - off_by) continue;
-        model_ = std::move(next);
-        here_ = there;
-        break;
+        higher = there > here_ - off_by_;
+        if (higher) climb_to(std::move(next), there);
     }
+    if (!higher) furthest = 0.0;
     column_times_.clear();
     for (Eigen::Index a = 0; a < m; ++a) {
         column_times_.push_back(std::max(1.0, std::sqrt(rounded(a, a) / std::max(known(a, a), 1e-300))));
@@ -212,19 +259,18 @@ double Climb::climb_columns() {
 
 }  // namespace
 
-RoundedSummit towards_summit(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until,
-                             int most_rounds) {
-    constexpr double little = 0.5;
-    Climb climb(fit, rounded, until);
+RoundedSummit towards_summit(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until, int most_rounds,
+                             const RoundedSummit* near) {
+    Climb climb(fit, rounded, until, near);
     for (int round = 0; round < most_rounds; ++round) {
         if (climb.climb_noises() < little) break;
     }
     return {climb.model(), climb.log_likelihood(), climb.noise_log_sd(), {}};
 }
 
-RoundedSummit find_summit(const SampleFit& fit, const RoundedIncrements& rounded, int most_rounds) {
-    constexpr double little = 0.5;
-    Climb climb(fit, rounded, rounded.arcsec.size());
+RoundedSummit find_summit(const SampleFit& fit, const RoundedIncrements& rounded, int most_rounds,
+                          const RoundedSummit* near) {
+    Climb climb(fit, rounded, rounded.arcsec.size(), near);
     for (int round = 0; round < most_rounds; ++round) {
         const double columns = climb.climb_columns();
         const double noises = climb.climb_noises();

@@ -22,10 +22,12 @@ struct RoundedSummit {
 };
 
 /// Noises alone, from afar, by the increments up to that row; of columns it says nothing.
-RoundedSummit towards_summit(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until,
-                             int most_rounds);
+/// \param near  of a model like it, or nothing: its noises are begun with where they are likelier
+RoundedSummit towards_summit(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until, int most_rounds,
+                             const RoundedSummit* near = nullptr);
 
 /// Noises and columns of a model that is near it.
-RoundedSummit find_summit(const SampleFit& fit, const RoundedIncrements& rounded, int most_rounds);
+RoundedSummit find_summit(const SampleFit& fit, const RoundedIncrements& rounded, int most_rounds,
+                          const RoundedSummit* near = nullptr);
 
 }  // namespace ringlock::closure

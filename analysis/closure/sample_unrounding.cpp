@@ -24,7 +24,7 @@ double upper_tail(double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); }
 
 std::size_t filters_for(double step_arcsec, double sd_arcsec) {
     std::size_t count = 64;
-    while (count < 256 && static_cast<double>(count) < 16.0 * step_arcsec / sd_arcsec) count *= 2;
+    while (count < 256 && static_cast<double>(count) < 8.0 * step_arcsec / sd_arcsec) count *= 2;
     return count;
 }
 
