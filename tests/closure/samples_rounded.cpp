@@ -3,10 +3,13 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "analysis/closure/closure.hpp"
+#include "analysis/closure/sample_rounded_summit.hpp"
 #include "analysis/closure/sample_score.hpp"
 #include "analysis/closure/sample_unrounding.hpp"
 #include "tests/closure/heldout.hpp"
@@ -17,6 +20,7 @@ namespace {
 
 using ringlock::closure::close_samples;
 using ringlock::closure::Closure;
+using ringlock::closure::RoundedIncrements;
 using ringlock::closure::Rows;
 using ringlock::closure::SampleFit;
 using ringlock::closure::SampleModel;
@@ -94,6 +98,55 @@ TEST(RoundedReadings, AreForetoldWithTheSpreadThatIsSaid) {
     const SampleFit linear(series, SampleModel{}, rows);
     EXPECT_NEAR(squares / variance, 1.0, 0.08);
     EXPECT_GT(log_probability, score_of(linear, rows, step_arcsec).log_score + 50.0);
+}
+
+// Filters are drawn anew by chance, but that says nearly the same of nearly the same model: a climb sees slopes.
+TEST(RoundedReadings, NearlyTheSameModelsAreNearlyAsLikely) {
+    for (const double noise : {0.25, 0.1, 0.02}) {
+        SCOPED_TRACE(noise);
+        const SampleTruth truth = counted(noise);
+        const SampleSeries series = ringlock::closure::prepare_samples(generate_samples(truth));
+        const Rows rows(series.size(), 1);
+        const RoundedIncrements rounded{series.increment, step_arcsec, 128};
+        std::vector<double> likelihood;
+        for (int k = 0; k < 12; ++k) {
+            SampleModel model = true_fit(truth, series, rows).model();
+            model.noise.angle_arcsec *= 1.0 + 1e-3 * k;
+            const SampleFit fit(series, std::move(model), rows, SampleFit::Noise::all_held);
+            likelihood.push_back(log_likelihood_of_rounded(fit, rounded, series.size()));
+        }
+        double squares = 0.0;
+        for (std::size_t k = 2; k < likelihood.size(); ++k) {
+            squares += std::pow(likelihood[k] - 2.0 * likelihood[k - 1] + likelihood[k - 2], 2) / 10.0;
+        }
+        EXPECT_LT(std::sqrt(squares), 0.5);
+    }
+}
+
+// Where the measured increments are likeliest, and how sharp that is: the truth, within its errors.
+TEST(RoundedReadings, AreLikeliestWhereTheNoiseIs) {
+    constexpr int records = 8;
+    double angle = 0.0;
+    double rate = 0.0;
+    for (int k = 1; k <= records; ++k) {
+        const SampleTruth truth = counted(0.1, static_cast<std::uint64_t>(k));
+        const SampleSeries series = ringlock::closure::prepare_samples(generate_samples(truth));
+        const Rows rows(series.size(), 1);
+        SampleModel model = true_fit(truth, series, rows).model();
+        const ringlock::closure::SampleNoise exact = model.noise;
+        model.noise.angle_arcsec *= 1.6;
+        model.noise.rate_arcsec_rt_s *= 2.0;
+        const SampleFit off(series, std::move(model), rows, SampleFit::Noise::all_held);
+        const auto summit = towards_summit(off, {series.increment, step_arcsec, 64}, series.size(), 8);
+        ASSERT_EQ(summit.noise_log_sd.size(), 2U);
+        EXPECT_NEAR(summit.noise_log_sd[0], 0.0165, 0.004);  // second differences of the log-likelihood
+        const auto& noise = summit.model.noise;
+        angle += std::pow(std::log(noise.angle_arcsec / exact.angle_arcsec) / summit.noise_log_sd[0], 2);
+        rate += std::pow(std::log(noise.rate_arcsec_rt_s / exact.rate_arcsec_rt_s) / summit.noise_log_sd[1], 2);
+    }
+    // Chi squared of eight degrees of freedom, one in ten thousand
+    EXPECT_LT(angle, 31.8);
+    EXPECT_LT(rate, 31.8);
 }
 
 TEST(RoundedRecords, CountsBesideLittleNoiseAreNoStructure) {
