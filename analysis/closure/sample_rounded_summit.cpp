@@ -49,7 +49,8 @@ class Climb {
     }
     void measure_roughness();
     void begin_near(const RoundedSummit& summit);
-    std::size_t noises() const { return model_.walk || model_.flicker ? 3 : 2; }
+    bool random() const { return model_.walk || model_.flicker; }
+    std::size_t noises() const { return (random() ? 3 : 2) + model_.noise.resonances.size(); }
     /// Their logarithms moved by so many lengths.
     SampleModel with_noises(const Eigen::VectorXd& lengths) const;
     SampleModel with_columns(const Eigen::VectorXd& moved) const;
@@ -91,11 +92,13 @@ void Climb::begin_near(const RoundedSummit& summit) {
     const SampleModel& other = summit.model;
     if (other.walk != model_.walk || other.flicker != model_.flicker) return;
     if (other.noise.terms.size() != model_.noise.terms.size()) return;
+    if (other.resonances != model_.resonances) return;
     SampleModel model = model_;
     model.noise.angle_arcsec = other.noise.angle_arcsec;
     model.noise.rate_arcsec_rt_s = other.noise.rate_arcsec_rt_s;
     model.noise.walk_arcsec2_s3 = other.noise.walk_arcsec2_s3;
     model.noise.terms = other.noise.terms;
+    model.noise.resonances = other.noise.resonances;
     model.flicker_deg_h = other.flicker_deg_h;
     const double there = at(model);
     if (there > here_) climb_to(std::move(model), there);
@@ -106,7 +109,9 @@ SampleModel Climb::with_noises(const Eigen::VectorXd& lengths) const {
     SampleModel model = model_;
     model.noise.angle_arcsec *= times(0);
     model.noise.rate_arcsec_rt_s *= times(1);
-    if (times.size() < 3) return model;
+    Eigen::Index next = random() ? 3 : 2;
+    for (auto& resonance : model.noise.resonances) resonance.arcsec *= times(next++);
+    if (!random()) return model;
     model.noise.walk_arcsec2_s3 *= times(2) * times(2);
     model.flicker_deg_h *= times(2);
     for (auto& term : model.noise.terms) term.variance_arcsec2_s2 *= times(2) * times(2);
