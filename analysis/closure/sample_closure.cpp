@@ -38,6 +38,8 @@ constexpr double most_disturbed = 0.6;
 
 /// Of increments that were rounded, after every step.
 constexpr int draws_of_step = 2;
+/// As it is told anew by what has been drawn beside it.
+constexpr int most_motions = 6;
 
 class Loop {
    public:
@@ -80,7 +82,7 @@ class Loop {
     void take(const SampleChoice& choice, Closure& closure);
     void take_back_lines(Closure& closure);
     void move_case(SampleStep& told, SampleFit::Noise noise);
-    void move_anew();
+    bool move_anew();
     void drop_needless();
     void test_what_is_left(Closure& closure) const;
     void finish(Closure& closure);
@@ -443,8 +445,11 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     drop_needless();
     move_anew();
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
+    now_.told.push_back({effect, next_step_++, best.candidate.witness, best.candidate.strong, choice.other_hz});
     if (rounded_.drawn()) {
         now_.fit = rounded_.draw(now_.fit, draws_of_step);
+        // What was drawn without a motion tells little of it.
+        for (int k = 0; k < most_motions && move_anew(); ++k) now_.fit = rounded_.draw(now_.fit, 1);
     } else if (series_.counted || used_step_ > 0.0) {
         // What has been taken off may have been what the rounding was small beside.
         find_coarse_steps(closure);
@@ -464,7 +469,6 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
         }
     }
     now_.steps.push_back(std::move(step));
-    now_.told.push_back({effect, next_step_++, best.candidate.witness, best.candidate.strong, choice.other_hz});
 }
 
 /// A line of the library keeps its amplitude, and its frequency but for an even drift. One that does not, as its own
@@ -490,7 +494,8 @@ void Loop::take_back_lines(Closure& closure) {
 
 /// What a witness told of a motion, and what it left, was told beside the noise as it was, which what has been added
 /// was a part of.
-void Loop::move_anew() {
+bool Loop::move_anew() {
+    bool any = false;
     for (SampleStep& told : now_.told) {
         if (told.effect != "case_motion") continue;
         const SampleFit still(series_, without_motion(now_.fit->model()), rows_, SampleFit::Noise::held);
@@ -500,7 +505,9 @@ void Loop::move_anew() {
         if (!(moved->gain_over(*now_.fit) > more)) continue;
         now_.fit = std::move(moved);
         told.strong = true;
+        any = true;
     }
+    return any;
 }
 
 /// A motion of the case that is known to be there, by two numbers or lag by lag.

@@ -50,7 +50,9 @@ class Climb {
     void measure_roughness();
     void begin_near(const RoundedSummit& summit);
     bool random() const { return model_.walk || model_.flicker; }
-    std::size_t noises() const { return (random() ? 3 : 2) + model_.noise.resonances.size(); }
+    std::size_t noises() const {
+        return (random() ? 3U : 2U) + model_.noise.resonances.size() + (model_.motion.empty() ? 0U : 1U);
+    }
     /// Their logarithms moved by so many lengths.
     SampleModel with_noises(const Eigen::VectorXd& lengths) const;
     SampleModel with_columns(const Eigen::VectorXd& moved) const;
@@ -92,13 +94,14 @@ void Climb::begin_near(const RoundedSummit& summit) {
     const SampleModel& other = summit.model;
     if (other.walk != model_.walk || other.flicker != model_.flicker) return;
     if (other.noise.terms.size() != model_.noise.terms.size()) return;
-    if (other.resonances != model_.resonances) return;
+    if (other.resonances != model_.resonances || other.motion.size() != model_.motion.size()) return;
     SampleModel model = model_;
     model.noise.angle_arcsec = other.noise.angle_arcsec;
     model.noise.rate_arcsec_rt_s = other.noise.rate_arcsec_rt_s;
     model.noise.walk_arcsec2_s3 = other.noise.walk_arcsec2_s3;
     model.noise.terms = other.noise.terms;
     model.noise.resonances = other.noise.resonances;
+    model.motion = other.motion;
     model.flicker_deg_h = other.flicker_deg_h;
     const double there = at(model);
     if (there > here_) climb_to(std::move(model), there);
@@ -111,6 +114,8 @@ SampleModel Climb::with_noises(const Eigen::VectorXd& lengths) const {
     model.noise.rate_arcsec_rt_s *= times(1);
     Eigen::Index next = random() ? 3 : 2;
     for (auto& resonance : model.noise.resonances) resonance.arcsec *= times(next++);
+    if (!model.motion.empty())
+        Eigen::Map<Eigen::VectorXd>(model.motion.data(), static_cast<Eigen::Index>(model.motion.size())) *= times(next);
     if (!random()) return model;
     model.noise.walk_arcsec2_s3 *= times(2) * times(2);
     model.flicker_deg_h *= times(2);

@@ -15,7 +15,7 @@ struct RoundedSummit {
     SampleModel model;
     double log_likelihood = 0.0;
     /// Standard errors of the logarithms of the noises: white angle, white rate, random rate where there is one,
-    /// resonances; not finite where the increments say nothing of them.
+    /// resonances, what a witness tells of a motion; not finite where the increments say nothing of them.
     std::vector<double> noise_log_sd;
     /// Of each column, its standard error over that which it would have were the increments known.
     std::vector<double> column_times;
