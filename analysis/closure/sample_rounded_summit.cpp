@@ -209,9 +209,10 @@ double Climb::climb_columns() {
     constexpr double reach = 3.0;
     const Eigen::MatrixXd& known = fit_.covariance();
     const Eigen::Index m = known.rows();
-    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> of;
     const Eigen::VectorXd scale = known.diagonal().cwiseMax(1e-300).cwiseSqrt();
-    of.compute(scale.cwiseInverse().asDiagonal() * known * scale.cwiseInverse().asDiagonal());
+    const Eigen::MatrixXd correlation = scale.cwiseInverse().asDiagonal() * known * scale.cwiseInverse().asDiagonal();
+    // Of all independent directions those nearest to the columns: steps hide a line's amplitude, and not the mean rate.
+    const Eigen::MatrixXd root = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(correlation).operatorSqrt();
     struct Along {
         Eigen::VectorXd direction;
         double length;
@@ -222,9 +223,8 @@ double Climb::climb_columns() {
     double furthest = 0.0;
     std::vector<Along> all;
     for (Eigen::Index j = 0; j < m; ++j) {
-        const double variance = of.eigenvalues()(j);
-        if (!(variance > 1e-12)) continue;
-        all.push_back({std::sqrt(variance) * scale.asDiagonal() * of.eigenvectors().col(j), first_length});
+        if (!root.col(j).allFinite()) continue;
+        all.push_back({scale.asDiagonal() * root.col(j), first_length});
     }
     // Further where the increments say little
     for (int k = 0; k <= doublings; ++k) {
@@ -246,11 +246,12 @@ double Climb::climb_columns() {
         }
     }
     for (const Along& along : all) {
-        // Rounding hides, it does not tell; and what bends less than the likelihood is off by is not seen to bend.
-        const double bend = std::clamp(along.bend, 2.0 * off_by_ / (along.length * along.length), 1.0);
+        // What bends less than the likelihood is off by is not seen to bend.
+        const double bend = std::max(along.bend, 2.0 * off_by_ / (along.length * along.length));
         moved += std::clamp(along.slope / bend, -reach * along.length, reach * along.length) * along.direction;
         furthest = std::max(furthest, std::abs(along.slope) / std::sqrt(bend));
-        rounded += along.direction * along.direction.transpose() / bend;
+        // Rounding hides, it does not tell.
+        rounded += along.direction * along.direction.transpose() / std::min(bend, 1.0);
     }
     bool higher = false;
     for (int k = 0; k < 3 && !higher; ++k, moved *= 0.5) {
