@@ -218,7 +218,12 @@ TEST(LongRoundedRecords, EffectsBeneathStepsOfTwentyTimesTheNoiseAreNamed) {
         named.push_back(step.effect);
         EXPECT_TRUE(step.confounded_with.empty());
     }
-    EXPECT_EQ(named, (std::vector<std::string>{"count_quantization", "rate_random_walk", "dither_residue"}));
+    ASSERT_EQ(named, (std::vector<std::string>{"count_quantization", "rate_random_walk", "dither_residue"}));
+    for (const auto& estimate : found.steps[2].parameters) {
+        if (estimate.name != "amplitude_arcsec") continue;
+        EXPECT_NEAR(estimate.value, truth.dither_residue.amplitude_arcsec, 4.0 * estimate.sd);
+        EXPECT_LT(estimate.sd, 0.02);
+    }
 }
 
 }  // namespace
