@@ -134,7 +134,7 @@ SampleModel Climb::with_columns(const Eigen::VectorXd& moved) const {
 double Climb::climb_noises() {
     constexpr double most = 2.0;  // lengths
     constexpr double softest = 0.25;
-    constexpr double of_it = 0.01;
+    constexpr double part = 0.01;
     constexpr int halvings = 2;
     const auto m = static_cast<Eigen::Index>(noises());
     const auto axis = [m](Eigen::Index i) { return Eigen::VectorXd::Unit(m, i); };
@@ -178,7 +178,7 @@ double Climb::climb_noises() {
         for (Eigen::Index i = 0; i < m; ++i) {
             const double share = along(i) * along(i);
             if (bends > softest) variance(i) += share / bends;
-            if (bends <= softest && share > of_it) variance(i) = std::numeric_limits<double>::infinity();
+            if (bends <= softest && share > part) variance(i) = std::numeric_limits<double>::infinity();
         }
     }
     noise_log_sd_.assign(static_cast<std::size_t>(m), 0.0);
@@ -212,7 +212,9 @@ double Climb::climb_columns() {
     const Eigen::VectorXd scale = known.diagonal().cwiseMax(1e-300).cwiseSqrt();
     const Eigen::MatrixXd correlation = scale.cwiseInverse().asDiagonal() * known * scale.cwiseInverse().asDiagonal();
     // Of all independent directions those nearest to the columns: steps hide a line's amplitude, and not the mean rate.
-    const Eigen::MatrixXd root = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(correlation).operatorSqrt();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(correlation);
+    const Eigen::MatrixXd root = axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
+                                 axes.eigenvectors().transpose();
     struct Along {
         Eigen::VectorXd direction;
         double length;
@@ -222,10 +224,7 @@ double Climb::climb_columns() {
     Eigen::VectorXd moved = Eigen::VectorXd::Zero(m);
     double furthest = 0.0;
     std::vector<Along> all;
-    for (Eigen::Index j = 0; j < m; ++j) {
-        if (!root.col(j).allFinite()) continue;
-        all.push_back({scale.asDiagonal() * root.col(j), first_length});
-    }
+    for (Eigen::Index j = 0; j < m; ++j) all.push_back({scale.asDiagonal() * root.col(j), first_length});
     // Further where the increments say little
     for (int k = 0; k <= doublings; ++k) {
         std::vector<Along*> open;
