@@ -36,6 +36,9 @@ double line_hz(const SampleModel& model, bool wanders) {
 /// Of a record; where it is more, that is what the record is like.
 constexpr double most_disturbed = 0.6;
 
+/// What an effect that has been added explains is not disturbed: so often it is looked at again.
+constexpr int most_looks = 3;
+
 /// Of increments that were rounded, after every step.
 constexpr int draws_of_step = 2;
 /// As it is told anew by what has been drawn beside it.
@@ -73,6 +76,7 @@ class Loop {
     Rows all_rows() const;
     void begin(Closure& closure);
     void close(Closure& closure);
+    void take_known(const std::vector<ActiveEffect>& effects, Closure& closure);
     void add_all(Closure& closure, bool random_rates);
     void begin_again(const State& at);
     void go_without_random(Closure& closure);
@@ -353,7 +357,6 @@ SampleFigures Loop::figures() {
 }
 
 Closure Loop::run() {
-    constexpr int most_looks = 3;
     Closure closure;
     for (int look = 0; look < most_looks; ++look) {
         closure = {};
@@ -522,9 +525,7 @@ void Loop::move_case(SampleStep& told, SampleFit::Noise noise) {
     now_.fit = told.strong ? std::move(strong) : std::move(weak);
 }
 
-/// Whatever is known to be there, at the values given or near them; what is left is not looked at.
-Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
-    Closure closure;
+void Loop::take_known(const std::vector<ActiveEffect>& effects, Closure& closure) {
     begin(closure);
     KnownEffects known = known_effects(*now_.fit, effects);
     for (const SampleStep& told : known.told) {
@@ -541,6 +542,16 @@ Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
         if (told.effect == "case_motion" && !series_.witnesses.empty()) move_case(told, known.noise);
     }
     if (series_.counted || used_step_ > 0.0) find_coarse_steps(closure);
+}
+
+/// Whatever is known to be there, at the values given or near them; what is left is not looked at.
+Closure Loop::fit(const std::vector<ActiveEffect>& effects) {
+    Closure closure;
+    for (int look = 0; look < most_looks; ++look) {
+        closure = {};
+        take_known(effects, closure);
+        if (!restore()) break;
+    }
     finish(closure);
     return closure;
 }

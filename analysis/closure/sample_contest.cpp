@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <string_view>
 #include <utility>
 
 #include "analysis/closure/chance.hpp"
@@ -63,6 +64,7 @@ class Contest {
         Where where = Where::time;
         bool jumps = false;
         bool repeats = false;  ///< a variance that does
+        double of_a_motion = 0.0;  ///< merit beside what has resonances of its own
     };
 
     std::vector<SampleCandidate> screened(const SampleState& state, Wanted wanted) const;
@@ -76,7 +78,7 @@ class Contest {
                                    const std::vector<SampleCandidate>& candidates) const;
     double p_beside(const SampleContender& first, const SampleContender& second, const std::vector<Shared>& firsts,
                     const std::vector<SampleCandidate>& candidates) const;
-    std::vector<Rival> rivals(bool resampled) const;
+    std::vector<Rival> rivals(bool resampled, bool moved) const;
     static double bar(const Account& account, const std::vector<Rival>& rivals, std::size_t rows);
     bool beside_each_other(const SampleContender& a, const SampleContender& b) const;
     static void tie(const Account& best, const std::vector<Account>& as_likely, SampleChoice& choice);
@@ -249,8 +251,8 @@ std::vector<Contest::Account> Contest::sets(const std::vector<Shared>& all,
 }
 
 /// The views of the residual that explain most, each fitted with the noise anew; where the record may be resampled, a
-/// variance that repeats as well.
-std::vector<Contest::Rival> Contest::rivals(bool resampled) const {
+/// variance that repeats as well; where the case may have moved, power that scatters about a line.
+std::vector<Contest::Rival> Contest::rivals(bool resampled, bool moved) const {
     constexpr std::size_t looked_at = 4;
     auto views = view_samples(*now_.fit, lattice_arcsec_);
     std::erase_if(views, [](const View& view) { return view.test.merit < closure::tie; });
@@ -263,12 +265,14 @@ std::vector<Contest::Rival> Contest::rivals(bool resampled) const {
     }
     std::vector<Rival> found;
     for (const View& view : views) {
-        Rival rival{view.test.merit, 0.0, view.test.where, view.jumps, view.test.view == repeating_variance};
+        const bool repeats = view.test.view == repeating_variance;
+        Rival rival{view.test.merit, 0.0, view.test.where, view.jumps, repeats};
         if (view.columns) {
             rival.merit = refitted_merit(*now_.fit, view);
             rival.coefficients = static_cast<double>(view.columns().size());
         }
-        if (view.refitted && resampled) rival.merit = std::max(rival.merit, view.refitted());
+        if (repeats && resampled) rival.merit = std::max(rival.merit, view.refitted());
+        rival.of_a_motion = !repeats && view.refitted && moved ? view.refitted() : rival.merit;
         found.push_back(rival);
     }
     return found;
@@ -280,7 +284,7 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
     const bool random = account.random();
     double most = 0.0;
     for (const Rival& rival : rivals) {
-        double merit = rival.merit;
+        double merit = account.has("case_motion") ? rival.of_a_motion : rival.merit;
         if (rival.repeats && account.has("resampling")) {
             // On straight lines the variance swings by half, no more and no less. What they are blurred by makes that
             // less, as any other swing may be.
@@ -377,16 +381,17 @@ SampleChoice Contest::choose() {
         accounts.push_back({{contender}, contender->merit, contender->candidate.p_value});
     }
     std::vector<Rival> against;
-    const bool resampled =
-        std::any_of(all.begin(), all.end(), [](const Shared& c) { return c->candidate.effect == "resampling"; });
-    if (!all.empty()) against = rivals(resampled);
+    const auto may_be_of = [&](std::string_view effect) {
+        return std::any_of(all.begin(), all.end(), [&](const Shared& c) { return c->candidate.effect == effect; });
+    };
+    if (!all.empty()) against = rivals(may_be_of("resampling"), may_be_of("case_motion"));
     const auto holds = [&](const Account& account) { return account.merit > bar(account, against, series_.size()); };
     const bool led = !all.empty() && holds(accounts.front());
     const double leader = all.empty() ? 0.0 : accounts.front().merit;
     const bool random_leads = !all.empty() && accounts.front().random();
     if (!led || is_slow(all.front()->candidate.effect)) {
         for (Account& account : sets(all, candidates)) accounts.push_back(std::move(account));
-        if (all.empty() && !accounts.empty()) against = rivals(false);
+        if (all.empty() && !accounts.empty()) against = rivals(false, false);
     }
     std::stable_sort(accounts.begin(), accounts.end(),
                      [](const Account& a, const Account& b) { return a.merit > b.merit; });

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
 #include <memory>
 #include <numbers>
@@ -137,6 +138,61 @@ Estimate time_of_step(const SampleFit& fit, std::size_t at) {
             std::sqrt(std::max(0.0, second / sum - mean * mean) + within * within / 12.0)};
 }
 
+double of_readings_hz(const SampleFit& fit) {
+    return fit.model().noise.from_hz > 0.0 ? fit.model().noise.from_hz : fit.series().rate_hz;
+}
+
+/// Mean square of a resonance's angle between two frequencies, by the spectrum of the autoregression that it is.
+double power_between(const SampleNoise::Resonance& resonance, double from_hz, double to_hz, double rate_hz) {
+    constexpr int parts = 64;
+    const double r = std::exp(-units::pi * resonance.width_hz / rate_hz);
+    const double a = 2.0 * r * std::cos(units::two_pi * resonance.hz / rate_hz);
+    const double b = r * r;
+    const double driven = resonance.arcsec * resonance.arcsec * (1.0 - b) * ((1.0 + b) * (1.0 + b) - a * a) / (1.0 + b);
+    const double low = std::max(from_hz, 0.0);
+    const double width = (std::min(to_hz, 0.5 * rate_hz) - low) / parts;
+    double sum = 0.0;
+    for (int k = 0; k < parts; ++k) {
+        const double w = units::two_pi * (low + (k + 0.5) * width) / rate_hz;
+        const std::complex<double> z = std::polar(1.0, -w);
+        sum += 2.0 / rate_hz * driven / std::norm(1.0 - a * z + b * z * z) * width;
+    }
+    return sum;
+}
+
+/// What a witness does not tell of a motion, with the relative errors of their amplitudes.
+struct Untold {
+    std::vector<SampleNoise::Resonance> resonances;
+    std::vector<double> relative;
+};
+
+Untold untold_in(const SampleFit& fit, int step) {
+    const SampleModel errors = fit.noise_errors();
+    Untold untold;
+    for (std::size_t k = 0; k < fit.model().resonances.size(); ++k) {
+        if (fit.model().resonance_steps[k] != step) continue;
+        const SampleNoise::Resonance& resonance = fit.model().noise.resonances[k];
+        untold.resonances.push_back(resonance);
+        untold.relative.push_back(errors.noise.resonances[k].arcsec / std::max(resonance.arcsec, 1e-12));
+    }
+    return untold;
+}
+
+/// Weak motion is told by two numbers, a response of many lags would be mostly noise: the motion as a resonance of its
+/// own beside these.
+Untold untold_beside(const SampleFit& fit, const SampleFit& whole) {
+    SampleModel beside = whole.model();
+    beside.motion.assign(fit.series().size(), 0.0);
+    for (const SampleColumn& column : fit.model().columns) {
+        if (column.effect != "case_motion") continue;
+        for (std::size_t i = 0; i < beside.motion.size(); ++i) beside.motion[i] += column.value * (*column.series)[i];
+    }
+    const SampleFit left(fit.series(), std::move(beside), fit.rows(), SampleFit::Noise::near);
+    const SampleNoise::Resonance& resonance = left.model().noise.resonances.front();
+    const double sd = left.noise_errors().noise.resonances.front().arcsec;
+    return {{resonance}, {sd / std::max(resonance.arcsec, 1e-12)}};
+}
+
 /// The motion's angle as a resonance of its own, whatever the witness tells of it; and what that leaves of it.
 void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estimate>& all,
                  std::vector<std::string>& notes) {
@@ -158,27 +214,27 @@ void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estim
     double coherence = unknown;
     double coherence_sd = unknown;
     if (seen) {
-        // The same resonance beside what the witness tells: the share of its power that is still needed.
-        SampleModel beside = whole.model();
-        beside.motion = told.increments;
-        if (!step.strong) {
-            // Weak motion is told by two numbers; a response of many lags would be mostly noise.
-            beside.motion.assign(series.size(), 0.0);
-            for (const SampleColumn& column : fit.model().columns) {
-                if (column.effect != "case_motion") continue;
-                for (std::size_t i = 0; i < series.size(); ++i) beside.motion[i] += column.value * (*column.series)[i];
-            }
+        // What is still needed beside what the witness tells, of the power where the motion is: elsewhere it is what
+        // the witness cannot tell.
+        const Untold untold = step.strong ? untold_in(fit, step.step) : untold_beside(fit, whole);
+        const auto power = [&](const SampleNoise::Resonance& of) {
+            return power_between(of, motion.hz - motion.width_hz, motion.hz + motion.width_hz, of_readings_hz(fit));
+        };
+        double squares = 0.0;
+        double squares_sd = 0.0;
+        for (std::size_t k = 0; k < untold.resonances.size(); ++k) {
+            const double part = power(untold.resonances[k]);
+            squares += part;
+            if (untold.relative[k] > 0.0) squares_sd += std::pow(2.0 * part * untold.relative[k], 2);
         }
-        const SampleFit first(series, beside, fit.rows(), SampleFit::Noise::near);
-        const double untold = first.model().noise.resonances.front().arcsec;
-        const double untold_sd = first.noise_errors().noise.resonances.front().arcsec;
-        const double left = std::min(1.0, std::pow(untold / motion.arcsec, 2));
+        squares_sd = std::sqrt(squares_sd);
+        const double all_of_it = power(motion);
+        const double left = std::min(1.0, squares / all_of_it);
         coherence = 1.0 - left;
-        const double relative = untold_sd / std::max(untold, 1e-12);
+        const double relative = 0.5 * squares_sd / std::max(squares, 1e-300);
         // Of n independent spectra: (1 - c) sqrt(2 c/n) (Bendat and Piersol 2010, table 9.6); of their power's
         // logarithm the standard error is 1/sqrt(n).
-        coherence_sd = relative < 0.25 ? left * std::sqrt(8.0 * coherence) * relative
-                                       : 2.0 * untold * untold_sd / (motion.arcsec * motion.arcsec);
+        coherence_sd = relative < 0.25 ? left * std::sqrt(8.0 * coherence) * relative : squares_sd / all_of_it;
     } else {
         notes.push_back(
             "the motion is known by its witness alone: its own spectrum does not stand out from the noise, "

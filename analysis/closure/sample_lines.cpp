@@ -5,6 +5,8 @@
 #include <memory>
 #include <utility>
 
+#include "engine/core/units.hpp"
+
 namespace ringlock::closure {
 
 namespace {
@@ -96,6 +98,28 @@ bool scatters(const SampleFit& fit, std::vector<double> innovations, const Found
     const FoundLines left = find_lines(innovations, fit.series().rate_hz);
     const bool same = std::abs(left.scattered_hz - found.scattered_hz) < near_hz;
     return same && left.scattered > found.scattered / 3.0 + much;
+}
+
+SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, const Rows& rows,
+                                const std::string& effect, int step) {
+    const SampleSeries& series = fit.series();
+    double squares = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (!rows[i]) continue;
+        squares += fit.innovations()[i] * fit.innovations()[i];
+        count += 1.0;
+    }
+    // Power over the level is chi-squared of two a piece; the angle's increments have 2 sin of it.
+    const double sd = fit.sd(0) * std::sqrt(squares / count);
+    const double gain = 2.0 * std::sin(units::pi * found.scattered_hz / series.rate_hz);
+    const double rms = sd * std::sqrt(found.scattered / count) / std::max(gain, 1e-6);
+    const double duration_s = static_cast<double>(series.size()) * series.interval_s;
+    SampleModel model = fit.model();
+    model.noise.resonances.push_back({rms, found.scattered_hz, 64.0 / duration_s});
+    model.resonances.push_back(effect);
+    model.resonance_steps.push_back(step);
+    return model;
 }
 
 SampleFit refine_lines(SampleFit fit, const Rows& rows) {

@@ -33,7 +33,11 @@ SampleLine refine_line(const SampleFit& fit, const SampleLine& shown);
 /// count.
 bool scatters(const SampleFit& fit, std::vector<double> innovations, const FoundLines& found, const SampleLine& line);
 
-/// The same for all lines of a model, which is fitted anew with them.
+/// The model with such power as a narrow resonance, which keeps neither amplitude nor phase.
+SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, const Rows& rows,
+                                const std::string& effect, int step);
+
+/// What refine_line() does for all lines of a model, which is fitted anew with them.
 SampleFit refine_lines(SampleFit fit, const Rows& rows);
 
 }  // namespace ringlock::closure

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
@@ -202,32 +203,17 @@ std::vector<OfferedLine> declared_lines(const SampleFit& now, const SampleContex
     return {still, drifting};
 }
 
-/// A line whose phase does not keep over the record: a narrow resonance.
 SampleCandidate wandering_line(const SampleFit& now, const SampleContext& in, const FoundLines& lines, double p_value,
                                bool declared) {
-    const double duration_s = static_cast<double>(in.series.size()) * in.series.interval_s;
     SampleCandidate c{.effect = "dither_residue",
-                      .model = now.model(),
+                      .model = {},
                       .p_value = p_value,
                       .searched = lines.tracked.searched,
                       .parameters = 3,
                       .freedom = 3,
                       .wanders = true};
     if (!declared) c.confounded = {"base_vibration"};
-    double squares = 0.0;
-    double rows = 0.0;
-    for (std::size_t i = 0; i < in.rows.size(); ++i) {
-        if (!in.rows[i]) continue;
-        squares += now.innovations()[i] * now.innovations()[i];
-        rows += 1.0;
-    }
-    // Power over the level is chi-squared of two a piece; the angle's increments have 2 sin of it.
-    const double sd = now.sd(0) * std::sqrt(squares / rows);
-    const double gain = 2.0 * std::sin(units::pi * lines.scattered_hz / in.series.rate_hz);
-    const double rms = sd * std::sqrt(lines.scattered / rows) / std::max(gain, 1e-6);
-    c.model.noise.resonances.push_back({rms, lines.scattered_hz, 64.0 / duration_s});
-    c.model.resonances.push_back(c.effect);
-    c.model.resonance_steps.push_back(in.step);
+    c.model = with_wandering_line(now, lines, in.rows, c.effect, in.step);
     return c;
 }
 
@@ -443,7 +429,7 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
 
 /// A motion that is the witness's and turned by a quarter of a cycle, slow drifts left out: two numbers tell of weak
 /// motion what a response of many lags cannot.
-void screen_weak_motion(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
+std::optional<SampleCandidate> weak_motion(const SampleFit& now, const SampleContext& in) {
     double best = 0.0;
     std::size_t at = 0;
     int rank = 0;
@@ -458,7 +444,7 @@ void screen_weak_motion(const SampleFit& now, const SampleContext& in, std::vect
     }
     const auto count = static_cast<double>(in.series.witnesses.size());
     const double p = rank > 0 ? of_several(chi2_tail(best, rank), 2.0 * count) : 1.0;
-    if (!(p < level_of_effects)) return;
+    if (!(p < level_of_effects)) return std::nullopt;
     SampleCandidate c{.effect = "case_motion",
                       .model = now.model(),
                       .p_value = p,
@@ -467,13 +453,19 @@ void screen_weak_motion(const SampleFit& now, const SampleContext& in, std::vect
                       .freedom = rank};
     add_motion(c.model, in.series, at, in.step);
     c.witness = at;
-    out.push_back(std::move(c));
+    return c;
 }
 
 void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
     if (in.series.witnesses.empty() || !now.model().motion.empty() || has(now.model(), "case_motion")) return;
-    screen_weak_motion(now, in, out);
-    const FoundWitness witness = find_witness(now.innovations(), in.rows, in.series);
+    const auto weak = weak_motion(now, in);
+    FoundWitness witness = find_witness(now.innovations(), in.rows, in.series);
+    // A motion of few frequencies shows by two numbers first, however strong it is.
+    if (weak && !(witness.p_value < weak->p_value)) {
+        witness.p_value = weak->p_value;
+        witness.index = weak->witness;
+    }
+    if (weak) out.push_back(*weak);
     if (!(witness.p_value < level_of_effects)) return;
     out.push_back({.effect = "case_motion",
                    .model = moved_as(now, witness.index, in.step),
@@ -550,6 +542,56 @@ SampleModel without_motion(SampleModel model) {
     return model;
 }
 
+namespace {
+
+/// Where, beside most of it, something is left of a motion that the witness does not tell: its own noise hides the
+/// edges, and what is a mean over intervals has nothing at half the rate of the record.
+enum class Untold { about_the_motion, at_half_the_rate };
+
+/// The noise with two resonances for what is left of a motion, the likeliest of many: how wide they are no mean over
+/// frequencies tells, and the likelihood has several tops.
+SampleNoise begun_with(const SampleFit& now, const std::vector<double>& told, double rms_arcsec, double hz,
+                       Untold where) {
+    const SampleSeries& series = now.series();
+    std::vector<double> rest = now.as_taken(told);
+    for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = now.rest()[i] - rest[i];
+    // The noise as it was has most of the motion in it. Twice differenced, increments have little but white angle.
+    double squares = 0.0;
+    for (std::size_t i = 2; i < rest.size(); ++i) squares += std::pow(rest[i] - 2.0 * rest[i - 1] + rest[i - 2], 2);
+    const double angle = std::sqrt(squares / 20.0 / static_cast<double>(rest.size()));
+    constexpr double of_rate = 0.1;
+    SampleNoise best;
+    double least = std::numeric_limits<double>::infinity();
+    const auto consider = [&](SampleNoise noise) {
+        const double value = SampleFilter::minus_log_likelihood(noise, series.interval_s, rest, now.rows());
+        if (!(value < least)) return;
+        least = value;
+        best = std::move(noise);
+    };
+    for (const double wide : {0.5, 0.15, 0.05}) {
+        for (const double wider : {0.15, 0.5}) {
+            for (const double share : {0.03, 0.1, 0.3}) {
+                for (const double white : {0.3, 0.6, 1.0}) {
+                    SampleNoise noise = now.model().noise;
+                    noise.angle_arcsec = white * angle;
+                    noise.rate_arcsec_rt_s = of_rate * noise.angle_arcsec / std::sqrt(series.interval_s);
+                    const double width_hz = std::max(wide * hz, 0.01);
+                    noise.resonances.push_back({rms_arcsec, hz, width_hz});
+                    if (where == Untold::at_half_the_rate) {
+                        noise.resonances.push_back({share * rms_arcsec, 0.45 * series.rate_hz, wider * series.rate_hz});
+                    } else {
+                        noise.resonances.push_back({share * rms_arcsec, hz, 20.0 * wider * width_hz});
+                    }
+                    consider(std::move(noise));
+                }
+            }
+        }
+    }
+    return best;
+}
+
+}  // namespace
+
 SampleModel moved_as(const SampleFit& now, std::size_t witness, int step) {
     const auto& watched = now.series().witnesses[witness].second;
     const WitnessMotion motion = fit_witness(now, watched);
@@ -558,15 +600,21 @@ SampleModel moved_as(const SampleFit& now, std::size_t witness, int step) {
     // What the witness does not tell moves like what it tells; its own noise hides the edges of that, which are wider.
     const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
     const double centre_hz = std::max(motion.centre_hz, 0.01);
-    const double width_hz = std::max(0.5 * motion.centre_hz, 0.01);
-    model.noise.resonances.push_back({untold, centre_hz, width_hz});
-    model.noise.resonances.push_back({0.3 * untold, centre_hz, 3.0 * width_hz});
     model.resonances.insert(model.resonances.end(), 2, "case_motion");
     model.resonance_steps.insert(model.resonance_steps.end(), 2, step);
+    std::optional<SampleFit> first;
+    for (const Untold where : {Untold::about_the_motion, Untold::at_half_the_rate}) {
+        SampleModel trial = model;
+        trial.noise = begun_with(now, motion.increments, untold, centre_hz, where);
+        SampleFit fit(now.series(), std::move(trial), now.rows());
+        // What is narrow and elsewhere is a line, and none of the motion.
+        const bool line = where == Untold::at_half_the_rate &&
+                          fit.model().noise.resonances.back().width_hz < 0.1 * now.series().rate_hz;
+        if (!first || (!line && fit.log_likelihood() > first->log_likelihood())) first.emplace(std::move(fit));
+    }
     // Once more with what is left as the noise.
-    const SampleFit first(now.series(), std::move(model), now.rows());
-    model = first.model();
-    const WitnessMotion more = fit_witness(first, watched);
+    model = first->model();
+    const WitnessMotion more = fit_witness(*first, watched);
     for (std::size_t i = 0; i < model.motion.size(); ++i) model.motion[i] += more.increments[i];
     return model;
 }

@@ -97,6 +97,13 @@ void test_spectrum(const SampleFit& fit, Views& views) {
             return regressors(fit.line(of.hz, drift_hz_per_s));
         };
     }
+    if (!coherent) {
+        // Power over the level in pieces is no likelihood: what follows it is a resonance.
+        view.refitted = [&fit, lines, cost] {
+            const SampleFit with(fit.series(), with_wandering_line(fit, lines, fit.rows(), "", -1), fit.rows());
+            return with.gain_over(fit) - cost;
+        };
+    }
     views.push_back(std::move(view));
 }
 
