@@ -32,11 +32,13 @@ struct View {
     bool jumps = false;  ///< random rates can follow it nearly as well as it can be said
     /// Merit where it is fitted anew otherwise than by a regression, if it is.
     std::function<double()> refitted = {};
+    /// Merit by a search that is gone through with where it comes near that of a rival, if there is one.
+    std::function<double(double rival)> beside = {};
 };
 
 /// Gain of the log-likelihood by the regression, the noise fitted anew beside it and its coefficients integrated out,
-/// less its search; minus infinity where coefficients make no sense.
-double refitted_merit(const TurnFit& fit, const View& view);
+/// less its search; minus infinity where coefficients make no sense. `rival`: the merit that it is compared with.
+double refitted_merit(const TurnFit& fit, const View& view, double rival);
 
 /// Holds the innovations that count against everything that the record has: phase at the turns and its harmonics,
 /// direction, amplitude, temperature, input rate, time, frequency, the innovations before. The views refer to the fit.

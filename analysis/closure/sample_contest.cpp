@@ -63,7 +63,7 @@ class Contest {
         double coefficients = 0.0;
         Where where = Where::time;
         bool jumps = false;
-        bool repeats = false;  ///< a variance that does
+        bool repeats = false;      ///< a variance that does
         double of_a_motion = 0.0;  ///< merit beside what has resonances of its own
     };
 

@@ -121,9 +121,11 @@ std::optional<double> something_else(const TurnFit& fit, const Choice& choice) {
     std::erase_if(views, [](const View& view) { return !view.columns || view.test.merit < tie; });
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
     if (views.size() > looked_at) views.resize(looked_at);
+    double rival = 0.0;
+    for (const Held& held : choice.held) rival = std::max(rival, held.merit);
     std::optional<double> most;
     for (const View& view : views) {
-        const double merit = refitted_merit(fit, view);
+        const double merit = refitted_merit(fit, view, rival);
         const bool beats_all = std::all_of(choice.held.begin(), choice.held.end(), [&](const Held& held) {
             const bool in_step =
                 view.test.where == Where::phase && held.effect->adds_angle() && fit.parameters().injected_sd_rad < 1.0;
@@ -173,7 +175,7 @@ void test_what_is_left(const TurnFit& fit, Closure& closure) {
     if (!views.front().columns) return;
     double most = 0.0;
     for (std::size_t k = 0; k < std::min(looked_at, views.size()) && views[k].columns; ++k) {
-        const double merit = refitted_merit(fit, views[k]);
+        const double merit = refitted_merit(fit, views[k], std::numeric_limits<double>::infinity());
         if (merit <= most) continue;
         most = merit;
         closure.unexplained = views[k].test;

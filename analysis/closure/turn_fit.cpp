@@ -92,7 +92,7 @@ TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows,
     finish();
 }
 
-TurnFit::TurnFit(const TurnFit& of, TurnParameters parameters)
+TurnFit::TurnFit(const TurnFit& of, TurnParameters parameters, int passes)
     : model_(of.model_),
       parameters_(std::move(parameters)),
       rows_(of.rows_),
@@ -101,8 +101,12 @@ TurnFit::TurnFit(const TurnFit& of, TurnParameters parameters)
       prediction_(of.prediction_),
       columns_(of.columns_),
       moved_(of.moved_) {
-    fit_deterministic(20);
+    if (passes > 0) fit_deterministic(passes);
     finish();
+}
+
+std::unique_ptr<TurnFit> TurnFit::with_noise(const TurnParameters& of) const {
+    return std::unique_ptr<TurnFit>(new TurnFit(*this, of, 0));
 }
 
 void TurnFit::climb() {

@@ -65,6 +65,8 @@ class TurnFit {
     /// The same without the noise that hardly shows, for scores: it may have swallowed what an effect does. None where
     /// all of it shows.
     std::unique_ptr<TurnFit> with_less_noise() const;
+    /// The same under the noise of these parameters, nothing fitted anew, for scores.
+    std::unique_ptr<TurnFit> with_noise(const TurnParameters& of) const;
 
     /// What all phases together tell of the reading's errors, where that is enough for what the lock-in makes of them
     /// to be linear about it, and not about the phases that were read; else none.
@@ -96,6 +98,7 @@ class TurnFit {
     struct Regression {
         double gain = 0.0;  ///< of the log-likelihood
         Eigen::VectorXd value;
+        TurnParameters noise = {};  ///< the model's own, with the noise fitted anew
     };
     Regression regress(const std::vector<Regressor>& regressors) const;
     /// One series whitened and freed likewise, and what is left: their product is the derivative of the log-likelihood.
@@ -115,7 +118,7 @@ class TurnFit {
     Spread spread(const ActiveEffect& effect, const std::string& parameter, double most) const;
 
    private:
-    TurnFit(const TurnFit& of, TurnParameters parameters);  ///< with that noise
+    TurnFit(const TurnFit& of, TurnParameters parameters, int passes);  ///< with that noise
     struct Column {
         std::string effect, name;
         Regressor of;

@@ -160,13 +160,14 @@ void TurnFit::try_other_noise() {
 
 std::unique_ptr<TurnFit> TurnFit::with_less_noise() const {
     constexpr double hardly = 100.0;  // of the log-likelihood: more than effects have that are hard to see
+    constexpr int passes = 20;
     std::unique_ptr<TurnFit> least;
     for (double TurnParameters::*own : {&TurnParameters::wander_sd_rad, &TurnParameters::injected_sd_rad}) {
         TurnParameters less = least ? least->parameters_ : parameters_;
         if (less.*own < 10.0 * no_noise || less.*own > less.readout_sd_rad) continue;
         less.*own = no_noise;
         try {
-            std::unique_ptr<TurnFit> without(new TurnFit(*this, std::move(less)));
+            std::unique_ptr<TurnFit> without(new TurnFit(*this, std::move(less), passes));
             if (without->log_likelihood() > log_likelihood_ - hardly) least = std::move(without);
         } catch (const RunError&) {
             // no motion of a gyro with such parameters can be followed

@@ -138,6 +138,7 @@ TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors) c
         regression.gain = gain;
         if (arrived) break;
     }
+    regression.noise = std::move(trial);
     return regression;
 }
 

@@ -435,5 +435,31 @@ TEST(TurnLoop, ClosesBackIntoTheMonteCarlo) {
     EXPECT_FALSE(json.at("unexplained").at("present"));
 }
 
+// Jumps far above the noise: places within a hundredth of the record leave more than a random rate does, and short
+// stays are seen under the noise that the others leave.
+TEST(LongTurnLoop, ARateThatJumpsFarAboveTheNoiseIsNoRandomRate) {
+    std::vector<Truth> truths;
+    for (const std::uint64_t seed : {9, 12, 13}) {
+        Truth& truth = truths.emplace_back();
+        truth.turns = 10000;
+        truth.scale_factor_arcsec = 1.3;
+        truth.dither_frequency_hz = 400.0;
+        truth.dither_peak_rate_deg_s = 80.0;
+        truth.lockin_threshold_deg_h = 100.0;
+        truth.injected_noise_rad = 2.5;
+        truth.readout_noise = 0.005;
+        truth.rates.telegraph_bias = {8.0, 0.8};
+        truth.seed = seed;
+    }
+    for (const auto& record : generate(truths)) {
+        const Closure closure = close_loop(record);
+        print("a rate that jumps", closure);
+        EXPECT_EQ(closure.verdict, Verdict::unexplained);
+        EXPECT_TRUE(closure.steps.empty());
+        ASSERT_TRUE(closure.unexplained);
+        EXPECT_EQ(closure.unexplained->where, ringlock::closure::Where::time);
+    }
+}
+
 }  // namespace
 }  // namespace ringlock::test::closure
