@@ -430,7 +430,7 @@ void test_levels(const TurnFit& fit, std::vector<View>& views) {
     view.columns = [&fit, found] { return Columns{placed(fit, found).angle(fit)}; };
     view.jumps = found.changes > 1;
     if (view.jumps) {
-        view.beside = [&fit, found](double rival) { return find_jumps(fit, found, rival).merit; };
+        view.refitted = [&fit, found](double rival) { return find_jumps(fit, found, rival).merit; };
     }
 }
 
@@ -555,7 +555,7 @@ std::string ResidualTest::description() const {
 }
 
 double refitted_merit(const TurnFit& fit, const View& view, double rival) {
-    if (view.beside) return view.beside(rival);
+    if (view.refitted) return view.refitted(rival);
     const TurnFit::Regression regression = fit.regress(view.columns());
     if (regression.value.cwiseAbs().maxCoeff() > view.largest) return -std::numeric_limits<double>::infinity();
     // The view has taken off one for each of them.

@@ -30,10 +30,9 @@ struct View {
     std::function<std::vector<Regressor>()> columns = {};  ///< none where nothing regresses
     double largest = std::numeric_limits<double>::infinity();  ///< coefficient that makes sense
     bool jumps = false;  ///< random rates can follow it nearly as well as it can be said
-    /// Merit where it is fitted anew otherwise than by a regression, if it is.
-    std::function<double()> refitted = {};
-    /// Merit by a search that is gone through with where it comes near that of a rival, if there is one.
-    std::function<double(double rival)> beside = {};
+    /// Merit where it is fitted anew otherwise than by a regression, if it is; by a search, that is gone through with
+    /// only where it comes near the merit of a rival.
+    std::function<double(double rival)> refitted = {};
 };
 
 /// Gain of the log-likelihood by the regression, the noise fitted anew beside it and its coefficients integrated out,

@@ -14,6 +14,7 @@
 #include "analysis/closure/sample_fit.hpp"
 #include "analysis/closure/sample_known.hpp"
 #include "analysis/closure/sample_lines.hpp"
+#include "analysis/closure/sample_motion.hpp"
 #include "analysis/closure/sample_rounded.hpp"
 #include "analysis/closure/sample_score.hpp"
 #include "analysis/closure/sample_screen.hpp"

@@ -271,8 +271,8 @@ std::vector<Contest::Rival> Contest::rivals(bool resampled, bool moved) const {
             rival.merit = refitted_merit(*now_.fit, view);
             rival.coefficients = static_cast<double>(view.columns().size());
         }
-        if (repeats && resampled) rival.merit = std::max(rival.merit, view.refitted());
-        rival.of_a_motion = !repeats && view.refitted && moved ? view.refitted() : rival.merit;
+        if (repeats && resampled) rival.merit = std::max(rival.merit, view.refitted(0.0));
+        rival.of_a_motion = !repeats && view.refitted && moved ? view.refitted(0.0) : rival.merit;
         found.push_back(rival);
     }
     return found;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "analysis/closure/sample_lines.hpp"
+#include "analysis/closure/sample_motion.hpp"
 #include "analysis/closure/sample_screen.hpp"
 #include "analysis/closure/sample_search.hpp"
 #include "analysis/closure/sample_steps.hpp"

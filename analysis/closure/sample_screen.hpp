@@ -41,12 +41,6 @@ struct SampleContext {
 std::vector<SampleColumn> rate_columns(const SampleSeries& series);
 void add_line(SampleModel& model, const SampleSeries& series, const SampleLine& line, const std::string& effect,
               int step);
-/// What a motion in proportion to a witness adds to the increments, and the same a quarter of a cycle later.
-std::vector<std::vector<double>> motion_columns(const std::vector<double>& witness);
-void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witness, int step);
-SampleModel without_motion(SampleModel model);
-/// The model with all that a witness tells of a motion, lag by lag, and what it does not tell as two resonances.
-SampleModel moved_as(const SampleFit& now, std::size_t witness, int step);
 /// Of itself, a declared frequency of the dither may be off: more, with its harmonics, would be half of all lines.
 inline constexpr double declared_to = 0.002;
 /// Of itself a second, a dither drifts so much at most: springs of steel soften by 2.5e-4 a kelvin, the resonance

@@ -102,7 +102,7 @@ void test_size(const SampleFit& fit, Views& views) {
     const Swing swing = swing_of_variance(fit, cycle.frequency_hz);
     View view{{Where::time, std::string(repeating_variance), cycle.p_value,
                fmt::format("{:.6g} times a second", cycle.frequency_hz), swing.gain - cost}};
-    view.refitted = [&fit, hz = cycle.frequency_hz, swing, cost] {
+    view.refitted = [&fit, hz = cycle.frequency_hz, swing, cost](double) {
         return gain_of_swinging_errors(fit, hz, swing) - cost;
     };
     views.push_back(std::move(view));

@@ -99,7 +99,7 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     }
     if (!coherent) {
         // Power over the level in pieces is no likelihood: what follows it is a resonance.
-        view.refitted = [&fit, lines, cost] {
+        view.refitted = [&fit, lines, cost](double) {
             const SampleFit with(fit.series(), with_wandering_line(fit, lines, fit.rows(), "", -1), fit.rows());
             return with.gain_over(fit) - cost;
         };

@@ -12,6 +12,7 @@
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/sample_contest.hpp"
 #include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_motion.hpp"
 #include "analysis/closure/sample_screen.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
