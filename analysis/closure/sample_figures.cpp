@@ -194,7 +194,26 @@ Untold untold_beside(const SampleFit& fit, const SampleFit& whole) {
     return {{resonance}, {sd / std::max(resonance.arcsec, 1e-12)}};
 }
 
-/// The motion's angle as a resonance of its own, whatever the witness tells of it; and what that leaves of it.
+/// The motion's angle as a resonance of its own, whatever the witness tells of it. Noises that stood in for it where it
+/// was taken out may go on to: those that were told beside it are tried as well.
+SampleFit motion_as_resonance(const SampleFit& fit, const SampleFit& bare, const WitnessMotion& told, int step) {
+    const double centre_hz = std::max(told.centre_hz, 0.01);
+    std::optional<SampleFit> best;
+    for (const SampleModel& from : {bare.model(), without_motion(fit.model())}) {
+        SampleModel with = bare.model();
+        with.noise = from.noise;
+        with.flicker_deg_h = from.flicker_deg_h;
+        with.resonances.insert(with.resonances.begin(), "case_motion");
+        with.resonance_steps.insert(with.resonance_steps.begin(), step);
+        with.noise.resonances.insert(with.noise.resonances.begin(),
+                                     {std::max(told.rms_arcsec, 1e-6), centre_hz, 0.5 * centre_hz});
+        SampleFit whole(fit.series(), std::move(with), fit.rows(), SampleFit::Noise::free);
+        if (!best || whole.log_likelihood() > best->log_likelihood()) best.emplace(std::move(whole));
+    }
+    return std::move(*best);
+}
+
+/// What the motion is, and what its witness leaves of it.
 void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estimate>& all,
                  std::vector<std::string>& notes) {
     const SampleSeries& series = fit.series();
@@ -202,13 +221,8 @@ void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estim
     all.push_back({"case_motion", "witness", static_cast<double>(name.back() - 'x'), 0.0, name});
     const SampleFit bare(series, without_motion(fit.model()), fit.rows(), SampleFit::Noise::near);
     const WitnessMotion told = fit_witness(bare, witness);
-    SampleModel with = bare.model();
-    with.resonances.insert(with.resonances.begin(), "case_motion");
-    with.resonance_steps.insert(with.resonance_steps.begin(), step.step);
     const double centre = std::max(told.centre_hz, 0.01);
-    with.noise.resonances.insert(with.noise.resonances.begin(),
-                                 {std::max(told.rms_arcsec, 1e-6), centre, 0.5 * centre});
-    const SampleFit whole(series, with, fit.rows(), SampleFit::Noise::free);
+    const SampleFit whole = motion_as_resonance(fit, bare, told, step.step);
     const auto& motion = whole.model().noise.resonances.front();
     const SampleNoise::Resonance error = whole.noise_errors().noise.resonances.front();
     const bool seen = whole.log_likelihood() - bare.log_likelihood() > 20.0;

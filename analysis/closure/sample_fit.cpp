@@ -219,6 +219,8 @@ SampleModel SampleFit::at(const std::vector<double>& x) const {
         auto& resonance = model.noise.resonances[k];
         const double rate_hz = model.noise.from_hz > 0.0 ? model.noise.from_hz : series_->rate_hz;
         if (resonance.hz > 0.5 * rate_hz || resonance.width_hz > 3.0 * rate_hz) resonance.arcsec = 0.0;
+        const bool slow = std::hypot(resonance.hz, 0.5 * resonance.width_hz) < model.motion_from_hz;
+        if (slow && model.resonances[k] == "case_motion") resonance.arcsec = 0.0;
     }
     if (model.noise.from_hz > 0.0) {
         // About the middle of the record, so that rate and place are told apart.

@@ -31,6 +31,7 @@ struct SampleModel {
     double flicker_deg_h = 0.0;         ///< B of the bias instability; makes the noise's terms
     std::vector<SampleColumn> columns;  ///< the mean rate first
     std::vector<double> motion;         ///< of the case, by its witness: taken off the increments; empty: none
+    double motion_from_hz = 0.0;        ///< what the witness does not tell of it is no slower: that is a slow rate
     double from_shift = 0.0;            ///< of from_hz, in tenths of a cycle over the record, while it is fitted
     /// Whose resonances the noise has, in their order.
     std::vector<std::string> resonances;

@@ -33,6 +33,7 @@ void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witn
 SampleModel without_motion(SampleModel model) {
     std::erase_if(model.columns, [](const SampleColumn& c) { return c.effect == "case_motion"; });
     model.motion.clear();
+    model.motion_from_hz = 0.0;
     for (std::size_t k = model.resonances.size(); k-- > 0;) {
         if (model.resonances[k] != "case_motion") continue;
         const auto at = static_cast<std::ptrdiff_t>(k);
@@ -98,6 +99,8 @@ SampleModel moved_as(const SampleFit& now, std::size_t witness, int step) {
     const WitnessMotion motion = fit_witness(now, watched);
     SampleModel model = now.model();
     model.motion = motion.increments;
+    constexpr double slowest = 0.2;
+    model.motion_from_hz = slowest * motion.centre_hz;
     // What the witness does not tell moves like what it tells; its own noise hides the edges of that, which are wider.
     const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
     const double centre_hz = std::max(motion.centre_hz, 0.01);
