@@ -42,7 +42,7 @@ constexpr int most_looks = 3;
 
 /// Of increments that were rounded, after every step.
 constexpr int draws_of_step = 2;
-/// As it is told anew by what has been drawn beside it.
+/// As it is told anew by what has come in, or has been drawn, beside it.
 constexpr int most_motions = 6;
 
 class Loop {
@@ -447,7 +447,7 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     now_.of_partners.insert(now_.of_partners.end(), choice.of_partners.begin(), choice.of_partners.end());
     if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
     drop_needless();
-    move_anew();
+    for (int k = 0; k < most_motions && move_anew();) ++k;
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
     now_.told.push_back({effect, next_step_++, best.candidate.witness, best.candidate.strong, choice.other_hz});
     if (rounded_.drawn()) {

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include "analysis/closure/closure.hpp"
+#include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_series.hpp"
 #include "analysis/record/record.hpp"
 #include "tests/closure/heldout.hpp"
 #include "tests/closure/samples.hpp"
@@ -203,6 +206,60 @@ TEST(LongSampleClosure, AMotionAndALineAreNamed) {
     ASSERT_EQ(found.steps.size(), 2U);
     EXPECT_EQ(found.steps[0].effect, "case_motion");
     EXPECT_EQ(found.steps[1].effect, "dither_residue");
+}
+
+// A resonance at next to nothing is a random walk of the rate.
+TEST(SampleMotion, WhatIsLeftOfItIsNoSlowDrift) {
+    SampleTruth truth = usual();
+    truth.size = 20000;
+    truth.rates.rate_random_walk_deg_h_rt_h = 100.0;
+    const closure::SampleSeries series = closure::prepare_samples(generate_samples(truth));
+    const closure::Rows rows(series.size(), 1);
+    const closure::SampleFit base(series, closure::SampleModel{}, rows);
+    const auto gain = [&](double motion_from_hz) {
+        closure::SampleModel model = base.model();
+        model.motion.assign(series.size(), 0.0);
+        model.motion_from_hz = motion_from_hz;
+        model.resonances = {"case_motion"};
+        model.resonance_steps = {0};
+        model.noise.resonances = {{100.0, 0.002, 0.01}};
+        return closure::SampleFit(series, std::move(model), rows, closure::SampleFit::Noise::near).gain_over(base);
+    };
+    EXPECT_GT(gain(0.0), 100.0);
+    EXPECT_LT(gain(0.3), 1.0);
+}
+
+// Either can stand in for the slow half of the other: each has to be told again once the other is there.
+TEST(LongSampleClosure, AMotionBesideAStrongWalkIsToldAsItIs) {
+    constexpr double most_errors = 4.0;
+    for (const std::uint64_t seed : {2U, 4U}) {
+        SampleTruth truth;
+        truth.seed = seed;
+        truth.size = 30000;
+        truth.white_angle_arcsec = 0.24;
+        truth.case_motion.witness = "accel_x";
+        truth.case_motion.rms_arcsec = 2.8;
+        truth.case_motion.coherence = 0.93;
+        truth.case_motion.centre_hz = 1.4;
+        truth.case_motion.width_hz = 2.8;
+        truth.rates.rate_random_walk_deg_h_rt_h = 112.0;
+        const auto found = closed(truth);
+        EXPECT_EQ(found.verdict, closure::Verdict::closed);
+        ASSERT_EQ(found.steps.size(), 2U);
+        EXPECT_EQ(found.steps[0].effect, "case_motion");
+        EXPECT_EQ(found.steps[1].effect, "rate_random_walk");
+        const auto near = [&](std::size_t step, const std::string& name, double value) {
+            for (const auto& estimate : found.steps[step].parameters) {
+                if (estimate.name != name) continue;
+                EXPECT_NEAR(estimate.value, value, most_errors * estimate.sd) << name << ", seed " << seed;
+            }
+        };
+        near(0, "coherence", 0.93);
+        near(0, "rms_arcsec", 2.8);
+        near(0, "centre_hz", 1.4);
+        near(0, "width_hz", 2.8);
+        near(1, "deg_h_rt_h", 112.0);
+    }
 }
 
 TEST(SampleClosure, DoesNotNameWhatTheLibraryDoesNotHave) {
