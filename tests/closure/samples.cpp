@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 
 #include "engine/core/error.hpp"
@@ -63,6 +64,33 @@ void check(const SampleTruth& truth) {
 }
 
 }  // namespace
+
+double coherence_with_noise(const SampleTruth& truth) {
+    constexpr int parts = 200;
+    const CaseMotion& motion = truth.case_motion;
+    const double nyquist_hz = 0.5 * truth.rate_hz;
+    const double noise_arcsec2_hz =
+        std::pow(truth.accelerometer_noise / gravity_m_s2 * arcsec_per_rad, 2) / nyquist_hz;
+    const double r = std::exp(-pi * motion.width_hz / truth.rate_hz);
+    const double r2 = r * r;
+    const double a = 2.0 * r * std::cos(two_pi * motion.centre_hz / truth.rate_hz);
+    const double innovation2 =
+        std::pow(motion.rms_arcsec, 2) * (1.0 - r2) * ((1.0 + r2) * (1.0 + r2) - a * a) / (1.0 + r2);
+    const double low_hz = std::max(0.0, motion.centre_hz - motion.width_hz);
+    const double high_hz = std::min(nyquist_hz, motion.centre_hz + motion.width_hz);
+    double coherent = 0.0;
+    double all = 0.0;
+    for (int k = 0; k < parts; ++k) {
+        const double w = two_pi * (low_hz + (k + 0.5) / parts * (high_hz - low_hz)) / truth.rate_hz;
+        const double power =
+            innovation2 / nyquist_hz / std::norm(1.0 - a * std::polar(1.0, -w) + r2 * std::polar(1.0, -2.0 * w));
+        // As the mean of an interval's ends
+        const double seen = power * std::pow(std::cos(0.5 * w), 2);
+        coherent += motion.coherence * power * seen / (seen + noise_arcsec2_hz);
+        all += power;
+    }
+    return coherent / all;
+}
 
 record::Record generate_samples(const SampleTruth& truth) {
     check(truth);

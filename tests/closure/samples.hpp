@@ -106,6 +106,10 @@ struct SampleTruth {
     std::optional<record::Declared> declared;  ///< not given: K where counts are put out
 };
 
+/// Coherence of the witness as it is recorded and the rotation, the mean over their power within a width of the centre:
+/// less than before the witness's own noise.
+double coherence_with_noise(const SampleTruth& truth);
+
 /// Order of what happens to the angle: motion and noise, saturation, quantization, resampling. Sample k covers
 /// [k, k+1]/rate, angles and counts are those at its end, less that at time 0; witnesses are means of its two ends.
 record::Record generate_samples(const SampleTruth& truth);

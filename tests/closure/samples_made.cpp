@@ -209,6 +209,37 @@ TEST(ClosureSamples, CaseMotionIsSeenByItsWitness) {
     for (const double v : made.samples->witnesses.at("accel_z")) ASSERT_EQ(v, 9.80665);
 }
 
+TEST(ClosureSamples, AWitnessSeesLessOfAMotionThroughItsNoise) {
+    SampleTruth truth;
+    truth.size = 200000;
+    truth.case_motion = {"accel_y", 0.6, 2.0, 5.0, 4.0};
+    truth.accelerometer_noise = 4e-4;
+    truth.kind = record::SampleKind::angle_arcsec;
+    const record::Record made = generate_samples(truth);
+    const std::vector<double>& witness = made.samples->witnesses.at("accel_y");
+    constexpr std::size_t block = 500;
+    double coherent = 0.0;
+    double all = 0.0;
+    for (std::size_t k = 5; k <= 45; k += 4) {  // fifths of a hertz, within a width of the centre
+        const double f = static_cast<double>(k) / block;
+        double xx = 0.0, yy = 0.0;
+        std::complex<double> xy = 0.0;
+        for (std::size_t first = 0; first < truth.size; first += block) {
+            const auto x = amplitude(made.samples->values, f, first, first + block);
+            const auto y = amplitude(witness, f, first, first + block);
+            xx += std::norm(x);
+            yy += std::norm(y);
+            xy += x * std::conj(y);
+        }
+        coherent += std::norm(xy) / yy;
+        all += xx;
+    }
+    const double expected = coherence_with_noise(truth);
+    EXPECT_LT(expected, 0.45);
+    // As above, of eleven frequencies; and the window's leakage
+    EXPECT_NEAR(coherent / all, expected, 0.04);
+}
+
 TEST(ClosureSamples, TemperatureIsAWitness) {
     SampleTruth truth;
     truth.size = 1000;
