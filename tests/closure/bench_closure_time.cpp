@@ -203,7 +203,7 @@ std::string time_stages(const std::vector<std::size_t>& lengths, int rounds) {
             const auto stage = [&](std::size_t k, const std::function<void()>& work) {
                 times[k].add(length, seconds_of(work));
             };
-            stage(0, [&] { fit = std::make_unique<closure::TurnFit>(model, start, closure::Rows(length, 1)); });
+            stage(0, [&] { fit = std::make_unique<closure::TurnFit>(model, start, closure::Rows(series.size(), 1)); });
             stage(1, [&] { closure::screen(*fit); });
             stage(2, [&] { closure::screen_side_channels(*made.turns, *fit, joined); });
             stage(3, [&] { closure::view_residual(*fit); });
