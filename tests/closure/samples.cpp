@@ -69,8 +69,7 @@ double coherence_with_noise(const SampleTruth& truth) {
     constexpr int parts = 200;
     const CaseMotion& motion = truth.case_motion;
     const double nyquist_hz = 0.5 * truth.rate_hz;
-    const double noise_arcsec2_hz =
-        std::pow(truth.accelerometer_noise / gravity_m_s2 * arcsec_per_rad, 2) / nyquist_hz;
+    const double noise_arcsec2_hz = std::pow(truth.accelerometer_noise / gravity_m_s2 * arcsec_per_rad, 2) / nyquist_hz;
     const double r = std::exp(-pi * motion.width_hz / truth.rate_hz);
     const double r2 = r * r;
     const double a = 2.0 * r * std::cos(two_pi * motion.centre_hz / truth.rate_hz);
