@@ -15,15 +15,24 @@ constexpr double two_pi = 2.0 * pi;
 constexpr double gravity_m_s2 = 9.80665;
 constexpr double arcsec_per_rad = 648000.0 / pi;
 
-/// x_k = 2 r cos(w) x_{k-1} - r^2 x_{k-2} + e_k, a pair of poles at r exp(+-i w), stationary and of the rms asked for.
-std::vector<double> resonance(std::size_t size, double rate_hz, const CaseMotion& motion, Random& random) {
+/// x_k = a x_{k-1} - r2 x_{k-2} + e_k, a = 2 r cos(w), r2 = r^2: a pair of poles at r exp(+-i w), of the rms asked for.
+struct Autoregression {
+    double a, r2;
+    double innovation;  ///< standard deviation of e
+};
+
+Autoregression autoregression(const CaseMotion& motion, double rate_hz) {
     const double r = std::exp(-pi * motion.width_hz / rate_hz);
-    const double w = two_pi * motion.centre_hz / rate_hz;
     const double r2 = r * r;
-    const double a = 2.0 * r * std::cos(w);
+    const double a = 2.0 * r * std::cos(two_pi * motion.centre_hz / rate_hz);
     // Variance of the process over that of e (Box & Jenkins, second-order autoregression)
     const double variance = (1.0 + r2) / ((1.0 - r2) * ((1.0 + r2) * (1.0 + r2) - a * a));
-    const double innovation = motion.rms_arcsec / std::sqrt(variance);
+    return {a, r2, motion.rms_arcsec / std::sqrt(variance)};
+}
+
+/// Stationary.
+std::vector<double> resonance(std::size_t size, double rate_hz, const CaseMotion& motion, Random& random) {
+    const auto [a, r2, innovation] = autoregression(motion, rate_hz);
     const double correlation = a / (1.0 + r2);
     std::vector<double> x(size);
     for (std::size_t k = 0; k < size; ++k) {
@@ -70,19 +79,15 @@ double coherence_with_noise(const SampleTruth& truth) {
     const CaseMotion& motion = truth.case_motion;
     const double nyquist_hz = 0.5 * truth.rate_hz;
     const double noise_arcsec2_hz = std::pow(truth.accelerometer_noise / gravity_m_s2 * arcsec_per_rad, 2) / nyquist_hz;
-    const double r = std::exp(-pi * motion.width_hz / truth.rate_hz);
-    const double r2 = r * r;
-    const double a = 2.0 * r * std::cos(two_pi * motion.centre_hz / truth.rate_hz);
-    const double innovation2 =
-        std::pow(motion.rms_arcsec, 2) * (1.0 - r2) * ((1.0 + r2) * (1.0 + r2) - a * a) / (1.0 + r2);
+    const auto [a, r2, innovation] = autoregression(motion, truth.rate_hz);
     const double low_hz = std::max(0.0, motion.centre_hz - motion.width_hz);
     const double high_hz = std::min(nyquist_hz, motion.centre_hz + motion.width_hz);
     double coherent = 0.0;
     double all = 0.0;
     for (int k = 0; k < parts; ++k) {
         const double w = two_pi * (low_hz + (k + 0.5) / parts * (high_hz - low_hz)) / truth.rate_hz;
-        const double power =
-            innovation2 / nyquist_hz / std::norm(1.0 - a * std::polar(1.0, -w) + r2 * std::polar(1.0, -2.0 * w));
+        const double power = innovation * innovation / nyquist_hz /
+                             std::norm(1.0 - a * std::polar(1.0, -w) + r2 * std::polar(1.0, -2.0 * w));
         // As the mean of an interval's ends
         const double seen = power * std::pow(std::cos(0.5 * w), 2);
         coherent += motion.coherence * power * seen / (seen + noise_arcsec2_hz);

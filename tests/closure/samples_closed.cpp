@@ -249,10 +249,11 @@ TEST(LongSampleClosure, AMotionBesideAStrongWalkIsToldAsItIs) {
         EXPECT_EQ(found.steps[0].effect, "case_motion");
         EXPECT_EQ(found.steps[1].effect, "rate_random_walk");
         const auto near = [&](std::size_t step, const std::string& name, double value) {
-            for (const auto& estimate : found.steps[step].parameters) {
-                if (estimate.name != name) continue;
-                EXPECT_NEAR(estimate.value, value, most_errors * estimate.sd) << name << ", seed " << seed;
-            }
+            const auto& parameters = found.steps[step].parameters;
+            const auto estimate =
+                std::find_if(parameters.begin(), parameters.end(), [&](const auto& e) { return e.name == name; });
+            ASSERT_NE(estimate, parameters.end()) << name;
+            EXPECT_NEAR(estimate->value, value, most_errors * estimate->sd) << name << ", seed " << seed;
         };
         near(0, "coherence", 0.93);
         near(0, "rms_arcsec", 2.8);
