@@ -204,6 +204,7 @@ SampleFit motion_as_resonance(const SampleFit& fit, const SampleFit& bare, const
         SampleModel with = bare.model();
         with.noise = from.noise;
         with.flicker_deg_h = from.flicker_deg_h;
+        with.motion_from_hz = slowest_of_motion * centre_hz;
         with.resonances.insert(with.resonances.begin(), "case_motion");
         with.resonance_steps.insert(with.resonance_steps.begin(), step);
         with.noise.resonances.insert(with.noise.resonances.begin(),
@@ -214,9 +215,15 @@ SampleFit motion_as_resonance(const SampleFit& fit, const SampleFit& bare, const
     return std::move(*best);
 }
 
+std::vector<Estimate> whites_of(const SampleNoise& noise, const SampleNoise& errors) {
+    const double to_deg = units::deg_rt_h_per_arcsec_rt_s;
+    return {{"", "white_angle_arcsec", noise.angle_arcsec, errors.angle_arcsec},
+            {"", "white_rate_deg_rt_h", noise.rate_arcsec_rt_s * to_deg, errors.rate_arcsec_rt_s * to_deg}};
+}
+
 /// What the motion is, and what its witness leaves of it.
 void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estimate>& all,
-                 std::vector<std::string>& notes) {
+                 std::vector<Estimate>& whites, std::vector<std::string>& notes) {
     const SampleSeries& series = fit.series();
     const auto& [name, witness] = series.witnesses[step.witness];
     all.push_back({"case_motion", "witness", static_cast<double>(name.back() - 'x'), 0.0, name});
@@ -225,8 +232,14 @@ void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estim
     const double centre = std::max(told.centre_hz, 0.01);
     const SampleFit whole = motion_as_resonance(fit, bare, told, step.step);
     const auto& motion = whole.model().noise.resonances.front();
-    const SampleNoise::Resonance error = whole.noise_errors().noise.resonances.front();
+    const SampleNoise errors = whole.noise_errors().noise;
+    const SampleNoise::Resonance& error = errors.resonances.front();
     const bool seen = whole.log_likelihood() - bare.log_likelihood() > 20.0;
+    // The witness's own noise comes in with what it tells of a strong motion, and is none of the gyro's. A motion that is
+    // no resonance leaves more beside it than there is.
+    if (seen && step.strong && whole.model().noise.angle_arcsec < fit.model().noise.angle_arcsec) {
+        whites = whites_of(whole.model().noise, errors);
+    }
     double coherence = unknown;
     double coherence_sd = unknown;
     if (seen) {
@@ -268,16 +281,19 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<SampleStep>& st
     const SampleModel& model = fit.model();
     const SampleModel errors = fit.noise_errors();
     SampleFigures figures;
-    const double to_deg = units::deg_rt_h_per_arcsec_rt_s;
-    figures.base.push_back({"", "mean_rate_deg_h", model.columns[0].value, model.columns[0].sd});
-    figures.base.push_back({"", "white_angle_arcsec", model.noise.angle_arcsec, errors.noise.angle_arcsec});
+    // It is that at the temperature of the start.
+    double of_start = 0.0;
+    for (const SampleColumn& column : model.columns) {
+        if (column.effect == "bias_temperature") of_start = column.value * fit.series().temperature_start_sd_k;
+    }
     figures.base.push_back(
-        {"", "white_rate_deg_rt_h", model.noise.rate_arcsec_rt_s * to_deg, errors.noise.rate_arcsec_rt_s * to_deg});
+        {"", "mean_rate_deg_h", model.columns[0].value, std::hypot(model.columns[0].sd, of_start)});
+    std::vector<Estimate> whites = whites_of(model.noise, errors.noise);
     for (const SampleStep& step : steps) {
         auto& all = figures.steps.emplace_back();
         const std::string& effect = step.effect;
         if (effect == "case_motion") {
-            take_motion(fit, step, all, figures.notes);
+            take_motion(fit, step, all, whites, figures.notes);
             continue;
         }
         for (std::size_t k = 0; k < model.columns.size(); ++k) {
@@ -320,6 +336,7 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<SampleStep>& st
             break;
         }
     }
+    figures.base.insert(figures.base.end(), whites.begin(), whites.end());
     return figures;
 }
 

@@ -5,6 +5,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "analysis/closure/gauss_markov.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -34,16 +35,21 @@ void SampleFilter::set_up(const SampleNoise& noise, double interval_s) {
         f_[0][n_] = dt;
         f_[n_][n_] = 1.0;
         q_[n_][n_] = noise.walk_arcsec2_s3 * dt;
+        q_[0][n_] = q_[n_][0] = 0.5 * q_[n_][n_] * dt;
+        q_[0][0] += q_[n_][n_] * dt * dt / 3.0;
         p[n_][n_] = q_[n_][n_];
         ++n_;
     }
     for (const auto& term : noise.terms) {
         if (n_ >= most - 5) break;
-        const double decay = std::exp(-dt / term.time_s);
-        f_[0][n_] = term.time_s * -std::expm1(-dt / term.time_s);
-        f_[n_][n_] = decay;
-        q_[n_][n_] = term.variance_arcsec2_s2 * -std::expm1(-2.0 * dt / term.time_s);
-        p[n_][n_] = term.variance_arcsec2_s2;
+        const GaussMarkovStep step(term.time_s, dt);
+        const double variance = term.variance_arcsec2_s2;
+        f_[0][n_] = step.gain_s;
+        f_[n_][n_] = step.decay;
+        q_[n_][n_] = variance * step.rate_variance;
+        q_[0][n_] = q_[n_][0] = variance * step.covariance_s;
+        q_[0][0] += variance * step.angle_variance_s2;
+        p[n_][n_] = variance;
         ++n_;
     }
     std::vector<int> resonances;

@@ -99,8 +99,7 @@ SampleModel moved_as(const SampleFit& now, std::size_t witness, int step) {
     const WitnessMotion motion = fit_witness(now, watched);
     SampleModel model = now.model();
     model.motion = motion.increments;
-    constexpr double slowest = 0.2;
-    model.motion_from_hz = slowest * motion.centre_hz;
+    model.motion_from_hz = slowest_of_motion * motion.centre_hz;
     // What the witness does not tell moves like what it tells; its own noise hides the edges of that, which are wider.
     const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
     const double centre_hz = std::max(motion.centre_hz, 0.01);

@@ -54,6 +54,49 @@ void take_input(const record::Record& record, SampleSeries& series) {
     }
 }
 
+struct Smoothed {
+    std::vector<double> values;
+    double start_sd = 0.0;
+};
+
+/// A thermometer's noise is faster than any temperature: straight lines through a 500th of the record about each row,
+/// at the ends those through the first of them and the last.
+Smoothed smooth(const std::vector<double>& values) {
+    const std::size_t n = values.size();
+    const std::size_t half = std::min(std::max<std::size_t>(1, n / 1000), (n - 1) / 2);
+    std::vector<double> sums(n + 1, 0.0);
+    for (std::size_t i = 0; i < n; ++i) sums[i + 1] = sums[i] + values[i];
+    const auto mean_about = [&](std::size_t middle) {
+        return (sums[middle + half + 1] - sums[middle - half]) / static_cast<double>(2 * half + 1);
+    };
+    const auto slope_about = [&](std::size_t middle) {
+        double by = 0.0;
+        double squares = 0.0;
+        for (std::size_t k = 1; k <= half; ++k) {
+            by += static_cast<double>(k) * (values[middle + k] - values[middle - k]);
+            squares += 2.0 * static_cast<double>(k * k);
+        }
+        return by / squares;
+    };
+    const std::size_t last = n - 1 - half;
+    const double first_slope = slope_about(half);
+    const double last_slope = slope_about(last);
+    Smoothed smoothed;
+    for (std::size_t i = 0; i < n; ++i) {
+        const std::size_t middle = std::clamp(i, half, last);
+        const double off = static_cast<double>(i) - static_cast<double>(middle);
+        smoothed.values.push_back(mean_about(middle) + off * (i < middle ? first_slope : last_slope));
+    }
+    double squares = 0.0;
+    for (std::size_t i = 0; i <= 2 * half; ++i) {
+        const double off = static_cast<double>(i) - static_cast<double>(half);
+        squares += std::pow(values[i] - mean_about(half) - off * first_slope, 2);
+    }
+    // At the end of a line through m values its error is 2/sqrt(m) of theirs, m large.
+    smoothed.start_sd = 2.0 * std::sqrt(squares / static_cast<double>(2 * half - 1) / static_cast<double>(2 * half + 1));
+    return smoothed;
+}
+
 }  // namespace
 
 SampleSeries prepare_samples(const record::Record& record) {
@@ -101,18 +144,10 @@ SampleSeries prepare_samples(const record::Record& record) {
         for (const double t : series.time_s) series.temperature_change_k.push_back(record.temperature_c.at(t));
     }
     if (!series.temperature_change_k.empty()) {
-        // A thermometer's noise is faster than any temperature: means over a 500th of the record.
-        auto& t = series.temperature_change_k;
-        const std::size_t half = std::max<std::size_t>(1, n / 1000);
-        std::vector<double> sums(n + 1, 0.0);
-        for (std::size_t i = 0; i < n; ++i) sums[i + 1] = sums[i] + t[i];
-        for (std::size_t i = 0; i < n; ++i) {
-            const std::size_t a = i > half ? i - half : 0;
-            const std::size_t b = std::min(n, i + half + 1);
-            t[i] = (sums[b] - sums[a]) / static_cast<double>(b - a);
-        }
-        const double start = t.front();
-        for (double& value : t) value -= start;
+        const Smoothed smoothed = smooth(series.temperature_change_k);
+        series.temperature_start_sd_k = smoothed.start_sd;
+        series.temperature_change_k = smoothed.values;
+        for (double& value : series.temperature_change_k) value -= smoothed.values.front();
     }
     if (!record.input_rate_deg_h.empty()) take_input(record, series);
     return series;

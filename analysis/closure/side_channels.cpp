@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "analysis/closure/chance.hpp"
+#include "analysis/closure/miscounts.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -191,8 +192,11 @@ std::vector<Candidate> screen_side_channels(const record::Turns& turns, const Tu
         constexpr double by_chance = 1e-9;
         const double surprise = missed > 0.0 ? missed * std::log(missed / (n * by_chance)) - missed : 0.0;
         Candidate candidate{effect, values_at_rest(*effect), 2.0 * surprise, chi2_tail(2.0 * surprise, 1), 1.0};
-        candidate.values.at("probability_per_turn") = missed / n;
-        candidate.sd["probability_per_turn"] = std::sqrt(missed) / n;
+        if (missed > 0.0) {
+            const MissedShare share = share_of_missed_counts(turns, joined, fit.rows());
+            candidate.values.at("probability_per_turn") = share.probability_per_turn;
+            candidate.sd["probability_per_turn"] = share.sd;
+        }
         candidates.push_back(candidate);
     }
     if (!fit.model().series().all_phases_come) return candidates;

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "analysis/closure/gauss_markov.hpp"
+
 namespace ringlock::closure {
 
 namespace {
@@ -20,17 +22,11 @@ struct State {
     double start = 0.0;
 };
 
-/// One step of a first-order Gauss-Markov rate and of its integral, the angle; what that gains goes to `angle`.
 State rate_state(const PhaseRateTerm& term, double dt, State& angle) {
-    const double x = dt / term.time_s;
-    const double e = std::expm1(-x);  // exp(-x) - 1
-    // 2 x - 3 + 4 exp(-x) - exp(-2 x): x^3 2/3 - x^4/2 + ..., which the closed form loses.
-    const double variance =
-        x < 0.02 ? x * x * x * (2.0 / 3.0 - x * (0.5 - x * (7.0 / 30.0 - x / 12.0))) : 2.0 * x + 2.0 * e - e * e;
-    const double t = term.time_s;
-    angle.noise += term.variance_rad2_s2 * t * t * variance;
-    return {1.0 + e, -e * t, term.variance_rad2_s2 * -std::expm1(-2.0 * x), term.variance_rad2_s2 * t * e * e,
-            term.variance_rad2_s2};
+    const GaussMarkovStep step(term.time_s, dt);
+    const double variance = term.variance_rad2_s2;
+    angle.noise += variance * step.angle_variance_s2;
+    return {step.decay, step.gain_s, variance * step.rate_variance, variance * step.covariance_s, variance};
 }
 
 std::vector<State> states_of(const TurnNoise& noise, bool walks, double dt) {

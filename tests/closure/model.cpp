@@ -9,6 +9,7 @@
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/miscounts.hpp"
 #include "analysis/closure/noise_shape.hpp"
 #include "analysis/closure/turn_fit.hpp"
 #include "analysis/closure/turn_kicks.hpp"
@@ -370,6 +371,42 @@ TEST(JoinedPhase, CountAndQuadratureMayDifferByAQuarterAtItsEdge) {
     for (std::size_t i = 0; i < truth.size(); ++i) {
         const double off = lost.phase_rad[i] - truth[i] - (lost.phase_rad[0] - truth[0]);
         EXPECT_NEAR(off, 0.0, 0.1) << i;
+    }
+}
+
+TEST(MissedCounts, AreNotLostWhereTheNextTurnTakesThemBack) {
+    constexpr std::size_t n = 20000;
+    const Rows all(n, 1);
+    for (const double p : {0.003, 0.2}) {
+        for (const double edge : {0.0, 0.05}) {
+            record::Turns turns;
+            std::mt19937_64 random(7);
+            std::normal_distribution<double> normal;
+            std::uniform_real_distribution<double> uniform;
+            std::int64_t missed = 0;
+            std::int64_t events = 0;
+            for (std::size_t i = 0; i < n; ++i) {
+                const int direction = i % 2 == 0 ? 1 : -1;
+                const double psi = 2000.0 * uniform(random) - 1000.0 * direction;
+                if (uniform(random) < p) {
+                    missed += direction;
+                    ++events;
+                }
+                const double counted = std::floor(psi / (0.5 * units::pi) + edge * normal(random));
+                turns.time_s.push_back(0.004 * static_cast<double>(i));
+                turns.direction.push_back(static_cast<std::int8_t>(direction));
+                turns.sine.push_back(std::sin(psi) + 0.005 * normal(random));
+                turns.cosine.push_back(std::cos(psi) + 0.005 * normal(random));
+                turns.quarter_count.push_back(static_cast<std::int64_t>(counted) + missed);
+            }
+            const JoinedPhase joined = join(turns, {}, false);
+            const auto share = share_of_missed_counts(turns, joined, all);
+            const double truth = static_cast<double>(events) / static_cast<double>(n);
+            const double of_trials = std::sqrt(truth * (1.0 - truth) / static_cast<double>(n));
+            EXPECT_NEAR(share.probability_per_turn, truth, 2.0 * of_trials) << "p " << p << ", edge " << edge;
+            EXPECT_GT(share.sd, 0.9 * of_trials) << "p " << p << ", edge " << edge;
+            EXPECT_LT(share.sd, 1.5 * of_trials) << "p " << p << ", edge " << edge;
+        }
     }
 }
 

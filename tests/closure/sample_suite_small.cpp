@@ -275,23 +275,24 @@ TEST(SampleFilter, LikelihoodIsThatOfTheCovariance) {
     ringlock::closure::SampleNoise noise;
     noise.angle_arcsec = 0.3;
     noise.rate_arcsec_rt_s = 0.8;
-    noise.terms = {{0.5, 0.4}, {5.0, 0.2}};
+    noise.terms = {{0.2, 2.0}, {0.5, 0.4}, {5.0, 0.2}};
     constexpr int n = 60;
     constexpr double dt = 0.1;
-    // Angles at the ends, less that at the start: variance of white rates, of Markov rates held over an interval as the
-    // filter has them, and of the reading errors.
+    noise.walk_arcsec2_s3 = 0.7;
+    // Angles at the ends, less that at the start: integrals of white, Markov and walking rates, and reading errors. The
+    // walk begins one step of it from zero.
     Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
     for (int i = 0; i < n; ++i) {
         for (int j = 0; j < n; ++j) {
-            covariance(i, j) = 0.64 * dt * (std::min(i, j) + 1) + 0.09 * (i == j ? 2.0 : 1.0);
+            const double s = dt * (std::min(i, j) + 1);
+            const double t = dt * (std::max(i, j) + 1);
+            covariance(i, j) = 0.64 * s + 0.09 * (i == j ? 2.0 : 1.0);
+            covariance(i, j) += noise.walk_arcsec2_s3 * (s * s * (t / 2.0 - s / 6.0) + dt * s * t);
             for (const auto& term : noise.terms) {
-                const double gain = term.time_s * -std::expm1(-dt / term.time_s);
-                for (int a = 0; a <= i; ++a) {
-                    for (int b = 0; b <= j; ++b) {
-                        covariance(i, j) +=
-                            gain * gain * term.variance_arcsec2_s2 * std::exp(-std::abs(a - b) * dt / term.time_s);
-                    }
-                }
+                const double time = term.time_s;
+                covariance(i, j) += term.variance_arcsec2_s2 * time * time *
+                                    (2.0 * s / time + std::exp(-s / time) + std::exp(-t / time) - 1.0 -
+                                     std::exp((s - t) / time));
             }
         }
     }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -227,6 +228,36 @@ TEST(SampleMotion, WhatIsLeftOfItIsNoSlowDrift) {
     };
     EXPECT_GT(gain(0.0), 100.0);
     EXPECT_LT(gain(0.3), 1.0);
+}
+
+// What a witness tells of a strong motion has the witness's own noise in it.
+TEST(SampleMotion, TheNoiseOfItsWitnessIsNoneOfTheGyros) {
+    SampleTruth truth = usual();
+    truth.size = 30000;
+    truth.case_motion.rms_arcsec = 5.0;
+    truth.accelerometer_noise = 3e-5;
+    const auto found = closed(truth);
+    only_step(found, "case_motion");
+    const auto white = std::find_if(found.base.begin(), found.base.end(),
+                                    [](const auto& e) { return e.name == "white_angle_arcsec"; });
+    ASSERT_NE(white, found.base.end());
+    EXPECT_NEAR(white->value, truth.white_angle_arcsec, 3.0 * white->sd);
+    EXPECT_LT(white->sd, 0.1 * truth.white_angle_arcsec);
+}
+
+// A base at the temperature of the start is as uncertain as that.
+TEST(SampleSeries, BeginAtTheTemperatureOfTheStart) {
+    SampleTruth truth = usual();
+    truth.size = 30000;
+    truth.temperature.ramp_k_per_h = 360.0;
+    truth.thermometer_noise_k = 0.01;
+    const closure::SampleSeries series = closure::prepare_samples(generate_samples(truth));
+    const double of_61 = 2.0 * truth.thermometer_noise_k / std::sqrt(61.0);
+    EXPECT_NEAR(series.temperature_start_sd_k, of_61, 0.3 * of_61);
+    for (const std::size_t i : {15000U, 29999U}) {
+        const double change_k = 0.1 * static_cast<double>(i) / truth.rate_hz;
+        EXPECT_NEAR(series.temperature_change_k[i], change_k, 4.0 * of_61) << i;
+    }
 }
 
 // Either can stand in for the slow half of the other: each has to be told again once the other is there.
