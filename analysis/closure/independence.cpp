@@ -287,6 +287,9 @@ struct Jumping {
 constexpr std::size_t stretches_of_levels = 120;
 constexpr double of_places = 2.0;  // jumps do not wait for the end of a stretch
 
+/// What a jump costs.
+double cost_of_jump() { return std::log(static_cast<double>(stretches_of_levels - 1)) + of_places; }
+
 /// Two levels in stretches of the record, under the noise of the fit.
 TwoLevels levels_of_stretches(const TurnFit& fit, std::size_t stretches = stretches_of_levels) {
     const auto& time = fit.model().series().time_s;
@@ -335,10 +338,9 @@ Jumping placed(const TurnFit& fit, const TwoLevels& levels) {
 /// The merit of jumps, and the noise fitted anew beside them.
 void judge(const TurnFit& fit, Jumping& jumping) {
     constexpr double of_levels = 1.0;
-    const double place = std::log(static_cast<double>(stretches_of_levels - 1)) + of_places;
     TurnFit::Regression regression = fit.regress({jumping.angle(fit)});
     jumping.merit = regression.gain - cost_of_amplitudes(regression.gain, 1) - of_levels -
-                    place * static_cast<double>(jumping.jumps.size());
+                    cost_of_jump() * static_cast<double>(jumping.jumps.size());
     jumping.noise = std::move(regression.noise);
 }
 
@@ -357,7 +359,7 @@ void move_jumps(const TurnFit& fit, Jumping& found) {
             columns.emplace_back(std::move(late));
             sign = -sign;
         }
-        const Eigen::VectorXd value = fit.regress(columns).value;
+        const Eigen::VectorXd value = fit.with_noise(found.noise)->score(columns).value;
         const double before = found.merit;
         // Too far, where jumps are near each other.
         for (double share = 1.0; share > 0.1 && !(found.merit > before); share *= 0.5) {
@@ -374,16 +376,22 @@ void move_jumps(const TurnFit& fit, Jumping& found) {
     }
 }
 
-/// Short stays that only made up for stretches that end elsewhere than jumps are no longer needed.
+/// Short stays that only made up for stretches that end elsewhere than jumps are no longer needed. Under the noise as it
+/// is more is lost without them than under one that is fitted anew.
 bool drop_stays(const TurnFit& fit, Jumping& found) {
+    constexpr double hardly = 2.0;
+    const auto beside = fit.with_noise(found.noise);
+    double explained = beside->score({found.angle(fit)}).chi2;
     bool dropped = false;
     for (std::size_t k = 0; k + 1 < found.jumps.size() && found.jumps.size() > 2;) {
         Jumping without{.jumps = found.jumps, .on = found.on};
         const auto first = without.jumps.begin() + static_cast<std::ptrdiff_t>(k);
         without.jumps.erase(first, first + 2);
-        judge(fit, without);
+        const double left = beside->score({without.angle(fit)}).chi2;
+        if (explained - left < hardly * 2.0 * 2.0 * cost_of_jump()) judge(fit, without);
         if (without.merit > found.merit) {
             found = std::move(without);
+            explained = left;
             dropped = true;
         } else {
             ++k;

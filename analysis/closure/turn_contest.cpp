@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <limits>
 #include <utility>
 
 #include "analysis/closure/chance.hpp"
@@ -109,7 +110,9 @@ class Fits {
     }
 
     /// From what the score says. `alike` is a model that has another random rate in its place, where there is one.
-    void begin(const Fitted* alike) {
+    /// Less than `needed` of gain need not be told exactly.
+    void begin(const Fitted* alike, double needed) {
+        needed_ = now_.fit->log_likelihood() + needed;
         // Coupling, threshold and bias move together: from next to nothing the first step takes all of them along.
         const effects::Effect& effect = *candidate_.effect;
         const bool of_coupling = !effect.adds_angle() && !is_random_rate(effect) && !told_by_other_columns(effect);
@@ -135,7 +138,7 @@ class Fits {
 
    private:
     void from(const TurnParameters& start) {
-        auto fitted = fit_or_none(record_, start, rows_);
+        auto fitted = fit_or_none(record_, start, rows_, needed_);
         if (!fitted) return;
         if (!best_ || fitted->fit->log_likelihood() > best_->fit->log_likelihood()) best_ = std::move(fitted);
     }
@@ -170,6 +173,7 @@ class Fits {
     const Rows& rows_;
     TurnParameters start_;
     bool strong_rate_;
+    double needed_ = 0.0;  ///< of the log-likelihood
     bool anew_ = false;
     std::shared_ptr<Fitted> best_;
 };
@@ -208,7 +212,7 @@ void linearise_again(Fitted& fitted, const Rows& rows, TurnFit::Effects effects)
 }  // namespace
 
 std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParameters& start, const Rows& rows,
-                                   TurnFit::Effects effects) {
+                                   TurnFit::Effects effects, double needed) {
     auto fitted = std::make_shared<Fitted>();
     gyro::Setup setup;
     bool count_again = false;
@@ -225,7 +229,7 @@ std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParam
         parameters.readout_sd_rad = std::max(fitted->joined.readout_sd_rad, 1e-6);
         parameters.threshold_deg_h = fitted->series.setup.lockin_threshold_deg_h;
     }
-    fitted->fit = std::make_unique<TurnFit>(*fitted->model, parameters, rows, effects);
+    fitted->fit = std::make_unique<TurnFit>(*fitted->model, parameters, rows, effects, needed);
     if (from_nothing) {
         // Where noise is injected the swings say how much: a fit that is not told may end beside a summit.
         parameters.injected_sd_rad = injected_by_swings(fitted->series);
@@ -234,13 +238,14 @@ std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParam
             if (other->log_likelihood() > fitted->fit->log_likelihood()) fitted->fit = std::move(other);
         }
     }
-    linearise_again(*fitted, rows, effects);
+    if (fitted->fit->log_likelihood() > needed) linearise_again(*fitted, rows, effects);
     return fitted;
 }
 
-std::shared_ptr<Fitted> fit_or_none(const record::Record& record, const TurnParameters& start, const Rows& rows) {
+std::shared_ptr<Fitted> fit_or_none(const record::Record& record, const TurnParameters& start, const Rows& rows,
+                                    double needed) {
     try {
-        return fit_record(record, start, rows);
+        return fit_record(record, start, rows, TurnFit::Effects::fitted, needed);
     } catch (const RunError&) {
         return nullptr;
     }
@@ -261,6 +266,7 @@ bool passes(double p_value) { return p_value < level_of_one_effect(); }
 Contest hold_contest(const record::Record& record, const Fitted& now, const Rows& rows, std::size_t most, Among among,
                      double matters) {
     constexpr double worth_looking = 0.1;
+    constexpr double much = 200.0;  // beside which fits that come nowhere near it are not gone on with
     Contest contest;
     auto candidates =
         worth_a_fit(screen_side_channels(*record.turns, *now.fit, now.joined), level_of_one_effect(), most);
@@ -297,23 +303,28 @@ Contest hold_contest(const record::Record& record, const Fitted& now, const Rows
                               : merit_of(gain_of(*contender.fitted, now), *contender.fitted, *candidate.effect);
         contender.p_value = contest.side ? candidate.p_value : p_of(*contender.fitted, now, candidate);
     };
-    const auto fit_contender = [&](std::size_t k, const Fitted* alike) {
-        fits[k].begin(alike);
-        judge(k);
-    };
-    // The likeliest random rate goes before the others.
-    oneapi::tbb::parallel_for(std::size_t{0}, contenders.size(), [&](std::size_t k) {
-        if (random.empty() || k == random.front() || !is_random_rate(*candidates[k].effect)) fit_contender(k, nullptr);
-    });
-    if (!random.empty()) {
-        oneapi::tbb::parallel_for(std::size_t{1}, random.size(), [&](std::size_t k) {
-            fit_contender(random[k], contenders[random.front()].fitted.get());
-        });
-    }
     constexpr double nearly = 0.9;  // of the most that any explains
-    for (const Contender& contender : contenders) {
-        if (contender.fitted) matters = std::max(matters, contender.merit);
+    constexpr double far = 0.5;
+    const auto needed = [&] { return matters > much ? far * matters : -std::numeric_limits<double>::infinity(); };
+    const auto fit_together = [&](const std::vector<std::size_t>& some, const Fitted* alike) {
+        const double least = needed();
+        oneapi::tbb::parallel_for(std::size_t{0}, some.size(), [&](std::size_t i) {
+            fits[some[i]].begin(is_random_rate(*candidates[some[i]].effect) ? alike : nullptr, least);
+            judge(some[i]);
+        });
+        for (const std::size_t k : some) {
+            if (contenders[k].fitted) matters = std::max(matters, contenders[k].merit);
+        }
+    };
+    // The likeliest goes before the others, and so does the likeliest random rate.
+    std::vector<std::size_t> first;
+    std::vector<std::size_t> others;
+    for (std::size_t k = 0; k < candidates.size(); ++k) {
+        const bool leads = k == 0 || (!random.empty() && k == random.front());
+        (leads ? first : others).push_back(k);
     }
+    fit_together(first, nullptr);
+    fit_together(others, random.empty() ? nullptr : contenders[random.front()].fitted.get());
     oneapi::tbb::parallel_for(std::size_t{0}, contenders.size(), [&](std::size_t k) {
         if (!contenders[k].fitted || contenders[k].merit < nearly * matters) return;
         fits[k].again_if_strong();

@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,11 +22,14 @@ struct Fitted {
 
 /// The model with these effects fitted to the rows that count; from the record's declared device where `start` has no
 /// noise yet.
+/// \param needed  log-likelihood below which nothing needs to be exact
 std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParameters& start, const Rows& rows,
-                                   TurnFit::Effects effects = TurnFit::Effects::fitted);
+                                   TurnFit::Effects effects = TurnFit::Effects::fitted,
+                                   double needed = -std::numeric_limits<double>::infinity());
 
 /// The same from parameters that have noise, or none where no motion of a gyro with such parameters can be followed.
-std::shared_ptr<Fitted> fit_or_none(const record::Record& record, const TurnParameters& start, const Rows& rows);
+std::shared_ptr<Fitted> fit_or_none(const record::Record& record, const TurnParameters& start, const Rows& rows,
+                                    double needed = -std::numeric_limits<double>::infinity());
 
 /// What the choice of one effect more among all of the library costs [nats].
 double cost_of_choice();

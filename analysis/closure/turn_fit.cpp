@@ -77,8 +77,13 @@ std::array<std::vector<double>, 3> amplitude_by(const AmplitudeSwing& swing, con
     return by;
 }
 
-TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows, Effects effects)
-    : model_(&model), parameters_(start), rows_(std::move(rows)), effects_(effects), nuisance_(2 + drift_terms, 0.0) {
+TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows, Effects effects, double needed)
+    : model_(&model),
+      parameters_(start),
+      rows_(std::move(rows)),
+      effects_(effects),
+      needed_(needed),
+      nuisance_(2 + drift_terms, 0.0) {
     if (rows_.size() != model.series().size()) throw std::logic_error("TurnFit: not as many rows as turns");
     if (parameters_.bias_deg_h == 0.0) parameters_.bias_deg_h = model.series().mean_rate_deg_h;
     prediction_ = model_->predict(parameters_);
@@ -97,6 +102,7 @@ TurnFit::TurnFit(const TurnFit& of, TurnParameters parameters, int passes)
       parameters_(std::move(parameters)),
       rows_(of.rows_),
       effects_(of.effects_),
+      needed_(of.needed_),
       nuisance_(of.nuisance_),
       prediction_(of.prediction_),
       columns_(of.columns_),
@@ -113,12 +119,15 @@ void TurnFit::climb() {
     constexpr int most = 24;
     constexpr int soon = 6;
     constexpr double gained = 0.01;
-    constexpr double well = 10.0;  // worth going on where the way is long
+    constexpr double well = 10.0;   // worth going on where the way is long
+    constexpr double rounds = 100;  // as good as the last, that it would take: too far
     for (int round = 0; round < most; ++round) {
         const double before = objective(parameters_, rest_);
         fit_deterministic(4);
         fit_noise();
-        if (before - objective(parameters_, rest_) < (round < soon ? gained : well)) break;
+        const double now = objective(parameters_, rest_);
+        if (before - now < (round < soon ? gained : well)) break;
+        if (-now + rounds * (before - now) < needed_) break;
     }
 }
 

@@ -2,6 +2,7 @@
 #include <Eigen/Dense>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -58,7 +59,10 @@ class TurnFit {
     /// What is done with the parameters of effects: held, they stay as given, and the rest is fitted beside them, so
     /// that standard errors are what Fisher's information says at these values.
     enum class Effects { fitted, held };
-    TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows, Effects effects = Effects::fitted);
+    /// \param needed  log-likelihood below which nothing needs to be exact: where the fit will not come that far it is
+    ///                not fitted to the end
+    TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows, Effects effects = Effects::fitted,
+            double needed = -std::numeric_limits<double>::infinity());
     TurnFit(const TurnFit&) = delete;  // the filter refers to what the fit holds
     TurnFit& operator=(const TurnFit&) = delete;
 
@@ -180,6 +184,7 @@ class TurnFit {
     TurnParameters parameters_;
     Rows rows_;
     Effects effects_;
+    double needed_;                     ///< log-likelihood
     std::vector<double> nuisance_;      ///< offset, amplitude and its drift; swings are among the parameters
     TurnModel::Prediction prediction_;  ///< of the parameters as they are
     std::vector<double> rest_;          ///< phases less all that is deterministic
