@@ -3,8 +3,9 @@
 
 namespace ringlock::closure {
 
-/// One step of a first-order Gauss-Markov rate of unit variance, and of its integral, the angle: rate' = decay rate + u,
-/// angle' = angle + gain_s rate + v, u and v normal. For a rate of variance s^2 the three variances are s^2 times these.
+/// One step of a first-order Gauss-Markov rate of unit variance, and of its integral, the angle: rate' = decay rate +
+/// u, angle' = angle + gain_s rate + v, u and v normal. For a rate of variance s^2 the three variances are s^2 times
+/// these.
 struct GaussMarkovStep {
     double decay = 1.0;
     double gain_s = 0.0;

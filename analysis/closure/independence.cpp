@@ -287,9 +287,6 @@ struct Jumping {
 constexpr std::size_t stretches_of_levels = 120;
 constexpr double of_places = 2.0;  // jumps do not wait for the end of a stretch
 
-/// What a jump costs.
-double cost_of_jump() { return std::log(static_cast<double>(stretches_of_levels - 1)) + of_places; }
-
 /// Two levels in stretches of the record, under the noise of the fit.
 TwoLevels levels_of_stretches(const TurnFit& fit, std::size_t stretches = stretches_of_levels) {
     const auto& time = fit.model().series().time_s;
@@ -335,12 +332,13 @@ Jumping placed(const TurnFit& fit, const TwoLevels& levels) {
     return found;
 }
 
-/// The merit of jumps, and the noise fitted anew beside them.
-void judge(const TurnFit& fit, Jumping& jumping) {
+/// The merit of jumps, and the noise fitted anew beside them, from one that is near.
+void judge(const TurnFit& fit, Jumping& jumping, const TurnParameters& near) {
     constexpr double of_levels = 1.0;
-    TurnFit::Regression regression = fit.regress({jumping.angle(fit)});
+    const double place = std::log(static_cast<double>(stretches_of_levels - 1)) + of_places;
+    TurnFit::Regression regression = fit.regress({jumping.angle(fit)}, near);
     jumping.merit = regression.gain - cost_of_amplitudes(regression.gain, 1) - of_levels -
-                    cost_of_jump() * static_cast<double>(jumping.jumps.size());
+                    place * static_cast<double>(jumping.jumps.size());
     jumping.noise = std::move(regression.noise);
 }
 
@@ -369,29 +367,58 @@ void move_jumps(const TurnFit& fit, Jumping& found) {
             }
             if (!std::is_sorted(moved.jumps.begin(), moved.jumps.end())) continue;
             if (!(moved.jumps.front() > 0.0 && moved.jumps.back() < time.back())) continue;
-            judge(fit, moved);
+            judge(fit, moved, found.noise);
             if (moved.merit > found.merit) found = std::move(moved);
         }
         if (found.merit < before + gained) break;
     }
 }
 
-/// Short stays that only made up for stretches that end elsewhere than jumps are no longer needed. Under the noise as it
-/// is more is lost without them than under one that is fitted anew.
-bool drop_stays(const TurnFit& fit, Jumping& found) {
-    constexpr double hardly = 2.0;
+Jumping without_stay(const Jumping& all, std::size_t k) {
+    Jumping without{.jumps = all.jumps, .on = all.on};
+    const auto first = without.jumps.begin() + static_cast<std::ptrdiff_t>(k);
+    without.jumps.erase(first, first + 2);
+    return without;
+}
+
+/// Many at once: those that explain least under the noise as it is.
+bool drop_many_stays(const TurnFit& fit, Jumping& found) {
     const auto beside = fit.with_noise(found.noise);
-    double explained = beside->score({found.angle(fit)}).chi2;
-    bool dropped = false;
-    for (std::size_t k = 0; k + 1 < found.jumps.size() && found.jumps.size() > 2;) {
-        Jumping without{.jumps = found.jumps, .on = found.on};
-        const auto first = without.jumps.begin() + static_cast<std::ptrdiff_t>(k);
-        without.jumps.erase(first, first + 2);
-        const double left = beside->score({without.angle(fit)}).chi2;
-        if (explained - left < hardly * 2.0 * 2.0 * cost_of_jump()) judge(fit, without);
+    const std::size_t stays = found.jumps.size() - 1;
+    std::vector<double> left(stays);
+    oneapi::tbb::parallel_for(std::size_t{0}, stays, [&](std::size_t k) {
+        left[k] = beside->score({without_stay(found, k).angle(fit)}).chi2;
+    });
+    std::vector<std::size_t> order(stays);
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return left[a] > left[b]; });
+    for (std::size_t most = found.jumps.size() / 2 - 1; most > 1; most /= 2) {
+        std::vector<std::size_t> dropped;  // whose jumps are no other's
+        for (const std::size_t k : order) {
+            const auto beside_it = [&](std::size_t other) { return other + 1 >= k && other <= k + 1; };
+            if (dropped.size() < most && std::none_of(dropped.begin(), dropped.end(), beside_it)) dropped.push_back(k);
+        }
+        std::sort(dropped.rbegin(), dropped.rend());
+        Jumping without = found;
+        for (const std::size_t k : dropped) without = without_stay(without, k);
+        judge(fit, without, found.noise);
         if (without.merit > found.merit) {
             found = std::move(without);
-            explained = left;
+            return true;
+        }
+    }
+    return false;
+}
+
+/// Short stays that only made up for stretches that end elsewhere than jumps are no longer needed.
+bool drop_stays(const TurnFit& fit, Jumping& found) {
+    bool dropped = false;
+    while (found.jumps.size() > 5 && drop_many_stays(fit, found)) dropped = true;
+    for (std::size_t k = 0; k + 1 < found.jumps.size() && found.jumps.size() > 2;) {
+        Jumping without = without_stay(found, k);
+        judge(fit, without, found.noise);
+        if (without.merit > found.merit) {
+            found = std::move(without);
             dropped = true;
         } else {
             ++k;
@@ -400,8 +427,8 @@ bool drop_stays(const TurnFit& fit, Jumping& found) {
     return dropped;
 }
 
-Jumping with_their_noise(const TurnFit& fit, Jumping found) {
-    judge(fit, found);
+Jumping with_their_noise(const TurnFit& fit, Jumping found, const TurnParameters& near) {
+    judge(fit, found, near);
     move_jumps(fit, found);
     while (drop_stays(fit, found)) move_jumps(fit, found);
     return found;
@@ -414,14 +441,15 @@ Jumping find_jumps(const TurnFit& fit, const TwoLevels& levels, double rival) {
     constexpr std::size_t finer = 3;
     constexpr double near = 0.9;
     Jumping best = placed(fit, levels);
-    judge(fit, best);
+    judge(fit, best, fit.parameters());
     if (best.merit < near * rival) return best;
-    best = with_their_noise(fit, std::move(best));
+    const TurnParameters noise = best.noise;
+    best = with_their_noise(fit, std::move(best), noise);
     for (int pass = 0; pass < most; ++pass) {
         const auto beside = fit.with_noise(best.noise);
         const TwoLevels again = levels_of_stretches(*beside, finer * stretches_of_levels);
         if (again.changes == 0) break;
-        Jumping other = with_their_noise(fit, placed(*beside, again));
+        Jumping other = with_their_noise(fit, placed(*beside, again), best.noise);
         if (!(other.merit > best.merit)) break;
         best = std::move(other);
     }

@@ -235,8 +235,8 @@ void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estim
     const SampleNoise errors = whole.noise_errors().noise;
     const SampleNoise::Resonance& error = errors.resonances.front();
     const bool seen = whole.log_likelihood() - bare.log_likelihood() > 20.0;
-    // The witness's own noise comes in with what it tells of a strong motion, and is none of the gyro's. A motion that is
-    // no resonance leaves more beside it than there is.
+    // The witness's own noise comes in with what it tells of a strong motion, and is none of the gyro's. A motion that
+    // is no resonance leaves more beside it than there is.
     if (seen && step.strong && whole.model().noise.angle_arcsec < fit.model().noise.angle_arcsec) {
         whites = whites_of(whole.model().noise, errors);
     }
@@ -286,8 +286,7 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<SampleStep>& st
     for (const SampleColumn& column : model.columns) {
         if (column.effect == "bias_temperature") of_start = column.value * fit.series().temperature_start_sd_k;
     }
-    figures.base.push_back(
-        {"", "mean_rate_deg_h", model.columns[0].value, std::hypot(model.columns[0].sd, of_start)});
+    figures.base.push_back({"", "mean_rate_deg_h", model.columns[0].value, std::hypot(model.columns[0].sd, of_start)});
     std::vector<Estimate> whites = whites_of(model.noise, errors.noise);
     for (const SampleStep& step : steps) {
         auto& all = figures.steps.emplace_back();

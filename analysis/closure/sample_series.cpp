@@ -93,7 +93,8 @@ Smoothed smooth(const std::vector<double>& values) {
         squares += std::pow(values[i] - mean_about(half) - off * first_slope, 2);
     }
     // At the end of a line through m values its error is 2/sqrt(m) of theirs, m large.
-    smoothed.start_sd = 2.0 * std::sqrt(squares / static_cast<double>(2 * half - 1) / static_cast<double>(2 * half + 1));
+    smoothed.start_sd =
+        2.0 * std::sqrt(squares / static_cast<double>(2 * half - 1) / static_cast<double>(2 * half + 1));
     return smoothed;
 }
 

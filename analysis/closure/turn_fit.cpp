@@ -92,8 +92,10 @@ TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows,
     fit_deterministic(4);
     fit_noise();
     climb();
-    try_other_noise();
-    shape_noise();
+    if (-objective(parameters_, rest_) > needed_) {
+        try_other_noise();
+        shape_noise();
+    }
     finish();
 }
 

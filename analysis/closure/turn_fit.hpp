@@ -98,13 +98,14 @@ class TurnFit {
         int rank = 0;
     };
     Score score(const std::vector<Regressor>& regressors) const;
-    /// That regression with the noise fitted anew beside it.
+    /// That regression with the noise fitted anew beside it, from the model's own, or from another that is nearer.
     struct Regression {
         double gain = 0.0;  ///< of the log-likelihood
         Eigen::VectorXd value;
         TurnParameters noise = {};  ///< the model's own, with the noise fitted anew
     };
-    Regression regress(const std::vector<Regressor>& regressors) const;
+    Regression regress(const std::vector<Regressor>& regressors) const { return regress(regressors, parameters_); }
+    Regression regress(const std::vector<Regressor>& regressors, const TurnParameters& noise) const;
     /// One series whitened and freed likewise, and what is left: their product is the derivative of the log-likelihood.
     /// Rows that do not count are zero. As many again are those of |1 - before'|: what is left is -1 there, the series
     /// its slope over 1 - before', so that their squares are what it adds to the information.

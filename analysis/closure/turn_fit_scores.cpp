@@ -103,11 +103,11 @@ std::vector<Estimate> TurnFit::estimates() const {
     return estimates;
 }
 
-TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors) const {
+TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors, const TurnParameters& noise) const {
     constexpr int most = 8;
     constexpr double gained = 0.01;  // of the log-likelihood, by another pass
     Regression regression{0.0, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(regressors.size()))};
-    TurnParameters trial = parameters_;
+    TurnParameters trial = noise;
     TurnFrame frame = prediction_.frame;
     std::vector<double> rest = rest_;
     const std::size_t own = columns_.size();

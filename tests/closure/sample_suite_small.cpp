@@ -290,9 +290,9 @@ TEST(SampleFilter, LikelihoodIsThatOfTheCovariance) {
             covariance(i, j) += noise.walk_arcsec2_s3 * (s * s * (t / 2.0 - s / 6.0) + dt * s * t);
             for (const auto& term : noise.terms) {
                 const double time = term.time_s;
-                covariance(i, j) += term.variance_arcsec2_s2 * time * time *
-                                    (2.0 * s / time + std::exp(-s / time) + std::exp(-t / time) - 1.0 -
-                                     std::exp((s - t) / time));
+                covariance(i, j) +=
+                    term.variance_arcsec2_s2 * time * time *
+                    (2.0 * s / time + std::exp(-s / time) + std::exp(-t / time) - 1.0 - std::exp((s - t) / time));
             }
         }
     }
