@@ -323,14 +323,18 @@ void SampleFit::score_noise(std::vector<double>& x, const Rows& rows, const std:
     }
 }
 
+/// White noises that stand at zero, made small: from nothing they could not grow, and it would tell nothing of them.
+void SampleFit::raise_whites(SampleNoise& noise) const {
+    constexpr double nothing = 1e-4;
+    constexpr double small = 1e-2;
+    const double root_s = std::sqrt(series_->interval_s);
+    const double scale = std::hypot(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s);
+    if (noise.angle_arcsec < nothing * scale) noise.angle_arcsec = small * scale;
+    if (noise.rate_arcsec_rt_s * root_s < nothing * scale) noise.rate_arcsec_rt_s = small * scale / root_s;
+}
+
 void SampleFit::fit_noise() {
-    const double scale =
-        std::hypot(model_.noise.angle_arcsec, model_.noise.rate_arcsec_rt_s * std::sqrt(series_->interval_s));
-    // What stands at zero begins small, so that it can grow.
-    if (model_.noise.angle_arcsec < 1e-4 * scale) model_.noise.angle_arcsec = 1e-2 * scale;
-    if (model_.noise.rate_arcsec_rt_s * std::sqrt(series_->interval_s) < 1e-4 * scale) {
-        model_.noise.rate_arcsec_rt_s = 1e-2 * scale / std::sqrt(series_->interval_s);
-    }
+    raise_whites(model_.noise);
     // So does a part of what a witness leaves of a motion: a line beside it may have had no use for it.
     auto& resonances = model_.noise.resonances;
     for (std::size_t k = 1; k < resonances.size(); ++k) {
@@ -403,6 +407,7 @@ void SampleFit::fit_noise() {
 SampleModel SampleFit::noise_errors() const {
     SampleModel errors = model_;
     SampleModel values = model_;
+    raise_whites(values.noise);
     std::vector<double> x;
     const auto own = knobs(values);
     for (const Free& knob : own)

@@ -105,6 +105,7 @@ class SampleFit {
     SampleSource source() const { return {model_.noise.from_hz, model_.noise.from_phase}; }
     void take_off();
     void take_whites(SampleNoise& noise) const;
+    void raise_whites(SampleNoise& noise) const;
     double evaluate(const SampleModel& model, std::span<const double> rest, const Rows& rows) const;
     SampleModel at(const std::vector<double>& knobs) const;
     void filter_by(const SampleNoise& noise);
