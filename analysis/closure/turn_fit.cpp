@@ -178,6 +178,8 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
             const std::string name(parameter.name);
             double& value = active.values.at(name);
             double step = 1e-4 * std::max(std::abs(value), 1e-2);
+            // Over the whole record it is a phase that a frequency moves.
+            if (parameter.role == effects::Role::frequency) step = 1e-4 / model_->series().time_s.back();
             if (value + step > parameter.max) step = -step;
             if (active.effect->adds_angle()) {
                 const auto here = model_->added_rad(prediction, *active.effect, active.values);

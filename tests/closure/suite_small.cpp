@@ -6,7 +6,9 @@
 #include <boost/random/mersenne_twister.hpp>
 #include <boost/random/normal_distribution.hpp>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <string>
 
 #include "analysis/closure/decision.hpp"
 #include "analysis/closure/dither_shape.hpp"
@@ -306,6 +308,27 @@ TEST(ClosureSuite, OneSummitOfTheLikelihoodWhateverTheStart) {
         const double highest = *std::max_element(found.begin(), found.end());
         for (const double other : found) EXPECT_NEAR(other, highest, 0.1) << seed;
     }
+}
+
+// In a minute a line of 70 Hz goes through thousands of cycles: its phases follow from its frequency in straight lines
+// for parts of a millionth of that only. Phase at the start and frequency have errors of sqrt(8/n) and sqrt(24/n)/T
+// over the noise-to-signal ratio (Rife and Boorstyn, IEEE Trans. Information Theory 20, 1974, 591, time from the
+// start).
+TEST(ClosureSuite, AFastLineHasTheErrorsOfALine) {
+    Case of{.truth = {}, .condition = &conditions[1], .seed = 5, .turns = turns};
+    of.truth = {{"base_vibration", {{"frequency_hz", 70.3}, {"rate_deg_h", 200.0}, {"phase_rad", 0.9}}}};
+    const record::Record record = make({&of, 1}).front();
+    const double duration_s = record.turns->time_s.back() - record.turns->time_s.front();
+    ringlock::closure::ActiveEffect line{effects::find("base_vibration")};
+    line.values = {{"frequency_hz", 70.3 + 0.1 / duration_s}, {"rate_deg_h", 180.0}, {"phase_rad", 0.7}};
+    ringlock::closure::TurnParameters start;
+    start.effects.push_back(line);
+    const auto fitted = ringlock::closure::fit_record(record, start, ringlock::closure::Rows(record.turns->size(), 1));
+    std::map<std::string, ringlock::closure::Estimate> found;
+    for (const ringlock::closure::Estimate& estimate : fitted->fit->estimates()) found[estimate.name] = estimate;
+    const auto& frequency = found.at("frequency_hz");
+    EXPECT_NEAR(frequency.value, 70.3, 3.0 * frequency.sd);
+    EXPECT_NEAR(units::two_pi * duration_s * frequency.sd / found.at("phase_rad").sd, std::sqrt(3.0), 0.02);
 }
 
 TEST(RandomRates, MayLookLikeARamp) {
