@@ -347,6 +347,7 @@ void judge(const TurnFit& fit, Jumping& jumping, const TurnParameters& near) {
 void move_jumps(const TurnFit& fit, Jumping& found) {
     constexpr int most = 12;
     constexpr double gained = 0.1;
+    constexpr double of_all = 1e-4;  // where jumps explain very much, what is compared is as rough
     const auto& time = fit.model().series().time_s;
     for (int pass = 0; pass < most && !found.jumps.empty(); ++pass) {
         Columns columns{found.angle(fit)};
@@ -370,7 +371,7 @@ void move_jumps(const TurnFit& fit, Jumping& found) {
             judge(fit, moved, found.noise);
             if (moved.merit > found.merit) found = std::move(moved);
         }
-        if (found.merit < before + gained) break;
+        if (found.merit < before + std::max(gained, of_all * before)) break;
     }
 }
 
@@ -381,17 +382,30 @@ Jumping without_stay(const Jumping& all, std::size_t k) {
     return without;
 }
 
-/// Many at once: those that explain least under the noise as it is.
-bool drop_many_stays(const TurnFit& fit, Jumping& found) {
-    const auto beside = fit.with_noise(found.noise);
-    const std::size_t stays = found.jumps.size() - 1;
-    std::vector<double> left(stays);
-    oneapi::tbb::parallel_for(std::size_t{0}, stays, [&](std::size_t k) {
-        left[k] = beside->score({without_stay(found, k).angle(fit)}).chi2;
-    });
-    std::vector<std::size_t> order(stays);
+/// Those that explain least under the noise as it is, first.
+std::vector<std::size_t> stays_by_use(const TurnFit& fit, const Jumping& all) {
+    const auto beside = fit.with_noise(all.noise);
+    std::vector<double> left(all.jumps.size() - 1);
+    oneapi::tbb::parallel_for(std::size_t{0}, left.size(),
+                              [&](std::size_t k) { left[k] = beside->score({without_stay(all, k).angle(fit)}).chi2; });
+    std::vector<std::size_t> order(left.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return left[a] > left[b]; });
+    return order;
+}
+
+/// Short stays that only made up for stretches that end elsewhere than jumps are no longer needed: half of all at once,
+/// or a quarter and so on, then each of those that explain least.
+bool drop_some(const TurnFit& fit, Jumping& found) {
+    constexpr std::size_t singles = 8;
+    if (found.jumps.size() < 3) return false;
+    const std::vector<std::size_t> order = stays_by_use(fit, found);
+    const auto better = [&](Jumping without) {
+        judge(fit, without, found.noise);
+        if (!(without.merit > found.merit)) return false;
+        found = std::move(without);
+        return true;
+    };
     for (std::size_t most = found.jumps.size() / 2 - 1; most > 1; most /= 2) {
         std::vector<std::size_t> dropped;  // whose jumps are no other's
         for (const std::size_t k : order) {
@@ -399,31 +413,19 @@ bool drop_many_stays(const TurnFit& fit, Jumping& found) {
             if (dropped.size() < most && std::none_of(dropped.begin(), dropped.end(), beside_it)) dropped.push_back(k);
         }
         std::sort(dropped.rbegin(), dropped.rend());
-        Jumping without = found;
+        Jumping without{.jumps = found.jumps, .on = found.on};
         for (const std::size_t k : dropped) without = without_stay(without, k);
-        judge(fit, without, found.noise);
-        if (without.merit > found.merit) {
-            found = std::move(without);
-            return true;
-        }
+        if (better(std::move(without))) return true;
+    }
+    for (std::size_t i = 0; i < std::min(singles, order.size()); ++i) {
+        if (better(without_stay(found, order[i]))) return true;
     }
     return false;
 }
 
-/// Short stays that only made up for stretches that end elsewhere than jumps are no longer needed.
 bool drop_stays(const TurnFit& fit, Jumping& found) {
     bool dropped = false;
-    while (found.jumps.size() > 5 && drop_many_stays(fit, found)) dropped = true;
-    for (std::size_t k = 0; k + 1 < found.jumps.size() && found.jumps.size() > 2;) {
-        Jumping without = without_stay(found, k);
-        judge(fit, without, found.noise);
-        if (without.merit > found.merit) {
-            found = std::move(without);
-            dropped = true;
-        } else {
-            ++k;
-        }
-    }
+    while (drop_some(fit, found)) dropped = true;
     return dropped;
 }
 
