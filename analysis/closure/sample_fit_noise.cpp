@@ -1,0 +1,391 @@
+// The random part of the fit, by the likelihood of what the columns leave.
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "analysis/closure/sample_fit.hpp"
+#include "engine/core/interrupt.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// Nelder and Mead (Computer Journal 7, 308, 1965): smallest value of a function of a few numbers.
+std::vector<double> smallest(const std::function<double(const std::vector<double>&)>& f, std::vector<double> start,
+                             double size, int evaluations) {
+    const std::size_t n = start.size();
+    std::vector<std::pair<double, std::vector<double>>> corners{{f(start), start}};
+    for (std::size_t i = 0; i < n; ++i) {
+        auto corner = start;
+        corner[i] += size;
+        corners.emplace_back(f(corner), corner);
+    }
+    evaluations -= static_cast<int>(n) + 1;
+    while (evaluations > 0) {
+        std::sort(corners.begin(), corners.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+        if (corners.back().first - corners.front().first < 0.01) break;
+        std::vector<double> centre(n, 0.0);
+        for (std::size_t c = 0; c < n; ++c) {
+            for (std::size_t i = 0; i < n; ++i) centre[i] += corners[c].second[i] / static_cast<double>(n);
+        }
+        const auto along = [&](double t) {
+            std::vector<double> x(n);
+            for (std::size_t i = 0; i < n; ++i) x[i] = centre[i] + t * (corners.back().second[i] - centre[i]);
+            --evaluations;
+            const double value = f(x);
+            return std::make_pair(value, x);
+        };
+        auto reflected = along(-1.0);
+        if (reflected.first < corners.front().first) {
+            auto expanded = along(-2.0);
+            corners.back() = expanded.first < reflected.first ? expanded : reflected;
+        } else if (reflected.first < corners[n - 1].first) {
+            corners.back() = reflected;
+        } else {
+            auto contracted = along(reflected.first < corners.back().first ? -0.5 : 0.5);
+            if (contracted.first < std::min(reflected.first, corners.back().first)) {
+                corners.back() = contracted;
+            } else {
+                for (std::size_t c = 1; c <= n; ++c) {
+                    for (std::size_t i = 0; i < n; ++i) {
+                        corners[c].second[i] = 0.5 * (corners[c].second[i] + corners[0].second[i]);
+                    }
+                    corners[c].first = f(corners[c].second);
+                    --evaluations;
+                }
+            }
+        }
+    }
+    return std::min_element(corners.begin(), corners.end(),
+                            [](const auto& a, const auto& b) { return a.first < b.first; })
+        ->second;
+}
+
+struct Free {
+    double* value;
+    bool logarithmic;
+    double scale = 1.0;      ///< of its steps
+    bool of_source = false;  ///< where a resampled record's source takes its samples
+};
+
+std::vector<Free> knobs(SampleModel& model) {
+    std::vector<Free> all{{&model.noise.angle_arcsec, true}, {&model.noise.rate_arcsec_rt_s, true}};
+    if (model.walk) all.push_back({&model.noise.walk_arcsec2_s3, true});
+    if (model.flicker) all.push_back({&model.flicker_deg_h, true});
+    for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+        auto& resonance = model.noise.resonances[k];
+        all.push_back({&resonance.arcsec, true});
+        // A wandering line is narrow: its frequency is known to its width.
+        all.push_back({&resonance.hz, true, std::min(1.0, resonance.width_hz / resonance.hz)});
+        all.push_back({&resonance.width_hz, true});
+    }
+    if (model.noise.swing_hz > 0.0) {
+        all.push_back({&model.noise.swing_cos, false});
+        all.push_back({&model.noise.swing_sin, false});
+    }
+    if (model.noise.from_hz > 0.0) {
+        all.push_back({&model.noise.from_phase, false, 1.0, true});
+        all.push_back({&model.from_shift, false, 1.0, true});
+        all.push_back({&model.noise.blur_arcsec, true, 1.0, true});
+    }
+    return all;
+}
+
+std::vector<double> places_of(SampleModel model) {
+    std::vector<double> places;
+    for (const Free& knob : knobs(model))
+        places.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
+    return places;
+}
+
+}  // namespace
+
+std::vector<SampleNoise::Term> flicker_terms(double deg_h, double shortest_s, double longest_s) {
+    // B^2/(2 pi f) by Markov rates: each of the variance (B^2/pi) ln(ratio), the integral of the density over the band
+    // that it stands for, doubled for both signs. The slowest is as good as constant over the record.
+    constexpr int most = 8;
+    const double last_s = std::sqrt(10.0) * longest_s;
+    const double ratio = std::max(std::sqrt(10.0), std::pow(last_s / shortest_s, 1.0 / (most - 1)));
+    std::vector<SampleNoise::Term> terms;
+    for (double t = shortest_s; t < 1.001 * last_s && terms.size() < most; t *= ratio) {
+        terms.push_back({t, deg_h * deg_h / units::pi * std::log(ratio)});
+    }
+    return terms;
+}
+
+/// The white noises by the variance of the rest and the covariance of neighbours, as if there were no others.
+void SampleFit::take_whites(SampleNoise& noise) const {
+    const Rows& rows = *rows_;
+    double sum = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 0; i < rest_.size(); ++i) {
+        if (!rows[i]) continue;
+        sum += rest_[i];
+        count += 1.0;
+    }
+    const double mean = sum / std::max(count, 1.0);
+    double white = 0.0;
+    double next = 0.0;
+    double pairs = 0.0;
+    for (std::size_t i = 1; i < rest_.size(); ++i) {
+        if (!rows[i - 1] || !rows[i]) continue;
+        white += (rest_[i] - mean) * (rest_[i] - mean);
+        next += (rest_[i - 1] - mean) * (rest_[i] - mean);
+        pairs += 1.0;
+    }
+    white /= std::max(pairs, 1.0);
+    const double angle = std::clamp(-next / std::max(pairs, 1.0), 1e-3 * white, 0.499 * white);
+    noise.angle_arcsec = std::sqrt(angle);
+    noise.rate_arcsec_rt_s = std::sqrt((white - 2.0 * angle) * series_->rate_hz);
+}
+
+double SampleFit::evaluate(const SampleModel& model, std::span<const double> rest, const Rows& rows) const {
+    check_interrupt();
+    const double value = SampleFilter::minus_log_likelihood(model.noise, series_->interval_s, rest, rows);
+    return std::isfinite(value) ? value : 1e300;
+}
+
+/// The model with its knobs at these places.
+SampleModel SampleFit::at(const std::vector<double>& x) const {
+    const double duration_s = series_->interval_s * static_cast<double>(series_->size());
+    SampleModel model = model_;
+    auto free = knobs(model);
+    for (std::size_t i = 0; i < free.size(); ++i)
+        *free[i].value = free[i].logarithmic ? std::exp(x[i] * free[i].scale) : x[i];
+    for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+        auto& resonance = model.noise.resonances[k];
+        const double rate_hz = model.noise.from_hz > 0.0 ? model.noise.from_hz : series_->rate_hz;
+        if (resonance.hz > 0.5 * rate_hz || resonance.width_hz > 3.0 * rate_hz) resonance.arcsec = 0.0;
+        const bool slow = std::hypot(resonance.hz, 0.5 * resonance.width_hz) < model.motion_from_hz;
+        if (slow && model.resonances[k] == "case_motion") resonance.arcsec = 0.0;
+    }
+    if (model.noise.from_hz > 0.0) {
+        // About the middle of the record, so that rate and place are told apart.
+        const double shift_hz = 0.1 * model.from_shift / duration_s;
+        model.noise.from_hz += shift_hz;
+        model.noise.from_phase -= 0.5 * shift_hz * duration_s;
+        model.noise.from_phase -= std::floor(model.noise.from_phase);
+        model.from_shift = 0.0;
+    }
+    if (model.flicker) model.noise.terms = flicker_terms(model.flicker_deg_h, 4.0 * series_->interval_s, duration_s);
+    return model;
+}
+
+/// Of the likelihood, with Fisher's information: sum over the rows of (dS/S)(dS/S)'/2 + (dr)(dr)'/S, r the innovations
+/// and S their variances (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter", 1989, section
+/// 3.4.5).
+SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows, const std::vector<bool>& held) const {
+    constexpr double step = 1e-4;
+    const std::size_t n = rest_.size();
+    const auto m = static_cast<Eigen::Index>(x.size());
+    check_interrupt();
+    const SampleFilter filter(at(x).noise, n, series_->interval_s);
+    const auto e = filter.apply(rest_);
+    Slope slope;
+    slope.gradient = Eigen::VectorXd::Zero(m);
+    slope.information = Eigen::MatrixXd::Zero(m, m);
+    for (std::size_t i = 0; i < n; ++i) {
+        if (rows[i]) slope.value += 0.5 * e[i] * e[i] + std::log(filter.sd(i));
+    }
+    // d log(sd) and d(innovation) of each knob
+    std::vector<std::vector<float>> log_sd(x.size(), std::vector<float>(n, 0.0F));
+    std::vector<std::vector<float>> moved(x.size(), std::vector<float>(n, 0.0F));
+    for (std::size_t j = 0; j < x.size(); ++j) {
+        if (!held.empty() && held[j]) continue;
+        auto beside = x;
+        beside[j] += step;
+        const SampleFilter other(at(beside).noise, n, series_->interval_s);
+        const auto f = other.apply(rest_);
+        double gradient = 0.0;
+        for (std::size_t i = 0; i < n; ++i) {
+            if (!rows[i]) continue;
+            const double of_log = std::log(other.sd(i) / filter.sd(i)) / step;
+            const double of_e = (f[i] - e[i]) / step;
+            gradient += e[i] * of_e + of_log;
+            log_sd[j][i] = static_cast<float>(of_log);
+            moved[j][i] = static_cast<float>(of_e + e[i] * of_log);
+        }
+        slope.gradient(static_cast<Eigen::Index>(j)) = gradient;
+    }
+    for (Eigen::Index a = 0; a < m; ++a) {
+        for (Eigen::Index b = 0; b <= a; ++b) {
+            const auto& la = log_sd[static_cast<std::size_t>(a)];
+            const auto& lb = log_sd[static_cast<std::size_t>(b)];
+            const auto& ma = moved[static_cast<std::size_t>(a)];
+            const auto& mb = moved[static_cast<std::size_t>(b)];
+            double sum = 0.0;
+            for (std::size_t i = 0; i < n; ++i) {
+                sum += 2.0 * static_cast<double>(la[i]) * static_cast<double>(lb[i]) +
+                       static_cast<double>(ma[i]) * static_cast<double>(mb[i]);
+            }
+            slope.information(a, b) = slope.information(b, a) = sum;
+        }
+    }
+    return slope;
+}
+
+/// Fisher's scoring, damped (Levenberg and Marquardt): steps by the information where the likelihood rises.
+void SampleFit::score_noise(std::vector<double>& x, const Rows& rows, const std::vector<bool>& held) const {
+    constexpr int most_rounds = 25;
+    constexpr double longest = 1.5;
+    constexpr double enough = 2e-3;  // of the log-likelihood
+    double damping = 1e-3;
+    Slope now = slope(x, rows, held);
+    for (int round = 0; round < most_rounds && damping < 1e7; ++round) {
+        bool better = false;
+        double gained = 0.0;
+        while (!better && damping < 1e7) {
+            Eigen::MatrixXd damped = now.information;
+            damped.diagonal() *= 1.0 + damping;
+            damped.diagonal().array() += 1e-6;
+            Eigen::VectorXd step = damped.ldlt().solve(-now.gradient);
+            if (!step.allFinite()) break;
+            const double most = step.cwiseAbs().maxCoeff();
+            if (most > longest) step *= longest / most;
+            if (-now.gradient.dot(step) < enough) return;
+            auto next = x;
+            for (std::size_t i = 0; i < x.size(); ++i) next[i] += step(static_cast<Eigen::Index>(i));
+            const double value = evaluate(at(next), rest_, rows);
+            if (value < now.value) {
+                better = true;
+                gained = now.value - value;
+                x = next;
+                damping = std::max(1e-6, 0.1 * damping);
+            } else {
+                damping *= 10.0;
+            }
+        }
+        if (!better || gained < enough) return;
+        now = slope(x, rows, held);
+    }
+}
+
+/// White noises that stand at zero, made small: from nothing they could not grow, and it would tell nothing of them.
+void SampleFit::raise_whites(SampleNoise& noise) const {
+    constexpr double nothing = 1e-4;
+    constexpr double small = 1e-2;
+    const double root_s = std::sqrt(series_->interval_s);
+    const double scale = std::hypot(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s);
+    if (noise.angle_arcsec < nothing * scale) noise.angle_arcsec = small * scale;
+    if (noise.rate_arcsec_rt_s * root_s < nothing * scale) noise.rate_arcsec_rt_s = small * scale / root_s;
+}
+
+void SampleFit::fit_noise() {
+    raise_whites(model_.noise);
+    // So does a part of what a witness leaves of a motion: a line beside it may have had no use for it.
+    auto& resonances = model_.noise.resonances;
+    for (std::size_t k = 1; k < resonances.size(); ++k) {
+        const bool of_one_motion = model_.resonances[k] == "case_motion" && model_.resonances[k - 1] == "case_motion";
+        if (of_one_motion && resonances[k].arcsec < 1e-2 * resonances[k - 1].arcsec) {
+            resonances[k] = resonances[k - 1];
+            resonances[k].arcsec *= 0.3;
+            resonances[k].width_hz *= 3.0;
+        }
+    }
+    std::vector<double> start = places_of(model_);
+    const std::size_t n = rest_.size();
+    const bool resampled = model_.noise.from_hz > 0.0;
+    const bool narrow = !model_.resonances.empty();
+    if (!resampled) {
+        // What has just come into the model may have been most of the noise: far from there the likelihood is flat.
+        SampleModel anew = model_;
+        take_whites(anew.noise);
+        double least = evaluate(at(start), rest_, *rows_);
+        const auto try_from = [&](const SampleModel& model) {
+            auto other = places_of(model);
+            const double value = evaluate(at(other), rest_, *rows_);
+            if (!(value < least)) return;
+            least = value;
+            start = std::move(other);
+        };
+        try_from(anew);
+        // Beside a rate that wanders neighbours are alike, and hide what is white: their differences show it.
+        const bool wanders = model_.walk || model_.flicker;
+        double squares = 0.0;
+        for (std::size_t i = 1; i < n; ++i) squares += std::pow(rest_[i] - rest_[i - 1], 2) / static_cast<double>(n);
+        for (const double share : {0.05, 0.5, 0.95}) {
+            if (!wanders) break;
+            anew.noise.angle_arcsec = std::sqrt(share * squares / 6.0);
+            anew.noise.rate_arcsec_rt_s = std::sqrt((1.0 - share) * squares / (2.0 * series_->interval_s));
+            try_from(anew);
+        }
+    }
+    if (!searched_ && (resampled || narrow)) {
+        // The likelihood may have several tops: by a simplex on a part of the record first, from where it stopped until
+        // that gains nothing, for it may have fallen flat.
+        const std::size_t part = std::min<std::size_t>(n, resampled ? 15000 : 20000);
+        const int evaluations = 30 * static_cast<int>(start.size());
+        const auto on_part = [&](const std::vector<double>& x) {
+            return evaluate(at(x), std::span<const double>(rest_.data(), part), *rows_);
+        };
+        double value = on_part(start);
+        for (int i = 0; i < 3; ++i) {
+            start = smallest(on_part, start, 0.3, evaluations);
+            const double now = on_part(start);
+            if (value - now < 0.5) break;
+            value = now;
+        }
+    }
+    score_noise(start, *rows_, {});
+    if (resampled) {
+        // Rows that are settled to their digits say how exactly the source's times are known, so well that numbers are
+        // rounded there by more than the noise tells elsewhere.
+        filter_by(at(start).noise);
+        std::vector<bool> held;
+        for (const Free& knob : knobs(model_)) held.push_back(knob.of_source);
+        auto told = start;
+        score_noise(told, telling_, held);
+        if (evaluate(at(told), rest_, *rows_) < evaluate(at(start), rest_, *rows_)) start = std::move(told);
+    }
+    model_ = at(start);
+    filter_by(model_.noise);
+}
+
+SampleModel SampleFit::noise_errors() const {
+    SampleModel errors = model_;
+    SampleModel values = model_;
+    raise_whites(values.noise);
+    std::vector<double> x;
+    const auto own = knobs(values);
+    for (const Free& knob : own)
+        x.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
+    std::vector<bool> of_source;
+    for (const Free& knob : own) of_source.push_back(knob.of_source);
+    Eigen::MatrixXd information = slope(x, telling_, {}).information;
+    if (model_.noise.from_hz > 0.0) {
+        // The source's times are told by the rows that tell nothing else.
+        const Eigen::MatrixXd by_all = slope(x, *rows_, {}).information;
+        for (std::size_t a = 0; a < x.size(); ++a) {
+            for (std::size_t b = 0; b < x.size(); ++b) {
+                const auto i = static_cast<Eigen::Index>(a);
+                const auto j = static_cast<Eigen::Index>(b);
+                if (of_source[a] != of_source[b]) information(i, j) = 0.0;
+                if (of_source[a] && of_source[b]) information(i, j) = by_all(i, j);
+            }
+        }
+    }
+    Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-12).cwiseSqrt();
+    Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * information * scale.cwiseInverse().asDiagonal();
+    // What the record does not tell at all must not spoil what it tells.
+    scaled.diagonal().array() += 1e-9;
+    const Eigen::MatrixXd covariance = scaled.ldlt().solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
+    const auto slots = knobs(errors);
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+        const auto k = static_cast<Eigen::Index>(i);
+        double sd = std::sqrt(std::max(0.0, covariance(k, k))) / scale(k);
+        if (own[i].logarithmic) {
+            sd *= own[i].scale * *own[i].value;
+            // Near zero it is the square that the record knows, to 2 value sd.
+            if (sd > *own[i].value) sd = std::sqrt(2.0 * *own[i].value * sd);
+        }
+        *slots[i].value = sd;
+    }
+    const double duration_s = series_->interval_s * static_cast<double>(series_->size());
+    if (model_.noise.from_hz > 0.0) errors.noise.from_hz = 0.1 * errors.from_shift / duration_s;
+    return errors;
+}
+
+}  // namespace ringlock::closure
