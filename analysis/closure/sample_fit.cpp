@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numeric>
 
-
 namespace ringlock::closure {
 
 SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& rows, Noise noise)
