@@ -1,5 +1,7 @@
 #include "analysis/closure/turn_fit.hpp"
 
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -240,14 +242,9 @@ TurnFit::Equations TurnFit::equations(const Whitening& whitening, bool guessed) 
     const Eigen::VectorXd y = counted(whitening, rest_);
     // Beside a noise that is only guessed |1 - before'| makes up for nothing.
     const Eigen::Index used = guessed ? y.size() / 2 : y.size();
-    Eigen::MatrixXd x(y.size(), count);
-    Eigen::VectorXd scale(count);
-    for (std::size_t k = 0; k < count; ++k) {
-        auto column = x.col(static_cast<Eigen::Index>(k));
-        column = counted(whitening, prediction_.frame, columns_[k].of);
-        scale(static_cast<Eigen::Index>(k)) = std::max(column.norm(), 1e-300);
-        column /= scale(static_cast<Eigen::Index>(k));
-    }
+    Eigen::VectorXd scale;
+    const auto column_of = [this](std::size_t k) -> const Regressor& { return columns_[k].of; };
+    const Eigen::MatrixXd x = counted(whitening, prediction_.frame, count, column_of, scale);
     Eigen::MatrixXd normal = x.topRows(used).transpose() * x.topRows(used);
     Eigen::VectorXd right = x.topRows(used).transpose() * y.head(used);
     for (std::size_t k = 0; k < count && !guessed; ++k) {
@@ -476,6 +473,19 @@ Eigen::VectorXd TurnFit::counted(const Whitening& whitening, const TurnFrame& fr
 
 Eigen::VectorXd TurnFit::counted(const Whitening& whitening, const std::vector<double>& rest) const {
     return below(whitening.apply(rest), -1.0);
+}
+
+Eigen::MatrixXd TurnFit::counted(const Whitening& whitening, const TurnFrame& frame, std::size_t count,
+                                 const RegressorAt& regressor, Eigen::VectorXd& norms) const {
+    Eigen::MatrixXd x(static_cast<Eigen::Index>(2 * rows_.size()), static_cast<Eigen::Index>(count));
+    norms.resize(x.cols());
+    oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t at) {
+        const auto k = static_cast<Eigen::Index>(at);
+        const Eigen::VectorXd column = counted(whitening, frame, regressor(at));
+        norms(k) = std::max(column.norm(), 1e-300);
+        x.col(k) = column / norms(k);
+    });
+    return x;
 }
 
 Eigen::VectorXd TurnFit::below(const std::vector<double>& white, double value) const {

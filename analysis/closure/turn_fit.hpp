@@ -2,6 +2,7 @@
 #include <Eigen/Dense>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <string>
@@ -150,6 +151,10 @@ class TurnFit {
     /// The series whitened, rows that do not count zero, and the rows of |1 - before'| below.
     Eigen::VectorXd counted(const Whitening& whitening, const TurnFrame& frame, const Regressor& regressor) const;
     Eigen::VectorXd counted(const Whitening& whitening, const std::vector<double>& rest) const;
+    /// Several such series beside one another, divided by their norms.
+    using RegressorAt = std::function<const Regressor&(std::size_t)>;
+    Eigen::MatrixXd counted(const Whitening& whitening, const TurnFrame& frame, std::size_t count,
+                            const RegressorAt& regressor, Eigen::VectorXd& norms) const;
     Eigen::VectorXd below(const std::vector<double>& white, double value) const;
     void hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) const;
     void take(const Eigen::VectorXd& step);

@@ -1,4 +1,6 @@
 // What a fit tells: parameters with their errors, and scores of what it does not have.
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -9,15 +11,8 @@
 namespace ringlock::closure {
 
 Eigen::MatrixXd TurnFit::whitened_columns(Eigen::VectorXd& scale) const {
-    const auto count = static_cast<Eigen::Index>(columns_.size());
-    Eigen::MatrixXd x(static_cast<Eigen::Index>(2 * rest_.size()), count);
-    scale.resize(count);
-    for (Eigen::Index k = 0; k < count; ++k) {
-        x.col(k) = counted(*whitening_, prediction_.frame, columns_[static_cast<std::size_t>(k)].of);
-        scale(k) = std::max(x.col(k).norm(), 1e-300);
-        x.col(k) /= scale(k);
-    }
-    return x;
+    const auto column_of = [this](std::size_t k) -> const Regressor& { return columns_[k].of; };
+    return counted(*whitening_, prediction_.frame, columns_.size(), column_of, scale);
 }
 
 /// Observed information, in units of the columns' norms. Squares of whitened columns are that but for one thing: what
@@ -111,26 +106,22 @@ TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors, c
     TurnFrame frame = prediction_.frame;
     std::vector<double> rest = rest_;
     const std::size_t own = columns_.size();
-    const auto column_of = [&](Eigen::Index k) -> const Regressor& {
-        const auto at = static_cast<std::size_t>(k);
-        return at < own ? columns_[at].of : regressors[at - own];
+    const auto column_of = [&](std::size_t k) -> const Regressor& {
+        return k < own ? columns_[k].of : regressors[k - own];
     };
     const double before = objective(parameters_, rest_);
     for (int pass = 0; pass < most; ++pass) {
         const Whitening whitening(frame, model_->noise(trial));
         const Eigen::VectorXd y = counted(whitening, rest);
-        Eigen::MatrixXd x(y.size(), static_cast<Eigen::Index>(own + regressors.size()));
-        Eigen::VectorXd scale(x.cols());
-        for (Eigen::Index k = 0; k < x.cols(); ++k) {
-            x.col(k) = counted(whitening, frame, column_of(k));
-            scale(k) = std::max(x.col(k).norm(), 1e-300);
-            x.col(k) /= scale(k);
-        }
+        Eigen::VectorXd scale;
+        const Eigen::MatrixXd x = counted(whitening, frame, own + regressors.size(), column_of, scale);
         const Eigen::MatrixXd normal = x.transpose() * x;
         const Eigen::VectorXd right = x.transpose() * y;
         Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(normal);
         const Eigen::VectorXd value = decomposition.solve(right).cwiseQuotient(scale);
-        for (Eigen::Index k = 0; k < x.cols(); ++k) column_of(k).take(value(k), rest, frame);
+        for (std::size_t k = 0; k < own + regressors.size(); ++k) {
+            column_of(k).take(value(static_cast<Eigen::Index>(k)), rest, frame);
+        }
         regression.value += value.tail(static_cast<Eigen::Index>(regressors.size()));
         trial = with_noise_of(frame, trial, rest);
         const double gain = before - objective(frame, trial, rest);
@@ -158,7 +149,8 @@ TurnFit::Score TurnFit::score(const std::vector<Regressor>& regressors) const {
     const auto k = static_cast<Eigen::Index>(regressors.size());
     const Eigen::VectorXd y = residual();
     Eigen::MatrixXd x(y.size(), k);
-    for (Eigen::Index j = 0; j < k; ++j) x.col(j) = whitened(regressors[static_cast<std::size_t>(j)]);
+    oneapi::tbb::parallel_for(Eigen::Index{0}, k,
+                              [&](Eigen::Index j) { x.col(j) = whitened(regressors[static_cast<std::size_t>(j)]); });
     Score score;
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(x.transpose() * x);
     const Eigen::VectorXd projected = x.transpose() * y;

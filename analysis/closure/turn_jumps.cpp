@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -51,21 +52,22 @@ Jumping placed(const TurnFit& fit, const TwoLevels& levels) {
     for (Eigen::Index k = 1; k < levels.shape.size(); ++k) {
         if (levels.shape(k) != levels.shape(k - 1)) found.jumps.push_back(stretch_s * static_cast<double>(k));
     }
-    const auto explained = [&] {
-        return std::is_sorted(found.jumps.begin(), found.jumps.end()) ? fit.score({found.angle(fit)}).chi2 : 0.0;
+    const auto explained = [&fit](const Jumping& by) {
+        return std::is_sorted(by.jumps.begin(), by.jumps.end()) ? fit.score({by.angle(fit)}).chi2 : 0.0;
     };
-    double best = explained();
+    double best = explained(found);
     for (double step_s = 0.5 * stretch_s; step_s > 0.02 * stretch_s; step_s *= 0.5) {
-        for (double& jump : found.jumps) {
-            for (const double to : {jump - step_s, jump + step_s}) {
-                const double from = std::exchange(jump, to);
-                const double chi2 = explained();
-                if (chi2 > best) {
-                    best = chi2;
-                } else {
-                    jump = from;
-                }
-            }
+        for (std::size_t k = 0; k < found.jumps.size(); ++k) {
+            std::array moved{found, found};
+            std::array<double, 2> chi2{};
+            moved[0].jumps[k] -= step_s;
+            moved[1].jumps[k] += step_s;
+            oneapi::tbb::parallel_for(std::size_t{0}, moved.size(),
+                                      [&](std::size_t i) { chi2[i] = explained(moved[i]); });
+            const std::size_t better = chi2[1] > chi2[0] ? 1 : 0;
+            if (!(chi2[better] > best)) continue;
+            best = chi2[better];
+            found = std::move(moved[better]);
         }
     }
     return found;
@@ -191,7 +193,16 @@ TwoLevels levels_of_stretches(const TurnFit& fit, std::size_t stretches) {
     oneapi::tbb::parallel_for(std::size_t{0}, stretches, [&](std::size_t k) {
         ramps.col(static_cast<Eigen::Index>(k)) = fit.whitened(ramp_of(k));
     });
-    return two_levels(ramps.transpose() * ramps, ramps.transpose() * residual);
+    // Squares in parts that are as much work each, the lower triangle of them.
+    constexpr Eigen::Index at_once = 24;
+    Eigen::MatrixXd squares(ramps.cols(), ramps.cols());
+    oneapi::tbb::parallel_for(Eigen::Index{0}, (ramps.cols() + at_once - 1) / at_once, [&](Eigen::Index part) {
+        const Eigen::Index first = part * at_once;
+        const Eigen::Index some = std::min(at_once, ramps.cols() - first);
+        squares.block(first, first, ramps.cols() - first, some).noalias() =
+            ramps.rightCols(ramps.cols() - first).transpose() * ramps.middleCols(first, some);
+    });
+    return two_levels(squares.selfadjointView<Eigen::Lower>(), ramps.transpose() * residual);
 }
 
 std::vector<double> placed_jumps(const TurnFit& fit, const TwoLevels& levels) { return placed(fit, levels).angle(fit); }

@@ -1,5 +1,8 @@
 #include "analysis/closure/turn_model.hpp"
 
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -146,10 +149,14 @@ TurnModel::Kicks TurnModel::kicks_at(const gyro::Setup& setup, const std::vector
     const KicksOverRange of(setup, {setup.input_rate_deg_h + *slowest, setup.input_rate_deg_h + *fastest},
                             {*least, *most});
     Kicks kicks(series_.size());
-    for (std::size_t i = 0; i < kicks.size(); ++i) {
-        kicks[i] = of.at(series_.direction[i], turned_[i], setup.input_rate_deg_h + rate_deg_h[i], threshold_factors[i],
-                         shape ? &shape->at(i) : nullptr);
-    }
+    constexpr std::size_t worth_a_task = 2048;
+    const oneapi::tbb::blocked_range<std::size_t> turns(0, kicks.size(), worth_a_task);
+    oneapi::tbb::parallel_for(turns, [&](const auto& some) {
+        for (std::size_t i = some.begin(); i < some.end(); ++i) {
+            kicks[i] = of.at(series_.direction[i], turned_[i], setup.input_rate_deg_h + rate_deg_h[i],
+                             threshold_factors[i], shape ? &shape->at(i) : nullptr);
+        }
+    });
     return kicks;
 }
 
