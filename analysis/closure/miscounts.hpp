@@ -11,11 +11,7 @@ struct MissedShare {
     double sd = 0.0;
 };
 
-/// By maximum likelihood of a hidden Markov chain: how many quarters are lost, modulo the four that the quadrature
-/// tells apart, falls or rises by one at each turn with that probability, as the phase went (the method of Baum,
-/// Petrie, Soules and Weiss, Annals of Mathematical Statistics 41, 1970, 164). A turn near the edge of a quarter says
-/// of two neighbours only that it is one of them; changes of the difference between count and quadrature, counted one
-/// by one, lose those that the next turn takes back.
+/// By maximum likelihood of the chain of what is lost (CountChain).
 MissedShare share_of_missed_counts(const record::Turns& turns, const JoinedPhase& joined, const Rows& rows);
 
 }  // namespace ringlock::closure

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "analysis/closure/count_chain.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 #include "engine/gyro/device.hpp"
@@ -43,6 +45,40 @@ bool all_phases_come(const std::vector<double>& phase_rad, const std::vector<int
         }
     }
     return true;
+}
+
+/// Quarters that the counter has lost, turn by turn; near none at the first.
+std::vector<std::int64_t> lost_quarters(const CountedQuarters& counted) {
+    const std::size_t n = counted.off.size();
+    std::vector<std::int64_t> lost(n);
+    std::int64_t now = most_frequent_quarter(counted.off, std::min<std::size_t>(n, 64));
+    if (now > 2) now -= 4;
+    std::size_t changes = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+        const double margin = 0.5 + std::min(0.15 + 6.0 * counted.sd[i], 0.4);
+        double rest = counted.off[i] - static_cast<double>(now);
+        rest -= 4.0 * std::round(0.25 * rest);
+        if (std::abs(rest) > margin) {
+            now += std::llround(rest);
+            ++changes;
+        }
+        lost[i] = now;
+    }
+    if (changes == 0) return lost;
+    // Near the edges of quarters some hide, and where many are lost there are two at once or four: what is likeliest of
+    // all.
+    const double p = std::min(0.5, static_cast<double>(changes) / static_cast<double>(n));
+    double likeliest = -std::numeric_limits<double>::infinity();
+    for (const double edge : CountChain::edges) {
+        CountChain chain(counted, edge);
+        const double log_likelihood = chain.log_likelihood(p);
+        if (!(log_likelihood > likeliest)) continue;
+        likeliest = log_likelihood;
+        lost = chain.likeliest_course(p);
+    }
+    const std::int64_t whole = lost.front() > 2 ? 4 : 0;
+    for (std::int64_t& quarters : lost) quarters -= whole;
+    return lost;
 }
 
 }  // namespace
@@ -98,27 +134,23 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
     }
     joined.readout_sd_rad = std::sqrt(squares / (of_radius * static_cast<double>(std::max<std::size_t>(counted, 1))));
 
-    std::vector<double> off(n);  // quadrature less middle of the counted quarter, in quarters of (-2, 2]
+    CountedQuarters quarters{.off = std::vector<double>(n), .sd = std::vector<double>(n), .direction = turns.direction};
     for (std::size_t i = 0; i < n; ++i) {
+        const double of_noise = joined.readout.empty() ? 1.0 : std::sqrt(joined.readout[i]);
+        quarters.sd[i] = joined.readout_sd_rad * of_noise / quarter_rad;
         const double q = angle[i] / quarter_rad - (static_cast<double>(turns.quarter_count[i] % 4) + 0.5);
-        off[i] = q - 4.0 * std::round(0.25 * q);
+        quarters.off[i] = q - 4.0 * std::round(0.25 * q);
     }
-    std::int64_t now = most_frequent_quarter(off, std::min<std::size_t>(n, 64));
-    if (now > 2) now -= 4;
-    const std::int64_t first = now;
-    const double margin = 0.5 + std::min(0.15 + 6.0 * joined.readout_sd_rad / quarter_rad, 0.4);
+    joined.miscounts = lost_quarters(quarters);
+    const std::int64_t first = joined.miscounts.front();
     for (std::size_t i = 0; i < n; ++i) {
-        double rest = off[i] - static_cast<double>(now);
-        rest -= 4.0 * std::round(0.25 * rest);
-        if (std::abs(rest) > margin) {
-            now += std::llround(rest);
-            joined.miscounted.push_back(i);
-        }
-        joined.miscounts[i] = now - first;
+        const std::int64_t now = joined.miscounts[i];
+        if (i > 0 && now != joined.miscounts[i - 1]) joined.miscounted.push_back(i);
         const std::int64_t count = turns.quarter_count[i] + (count_again ? now : first);
         const double middle = (static_cast<double>(count) + 0.5) * quarter_rad;
         joined.phase_rad[i] = angle[i] + units::two_pi * std::round((middle - angle[i]) / units::two_pi);
     }
+    for (std::int64_t& lost : joined.miscounts) lost -= first;
     return joined;
 }
 

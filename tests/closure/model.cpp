@@ -383,6 +383,7 @@ TEST(MissedCounts, AreNotLostWhereTheNextTurnTakesThemBack) {
             std::mt19937_64 random(7);
             std::normal_distribution<double> normal;
             std::uniform_real_distribution<double> uniform;
+            std::vector<double> phase_rad;
             std::int64_t missed = 0;
             std::int64_t events = 0;
             for (std::size_t i = 0; i < n; ++i) {
@@ -398,6 +399,12 @@ TEST(MissedCounts, AreNotLostWhereTheNextTurnTakesThemBack) {
                 turns.sine.push_back(std::sin(psi) + 0.005 * normal(random));
                 turns.cosine.push_back(std::cos(psi) + 0.005 * normal(random));
                 turns.quarter_count.push_back(static_cast<std::int64_t>(counted) + missed);
+                phase_rad.push_back(psi);
+            }
+            const JoinedPhase again = join(turns, {}, true);
+            for (std::size_t i = 0; i < n; ++i) {
+                const double off = again.phase_rad[i] - phase_rad[i] - (again.phase_rad[0] - phase_rad[0]);
+                ASSERT_NEAR(off, 0.0, 0.1) << "p " << p << ", edge " << edge << ", turn " << i;
             }
             const JoinedPhase joined = join(turns, {}, false);
             const auto share = share_of_missed_counts(turns, joined, all);
