@@ -5,29 +5,9 @@
 #include <span>
 #include <vector>
 
-namespace ringlock::closure {
+#include "analysis/closure/sample_states.hpp"
 
-/// What is random in a record of samples; angles in arcsec.
-struct SampleNoise {
-    double angle_arcsec = 0.0;      ///< rms of the white error of each reading of the angle
-    double rate_arcsec_rt_s = 0.0;  ///< white rate: root of the variance of the angle a second
-    double walk_arcsec2_s3 = 0.0;   ///< growth of the variance of a rate that walks [(arcsec/s)^2/s]
-    struct Term {
-        double time_s, variance_arcsec2_s2;
-    };
-    std::vector<Term> terms = {};  ///< Gauss-Markov rates
-    /// An angle that is a second-order autoregression.
-    struct Resonance {
-        double arcsec, hz, width_hz;
-    };
-    std::vector<Resonance> resonances = {};
-    /// The variance of the readings' errors goes up and down at that frequency: its logarithm by cos, and by sin.
-    double swing_hz = 0.0, swing_cos = 0.0, swing_sin = 0.0;
-    double from_hz = 0.0;        ///< taken at that rate and interpolated; 0: not
-    double blur_arcsec = 0.0;    ///< rms of what interpolated readings are off the straight line
-    double digits_arcsec = 0.0;  ///< the least of it: what the values are written to
-    double from_phase = 0.0;     ///< source intervals from the sample before the record's start to that start
-};
+namespace ringlock::closure {
 
 /// The Kalman filter that makes innovations of increments: independent and of unit variance where the noise is as said.
 ///
@@ -39,12 +19,15 @@ class SampleFilter {
     /// Innovations over their standard deviations. Linear in the increments.
     std::vector<double> apply(std::span<const double> increments) const;
     double sd(std::size_t row) const { return sd_[std::min(row, sd_.size() - 1)]; }
-    /// Minus the log-likelihood of the rows that count, but for a constant, in one pass that keeps nothing.
+    /// Minus the log-likelihood of the rows that count, but for a constant, under each of several noises, in much less
+    /// time than one after the other and keeping nothing.
+    static std::vector<double> minus_log_likelihoods(std::span<const SampleNoise> noises, double interval_s,
+                                                     std::span<const double> increments,
+                                                     std::span<const std::uint8_t> rows);
     static double minus_log_likelihood(const SampleNoise& noise, double interval_s, std::span<const double> increments,
-                                       std::span<const std::uint8_t> rows);
-
-    static constexpr int most = 16;
-    using Vector = std::array<double, most>;
+                                       std::span<const std::uint8_t> rows) {
+        return minus_log_likelihoods({&noise, 1}, interval_s, increments, rows).front();
+    }
 
     /// Many filters step by step, for readings of the angle that are not known beforehand; not of a resampled record.
     class Many {
@@ -65,28 +48,13 @@ class SampleFilter {
     };
 
    private:
-    using Matrix = std::array<Vector, most>;
-    struct Terms {
-        int count = 0;
-        std::array<int, most> at{};
-    };
-    SampleFilter() = default;
-    void set_up(const SampleNoise& noise, double interval_s);
+    using Terms = SampleStates::Terms;
     template <int D, class Row>
     void run(std::size_t rows, Row&& row) const;
     template <int D>
     static void advance(const SampleFilter& filter, std::array<double, D>& x);
 
-    int n_ = 0;
-    bool resampled_ = false;
-    bool swings_ = false;
-    double swing_by_row_ = 0.0, swing_cos_ = 0.0, swing_sin_ = 0.0;
-    double floor_ = 0.0;  ///< variance of the measurement itself
-    double ratio_ = 0.0;  ///< resampled: source intervals a row
-    double first_place_ = 0.0;
-    Matrix f_{}, q_{}, start_{};  ///< one interval of the source
-    Vector h_{};
-    std::array<Terms, most> nonzero_{};
+    SampleStates states_;
     std::vector<double> gain_;  ///< until they stay the same
     std::vector<double> sd_;
     std::vector<std::uint8_t> ticks_;  ///< resampled: source samples passed before each row

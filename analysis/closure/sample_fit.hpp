@@ -106,7 +106,9 @@ class SampleFit {
     void take_off();
     void take_whites(SampleNoise& noise) const;
     void raise_whites(SampleNoise& noise) const;
-    double evaluate(const SampleModel& model, std::span<const double> rest, const Rows& rows) const;
+    /// Minus the log-likelihood under each.
+    std::vector<double> evaluate(const std::vector<SampleModel>& models, std::span<const double> rest,
+                                 const Rows& rows) const;
     SampleModel at(const std::vector<double>& knobs) const;
     void filter_by(const SampleNoise& noise);
     void find_settled(SampleNoise noise);

@@ -1,11 +1,15 @@
 // The random part of the fit, by the likelihood of what the columns leave.
+#include <oneapi/tbb/parallel_for.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <utility>
 
 #include "analysis/closure/sample_fit.hpp"
+#include "analysis/closure/sample_lanes.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
 
@@ -13,55 +17,58 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Nelder and Mead (Computer Journal 7, 308, 1965): smallest value of a function of a few numbers.
-std::vector<double> smallest(const std::function<double(const std::vector<double>&)>& f, std::vector<double> start,
-                             double size, int evaluations) {
+using Point = std::vector<double>;
+/// Of several points at once, in much less time than one after the other.
+using Values = std::function<std::vector<double>(const std::vector<Point>&)>;
+
+/// Nelder and Mead (Computer Journal 7, 308, 1965): smallest value of a function of a few numbers. All places that a
+/// step may go to are looked at together.
+Point smallest(const Values& f, const Point& start, double size, int steps) {
     const std::size_t n = start.size();
-    std::vector<std::pair<double, std::vector<double>>> corners{{f(start), start}};
-    for (std::size_t i = 0; i < n; ++i) {
-        auto corner = start;
-        corner[i] += size;
-        corners.emplace_back(f(corner), corner);
-    }
-    evaluations -= static_cast<int>(n) + 1;
-    while (evaluations > 0) {
-        std::sort(corners.begin(), corners.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-        if (corners.back().first - corners.front().first < 0.01) break;
-        std::vector<double> centre(n, 0.0);
+    std::vector<Point> places(n + 1, start);
+    for (std::size_t i = 0; i < n; ++i) places[i + 1][i] += size;
+    std::vector<double> values = f(places);
+    std::vector<std::pair<double, Point>> corners;
+    for (std::size_t c = 0; c <= n; ++c) corners.emplace_back(values[c], places[c]);
+    const auto lower = [](const auto& a, const auto& b) { return a.first < b.first; };
+    for (; steps > 0; --steps) {
+        std::sort(corners.begin(), corners.end(), lower);
+        const double best = corners.front().first;
+        auto& worst = corners.back();
+        if (worst.first - best < 0.01) break;
+        Point centre(n, 0.0);
         for (std::size_t c = 0; c < n; ++c) {
             for (std::size_t i = 0; i < n; ++i) centre[i] += corners[c].second[i] / static_cast<double>(n);
         }
-        const auto along = [&](double t) {
-            std::vector<double> x(n);
-            for (std::size_t i = 0; i < n; ++i) x[i] = centre[i] + t * (corners.back().second[i] - centre[i]);
-            --evaluations;
-            const double value = f(x);
-            return std::make_pair(value, x);
-        };
-        auto reflected = along(-1.0);
-        if (reflected.first < corners.front().first) {
-            auto expanded = along(-2.0);
-            corners.back() = expanded.first < reflected.first ? expanded : reflected;
-        } else if (reflected.first < corners[n - 1].first) {
-            corners.back() = reflected;
-        } else {
-            auto contracted = along(reflected.first < corners.back().first ? -0.5 : 0.5);
-            if (contracted.first < std::min(reflected.first, corners.back().first)) {
-                corners.back() = contracted;
-            } else {
+        places.assign(4, centre);
+        constexpr double reflected = -1.0;
+        constexpr double expanded = -2.0;
+        constexpr double outside = -0.5;
+        constexpr double inside = 0.5;
+        const double along[] = {reflected, expanded, outside, inside};
+        for (std::size_t k = 0; k < places.size(); ++k) {
+            for (std::size_t i = 0; i < n; ++i) places[k][i] += along[k] * (worst.second[i] - centre[i]);
+        }
+        values = f(places);
+        std::size_t taken = 0;
+        if (values[0] < best) {
+            taken = values[1] < values[0] ? 1 : 0;
+        } else if (!(values[0] < corners[n - 1].first)) {
+            taken = values[0] < worst.first ? 2 : 3;
+            if (!(values[taken] < std::min(values[0], worst.first))) {
+                places.clear();
                 for (std::size_t c = 1; c <= n; ++c) {
-                    for (std::size_t i = 0; i < n; ++i) {
-                        corners[c].second[i] = 0.5 * (corners[c].second[i] + corners[0].second[i]);
-                    }
-                    corners[c].first = f(corners[c].second);
-                    --evaluations;
+                    Point& place = places.emplace_back(corners[c].second);
+                    for (std::size_t i = 0; i < n; ++i) place[i] = 0.5 * (place[i] + corners.front().second[i]);
                 }
+                values = f(places);
+                for (std::size_t c = 1; c <= n; ++c) corners[c] = {values[c - 1], places[c - 1]};
+                continue;
             }
         }
+        worst = {values[taken], places[taken]};
     }
-    return std::min_element(corners.begin(), corners.end(),
-                            [](const auto& a, const auto& b) { return a.first < b.first; })
-        ->second;
+    return std::min_element(corners.begin(), corners.end(), lower)->second;
 }
 
 struct Free {
@@ -142,10 +149,14 @@ void SampleFit::take_whites(SampleNoise& noise) const {
     noise.rate_arcsec_rt_s = std::sqrt((white - 2.0 * angle) * series_->rate_hz);
 }
 
-double SampleFit::evaluate(const SampleModel& model, std::span<const double> rest, const Rows& rows) const {
+std::vector<double> SampleFit::evaluate(const std::vector<SampleModel>& models, std::span<const double> rest,
+                                        const Rows& rows) const {
     check_interrupt();
-    const double value = SampleFilter::minus_log_likelihood(model.noise, series_->interval_s, rest, rows);
-    return std::isfinite(value) ? value : 1e300;
+    std::vector<SampleNoise> noises;
+    for (const SampleModel& model : models) noises.push_back(model.noise);
+    auto values = SampleFilter::minus_log_likelihoods(noises, series_->interval_s, rest, rows);
+    for (double& value : values) value = std::isfinite(value) ? value : 1e300;
+    return values;
 }
 
 /// The model with its knobs at these places.
@@ -181,35 +192,52 @@ SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows
     constexpr double step = 1e-4;
     const std::size_t n = rest_.size();
     const auto m = static_cast<Eigen::Index>(x.size());
-    check_interrupt();
-    const SampleFilter filter(at(x).noise, n, series_->interval_s);
-    const auto e = filter.apply(rest_);
     Slope slope;
     slope.gradient = Eigen::VectorXd::Zero(m);
     slope.information = Eigen::MatrixXd::Zero(m, m);
-    for (std::size_t i = 0; i < n; ++i) {
-        if (rows[i]) slope.value += 0.5 * e[i] * e[i] + std::log(filter.sd(i));
-    }
-    // d log(sd) and d(innovation) of each knob
-    std::vector<std::vector<float>> log_sd(x.size(), std::vector<float>(n, 0.0F));
-    std::vector<std::vector<float>> moved(x.size(), std::vector<float>(n, 0.0F));
+    const SampleStates here(at(x).noise, series_->interval_s);
+    std::vector<std::size_t> moves;
+    std::vector<SampleStates> moved_there;
     for (std::size_t j = 0; j < x.size(); ++j) {
         if (!held.empty() && held[j]) continue;
         auto beside = x;
         beside[j] += step;
-        const SampleFilter other(at(beside).noise, n, series_->interval_s);
-        const auto f = other.apply(rest_);
-        double gradient = 0.0;
-        for (std::size_t i = 0; i < n; ++i) {
-            if (!rows[i]) continue;
-            const double of_log = std::log(other.sd(i) / filter.sd(i)) / step;
-            const double of_e = (f[i] - e[i]) / step;
-            gradient += e[i] * of_e + of_log;
-            log_sd[j][i] = static_cast<float>(of_log);
-            moved[j][i] = static_cast<float>(of_e + e[i] * of_log);
-        }
-        slope.gradient(static_cast<Eigen::Index>(j)) = gradient;
+        SampleStates there(at(beside).noise, series_->interval_s);
+        if (!there.is_like(here)) continue;  // beyond the end of its range
+        moves.push_back(j);
+        moved_there.push_back(there);
     }
+    // d log(sd) and d(innovation) of each knob
+    std::vector<std::vector<float>> log_sd(x.size(), std::vector<float>(n, 0.0F));
+    std::vector<std::vector<float>> moved(x.size(), std::vector<float>(n, 0.0F));
+    const auto parts = std::max<std::size_t>(1, (moves.size() + most_lanes - 2) / (most_lanes - 1));
+    oneapi::tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t part) {
+        check_interrupt();
+        const std::size_t first = part * (most_lanes - 1);
+        const std::size_t some = std::min(most_lanes - 1, moves.size() - first);
+        std::vector<SampleStates> lanes{here};
+        for (std::size_t k = 0; k < some; ++k) lanes.push_back(moved_there[first + k]);
+        std::array<double, most_lanes> gradient{};
+        double value = 0.0;
+        filter_lanes(lanes, rest_, [&](std::size_t i, const double* e, const double* variances) {
+            if (!rows[i]) return;
+            const double sd = std::sqrt(variances[0]);
+            const double white = e[0] / sd;
+            value += 0.5 * white * white + std::log(sd);
+            for (std::size_t k = 0; k < some; ++k) {
+                const double sd_there = std::sqrt(variances[k + 1]);
+                const double of_log = std::log1p((sd_there - sd) / sd) / step;
+                const double of_e = (e[k + 1] / sd_there - white) / step;
+                gradient[k] += white * of_e + of_log;
+                log_sd[moves[first + k]][i] = static_cast<float>(of_log);
+                moved[moves[first + k]][i] = static_cast<float>(of_e + white * of_log);
+            }
+        });
+        if (part == 0) slope.value = value;
+        for (std::size_t k = 0; k < some; ++k) {
+            slope.gradient(static_cast<Eigen::Index>(moves[first + k])) = gradient[k];
+        }
+    });
     for (Eigen::Index a = 0; a < m; ++a) {
         for (Eigen::Index b = 0; b <= a; ++b) {
             const auto& la = log_sd[static_cast<std::size_t>(a)];
@@ -248,18 +276,19 @@ void SampleFit::score_noise(std::vector<double>& x, const Rows& rows, const std:
             if (-now.gradient.dot(step) < enough) return;
             auto next = x;
             for (std::size_t i = 0; i < x.size(); ++i) next[i] += step(static_cast<Eigen::Index>(i));
-            const double value = evaluate(at(next), rest_, rows);
-            if (value < now.value) {
+            // Most steps are taken, and the next begins with the slope there.
+            Slope there = slope(next, rows, held);
+            if (there.value < now.value) {
                 better = true;
-                gained = now.value - value;
-                x = next;
+                gained = now.value - there.value;
+                x = std::move(next);
+                now = std::move(there);
                 damping = std::max(1e-6, 0.1 * damping);
             } else {
                 damping *= 10.0;
             }
         }
         if (!better || gained < enough) return;
-        now = slope(x, rows, held);
     }
 }
 
@@ -293,10 +322,10 @@ void SampleFit::fit_noise() {
         // What has just come into the model may have been most of the noise: far from there the likelihood is flat.
         SampleModel anew = model_;
         take_whites(anew.noise);
-        double least = evaluate(at(start), rest_, *rows_);
+        double least = evaluate({at(start)}, rest_, *rows_).front();
         const auto try_from = [&](const SampleModel& model) {
             auto other = places_of(model);
-            const double value = evaluate(at(other), rest_, *rows_);
+            const double value = evaluate({at(other)}, rest_, *rows_).front();
             if (!(value < least)) return;
             least = value;
             start = std::move(other);
@@ -317,14 +346,16 @@ void SampleFit::fit_noise() {
         // The likelihood may have several tops: by a simplex on a part of the record first, from where it stopped until
         // that gains nothing, for it may have fallen flat.
         const std::size_t part = std::min<std::size_t>(n, resampled ? 15000 : 20000);
-        const int evaluations = 30 * static_cast<int>(start.size());
-        const auto on_part = [&](const std::vector<double>& x) {
-            return evaluate(at(x), std::span<const double>(rest_.data(), part), *rows_);
+        const int steps = 18 * static_cast<int>(start.size());
+        const auto on_part = [&](const std::vector<Point>& points) {
+            std::vector<SampleModel> models;
+            for (const Point& x : points) models.push_back(at(x));
+            return evaluate(models, std::span<const double>(rest_.data(), part), *rows_);
         };
-        double value = on_part(start);
+        double value = on_part({start}).front();
         for (int i = 0; i < 3; ++i) {
-            start = smallest(on_part, start, 0.3, evaluations);
-            const double now = on_part(start);
+            start = smallest(on_part, start, 0.3, steps);
+            const double now = on_part({start}).front();
             if (value - now < 0.5) break;
             value = now;
         }
@@ -338,7 +369,8 @@ void SampleFit::fit_noise() {
         for (const Free& knob : knobs(model_)) held.push_back(knob.of_source);
         auto told = start;
         score_noise(told, telling_, held);
-        if (evaluate(at(told), rest_, *rows_) < evaluate(at(start), rest_, *rows_)) start = std::move(told);
+        const auto values = evaluate({at(told), at(start)}, rest_, *rows_);
+        if (values[0] < values[1]) start = std::move(told);
     }
     model_ = at(start);
     filter_by(model_.noise);

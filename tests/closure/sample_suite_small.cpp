@@ -315,5 +315,51 @@ TEST(SampleFilter, LikelihoodIsThatOfTheCovariance) {
     EXPECT_NEAR(applied, expected, 1e-6 * std::abs(expected));
 }
 
+// Beside one another filters are what each is alone: far more of them than a vector has lanes, of different kinds, and
+// of sources that pass a row at different times.
+TEST(SampleFilter, ManyBesideOneAnotherAreWhatEachIsAlone) {
+    using ringlock::closure::SampleFilter;
+    using ringlock::closure::SampleNoise;
+    constexpr std::size_t n = 3000;
+    constexpr double dt = 0.01;
+    std::vector<SampleNoise> noises;
+    for (int k = 0; k < 24; ++k) {
+        SampleNoise noise;
+        noise.angle_arcsec = 0.3 + 0.01 * k;
+        noise.rate_arcsec_rt_s = 0.8 - 0.02 * k;
+        noise.terms = {{0.2 + 0.1 * k, 2.0}, {5.0, 0.2}};
+        if (k % 3 > 0) noise.resonances = {{0.5, 7.0 + 0.5 * k, 0.3}};
+        if (k % 4 == 1) noise.walk_arcsec2_s3 = 0.7;
+        if (k % 4 == 2) {
+            noise.from_hz = 125.0 + 3.0 * k;
+            noise.from_phase = 0.03 * k;
+            noise.blur_arcsec = 0.05;
+        }
+        if (k % 4 == 3) {
+            noise.swing_hz = 3.0;
+            noise.swing_cos = 0.2;
+            noise.swing_sin = -0.1;
+        }
+        noises.push_back(noise);
+    }
+    std::mt19937_64 random(4);
+    std::normal_distribution<double> normal;
+    std::vector<double> increments(n);
+    std::vector<std::uint8_t> rows(n, 1);
+    for (double& increment : increments) increment = normal(random);
+    for (std::size_t i = 500; i < 700; ++i) rows[i] = 0;
+    const auto values = SampleFilter::minus_log_likelihoods(noises, dt, increments, rows);
+    ASSERT_EQ(values.size(), noises.size());
+    for (std::size_t k = 0; k < noises.size(); ++k) {
+        const SampleFilter filter(noises[k], n, dt);
+        const auto e = filter.apply(increments);
+        double expected = 0.0;
+        for (std::size_t i = 0; i < n; ++i) {
+            if (rows[i]) expected += 0.5 * e[i] * e[i] + std::log(filter.sd(i));
+        }
+        EXPECT_NEAR(values[k], expected, 1e-7 * std::abs(expected)) << k;
+    }
+}
+
 }  // namespace
 }  // namespace ringlock::test::closure

@@ -1,0 +1,61 @@
+#pragma once
+#include <array>
+#include <vector>
+
+namespace ringlock::closure {
+
+/// What is random in a record of samples; angles in arcsec.
+struct SampleNoise {
+    double angle_arcsec = 0.0;      ///< rms of the white error of each reading of the angle
+    double rate_arcsec_rt_s = 0.0;  ///< white rate: root of the variance of the angle a second
+    double walk_arcsec2_s3 = 0.0;   ///< growth of the variance of a rate that walks [(arcsec/s)^2/s]
+    struct Term {
+        double time_s, variance_arcsec2_s2;
+    };
+    std::vector<Term> terms = {};  ///< Gauss-Markov rates
+    /// An angle that is a second-order autoregression.
+    struct Resonance {
+        double arcsec, hz, width_hz;
+    };
+    std::vector<Resonance> resonances = {};
+    /// The variance of the readings' errors goes up and down at that frequency: its logarithm by cos, and by sin.
+    double swing_hz = 0.0, swing_cos = 0.0, swing_sin = 0.0;
+    double from_hz = 0.0;        ///< taken at that rate and interpolated; 0: not
+    double blur_arcsec = 0.0;    ///< rms of what interpolated readings are off the straight line
+    double digits_arcsec = 0.0;  ///< the least of it: what the values are written to
+    double from_phase = 0.0;     ///< source intervals from the sample before the record's start to that start
+};
+
+/// A record of samples as a linear system: x' = F x + noise of covariance Q from reading to reading of the instrument,
+/// or of the source that it was resampled from; a sample is h x + error. States: angle, rates, resonances (two each),
+/// of a resampled record two readings.
+struct SampleStates {
+    static constexpr int most = 16;
+    using Vector = std::array<double, most>;
+    using Matrix = std::array<Vector, most>;
+    /// Which of a row of F are not zero.
+    struct Terms {
+        int count = 0;
+        std::array<int, most> at{};
+        bool operator==(const Terms&) const = default;
+    };
+
+    SampleStates() = default;
+    SampleStates(const SampleNoise& noise, double interval_s);
+
+    /// Whether the states are the same, and steps from one to the next: their numbers may differ.
+    bool is_like(const SampleStates& other) const;
+
+    int count = 0;
+    bool resampled = false;
+    bool swings = false;
+    double swing_by_row = 0.0, swing_cos = 0.0, swing_sin = 0.0;
+    double floor = 0.0;  ///< variance of the measurement itself
+    double ratio = 0.0;  ///< resampled: source intervals a row
+    double first_place = 0.0;
+    Matrix f{}, q{}, start{};  ///< one interval of the source
+    Vector h{};                ///< of a resampled record: by row
+    std::array<Terms, most> nonzero{};
+};
+
+}  // namespace ringlock::closure
