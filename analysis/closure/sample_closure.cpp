@@ -380,13 +380,34 @@ void Loop::begin_again(const State& at) {
 /// A rate is left that the random one has only come nearest to: several of the library together, if they leave nothing
 /// and are likelier; else none of it.
 void Loop::go_without_random(Closure& closure) {
-    const std::shared_ptr<SampleFit> followed = now_.fit;
+    const State followed = now_;
+    const std::optional<ResidualTest> left = closure.unexplained;
+    const std::vector<ResidualTest> tests = closure.tests;
     begin_again(*earlier_);
     add_all(closure, false);
     test_what_is_left(closure);
-    if (!closure.unexplained && now_.fit->gain_over(*followed) > 0.0) return;
-    begin_again(*earlier_);
-    test_what_is_left(closure);
+    if (!closure.unexplained && now_.fit->gain_over(*followed.fit) > 0.0) return;
+    const int first = earlier_->told.empty() ? 0 : earlier_->told.back().step + 1;
+    const auto since = [first](const SampleStep& told) { return told.step >= first; };
+    const auto stays = [&](const SampleStep& told) { return since(told) && !is_slow_rate(told.effect); };
+    if (std::none_of(followed.told.begin(), followed.told.end(), stays)) {
+        begin_again(*earlier_);
+        test_what_is_left(closure);
+        return;
+    }
+    // What is no rate was found beside it, and stays.
+    begin_again(followed);
+    closure.unexplained = left;
+    closure.tests = tests;
+    for (std::size_t k = now_.told.size(); k-- > 0;) {
+        if (!since(now_.told[k]) || stays(now_.told[k])) continue;
+        closure.notes.push_back(fmt::format(
+            "{} follows a rate that the library does not have: it is in the model, so that the rest can be told, and "
+            "is not named",
+            now_.steps[k].effect));
+        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
+        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+    }
 }
 
 void Loop::close(Closure& closure) {

@@ -19,12 +19,11 @@ bool passes_on_samples(double p_value) { return p_value * effects_on_samples < l
 
 bool is_random_rate(const std::string& effect) { return effect == "rate_random_walk" || effect == "bias_instability"; }
 
-namespace {
-
-/// Rates that change slowly: each can be taken for another, or for two others together.
-bool is_slow(const std::string& effect) {
+bool is_slow_rate(const std::string& effect) {
     return is_random_rate(effect) || effect == "scale_factor_error" || effect.starts_with("bias_");
 }
+
+namespace {
 
 constexpr double worth_looking = 0.01;
 
@@ -106,7 +105,8 @@ std::vector<SampleCandidate> Contest::screened(const SampleState& state, Wanted 
     if (!state.random_rates) {
         std::erase_if(candidates, [](const SampleCandidate& c) { return is_random_rate(c.effect); });
     }
-    std::sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
     return candidates;
 }
 
@@ -153,12 +153,37 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
                                                  std::vector<SampleCandidate> candidates) const {
     std::erase_if(candidates, [](const SampleCandidate& candidate) {
         const bool worth =
-            (is_slow(candidate.effect) || is_line(candidate.effect)) && candidate.p_value < worth_looking;
+            (is_slow_rate(candidate.effect) || is_line(candidate.effect)) && candidate.p_value < worth_looking;
         return !passes_on_samples(candidate.p_value) && !worth;
     });
-    std::vector<Shared> all(candidates.size());
-    oneapi::tbb::parallel_for(std::size_t{0}, all.size(),
-                              [&](std::size_t k) { all[k] = fitted(state, std::move(candidates[k])); });
+    // Rates that a record may be resampled from take long to fit, and explain much the same: where the likeliest by
+    // either kind of errors are far from the leader, the others are as well.
+    constexpr std::size_t kinds = 2;
+    constexpr double far = 0.5;
+    const auto resampled = [](const SampleCandidate& c) { return c.effect == "resampling"; };
+    std::vector<SampleCandidate> later;
+    std::size_t rates = 0;
+    std::erase_if(candidates, [&](SampleCandidate& candidate) {
+        if (!resampled(candidate) || rates++ < kinds) return false;
+        later.push_back(std::move(candidate));
+        return true;
+    });
+    std::vector<Shared> all;
+    const auto fit_all = [&](std::vector<SampleCandidate> some) {
+        const std::size_t first = all.size();
+        all.resize(first + some.size());
+        oneapi::tbb::parallel_for(std::size_t{0}, some.size(),
+                                  [&](std::size_t k) { all[first + k] = fitted(state, std::move(some[k])); });
+    };
+    fit_all(std::move(candidates));
+    double most = 0.0;
+    double most_resampled = 0.0;
+    for (const Shared& contender : all) {
+        if (is_slow_rate(contender->candidate.effect)) continue;
+        double& of_these = resampled(contender->candidate) ? most_resampled : most;
+        of_these = std::max(of_these, contender->merit);
+    }
+    if (!(most_resampled > 0.0 && most_resampled < far * most)) fit_all(std::move(later));
     std::erase_if(all, [](const Shared& contender) { return !contender->passes; });
     std::sort(all.begin(), all.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
     if (all.size() > most_contenders + 2) all.resize(most_contenders + 2);
@@ -203,7 +228,7 @@ std::vector<Contest::Account> Contest::sets_from(const Shared& first, const std:
     const auto seconds = contenders(with_first, screened(with_first, Wanted::slow));
     for (const bool random : {false, true}) {
         const auto second = std::find_if(seconds.begin(), seconds.end(), [&](const Shared& c) {
-            return is_slow(c->candidate.effect) && is_random_rate(c->candidate.effect) == random;
+            return is_slow_rate(c->candidate.effect) && is_random_rate(c->candidate.effect) == random;
         });
         if (second == seconds.end()) continue;
         const double p = p_beside(*first, **second, firsts, candidates);
@@ -213,7 +238,7 @@ std::vector<Contest::Account> Contest::sets_from(const Shared& first, const std:
         if (random || is_random_rate(first->candidate.effect)) continue;
         const SampleState with_both = beside(with_first, **second);
         for (const Shared& third : contenders(with_both, screened(with_both, Wanted::slow))) {
-            if (!is_slow(third->candidate.effect) || is_random_rate(third->candidate.effect)) continue;
+            if (!is_slow_rate(third->candidate.effect) || is_random_rate(third->candidate.effect)) continue;
             found.push_back({{first, *second, third}, merit + third->merit - choice, p});
             break;
         }
@@ -229,7 +254,7 @@ std::vector<Contest::Account> Contest::sets(const std::vector<Shared>& all,
     std::vector<Shared> firsts;
     bool random = false;
     for (const Shared& contender : all) {
-        if (!is_slow(contender->candidate.effect)) continue;
+        if (!is_slow_rate(contender->candidate.effect)) continue;
         // One random rate can stand for another.
         if (is_random_rate(contender->candidate.effect) && std::exchange(random, true)) continue;
         firsts.push_back(contender);
@@ -237,7 +262,7 @@ std::vector<Contest::Account> Contest::sets(const std::vector<Shared>& all,
     for (const SampleCandidate& candidate : candidates) {
         const bool known = std::any_of(all.begin(), all.end(),
                                        [&](const Shared& c) { return c->candidate.effect == candidate.effect; });
-        if (known || !is_slow(candidate.effect) || is_random_rate(candidate.effect)) continue;
+        if (known || !is_slow_rate(candidate.effect) || is_random_rate(candidate.effect)) continue;
         if (candidate.p_value < worth_looking) firsts.push_back(fitted(now_, candidate));
     }
     std::sort(firsts.begin(), firsts.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
@@ -316,7 +341,7 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
 /// Whether two effects of different kinds explain different things: one is needed beside the other as well. Such may
 /// have the same merit, and are no answer in each other's place.
 bool Contest::beside_each_other(const SampleContender& a, const SampleContender& b) const {
-    const auto kind = [](const std::string& effect) { return is_slow(effect) ? 0 : is_line(effect) ? 1 : 2; };
+    const auto kind = [](const std::string& effect) { return is_slow_rate(effect) ? 0 : is_line(effect) ? 1 : 2; };
     if (kind(a.candidate.effect) == kind(b.candidate.effect)) return false;
     for (const auto& [with, without] : {std::pair{&a, &b}, std::pair{&b, &a}}) {
         std::vector<std::vector<double>> added;
@@ -389,7 +414,7 @@ SampleChoice Contest::choose() {
     const bool led = !all.empty() && holds(accounts.front());
     const double leader = all.empty() ? 0.0 : accounts.front().merit;
     const bool random_leads = !all.empty() && accounts.front().random();
-    if (!led || is_slow(all.front()->candidate.effect)) {
+    if (!led || is_slow_rate(all.front()->candidate.effect)) {
         for (Account& account : sets(all, candidates)) accounts.push_back(std::move(account));
         if (all.empty() && !accounts.empty()) against = rivals(false, false);
     }
@@ -415,7 +440,8 @@ SampleChoice Contest::choose() {
         if (best == nullptr || account.members.size() < best->members.size()) best = &account;
     }
     if (best == nullptr) return {};
-    const bool slow = best->members.size() == 1 && !best->random() && is_slow(best->members.front()->candidate.effect);
+    const bool slow =
+        best->members.size() == 1 && !best->random() && is_slow_rate(best->members.front()->candidate.effect);
     const double least_random = slow ? std::max(0.0, best->merit - tie_with_random) : least;
     std::vector<Account> as_likely;
     for (const Account& account : accounts) {

@@ -18,6 +18,8 @@ bool passes_on_samples(double p_value);
 
 /// A random rate can follow whatever the library does not have, more or less.
 bool is_random_rate(const std::string& effect);
+/// Rates that change slowly: each can be taken for another, or for two others together.
+bool is_slow_rate(const std::string& effect);
 
 /// A model of the samples, with what is looked for next.
 struct SampleState {

@@ -78,6 +78,8 @@ struct Free {
     bool of_source = false;  ///< where a resampled record's source takes its samples
 };
 
+constexpr std::size_t whites = 2;  // the first of the knobs
+
 std::vector<Free> knobs(SampleModel& model) {
     std::vector<Free> all{{&model.noise.angle_arcsec, true}, {&model.noise.rate_arcsec_rt_s, true}};
     if (model.walk) all.push_back({&model.noise.walk_arcsec2_s3, true});
@@ -344,21 +346,35 @@ void SampleFit::fit_noise() {
     }
     if (!searched_ && (resampled || narrow)) {
         // The likelihood may have several tops: by a simplex on a part of the record first, from where it stopped until
-        // that gains nothing, for it may have fallen flat.
+        // that gains nothing, for it may have fallen flat. Of a source by where it takes its samples and what is white;
+        // the rest is as it was without it.
         const std::size_t part = std::min<std::size_t>(n, resampled ? 15000 : 20000);
-        const int steps = 18 * static_cast<int>(start.size());
+        std::vector<std::size_t> turned;
+        const std::vector<Free> own = knobs(model_);
+        for (std::size_t i = 0; i < own.size(); ++i) {
+            if (!resampled || own[i].of_source || i < whites) turned.push_back(i);
+        }
+        const auto with = [&](const Point& some) {
+            Point all = start;
+            for (std::size_t k = 0; k < turned.size(); ++k) all[turned[k]] = some[k];
+            return all;
+        };
         const auto on_part = [&](const std::vector<Point>& points) {
             std::vector<SampleModel> models;
-            for (const Point& x : points) models.push_back(at(x));
+            for (const Point& some : points) models.push_back(at(with(some)));
             return evaluate(models, std::span<const double>(rest_.data(), part), *rows_);
         };
-        double value = on_part({start}).front();
+        Point some;
+        for (const std::size_t i : turned) some.push_back(start[i]);
+        const int steps = 18 * static_cast<int>(some.size());
+        double value = on_part({some}).front();
         for (int i = 0; i < 3; ++i) {
-            start = smallest(on_part, start, 0.3, steps);
-            const double now = on_part({start}).front();
+            some = smallest(on_part, some, 0.3, steps);
+            const double now = on_part({some}).front();
             if (value - now < 0.5) break;
             value = now;
         }
+        start = with(some);
     }
     score_noise(start, *rows_, {});
     if (resampled) {
