@@ -1,5 +1,7 @@
 #include "analysis/closure/sample_filter.hpp"
 
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -223,24 +225,29 @@ std::vector<double> SampleFilter::minus_log_likelihoods(std::span<const SampleNo
                                                         std::span<const std::uint8_t> rows) {
     std::vector<SampleStates> states;
     for (const SampleNoise& noise : noises) states.emplace_back(noise, interval_s);
-    std::vector<double> all(noises.size());
-    std::vector<std::uint8_t> done(noises.size(), 0);
-    for (std::size_t first = 0; first < noises.size(); ++first) {
-        if (done[first]) continue;
-        std::vector<std::size_t> which;
-        std::vector<SampleStates> alike;
-        for (std::size_t k = first; k < noises.size() && alike.size() < most_lanes; ++k) {
-            if (done[k] || !states[k].is_like(states[first])) continue;
-            done[k] = 1;
-            which.push_back(k);
-            alike.push_back(states[k]);
+    // By kind, as many at once as there are lanes.
+    std::vector<std::vector<std::size_t>> parts;
+    for (std::size_t k = 0; k < noises.size(); ++k) {
+        const auto part = std::find_if(parts.begin(), parts.end(), [&](const std::vector<std::size_t>& of) {
+            return of.size() < most_lanes && states[of.front()].is_like(states[k]);
+        });
+        if (part == parts.end()) {
+            parts.push_back({k});
+        } else {
+            part->push_back(k);
         }
+    }
+    std::vector<double> all(noises.size());
+    oneapi::tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t at) {
+        const std::vector<std::size_t>& part = parts[at];
+        std::vector<SampleStates> alike;
+        for (const std::size_t k : part) alike.push_back(states[k]);
         std::array<double, most_lanes> sums{};
         std::array<double, most_lanes> products;  // of variances, whose logarithms cost more than all the rest
         products.fill(1.0);
         filter_lanes(alike, increments, [&](std::size_t row, const double* e, const double* variances) {
             if (!rows[row]) return;
-            for (std::size_t k = 0; k < alike.size(); ++k) {
+            for (std::size_t k = 0; k < part.size(); ++k) {
                 sums[k] += 0.5 * e[k] * e[k] / variances[k];
                 products[k] *= variances[k];
                 if (products[k] > 1e-200 && products[k] < 1e200) continue;
@@ -248,8 +255,8 @@ std::vector<double> SampleFilter::minus_log_likelihoods(std::span<const SampleNo
                 products[k] = 1.0;
             }
         });
-        for (std::size_t k = 0; k < alike.size(); ++k) all[which[k]] = sums[k] + 0.5 * std::log(products[k]);
-    }
+        for (std::size_t k = 0; k < part.size(); ++k) all[part[k]] = sums[k] + 0.5 * std::log(products[k]);
+    });
     return all;
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -62,14 +61,7 @@ SampleNoise begun_with(const SampleFit& now, const std::vector<double>& told, do
     for (std::size_t i = 2; i < rest.size(); ++i) squares += std::pow(rest[i] - 2.0 * rest[i - 1] + rest[i - 2], 2);
     const double angle = std::sqrt(squares / 20.0 / static_cast<double>(rest.size()));
     constexpr double of_rate = 0.1;
-    SampleNoise best;
-    double least = std::numeric_limits<double>::infinity();
-    const auto consider = [&](SampleNoise noise) {
-        const double value = SampleFilter::minus_log_likelihood(noise, series.interval_s, rest, now.rows());
-        if (!(value < least)) return;
-        least = value;
-        best = std::move(noise);
-    };
+    std::vector<SampleNoise> trials;
     for (const double wide : {0.5, 0.15, 0.05}) {
         for (const double wider : {0.15, 0.5}) {
             for (const double share : {0.03, 0.1, 0.3}) {
@@ -84,12 +76,14 @@ SampleNoise begun_with(const SampleFit& now, const std::vector<double>& told, do
                     } else {
                         noise.resonances.push_back({share * rms_arcsec, hz, 20.0 * wider * width_hz});
                     }
-                    consider(std::move(noise));
+                    trials.push_back(std::move(noise));
                 }
             }
         }
     }
-    return best;
+    const auto likelier = [](double a, double b) { return a < b || (std::isnan(b) && !std::isnan(a)); };
+    const auto values = SampleFilter::minus_log_likelihoods(trials, series.interval_s, rest, now.rows());
+    return trials[static_cast<std::size_t>(std::min_element(values.begin(), values.end(), likelier) - values.begin())];
 }
 
 }  // namespace
