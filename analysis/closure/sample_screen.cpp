@@ -1,5 +1,7 @@
 #include "analysis/closure/sample_screen.hpp"
 
+#include <oneapi/tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -407,14 +409,17 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
     }
     // Rates whose distance from a multiple of the record's is that frequency
     const double rate = in.series.rate_hz;
-    std::vector<Resampled> found;
+    std::vector<double> rates;
     for (int m = 0; m <= 4; ++m) {
         for (const int sign : {-1, 1}) {
             const double from = m * rate + sign * cycle.frequency_hz;
             if (from < 0.3 * rate || from > 4.5 * rate || std::abs(from - rate) < 1e-9 * rate) continue;
-            found.push_back(best_placed(now, from, Errors::as_they_are));
+            rates.push_back(from);
         }
     }
+    std::vector<Resampled> found(rates.size());
+    oneapi::tbb::parallel_for(std::size_t{0}, rates.size(),
+                              [&](std::size_t k) { found[k] = best_placed(now, rates[k], Errors::as_they_are); });
     // That was on a part of the record, with noises that are not fitted: it may be wrong by tens of nats.
     std::sort(found.begin(), found.end(),
               [](const Resampled& a, const Resampled& b) { return a.log_likelihood > b.log_likelihood; });
