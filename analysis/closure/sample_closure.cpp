@@ -378,7 +378,7 @@ void Loop::begin_again(const State& at) {
 }
 
 /// A rate is left that the random one has only come nearest to: several of the library together, if they leave nothing
-/// and are likelier; else none of it.
+/// and are likelier; else no rate is named, and what was found beside it that is none stays.
 void Loop::go_without_random(Closure& closure) {
     const State followed = now_;
     const std::optional<ResidualTest> left = closure.unexplained;
