@@ -5,25 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <type_traits>
-#include <utility>
 
 #include "analysis/closure/sample_lanes.hpp"
 
 namespace ringlock::closure {
-
-namespace {
-
-/// Calls `with` with the number of states as a constant.
-template <int D = 1, class With>
-void for_states(int states, With&& with) {
-    if constexpr (D <= SampleStates::most) {
-        if (states == D) return with(std::integral_constant<int, D>{});
-        for_states<D + 1>(states, with);
-    }
-}
-
-}  // namespace
 
 template <int D>
 void SampleFilter::advance(const SampleFilter& filter, std::array<double, D>& x) {
@@ -35,114 +20,13 @@ void SampleFilter::advance(const SampleFilter& filter, std::array<double, D>& x)
     x = next;
 }
 
-/// Covariances and gains, row after row: row(ticks, share, variance, gain) says whether to go on.
-template <int D, class Row>
-void SampleFilter::run(std::size_t rows, Row&& row) const {
-    using Line = std::array<double, D>;
-    std::array<Line, D> p;
-    std::array<Line, D> q;
-    Line h;
-    for (int i = 0; i < D; ++i) {
-        for (int j = 0; j < D; ++j) {
-            p[i][j] = states_.start[i][j];
-            q[i][j] = states_.q[i][j];
-        }
-        h[i] = states_.h[i];
-    }
-    // P <- F (F P)' + Q, P being symmetric
-    const auto step = [&] {
-        std::array<Line, D> turned;
-        for (int i = 0; i < D; ++i) {
-            Line fp{};
-            const Terms& terms = states_.nonzero[i];
-            for (int k = 0; k < terms.count; ++k) {
-                const int l = terms.at[k];
-                const double f = states_.f[i][l];
-                for (int j = 0; j < D; ++j) fp[j] += f * p[l][j];
-            }
-            for (int j = 0; j < D; ++j) turned[j][i] = fp[j];
-        }
-        for (int i = 0; i < D; ++i) {
-            Line sum = q[i];
-            const Terms& terms = states_.nonzero[i];
-            for (int k = 0; k < terms.count; ++k) {
-                const int l = terms.at[k];
-                const double f = states_.f[i][l];
-                for (int j = 0; j < D; ++j) sum[j] += f * turned[l][j];
-            }
-            p[i] = sum;
-        }
-    };
-    double place = states_.first_place;
-    for (std::size_t r = 0; r < rows; ++r) {
-        int ticks = 1;
-        if (states_.resampled) {
-            place += states_.ratio;
-            const double whole = std::floor(place);
-            place -= whole;
-            ticks = static_cast<int>(std::min(whole, 250.0));
-            if constexpr (D >= 2) {
-                h[D - 2] = 1.0 - place;
-                h[D - 1] = place;
-            }
-        }
-        for (int i = 0; i < ticks; ++i) step();
-        Line ph{};
-        for (int j = 0; j < D; ++j) {
-            if (h[j] == 0.0) continue;
-            for (int i = 0; i < D; ++i) ph[i] += p[j][i] * h[j];
-        }
-        double s = states_.floor;
-        if (states_.swings) {
-            const double phase = states_.swing_by_row * static_cast<double>(r);
-            s *= std::exp(states_.swing_cos * std::cos(phase) + states_.swing_sin * std::sin(phase));
-        }
-        for (int i = 0; i < D; ++i) s += h[i] * ph[i];
-        Line gain;
-        for (int i = 0; i < D; ++i) gain[i] = ph[i] / s;
-        for (int i = 0; i < D; ++i) {
-            for (int j = 0; j < D; ++j) p[i][j] -= gain[i] * ph[j];
-        }
-        if (!row(ticks, place, s, gain)) return;
-    }
-}
-
-namespace {
-
-/// Whether gains have stopped changing: each, since those of slow rates settle long after the variance has.
-template <int D>
-class Settling {
-   public:
-    bool operator()(const std::array<double, D>& gain) {
-        bool same = true;
-        for (int i = 0; i < D; ++i) {
-            if (std::abs(gain[i] - last_[i]) > 1e-9 * std::abs(gain[i])) same = false;
-        }
-        last_ = gain;
-        count_ = same ? count_ + 1 : 0;
-        return count_ > 50;
-    }
-
-   private:
-    std::array<double, D> last_{};
-    int count_ = 0;
-};
-
-}  // namespace
-
 SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double interval_s) : states_(noise, interval_s) {
-    for_states(states_.count, [&](auto d) {
-        constexpr int D = decltype(d)::value;
-        Settling<D> settled;
-        run<D>(rows, [&](int ticks, double share, double variance, const std::array<double, D>& gain) {
-            gain_.insert(gain_.end(), gain.begin(), gain.end());
-            sd_.push_back(std::sqrt(variance));
-            if (states_.resampled) {
-                ticks_.push_back(static_cast<std::uint8_t>(ticks));
-                share_.push_back(share);
-            }
-            return states_.resampled || states_.swings || !settled(gain);
-        });
+    filter_gains(states_, rows, [&](const SampleGains& row) {
+        gain_.insert(gain_.end(), row.gain.begin(), row.gain.end());
+        sd_.push_back(std::sqrt(row.variance));
+        if (!states_.resampled) return;
+        ticks_.push_back(static_cast<std::uint8_t>(row.ticks));
+        share_.push_back(row.share);
     });
 }
 

@@ -24,10 +24,6 @@ class SampleFilter {
     static std::vector<double> minus_log_likelihoods(std::span<const SampleNoise> noises, double interval_s,
                                                      std::span<const double> increments,
                                                      std::span<const std::uint8_t> rows);
-    static double minus_log_likelihood(const SampleNoise& noise, double interval_s, std::span<const double> increments,
-                                       std::span<const std::uint8_t> rows) {
-        return minus_log_likelihoods({&noise, 1}, interval_s, increments, rows).front();
-    }
 
     /// Many filters step by step, for readings of the angle that are not known beforehand; not of a resampled record.
     class Many {
@@ -49,8 +45,6 @@ class SampleFilter {
 
    private:
     using Terms = SampleStates::Terms;
-    template <int D, class Row>
-    void run(std::size_t rows, Row&& row) const;
     template <int D>
     static void advance(const SampleFilter& filter, std::array<double, D>& x);
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
-#include <type_traits>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "analysis/closure/sample_lanes.cpp"
@@ -16,13 +15,53 @@ namespace ringlock::closure::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Tag = hn::CappedTag<double, most_lanes>;
-using V = hn::Vec<Tag>;
+/// Filters in the lanes of a vector.
+struct Beside {
+    using Tag = hn::CappedTag<double, most_lanes>;
+    using Value = hn::Vec<Tag>;
+    static std::size_t lanes() { return hn::Lanes(Tag()); }
+    static Value set(double v) { return hn::Set(Tag(), v); }
+    static Value load(const double* from) { return hn::LoadU(Tag(), from); }
+    static void store(Value v, double* to) { hn::StoreU(v, Tag(), to); }
+    static Value sub(Value a, Value b) { return hn::Sub(a, b); }
+    static Value add(Value a, Value b) { return hn::Add(a, b); }
+    static Value mul(Value a, Value b) { return hn::Mul(a, b); }
+    static Value div(Value a, Value b) { return hn::Div(a, b); }
+    static Value mul_add(Value a, Value b, Value c) { return hn::MulAdd(a, b, c); }
+    static Value neg_mul_add(Value a, Value b, Value c) { return hn::NegMulAdd(a, b, c); }
+    static Value floor(Value v) { return hn::Floor(v); }
+    static Value min(Value a, Value b) { return hn::Min(a, b); }
+    static Value abs(Value v) { return hn::Abs(v); }
+    static bool none_above(Value a, Value b) { return hn::AllTrue(Tag(), hn::Le(a, b)); }
+    /// `yes` where a < b, else `no`.
+    static Value where_less(Value a, Value b, Value yes, Value no) { return hn::IfThenElse(hn::Lt(a, b), yes, no); }
+};
 
-/// As many filters as there are lanes in a vector. D states.
-template <int D>
+/// One filter: the compiler puts what is known of its states in the lanes.
+struct Alone {
+    using Value = double;
+    static std::size_t lanes() { return 1; }
+    static Value set(double v) { return v; }
+    static Value load(const double* from) { return *from; }
+    static void store(Value v, double* to) { *to = v; }
+    static Value sub(Value a, Value b) { return a - b; }
+    static Value add(Value a, Value b) { return a + b; }
+    static Value mul(Value a, Value b) { return a * b; }
+    static Value div(Value a, Value b) { return a / b; }
+    static Value mul_add(Value a, Value b, Value c) { return a * b + c; }
+    static Value neg_mul_add(Value a, Value b, Value c) { return c - a * b; }
+    static Value floor(Value v) { return std::floor(v); }
+    static Value min(Value a, Value b) { return std::min(a, b); }
+    static Value abs(Value v) { return std::abs(v); }
+    static bool none_above(Value a, Value b) { return a <= b; }
+    static Value where_less(Value a, Value b, Value yes, Value no) { return a < b ? yes : no; }
+};
+
+/// As many filters as a value of the arithmetic holds. D states.
+template <class A, int D>
 class Lanes {
    public:
+    using V = typename A::Value;
     using Line = std::array<V, D>;
 
     /// The last filter again in lanes that no other is in.
@@ -30,10 +69,10 @@ class Lanes {
         of_ = &filters.front();
         const auto from = [&](auto&& value) {
             double values[most_lanes];
-            for (std::size_t k = 0; k < hn::Lanes(d_); ++k) {
+            for (std::size_t k = 0; k < A::lanes(); ++k) {
                 values[k] = value(filters[std::min(first + k, filters.size() - 1)]);
             }
-            return hn::LoadU(d_, values);
+            return A::load(values);
         };
         for (int i = 0; i < D; ++i) {
             for (int j = 0; j < D; ++j) {
@@ -42,13 +81,13 @@ class Lanes {
                 f_[i][j] = from([&](const SampleStates& s) { return s.f[i][j]; });
             }
             h_[i] = from([&](const SampleStates& s) { return s.h[i]; });
-            x_[i] = hn::Zero(d_);
-            gain_[i] = hn::Zero(d_);
+            x_[i] = A::set(0.0);
+            gain_[i] = A::set(0.0);
         }
         floor_ = from([](const SampleStates& s) { return s.floor; });
         ratio_ = from([](const SampleStates& s) { return s.ratio; });
         place_ = from([](const SampleStates& s) { return s.first_place; });
-        for (std::size_t k = 0; k < hn::Lanes(d_); ++k) {
+        for (std::size_t k = 0; k < A::lanes(); ++k) {
             const SampleStates& s = filters[std::min(first + k, filters.size() - 1)];
             swing_[k] = {s.swing_by_row, s.swing_cos, s.swing_sin};
         }
@@ -60,46 +99,55 @@ class Lanes {
         } else {
             step_row();
         }
-        V e = hn::Set(d_, angle);
+        V e = A::set(angle);
         for (int i = 0; i < D; ++i) {
-            if (reads(i)) e = hn::NegMulAdd(h_[i], x_[i], e);
+            if (reads(i)) e = A::neg_mul_add(h_[i], x_[i], e);
         }
         if (!settled_) weigh(row);
-        for (int i = 0; i < D; ++i) x_[i] = hn::MulAdd(gain_[i], e, x_[i]);
-        hn::StoreU(e, d_, innovation);
-        hn::StoreU(variance_, d_, variance);
+        for (int i = 0; i < D; ++i) x_[i] = A::mul_add(gain_[i], e, x_[i]);
+        A::store(e, innovation);
+        A::store(variance_, variance);
     }
+
+    /// Source intervals passed before the last row; of the first filter.
+    int ticks() const { return static_cast<int>(ticks_[0]); }
+    V share() const { return place_; }
+    const Line& gain() const { return gain_; }
+    /// Whether variances and gains stay what they are.
+    bool settled() const { return settled_; }
 
    private:
     bool reads(int i) const { return of_->resampled ? i >= D - 2 : of_->h[i] != 0.0; }
 
     /// On to the row, by as many intervals of the source as lie between.
     void step_row() {
-        if (!of_->resampled) return step();
-        place_ = hn::Add(place_, ratio_);
-        const V whole = hn::Floor(place_);
-        place_ = hn::Sub(place_, whole);
+        if (!of_->resampled) {
+            ticks_[0] = 1.0;
+            return step();
+        }
+        place_ = A::add(place_, ratio_);
+        const V whole = A::floor(place_);
+        place_ = A::sub(place_, whole);
         if constexpr (D >= 2) {
-            h_[D - 2] = hn::Sub(hn::Set(d_, 1.0), place_);
+            h_[D - 2] = A::sub(A::set(1.0), place_);
             h_[D - 1] = place_;
         }
         constexpr double most_ticks = 250.0;
-        double ticks[most_lanes];
-        hn::StoreU(hn::Min(whole, hn::Set(d_, most_ticks)), d_, ticks);
-        const auto [least, most] = std::minmax_element(ticks, ticks + hn::Lanes(d_));
+        A::store(A::min(whole, A::set(most_ticks)), ticks_.data());
+        const auto [least, most] = std::minmax_element(ticks_.data(), ticks_.data() + A::lanes());
         double tick = 0.0;
         for (; tick < *least; ++tick) step();
         if (tick == *most) return;
         // Some are there before others.
-        const V all = hn::LoadU(d_, ticks);
+        const V all = A::load(ticks_.data());
         for (; tick < *most; ++tick) {
-            const auto goes = hn::Lt(hn::Set(d_, tick), all);
             const auto p = p_;
             const auto x = x_;
             step();
+            const V at = A::set(tick);
             for (int i = 0; i < D; ++i) {
-                x_[i] = hn::IfThenElse(goes, x_[i], x[i]);
-                for (int j = 0; j < D; ++j) p_[i][j] = hn::IfThenElse(goes, p_[i][j], p[i][j]);
+                x_[i] = A::where_less(at, all, x_[i], x[i]);
+                for (int j = 0; j < D; ++j) p_[i][j] = A::where_less(at, all, p_[i][j], p[i][j]);
             }
         }
     }
@@ -110,11 +158,11 @@ class Lanes {
         std::array<Line, D> turned;
         for (int i = 0; i < D; ++i) {
             Line fp;
-            for (V& v : fp) v = hn::Zero(d_);
+            for (V& v : fp) v = A::set(0.0);
             const auto& terms = of_->nonzero[i];
             for (int k = 0; k < terms.count; ++k) {
                 const int l = terms.at[k];
-                for (int j = 0; j < D; ++j) fp[j] = hn::MulAdd(f_[i][l], p_[l][j], fp[j]);
+                for (int j = 0; j < D; ++j) fp[j] = A::mul_add(f_[i][l], p_[l][j], fp[j]);
             }
             for (int j = 0; j < D; ++j) turned[j][i] = fp[j];
         }
@@ -123,7 +171,7 @@ class Lanes {
             const auto& terms = of_->nonzero[i];
             for (int k = 0; k < terms.count; ++k) {
                 const int l = terms.at[k];
-                for (int j = 0; j < D; ++j) sum[j] = hn::MulAdd(f_[i][l], turned[l][j], sum[j]);
+                for (int j = 0; j < D; ++j) sum[j] = A::mul_add(f_[i][l], turned[l][j], sum[j]);
             }
             p_[i] = sum;
         }
@@ -132,10 +180,10 @@ class Lanes {
     void step_states() {
         Line next;
         for (int i = 0; i < D; ++i) {
-            next[i] = hn::Zero(d_);
+            next[i] = A::set(0.0);
             const auto& terms = of_->nonzero[i];
             for (int k = 0; k < terms.count; ++k) {
-                next[i] = hn::MulAdd(f_[i][terms.at[k]], x_[terms.at[k]], next[i]);
+                next[i] = A::mul_add(f_[i][terms.at[k]], x_[terms.at[k]], next[i]);
             }
         }
         x_ = next;
@@ -144,28 +192,28 @@ class Lanes {
     /// Variance and gains of this row, and what is known after it.
     void weigh(std::size_t row) {
         Line ph;
-        for (V& v : ph) v = hn::Zero(d_);
+        for (V& v : ph) v = A::set(0.0);
         for (int j = 0; j < D; ++j) {
             if (!reads(j)) continue;
-            for (int i = 0; i < D; ++i) ph[i] = hn::MulAdd(p_[j][i], h_[j], ph[i]);
+            for (int i = 0; i < D; ++i) ph[i] = A::mul_add(p_[j][i], h_[j], ph[i]);
         }
         variance_ = floor_;
         if (of_->swings) {
             double factors[most_lanes];
-            for (std::size_t k = 0; k < hn::Lanes(d_); ++k) {
+            for (std::size_t k = 0; k < A::lanes(); ++k) {
                 const double phase = swing_[k].by_row * static_cast<double>(row);
                 factors[k] = std::exp(swing_[k].cosine * std::cos(phase) + swing_[k].sine * std::sin(phase));
             }
-            variance_ = hn::Mul(variance_, hn::LoadU(d_, factors));
+            variance_ = A::mul(variance_, A::load(factors));
         }
         for (int i = 0; i < D; ++i) {
-            if (reads(i)) variance_ = hn::MulAdd(h_[i], ph[i], variance_);
+            if (reads(i)) variance_ = A::mul_add(h_[i], ph[i], variance_);
         }
-        const V over = hn::Div(hn::Set(d_, 1.0), variance_);
+        const V over = A::div(A::set(1.0), variance_);
         const Line last = gain_;
-        for (int i = 0; i < D; ++i) gain_[i] = hn::Mul(ph[i], over);
+        for (int i = 0; i < D; ++i) gain_[i] = A::mul(ph[i], over);
         for (int i = 0; i < D; ++i) {
-            for (int j = 0; j < D; ++j) p_[i][j] = hn::NegMulAdd(gain_[i], ph[j], p_[i][j]);
+            for (int j = 0; j < D; ++j) p_[i][j] = A::neg_mul_add(gain_[i], ph[j], p_[i][j]);
         }
         if (!of_->resampled && !of_->swings) settle(last);
     }
@@ -173,11 +221,11 @@ class Lanes {
     /// Whether gains have stopped changing: each, since those of slow rates settle long after the variance has.
     void settle(const Line& last) {
         constexpr int rows = 50;
-        const V little = hn::Set(d_, 1e-9);
+        const V little = A::set(1e-9);
         bool same = true;
         for (int i = 0; i < D && same; ++i) {
-            const V most = hn::Mul(little, hn::Abs(gain_[i]));
-            same = hn::AllTrue(d_, hn::Le(hn::Abs(hn::Sub(gain_[i], last[i])), most));
+            const V most = A::mul(little, A::abs(gain_[i]));
+            same = A::none_above(A::abs(A::sub(gain_[i], last[i])), most);
         }
         settled_rows_ = same ? settled_rows_ + 1 : 0;
         settled_ = settled_rows_ > rows;
@@ -186,12 +234,12 @@ class Lanes {
     struct Swing {
         double by_row, cosine, sine;
     };
-    Tag d_;
     const SampleStates* of_ = nullptr;  ///< what all have in common
     std::array<Line, D> p_, q_, f_;
     Line h_, x_, gain_;
     V floor_, ratio_, place_;
     V variance_;
+    std::array<double, most_lanes> ticks_{};
     std::array<Swing, most_lanes> swing_{};
     int settled_rows_ = 0;
     bool settled_ = false;
@@ -199,9 +247,9 @@ class Lanes {
 
 template <int D>
 void lanes_with(std::span<const SampleStates> filters, std::span<const double> increments, const TakeLanes& take) {
-    const Tag d;
+    const Beside::Tag d;
     // On the stack: what the heap gives is not aligned for the longest vectors.
-    Lanes<D> vectors[most_lanes / hn::MaxLanes(d)];
+    Lanes<Beside, D> vectors[most_lanes / hn::MaxLanes(d)];
     const std::size_t count = (filters.size() + hn::Lanes(d) - 1) / hn::Lanes(d);
     for (std::size_t k = 0; k < count; ++k) vectors[k].begin(filters, k * hn::Lanes(d));
     double innovations[most_lanes] = {};
@@ -217,18 +265,23 @@ void lanes_with(std::span<const SampleStates> filters, std::span<const double> i
     }
 }
 
-/// Calls `with` with the number of states as a constant.
-template <int D = 1, class With>
-void for_states(int states, With&& with) {
-    if constexpr (D <= SampleStates::most) {
-        if (states == D) return with(std::integral_constant<int, D>{});
-        for_states<D + 1>(states, with);
-    }
-}
-
 void lanes(std::span<const SampleStates> filters, std::span<const double> increments, const TakeLanes& take) {
     for_states(filters.front().count,
                [&](auto states) { lanes_with<decltype(states)::value>(filters, increments, take); });
+}
+
+void gains(const SampleStates& filter, std::size_t rows, const std::function<void(const SampleGains&)>& take) {
+    for_states(filter.count, [&](auto states) {
+        constexpr int D = decltype(states)::value;
+        Lanes<Alone, D> one;
+        one.begin({&filter, 1}, 0);
+        double innovation = 0.0;
+        double variance = 0.0;
+        for (std::size_t row = 0; row < rows && !one.settled(); ++row) {
+            one.row(row, 0.0, &innovation, &variance);
+            take({one.ticks(), one.share(), variance, one.gain()});
+        }
+    });
 }
 
 }  // namespace ringlock::closure::HWY_NAMESPACE
@@ -238,6 +291,11 @@ HWY_AFTER_NAMESPACE();
 namespace ringlock::closure {
 
 HWY_EXPORT(lanes);
+HWY_EXPORT(gains);
+
+void filter_gains(const SampleStates& filter, std::size_t rows, const std::function<void(const SampleGains&)>& take) {
+    HWY_DYNAMIC_DISPATCH(gains)(filter, rows, take);
+}
 
 void filter_lanes(std::span<const SampleStates> filters, std::span<const double> increments, const TakeLanes& take) {
     if (filters.empty()) return;

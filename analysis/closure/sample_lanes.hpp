@@ -7,6 +7,17 @@
 
 namespace ringlock::closure {
 
+/// What a filter does with a reading, whatever it is.
+struct SampleGains {
+    int ticks;                     ///< source intervals from the row before
+    double share;                  ///< resampled: from the source's reading before to that after
+    double variance;               ///< of the innovation
+    std::span<const double> gain;  ///< a state each
+};
+
+/// Row after row, to where they stay the same.
+void filter_gains(const SampleStates& filter, std::size_t rows, const std::function<void(const SampleGains&)>& take);
+
 constexpr std::size_t most_lanes = 8;
 
 /// What each filter makes of a row: innovations and their variances, one a lane.

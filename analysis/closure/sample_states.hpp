@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <type_traits>
 #include <vector>
 
 namespace ringlock::closure {
@@ -57,5 +58,14 @@ struct SampleStates {
     Vector h{};                ///< of a resampled record: by row
     std::array<Terms, most> nonzero{};
 };
+
+/// Calls `with` with the number of states as a constant.
+template <int D = 1, class With>
+void for_states(int states, With&& with) {
+    if constexpr (D <= SampleStates::most) {
+        if (states == D) return with(std::integral_constant<int, D>{});
+        for_states<D + 1>(states, with);
+    }
+}
 
 }  // namespace ringlock::closure

@@ -307,7 +307,8 @@ TEST(SampleFilter, LikelihoodIsThatOfTheCovariance) {
     double expected = 0.5 * white.squaredNorm();
     for (int i = 0; i < n; ++i) expected += std::log(factor.matrixL()(i, i));
     const std::vector<std::uint8_t> rows(n, 1);
-    EXPECT_NEAR(SampleFilter::minus_log_likelihood(noise, dt, increments, rows), expected, 1e-6 * std::abs(expected));
+    const auto likelihoods = SampleFilter::minus_log_likelihoods({&noise, 1}, dt, increments, rows);
+    EXPECT_NEAR(likelihoods.front(), expected, 1e-6 * std::abs(expected));
     const SampleFilter filter(noise, n, dt);
     const auto e = filter.apply(increments);
     double applied = 0.0;
