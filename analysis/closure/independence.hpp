@@ -1,6 +1,7 @@
 #pragma once
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,7 +30,8 @@ struct View {
     double cost = 0.0;                                     ///< of its parameters and its search, in the log-likelihood
     std::function<std::vector<Regressor>()> columns = {};  ///< none where nothing regresses
     double largest = std::numeric_limits<double>::infinity();  ///< coefficient that makes sense
-    bool jumps = false;  ///< random rates can follow it nearly as well as it can be said
+    bool jumps = false;             ///< random rates can follow it nearly as well as it can be said
+    std::optional<double> hz = {};  ///< of a line
     /// Merit where it is fitted anew otherwise than by a regression, if it is; by a search, that is gone through with
     /// only where it comes near the merit of a rival.
     std::function<double(double rival)> refitted = {};

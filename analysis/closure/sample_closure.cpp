@@ -81,6 +81,8 @@ class Loop {
     void add_all(Closure& closure, bool random_rates);
     void begin_again(const State& at);
     void go_without_random(Closure& closure);
+    void look_beside_nearest(Closure& closure);
+    bool keep_names(int first_step, const std::function<bool(const SampleStep&)>& keeps, Closure& closure);
     bool restore();
     void take_lattice(Closure& closure);
     const SampleContender& take_likelier(const SampleChoice& choice, Step& step);
@@ -108,7 +110,8 @@ class Loop {
     double used_step_ = 0.0;  ///< of the lattice in the model
     std::shared_ptr<SampleFit> base_;
     State now_;
-    std::optional<State> earlier_;  ///< before the first random rate
+    std::optional<State> earlier_;              ///< before the first random rate
+    std::shared_ptr<SampleContender> nearest_;  ///< of SampleChoice, where nothing was chosen any more
     int next_step_ = 0;
 };
 
@@ -365,7 +368,11 @@ Closure Loop::run() {
         if (!restore()) break;
     }
     test_what_is_left(closure);
-    if (earlier_ && closure.unexplained) go_without_random(closure);
+    if (closure.unexplained && earlier_) {
+        go_without_random(closure);
+    } else if (closure.unexplained && nearest_) {
+        look_beside_nearest(closure);
+    }
     take_back_lines(closure);
     finish(closure);
     return closure;
@@ -387,27 +394,60 @@ void Loop::go_without_random(Closure& closure) {
     add_all(closure, false);
     test_what_is_left(closure);
     if (!closure.unexplained && now_.fit->gain_over(*followed.fit) > 0.0) return;
-    const int first = earlier_->told.empty() ? 0 : earlier_->told.back().step + 1;
-    const auto since = [first](const SampleStep& told) { return told.step >= first; };
-    const auto stays = [&](const SampleStep& told) { return since(told) && !is_slow_rate(told.effect); };
-    if (std::none_of(followed.told.begin(), followed.told.end(), stays)) {
-        begin_again(*earlier_);
-        test_what_is_left(closure);
-        return;
-    }
-    // What is no rate was found beside it, and stays.
     begin_again(followed);
     closure.unexplained = left;
     closure.tests = tests;
+    const auto keeps = [](const SampleStep& told) { return !is_slow_rate(told.effect); };
+    if (keep_names(earlier_->told.empty() ? 0 : earlier_->told.back().step + 1, keeps, closure)) return;
+    begin_again(*earlier_);
+    test_what_is_left(closure);
+}
+
+/// A rate or a line is left that the library does not have, and in the way of what else there is: that is looked for
+/// beside what comes nearest to it.
+void Loop::look_beside_nearest(Closure& closure) {
+    constexpr int most = 3;
+    const State without = now_;
+    const int first = next_step_;
+    const std::optional<ResidualTest> left = closure.unexplained;
+    const std::vector<ResidualTest> tests = closure.tests;
+    const bool line = is_line(nearest_->candidate.effect);
+    std::vector<double> around_hz;
+    for (int k = 0; k < most && nearest_ && is_line(nearest_->candidate.effect) == line; ++k) {
+        SampleChoice choice;
+        choice.chosen = std::exchange(nearest_, {});
+        take(choice, closure);
+        around_hz.push_back(now_.told.back().hz);
+        add_all(closure, line);
+    }
+    // What is left of a line lies about it, and a rate that is left takes another's shape.
+    const auto keeps = [&](const SampleStep& told) {
+        if (!line) return !is_slow_rate(told.effect);
+        if (!is_line(told.effect)) return !is_random_rate(told.effect);
+        return std::none_of(around_hz.begin(), around_hz.end(),
+                            [&](double hz) { return std::abs(hz - told.hz) < beside_hz; });
+    };
+    if (!keep_names(first, keeps, closure)) begin_again(without);
+    closure.unexplained = left;
+    closure.tests = tests;
+}
+
+/// Of what was added from that step on, some loses its name.
+/// \return whether anything keeps it
+bool Loop::keep_names(int first_step, const std::function<bool(const SampleStep&)>& keeps, Closure& closure) {
+    const auto since = [&](const SampleStep& told) { return told.step >= first_step; };
+    const auto stays = [&](const SampleStep& told) { return since(told) && keeps(told); };
+    if (std::none_of(now_.told.begin(), now_.told.end(), stays)) return false;
     for (std::size_t k = now_.told.size(); k-- > 0;) {
         if (!since(now_.told[k]) || stays(now_.told[k])) continue;
         closure.notes.push_back(fmt::format(
-            "{} follows a rate that the library does not have: it is in the model, so that the rest can be told, and "
-            "is not named",
+            "{} follows what may be nothing that the library has: it is in the model, so that the rest can be "
+            "told, and is not named",
             now_.steps[k].effect));
         now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
         now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
     }
+    return true;
 }
 
 void Loop::close(Closure& closure) {
@@ -422,6 +462,7 @@ void Loop::add_all(Closure& closure, bool random_rates) {
     while (now_.steps.size() < most_steps) {
         const SampleChoice choice = choose_on_samples(
             record_.declared, {now_.fit, now_.lines_hz, next_step_, random_rates}, whole_, lattice_step());
+        nearest_ = choice.nearest;
         if (!choice.chosen) break;
         if (!earlier_ && is_random_rate(choice.chosen->candidate.effect)) earlier_ = now_;
         take(choice, closure);
@@ -470,7 +511,11 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     drop_needless();
     for (int k = 0; k < most_motions && move_anew();) ++k;
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
-    now_.told.push_back({effect, next_step_++, best.candidate.witness, best.candidate.strong, choice.other_hz});
+    now_.told.push_back({.effect = effect,
+                         .step = next_step_++,
+                         .witness = best.candidate.witness,
+                         .strong = best.candidate.strong,
+                         .other_hz = choice.other_hz});
     if (rounded_.drawn()) {
         now_.fit = rounded_.draw(now_.fit, draws_of_step);
         // What was drawn without a motion tells little of it.
@@ -486,6 +531,7 @@ void Loop::take(const SampleChoice& choice, Closure& closure) {
     if (is_line(effect)) {
         const double hz = line_hz(now_.fit->model(), best.candidate.wanders);
         now_.lines_hz.push_back(alias(hz, series_.rate_hz).hz);
+        now_.told.back().hz = now_.lines_hz.back();
         if (best.candidate.wanders) {
             now_.notes.push_back(
                 fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -62,8 +63,9 @@ class Contest {
         double coefficients = 0.0;
         Where where = Where::time;
         bool jumps = false;
-        bool repeats = false;      ///< a variance that does
-        double of_a_motion = 0.0;  ///< merit beside what has resonances of its own
+        bool repeats = false;           ///< a variance that does
+        std::optional<double> hz = {};  ///< of a line
+        double of_a_motion = 0.0;       ///< merit beside what has resonances of its own
     };
 
     std::vector<SampleCandidate> screened(const SampleState& state, Wanted wanted) const;
@@ -80,6 +82,8 @@ class Contest {
     std::vector<Rival> rivals(bool resampled, bool moved) const;
     static double bar(const Account& account, const std::vector<Rival>& rivals, std::size_t rows);
     bool beside_each_other(const SampleContender& a, const SampleContender& b) const;
+    Shared set_aside(std::vector<Shared>& all, const std::vector<Rival>& against) const;
+    static Shared nearest(const std::vector<Shared>& all, const Shared& unnamed);
     static void tie(const Account& best, const std::vector<Account>& as_likely, SampleChoice& choice);
 
     const record::Declared& declared_;
@@ -186,7 +190,13 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
     if (!(most_resampled > 0.0 && most_resampled < far * most)) fit_all(std::move(later));
     std::erase_if(all, [](const Shared& contender) { return !contender->passes; });
     std::sort(all.begin(), all.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
-    if (all.size() > most_contenders + 2) all.resize(most_contenders + 2);
+    // Those rates crowd nobody out.
+    std::size_t count = 0;
+    std::size_t count_resampled = 0;
+    std::erase_if(all, [&](const Shared& contender) {
+        std::size_t& of_these = resampled(contender->candidate) ? count_resampled : count;
+        return of_these++ >= most_contenders + 2;
+    });
     return all;
 }
 
@@ -291,7 +301,8 @@ std::vector<Contest::Rival> Contest::rivals(bool resampled, bool moved) const {
     std::vector<Rival> found;
     for (const View& view : views) {
         const bool repeats = view.test.view == repeating_variance;
-        Rival rival{view.test.merit, 0.0, view.test.where, view.jumps, repeats};
+        Rival rival{
+            .merit = view.test.merit, .where = view.test.where, .jumps = view.jumps, .repeats = repeats, .hz = view.hz};
         if (view.columns) {
             rival.merit = refitted_merit(*now_.fit, view);
             rival.coefficients = static_cast<double>(view.columns().size());
@@ -307,8 +318,19 @@ std::vector<Contest::Rival> Contest::rivals(bool resampled, bool moved) const {
 /// library does not have. What a view must have more than an effect to be taken for the truth is off it.
 double Contest::bar(const Account& account, const std::vector<Rival>& rivals, std::size_t rows) {
     const bool random = account.random();
+    const bool moves = std::all_of(account.members.begin(), account.members.end(), [](const Shared& member) {
+        return is_slow_rate(member->candidate.effect) || is_line(member->candidate.effect);
+    });
     double most = 0.0;
     for (const Rival& rival : rivals) {
+        // Noise whose size changes looks like no rate and no line, nor do these like it.
+        if (rival.repeats && moves) continue;
+        // A line is nothing of another that is far from it.
+        const SampleCandidate& first = account.members.front()->candidate;
+        if (rival.hz && account.members.size() == 1 && is_line(first.effect) &&
+            std::abs(*rival.hz - first.hz) > beside_hz) {
+            continue;
+        }
         double merit = account.has("case_motion") ? rival.of_a_motion : rival.merit;
         if (rival.repeats && account.has("resampling")) {
             // On straight lines the variance swings by half, no more and no less. What they are blurred by makes that
@@ -398,19 +420,48 @@ void Contest::tie(const Account& best, const std::vector<Account>& as_likely, Sa
     }
 }
 
+/// Contenders that are no answer go.
+/// \return what has no name, if there is such
+Contest::Shared Contest::set_aside(std::vector<Shared>& all, const std::vector<Rival>& against) const {
+    Shared unnamed;
+    std::erase_if(all, [&](const Shared& contender) {
+        if (contender->candidate.nameless && !unnamed) unnamed = contender;
+        return contender->candidate.nameless;
+    });
+    // What repeats otherwise than on straight lines is not resampled.
+    if (all.empty() || all.front()->candidate.effect != "resampling") return unnamed;
+    std::vector<Rival> repeats = against;
+    std::erase_if(repeats, [](const Rival& rival) { return !rival.repeats; });
+    if (all.front()->merit > bar({{all.front()}, all.front()->merit, 0.0}, repeats, series_.size())) return unnamed;
+    std::erase_if(all, [](const Shared& contender) { return contender->candidate.effect == "resampling"; });
+    return unnamed;
+}
+
+/// Where nothing holds: what comes nearest to a rate or to a line that the library does not have.
+Contest::Shared Contest::nearest(const std::vector<Shared>& all, const Shared& unnamed) {
+    if (all.empty() || (unnamed && unnamed->merit > all.front()->merit)) return unnamed;
+    const std::string& leader = all.front()->candidate.effect;
+    if (is_line(leader)) return all.front();
+    if (!is_slow_rate(leader)) return unnamed;
+    const auto random =
+        std::find_if(all.begin(), all.end(), [](const Shared& c) { return is_random_rate(c->candidate.effect); });
+    return random == all.end() ? unnamed : *random;
+}
+
 SampleChoice Contest::choose() {
     const auto candidates = screened(now_, Wanted::all);
-    const auto all = contenders(now_, candidates);
-    std::vector<Account> accounts;
-    for (const Shared& contender : all) {
-        accounts.push_back({{contender}, contender->merit, contender->candidate.p_value});
-    }
+    auto all = contenders(now_, candidates);
     std::vector<Rival> against;
     const auto may_be_of = [&](std::string_view effect) {
         return std::any_of(all.begin(), all.end(), [&](const Shared& c) { return c->candidate.effect == effect; });
     };
     if (!all.empty()) against = rivals(may_be_of("resampling"), may_be_of("case_motion"));
     const auto holds = [&](const Account& account) { return account.merit > bar(account, against, series_.size()); };
+    const Shared unnamed = set_aside(all, against);
+    std::vector<Account> accounts;
+    for (const Shared& contender : all) {
+        accounts.push_back({{contender}, contender->merit, contender->candidate.p_value});
+    }
     const bool led = !all.empty() && holds(accounts.front());
     const double leader = all.empty() ? 0.0 : accounts.front().merit;
     const bool random_leads = !all.empty() && accounts.front().random();
@@ -439,7 +490,11 @@ SampleChoice Contest::choose() {
         if (best == nullptr) least = std::max(least, account.merit - closure::tie);
         if (best == nullptr || account.members.size() < best->members.size()) best = &account;
     }
-    if (best == nullptr) return {};
+    if (best == nullptr) {
+        SampleChoice none;
+        none.nearest = nearest(all, unnamed);
+        return none;
+    }
     const bool slow =
         best->members.size() == 1 && !best->random() && is_slow_rate(best->members.front()->candidate.effect);
     const double least_random = slow ? std::max(0.0, best->merit - tie_with_random) : least;

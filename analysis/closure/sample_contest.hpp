@@ -46,6 +46,9 @@ struct SampleChoice {
     std::vector<std::pair<std::string, std::vector<std::string>>> of_partners;
     std::vector<double> other_hz;                        ///< rates that explain a resampled record as well
     std::shared_ptr<SampleContender> other_random = {};  ///< the likeliest other random rate, where one is chosen
+    /// Where a rate or a line leads, but a view explains more, and nothing is chosen: the likeliest random rate, or
+    /// that line. It comes nearest to what is there, and what is something else can be told beside it.
+    std::shared_ptr<SampleContender> nearest = {};
 };
 
 /// The likeliest effect, or the first of the likeliest two or three, with all that are as likely tied to it. None where

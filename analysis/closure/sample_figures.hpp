@@ -16,6 +16,7 @@ struct SampleStep {
     int step = 0;                       ///< as in its columns and resonances
     std::size_t witness = 0;            ///< of a motion, in the series
     bool strong = false;                ///< motion that is told at many lags
+    double hz = 0.0;                    ///< of a line, where the record has it
     std::vector<double> other_hz = {};  ///< rates that explain a resampled record as well
 };
 

@@ -214,6 +214,7 @@ SampleCandidate wandering_line(const SampleFit& now, const SampleContext& in, co
                       .searched = lines.tracked.searched,
                       .parameters = 3,
                       .freedom = 3,
+                      .hz = lines.scattered_hz,
                       .wanders = true};
     if (!declared) c.confounded = {"base_vibration"};
     c.model = with_wandering_line(now, lines, in.rows, c.effect, in.step);
@@ -243,8 +244,8 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
         if (scatters(now, e, lines, drifting.chi2 > still.chi2 ? drifting : still)) {
             // Slow ones are what a base does as well.
             const bool declared = near_declared(now, in, likeliest.frequency_hz);
-            if (!declared && likeliest.frequency_hz <= fast_hz) return;
             out.push_back(wandering_line(now, in, lines, likeliest.p_value, declared));
+            out.back().nameless = !declared && likeliest.frequency_hz <= fast_hz;
             return;
         }
     }
@@ -271,7 +272,8 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
                           .p_value = of_several(chi2_tail(mended.chi2, 2), line.found.searched),
                           .searched = line.found.searched,
                           .parameters = 2,
-                          .freedom = 2};
+                          .freedom = 2,
+                          .hz = line.found.frequency_hz};
         if (!dither) c.confounded.emplace_back(fast ? "base_vibration" : "dither_residue");
         add_line(c.model, in.series, mended, c.effect, in.step);
         out.push_back(std::move(c));

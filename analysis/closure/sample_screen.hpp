@@ -20,8 +20,10 @@ struct SampleCandidate {
     std::optional<double> places = {};
     int parameters = 1;
     int freedom = 1;          ///< of its chi-squared, beside what the search counts
+    double hz = 0.0;          ///< of a line, where the record has it
     bool wanders = false;     ///< a line as a narrow resonance
     bool strong = false;      ///< motion that is told at many lags
+    bool nameless = false;    ///< nothing of the library, and only to be in nobody's way
     std::size_t witness = 0;  ///< in the series, of a motion
     SampleFit::Noise noise = SampleFit::Noise::near;
     std::vector<std::string> confounded = {};  ///< the same model by other names

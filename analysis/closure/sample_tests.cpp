@@ -90,6 +90,7 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     View view{{Where::frequency, "lines, still and drifting", p,
                fmt::format("at {:.6g} Hz", coherent ? line.frequency_hz : lines.scattered_hz), gain - cost},
               cost};
+    view.hz = coherent ? line.frequency_hz : lines.scattered_hz;
     if (coherent) {
         view.columns = [&fit, line] {
             const Alias of = of_source(line.frequency_hz, fit.series().rate_hz, fit.model().noise.from_hz).front();
@@ -162,10 +163,9 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
     }
     const FoundLines left = find_lines(e, fit.series().rate_hz);
     const FoundLine line = left.likeliest();
-    constexpr double near_hz = 1.0;
     const double hz = line.chi2 >= left.scattered ? line.frequency_hz : left.scattered_hz;
     least.beside =
-        line.p_value < level_of_residual && std::abs(hz - alias(least.hz, fit.series().rate_hz).hz) < near_hz;
+        line.p_value < level_of_residual && std::abs(hz - alias(least.hz, fit.series().rate_hz).hz) < beside_hz;
     return least;
 }
 

@@ -34,6 +34,7 @@ constexpr double evident[] = {6.0, 30.0, 150.0};
 
 constexpr double of_other_gyros = 6.0;
 constexpr double of_several[] = {5.0, 10.0, 30.0};
+constexpr double of_mixed = 6.0;
 
 /// Whether a gyro in that condition shows the effect at all.
 bool shows(const std::string& effect, const Condition& condition) {
@@ -126,6 +127,19 @@ int main(int argc, char** argv) {
     if (command.wants(Kind::foreign)) {
         for (Case& of : foreign_cases(command.scaled(12), command.series)) cases.push_back(std::move(of));
     }
+    if (command.wants(Kind::mixed)) {
+        std::size_t next = 0;
+        std::uint64_t seed = seeds_of_series * command.series + 70000;
+        for (Case& of : foreign_cases(command.scaled(6), command.series)) {
+            while (!shows(effects[next % effects.size()], *of.condition)) ++next;
+            const std::string& effect = effects[next++ % effects.size()];
+            of.kind = Kind::mixed;
+            of.multiple = of_mixed;
+            of.seed = seed++;
+            of.truth.push_back(draw(effect, of_mixed * start_size(effect), of.seed, duration_s(of)));
+            cases.push_back(std::move(of));
+        }
+    }
 
     std::erase_if(cases,
                   [&](const Case& of) { return !command.seed.empty() && std::to_string(of.seed) != command.seed; });
@@ -155,10 +169,10 @@ int main(int argc, char** argv) {
             if (settled[k - first]) {
                 if (!command.seed.empty()) record::write_record(command.folder + "/record.h5", record);
                 try {
-                    const std::string where(of.kind == Kind::foreign ? ringlock::closure::name_of(of.where) : "");
+                    const std::string where(of.foreign.empty() ? "" : ringlock::closure::name_of(of.where));
                     tables.keep(k,
                                 {of.kind, of.truth_text(), of.multiple, of.condition->name,
-                                 of.direct ? "equation" : "map", of.seed, values_of(of.truth), where},
+                                 of.direct ? "equation" : "map", of.seed, values_of(of.added()), where},
                                 judge(of, record));
                 } catch (const std::exception& error) {
                     fmt::print(stderr, "record {} ({}): {}\n", of.seed, of.truth_text(), error.what());

@@ -24,6 +24,7 @@ namespace {
 using namespace ringlock::test::closure;
 
 constexpr double of_several[] = {5.0, 10.0, 30.0};
+constexpr double of_mixed = 6.0;
 
 std::vector<SampleCase> all_cases(const Command& command) {
     const std::vector<std::string> effects = effects_on_samples();
@@ -74,6 +75,16 @@ std::vector<SampleCase> all_cases(const Command& command) {
         add(Kind::several, multiple, {sized.begin(), sized.begin() + (k % 2 == 0 ? 2 : 3)});
     }
     for (SampleCase& of : foreign_sample_cases(command.scaled(10), command.series)) cases.push_back(std::move(of));
+    std::uint64_t mixed_seed = seeds_of_series * command.series + 70000;
+    std::size_t next = 0;
+    for (SampleCase& of : foreign_sample_cases(command.scaled(5), command.series)) {
+        while (!shows(effects[next % effects.size()], *of.condition)) ++next;
+        of.kind = Kind::mixed;
+        of.multiple = of_mixed;
+        of.seed = mixed_seed++;
+        of.truth.push_back(draw_on_samples(effects[next++ % effects.size()], of));
+        cases.push_back(std::move(of));
+    }
     std::erase_if(cases, [&](const SampleCase& of) { return !command.wants(of.kind); });
     return cases;
 }
@@ -92,10 +103,10 @@ int main(int argc, char** argv) {
             const auto record = make(cases[k]);
             if (!command.seed.empty()) ringlock::record::write_record(command.folder + "/record.h5", record);
             const SampleCase& of = cases[k];
-            const std::string where(of.kind == Kind::foreign ? ringlock::closure::name_of(of.where) : "");
+            const std::string where(of.foreign.empty() ? "" : ringlock::closure::name_of(of.where));
             tables.keep(k,
                         {of.kind, of.truth_text(), of.multiple, of.condition->name, "samples", of.seed,
-                         values_of(of.truth), where},
+                         values_of(of.added()), where},
                         judge(of, record));
         } catch (const std::exception& error) {
             fmt::print(stderr, "record {} ({}): {}\n", cases[k].seed, cases[k].truth_text(), error.what());

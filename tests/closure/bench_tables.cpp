@@ -27,7 +27,8 @@ double quantile(std::vector<double> values, double at) {
 }
 
 bool of_library(Kind kind) {
-    return kind == Kind::single || kind == Kind::pair || kind == Kind::other || kind == Kind::several;
+    return kind == Kind::single || kind == Kind::pair || kind == Kind::other || kind == Kind::several ||
+           kind == Kind::mixed;
 }
 
 bool settled(const Outcome& o) { return o.judged == Judged::right || o.judged == Judged::tie; }
@@ -146,6 +147,18 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
         row("... ties that hold the truth", count(several, is(Judged::tie)));
         row("... not all of them", count(several, is(Judged::missed)));
         row("... `unexplained`", count(several, is(Judged::unexplained)));
+    }
+    if (std::any_of(truths.begin(), truths.end(), kind(Kind::mixed, 0.0))) {
+        const auto mixed = kind(Kind::mixed, 0.0);
+        row("one effect of 6 times its limit beside one outside the library: `unexplained` with the right place, the "
+            "effect "
+            "named",
+            count(mixed, is(Judged::right)));
+        row("... in a tie that holds it", count(mixed, is(Judged::tie)));
+        row("... `unexplained`, the effect not named", count(mixed, [](const Outcome& o) {
+                return o.verdict == "unexplained" && !o.false_name && !o.missing.empty();
+            }));
+        row("... a name of nothing that is there", count(mixed, [](const Outcome& o) { return o.false_name; }));
     }
     const Totals totals = totals_of(truths, outcomes);
     row("a wrong name with confidence, over all records", share_of(totals.wrong.count, totals.wrong.of));
@@ -280,12 +293,13 @@ Command command_of(int argc, char** argv, const char* program) {
         }
     }
     const bool known = command.wants(Kind::null) || command.wants(Kind::single) || command.wants(Kind::pair) ||
-                       command.wants(Kind::foreign) || command.wants(Kind::other) || command.wants(Kind::several);
+                       command.wants(Kind::foreign) || command.wants(Kind::other) || command.wants(Kind::several) ||
+                       command.wants(Kind::mixed);
     if (wrong || command.folder.empty() || !known || !(command.share > 0.0 && command.share <= 1.0)) {
-        fmt::print(
-            stderr,
-            "usage: {} FOLDER [--share S] [--only null|single|pair|foreign|other|several] [--seed N] [--series N]\n",
-            program);
+        fmt::print(stderr,
+                   "usage: {} FOLDER [--share S] [--only null|single|pair|foreign|other|several|mixed] [--seed N] "
+                   "[--series N]\n",
+                   program);
         std::exit(2);
     }
     std::filesystem::create_directories(command.folder);

@@ -42,11 +42,13 @@ const std::vector<SampleCondition> sample_conditions = {
     {"fine digits, accelerometers", 0.3, 0.02, increments, true, true, false, 0.005, 0.0},
 };
 
-std::string SampleCase::truth_text() const {
-    std::string text;
-    for (const Added& added : truth) text += (text.empty() ? "" : "+") + added.effect;
-    return text.empty() ? "nothing" : text;
+std::vector<Added> SampleCase::added() const {
+    std::vector<Added> all = truth;
+    all.insert(all.end(), foreign.begin(), foreign.end());
+    return all;
 }
+
+std::string SampleCase::truth_text() const { return text_of(added()); }
 
 namespace {
 
@@ -88,7 +90,7 @@ SampleTruth truth_of(const SampleCase& of) {
             rate = next;
         }
     }
-    for (const Added& added : of.truth) {
+    for (const Added& added : of.added()) {
         for (const auto& [name, value] : added.values) {
             const std::string key = name.empty() ? added.effect : added.effect + "." + name;
             if (key == "case_motion.witness") {
@@ -238,6 +240,7 @@ void settle(SampleCase& of) {
     constexpr int rounds = 4;
     constexpr std::uint64_t other_noise = 7919;
     SampleCase at = of;
+    at.foreign.clear();
     std::vector<std::vector<double>> last(of.truth.size());
     for (int round = 0; round < rounds; ++round) {
         double moved = 0.0;
@@ -283,7 +286,7 @@ std::vector<SampleCase> foreign_sample_cases(std::size_t each, std::uint64_t ser
             of.condition = &sample_conditions[condition];
             of.seed = seeds_of_series * series + 60000 + cases.size();
             of.where = where;
-            of.truth = {std::move(added)};
+            of.foreign = {std::move(added)};
             cases.push_back(std::move(of));
         };
         const double sign = k % 2 == 0 ? 1.0 : -1.0;
@@ -309,8 +312,8 @@ Outcome judge(const SampleCase& of, const record::Record& record) {
     const auto start = std::chrono::steady_clock::now();
     const Closure closure = ringlock::closure::close_samples(record);
     outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    const bool foreign = of.kind == Kind::foreign;
-    compare(closure, foreign, of.where, of.truth, outcome);
+    const bool foreign = !of.foreign.empty();
+    compare(closure, foreign ? std::optional(of.where) : std::nullopt, of.truth, outcome);
     if (foreign) return outcome;
     const Closure oracle = ringlock::closure::fit_samples(record, known(of.truth));
     outcome.oracle = oracle.heldout_after;

@@ -26,13 +26,15 @@ extern const std::vector<SampleCondition> sample_conditions;
 
 struct SampleCase {
     Kind kind = Kind::null;
-    std::vector<Added> truth;
-    double multiple = 0.0;  ///< of the detection limit; 0 for nulls and for what the library does not have
+    std::vector<Added> truth;         ///< of the library
+    std::vector<Added> foreign = {};  ///< that the library does not have
+    double multiple = 0.0;            ///< of the detection limit of what is of the library; 0 for nulls
     const SampleCondition* condition = nullptr;
     std::uint64_t seed = 1;
     std::size_t size = 30000;
     ringlock::closure::Where where = {};  ///< in which foreign effects show themselves
 
+    std::vector<Added> added() const;
     std::string truth_text() const;
 };
 

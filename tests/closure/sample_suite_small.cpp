@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -146,6 +147,47 @@ TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
     EXPECT_TRUE(found.steps.empty());
     ASSERT_TRUE(found.unexplained);
     EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::time);
+}
+
+// Jumps between two levels explain more than any random rate, and more than the line: it is looked for beside the
+// random rate that comes nearest.
+TEST(ClosureSampleSuite, ALineBesideARateOfNoNameIsNamed) {
+    SampleTruth truth;
+    truth.size = 16000;
+    truth.seed = 5;
+    truth.white_angle_arcsec = 0.3;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.rates.telegraph_bias = {3.0, 20.0};
+    truth.dither_residue = {37.3, 0.0, 0.04, 1.0};
+    const auto found = ringlock::closure::close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
+    ASSERT_TRUE(found.unexplained);
+    EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::time);
+    ASSERT_EQ(found.steps.size(), 1U);
+    EXPECT_EQ(found.steps[0].effect, "dither_residue");
+    EXPECT_NEAR(found.steps[0].parameters[0].value, 37.3, 4.0 * found.steps[0].parameters[0].sd);
+}
+
+// A line that swings is no line of the library, and is beside nothing else.
+TEST(ClosureSampleSuite, WhatIsBesideALineOfNoNameIsNamed) {
+    SampleTruth truth;
+    truth.size = 16000;
+    truth.seed = 6;
+    truth.white_angle_arcsec = 0.3;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.swinging_line = {8.0, 30.0, 0.2, 60.0};
+    const auto alone = ringlock::closure::close_samples(generate_samples(truth));
+    EXPECT_EQ(alone.verdict, ringlock::closure::Verdict::unexplained);
+    EXPECT_TRUE(alone.steps.empty());
+    truth.rates.bias_step = {5.0, 90.0};
+    truth.dither_residue = {37.3, 0.0, 0.05, 1.0};
+    const auto found = ringlock::closure::close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
+    ASSERT_TRUE(found.unexplained);
+    EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::frequency);
+    std::set<std::string> named;
+    for (const auto& step : found.steps) named.insert(step.effect);
+    EXPECT_EQ(named, (std::set<std::string>{"bias_step", "dither_residue"}));
 }
 
 // A gyro that moves by rates that are known has nothing missing, and a scale factor's error is one of them alone.

@@ -37,7 +37,7 @@ const std::vector<Condition> conditions = {
 const Condition other_gyro = {"another gyro", 0.0, false, true};
 
 const char* name_of(Kind kind) {
-    constexpr const char* names[] = {"null", "single", "pair", "foreign", "other", "several"};
+    constexpr const char* names[] = {"null", "single", "pair", "foreign", "other", "several", "mixed"};
     return names[static_cast<std::size_t>(kind)];
 }
 
@@ -46,11 +46,19 @@ const char* name_of(Judged judged) {
     return names[static_cast<std::size_t>(judged)];
 }
 
-std::string Case::truth_text() const {
+std::string text_of(const std::vector<Added>& added) {
     std::string text;
-    for (const Added& added : truth) text += (text.empty() ? "" : "+") + added.effect;
+    for (const Added& one : added) text += (text.empty() ? "" : "+") + one.effect;
     return text.empty() ? "nothing" : text;
 }
+
+std::vector<Added> Case::added() const {
+    std::vector<Added> all = truth;
+    all.insert(all.end(), foreign.begin(), foreign.end());
+    return all;
+}
+
+std::string Case::truth_text() const { return text_of(added()); }
 
 namespace {
 
@@ -145,7 +153,7 @@ record::Record by_map(const Case& of, const Device& device) {
     scenario.environment.temperature_swing_k = temperature_swing_k;
     scenario.environment.temperature_period_s = 0.4 * device.duration_s;
     scenario.record.temperature_interval_s = temperature_interval_s;
-    for (const Added& added : of.truth) {
+    for (const Added& added : of.added()) {
         for (const auto& [name, value] : added.values) scenario.effects.at(added.effect).at(name) = value;
     }
     record::Record record = instrument::simulate_record(scenario);
@@ -174,7 +182,7 @@ Truth truth_of(const Case& of, const Device& device) {
     truth.temperature.swing_k = temperature_swing_k;
     truth.temperature.period_s = 0.4 * device.duration_s;
     truth.temperature.interval_s = temperature_interval_s;
-    for (const Added& added : of.truth) {
+    for (const Added& added : of.added()) {
         for (const auto& [name, value] : added.values) {
             const std::string key = name.empty() ? added.effect : added.effect + "." + name;
             set(truth, key, fmt::format("{:.17g}", value));
@@ -286,6 +294,7 @@ bool settle(Case& of) {
     for (int round = 0; round < most_rounds; ++round) {
         Case at_limit = of;
         at_limit.direct = false;
+        at_limit.foreign.clear();
         std::vector<ActiveEffect> known;
         for (Added& added : at_limit.truth) {
             const effects::Effect* effect = effects::find(added.effect);
@@ -341,7 +350,7 @@ std::vector<Case> foreign_cases(std::size_t each, std::uint64_t series) {
             of.direct = true;
             of.seed = seeds_of_series * series + 50000 + cases.size();
             of.where = where;
-            of.truth = {std::move(added)};
+            of.foreign = {std::move(added)};
             cases.push_back(std::move(of));
         };
         // From what shows itself well to what is evident: sizes are even in their logarithms.
@@ -413,7 +422,7 @@ std::vector<std::string> not_held(const std::set<std::string>& true_effects,
 
 }  // namespace
 
-void compare(const Closure& closure, bool foreign, Where where, const std::vector<Added>& truth, Outcome& outcome) {
+void compare(const Closure& closure, std::optional<Where> where, const std::vector<Added>& truth, Outcome& outcome) {
     outcome.verdict = std::string(name_of(closure.verdict));
     outcome.before = closure.heldout_before;
     outcome.after = closure.heldout_after;
@@ -422,9 +431,7 @@ void compare(const Closure& closure, bool foreign, Where where, const std::vecto
     outcome.oracle = std::numeric_limits<double>::quiet_NaN();
     if (closure.unexplained) outcome.where = std::string(name_of(closure.unexplained->where));
     std::set<std::string> true_effects;
-    if (!foreign) {
-        for (const Added& added : truth) true_effects.insert(added.effect);
-    }
+    for (const Added& added : truth) true_effects.insert(added.effect);
     bool ties = false;
     for (const auto& step : closure.steps) {
         outcome.named += (outcome.named.empty() ? "" : "+") + step.effect;
@@ -436,12 +443,13 @@ void compare(const Closure& closure, bool foreign, Where where, const std::vecto
         if (!named && !tied_to_truth) outcome.false_name = true;
     }
     outcome.missing = not_held(true_effects, closure.steps);
-    if (closure.verdict == Verdict::unexplained) {
-        outcome.judged =
-            foreign && closure.unexplained->where == where && !outcome.false_name ? Judged::right : Judged::unexplained;
-    } else if (outcome.false_name) {
+    const bool unexplained = closure.verdict == Verdict::unexplained;
+    const bool as_it_is = unexplained ? where && closure.unexplained->where == *where : !where;
+    if (outcome.false_name && !unexplained) {
         outcome.judged = Judged::wrong;
-    } else if (foreign || !outcome.missing.empty()) {
+    } else if (unexplained && (!as_it_is || outcome.false_name)) {
+        outcome.judged = Judged::unexplained;
+    } else if (!as_it_is || !outcome.missing.empty()) {
         outcome.judged = Judged::missed;
     } else {
         outcome.judged = ties ? Judged::tie : Judged::right;
@@ -453,8 +461,8 @@ Outcome judge(const Case& of, const record::Record& record) {
     const auto start = std::chrono::steady_clock::now();
     const Closure closure = ringlock::closure::close_turns(record);
     outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    const bool foreign = of.kind == Kind::foreign;
-    compare(closure, foreign, of.where, of.truth, outcome);
+    const bool foreign = !of.foreign.empty();
+    compare(closure, foreign ? std::optional(of.where) : std::nullopt, of.truth, outcome);
     if (foreign) return outcome;
 
     std::vector<ActiveEffect> known;

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -33,13 +34,14 @@ extern const Condition other_gyro;
 /// Seeds of one series of records are apart from those of another by this.
 constexpr std::uint64_t seeds_of_series = 1'000'000;
 
-enum class Kind { null, single, pair, foreign, other, several };
+enum class Kind { null, single, pair, foreign, other, several, mixed };
 const char* name_of(Kind kind);
 
 struct Case {
     Kind kind = Kind::null;
-    std::vector<Added> truth;
-    double multiple = 0.0;  ///< of the detection limit; 0 for nulls and for what the library does not have
+    std::vector<Added> truth;         ///< of the library
+    std::vector<Added> foreign = {};  ///< that the library does not have
+    double multiple = 0.0;            ///< of the detection limit of what is of the library; 0 for nulls
     const Condition* condition = nullptr;
     bool direct = false;  ///< by the generator's integration of the equation of motion, not by the turn map
     std::uint64_t seed = 1;
@@ -47,12 +49,15 @@ struct Case {
     std::size_t turns = 16000;
     ringlock::closure::Where where = {};  ///< in which foreign effects show themselves
 
+    std::vector<Added> added() const;
     std::string truth_text() const;
 };
 
 /// The records of cases, those of the generator in one go. Threshold, amplitude and rate of the gyro differ from seed
 /// to seed; declared is the nominal threshold.
 std::vector<record::Record> make(std::span<const Case> cases);
+
+std::string text_of(const std::vector<Added>& added);
 
 /// How long the record of a case is.
 double duration_s(const Case& of);
@@ -76,7 +81,10 @@ bool settle(Case& of);
 std::vector<Case> foreign_cases(std::size_t each, std::uint64_t series = 0);
 
 enum class Judged {
-    right,        ///< nothing missing in a null; all effects named, no other; unexplained with the right place
+    /// Nothing missing in a null; all effects named, no other; what the library does not have unexplained, with the
+    /// right
+    /// place
+    right,
     tie,          ///< ties hold all that is true
     missed,       ///< not all of the truth is there, nothing false is
     unexplained,  ///< and not outside the library, or with another place
@@ -112,7 +120,8 @@ struct Outcome {
 double gain_asked(const std::vector<std::string>& missing, double library);
 
 /// An answer held against the truth: what was said, and what that is judged. The oracle's error is left to be found.
-void compare(const ringlock::closure::Closure& closure, bool foreign, ringlock::closure::Where where,
+/// \param where  something that the library does not have shows itself there
+void compare(const ringlock::closure::Closure& closure, std::optional<ringlock::closure::Where> where,
              const std::vector<Added>& truth, Outcome& outcome);
 
 Outcome judge(const Case& of, const record::Record& record);

@@ -72,7 +72,7 @@ TEST(ClosureSuite, AnswersAreJudgedStepByStep) {
         closure.verdict = ringlock::closure::Verdict::closed;
         closure.steps = std::move(steps);
         Outcome outcome;
-        compare(closure, false, ringlock::closure::Where::time, truth, outcome);
+        compare(closure, std::nullopt, truth, outcome);
         return outcome;
     };
     const auto step = [](const char* effect, std::vector<std::string> others) {
@@ -318,9 +318,10 @@ TEST(ClosureSuite, AFastLineHasTheErrorsOfALine) {
     Case of{.truth = {}, .condition = &conditions[1], .seed = 5, .turns = turns};
     of.truth = {{"base_vibration", {{"frequency_hz", 70.3}, {"rate_deg_h", 200.0}, {"phase_rad", 0.9}}}};
     const record::Record record = make({&of, 1}).front();
-    const double duration_s = record.turns->time_s.back() - record.turns->time_s.front();
-    ringlock::closure::ActiveEffect line{effects::find("base_vibration")};
-    line.values = {{"frequency_hz", 70.3 + 0.1 / duration_s}, {"rate_deg_h", 180.0}, {"phase_rad", 0.7}};
+    const double length_s = record.turns->time_s.back() - record.turns->time_s.front();
+    const ringlock::closure::ActiveEffect line{
+        effects::find("base_vibration"),
+        {{"frequency_hz", 70.3 + 0.1 / length_s}, {"rate_deg_h", 180.0}, {"phase_rad", 0.7}}};
     ringlock::closure::TurnParameters start;
     start.effects.push_back(line);
     const auto fitted = ringlock::closure::fit_record(record, start, ringlock::closure::Rows(record.turns->size(), 1));
@@ -328,7 +329,7 @@ TEST(ClosureSuite, AFastLineHasTheErrorsOfALine) {
     for (const ringlock::closure::Estimate& estimate : fitted->fit->estimates()) found[estimate.name] = estimate;
     const auto& frequency = found.at("frequency_hz");
     EXPECT_NEAR(frequency.value, 70.3, 3.0 * frequency.sd);
-    EXPECT_NEAR(units::two_pi * duration_s * frequency.sd / found.at("phase_rad").sd, std::sqrt(3.0), 0.02);
+    EXPECT_NEAR(units::two_pi * length_s * frequency.sd / found.at("phase_rad").sd, std::sqrt(3.0), 0.02);
 }
 
 TEST(RandomRates, MayLookLikeARamp) {
