@@ -11,6 +11,7 @@
 
 #include "analysis/closure/chance.hpp"
 #include "analysis/closure/decision.hpp"
+#include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_steps.hpp"
 #include "analysis/closure/sample_tests.hpp"
 

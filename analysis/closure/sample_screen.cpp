@@ -238,15 +238,16 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
         return refine_line(
             now, {.hz = line.frequency_hz, .drift_hz_per_s = drifts ? line.drift_hz_per_s : 0.0, .drifts = drifts});
     };
+    bool scattered = false;
     if (likeliest.p_value < worth_looking) {
         const SampleLine still = refined(likeliest, false);
         const SampleLine drifting = refined(likeliest, true);
         if (scatters(now, e, lines, drifting.chi2 > still.chi2 ? drifting : still)) {
             // Slow ones are what a base does as well.
-            const bool declared = near_declared(now, in, likeliest.frequency_hz);
+            const bool declared = near_declared(now, in, lines.scattered_hz);
             out.push_back(wandering_line(now, in, lines, likeliest.p_value, declared));
-            out.back().nameless = !declared && likeliest.frequency_hz <= fast_hz;
-            return;
+            out.back().nameless = !declared && lines.scattered_hz <= fast_hz;
+            scattered = true;
         }
     }
     const LineShares shares = in.declared.dither_frequency_hz ? dither_declared : nothing_declared;
@@ -261,6 +262,7 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
     }
     for (const OfferedLine& line : offered) {
         if (!(line.found.p_value < worth_looking)) continue;
+        if (scattered && std::abs(line.found.frequency_hz - lines.scattered_hz) < beside_hz) continue;
         // The level of the spectrum about a line is itself a random number: what the regression says is closer.
         const SampleLine mended = refined(line.found, line.drifts);
         // What hardly drifts is told as well without.

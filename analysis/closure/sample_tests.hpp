@@ -34,7 +34,6 @@ struct UnsteadyLine {
     double p_value = 1.0;
     bool beside = false;  ///< there are other lines within beside_hz of it
 };
-inline constexpr double beside_hz = 1.0;
 UnsteadyLine unsteady_line(const SampleFit& fit);
 
 /// Gain of the log-likelihood by the view's regression, the noise fitted anew beside it, less its cost and so much for
