@@ -64,9 +64,10 @@ class Contest {
         double coefficients = 0.0;
         Where where = Where::time;
         bool jumps = false;
-        bool repeats = false;           ///< a variance that does
-        std::optional<double> hz = {};  ///< of a line
-        double of_a_motion = 0.0;       ///< merit beside what has resonances of its own
+        bool repeats = false;                  ///< a variance that does
+        std::optional<double> hz = {};         ///< of a line
+        double of_a_motion = 0.0;              ///< merit beside what has resonances of its own
+        std::optional<double> of_states = {};  ///< merit of jumps, their course integrated out
     };
 
     std::vector<SampleCandidate> screened(const SampleState& state, Wanted wanted) const;
@@ -309,7 +310,9 @@ std::vector<Contest::Rival> Contest::rivals(bool resampled, bool moved) const {
             rival.coefficients = static_cast<double>(view.columns().size());
         }
         if (repeats && resampled) rival.merit = std::max(rival.merit, view.refitted(0.0));
-        rival.of_a_motion = !repeats && view.refitted && moved ? view.refitted(0.0) : rival.merit;
+        const bool levels = view.test.view == jumping_rate;
+        if (levels && view.refitted) rival.of_states = view.refitted(0.0);
+        rival.of_a_motion = !repeats && !levels && view.refitted && moved ? view.refitted(0.0) : rival.merit;
         found.push_back(rival);
     }
     return found;
@@ -357,6 +360,7 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
             more = closure::tie;
         }
         most = std::max(most, merit + more);
+        if (rival.of_states) most = std::max(most, *rival.of_states - closure::tie);
     }
     return most;
 }

@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <utility>
 
@@ -12,8 +11,10 @@
 #include "analysis/closure/sample_lines.hpp"
 #include "analysis/closure/sample_search.hpp"
 #include "analysis/closure/sample_steps.hpp"
+#include "analysis/closure/sample_tests.hpp"
 #include "analysis/closure/sample_views.hpp"
 #include "analysis/closure/two_levels.hpp"
+#include "analysis/closure/two_states.hpp"
 
 namespace ringlock::closure {
 
@@ -133,9 +134,14 @@ std::vector<double> two_level_rate(const SampleFit& fit, const Eigen::VectorXd& 
     return rate();
 }
 
-/// Rates of stretches of the record, for a rate that jumps to and fro.
-void test_levels(const SampleFit& fit, Views& views) {
-    constexpr std::size_t stretches = 120;
+/// The normal equations of a regression on the rates of stretches of the record, beside the columns of the model; and
+/// what these take off them.
+struct Stretches {
+    Eigen::MatrixXd normal, of_columns;
+    Eigen::VectorXd right;
+};
+
+Stretches regress_on_stretches(const SampleFit& fit, std::size_t stretches) {
     const std::size_t n = fit.series().size();
     // The filter forgets: of each stretch's series only what is not negligible.
     struct Response {
@@ -186,17 +192,57 @@ void test_levels(const SampleFit& fit, Views& views) {
             normal(static_cast<Eigen::Index>(b), static_cast<Eigen::Index>(a)) = sum;
         }
     }
-    normal -= cross.transpose() * fit.covariance() * cross;
-    const TwoLevels found = two_levels(normal, right);
+    return {std::move(normal), cross.transpose() * fit.covariance() * cross, std::move(right)};
+}
+
+/// Gain of the log-likelihood by a rate of two states, the noise fitted anew beside it, less its numbers.
+double merit_of_states(const SampleFit& fit, const TwoStates& first) {
+    constexpr double numbers = 3.0;  // the step and two probabilities
+    const std::size_t n = fit.series().size();
+    const auto stretches = static_cast<std::size_t>(first.expected.size());
+    std::vector<double> rate(n);
+    for (std::size_t i = 0; i < n; ++i) {
+        rate[i] = fit.series().interval_s * first.expected(static_cast<Eigen::Index>(i * stretches / n));
+    }
+    SampleModel with = fit.model();
+    with.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(std::move(rate))});
+    SampleModel without = fit.model();
+    without.noise = SampleFit(fit.series(), std::move(with), fit.rows(), SampleFit::Noise::near).model().noise;
+    const SampleFit beside(fit.series(), std::move(without), fit.rows(), SampleFit::Noise::held);
+    // Jumps do not wait for the end of a stretch: as short as has nothing to do with any but its neighbours.
+    constexpr double little = 1e-3;
+    std::size_t finer = 4;
+    Stretches all = regress_on_stretches(beside, finer * stretches);
+    while (finer > 1 && all.normal.diagonal(2).cwiseAbs().maxCoeff() > little * all.normal.diagonal().maxCoeff()) {
+        finer /= 2;
+        all = regress_on_stretches(beside, finer * stretches);
+    }
+    Eigen::VectorXd shape(all.right.size());
+    for (Eigen::Index k = 0; k < shape.size(); ++k) {
+        shape(k) = (first.expected(k / static_cast<Eigen::Index>(finer)) - first.rate) / first.step;
+    }
+    return beside.gain_over(fit) + two_states(all.normal, all.right, shape).gain - numbers;
+}
+
+/// Rates of stretches of the record, for a rate that jumps to and fro.
+void test_levels(const SampleFit& fit, Views& views) {
+    constexpr std::size_t stretches = 120;
+    const Stretches all = regress_on_stretches(fit, stretches);
+    const TwoLevels found = two_levels(all.normal - all.of_columns, all.right);
     // Jumps do not wait for the end of a stretch.
     constexpr double of_places = 2.0;
     const double cost = found.cost + of_places * found.changes;
-    views.push_back({{Where::time, "a rate that jumps between two levels", found.p_value,
-                      fmt::format("{} jumps", found.changes), found.merit},
-                     cost,
-                     [&fit, found] { return regressors({two_level_rate(fit, found.shape)}); },
-                     std::numeric_limits<double>::infinity(),
-                     found.changes > 1});  // one is the library's step
+    View view{
+        {Where::time, std::string(jumping_rate), found.p_value, fmt::format("{} jumps", found.changes), found.merit},
+        cost,
+        [&fit, found] { return regressors({two_level_rate(fit, found.shape)}); }};
+    view.jumps = found.changes > 1;  // one is the library's step
+    // Beside a random rate stretches are not on their own.
+    if (view.jumps && !fit.model().walk && !fit.model().flicker) {
+        const TwoStates states = two_states(all.normal, all.right, found.shape);
+        if (states.step != 0.0) view.refitted = [&fit, states](double) { return merit_of_states(fit, states); };
+    }
+    views.push_back(std::move(view));
 }
 
 void test_jumps(const SampleFit& fit, Views& views) {

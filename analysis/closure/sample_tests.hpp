@@ -22,6 +22,9 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows);
 /// The view of a variance that goes up and down evenly.
 inline constexpr std::string_view repeating_variance = "variance and covariance that repeat";
 
+/// The view of a rate that jumps to and fro between two levels.
+inline constexpr std::string_view jumping_rate = "a rate that jumps between two levels";
+
 /// Holds the innovations that count against everything that the record has: time, frequency, the place in the record
 /// modulo small numbers, witnesses, temperature, input rate, their own size. The views refer to the fit.
 /// \param lattice_arcsec  steps of the values, which are not normal then
