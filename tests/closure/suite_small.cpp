@@ -14,6 +14,7 @@
 #include "analysis/closure/dither_shape.hpp"
 #include "analysis/closure/turn_contest.hpp"
 #include "analysis/closure/two_levels.hpp"
+#include "analysis/closure/two_states.hpp"
 #include "tests/closure/suite.hpp"
 
 namespace ringlock::test::closure {
@@ -420,4 +421,66 @@ TEST(TwoLevels, EndsWhateverItIsGiven) {
 }
 
 }  // namespace
+// All courses of eight stretches one by one, each as likely as its steps and as what it is held against.
+TEST(TwoStates, AreSummedOverAllCourses) {
+    const Eigen::Index n = 8;
+    Eigen::MatrixXd normal = 3.0 * Eigen::MatrixXd::Identity(n, n);
+    Eigen::VectorXd right(n);
+    Eigen::VectorXd shape(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+        right(k) = 1.0 + 2.0 * std::sin(1.0 + 7.0 * static_cast<double>(k * k));
+        shape(k) = right(k) > 1.0 ? 1.0 : 0.0;
+        if (k + 1 < n) normal(k, k + 1) = normal(k + 1, k) = -0.4 + 0.05 * static_cast<double>(k);
+    }
+    const auto found = ringlock::closure::two_states(normal, right, shape);
+    const auto gain = [&](const ringlock::closure::TwoStates& states) {
+        double sum = 0.0;
+        for (unsigned course = 0; course < 1U << n; ++course) {
+            Eigen::VectorXd rate(n);
+            double chance = 0.5;
+            const auto upper = [&](Eigen::Index k) { return (course >> k & 1U) != 0; };
+            for (Eigen::Index k = 0; k < n; ++k) {
+                rate(k) = states.rate + (upper(k) ? states.step : 0.0);
+                if (k == 0) continue;
+                const double leaves = upper(k - 1) ? states.down : states.up;
+                chance *= upper(k) == upper(k - 1) ? 1.0 - leaves : leaves;
+            }
+            sum += chance * std::exp(right.dot(rate) - 0.5 * rate.dot(normal * rate));
+        }
+        return std::log(sum);
+    };
+    EXPECT_NEAR(found.gain, gain(found), 1e-9);
+    // And none near it has more.
+    for (const double more : {-0.05, 0.05}) {
+        for (double ringlock::closure::TwoStates::*number :
+             {&ringlock::closure::TwoStates::rate, &ringlock::closure::TwoStates::step,
+              &ringlock::closure::TwoStates::up, &ringlock::closure::TwoStates::down}) {
+            auto other = found;
+            other.*number *= 1.0 + more;
+            if (other.up > 0.5 || other.down > 0.5) continue;
+            EXPECT_LT(gain(other), found.gain + 1e-3);
+        }
+    }
+}
+
+// What the search of a single course must pay for the places of many jumps it need not.
+TEST(TwoStates, ManyJumpsCostLessThanTheirPlaces) {
+    const Eigen::Index n = 120;
+    boost::random::mt19937_64 random(4);
+    boost::random::normal_distribution<double> normal;
+    Eigen::VectorXd right(n);
+    double state = 0.0;
+    for (Eigen::Index k = 0; k < n; ++k) {
+        if (normal(random) > 0.8416) state = 4.0 - state;  // one in five
+        right(k) = state - 2.0 + normal(random);
+    }
+    const Eigen::MatrixXd each = Eigen::MatrixXd::Identity(n, n);
+    const auto course = ringlock::closure::two_levels(each, right);
+    ASSERT_GT(course.changes, 5);
+    const auto states = ringlock::closure::two_states(each, right, course.shape);
+    EXPECT_GT(states.gain, course.merit + 2.0 * course.changes);
+    EXPECT_NEAR(states.step, 4.0, 0.6);
+    EXPECT_NEAR(states.up, 0.2, 0.12);
+}
+
 }  // namespace ringlock::test::closure
