@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <set>
 #include <string>
@@ -134,13 +135,18 @@ TEST(LongClosureSampleSuite, AFlickerBeneathLargeStepsIsNoWalk) {
                      of_draws);
 }
 
-// A bias of two states, 3 deg/h apart, was called bias_instability.
-TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
+SampleTruth short_record(std::uint64_t seed) {
     SampleTruth truth;
     truth.size = 16000;
-    truth.seed = 5;
+    truth.seed = seed;
     truth.white_angle_arcsec = 0.3;
     truth.rates.quantum_noise_deg_rt_h = 0.01;
+    return truth;
+}
+
+// A bias of two states, 3 deg/h apart, was called bias_instability.
+TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
+    SampleTruth truth = short_record(5);
     truth.rates.telegraph_bias = {3.0, 20.0};
     const auto found = ringlock::closure::close_samples(generate_samples(truth));
     EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
@@ -152,11 +158,7 @@ TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
 // Jumps between two levels explain more than any random rate, and more than the line: it is looked for beside the
 // random rate that comes nearest.
 TEST(ClosureSampleSuite, ALineBesideARateOfNoNameIsNamed) {
-    SampleTruth truth;
-    truth.size = 16000;
-    truth.seed = 5;
-    truth.white_angle_arcsec = 0.3;
-    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    SampleTruth truth = short_record(5);
     truth.rates.telegraph_bias = {3.0, 20.0};
     truth.dither_residue = {37.3, 0.0, 0.04, 1.0};
     const auto found = ringlock::closure::close_samples(generate_samples(truth));
@@ -170,11 +172,7 @@ TEST(ClosureSampleSuite, ALineBesideARateOfNoNameIsNamed) {
 
 // A line that swings is no line of the library, and is beside nothing else.
 TEST(ClosureSampleSuite, WhatIsBesideALineOfNoNameIsNamed) {
-    SampleTruth truth;
-    truth.size = 16000;
-    truth.seed = 6;
-    truth.white_angle_arcsec = 0.3;
-    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    SampleTruth truth = short_record(6);
     truth.swinging_line = {8.0, 30.0, 0.2, 60.0};
     const auto alone = ringlock::closure::close_samples(generate_samples(truth));
     EXPECT_EQ(alone.verdict, ringlock::closure::Verdict::unexplained);

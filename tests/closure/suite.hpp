@@ -81,10 +81,7 @@ bool settle(Case& of);
 std::vector<Case> foreign_cases(std::size_t each, std::uint64_t series = 0);
 
 enum class Judged {
-    /// Nothing missing in a null; all effects named, no other; what the library does not have unexplained, with the
-    /// right
-    /// place
-    right,
+    right,        ///< nothing missing in a null; all effects named, no other; what is foreign at its place, unexplained
     tie,          ///< ties hold all that is true
     missed,       ///< not all of the truth is there, nothing false is
     unexplained,  ///< and not outside the library, or with another place

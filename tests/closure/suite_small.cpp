@@ -420,7 +420,6 @@ TEST(TwoLevels, EndsWhateverItIsGiven) {
     EXPECT_TRUE(std::isfinite(ringlock::closure::two_levels(along * along.transpose(), rate).p_value));
 }
 
-}  // namespace
 // All courses of eight stretches one by one, each as likely as its steps and as what it is held against.
 TEST(TwoStates, AreSummedOverAllCourses) {
     const Eigen::Index n = 8;
@@ -483,4 +482,5 @@ TEST(TwoStates, ManyJumpsCostLessThanTheirPlaces) {
     EXPECT_NEAR(states.up, 0.2, 0.12);
 }
 
+}  // namespace
 }  // namespace ringlock::test::closure
