@@ -1,0 +1,236 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/closure/chance.hpp"
+#include "analysis/closure/decision.hpp"
+#include "analysis/closure/sample_lines.hpp"
+#include "analysis/closure/sample_loop.hpp"
+#include "analysis/closure/sample_motion.hpp"
+#include "analysis/closure/sample_screen.hpp"
+#include "analysis/closure/sample_search.hpp"
+#include "analysis/closure/sample_steps.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// Of the line that was added last.
+double line_hz(const SampleModel& model, bool wanders) {
+    return wanders ? model.noise.resonances.back().hz : model.columns[model.columns.size() - 2].hz;
+}
+
+/// As a motion is told anew by what has come in, or has been drawn, beside it.
+constexpr int most_motions = 6;
+
+}  // namespace
+
+/// Values that nothing is held out of: steps are chosen like any other effect.
+std::vector<double> SampleLoop::chosen_increments() const {
+    std::vector<double> values;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+        if (rows_[i]) values.push_back(series_.increment[i]);
+    }
+    return values;
+}
+
+void SampleLoop::take_lattice(Closure& closure) {
+    if (series_.counted) {
+        closure.notes.push_back(fmt::format(
+            "counts are whole by their kind: steps of {:.6g} arcsec are no missing effect", counted_step()));
+        find_coarse_steps(closure);
+        if (rounded_.drawn()) closure.heldout_before = score(*now_.fit).error;
+        return;
+    }
+    lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
+    if (lattice_.step_arcsec == 0.0) return;
+    const double step = lattice_.step_arcsec;
+    const double sd = now_.fit->sd(series_.size() / 2);
+    // Steps add step^2/12 to the variance: less than a thousandth of it changes nothing that is told here.
+    if (step * step / 12.0 < 1e-3 * sd * sd) {
+        closure.notes.push_back(fmt::format(
+            "values come in steps of {:.6g} arcsec, too fine to matter beside {:.3g} arcsec of noise", step, sd));
+        return;
+    }
+    const bool blurred = lattice_.step_arcsec > 1.5 * lattice_.printed_arcsec;
+    if (blurred) {
+        closure.notes.push_back(fmt::format(
+            "values are written in steps of {:.6g} arcsec; beneath them is a coarser one, of which {:.0f} % "
+            "of the characteristic function is left",
+            lattice_.printed_arcsec, 100.0 * lattice_.strength));
+    }
+    Step taken;
+    taken.effect = "count_quantization";
+    taken.p_value = lattice_.p_value;
+    const SampleScore before = score_of(*now_.fit, reported_, 0.0);
+    // Blurred steps are not where the values are: the digits are.
+    used_step_ = blurred ? lattice_.printed_arcsec : step;
+    find_coarse_steps(closure);
+    const SampleScore after = score(*now_.fit);
+    taken.heldout_error_before = before.error;
+    taken.heldout_error_after = after.error;
+    taken.heldout_log_score_gain = after.log_score - before.log_score;
+    taken.parameters.push_back({"count_quantization", "step_arcsec", step, lattice_.step_sd_arcsec});
+    now_.steps.push_back(std::move(taken));
+    now_.told.push_back({"count_quantization", next_step_++});
+}
+
+/// Steps whose rounding follows the angle.
+void SampleLoop::find_coarse_steps(Closure& closure) {
+    const bool blurred = lattice_.step_arcsec > 1.5 * lattice_.printed_arcsec;
+    const double step = series_.counted ? counted_step() : blurred ? 0.0 : lattice_.step_arcsec;
+    if (!RoundedSamples::show(*now_.fit, step)) return;
+    now_.fit = rounded_.begin(*now_.fit, step);
+    closure.notes.push_back(
+        fmt::format("steps of {:.6g} arcsec are large beside the noise, and their rounding follows the angle: what "
+                    "was rounded is drawn by the model, and white_angle_arcsec is the noise before it was rounded",
+                    step));
+}
+
+/// Adds what earns its place, until nothing does.
+void SampleLoop::add_all(Closure& closure, bool random_rates) {
+    while (now_.steps.size() < most_steps) {
+        const SampleChoice choice = choose_on_samples(
+            record_.declared, {now_.fit, now_.lines_hz, next_step_, random_rates}, whole_, lattice_step());
+        nearest_ = choice.nearest;
+        if (!choice.chosen) break;
+        if (!earlier_ && is_random_rate(choice.chosen->candidate.effect)) earlier_ = now_;
+        take(choice, closure);
+    }
+}
+
+/// What was rounded was drawn by the model without a random rate, and says little of which one it is: the rounded
+/// values say that. The likelier is taken, with the fit to what was drawn by it.
+const SampleContender& SampleLoop::take_likelier(const SampleChoice& choice, Step& step) {
+    now_.fit = choice.chosen->fit;
+    if (!rounded_.drawn() || !choice.other_random) return *choice.chosen;
+    const auto drawn = rounded_.draw(choice.chosen->fit, draws_of_step);
+    const double without = score(*drawn).log_likelihood;
+    now_.fit = rounded_.draw(choice.other_random->fit, draws_of_step);
+    const double gain = score(*now_.fit).log_likelihood - without;
+    const bool other = gain > 0.0;
+    if (!other) now_.fit = rounded_.draw(drawn, 1);
+    const SampleContender& taken = other ? *choice.other_random : *choice.chosen;
+    const SampleContender& left = other ? *choice.chosen : *choice.other_random;
+    auto& tied = step.confounded_with;
+    std::erase_if(
+        tied, [&](const std::string& name) { return name == left.candidate.effect || name == taken.candidate.effect; });
+    if (std::abs(gain) < tie) tied.push_back(left.candidate.effect);
+    if (other) step.p_value = taken.candidate.p_value;
+    return taken;
+}
+
+/// Adds an effect to the model.
+void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
+    Step step;
+    step.p_value = choice.p_value;
+    step.confounded_with = choice.confounded_with;
+    const SampleScore before = score(*now_.fit);
+    const SampleContender& best = take_likelier(choice, step);
+    const std::string effect = best.candidate.effect;
+    step.effect = effect;
+    for (const auto& [partner, names] : now_.of_partners) {
+        if (partner != effect) continue;
+        for (const std::string& name : names) {
+            const auto& named = step.confounded_with;
+            if (std::find(named.begin(), named.end(), name) == named.end()) step.confounded_with.push_back(name);
+        }
+    }
+    now_.of_partners.insert(now_.of_partners.end(), choice.of_partners.begin(), choice.of_partners.end());
+    if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
+    drop_needless();
+    for (int k = 0; k < most_motions && move_anew();) ++k;
+    now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
+    now_.told.push_back({.effect = effect,
+                         .step = next_step_++,
+                         .witness = best.candidate.witness,
+                         .strong = best.candidate.strong,
+                         .other_hz = choice.other_hz});
+    if (rounded_.drawn()) {
+        now_.fit = rounded_.draw(now_.fit, draws_of_step);
+        // What was drawn without a motion tells little of it.
+        for (int k = 0; k < most_motions && move_anew(); ++k) now_.fit = rounded_.draw(now_.fit, 1);
+    } else if (series_.counted || used_step_ > 0.0) {
+        // What has been taken off may have been what the rounding was small beside.
+        find_coarse_steps(closure);
+    }
+    const SampleScore after = score(*now_.fit);
+    step.heldout_error_before = before.error;
+    step.heldout_error_after = after.error;
+    step.heldout_log_score_gain = after.log_score - before.log_score;
+    if (is_line(effect)) {
+        const double hz = line_hz(now_.fit->model(), best.candidate.wanders);
+        now_.lines_hz.push_back(alias(hz, series_.rate_hz).hz);
+        now_.told.back().hz = now_.lines_hz.back();
+        if (best.candidate.wanders) {
+            now_.notes.push_back(
+                fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "
+                            "samples before as a narrow resonance",
+                            now_.lines_hz.back()));
+        }
+    }
+    now_.steps.push_back(std::move(step));
+}
+
+/// Effects that stood in for the one added last are no longer needed beside it.
+void SampleLoop::drop_needless() {
+    for (std::size_t k = now_.steps.size(); k-- > 0;) {
+        const std::string effect = now_.steps[k].effect;
+        SampleModel without = now_.fit->model();
+        if (effect == "rate_random_walk") {
+            without.walk = false;
+            without.noise.walk_arcsec2_s3 = 0.0;
+        } else if (effect == "bias_instability") {
+            without.flicker = false;
+            without.noise.terms.clear();
+        } else if (effect.starts_with("bias_") || effect == "scale_factor_error") {
+            std::erase_if(without.columns, [&](const SampleColumn& c) { return c.effect == effect; });
+        } else {
+            continue;
+        }
+        auto fitted = std::make_shared<SampleFit>(series_, std::move(without), rows_, SampleFit::Noise::near);
+        const double chi2 = 2.0 * (now_.fit->gain_over(*fitted));
+        const int parameters = effect == "bias_step" ? 2 : 1;
+        if (passes_on_samples(chi2_tail(chi2, parameters))) continue;
+        now_.fit = std::move(fitted);
+        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
+        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+}
+
+/// What a witness told of a motion, and what it left, was told beside the noise as it was, which what has been added
+/// was a part of.
+bool SampleLoop::move_anew() {
+    bool any = false;
+    for (SampleStep& told : now_.told) {
+        if (told.effect != "case_motion") continue;
+        const SampleFit still(series_, without_motion(now_.fit->model()), rows_, SampleFit::Noise::held);
+        auto moved = std::make_shared<SampleFit>(series_, moved_as(still, told.witness, told.step), rows_,
+                                                 SampleFit::Noise::near);
+        const double more = told.strong ? 1.0 : 2.0 * witness_lags(series_.rate_hz) - 1.0;
+        if (!(moved->gain_over(*now_.fit) > more)) continue;
+        now_.fit = std::move(moved);
+        told.strong = true;
+        any = true;
+    }
+    return any;
+}
+
+/// A motion of the case that is known to be there, by two numbers or lag by lag.
+void SampleLoop::move_case(SampleStep& told, SampleFit::Noise noise) {
+    SampleModel model = now_.fit->model();
+    add_motion(model, series_, told.witness, told.step);
+    auto weak = std::make_shared<SampleFit>(series_, std::move(model), rows_, noise);
+    auto strong = std::make_shared<SampleFit>(series_, moved_as(*now_.fit, told.witness, told.step), rows_,
+                                              SampleFit::Noise::near);
+    const double more = 2.0 * witness_lags(series_.rate_hz) - 1.0;
+    told.strong = strong->gain_over(*weak) > more;
+    now_.fit = told.strong ? std::move(strong) : std::move(weak);
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,143 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/closure/chance.hpp"
+#include "analysis/closure/decision.hpp"
+#include "analysis/closure/sample_lines.hpp"
+#include "analysis/closure/sample_loop.hpp"
+#include "analysis/closure/sample_tests.hpp"
+
+namespace ringlock::closure {
+
+/// Tests of what the model has left; where structure lies, if any passes the level: by the regression that explains
+/// most, the noise fitted anew beside it; where none does, by the test that is least probable by chance.
+void SampleLoop::test_what_is_left(Closure& closure) const {
+    constexpr std::size_t looked_at = 4;
+    auto views = view_samples(*now_.fit, lattice_step());
+    const Disturbed still = find_disturbed(*now_.fit, whole_);
+    views.push_back(
+        {{Where::time, fmt::format("stretches of {:.3g} s far larger than the others", still.length_s),
+          still.share > 0.0 ? still.p_value : 1.0,
+          still.share > 0.0 ? fmt::format("{:.1f} % of the record, most at {:.6g} s, {:.3g} times the usual variance",
+                                          100.0 * still.share, still.at_s, still.worst)
+                            : ""}});
+    if (rounded_.drawn()) views.push_back({rounded_.test(*now_.fit)});
+    closure.tests.clear();
+    for (const View& view : views) closure.tests.push_back(view.test);
+    closure.unexplained.reset();
+    const auto count = static_cast<double>(views.size());
+    std::erase_if(views, [&](const View& view) { return of_several(view.test.p_value, count) >= level_of_residual; });
+    if (views.empty()) return;
+    std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.p_value < b.test.p_value; });
+    closure.unexplained = views.front().test;
+    std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
+    double most = 0.0;
+    for (std::size_t k = 0; k < std::min(looked_at, views.size()); ++k) {
+        if (!views[k].columns && !(views[k].test.merit > 0.0)) continue;
+        const double merit = views[k].columns ? refitted_merit(*now_.fit, views[k]) : views[k].test.merit;
+        if (merit <= most) continue;
+        most = merit;
+        closure.unexplained = views[k].test;
+    }
+}
+
+void SampleLoop::begin_again(const State& at) {
+    now_ = at;
+    // It was fitted to what was drawn then.
+    if (rounded_.drawn()) now_.fit = rounded_.draw(now_.fit, draws_of_step);
+}
+
+/// A rate is left that the random one has only come nearest to: several of the library together, if they leave nothing
+/// and are likelier; else no rate is named, and what was found beside it that is none stays.
+void SampleLoop::go_without_random(Closure& closure) {
+    const State followed = now_;
+    const std::optional<ResidualTest> left = closure.unexplained;
+    const std::vector<ResidualTest> tests = closure.tests;
+    begin_again(*earlier_);
+    add_all(closure, false);
+    test_what_is_left(closure);
+    if (!closure.unexplained && now_.fit->gain_over(*followed.fit) > 0.0) return;
+    begin_again(followed);
+    closure.unexplained = left;
+    closure.tests = tests;
+    const auto keeps = [](const SampleStep& told) { return !is_slow_rate(told.effect); };
+    if (keep_names(earlier_->told.empty() ? 0 : earlier_->told.back().step + 1, keeps, closure)) return;
+    begin_again(*earlier_);
+    test_what_is_left(closure);
+}
+
+/// A rate or a line is left that the library does not have, and in the way of what else there is: that is looked for
+/// beside what comes nearest to it.
+void SampleLoop::look_beside_nearest(Closure& closure) {
+    constexpr int most = 3;
+    const State without = now_;
+    const int first = next_step_;
+    const std::optional<ResidualTest> left = closure.unexplained;
+    const std::vector<ResidualTest> tests = closure.tests;
+    const bool line = is_line(nearest_->candidate.effect);
+    std::vector<double> around_hz;
+    for (int k = 0; k < most && nearest_ && is_line(nearest_->candidate.effect) == line; ++k) {
+        SampleChoice choice;
+        choice.chosen = std::exchange(nearest_, {});
+        take(choice, closure);
+        around_hz.push_back(now_.told.back().hz);
+        add_all(closure, line);
+    }
+    // What is left of a line lies about it, and a rate that is left takes another's shape.
+    const auto keeps = [&](const SampleStep& told) {
+        if (!line) return !is_slow_rate(told.effect);
+        if (!is_line(told.effect)) return !is_random_rate(told.effect);
+        return std::none_of(around_hz.begin(), around_hz.end(),
+                            [&](double hz) { return std::abs(hz - told.hz) < beside_hz; });
+    };
+    if (!keep_names(first, keeps, closure)) begin_again(without);
+    closure.unexplained = left;
+    closure.tests = tests;
+}
+
+/// Of what was added from that step on, some loses its name.
+/// \return whether anything keeps it
+bool SampleLoop::keep_names(int first_step, const std::function<bool(const SampleStep&)>& keeps, Closure& closure) {
+    const auto since = [&](const SampleStep& told) { return told.step >= first_step; };
+    const auto stays = [&](const SampleStep& told) { return since(told) && keeps(told); };
+    if (std::none_of(now_.told.begin(), now_.told.end(), stays)) return false;
+    for (std::size_t k = now_.told.size(); k-- > 0;) {
+        if (!since(now_.told[k]) || stays(now_.told[k])) continue;
+        closure.notes.push_back(fmt::format(
+            "{} follows what may be nothing that the library has: it is in the model, so that the rest can be "
+            "told, and is not named",
+            now_.steps[k].effect));
+        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
+        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+    return true;
+}
+
+/// A line of the library keeps its amplitude, and its frequency but for an even drift. One that does not, as its own
+/// amplitudes in time or lines beside it show, is none and is not named.
+void SampleLoop::take_back_lines(Closure& closure) {
+    if (!closure.unexplained) return;
+    const UnsteadyLine line = unsteady_line(*now_.fit);
+    const bool fails = of_several(line.p_value, static_cast<double>(closure.tests.size())) < level_of_residual;
+    if (!fails && !line.beside) return;
+    for (std::size_t k = 0; k < now_.told.size(); ++k) {
+        if (now_.told[k].step != line.step) continue;
+        const std::string at = fmt::format("at {:.6g} Hz", line.hz);
+        closure.unexplained = ResidualTest{line.beside ? Where::frequency : Where::amplitude,
+                                           "a line that does not keep its amplitude or its frequency",
+                                           fails ? line.p_value : closure.unexplained->p_value, at};
+        closure.notes.push_back(
+            fmt::format("the line {} is in the model, so that the rest can be told, and is not named", at));
+        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
+        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+        return;
+    }
+}
+
+}  // namespace ringlock::closure
