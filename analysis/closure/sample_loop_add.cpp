@@ -15,14 +15,21 @@
 #include "analysis/closure/sample_screen.hpp"
 #include "analysis/closure/sample_search.hpp"
 #include "analysis/closure/sample_steps.hpp"
+#include "engine/core/error.hpp"
 
 namespace ringlock::closure {
 
 namespace {
 
-/// Of the line that was added last.
-double line_hz(const SampleModel& model, bool wanders) {
-    return wanders ? model.noise.resonances.back().hz : model.columns[model.columns.size() - 2].hz;
+/// Frequency of the line that a step added, as it is read. Others may have come behind it: a motion that is told anew.
+double line_hz(const SampleModel& model, int step) {
+    for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+        if (model.resonance_steps[k] == step) return model.noise.resonances[k].hz;
+    }
+    const auto of_step = [step](const SampleColumn& c) { return c.step == step && c.name == "cosine"; };
+    const auto found = std::find_if(model.columns.begin(), model.columns.end(), of_step);
+    if (found == model.columns.end()) throw RunError("a line that was added is not in the model");
+    return found->hz;
 }
 
 /// As a motion is told anew by what has come in, or has been drawn, beside it.
@@ -164,7 +171,7 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     step.heldout_error_after = after.error;
     step.heldout_log_score_gain = after.log_score - before.log_score;
     if (is_line(effect)) {
-        const double hz = line_hz(now_.fit->model(), best.candidate.wanders);
+        const double hz = line_hz(now_.fit->model(), now_.told.back().step);
         now_.lines_hz.push_back(alias(hz, series_.rate_hz).hz);
         now_.told.back().hz = now_.lines_hz.back();
         if (best.candidate.wanders) {
