@@ -55,10 +55,10 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     const auto& columns = fit.model().columns;
     const SampleColumn& column = columns[cosine];
     const std::string& effect = column.effect;
-    const SampleLine line{column.hz, column.drift_hz_per_s, column.drifts};
+    const LineCourse& course = column.course;
     const double a = column.value;
     const double b = columns[cosine + 1].value;
-    const auto slopes = line_slopes(fit, line, a, b);
+    const auto slopes = line_slopes(fit, course, a, b);
     const Eigen::MatrixXd joint = fit.joint_covariance(slopes);
     const auto of_a = static_cast<Eigen::Index>(cosine);
     const auto of_hz = static_cast<Eigen::Index>(columns.size());
@@ -66,33 +66,33 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     // Of the amplitude and of the phase in the middle, by a, b
     const Eigen::Vector2d along(a / amplitude, b / amplitude);
     const double amplitude_sd = std::sqrt(std::max(0.0, along.dot(joint.block<2, 2>(of_a, of_a) * along)));
-    const Unaliased real = unaliased(line.hz, fit, declared);
+    const Unaliased real = unaliased(course.hz, fit, declared);
     const double hz_sd = std::sqrt(std::max(0.0, joint(of_hz, of_hz)));
     if (effect == "dither_residue") {
         all.push_back({effect, "frequency_hz", real.hz, std::hypot(hz_sd, real.from_hz_times * from_hz_sd)});
-        const double drift = line.drifts ? real.drift_sign * line.drift_hz_per_s : 0.0;
-        // Where none is needed it is held at zero; the error says what of it would not show.
-        double sd = 0.0;
-        if (line.drifts) {
-            sd = std::sqrt(std::max(0.0, joint(of_hz + 1, of_hz + 1)));
-        } else {
-            SampleLine drifting = line;
-            drifting.drifts = true;
+        if (course.free == 1) {
+            // It is held at zero; the error says what of it would not show.
+            LineCourse drifting = course;
+            drifting.free = 2;
             const auto more = fit.joint_covariance(line_slopes(fit, drifting, a, b));
-            sd = std::sqrt(std::max(0.0, more(of_hz + 1, of_hz + 1)));
+            all.push_back({effect, drift_names[0], 0.0, std::sqrt(std::max(0.0, more(of_hz + 1, of_hz + 1)))});
         }
-        all.push_back({effect, "drift_hz_per_s", drift, sd});
-        const double gain = std::max(1e-9, 2.0 * std::abs(std::sin(units::pi * line.hz * series.interval_s)));
+        for (std::size_t k = 1; k < course.free; ++k) {
+            const auto at = of_hz + static_cast<Eigen::Index>(k);
+            all.push_back({effect, drift_names[k - 1], real.drift_sign * course.coefficient(k),
+                           std::sqrt(std::max(0.0, joint(at, at)))});
+        }
+        const double gain = std::max(1e-9, 2.0 * std::abs(std::sin(units::pi * course.hz * series.interval_s)));
         all.push_back({effect, "amplitude_arcsec", amplitude / gain, amplitude_sd / gain});
         return;
     }
-    all.push_back({effect, "frequency_hz", line.hz, hz_sd});
+    all.push_back({effect, "frequency_hz", course.hz, hz_sd});
     // Increments are those of a rate integrated over each interval.
-    const double gain = std::sin(units::pi * line.hz * series.interval_s) / (units::pi * line.hz);
+    const double gain = std::sin(units::pi * course.hz * series.interval_s) / (units::pi * course.hz);
     all.push_back({effect, "rate_deg_h", amplitude / std::abs(gain), amplitude_sd / std::abs(gain)});
     // a cos + b sin = A sin(phase + 2 pi f (t + middle)), t from the middle
     const double middle_s = middle_of(series);
-    const double turns = line.hz * middle_s;
+    const double turns = course.hz * middle_s;
     const double sign = std::copysign(1.0, gain);
     const double phase = std::atan2(sign * a, sign * b) - units::two_pi * (turns - std::floor(turns));
     Eigen::VectorXd by = Eigen::VectorXd::Zero(joint.rows());

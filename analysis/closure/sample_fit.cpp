@@ -33,15 +33,15 @@ std::vector<double> SampleFit::as_taken(const std::vector<double>& increments) c
     return closure::as_taken(source(), increments, series_->interval_s);
 }
 
-std::vector<std::vector<double>> SampleFit::line(double hz, double drift_hz_per_s) const {
-    if (!(model_.noise.from_hz > 0.0)) return line_columns(series_->size(), series_->rate_hz, hz, drift_hz_per_s);
-    return line_as_taken(source(), series_->size(), series_->rate_hz, hz, drift_hz_per_s);
+std::vector<std::vector<double>> SampleFit::line(const LineCourse& course) const {
+    if (!(model_.noise.from_hz > 0.0)) return line_columns(series_->size(), series_->rate_hz, course);
+    return line_as_taken(source(), series_->size(), series_->rate_hz, course);
 }
 
 std::vector<double> SampleFit::taken(const SampleColumn& column) const {
     if (column.as_recorded || !(model_.noise.from_hz > 0.0)) return *column.series;
-    if (column.hz == 0.0) return as_taken(*column.series);
-    return line(column.hz, column.drift_hz_per_s)[column.name == "cosine" ? 0 : 1];
+    if (column.course.hz == 0.0) return as_taken(*column.series);
+    return line(column.course)[column.name == "cosine" ? 0 : 1];
 }
 
 std::vector<double> SampleFit::determined() const {

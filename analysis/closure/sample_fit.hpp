@@ -19,10 +19,9 @@ struct SampleColumn {
     double sd = 0.0;
     int step = -1;             ///< of the loop that added it
     bool as_recorded = false;  ///< and no further what a resampled record's source makes of it
-    /// Of a line's cosine and of the sine that follows it: frequency in the middle of the record; 0: no line. It may be
-    /// any up to half of the rate at which the readings were taken.
-    double hz = 0.0, drift_hz_per_s = 0.0;
-    bool drifts = false;
+    /// Of a line's cosine and of the sine that follows it; 0 Hz: no line. It may be any up to half of the rate at which
+    /// the readings were taken.
+    LineCourse course = {};
 };
 
 /// What a model of the samples consists of.
@@ -71,7 +70,7 @@ class SampleFit {
     /// where the record is resampled. Rows that those before them settle know it to their digits.
     std::vector<double> as_taken(const std::vector<double>& increments) const;
     /// Cosine and sine of a line, as the record has them.
-    std::vector<std::vector<double>> line(double hz, double drift_hz_per_s) const;
+    std::vector<std::vector<double>> line(const LineCourse& course) const;
     /// Of a column.
     std::vector<double> taken(const SampleColumn& column) const;
     /// Increments by all that is deterministic in the model.
@@ -105,6 +104,7 @@ class SampleFit {
     SampleSource source() const { return {model_.noise.from_hz, model_.noise.from_phase}; }
     void take_off();
     void take_whites(SampleNoise& noise) const;
+    std::vector<bool> places_of_lost(const std::vector<double>& before, const std::vector<double>& after) const;
     void raise_whites(SampleNoise& noise) const;
     /// Minus the log-likelihood under each.
     std::vector<double> evaluate(const std::vector<SampleModel>& models, std::span<const double> rest,

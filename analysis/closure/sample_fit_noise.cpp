@@ -304,6 +304,23 @@ void SampleFit::raise_whites(SampleNoise& noise) const {
     if (noise.rate_arcsec_rt_s * root_s < nothing * scale) noise.rate_arcsec_rt_s = small * scale / root_s;
 }
 
+/// The knobs for the places of resonances that one point has and the other has not.
+std::vector<bool> SampleFit::places_of_lost(const std::vector<double>& before, const std::vector<double>& after) const {
+    SampleModel own = model_;
+    const auto all = knobs(own);
+    const SampleModel had = at(before);
+    const SampleModel has = at(after);
+    std::vector<bool> lost(all.size(), false);
+    for (std::size_t k = 0; k < own.noise.resonances.size(); ++k) {
+        if (!(had.noise.resonances[k].arcsec > 0.0) || has.noise.resonances[k].arcsec > 0.0) continue;
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            const auto& resonance = own.noise.resonances[k];
+            lost[i] = lost[i] || all[i].value == &resonance.hz || all[i].value == &resonance.width_hz;
+        }
+    }
+    return lost;
+}
+
 void SampleFit::fit_noise() {
     raise_whites(model_.noise);
     // So does a part of what a witness leaves of a motion: a line beside it may have had no use for it.
@@ -344,6 +361,7 @@ void SampleFit::fit_noise() {
             try_from(anew);
         }
     }
+    std::vector<double> as_it_was = start;
     if (!searched_ && (resampled || narrow)) {
         // The likelihood may have several tops: by a simplex on a part of the record first, from where it stopped until
         // that gains nothing, for it may have fallen flat. Of a source by where it takes its samples and what is white;
@@ -376,7 +394,17 @@ void SampleFit::fit_noise() {
         }
         start = with(some);
     }
+    // A part of the record may have another top than the whole, and a resonance that goes beyond the end of its range
+    // does not come back.
+    const auto began = evaluate({at(start), at(as_it_was)}, rest_, *rows_);
     score_noise(start, *rows_, {});
+    const std::vector<bool> lost = places_of_lost(as_it_was, start);
+    const bool any_lost = std::find(lost.begin(), lost.end(), true) != lost.end();
+    if (any_lost || began[1] < began[0]) {
+        score_noise(as_it_was, *rows_, lost);
+        const auto values = evaluate({at(start), at(as_it_was)}, rest_, *rows_);
+        if (values[1] < values[0]) start = std::move(as_it_was);
+    }
     if (resampled) {
         // Rows that are settled to their digits say how exactly the source's times are known, so well that numbers are
         // rounded there by more than the noise tells elsewhere.

@@ -24,12 +24,12 @@ KnownEffects known_effects(const SampleFit& base, const std::vector<ActiveEffect
         SampleStep told{std::string(active.effect->name()), static_cast<int>(known.told.size())};
         if (is_line(told.effect)) {
             const Alias shown = alias(active.values.at("frequency_hz"), from_hz > 0.0 ? from_hz : series.rate_hz);
-            SampleLine line{shown.hz};
-            if (told.effect == "dither_residue") {
-                line.drift_hz_per_s = (shown.folded ? -1.0 : 1.0) * active.values.at("drift_hz_per_s");
-                line.drifts = line.drift_hz_per_s != 0.0;
+            LineCourse course = LineCourse::still(active.values.at("frequency_hz"));
+            for (std::size_t k = 1; told.effect == "dither_residue" && k < LineCourse::most; ++k) {
+                course.coefficient(k) = active.values.at(drift_names[k - 1]);
+                if (course.coefficient(k) != 0.0) course.free = k + 1;
             }
-            add_line(model, series, line, told.effect, told.step);
+            add_line(model, series, course.shown_at(shown.hz, shown.folded), told.effect, told.step);
         } else if (told.effect == "case_motion") {
             const std::string name = std::string("accel_") + "xyz"[std::lround(active.values.at("witness"))];
             for (std::size_t w = 0; w < series.witnesses.size(); ++w) {

@@ -45,11 +45,11 @@ std::vector<double> periodogram(const std::vector<double>& values, std::size_t p
     return power;
 }
 
-std::vector<double> line_phase(std::size_t size, double rate_hz, double frequency_hz, double drift_hz_per_s) {
+std::vector<double> line_phase(std::size_t size, double rate_hz, const LineCourse& course) {
     std::vector<double> phase(size);
     for (std::size_t i = 0; i < size; ++i) {
         const double t = (static_cast<double>(i) - 0.5 * static_cast<double>(size - 1)) / rate_hz;
-        const double turns = frequency_hz * t + 0.5 * drift_hz_per_s * t * t;
+        const double turns = course.turns(t);
         phase[i] = units::two_pi * (turns - std::floor(turns));
     }
     return phase;
@@ -179,7 +179,7 @@ FoundLine follow(const std::vector<double>& values, const Spectrum& spectrum, do
     const std::size_t step = n / keep;
     const std::size_t slow = (n + step - 1) / step;
     const double low_rate = spectrum.rate_hz / static_cast<double>(step);
-    const auto phase = line_phase(n, spectrum.rate_hz, centre_hz, drift);
+    const auto phase = line_phase(n, spectrum.rate_hz, LineCourse::even(centre_hz, drift));
     std::vector<Complex> low(slow, 0.0);
     for (std::size_t i = 0; i < n; ++i) low[i / step] += values[i] * std::polar(1.0, -phase[i]);
     const std::size_t padded = power_of_two(4 * slow);
@@ -267,6 +267,7 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
         if (best - 2.0 * used > lines.scattered && p < 1e-6) {
             lines.scattered = best - 2.0 * used;
             lines.scattered_hz = hz * static_cast<double>(best_bin);
+            lines.scattered_drift_hz_per_s = best_slope * bins * hz / spectrum.duration_s;
         }
         if (p >= least) continue;
         least = p;

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "analysis/closure/line_course.hpp"
+
 /// Lines in a series of white innovations: where one stands out, and how probable that is by chance.
 namespace ringlock::closure {
 
@@ -20,7 +22,7 @@ struct FoundLine {
 struct FoundLines {
     FoundLine still, slow, tracked;
     double scattered = 0.0;  ///< power over the level in pieces, chi-squared above what chance leaves there
-    double scattered_hz = 0.0;
+    double scattered_hz = 0.0, scattered_drift_hz_per_s = 0.0;
 
     /// The least probable by chance, that being one of three counted.
     FoundLine likeliest() const;
@@ -33,6 +35,17 @@ FoundLines find_lines(const std::vector<double>& values, double rate_hz, const s
 /// The same for lines that keep their frequency only.
 FoundLine find_still_line(const std::vector<double>& values, double rate_hz, const std::vector<double>& known_hz = {},
                           double width_hz = 0.0);
+
+/// A line on a curve, its phase followed over the whole record, through the power that stands out in pieces: first the
+/// phases within the pieces alone, then of ever fewer and longer ones.
+struct FoundCourse {
+    LineCourse course;
+    double chi2 = 0.0;  ///< of its two amplitudes
+};
+/// How many independent places a search over such curves is worth: those of a line that drifts by as much as is
+/// tracked, and for each coefficient more those of half a cycle a piece.
+double places_of_bends(double chi2, double cycles, std::size_t coefficients);
+FoundCourse follow_bends(const std::vector<double>& values, double rate_hz, const FoundLines& found);
 
 /// A narrow band about where a line is expected.
 struct LineBand {
@@ -50,8 +63,8 @@ NarrowLines find_lines_in(const std::vector<double>& values, double rate_hz, con
 /// chi-squared field above that level (Worsley, Adv. Appl. Prob. 26, 1994, 13).
 double places_of_drift(double chi2, double cycles, double drift_cycles);
 
-/// The angle 2 pi (f t + d t^2/2) of a line at each sample, t from the middle.
-std::vector<double> line_phase(std::size_t size, double rate_hz, double frequency_hz, double drift_hz_per_s);
+/// The angle of a line at each sample, zero in the middle.
+std::vector<double> line_phase(std::size_t size, double rate_hz, const LineCourse& course);
 
 /// Squared magnitudes of the Fourier transform of real values, zeros behind, below half the rate.
 std::vector<double> periodogram(const std::vector<double>& values, std::size_t padded);

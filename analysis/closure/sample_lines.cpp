@@ -11,22 +11,43 @@ namespace ringlock::closure {
 
 namespace {
 
+/// A step of the coefficients no longer than where the next is surely better told.
+void step_course(LineCourse& course, const Eigen::VectorXd& off, double duration_s) {
+    double share = 1.0;
+    if (course.free <= 2) {
+        const double most = 2.0 / (duration_s * duration_s);
+        course.hz += std::clamp(off[0], -0.3 / duration_s, 0.3 / duration_s);
+        if (course.free == 2) course.drifts[0] += std::clamp(off[1], -most, most);
+        return;
+    }
+    // Coefficients of a polynomial make up for each other: all go together.
+    constexpr double most_cycles = 0.3;
+    constexpr int places = 64;
+    LineCourse step;
+    for (std::size_t k = 0; k < course.free; ++k) step.coefficient(k) = off[static_cast<Eigen::Index>(k)];
+    for (int i = -places; i <= places; ++i) {
+        const double turns = std::abs(step.turns(0.5 * duration_s * i / places));
+        if (share * turns > most_cycles) share = most_cycles / turns;
+    }
+    for (std::size_t k = 0; k < course.free; ++k) course.coefficient(k) += share * step.coefficient(k);
+}
+
 SampleLine refined_from(const SampleFit& fit, SampleLine line) {
     const double duration_s = static_cast<double>(fit.series().size()) * fit.series().interval_s;
-    for (int round = 0; round < 6; ++round) {
-        auto columns = fit.line(line.hz, line.drift_hz_per_s);
+    const int most = line.course.free > 2 ? 20 : 6;
+    for (int round = 0; round < most; ++round) {
+        auto columns = fit.line(line.course);
         const auto score = fit.score(columns);
         if (score.rank < 2) return line;
         line.chi2 = score.chi2;
-        for (auto& slope : line_slopes(fit, line, score.value[0], score.value[1])) columns.push_back(std::move(slope));
+        for (auto& slope : line_slopes(fit, line.course, score.value[0], score.value[1])) {
+            columns.push_back(std::move(slope));
+        }
         const auto all = fit.score(columns);
-        const double off_hz = std::clamp(all.value[2], -0.3 / duration_s, 0.3 / duration_s);
-        const double most = 2.0 / (duration_s * duration_s);
-        const double off_drift = line.drifts ? std::clamp(all.value[3], -most, most) : 0.0;
         SampleLine next = line;
-        next.hz += off_hz;
-        next.drift_hz_per_s += off_drift;
-        next.chi2 = fit.score(fit.line(next.hz, next.drift_hz_per_s)).chi2;
+        step_course(next.course, Eigen::VectorXd::Map(&all.value[2], static_cast<Eigen::Index>(line.course.free)),
+                    duration_s);
+        next.chi2 = fit.score(fit.line(next.course)).chi2;
         if (!(next.chi2 > line.chi2)) break;
         const double gained = next.chi2 - line.chi2;
         line = next;
@@ -39,55 +60,48 @@ SampleLine refined_from(const SampleFit& fit, SampleLine line) {
 
 bool is_line(const std::string& effect) { return effect == "dither_residue" || effect == "base_vibration"; }
 
-std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const SampleLine& line, double a, double b) {
+std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const LineCourse& course, double a, double b) {
     const double duration_s = static_cast<double>(fit.series().size()) * fit.series().interval_s;
     // So small a part of a cycle at either end of the record that the next term does not matter.
     constexpr double part = 1e-4;
-    const auto by = [&](double off_hz, double off_drift) {
-        const auto more = fit.line(line.hz + off_hz, line.drift_hz_per_s + off_drift);
-        const auto less = fit.line(line.hz - off_hz, line.drift_hz_per_s - off_drift);
-        const double per = 0.5 / (off_hz + off_drift);
-        std::vector<double> slope(more[0].size());
+    std::vector<std::vector<double>> slopes;
+    for (std::size_t k = 0; k < course.free; ++k) {
+        const double off = part * LineCourse::a_cycle(k, duration_s);
+        LineCourse beside = course;
+        beside.coefficient(k) += off;
+        const auto more = fit.line(beside);
+        beside.coefficient(k) -= 2.0 * off;
+        const auto less = fit.line(beside);
+        std::vector<double>& slope = slopes.emplace_back(more[0].size());
         for (std::size_t i = 0; i < slope.size(); ++i) {
-            slope[i] = per * (a * (more[0][i] - less[0][i]) + b * (more[1][i] - less[1][i]));
+            slope[i] = 0.5 / off * (a * (more[0][i] - less[0][i]) + b * (more[1][i] - less[1][i]));
         }
-        return slope;
-    };
-    std::vector<std::vector<double>> slopes{by(part / duration_s, 0.0)};
-    if (line.drifts) slopes.push_back(by(0.0, part / (duration_s * duration_s)));
+    }
     return slopes;
 }
 
-void set_line(SampleModel& model, std::size_t cosine, const SampleSeries& series, const SampleLine& line) {
-    auto columns = line_columns(series.size(), series.rate_hz, line.hz, line.drift_hz_per_s);
-    model.columns[cosine].series = std::make_shared<const std::vector<double>>(std::move(columns[0]));
-    model.columns[cosine + 1].series = std::make_shared<const std::vector<double>>(std::move(columns[1]));
-    for (std::size_t k = cosine; k < cosine + 2; ++k) {
-        model.columns[k].hz = line.hz;
-        model.columns[k].drift_hz_per_s = line.drift_hz_per_s;
-        model.columns[k].drifts = line.drifts;
+void set_line(SampleModel& model, std::size_t cosine, const SampleSeries& series, const LineCourse& course) {
+    auto columns = line_columns(series.size(), series.rate_hz, course);
+    for (std::size_t k = 0; k < 2; ++k) {
+        model.columns[cosine + k].series = std::make_shared<const std::vector<double>>(std::move(columns[k]));
+        model.columns[cosine + k].course = course;
     }
 }
 
-SampleLine refine_line(const SampleFit& fit, const SampleLine& shown) {
-    SampleLine best = shown;
-    best.chi2 = -1.0;
+SampleLine refine_line(const SampleFit& fit, const LineCourse& shown) {
+    SampleLine best{shown, -1.0};
     for (const Alias& of : of_source(shown.hz, fit.series().rate_hz, fit.model().noise.from_hz)) {
-        SampleLine line = shown;
-        line.hz = of.hz;
-        if (of.folded) line.drift_hz_per_s = -line.drift_hz_per_s;
-        line = refined_from(fit, line);
+        const SampleLine line = refined_from(fit, {shown.shown_at(of.hz, of.folded)});
         if (line.chi2 > best.chi2) best = line;
     }
     return best;
 }
 
 bool scatters(const SampleFit& fit, std::vector<double> innovations, const FoundLines& found, const SampleLine& line) {
-    constexpr double much = 60.0;
     constexpr double near_hz = 1.0;
-    if (!(found.scattered > line.chi2 + much)) return false;
+    if (!(found.scattered > line.chi2 + much_scattered)) return false;
     // A strong line raises the level about it, which powers are over: more than about its peaks in pieces.
-    const auto columns = fit.line(line.hz, line.drift_hz_per_s);
+    const auto columns = fit.line(line.course);
     const auto score = fit.score(columns);
     for (std::size_t c = 0; c < columns.size(); ++c) {
         const auto white = fit.filter().apply(columns[c]);
@@ -97,7 +111,7 @@ bool scatters(const SampleFit& fit, std::vector<double> innovations, const Found
     }
     const FoundLines left = find_lines(innovations, fit.series().rate_hz);
     const bool same = std::abs(left.scattered_hz - found.scattered_hz) < near_hz;
-    return same && left.scattered > found.scattered / 3.0 + much;
+    return same && left.scattered > found.scattered / 3.0 + much_scattered;
 }
 
 SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, const Rows& rows,
@@ -132,13 +146,12 @@ SampleFit refine_lines(SampleFit fit, const Rows& rows) {
             const SampleColumn& cosine = model.columns[k];
             if (cosine.name != "cosine") continue;
             any = true;
-            SampleLine line{cosine.hz, cosine.drift_hz_per_s, cosine.drifts};
-            const auto score = fit.score(line_slopes(fit, line, cosine.value, model.columns[k + 1].value));
+            LineCourse course = cosine.course;
+            const auto score = fit.score(line_slopes(fit, course, cosine.value, model.columns[k + 1].value));
             // Where it cannot be said better than within a cycle over the record there is nothing to be mended.
-            line.hz += std::clamp(score.value[0], -0.3 / duration_s, 0.3 / duration_s);
-            const double most = 2.0 / (duration_s * duration_s);
-            if (line.drifts) line.drift_hz_per_s += std::clamp(score.value[1], -most, most);
-            set_line(model, k, series, line);
+            step_course(course, Eigen::VectorXd::Map(score.value.data(), static_cast<Eigen::Index>(course.free)),
+                        duration_s);
+            set_line(model, k, series, course);
         }
         if (!any) break;
         fit = SampleFit(series, std::move(model), rows, SampleFit::Noise::near);

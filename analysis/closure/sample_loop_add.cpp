@@ -29,7 +29,7 @@ double line_hz(const SampleModel& model, int step) {
     const auto of_step = [step](const SampleColumn& c) { return c.step == step && c.name == "cosine"; };
     const auto found = std::find_if(model.columns.begin(), model.columns.end(), of_step);
     if (found == model.columns.end()) throw RunError("a line that was added is not in the model");
-    return found->hz;
+    return found->course.hz;
 }
 
 /// As a motion is told anew by what has come in, or has been drawn, beside it.

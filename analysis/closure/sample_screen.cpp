@@ -206,8 +206,7 @@ std::vector<OfferedLine> declared_lines(const SampleFit& now, const SampleContex
     return {still, drifting};
 }
 
-SampleCandidate wandering_line(const SampleFit& now, const SampleContext& in, const FoundLines& lines, double p_value,
-                               bool declared) {
+SampleCandidate wandering_line(const SampleFit& now, const SampleContext& in, const FoundLines& lines, double p_value) {
     SampleCandidate c{.effect = "dither_residue",
                       .model = {},
                       .p_value = p_value,
@@ -216,8 +215,26 @@ SampleCandidate wandering_line(const SampleFit& now, const SampleContext& in, co
                       .freedom = 3,
                       .hz = lines.scattered_hz,
                       .wanders = true};
-    if (!declared) c.confounded = {"base_vibration"};
     c.model = with_wandering_line(now, lines, in.rows, c.effect, in.step);
+    return c;
+}
+
+/// A line on a curve, where power is scattered that none which drifts evenly has.
+std::optional<SampleCandidate> bent_line(const SampleFit& now, const SampleContext& in, const FoundLines& lines,
+                                         const std::vector<double>& e) {
+    const FoundCourse found = follow_bends(e, in.series.rate_hz, lines);
+    if (found.course.free < 3) return std::nullopt;
+    const SampleLine line = refine_line(now, found.course);
+    if (scatters(now, e, lines, line)) return std::nullopt;
+    const double searched = places_of_bends(line.chi2, 0.5 * static_cast<double>(e.size()), found.course.free);
+    SampleCandidate c{.effect = "dither_residue",
+                      .model = now.model(),
+                      .p_value = of_several(chi2_tail(line.chi2, 2), searched),
+                      .searched = searched,
+                      .parameters = 2,
+                      .freedom = 2,
+                      .hz = lines.scattered_hz};
+    add_line(c.model, in.series, line.course, c.effect, in.step);
     return c;
 }
 
@@ -235,18 +252,25 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
     const FoundLines lines = find_lines(e, in.series.rate_hz, in.lines_hz, width_hz);
     const FoundLine likeliest = lines.likeliest();
     const auto refined = [&](const FoundLine& line, bool drifts) {
-        return refine_line(
-            now, {.hz = line.frequency_hz, .drift_hz_per_s = drifts ? line.drift_hz_per_s : 0.0, .drifts = drifts});
+        return refine_line(now, drifts ? LineCourse::even(line.frequency_hz, line.drift_hz_per_s)
+                                       : LineCourse::still(line.frequency_hz));
     };
     bool scattered = false;
     if (likeliest.p_value < worth_looking) {
         const SampleLine still = refined(likeliest, false);
         const SampleLine drifting = refined(likeliest, true);
+        // Slow ones are what a base does as well.
+        const bool declared = near_declared(now, in, lines.scattered_hz);
+        const auto offer = [&](SampleCandidate c) {
+            c.nameless = !declared && lines.scattered_hz <= fast_hz;
+            if (!declared) c.confounded = {"base_vibration"};
+            out.push_back(std::move(c));
+        };
+        if (lines.scattered > drifting.chi2 + much_scattered) {
+            if (auto bent = bent_line(now, in, lines, e)) offer(*std::move(bent));
+        }
         if (scatters(now, e, lines, drifting.chi2 > still.chi2 ? drifting : still)) {
-            // Slow ones are what a base does as well.
-            const bool declared = near_declared(now, in, lines.scattered_hz);
-            out.push_back(wandering_line(now, in, lines, likeliest.p_value, declared));
-            out.back().nameless = !declared && lines.scattered_hz <= fast_hz;
+            offer(wandering_line(now, in, lines, likeliest.p_value));
             scattered = true;
         }
     }
@@ -266,8 +290,8 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
         // The level of the spectrum about a line is itself a random number: what the regression says is closer.
         const SampleLine mended = refined(line.found, line.drifts);
         // What hardly drifts is told as well without.
-        if (line.drifts && !(std::abs(mended.drift_hz_per_s) * duration_s * duration_s > 1.0)) continue;
-        const bool fast = mended.hz > fast_hz;
+        if (line.drifts && !(std::abs(mended.course.drifts[0]) * duration_s * duration_s > 1.0)) continue;
+        const bool fast = mended.course.hz > fast_hz;
         const bool dither = line.declared || line.drifts;
         SampleCandidate c{.effect = dither || fast ? "dither_residue" : "base_vibration",
                           .model = now.model(),
@@ -277,7 +301,7 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
                           .freedom = 2,
                           .hz = line.found.frequency_hz};
         if (!dither) c.confounded.emplace_back(fast ? "base_vibration" : "dither_residue");
-        add_line(c.model, in.series, mended, c.effect, in.step);
+        add_line(c.model, in.series, mended.course, c.effect, in.step);
         out.push_back(std::move(c));
     }
 }
@@ -304,10 +328,9 @@ SampleModel with_lines_of_source(const SampleFit& now, SampleModel model) {
     };
     for (std::size_t k = 0; k + 1 < model.columns.size(); ++k) {
         if (model.columns[k].name != "cosine") continue;
-        const SampleColumn line = model.columns[k];
-        choose(line.hz, [&](SampleModel& there, const Alias& of) {
-            const double drift_hz_per_s = of.folded ? -line.drift_hz_per_s : line.drift_hz_per_s;
-            set_line(there, k, now.series(), {of.hz, drift_hz_per_s, line.drifts});
+        const LineCourse course = model.columns[k].course;
+        choose(course.hz, [&](SampleModel& there, const Alias& of) {
+            set_line(there, k, now.series(), course.shown_at(of.hz, of.folded));
         });
     }
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
@@ -512,13 +535,13 @@ std::vector<SampleColumn> rate_columns(const SampleSeries& series) {
     return columns;
 }
 
-void add_line(SampleModel& model, const SampleSeries& series, const SampleLine& line, const std::string& effect,
+void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const std::string& effect,
               int step) {
     for (const char* name : {"cosine", "sine"}) {
         model.columns.push_back({effect, name, nullptr});
         model.columns.back().step = step;
     }
-    set_line(model, model.columns.size() - 2, series, line);
+    set_line(model, model.columns.size() - 2, series, course);
 }
 
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in) {

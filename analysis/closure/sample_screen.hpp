@@ -41,7 +41,7 @@ struct SampleContext {
 
 /// Rates in proportion to one number that the record can tell of: time, temperature, input rate.
 std::vector<SampleColumn> rate_columns(const SampleSeries& series);
-void add_line(SampleModel& model, const SampleSeries& series, const SampleLine& line, const std::string& effect,
+void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const std::string& effect,
               int step);
 /// Of itself, a declared frequency of the dither may be off: more, with its harmonics, would be half of all lines.
 inline constexpr double declared_to = 0.002;

@@ -26,7 +26,7 @@ struct Swing {
 /// Of the innovations: fitted by Newton's method.
 Swing swing_of_variance(const SampleFit& fit, double hz) {
     const auto& e = fit.innovations();
-    const auto phase = line_phase(e.size(), fit.series().rate_hz, hz, 0.0);
+    const auto phase = line_phase(e.size(), fit.series().rate_hz, LineCourse::still(hz));
     Swing swing;
     double mean = 0.0;
     for (int round = 0; round < 8; ++round) {
@@ -55,7 +55,7 @@ Swing swing_of_variance(const SampleFit& fit, double hz) {
 /// errors of the readings before as well, and shows less.
 double gain_of_swinging_errors(const SampleFit& fit, double hz, const Swing& seen) {
     SampleModel model = fit.model();
-    const auto phase = line_phase(1, fit.series().rate_hz, hz, 0.0)[0];
+    const auto phase = line_phase(1, fit.series().rate_hz, LineCourse::still(hz))[0];
     // From the phase of the innovations to one that begins with the record.
     model.noise.swing_hz = hz;
     model.noise.swing_cos = seen.cos * std::cos(phase) + seen.sin * std::sin(phase);

@@ -108,8 +108,8 @@ std::vector<double> as_taken(const SampleSource& source, const std::vector<doubl
     });
 }
 
-std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, double hz, double drift_hz_per_s) {
-    const auto phase = line_phase(size, rate_hz, hz, drift_hz_per_s);
+std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, const LineCourse& course) {
+    const auto phase = line_phase(size, rate_hz, course);
     std::vector<std::vector<double>> columns(2, std::vector<double>(size));
     for (std::size_t i = 0; i < size; ++i) {
         columns[0][i] = std::cos(phase[i]);
@@ -118,13 +118,13 @@ std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, 
     return columns;
 }
 
-std::vector<std::vector<double>> line_as_taken(const SampleSource& source, std::size_t size, double rate_hz, double hz,
-                                               double drift_hz_per_s) {
+std::vector<std::vector<double>> line_as_taken(const SampleSource& source, std::size_t size, double rate_hz,
+                                               const LineCourse& course) {
     // An angle of sin(phase)/(2 sin(pi f/rate)) has increments of cos(phase).
-    const double gain = 2.0 * std::sin(units::pi * hz / rate_hz);
+    const double gain = 2.0 * std::sin(units::pi * course.hz / rate_hz);
     const auto phase = [&](double tick) {
         const double t = (tick - source.from_phase) / source.from_hz - 0.5 * static_cast<double>(size) / rate_hz;
-        const double turns = hz * t + 0.5 * drift_hz_per_s * t * t;
+        const double turns = course.turns(t);
         return units::two_pi * (turns - std::floor(turns));
     };
     return {between_readings(source, size, 1.0 / rate_hz, [&](double tick) { return std::sin(phase(tick)) / gain; }),

@@ -2,6 +2,8 @@
 #include <optional>
 #include <vector>
 
+#include "analysis/closure/line_course.hpp"
+
 /// What a resampled record has of an angle: its source took readings at a rate of its own, and the record has the
 /// straight lines between them.
 namespace ringlock::closure {
@@ -19,13 +21,13 @@ std::optional<SampleSource> find_straight_lines(const std::vector<double>& incre
 /// Increments of the record, of an angle that has these between the same times.
 std::vector<double> as_taken(const SampleSource& source, const std::vector<double>& increments, double interval_s);
 
-/// Increments of a line that are cos and sin of 2 pi (f t + d t^2/2), t from the middle of the record to the middle of
-/// each interval.
-std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, double hz, double drift_hz_per_s);
+/// Increments of a line that are cos and sin of its course, from the middle of the record to the middle of each
+/// interval.
+std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, const LineCourse& course);
 /// The same as the record has it. The frequency is what the source's readings are of: up to half of its rate, which may
 /// be more than half the record's. It is no multiple of the record's rate.
-std::vector<std::vector<double>> line_as_taken(const SampleSource& source, std::size_t size, double rate_hz, double hz,
-                                               double drift_hz_per_s);
+std::vector<std::vector<double>> line_as_taken(const SampleSource& source, std::size_t size, double rate_hz,
+                                               const LineCourse& course);
 
 /// Where a frequency shows in samples, and whether it goes down there as it goes up.
 struct Alias {

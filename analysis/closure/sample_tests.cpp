@@ -81,8 +81,9 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     double p = line.p_value;
     bool coherent = line.chi2 >= lines.scattered;
     if (p < 0.01) {
-        const SampleLine refined =
-            refine_line(fit, {line.frequency_hz, line.drift_hz_per_s, line.drift_hz_per_s != 0.0});
+        const LineCourse shown = line.drift_hz_per_s != 0.0 ? LineCourse::even(line.frequency_hz, line.drift_hz_per_s)
+                                                            : LineCourse::still(line.frequency_hz);
+        const SampleLine refined = refine_line(fit, shown);
         coherent = !scatters(fit, e, lines, refined);
         // The level about a line is itself a random number: what the regression says counts as well.
         if (coherent) p = std::max(p, of_several(chi2_tail(refined.chi2, 2), line.searched));
@@ -94,8 +95,8 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     if (coherent) {
         view.columns = [&fit, line] {
             const Alias of = of_source(line.frequency_hz, fit.series().rate_hz, fit.model().noise.from_hz).front();
-            const double drift_hz_per_s = of.folded ? -line.drift_hz_per_s : line.drift_hz_per_s;
-            return regressors(fit.line(of.hz, drift_hz_per_s));
+            return regressors(
+                fit.line(LineCourse::even(line.frequency_hz, line.drift_hz_per_s).shown_at(of.hz, of.folded)));
         };
     }
     if (!coherent) {
@@ -153,7 +154,7 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
         lines += 1.0;
         const double p = line_over_time(fit, c);
         if (least.step >= 0 && p >= least.p_value) continue;
-        least = {columns[c].step, columns[c].hz, p, false};
+        least = {columns[c].step, columns[c].course.hz, p, false};
     }
     least.p_value = of_several(least.p_value, std::max(lines, 1.0));
     if (least.step < 0) return least;

@@ -21,6 +21,7 @@ enum class Purpose : std::uint32_t {
     white_angle,
     case_motion,
     witness,
+    residue_wander,
 };
 
 class Random {

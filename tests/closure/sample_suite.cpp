@@ -124,7 +124,11 @@ bool is_random(const std::string& effect) { return effect == "bias_instability" 
 std::vector<ActiveEffect> known(const std::vector<Added>& truth) {
     std::vector<ActiveEffect> all;
     for (const Added& added : truth) {
-        all.push_back({effects::find(added.effect), {added.values.begin(), added.values.end()}});
+        ActiveEffect& active = all.emplace_back(ActiveEffect{effects::find(added.effect), {}});
+        for (const effects::Parameter& parameter : active.effect->parameters()) {
+            active.values.emplace(parameter.name, parameter.default_value);
+        }
+        for (const auto& [name, value] : added.values) active.values[name] = value;
     }
     return all;
 }

@@ -301,12 +301,54 @@ TEST(SampleLines, OfStrongOnesTheStrongestIsTheLikeliest) {
     std::mt19937_64 random(4);
     std::normal_distribution<double> normal;
     std::vector<double> values(30000);
-    const auto phase = ringlock::closure::line_phase(values.size(), rate_hz, 37.56, drift_hz_per_s);
+    const auto phase = ringlock::closure::line_phase(values.size(), rate_hz,
+                                                     ringlock::closure::LineCourse::even(37.56, drift_hz_per_s));
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = normal(random) + 5.0 * std::cos(phase[i]);
     const auto lines = ringlock::closure::find_lines(values, rate_hz);
     ASSERT_EQ(lines.still.p_value, 0.0);
     const double a_cycle = std::pow(rate_hz / static_cast<double>(values.size()), 2);
     EXPECT_NEAR(lines.likeliest().drift_hz_per_s, drift_hz_per_s, 1.1 * a_cycle);
+}
+
+// Through power that pieces of the record have, with the phase lost from one to the next: the course is found to a
+// hundredth of a cycle everywhere, by as many coefficients as that takes.
+TEST(SampleLines, AreFollowedOnACurve) {
+    using ringlock::closure::LineCourse;
+    constexpr double rate_hz = 100.0;
+    constexpr std::size_t n = 60000;
+    const LineCourse truth{37.56, {6e-4, -3e-6, 1.5e-8, -6e-11, 2e-13}, 6};
+    std::mt19937_64 random(6);
+    std::normal_distribution<double> normal;
+    const auto phase = ringlock::closure::line_phase(n, rate_hz, truth);
+    std::vector<double> values(n);
+    for (std::size_t i = 0; i < n; ++i) values[i] = normal(random) + std::cos(phase[i]);
+    const auto lines = ringlock::closure::find_lines(values, rate_hz);
+    const auto found = ringlock::closure::follow_bends(values, rate_hz, lines);
+    // The amplitude's square times half the values, and two for the noise; its standard error
+    EXPECT_NEAR(found.chi2, 0.5 * n / 1.5, 3.0 * std::sqrt(2.0 * n));
+    const auto off = [&](double t) {
+        const double turns = found.course.turns(t) - truth.turns(t);
+        return turns - std::round(turns);
+    };
+    for (double t = -295.0; t <= 295.0; t += 5.0) EXPECT_NEAR(off(t), 0.0, 0.03) << t;
+    EXPECT_GT(found.course.free, 3U);
+}
+
+// By how many places the search over curves is counted: in noise alone what it finds is not rare.
+TEST(SampleLines, SearchesOverCurvesAreCounted) {
+    constexpr double rate_hz = 100.0;
+    std::mt19937_64 random(8);
+    std::normal_distribution<double> normal;
+    for (int k = 0; k < 20; ++k) {
+        std::vector<double> values(20000);
+        for (double& x : values) x = normal(random);
+        auto lines = ringlock::closure::find_lines(values, rate_hz);
+        lines.scattered_hz = 10.0 + k;
+        const auto found = ringlock::closure::follow_bends(values, rate_hz, lines);
+        const double cycles = 0.5 * static_cast<double>(values.size());
+        const double places = ringlock::closure::places_of_bends(found.chi2, cycles, found.course.free);
+        EXPECT_GT(ringlock::closure::of_several(ringlock::closure::chi2_tail(found.chi2, 2), places), 0.01);
+    }
 }
 
 // The filter's likelihood is that of the increments' covariance matrix: here by its Cholesky factor.

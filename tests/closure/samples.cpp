@@ -153,6 +153,9 @@ record::Record generate_samples(const SampleTruth& truth) {
     std::vector<double> angle(intervals + 1);
     Random white(truth.seed, Purpose::white_angle);
     const DitherResidue& residue = truth.dither_residue;
+    Random walk(truth.seed, Purpose::residue_wander);
+    const double walked_rad = std::sqrt(two_pi * residue.wander_hz / source_hz);
+    double wandered_rad = residue.phase_rad;
     double rotated = 0.0;
     for (std::size_t i = 0; i <= intervals; ++i) {
         if (i > 0) rotated += rate[i - 1] / source_hz;
@@ -161,9 +164,12 @@ record::Record generate_samples(const SampleTruth& truth) {
         angle[i] = rotated + case_angle[i] + truth.white_angle_arcsec * std::sqrt(power) * white.normal();
         if (residue.amplitude_arcsec != 0.0) {
             const double since_middle = time_s[i] - 0.5 * end_s;
-            const double turns =
-                residue.frequency_hz * since_middle + 0.5 * residue.drift_hz_per_s * since_middle * since_middle;
-            angle[i] += residue.amplitude_arcsec * std::sin(two_pi * (turns - std::floor(turns)) + residue.phase_rad);
+            const double settled = 1.0 - std::exp(-time_s[i] / residue.settling_s);
+            const double turns = residue.frequency_hz * since_middle +
+                                 0.5 * residue.drift_hz_per_s * since_middle * since_middle +
+                                 residue.settles_hz * residue.settling_s * settled;
+            angle[i] += residue.amplitude_arcsec * std::sin(two_pi * (turns - std::floor(turns)) + wandered_rad);
+            if (walked_rad > 0.0) wandered_rad += walked_rad * walk.normal();
         }
     }
     if (truth.saturation_arcsec > 0.0) {

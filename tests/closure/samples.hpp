@@ -12,13 +12,18 @@
 namespace ringlock::test::closure {
 
 /// A line in the angle, the stripped dither that is left: amplitude sin(2 pi int f dt + phase), f = frequency + drift
-/// (t - mid-record). In increments it has 2 |sin(pi f/rate)| times the amplitude, and appears at its alias where f is
-/// above half the rate.
+/// (t - mid-record), and what is still to come of `settles_hz` from the start, by the rule of a body that takes on
+/// another temperature: settles exp(-(t - start)/settling time). Where it wanders its phase walks at random, by
+/// a variance of 2 pi wander a second: a line of that full width at half its power. In increments it has 2 |sin(pi
+/// f/rate)| times the amplitude, and appears at its alias where f is above half the rate.
 struct DitherResidue {
     double frequency_hz = 100.0;
     double drift_hz_per_s = 0.0;
     double amplitude_arcsec = 0.0;
     double phase_rad = 0.0;
+    double settles_hz = 0.0;
+    double settling_s = 600.0;
+    double wander_hz = 0.0;
 };
 
 /// Taken at `from_hz` and interpolated to the record's rate, the angle or (as from a table of rates) the rate linearly.

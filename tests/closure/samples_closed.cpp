@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -108,6 +109,47 @@ TEST(SampleClosure, NamesADitherThatDrifts) {
     EXPECT_NEAR(value_of(step, "drift_hz_per_s"), 1e-4, 1e-5);
     EXPECT_NEAR(value_of(step, "amplitude_arcsec"), 0.05, 0.008);
     EXPECT_TRUE(step.confounded_with.empty());
+}
+
+// A dither whose springs take on another temperature: its frequency goes on a curve that no even drift follows. The
+// truth is no polynomial.
+TEST(SampleClosure, NamesADitherThatSettles) {
+    SampleTruth truth = usual();
+    truth.dither_residue = {437.3, 0.0, 0.1, 0.5, -0.5, 250.0};
+    const auto step = only_step(closed(truth), "dither_residue");
+    const double middle = -0.5 * std::exp(-300.0 / 250.0);
+    EXPECT_NEAR(value_of(step, "frequency_hz"), 37.3 + middle, 1e-3);
+    EXPECT_NEAR(value_of(step, "drift_hz_per_s"), -middle / 250.0, 2e-5);
+    EXPECT_NEAR(value_of(step, "drift_2_hz_per_s2"), middle / 250.0 / 250.0, 1e-6);
+    EXPECT_NEAR(value_of(step, "amplitude_arcsec"), 0.1, 0.008);
+    for (const auto& estimate : step.parameters) EXPECT_NE(estimate.name, "wander_hz");
+}
+
+// A line whose phase walks is foretold as a resonance, and is not taken for the motion beside it, which has resonances
+// too.
+TEST(SampleClosure, AWanderingLineIsNotTheMotionBesideIt) {
+    SampleTruth truth = usual();
+    truth.accelerometers = true;
+    truth.case_motion.rms_arcsec = 2.0;
+    truth.case_motion.coherence = 0.7;
+    truth.case_motion.centre_hz = 4.0;
+    truth.dither_residue = {37.3, 0.0, 1.0, 0.0};
+    truth.dither_residue.wander_hz = 0.05;
+    const auto found = closed(truth);
+    EXPECT_EQ(found.verdict, closure::Verdict::closed) << (found.unexplained ? found.unexplained->description() : "");
+    std::set<std::string> named;
+    for (const auto& step : found.steps) {
+        named.insert(step.effect);
+        if (step.effect != "dither_residue") continue;
+        EXPECT_NEAR(value_of(step, "frequency_hz"), 37.3, 0.05);
+        EXPECT_NEAR(value_of(step, "wander_hz"), 0.05, 0.025);
+    }
+    EXPECT_EQ(named, (std::set<std::string>{"case_motion", "dither_residue"}));
+    const auto of_line = std::find_if(found.notes.begin(), found.notes.end(), [](const std::string& note) {
+        return note.find("does not keep its phase") != std::string::npos;
+    });
+    ASSERT_NE(of_line, found.notes.end());
+    EXPECT_EQ(of_line->find("the line at 37."), 0U) << *of_line;
 }
 
 TEST(SampleClosure, ALineThatStandsStillMayBeEither) {
