@@ -119,17 +119,21 @@ bool SampleLoop::keep_names(int first_step, const std::function<bool(const Sampl
     return true;
 }
 
-/// A line of the library keeps its amplitude, and its frequency but for an even drift. One that does not, as its own
-/// amplitudes in time or lines beside it show, is none and is not named.
+/// A line of the library keeps its amplitude, and its frequency but for a drift. One that does not, as its own
+/// amplitudes in time or lines beside it show, is none and is not named. What a strong one does beside, by a hundredth
+/// of its power, is left, but takes the name from none.
 void SampleLoop::take_back_lines(Closure& closure) {
     if (!closure.unexplained) return;
     const UnsteadyLine line = unsteady_line(*now_.fit);
-    const bool fails = of_several(line.p_value, static_cast<double>(closure.tests.size())) < level_of_residual;
-    if (!fails && !line.beside) return;
+    constexpr double little = 0.02;
+    const bool fails =
+        line.off > little && of_several(line.p_value, static_cast<double>(closure.tests.size())) < level_of_residual;
+    const bool beside = line.beside > little;
+    if (!fails && !beside) return;
     for (std::size_t k = 0; k < now_.told.size(); ++k) {
         if (now_.told[k].step != line.step) continue;
         const std::string at = fmt::format("at {:.6g} Hz", line.hz);
-        closure.unexplained = ResidualTest{line.beside ? Where::frequency : Where::amplitude,
+        closure.unexplained = ResidualTest{beside ? Where::frequency : Where::amplitude,
                                            "a line that does not keep its amplitude or its frequency",
                                            fails ? line.p_value : closure.unexplained->p_value, at};
         closure.notes.push_back(

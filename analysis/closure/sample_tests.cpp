@@ -109,12 +109,20 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     views.push_back(std::move(view));
 }
 
-/// A line that is not what it was: its amplitudes in stretches. By chance, of the cosine in that column.
-double line_over_time(const SampleFit& fit, std::size_t cosine) {
+/// A line that is not what it was: its amplitudes in stretches. Of the cosine in that column.
+struct OverTime {
+    double p_value = 1.0;  ///< by chance
+    double power = 0.0;    ///< chi-squared of the line
+    double off = 0.0;      ///< chi-squared of what the stretches have beside it, less what chance leaves
+};
+OverTime line_over_time(const SampleFit& fit, std::size_t cosine) {
     constexpr std::size_t stretches = 20;
     const std::size_t n = fit.innovations().size();
     const auto& x = fit.whitened()[cosine];
     const auto& y = fit.whitened()[cosine + 1];
+    const double a = fit.model().columns[cosine].value;
+    const double b = fit.model().columns[cosine + 1].value;
+    double power = 0.0;
     double chi2 = 0.0;
     int freedom = -2;
     for (std::size_t s = 0; s < stretches; ++s) {
@@ -130,10 +138,12 @@ double line_over_time(const SampleFit& fit, std::size_t cosine) {
         }
         const double det = xx * yy - xy * xy;
         if (!(det > 1e-6 * xx * yy)) continue;
+        power += a * a * xx + 2.0 * a * b * xy + b * b * yy;
         chi2 += (yy * xe * xe - 2.0 * xy * xe * ye + xx * ye * ye) / det;
         freedom += 2;
     }
-    return freedom > 0 ? chi2_tail(chi2, freedom) : 1.0;
+    if (freedom <= 0) return {1.0, power, 0.0};
+    return {chi2_tail(chi2, freedom), power, chi2 - freedom};
 }
 
 void test_lines(const SampleFit& fit, Views& views) {
@@ -147,14 +157,19 @@ void test_lines(const SampleFit& fit, Views& views) {
 
 UnsteadyLine unsteady_line(const SampleFit& fit) {
     UnsteadyLine least;
+    double power = 0.0;
     double lines = 0.0;
     const auto& columns = fit.model().columns;
     for (std::size_t c = 0; c + 1 < columns.size(); ++c) {
         if (columns[c].name != "cosine") continue;
         lines += 1.0;
-        const double p = line_over_time(fit, c);
-        if (least.step >= 0 && p >= least.p_value) continue;
-        least = {columns[c].step, columns[c].course.hz, p, false};
+        const OverTime found = line_over_time(fit, c);
+        if (least.step >= 0 && found.p_value >= least.p_value) continue;
+        power = found.power;
+        least = {.step = columns[c].step,
+                 .hz = columns[c].course.hz,
+                 .p_value = found.p_value,
+                 .off = found.off / std::max(power, 1e-300)};
     }
     least.p_value = of_several(least.p_value, std::max(lines, 1.0));
     if (least.step < 0) return least;
@@ -165,8 +180,9 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
     const FoundLines left = find_lines(e, fit.series().rate_hz);
     const FoundLine line = left.likeliest();
     const double hz = line.chi2 >= left.scattered ? line.frequency_hz : left.scattered_hz;
-    least.beside =
-        line.p_value < level_of_residual && std::abs(hz - alias(least.hz, fit.series().rate_hz).hz) < beside_hz;
+    if (line.p_value < level_of_residual && std::abs(hz - alias(least.hz, fit.series().rate_hz).hz) < beside_hz) {
+        least.beside = std::max(line.chi2, left.scattered) / std::max(power, 1e-300);
+    }
     return least;
 }
 

@@ -35,7 +35,8 @@ struct UnsteadyLine {
     int step = -1;  ///< of the loop that added it; -1: there is none
     double hz = 0.0;
     double p_value = 1.0;
-    bool beside = false;  ///< there are other lines within beside_hz of it
+    double off = 0.0;     ///< power of its changes over that of the line
+    double beside = 0.0;  ///< power of another line within beside_hz of it, over its own
 };
 UnsteadyLine unsteady_line(const SampleFit& fit);
 
