@@ -66,8 +66,10 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
         scenario.effects.at("count_quantization").at("step_arcsec") = 0.25 * scale_factor_arcsec;
     }
     double step_arcsec = scenario.effects.at("count_quantization").at("step_arcsec");
+    double readings_hz = samples.rate_hz;
     for (const Step& step : closure.steps) {
         if (step.effect == "count_quantization") step_arcsec = value_of(step.parameters, "step_arcsec", 0.0);
+        if (step.effect == "resampling") readings_hz = value_of(step.parameters, "from_hz", readings_hz);
     }
     // What is fitted as white noise of the angle has that of the steps in it.
     const double white = value_of(closure.base, "white_angle_arcsec", 0.0);
@@ -82,9 +84,10 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
         scenario.readout.model = scenario::ReadoutModel::ideal;
         scenario.gyro.scale_factor_arcsec = scale_factor_arcsec;
     }
-    // A turn at every end of a sample, so that nothing is interpolated, and fringes enough between turns.
-    const double halves = std::max(1.0, std::ceil(2.0 / samples.rate_hz));
-    scenario.dither.frequency_hz = 0.5 * halves * samples.rate_hz;
+    // A turn at every reading, so that none is interpolated and each has an error of its own, and fringes enough between
+    // turns.
+    const double halves = std::max(1.0, std::ceil(2.0 / readings_hz));
+    scenario.dither.frequency_hz = 0.5 * halves * readings_hz;
     constexpr double fringes = 200.0;
     scenario.dither.peak_rate_deg_s = 0.5 * fringes * scenario.gyro.scale_factor_arcsec * units::two_pi *
                                       scenario.dither.frequency_hz / units::deg_h_per_deg_s;

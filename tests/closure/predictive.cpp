@@ -21,6 +21,7 @@
 #include "engine/scenario/scenario.hpp"
 #include "engine/store/hdf5.hpp"
 #include "tests/closure/plain_gyro.hpp"
+#include "tests/closure/samples.hpp"
 
 namespace ringlock::test::closure {
 namespace {
@@ -200,6 +201,23 @@ TEST_F(Predictively, SamplesTooAndTheirWhiteNoises) {
         const Predictive lacking = check_predictive(record, without);
         for (const PredictiveStatistic& s : lacking.statistics) EXPECT_EQ(s.p_value_all, 0.025) << s.name << noise;
     }
+}
+
+// Readings at another rate than the record's, each with an error of its own, and a line on a curve.
+TEST_F(Predictively, ResampledRecordsToo) {
+    test::closure::SampleTruth truth;
+    truth.size = 20000;
+    truth.white_angle_arcsec = 0.3;
+    truth.rates.quantum_noise_deg_rt_h = 0.01;
+    truth.resampling.from_hz = 137.3;
+    truth.dither_residue = {37.3, 0.0, 0.1, 0.0, -0.3, 80.0};
+    const record::Record record = test::closure::generate_samples(truth);
+    const Closure closure = close_loop(record);
+    ASSERT_EQ(closure.steps.size(), 2U);
+    const Predictive predictive = check_predictive(record, closure);
+    print(predictive);
+    ASSERT_EQ(predictive.statistics.size(), 2U);
+    for (const PredictiveStatistic& s : predictive.statistics) EXPECT_GT(s.p_value_all, 0.05) << s.name;
 }
 
 TEST_F(Predictively, WhatCannotBeSimulatedIsANote) {
