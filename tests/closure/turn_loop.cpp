@@ -190,7 +190,7 @@ TEST(TurnLoop, InjectedNoiseOfAFiftiethOfTheDitherIsFitted) {
 }
 
 /// Each moves what tells of others: times of turns, accelerations, readings and kicks.
-TEST(TurnLoop, EvidentEffectsAreNamedAndNoOther) {
+TEST(LongTurnLoop, EvidentEffectsAreNamedAndNoOther) {
     struct Evident {
         std::set<std::string> named;
         Truth truth;
