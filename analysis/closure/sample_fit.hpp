@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/closure/line_course.hpp"
 #include "analysis/closure/sample_filter.hpp"
 #include "analysis/closure/sample_series.hpp"
 #include "analysis/closure/sample_source.hpp"

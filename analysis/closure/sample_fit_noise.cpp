@@ -362,6 +362,7 @@ void SampleFit::fit_noise() {
         }
     }
     std::vector<double> as_it_was = start;
+    bool was_better = false;
     if (!searched_ && (resampled || narrow)) {
         // The likelihood may have several tops: by a simplex on a part of the record first, from where it stopped until
         // that gains nothing, for it may have fallen flat. Of a source by where it takes its samples and what is white;
@@ -393,14 +394,14 @@ void SampleFit::fit_noise() {
             value = now;
         }
         start = with(some);
+        // A part of the record may have another top than the whole.
+        const auto began = evaluate({at(start), at(as_it_was)}, rest_, *rows_);
+        was_better = began[1] < began[0];
     }
-    // A part of the record may have another top than the whole, and a resonance that goes beyond the end of its range
-    // does not come back.
-    const auto began = evaluate({at(start), at(as_it_was)}, rest_, *rows_);
     score_noise(start, *rows_, {});
+    // A resonance that goes beyond the end of its range does not come back.
     const std::vector<bool> lost = places_of_lost(as_it_was, start);
-    const bool any_lost = std::find(lost.begin(), lost.end(), true) != lost.end();
-    if (any_lost || began[1] < began[0]) {
+    if (was_better || std::find(lost.begin(), lost.end(), true) != lost.end()) {
         score_noise(as_it_was, *rows_, lost);
         const auto values = evaluate({at(start), at(as_it_was)}, rest_, *rows_);
         if (values[1] < values[0]) start = std::move(as_it_was);

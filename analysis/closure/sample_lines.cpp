@@ -13,7 +13,6 @@ namespace {
 
 /// A step of the coefficients no longer than where the next is surely better told.
 void step_course(LineCourse& course, const Eigen::VectorXd& off, double duration_s) {
-    double share = 1.0;
     if (course.free <= 2) {
         const double most = 2.0 / (duration_s * duration_s);
         course.hz += std::clamp(off[0], -0.3 / duration_s, 0.3 / duration_s);
@@ -23,6 +22,7 @@ void step_course(LineCourse& course, const Eigen::VectorXd& off, double duration
     // Coefficients of a polynomial make up for each other: all go together.
     constexpr double most_cycles = 0.3;
     constexpr int places = 64;
+    double share = 1.0;
     LineCourse step;
     for (std::size_t k = 0; k < course.free; ++k) step.coefficient(k) = off[static_cast<Eigen::Index>(k)];
     for (int i = -places; i <= places; ++i) {

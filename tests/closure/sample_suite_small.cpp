@@ -310,8 +310,8 @@ TEST(SampleLines, OfStrongOnesTheStrongestIsTheLikeliest) {
     EXPECT_NEAR(lines.likeliest().drift_hz_per_s, drift_hz_per_s, 1.1 * a_cycle);
 }
 
-// Through power that pieces of the record have, with the phase lost from one to the next: the course is found to a
-// hundredth of a cycle everywhere, by as many coefficients as that takes.
+// Through power that pieces of the record have, with the phase lost from one to the next: the course is found to
+// 0.03 cycles everywhere, by as many coefficients as that takes.
 TEST(SampleLines, AreFollowedOnACurve) {
     using ringlock::closure::LineCourse;
     constexpr double rate_hz = 100.0;
@@ -324,7 +324,7 @@ TEST(SampleLines, AreFollowedOnACurve) {
     for (std::size_t i = 0; i < n; ++i) values[i] = normal(random) + std::cos(phase[i]);
     const auto lines = ringlock::closure::find_lines(values, rate_hz);
     const auto found = ringlock::closure::follow_bends(values, rate_hz, lines);
-    // The amplitude's square times half the values, and two for the noise; its standard error
+    // Half the values over 1.5, the variance with the line in it
     EXPECT_NEAR(found.chi2, 0.5 * n / 1.5, 3.0 * std::sqrt(2.0 * n));
     const auto off = [&](double t) {
         const double turns = found.course.turns(t) - truth.turns(t);
