@@ -5,7 +5,15 @@
 #include <cmath>
 #include <numeric>
 
+#include "analysis/closure/column_regression.hpp"
+
 namespace ringlock::closure {
+
+namespace {
+
+SampleSource source_of(const SampleNoise& noise) { return {noise.from_hz, noise.from_phase}; }
+
+}  // namespace
 
 SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& rows, Noise noise)
     : series_(&series), rows_(&rows), model_(std::move(model)), searched_(noise == Noise::near) {
@@ -29,42 +37,47 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
 }
 
 std::vector<double> SampleFit::as_taken(const std::vector<double>& increments) const {
-    if (!(model_.noise.from_hz > 0.0)) return increments;
-    return closure::as_taken(source(), increments, series_->interval_s);
+    return closure::as_taken(source_of(model_.noise), increments, series_->interval_s);
 }
 
 std::vector<std::vector<double>> SampleFit::line(const LineCourse& course) const {
-    if (!(model_.noise.from_hz > 0.0)) return line_columns(series_->size(), series_->rate_hz, course);
-    return line_as_taken(source(), series_->size(), series_->rate_hz, course);
+    return line_as_taken(source_of(model_.noise), series_->size(), series_->rate_hz, course);
 }
 
-std::vector<double> SampleFit::taken(const SampleColumn& column) const {
-    if (column.as_recorded || !(model_.noise.from_hz > 0.0)) return *column.series;
-    if (column.course.hz == 0.0) return as_taken(*column.series);
-    return line(column.course)[column.name == "cosine" ? 0 : 1];
+std::vector<double> SampleFit::taken(const SampleColumn& column) const { return taken_by(model_.noise, column); }
+
+std::vector<double> SampleFit::taken_by(const SampleNoise& noise, const SampleColumn& column) const {
+    if (column.as_recorded || !(noise.from_hz > 0.0)) return *column.series;
+    if (column.course.hz == 0.0) return closure::as_taken(source_of(noise), *column.series, series_->interval_s);
+    const auto both = line_as_taken(source_of(noise), series_->size(), series_->rate_hz, column.course);
+    return both[column.name == "cosine" ? 0 : 1];
 }
 
-std::vector<double> SampleFit::determined() const {
+std::vector<double> SampleFit::determined() const { return determined_by(model_); }
+
+std::vector<double> SampleFit::determined_by(const SampleModel& model) const {
     std::vector<double> sum(series_->size(), 0.0);
     const auto add = [&](double value, const std::vector<double>& series) {
         for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += value * series[i];
     };
+    const SampleSource source = source_of(model.noise);
     if (!series_->input_rate_deg_h.empty()) {
         // What is known of the input but for its mean, which belongs to the mean rate.
         const auto& input = series_->input_rate_deg_h;
         const double mean = std::accumulate(input.begin(), input.end(), 0.0) / static_cast<double>(input.size());
         std::vector<double> known(sum.size());
         for (std::size_t i = 0; i < known.size(); ++i) known[i] = (input[i] - mean) * series_->interval_s;
-        add(1.0, as_taken(known));
+        add(1.0, closure::as_taken(source, known, series_->interval_s));
     }
-    if (!model_.motion.empty()) add(1.0, as_taken(model_.motion));
-    for (const SampleColumn& column : model_.columns) add(column.value, taken(column));
+    if (!model.motion.empty()) add(1.0, closure::as_taken(source, model.motion, series_->interval_s));
+    for (const SampleColumn& column : model.columns) add(column.value, taken_by(model.noise, column));
     return sum;
 }
 
-void SampleFit::take_off() {
-    rest_ = determined();
-    for (std::size_t i = 0; i < rest_.size(); ++i) rest_[i] = series_->increment[i] - rest_[i];
+std::vector<double> SampleFit::rest_of(const SampleModel& model) const {
+    std::vector<double> rest = determined_by(model);
+    for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = series_->increment[i] - rest[i];
+    return rest;
 }
 
 void SampleFit::filter_by(const SampleNoise& noise) {
@@ -97,39 +110,15 @@ void SampleFit::fit_columns(bool held) {
     // rest + columns = what was measured; a correction to each value.
     take_off();
     whitened_.clear();
-    for (const SampleColumn& column : model_.columns) {
-        whitened_.push_back(filter_->apply(taken(column)));
+    for (const SampleColumn& column : model_.columns) whitened_.push_back(filter_->apply(taken(column)));
+    const ColumnRegression regression(whitened_, telling_);
+    const Eigen::VectorXd correction = regression.of(filter_->apply(rest_));
+    covariance_ = regression.covariance();
+    for (std::size_t k = 0; k < model_.columns.size(); ++k) {
+        const auto at = static_cast<Eigen::Index>(k);
+        if (!held) model_.columns[k].value += correction(at);
+        model_.columns[k].sd = std::sqrt(std::max(0.0, covariance_(at, at)));
     }
-    const auto e = filter_->apply(rest_);
-    const auto m = static_cast<Eigen::Index>(whitened_.size());
-    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(m, m);
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(m);
-    for (Eigen::Index a = 0; a < m; ++a) {
-        const auto& wa = whitened_[static_cast<std::size_t>(a)];
-        for (Eigen::Index b = 0; b <= a; ++b) {
-            const auto& wb = whitened_[static_cast<std::size_t>(b)];
-            double sum = 0.0;
-            for (std::size_t i = 0; i < e.size(); ++i) {
-                if (telling_[i]) sum += wa[i] * wb[i];
-            }
-            normal(a, b) = normal(b, a) = sum;
-        }
-        for (std::size_t i = 0; i < e.size(); ++i) {
-            if (telling_[i]) right(a) += wa[i] * e[i];
-        }
-    }
-    Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt();
-    const Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * normal * scale.cwiseInverse().asDiagonal();
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver(scaled);
-    const Eigen::VectorXd correction =
-        scale.cwiseInverse().asDiagonal() * solver.solve(scale.cwiseInverse().asDiagonal() * right);
-    const Eigen::MatrixXd covariance = solver.pseudoInverse();
-    for (Eigen::Index a = 0; a < m; ++a) {
-        auto& column = model_.columns[static_cast<std::size_t>(a)];
-        if (!held) column.value += correction(a);
-        column.sd = std::sqrt(std::max(0.0, covariance(a, a))) / scale(a);
-    }
-    covariance_ = scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
     take_off();
 }
 
@@ -161,33 +150,14 @@ Eigen::MatrixXd SampleFit::normal_with(const std::vector<std::vector<double>>& s
     std::vector<const std::vector<double>*> all;
     for (const auto& w : whitened_) all.push_back(&w);
     for (const auto& w : more) all.push_back(&w);
-    const auto m = static_cast<Eigen::Index>(all.size());
-    Eigen::MatrixXd normal(m, m);
-    right = Eigen::VectorXd::Zero(m);
-    for (Eigen::Index a = 0; a < m; ++a) {
-        const auto& wa = *all[static_cast<std::size_t>(a)];
-        for (Eigen::Index b = 0; b <= a; ++b) {
-            const auto& wb = *all[static_cast<std::size_t>(b)];
-            double sum = 0.0;
-            for (std::size_t i = 0; i < wa.size(); ++i) {
-                if (telling_[i]) sum += wa[i] * wb[i];
-            }
-            normal(a, b) = normal(b, a) = sum;
-        }
-        for (std::size_t i = 0; i < wa.size(); ++i) {
-            if (telling_[i]) right(a) += wa[i] * innovations_[i];
-        }
-    }
-    return normal;
+    right = products(all, innovations_, telling_);
+    return products(all, telling_);
 }
 
 Eigen::MatrixXd SampleFit::joint_covariance(const std::vector<std::vector<double>>& series) const {
-    Eigen::VectorXd right;
-    const Eigen::MatrixXd normal = normal_with(series, right);
-    const Eigen::VectorXd over = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-    const Eigen::MatrixXd scaled = over.asDiagonal() * normal * over.asDiagonal();
-    const Eigen::MatrixXd inverse = Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd>(scaled).pseudoInverse();
-    return over.asDiagonal() * inverse * over.asDiagonal();
+    std::vector<std::vector<double>> all = whitened_;
+    for (const auto& s : series) all.push_back(filter_->apply(s));
+    return ColumnRegression(all, telling_).covariance();
 }
 
 SampleFit::Score SampleFit::score(const std::vector<std::vector<double>>& series) const {

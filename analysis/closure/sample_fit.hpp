@@ -101,11 +101,23 @@ class SampleFit {
         Eigen::VectorXd gradient;
         Eigen::MatrixXd information;
     };
+    /// Increments less what a source's clock makes of all that is determined, and how they go with the clock.
+    struct ByClock {
+        std::vector<double> rest;
+        /// A knob each, innovations over their standard deviations; empty where it does not move the clock.
+        std::vector<std::vector<double>> moved;
+    };
     Eigen::MatrixXd normal_with(const std::vector<std::vector<double>>& series, Eigen::VectorXd& right) const;
-    SampleSource source() const { return {model_.noise.from_hz, model_.noise.from_phase}; }
-    void take_off();
+    std::vector<double> taken_by(const SampleNoise& source, const SampleColumn& column) const;
+    std::vector<double> determined_by(const SampleModel& model) const;
+    std::vector<double> rest_of(const SampleModel& model) const;
+    void take_off() { rest_ = rest_of(model_); }
     void take_whites(SampleNoise& noise) const;
+    ByClock by_clock(const std::vector<double>& knobs, const Rows& rows, const std::vector<bool>& held) const;
+    double value_at(const std::vector<double>& knobs, const Rows& rows) const;
     std::vector<bool> places_of_lost(const std::vector<double>& before, const std::vector<double>& after) const;
+    void share_whites(SampleNoise& noise, double share) const;
+    bool gone(const SampleNoise& noise) const;
     void raise_whites(SampleNoise& noise) const;
     /// Minus the log-likelihood under each.
     std::vector<double> evaluate(const std::vector<SampleModel>& models, std::span<const double> rest,

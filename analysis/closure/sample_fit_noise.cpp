@@ -8,6 +8,7 @@
 #include <functional>
 #include <utility>
 
+#include "analysis/closure/column_regression.hpp"
 #include "analysis/closure/sample_fit.hpp"
 #include "analysis/closure/sample_lanes.hpp"
 #include "engine/core/interrupt.hpp"
@@ -74,11 +75,13 @@ Point smallest(const Values& f, const Point& start, double size, int steps) {
 struct Free {
     double* value;
     bool logarithmic;
-    double scale = 1.0;      ///< of its steps
-    bool of_source = false;  ///< where a resampled record's source takes its samples
+    double scale = 1.0;  ///< of its steps
+    bool of_source = false;  ///< of a resampled record
+    bool of_clock = false;   ///< when that source takes its samples
 };
 
-constexpr std::size_t whites = 2;  // the first of the knobs
+constexpr std::size_t whites = 2;   // the first of the knobs
+constexpr double nothing = 1e-4;    // of white noises, beside the other
 
 std::vector<Free> knobs(SampleModel& model) {
     std::vector<Free> all{{&model.noise.angle_arcsec, true}, {&model.noise.rate_arcsec_rt_s, true}};
@@ -96,8 +99,8 @@ std::vector<Free> knobs(SampleModel& model) {
         all.push_back({&model.noise.swing_sin, false});
     }
     if (model.noise.from_hz > 0.0) {
-        all.push_back({&model.noise.from_phase, false, 1.0, true});
-        all.push_back({&model.from_shift, false, 1.0, true});
+        all.push_back({&model.noise.from_phase, false, 1.0, true, true});
+        all.push_back({&model.from_shift, false, 1.0, true, true});
         all.push_back({&model.noise.blur_arcsec, true, 1.0, true});
     }
     return all;
@@ -187,6 +190,52 @@ SampleModel SampleFit::at(const std::vector<double>& x) const {
     return model;
 }
 
+/// The values of columns are fitted anew for each place of the clock: what it moves is freed of what these can take of
+/// it (Golub and Pereyra, SIAM Journal on Numerical Analysis 10, 413, 1973; Kaufman, BIT 15, 49, 1975).
+SampleFit::ByClock SampleFit::by_clock(const std::vector<double>& x, const Rows& rows,
+                                       const std::vector<bool>& held) const {
+    constexpr double step = 1e-4;
+    ByClock by;
+    by.moved.resize(x.size());
+    SampleModel own = model_;
+    const auto all = knobs(own);
+    std::vector<std::size_t> free;
+    for (std::size_t j = 0; j < all.size(); ++j) {
+        if (all[j].of_clock && (held.empty() || !held[j])) free.push_back(j);
+    }
+    if (free.empty()) {
+        by.rest = rest_;
+        return by;
+    }
+    SampleModel model = at(x);
+    const SampleFilter filter(model.noise, rest_.size(), series_->interval_s);
+    std::vector<std::vector<double>> whitened;
+    for (const SampleColumn& column : model.columns) whitened.push_back(filter.apply(taken_by(model.noise, column)));
+    const ColumnRegression regression(whitened, rows);
+    const Eigen::VectorXd correction = regression.of(filter.apply(rest_of(model)));
+    for (std::size_t k = 0; k < model.columns.size(); ++k) {
+        model.columns[k].value += correction(static_cast<Eigen::Index>(k));
+    }
+    by.rest = rest_of(model);
+    for (const std::size_t j : free) {
+        auto beside = x;
+        beside[j] += step;
+        const SampleNoise there = at(beside).noise;
+        SampleModel moved = model;
+        moved.noise.from_hz = there.from_hz;
+        moved.noise.from_phase = there.from_phase;
+        std::vector<double> change = rest_of(moved);
+        for (std::size_t i = 0; i < change.size(); ++i) change[i] = (change[i] - by.rest[i]) / step;
+        by.moved[j] = regression.freed(filter.apply(change));
+    }
+    return by;
+}
+
+/// Minus the log-likelihood, columns fitted anew where the record was resampled.
+double SampleFit::value_at(const std::vector<double>& x, const Rows& rows) const {
+    return evaluate({at(x)}, by_clock(x, rows, {}).rest, rows).front();
+}
+
 /// Of the likelihood, with Fisher's information: sum over the rows of (dS/S)(dS/S)'/2 + (dr)(dr)'/S, r the innovations
 /// and S their variances (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter", 1989, section
 /// 3.4.5).
@@ -197,6 +246,7 @@ SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows
     Slope slope;
     slope.gradient = Eigen::VectorXd::Zero(m);
     slope.information = Eigen::MatrixXd::Zero(m, m);
+    const ByClock by = by_clock(x, rows, held);
     const SampleStates here(at(x).noise, series_->interval_s);
     std::vector<std::size_t> moves;
     std::vector<SampleStates> moved_there;
@@ -221,7 +271,7 @@ SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows
         for (std::size_t k = 0; k < some; ++k) lanes.push_back(moved_there[first + k]);
         std::array<double, most_lanes> gradient{};
         double value = 0.0;
-        filter_lanes(lanes, rest_, [&](std::size_t i, const double* e, const double* variances) {
+        filter_lanes(lanes, by.rest, [&](std::size_t i, const double* e, const double* variances) {
             if (!rows[i]) return;
             const double sd = std::sqrt(variances[0]);
             const double white = e[0] / sd;
@@ -229,7 +279,9 @@ SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows
             for (std::size_t k = 0; k < some; ++k) {
                 const double sd_there = std::sqrt(variances[k + 1]);
                 const double of_log = std::log1p((sd_there - sd) / sd) / step;
-                const double of_e = (e[k + 1] / sd_there - white) / step;
+                const auto& moves_rest = by.moved[moves[first + k]];
+                const double of_rest = moves_rest.empty() ? 0.0 : moves_rest[i];
+                const double of_e = (e[k + 1] / sd_there - white) / step + of_rest;
                 gradient[k] += white * of_e + of_log;
                 log_sd[moves[first + k]][i] = static_cast<float>(of_log);
                 moved[moves[first + k]][i] = static_cast<float>(of_e + white * of_log);
@@ -294,9 +346,29 @@ void SampleFit::score_noise(std::vector<double>& x, const Rows& rows, const std:
     }
 }
 
+/// The white noises by the differences of neighbours, of whose variance the readings' errors have that share.
+void SampleFit::share_whites(SampleNoise& noise, double share) const {
+    double squares = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 1; i < rest_.size(); ++i) {
+        if (!(*rows_)[i - 1] || !(*rows_)[i]) continue;
+        squares += std::pow(rest_[i] - rest_[i - 1], 2);
+        count += 1.0;
+    }
+    squares /= std::max(count, 1.0);
+    noise.angle_arcsec = std::sqrt(share * squares / 6.0);
+    noise.rate_arcsec_rt_s = std::sqrt((1.0 - share) * squares / (2.0 * series_->interval_s));
+}
+
+/// Whether one of the white noises is nothing beside the other.
+bool SampleFit::gone(const SampleNoise& noise) const {
+    const double root_s = std::sqrt(series_->interval_s);
+    const double scale = std::hypot(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s);
+    return std::min(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s) < nothing * scale;
+}
+
 /// White noises that stand at zero, made small: from nothing they could not grow, and it would tell nothing of them.
 void SampleFit::raise_whites(SampleNoise& noise) const {
-    constexpr double nothing = 1e-4;
     constexpr double small = 1e-2;
     const double root_s = std::sqrt(series_->interval_s);
     const double scale = std::hypot(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s);
@@ -322,6 +394,7 @@ std::vector<bool> SampleFit::places_of_lost(const std::vector<double>& before, c
 }
 
 void SampleFit::fit_noise() {
+    const bool had_both = !gone(model_.noise);
     raise_whites(model_.noise);
     // So does a part of what a witness leaves of a motion: a line beside it may have had no use for it.
     auto& resonances = model_.noise.resonances;
@@ -351,18 +424,13 @@ void SampleFit::fit_noise() {
         };
         try_from(anew);
         // Beside a rate that wanders neighbours are alike, and hide what is white: their differences show it.
-        const bool wanders = model_.walk || model_.flicker;
-        double squares = 0.0;
-        for (std::size_t i = 1; i < n; ++i) squares += std::pow(rest_[i] - rest_[i - 1], 2) / static_cast<double>(n);
         for (const double share : {0.05, 0.5, 0.95}) {
-            if (!wanders) break;
-            anew.noise.angle_arcsec = std::sqrt(share * squares / 6.0);
-            anew.noise.rate_arcsec_rt_s = std::sqrt((1.0 - share) * squares / (2.0 * series_->interval_s));
+            if (!model_.walk && !model_.flicker) break;
+            share_whites(anew.noise, share);
             try_from(anew);
         }
     }
     std::vector<double> as_it_was = start;
-    bool was_better = false;
     if (!searched_ && (resampled || narrow)) {
         // The likelihood may have several tops: by a simplex on a part of the record first, from where it stopped until
         // that gains nothing, for it may have fallen flat. Of a source by where it takes its samples and what is white;
@@ -394,22 +462,30 @@ void SampleFit::fit_noise() {
             value = now;
         }
         start = with(some);
-        // A part of the record may have another top than the whole.
-        const auto began = evaluate({at(start), at(as_it_was)}, rest_, *rows_);
-        was_better = began[1] < began[0];
     }
     score_noise(start, *rows_, {});
+    if (!resampled && had_both && gone(at(start).noise)) {
+        // Where one of the white noises goes to nothing, there may be another top with both.
+        SampleModel both = at(start);
+        share_whites(both.noise, 0.5);
+        auto other = places_of(both);
+        score_noise(other, *rows_, {});
+        const auto values = evaluate({at(start), at(other)}, rest_, *rows_);
+        if (values[1] < values[0]) start = std::move(other);
+    }
     // A resonance that goes beyond the end of its range does not come back.
     const std::vector<bool> lost = places_of_lost(as_it_was, start);
-    if (was_better || std::find(lost.begin(), lost.end(), true) != lost.end()) {
+    if (std::find(lost.begin(), lost.end(), true) != lost.end()) {
         score_noise(as_it_was, *rows_, lost);
-        const auto values = evaluate({at(start), at(as_it_was)}, rest_, *rows_);
-        if (values[1] < values[0]) start = std::move(as_it_was);
+        if (value_at(as_it_was, *rows_) < value_at(start, *rows_)) start = std::move(as_it_was);
     }
     if (resampled) {
         // Rows that are settled to their digits say how exactly the source's times are known, so well that numbers are
         // rounded there by more than the noise tells elsewhere.
-        filter_by(at(start).noise);
+        model_ = at(start);
+        filter_by(model_.noise);
+        fit_columns();
+        start = places_of(model_);
         std::vector<bool> held;
         for (const Free& knob : knobs(model_)) held.push_back(knob.of_source);
         auto told = start;

@@ -69,7 +69,12 @@ class SampleLoop {
     void take_back_lines(Closure& closure);
     void move_case(SampleStep& told, SampleFit::Noise noise);
     bool move_anew();
-    void drop_needless();
+    struct Stripped {
+        SampleModel model;
+        int parameters = 1;  ///< that it has less
+    };
+    std::optional<Stripped> stripped(const SampleStep& told, const std::string& added) const;
+    void drop_needless(const std::string& added);
     void test_what_is_left(Closure& closure) const;
     void finish(Closure& closure);
 

@@ -150,7 +150,7 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     }
     now_.of_partners.insert(now_.of_partners.end(), choice.of_partners.begin(), choice.of_partners.end());
     if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
-    drop_needless();
+    drop_needless(effect);
     for (int k = 0; k < most_motions && move_anew();) ++k;
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
     now_.told.push_back({.effect = effect,
@@ -184,27 +184,47 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     now_.steps.push_back(std::move(step));
 }
 
+/// The model without what that step added, if it may only have stood in for the effect that was added last.
+std::optional<SampleLoop::Stripped> SampleLoop::stripped(const SampleStep& told, const std::string& added) const {
+    Stripped without{now_.fit->model()};
+    SampleModel& model = without.model;
+    if (told.effect == "rate_random_walk") {
+        model.walk = false;
+        model.noise.walk_arcsec2_s3 = 0.0;
+    } else if (told.effect == "bias_instability") {
+        model.flicker = false;
+        model.noise.terms.clear();
+    } else if (told.effect.starts_with("bias_") || told.effect == "scale_factor_error") {
+        std::erase_if(model.columns, [&](const SampleColumn& c) { return c.effect == told.effect; });
+        if (told.effect == "bias_step") without.parameters = 2;
+    } else if (is_line(told.effect) && added == "resampling") {
+        // Of a line that was resampled there are images, each a line to who does not know that.
+        const auto of_step = [&](const SampleColumn& c) { return c.step == told.step; };
+        const auto cosine = std::find_if(model.columns.begin(), model.columns.end(), of_step);
+        if (cosine == model.columns.end()) return std::nullopt;
+        without.parameters = 2 + static_cast<int>(cosine->course.free);
+        std::erase_if(model.columns, of_step);
+    } else {
+        return std::nullopt;
+    }
+    return without;
+}
+
 /// Effects that stood in for the one added last are no longer needed beside it.
-void SampleLoop::drop_needless() {
-    for (std::size_t k = now_.steps.size(); k-- > 0;) {
-        const std::string effect = now_.steps[k].effect;
-        SampleModel without = now_.fit->model();
-        if (effect == "rate_random_walk") {
-            without.walk = false;
-            without.noise.walk_arcsec2_s3 = 0.0;
-        } else if (effect == "bias_instability") {
-            without.flicker = false;
-            without.noise.terms.clear();
-        } else if (effect.starts_with("bias_") || effect == "scale_factor_error") {
-            std::erase_if(without.columns, [&](const SampleColumn& c) { return c.effect == effect; });
-        } else {
-            continue;
-        }
-        auto fitted = std::make_shared<SampleFit>(series_, std::move(without), rows_, SampleFit::Noise::near);
+void SampleLoop::drop_needless(const std::string& added) {
+    for (std::size_t k = now_.told.size(); k-- > 0;) {
+        auto without = stripped(now_.told[k], added);
+        if (!without) continue;
+        auto fitted = std::make_shared<SampleFit>(series_, std::move(without->model), rows_, SampleFit::Noise::near);
         const double chi2 = 2.0 * (now_.fit->gain_over(*fitted));
-        const int parameters = effect == "bias_step" ? 2 : 1;
-        if (passes_on_samples(chi2_tail(chi2, parameters))) continue;
+        if (passes_on_samples(chi2_tail(chi2, without->parameters))) continue;
         now_.fit = std::move(fitted);
+        if (is_line(now_.told[k].effect)) {
+            std::erase(now_.lines_hz, now_.told[k].hz);
+            now_.notes.push_back(
+                fmt::format("a line at {:.6g} Hz was in the model until {} came in, beside which it is nothing",
+                            now_.told[k].hz, added));
+        }
         now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
         now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
     }

@@ -97,6 +97,7 @@ std::optional<SampleSource> find_straight_lines(const std::vector<double>& incre
 }
 
 std::vector<double> as_taken(const SampleSource& source, const std::vector<double>& increments, double interval_s) {
+    if (!(source.from_hz > 0.0)) return increments;
     const std::size_t n = increments.size();
     std::vector<double> angle(n + 1, 0.0);
     for (std::size_t i = 0; i < n; ++i) angle[i + 1] = angle[i] + increments[i];
@@ -120,6 +121,7 @@ std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, 
 
 std::vector<std::vector<double>> line_as_taken(const SampleSource& source, std::size_t size, double rate_hz,
                                                const LineCourse& course) {
+    if (!(source.from_hz > 0.0)) return line_columns(size, rate_hz, course);
     // An angle of sin(phase)/(2 sin(pi f/rate)) has increments of cos(phase).
     const double gain = 2.0 * std::sin(units::pi * course.hz / rate_hz);
     const auto phase = [&](double tick) {

@@ -9,7 +9,7 @@
 namespace ringlock::closure {
 
 struct SampleSource {
-    double from_hz = 0.0;
+    double from_hz = 0.0;     ///< 0: the record was not resampled, and has what there is
     double from_phase = 0.0;  ///< of the record's begin, between two of the source's readings; of their distance
 };
 
