@@ -115,11 +115,20 @@ struct Spectrum {
     double level_at(double hz) const {
         return level[std::min(level.size() - 1, static_cast<std::size_t>(std::max(0.0, hz) / bin_hz))];
     }
+    /// A line of amplitude a has the power (a n/2)^2, and n a^2/2 of the sum of squares.
+    double squares(double power_there) const { return 2.0 * power_there / rows; }
     bool passed_over(double hz) const {
         return std::any_of(known_hz.begin(), known_hz.end(), [&](double k) { return std::abs(hz - k) < width_hz; });
     }
     double cycles() const { return 0.5 * rows; }
 };
+
+/// Over the level about it; where that leaves nothing to chance, by its own power: a strong line raises the level about
+/// itself, and what is elsewhere may be what it does there.
+bool stands_out(double chi2, double squares, const FoundLine& from) {
+    constexpr double certain = 1000.0;
+    return std::min(chi2, from.chi2) > certain ? squares > from.squares : chi2 > from.chi2;
+}
 
 void count_places(FoundLine& line, double places) {
     line.searched = std::max(1.0, places);
@@ -131,9 +140,9 @@ FoundLine still_line(const Spectrum& spectrum) {
     for (std::size_t k = spectrum.first; k + 4 < spectrum.power.size(); ++k) {
         const double chi2 = 2.0 * spectrum.power[k] / spectrum.level[k];
         const double hz = spectrum.bin_hz * static_cast<double>(k);
-        if (chi2 <= found.chi2 || spectrum.passed_over(hz)) continue;
-        found.chi2 = chi2;
-        found.frequency_hz = hz;
+        const double squares = spectrum.squares(spectrum.power[k]);
+        if (!stands_out(chi2, squares, found) || spectrum.passed_over(hz)) continue;
+        found = {.frequency_hz = hz, .chi2 = chi2, .squares = squares};
     }
     count_places(found, places_of_frequency(found.chi2, spectrum.cycles()));
     return found;
@@ -157,10 +166,12 @@ FoundLine slow_line(const std::vector<double>& values, const Spectrum& spectrum)
         // Of real values, the other sign of the drift is at the other sign of the frequency.
         for (const int sign : {1, -1}) {
             for (std::size_t k = spectrum.first; k + 4 < spectrum.power.size(); ++k) {
-                const double chi2 = 2.0 * std::norm(out[sign > 0 ? k : spectrum.padded - k]) / spectrum.level[k];
+                const double power = std::norm(out[sign > 0 ? k : spectrum.padded - k]);
+                const double chi2 = 2.0 * power / spectrum.level[k];
                 const double hz = spectrum.bin_hz * static_cast<double>(k);
-                if (chi2 <= found.chi2 || spectrum.passed_over(hz)) continue;
-                found = {hz, sign * drift, chi2};
+                const double squares = spectrum.squares(power);
+                if (!stands_out(chi2, squares, found) || spectrum.passed_over(hz)) continue;
+                found = {.frequency_hz = hz, .drift_hz_per_s = sign * drift, .chi2 = chi2, .squares = squares};
             }
         }
     }
@@ -199,9 +210,11 @@ FoundLine follow(const std::vector<double>& values, const Spectrum& spectrum, do
         for (std::ptrdiff_t k = -reach; k <= reach; ++k) {
             const double hz = centre_hz + bin_hz * static_cast<double>(k);
             if (hz * spectrum.duration_s < 8.0 || hz > 0.5 * spectrum.rate_hz - 4.0 * spectrum.bin_hz) continue;
-            const double chi2 = 2.0 * std::norm(out[static_cast<std::size_t>((k + all) % all)]) / spectrum.level_at(hz);
-            if (chi2 <= found.chi2 || spectrum.passed_over(hz)) continue;
-            found = {hz, drift + d * unit, chi2};
+            const double power = std::norm(out[static_cast<std::size_t>((k + all) % all)]);
+            const double chi2 = 2.0 * power / spectrum.level_at(hz);
+            const double squares = spectrum.squares(power);
+            if (!stands_out(chi2, squares, found) || spectrum.passed_over(hz)) continue;
+            found = {.frequency_hz = hz, .drift_hz_per_s = drift + d * unit, .chi2 = chi2, .squares = squares};
         }
     }
     return found;
@@ -224,16 +237,18 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
         // A piece in which a part does not count is as much the less: each by its own level.
         const double bins = static_cast<double>(wide) / static_cast<double>(length);
         std::vector<std::vector<double>> relative;
+        std::vector<std::vector<double>> levels;
         double used = 0.0;
         for (std::size_t p = 0; p < pieces; ++p) {
             const std::vector<double> part(values.begin() + static_cast<std::ptrdiff_t>(p * length),
                                            values.begin() + static_cast<std::ptrdiff_t>((p + 1) * length));
             auto s = periodogram(part, wide);
+            auto& level = levels.emplace_back(s.size(), 0.0);
             if (std::accumulate(s.begin(), s.end(), 0.0) > 0.0) {
                 used += 1.0;
-                const auto l =
+                level =
                     level_about(s, static_cast<std::size_t>(std::max(32.0, static_cast<double>(length) / 20.0) * bins));
-                for (std::size_t k = 0; k < s.size(); ++k) s[k] *= 2.0 / l[k];
+                for (std::size_t k = 0; k < s.size(); ++k) s[k] *= 2.0 / level[k];
             }
             relative.push_back(std::move(s));
         }
@@ -242,6 +257,7 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
         double best = 0.0;
         int best_slope = 0;
         std::size_t best_bin = 0;
+        double best_squares = 0.0;
         const auto first = static_cast<std::ptrdiff_t>(8.0 * bins);
         for (int slope = -most; slope <= most; ++slope) {
             std::vector<std::ptrdiff_t> shift(pieces);
@@ -258,6 +274,12 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
                     best = sum;
                     best_slope = slope;
                     best_bin = static_cast<std::size_t>(k);
+                    best_squares = 0.0;
+                    for (std::size_t p = 0; p < pieces; ++p) {
+                        const auto at = static_cast<std::size_t>(k + shift[p]);
+                        best_squares += std::max(0.0, relative[p][at] - 2.0) * levels[p][at];
+                    }
+                    best_squares /= static_cast<double>(length);
                 }
             }
         }
@@ -268,6 +290,7 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
             lines.scattered = best - 2.0 * used;
             lines.scattered_hz = hz * static_cast<double>(best_bin);
             lines.scattered_drift_hz_per_s = best_slope * bins * hz / spectrum.duration_s;
+            lines.scattered_squares = best_squares;
         }
         if (p >= least) continue;
         least = p;
@@ -296,7 +319,7 @@ FoundLine FoundLines::likeliest() const {
     FoundLine best = still;
     for (const FoundLine& other : {slow, tracked}) {
         // Of strong lines no p is left to compare.
-        const bool as_rare = other.p_value == best.p_value && other.chi2 > best.chi2;
+        const bool as_rare = other.p_value == best.p_value && stands_out(other.chi2, other.squares, best);
         if (other.p_value < best.p_value || as_rare) best = other;
     }
     constexpr double kinds = 3.0;

@@ -15,6 +15,7 @@ struct FoundLine {
     double chi2 = 0.0;      ///< of its two amplitudes, frequency and drift as found
     double p_value = 1.0;   ///< its search counted
     double searched = 1.0;  ///< independent places that this search is worth at that chi2
+    double squares = 0.0;   ///< what it is of the sum of the values' squares
 };
 
 /// By how much a line is found: as one that keeps its frequency; that drifts by a few cycles over the record, its phase
@@ -23,6 +24,7 @@ struct FoundLines {
     FoundLine still, slow, tracked;
     double scattered = 0.0;  ///< power over the level in pieces, chi-squared above what chance leaves there
     double scattered_hz = 0.0, scattered_drift_hz_per_s = 0.0;
+    double scattered_squares = 0.0;  ///< of the sum of the values' squares, what that power is
 
     /// The least probable by chance, that being one of three counted.
     FoundLine likeliest() const;

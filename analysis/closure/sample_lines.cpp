@@ -100,7 +100,8 @@ SampleLine refine_line(const SampleFit& fit, const LineCourse& shown) {
 bool scatters(const SampleFit& fit, std::vector<double> innovations, const FoundLines& found, const SampleLine& line) {
     constexpr double near_hz = 1.0;
     if (!(found.scattered > line.chi2 + much_scattered)) return false;
-    // A strong line raises the level about it, which powers are over: more than about its peaks in pieces.
+    // A strong line raises the level about it, which powers are over, and hides others near it: what is left of it is a
+    // good part of its own power.
     const auto columns = fit.line(line.course);
     const auto score = fit.score(columns);
     for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -111,7 +112,7 @@ bool scatters(const SampleFit& fit, std::vector<double> innovations, const Found
     }
     const FoundLines left = find_lines(innovations, fit.series().rate_hz);
     const bool same = std::abs(left.scattered_hz - found.scattered_hz) < near_hz;
-    return same && left.scattered > found.scattered / 3.0 + much_scattered;
+    return same && left.scattered > much_scattered && left.scattered_squares > found.scattered_squares / 3.0;
 }
 
 SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, const Rows& rows,
