@@ -75,13 +75,13 @@ Point smallest(const Values& f, const Point& start, double size, int steps) {
 struct Free {
     double* value;
     bool logarithmic;
-    double scale = 1.0;  ///< of its steps
+    double scale = 1.0;      ///< of its steps
     bool of_source = false;  ///< of a resampled record
     bool of_clock = false;   ///< when that source takes its samples
 };
 
-constexpr std::size_t whites = 2;   // the first of the knobs
-constexpr double nothing = 1e-4;    // of white noises, beside the other
+constexpr std::size_t whites = 2;  // the first of the knobs
+constexpr double nothing = 1e-4;   // of white noises, beside the other
 
 std::vector<Free> knobs(SampleModel& model) {
     std::vector<Free> all{{&model.noise.angle_arcsec, true}, {&model.noise.rate_arcsec_rt_s, true}};
@@ -111,6 +111,15 @@ std::vector<double> places_of(SampleModel model) {
     for (const Free& knob : knobs(model))
         places.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
     return places;
+}
+
+/// What is not told at all must not spoil what is.
+Eigen::MatrixXd inverse_of_information(const Eigen::MatrixXd& information) {
+    const Eigen::VectorXd over = information.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
+    Eigen::MatrixXd scaled = over.asDiagonal() * information * over.asDiagonal();
+    scaled.diagonal().array() += 1e-9;
+    const Eigen::MatrixXd inverse = scaled.ldlt().solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
+    return over.asDiagonal() * inverse * over.asDiagonal();
 }
 
 }  // namespace
@@ -505,30 +514,36 @@ SampleModel SampleFit::noise_errors() const {
     const auto own = knobs(values);
     for (const Free& knob : own)
         x.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
-    std::vector<bool> of_source;
-    for (const Free& knob : own) of_source.push_back(knob.of_source);
     Eigen::MatrixXd information = slope(x, telling_, {}).information;
     if (model_.noise.from_hz > 0.0) {
-        // The source's times are told by the rows that tell nothing else.
+        // The source's times, and how far readings are off its lines, are told by the rows that tell nothing else. How
+        // far they are off goes with their errors.
         const Eigen::MatrixXd by_all = slope(x, *rows_, {}).information;
         for (std::size_t a = 0; a < x.size(); ++a) {
             for (std::size_t b = 0; b < x.size(); ++b) {
                 const auto i = static_cast<Eigen::Index>(a);
                 const auto j = static_cast<Eigen::Index>(b);
-                if (of_source[a] != of_source[b]) information(i, j) = 0.0;
-                if (of_source[a] && of_source[b]) information(i, j) = by_all(i, j);
+                if (own[a].of_clock != own[b].of_clock) information(i, j) = 0.0;
+                if (own[a].of_source && own[b].of_source) information(i, j) = by_all(i, j);
             }
         }
     }
-    Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-12).cwiseSqrt();
-    Eigen::MatrixXd scaled = scale.cwiseInverse().asDiagonal() * information * scale.cwiseInverse().asDiagonal();
-    // What the record does not tell at all must not spoil what it tells.
-    scaled.diagonal().array() += 1e-9;
-    const Eigen::MatrixXd covariance = scaled.ldlt().solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
+    Eigen::MatrixXd covariance = inverse_of_information(information);
+    for (std::size_t a = 0; a < x.size(); ++a) {
+        // What stands at zero, its lower bound, moves no other.
+        constexpr double at_zero = 1.5;  // standard error of the logarithm
+        const auto i = static_cast<Eigen::Index>(a);
+        if (own[a].of_clock || !own[a].of_source || !(std::sqrt(covariance(i, i)) > at_zero)) continue;
+        const double own_information = information(i, i);
+        information.row(i).setZero();
+        information.col(i).setZero();
+        information(i, i) = own_information;
+        covariance = inverse_of_information(information);
+    }
     const auto slots = knobs(errors);
     for (std::size_t i = 0; i < slots.size(); ++i) {
         const auto k = static_cast<Eigen::Index>(i);
-        double sd = std::sqrt(std::max(0.0, covariance(k, k))) / scale(k);
+        double sd = std::sqrt(std::max(0.0, covariance(k, k)));
         if (own[i].logarithmic) {
             sd *= own[i].scale * *own[i].value;
             // Near zero it is the square that the record knows, to 2 value sd.

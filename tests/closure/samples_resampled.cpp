@@ -167,6 +167,48 @@ const Estimate& named(const Closure& found, const std::string& effect, const std
     throw std::runtime_error("no " + parameter + " of " + effect);
 }
 
+// A line a hundred times the noise has images far above it, which look like lines of their own and go when their source
+// is known; whose clock the line tells, if all that the clock moves is fitted with it, better than anything else.
+TEST(ResampledRecords, StrongLinesHaveImagesAndTellTheClock) {
+    struct Case {
+        double from_hz, shown_hz, amplitude_arcsec;
+        std::uint64_t seed;
+    };
+    // At 125 Hz the variance comes back every four samples as a sum of lines does; a still one is the strongest of all.
+    for (const Case& of : {Case{125.0, 48.1, 1.0, 1}, Case{61.8, 24.5, 3.0, 2}, Case{157.2, 34.3, 0.3, 6}}) {
+        SCOPED_TRACE(of.from_hz);
+        SampleTruth truth = taken_at(of.from_hz, of.seed, 20000);
+        truth.white_angle_arcsec = 0.05;
+        truth.dither_residue = {3.0 * of.from_hz + of.shown_hz, 1e-4, of.amplitude_arcsec, 0.0};
+        const Closure found = close_samples(generate_samples(truth));
+        EXPECT_EQ(found.verdict, Verdict::closed);
+        ASSERT_EQ(found.steps.size(), 2U);
+        const auto expect_near = [&](const Estimate& estimate, double value) {
+            EXPECT_NEAR(estimate.value, value, 4.0 * estimate.sd) << estimate.name;
+        };
+        expect_near(found.base.at(1), 0.05);
+        expect_near(named(found, "resampling", "from_hz"), of.from_hz);
+        expect_near(named(found, "dither_residue", "frequency_hz"), of.shown_hz);
+        expect_near(named(found, "dither_residue", "drift_hz_per_s"), 1e-4);
+        expect_near(named(found, "dither_residue", "amplitude_arcsec"), of.amplitude_arcsec);
+        EXPECT_LT(named(found, "resampling", "from_hz").sd, 1e-4);
+    }
+}
+
+// A line on a curve that was resampled: its phase is lost from one part of the record to the next, its power is not.
+TEST(ResampledRecords, ALineOnACurveToo) {
+    SampleTruth truth = taken_at(157.2, 4);
+    truth.white_angle_arcsec = 0.05;
+    truth.dither_residue = {437.3, 0.0, 0.3, 0.0, -0.5, 250.0};
+    const Closure found = close_samples(generate_samples(truth));
+    EXPECT_EQ(found.verdict, Verdict::closed);
+    ASSERT_EQ(found.steps.size(), 2U);
+    const Estimate from_hz = named(found, "resampling", "from_hz");
+    EXPECT_NEAR(from_hz.value, 157.2, 4.0 * from_hz.sd);
+    const Estimate amplitude = named(found, "dither_residue", "amplitude_arcsec");
+    EXPECT_NEAR(amplitude.value, 0.3, 4.0 * amplitude.sd);
+}
+
 // Of a line the record has the straight lines between the source's readings: it is weaker there, and has others beside
 // it. Where the source is faster it may be above half the record's rate, and shows below; found first or last.
 TEST(ResampledRecords, LinesAreThoseOfTheSource) {
