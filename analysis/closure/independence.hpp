@@ -32,6 +32,8 @@ struct View {
     double largest = std::numeric_limits<double>::infinity();  ///< coefficient that makes sense
     bool jumps = false;             ///< random rates can follow it nearly as well as it can be said
     std::optional<double> hz = {};  ///< of a line
+    /// Of a line whose power is scattered: merit as the likelihood gains it where as much of the variance goes.
+    std::optional<double> by_variance = {};
     /// Merit where it is fitted anew otherwise than by a regression, if it is; by a search, that is gone through with
     /// only where it comes near the merit of a rival.
     std::function<double(double rival)> refitted = {};

@@ -64,10 +64,11 @@ class Contest {
         double coefficients = 0.0;
         Where where = Where::time;
         bool jumps = false;
-        bool repeats = false;                  ///< a variance that does
-        std::optional<double> hz = {};         ///< of a line
-        double of_a_motion = 0.0;              ///< merit beside what has resonances of its own
-        std::optional<double> of_states = {};  ///< merit of jumps, their course integrated out
+        bool repeats = false;                    ///< a variance that does
+        std::optional<double> hz = {};           ///< of a line
+        std::optional<double> by_variance = {};  ///< of one whose power is scattered
+        double of_a_motion = 0.0;                ///< merit beside what has resonances of its own
+        std::optional<double> of_states = {};    ///< merit of jumps, their course integrated out
     };
 
     std::vector<SampleCandidate> screened(const SampleState& state, Wanted wanted) const;
@@ -303,8 +304,12 @@ std::vector<Contest::Rival> Contest::rivals(bool resampled, bool moved) const {
     std::vector<Rival> found;
     for (const View& view : views) {
         const bool repeats = view.test.view == repeating_variance;
-        Rival rival{
-            .merit = view.test.merit, .where = view.test.where, .jumps = view.jumps, .repeats = repeats, .hz = view.hz};
+        Rival rival{.merit = view.test.merit,
+                    .where = view.test.where,
+                    .jumps = view.jumps,
+                    .repeats = repeats,
+                    .hz = view.hz,
+                    .by_variance = view.by_variance};
         if (view.columns) {
             rival.merit = refitted_merit(*now_.fit, view);
             rival.coefficients = static_cast<double>(view.columns().size());
@@ -336,6 +341,10 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
             continue;
         }
         double merit = account.has("case_motion") ? rival.of_a_motion : rival.merit;
+        // What keeps its phase, and readings that were interpolated, leave no power of a strong line; a resonance
+        // follows any line.
+        const bool keeps = is_line(first.effect) ? !first.wanders : first.effect == "resampling";
+        if (keeps && rival.by_variance) merit = *rival.by_variance;
         if (rival.repeats && account.has("resampling")) {
             // On straight lines the variance swings by half, no more and no less. What they are blurred by makes that
             // less, as any other swing may be.

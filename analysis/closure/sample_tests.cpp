@@ -76,13 +76,8 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     const FoundLines lines = find_lines(e, fit.series().rate_hz);
     const FoundLine line = lines.likeliest();
     const double cost = 3.0 + std::log(line.searched);
-    // A line whose power is scattered explains as much as follows it from stretch to stretch; a strong one no more than
-    // what the likelihood gains where as much of the variance goes.
-    const double squares = std::inner_product(e.begin(), e.end(), e.begin(), 0.0);
-    const auto rows = static_cast<double>(std::count_if(e.begin(), e.end(), [](double x) { return x != 0.0; }));
-    const double share = std::min(lines.scattered_squares / std::max(squares, 1e-300), 1.0 - 1e-9);
-    const double of_scattered = std::min(0.5 * lines.scattered, -0.5 * rows * std::log1p(-share));
-    const double gain = std::max(0.5 * line.chi2, of_scattered);
+    // A line whose power is scattered explains as much as follows it from stretch to stretch.
+    const double gain = 0.5 * std::max(line.chi2, lines.scattered);
     double p = line.p_value;
     bool coherent = line.chi2 >= lines.scattered;
     if (p < 0.01) {
@@ -105,7 +100,12 @@ void test_spectrum(const SampleFit& fit, Views& views) {
         };
     }
     if (!coherent) {
-        // Power over the level in pieces is no likelihood: what follows it is a resonance.
+        // Power over the level in pieces is no likelihood: of a strong line it is far more. What follows it is a
+        // resonance.
+        const double squares = std::inner_product(e.begin(), e.end(), e.begin(), 0.0);
+        const auto rows = static_cast<double>(std::count_if(e.begin(), e.end(), [](double x) { return x != 0.0; }));
+        const double share = std::min(lines.scattered_squares / std::max(squares, 1e-300), 1.0 - 1e-9);
+        view.by_variance = std::min(gain, -0.5 * rows * std::log1p(-share)) - cost;
         view.refitted = [&fit, lines, cost](double) {
             const SampleFit with(fit.series(), with_wandering_line(fit, lines, fit.rows(), "", -1), fit.rows());
             return with.gain_over(fit) - cost;
