@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <span>
 
@@ -83,8 +84,15 @@ void add_rate_curves(const std::vector<double>& increment_arcsec, double interva
         deviation.x.push_back(point.tau_s);
         deviation.y.push_back(point.dev);
     }
+    // Tapered (Hann), for the ends of a strong line would be seen in all bands, as its phase there is.
     std::vector<double> rate_deg_h = increment_arcsec;
-    for (double& rate : rate_deg_h) rate /= interval_s;
+    const auto n = static_cast<double>(rate_deg_h.size());
+    const double mean = std::accumulate(rate_deg_h.begin(), rate_deg_h.end(), 0.0) / n;
+    const double unit = std::sqrt(8.0 / 3.0) / interval_s;
+    for (std::size_t i = 0; i < rate_deg_h.size(); ++i) {
+        const double bell = std::sin(units::pi * (static_cast<double>(i) + 0.5) / n);
+        rate_deg_h[i] = unit * bell * bell * (rate_deg_h[i] - mean);
+    }
     const noise::Spectrum spectrum = noise::cosine_spectrum(rate_deg_h);
     // Bands of equal ratio, but of four coefficients at least.
     Curve& density = curves.emplace_back();
