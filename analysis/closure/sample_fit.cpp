@@ -44,13 +44,32 @@ std::vector<std::vector<double>> SampleFit::line(const LineCourse& course) const
     return line_as_taken(source_of(model_.noise), series_->size(), series_->rate_hz, course);
 }
 
-std::vector<double> SampleFit::taken(const SampleColumn& column) const { return taken_by(model_.noise, column); }
+std::vector<double> SampleFit::taken(const SampleColumn& column) const {
+    if (column.as_recorded || !(model_.noise.from_hz > 0.0)) return *column.series;
+    if (column.course.hz == 0.0) return as_taken(*column.series);
+    return line(column.course)[column.name == "cosine" ? 0 : 1];
+}
 
-std::vector<double> SampleFit::taken_by(const SampleNoise& noise, const SampleColumn& column) const {
-    if (column.as_recorded || !(noise.from_hz > 0.0)) return *column.series;
-    if (column.course.hz == 0.0) return closure::as_taken(source_of(noise), *column.series, series_->interval_s);
-    const auto both = line_as_taken(source_of(noise), series_->size(), series_->rate_hz, column.course);
-    return both[column.name == "cosine" ? 0 : 1];
+std::vector<SampleFit::Shared> SampleFit::taken_by(const SampleModel& model) const {
+    const SampleSource source = source_of(model.noise);
+    const auto share = [](std::vector<double> series) {
+        return std::make_shared<const std::vector<double>>(std::move(series));
+    };
+    std::vector<Shared> all;
+    while (all.size() < model.columns.size()) {
+        const SampleColumn& column = model.columns[all.size()];
+        if (column.as_recorded || !(source.from_hz > 0.0)) {
+            all.push_back(column.series);
+        } else if (column.course.hz == 0.0) {
+            all.push_back(share(closure::as_taken(source, *column.series, series_->interval_s)));
+        } else {
+            // A cosine, and the sine behind it.
+            for (auto& taken : line_as_taken(source, series_->size(), series_->rate_hz, column.course)) {
+                all.push_back(share(std::move(taken)));
+            }
+        }
+    }
+    return all;
 }
 
 std::vector<double> SampleFit::determined() const { return determined_by(model_); }
@@ -70,7 +89,8 @@ std::vector<double> SampleFit::determined_by(const SampleModel& model) const {
         add(1.0, closure::as_taken(source, known, series_->interval_s));
     }
     if (!model.motion.empty()) add(1.0, closure::as_taken(source, model.motion, series_->interval_s));
-    for (const SampleColumn& column : model.columns) add(column.value, taken_by(model.noise, column));
+    const auto taken = taken_by(model);
+    for (std::size_t k = 0; k < taken.size(); ++k) add(model.columns[k].value, *taken[k]);
     return sum;
 }
 
@@ -110,7 +130,7 @@ void SampleFit::fit_columns(bool held) {
     // rest + columns = what was measured; a correction to each value.
     take_off();
     whitened_.clear();
-    for (const SampleColumn& column : model_.columns) whitened_.push_back(filter_->apply(taken(column)));
+    for (const Shared& taken : taken_by(model_)) whitened_.push_back(filter_->apply(*taken));
     const ColumnRegression regression(whitened_, telling_);
     const Eigen::VectorXd correction = regression.of(filter_->apply(rest_));
     covariance_ = regression.covariance();

@@ -108,7 +108,8 @@ class SampleFit {
         std::vector<std::vector<double>> moved;
     };
     Eigen::MatrixXd normal_with(const std::vector<std::vector<double>>& series, Eigen::VectorXd& right) const;
-    std::vector<double> taken_by(const SampleNoise& source, const SampleColumn& column) const;
+    using Shared = std::shared_ptr<const std::vector<double>>;
+    std::vector<Shared> taken_by(const SampleModel& model) const;
     std::vector<double> determined_by(const SampleModel& model) const;
     std::vector<double> rest_of(const SampleModel& model) const;
     void take_off() { rest_ = rest_of(model_); }

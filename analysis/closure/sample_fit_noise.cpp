@@ -218,14 +218,17 @@ SampleFit::ByClock SampleFit::by_clock(const std::vector<double>& x, const Rows&
     }
     SampleModel model = at(x);
     const SampleFilter filter(model.noise, rest_.size(), series_->interval_s);
+    const std::vector<Shared> taken = taken_by(model);
     std::vector<std::vector<double>> whitened;
-    for (const SampleColumn& column : model.columns) whitened.push_back(filter.apply(taken_by(model.noise, column)));
+    for (const Shared& column : taken) whitened.push_back(filter.apply(*column));
     const ColumnRegression regression(whitened, rows);
-    const Eigen::VectorXd correction = regression.of(filter.apply(rest_of(model)));
-    for (std::size_t k = 0; k < model.columns.size(); ++k) {
-        model.columns[k].value += correction(static_cast<Eigen::Index>(k));
-    }
     by.rest = rest_of(model);
+    const Eigen::VectorXd correction = regression.of(filter.apply(by.rest));
+    for (std::size_t k = 0; k < taken.size(); ++k) {
+        const double more = correction(static_cast<Eigen::Index>(k));
+        model.columns[k].value += more;
+        for (std::size_t i = 0; i < by.rest.size(); ++i) by.rest[i] -= more * (*taken[k])[i];
+    }
     for (const std::size_t j : free) {
         auto beside = x;
         beside[j] += step;

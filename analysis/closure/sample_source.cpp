@@ -1,7 +1,9 @@
 #include "analysis/closure/sample_source.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "analysis/closure/sample_line_search.hpp"
 #include "engine/core/units.hpp"
@@ -10,26 +12,29 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Differences of an angle at the ends of the record's intervals, on straight lines between the source's readings.
-template <class Reading>
-std::vector<double> between_readings(const SampleSource& source, std::size_t size, double interval_s,
-                                     const Reading& reading) {
+/// Differences of angles at the ends of the record's intervals, on straight lines between the source's readings.
+template <std::size_t N, class Readings>
+std::array<std::vector<double>, N> between_readings(const SampleSource& source, std::size_t size, double interval_s,
+                                                    const Readings& readings) {
     const double ratio = source.from_hz * interval_s;
-    std::vector<double> taken(size);
+    std::array<std::vector<double>, N> taken;
+    taken.fill(std::vector<double>(size));
     double tick = std::floor(source.from_phase);
-    double from = reading(tick);
-    double to = reading(tick + 1.0);
-    double before = 0.0;
+    std::array<double, N> from = readings(tick);
+    std::array<double, N> to = readings(tick + 1.0);
+    std::array<double, N> before{};
     for (std::size_t i = 0; i <= size; ++i) {
         const double place = source.from_phase + ratio * static_cast<double>(i);
         if (const double at = std::floor(place); at != tick) {
-            from = at == tick + 1.0 ? to : reading(at);
-            to = reading(at + 1.0);
+            from = at == tick + 1.0 ? to : readings(at);
+            to = readings(at + 1.0);
             tick = at;
         }
-        const double now = from + (place - tick) * (to - from);
-        if (i > 0) taken[i - 1] = now - before;
-        before = now;
+        for (std::size_t k = 0; k < N; ++k) {
+            const double now = from[k] + (place - tick) * (to[k] - from[k]);
+            if (i > 0) taken[k][i - 1] = now - before[k];
+            before[k] = now;
+        }
     }
     return taken;
 }
@@ -102,11 +107,12 @@ std::vector<double> as_taken(const SampleSource& source, const std::vector<doubl
     std::vector<double> angle(n + 1, 0.0);
     for (std::size_t i = 0; i < n; ++i) angle[i + 1] = angle[i] + increments[i];
     const double ratio = source.from_hz * interval_s;
-    return between_readings(source, n, interval_s, [&](double tick) {
+    auto taken = between_readings<1>(source, n, interval_s, [&](double tick) {
         const double row = (tick - source.from_phase) / ratio;
         const auto i = static_cast<std::size_t>(std::clamp(row, 0.0, static_cast<double>(n - 1)));
-        return angle[i] + (row - static_cast<double>(i)) * (angle[i + 1] - angle[i]);
+        return std::array{angle[i] + (row - static_cast<double>(i)) * (angle[i + 1] - angle[i])};
     });
+    return std::move(taken[0]);
 }
 
 std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, const LineCourse& course) {
@@ -124,13 +130,13 @@ std::vector<std::vector<double>> line_as_taken(const SampleSource& source, std::
     if (!(source.from_hz > 0.0)) return line_columns(size, rate_hz, course);
     // An angle of sin(phase)/(2 sin(pi f/rate)) has increments of cos(phase).
     const double gain = 2.0 * std::sin(units::pi * course.hz / rate_hz);
-    const auto phase = [&](double tick) {
+    auto taken = between_readings<2>(source, size, 1.0 / rate_hz, [&](double tick) {
         const double t = (tick - source.from_phase) / source.from_hz - 0.5 * static_cast<double>(size) / rate_hz;
         const double turns = course.turns(t);
-        return units::two_pi * (turns - std::floor(turns));
-    };
-    return {between_readings(source, size, 1.0 / rate_hz, [&](double tick) { return std::sin(phase(tick)) / gain; }),
-            between_readings(source, size, 1.0 / rate_hz, [&](double tick) { return -std::cos(phase(tick)) / gain; })};
+        const double phase = units::two_pi * (turns - std::floor(turns));
+        return std::array{std::sin(phase) / gain, -std::cos(phase) / gain};
+    });
+    return {std::move(taken[0]), std::move(taken[1])};
 }
 
 Alias alias(double hz, double rate_hz) {
