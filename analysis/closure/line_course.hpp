@@ -25,6 +25,15 @@ struct LineCourse {
         }
         return sum;
     }
+    double frequency_hz(double since_middle_s) const {
+        double sum = 0.0;
+        double power = 1.0;
+        for (std::size_t k = 0; k < most; ++k) {
+            sum += coefficient(k) * power;
+            power *= since_middle_s / static_cast<double>(k + 1);
+        }
+        return sum;
+    }
     /// Of a coefficient, so much as makes a cycle at either end of a record of that length.
     static double a_cycle(std::size_t k, double duration_s) {
         double unit = 1.0;

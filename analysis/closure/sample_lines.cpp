@@ -101,7 +101,7 @@ bool scatters(const SampleFit& fit, std::vector<double> innovations, const Found
     constexpr double near_hz = 1.0;
     if (!(found.scattered > line.chi2 + much_scattered)) return false;
     // A strong line raises the level about it, which powers are over, and hides others near it: what is left of it is a
-    // good part of its own power.
+    // good part of its own power, over the level as well.
     const auto columns = fit.line(line.course);
     const auto score = fit.score(columns);
     for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -112,7 +112,8 @@ bool scatters(const SampleFit& fit, std::vector<double> innovations, const Found
     }
     const FoundLines left = find_lines(innovations, fit.series().rate_hz);
     const bool same = std::abs(left.scattered_hz - found.scattered_hz) < near_hz;
-    return same && left.scattered > much_scattered && left.scattered_squares > found.scattered_squares / 3.0;
+    return same && left.scattered > found.scattered / 3.0 + much_scattered &&
+           left.scattered_squares > found.scattered_squares / 3.0;
 }
 
 SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, const Rows& rows,

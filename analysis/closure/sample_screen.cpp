@@ -219,12 +219,24 @@ SampleCandidate wandering_line(const SampleFit& now, const SampleContext& in, co
     return c;
 }
 
+/// Whether it goes through less than eight cycles as fast as where it is slowest: a rate that changes, and no line.
+bool is_slow(const LineCourse& course, double duration_s) {
+    constexpr double cycles = 8.0;
+    constexpr int places = 64;
+    for (int i = 0; i <= places; ++i) {
+        const double since_middle_s = duration_s * (static_cast<double>(i) / places - 0.5);
+        if (course.frequency_hz(since_middle_s) * duration_s < cycles) return true;
+    }
+    return false;
+}
+
 /// A line on a curve, where power is scattered that none which drifts evenly has.
 std::optional<SampleCandidate> bent_line(const SampleFit& now, const SampleContext& in, const FoundLines& lines,
                                          const std::vector<double>& e) {
     const FoundCourse found = follow_bends(e, in.series.rate_hz, lines);
     if (found.course.free < 3) return std::nullopt;
     const SampleLine line = refine_line(now, found.course);
+    if (is_slow(line.course, static_cast<double>(in.series.size()) * in.series.interval_s)) return std::nullopt;
     if (scatters(now, e, lines, line)) return std::nullopt;
     const double searched = places_of_bends(line.chi2, 0.5 * static_cast<double>(e.size()), found.course.free);
     SampleCandidate c{.effect = "dither_residue",
