@@ -513,10 +513,8 @@ SampleModel SampleFit::noise_errors() const {
     SampleModel errors = model_;
     SampleModel values = model_;
     raise_whites(values.noise);
-    std::vector<double> x;
+    const std::vector<double> x = places_of(values);
     const auto own = knobs(values);
-    for (const Free& knob : own)
-        x.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
     Eigen::MatrixXd information = slope(x, telling_, {}).information;
     if (model_.noise.from_hz > 0.0) {
         // The source's times, and how far readings are off its lines, are told by the rows that tell nothing else. How

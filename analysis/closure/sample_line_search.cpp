@@ -95,7 +95,7 @@ struct Spectrum {
     std::size_t padded;
     double rows, rate_hz, duration_s, bin_hz;
     std::vector<double> power, level;
-    std::size_t first;  ///< bin: below eight cycles a record a line is a drift
+    std::size_t first;  ///< bin that is looked at
     std::vector<double> known_hz;
     double width_hz;
 
@@ -110,7 +110,7 @@ struct Spectrum {
           width_hz(width) {
         const double per_bin = rows / static_cast<double>(padded);  // Fourier frequencies a bin
         level = level_about(power, static_cast<std::size_t>(std::min(300.0, std::max(40.0, rows / 100.0)) / per_bin));
-        first = static_cast<std::size_t>(8.0 / per_bin);
+        first = static_cast<std::size_t>(fewest_cycles / per_bin);
     }
     double level_at(double hz) const {
         return level[std::min(level.size() - 1, static_cast<std::size_t>(std::max(0.0, hz) / bin_hz))];
@@ -209,7 +209,8 @@ FoundLine follow(const std::vector<double>& values, const Spectrum& spectrum, do
         const auto out = transform(turned);
         for (std::ptrdiff_t k = -reach; k <= reach; ++k) {
             const double hz = centre_hz + bin_hz * static_cast<double>(k);
-            if (hz * spectrum.duration_s < 8.0 || hz > 0.5 * spectrum.rate_hz - 4.0 * spectrum.bin_hz) continue;
+            if (hz * spectrum.duration_s < fewest_cycles || hz > 0.5 * spectrum.rate_hz - 4.0 * spectrum.bin_hz)
+                continue;
             const double power = std::norm(out[static_cast<std::size_t>((k + all) % all)]);
             const double chi2 = 2.0 * power / spectrum.level_at(hz);
             const double squares = spectrum.squares(power);

@@ -219,13 +219,12 @@ SampleCandidate wandering_line(const SampleFit& now, const SampleContext& in, co
     return c;
 }
 
-/// Whether it goes through less than eight cycles as fast as where it is slowest: a rate that changes, and no line.
+/// Whether it would be a rate that changes, were it everywhere as slow as where it is slowest.
 bool is_slow(const LineCourse& course, double duration_s) {
-    constexpr double cycles = 8.0;
     constexpr int places = 64;
     for (int i = 0; i <= places; ++i) {
         const double since_middle_s = duration_s * (static_cast<double>(i) / places - 0.5);
-        if (course.frequency_hz(since_middle_s) * duration_s < cycles) return true;
+        if (course.frequency_hz(since_middle_s) * duration_s < fewest_cycles) return true;
     }
     return false;
 }

@@ -174,7 +174,7 @@ TEST(ResampledRecords, StrongLinesHaveImagesAndTellTheClock) {
         double from_hz, shown_hz, amplitude_arcsec;
         std::uint64_t seed;
     };
-    // At 125 Hz the variance comes back every four samples as a sum of lines does; a still one is the strongest of all.
+    // At 125 Hz images of the line are 25 Hz apart, and the variance comes back every four samples as they do.
     for (const Case& of : {Case{125.0, 48.1, 1.0, 1}, Case{61.8, 24.5, 3.0, 2}, Case{157.2, 34.3, 0.3, 6}}) {
         SCOPED_TRACE(of.from_hz);
         SampleTruth truth = taken_at(of.from_hz, of.seed, 20000);
