@@ -117,7 +117,7 @@ class Fits {
         const effects::Effect& effect = *candidate_.effect;
         const bool of_coupling = !effect.adds_angle() && !is_random_rate(effect) && !told_by_other_columns(effect);
         if (of_coupling) from(with_share(0.01));
-        if (!of_coupling || !gained(0.25 * candidate_.chi2)) from(start_);
+        if (!of_coupling || !gained(nearly_all * candidate_.chi2)) from(start_);
         // Without it the rest may have gone far astray.
         if (is_random_rate(effect) || on_phase(effect) || (strong_rate_ && !gained(0.25 * candidate_.chi2))) {
             anew(alike);
@@ -166,6 +166,8 @@ class Fits {
     }
 
     static constexpr double strong = 400.0;  // chi-squared
+    // Half of it is what the score says: a fit that ends with much less may lie in a valley beside it.
+    static constexpr double nearly_all = 0.45;
 
     const record::Record& record_;
     const Fitted& now_;
