@@ -3,6 +3,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <unsupported/Eigen/FFT>
@@ -155,11 +156,56 @@ std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Predi
     return candidate;
 }
 
+/// Frequencies of a rate that would show at this one too, or there alone: the lock-in's kicks follow the phase, whose
+/// beat with a vibration is a rate that stands in the record as if it were one of its own.
+std::array<double, 4> seen_by_beat(const TurnModel& model, double hz) {
+    const TurnSeries& series = model.series();
+    const std::size_t last = (series.size() - 1) / 2 * 2;  // of the first one's kind
+    const double beat_hz =
+        (model.phase_rad()[last] - model.phase_rad().front()) / (units::two_pi * series.time_s[last]);
+    const double turns_hz = 1.0 / series.interval_s;
+    const auto folded = [&](double f) { return std::abs(std::remainder(f, turns_hz)); };
+    const double dither_hz = 0.5 * turns_hz;
+    return {folded(hz + beat_hz), folded(hz - beat_hz), folded(hz + dither_hz + beat_hz),
+            folded(hz + dither_hz - beat_hz)};
+}
+
+/// Of that frequency, size and phase free. None where the record cannot tell both amplitudes.
+std::optional<Candidate> at_frequency(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
+                                      double hz) {
+    const std::string size = name_of(*first_of(effect, Role::size));
+    const std::string phase = name_of(*first_of(effect, Role::phase));
+    Values values = values_at_rest(effect);
+    values.at(size) = 1.0;
+    values.at(name_of(*first_of(effect, Role::frequency))) = hz;
+    std::vector<Regressor> columns;
+    for (const double turned : {0.0, 0.5 * units::pi}) {
+        values.at(phase) = turned;
+        columns.push_back(added(fit, without, effect, values));
+    }
+    const auto score = fit.score(columns);
+    if (score.rank < 2) return std::nullopt;
+    values.at(size) = std::hypot(score.value(0), score.value(1));
+    values.at(phase) = std::atan2(score.value(1), score.value(0));
+    return Candidate{&effect, std::move(values), score.chi2};
+}
+
+/// Frequencies that a rate may have.
+struct Band {
+    double lowest_hz, highest_hz;
+    bool has(double hz) const { return hz >= lowest_hz && hz < highest_hz; }
+};
+
+/// Slower than three periods in the record is drift; next to half the turns' rate it is the dither's amplitude.
+Band band_of(const TurnSeries& series) {
+    return {3.0 / (static_cast<double>(series.size()) * series.interval_s),
+            0.5 / series.interval_s - series.amplitude_band_hz()};
+}
+
 std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::Prediction& without,
-                                           const Effect& effect, Values values) {
-    const Parameter& size = *first_of(effect, Role::size);
-    const Parameter& phase = *first_of(effect, Role::phase);
-    const Parameter& frequency = *first_of(effect, Role::frequency);
+                                           const Effect& effect) {
+    const TurnSeries& series = fit.model().series();
+    const Band band = band_of(series);
     const Eigen::VectorXd residual = fit.residual();
     const std::size_t n = fit.rows().size();
     std::size_t padded = 1;
@@ -170,42 +216,42 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
     Eigen::FFT<double> fft;
     fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
     fft.fwd(out, in);
-    const double bin_hz = 1.0 / (static_cast<double>(padded) * fit.model().series().interval_s);
-    // Slower than three periods in the record is drift; next to half the turns' rate it is the dither's amplitude.
-    const auto lowest = static_cast<std::size_t>(3.0 * static_cast<double>(padded) / static_cast<double>(n)) + 1;
-    const auto amplitude = static_cast<std::size_t>(fit.model().series().amplitude_band_hz() / bin_hz) + 1;
+    const double bin_hz = 1.0 / (static_cast<double>(padded) * series.interval_s);
     // What else the model could do of a line the spectrum does not know: the highest peaks are looked at closely.
     constexpr std::size_t looked_at = 8;
+    constexpr std::size_t images_of = 4;
     std::vector<std::size_t> peaks;
-    for (std::size_t k = lowest; k + amplitude < padded / 2; ++k) {
+    for (std::size_t k = 1; k < padded / 2; ++k) {
+        if (!band.has(static_cast<double>(k) * bin_hz)) continue;
         if (std::norm(out[k]) >= std::norm(out[k - 1]) && std::norm(out[k]) > std::norm(out[k + 1])) peaks.push_back(k);
     }
     std::sort(peaks.begin(), peaks.end(),
               [&](std::size_t a, std::size_t b) { return std::norm(out[a]) > std::norm(out[b]); });
     if (peaks.size() > looked_at) peaks.resize(looked_at);
-    const auto score_at = [&](double f, Candidate& candidate) {
-        std::vector<Regressor> columns;
-        for (const double turned : {0.0, 0.5 * units::pi}) {
-            Values at = values;
-            at.at(name_of(size)) = 1.0;
-            at.at(name_of(frequency)) = f;
-            at.at(name_of(phase)) = turned;
-            columns.push_back(added(fit, without, effect, at));
+    std::vector<double> places;
+    for (std::size_t k = 0; k < peaks.size(); ++k) {
+        places.push_back(static_cast<double>(peaks[k]) * bin_hz);
+        if (k >= images_of) continue;
+        for (const double hz : seen_by_beat(fit.model(), places.back())) {
+            if (band.has(hz)) places.push_back(hz);
         }
-        const auto score = fit.score(columns);
-        if (score.rank < 2 || score.chi2 <= candidate.chi2) return;
-        candidate.chi2 = score.chi2;
-        candidate.values.at(name_of(frequency)) = f;
-        candidate.values.at(name_of(size)) = std::hypot(score.value(0), score.value(1));
-        candidate.values.at(name_of(phase)) = std::atan2(score.value(1), score.value(0));
+    }
+    if (places.empty()) return std::nullopt;
+    Candidate best{&effect, values_at_rest(effect)};
+    double centre = 0.0;
+    const auto consider = [&](double hz) {
+        auto candidate = at_frequency(fit, without, effect, hz);
+        if (!candidate || candidate->chi2 <= best.chi2) return false;
+        best = std::move(*candidate);
+        return true;
     };
-    Candidate candidate{&effect, values};
-    for (const std::size_t peak : peaks) score_at(static_cast<double>(peak) * bin_hz, candidate);
-    const double centre = candidate.values.at(name_of(frequency));
-    for (const double off : {-1.0, -0.5, 0.5, 1.0}) score_at(centre + off * bin_hz, candidate);
-    candidate.searched = places_of_frequency(candidate.chi2, 0.5 * static_cast<double>(n));
-    candidate.p_value = of_several(chi2_tail(candidate.chi2, 2), candidate.searched);
-    return candidate;
+    for (const double hz : places) {
+        if (consider(hz)) centre = hz;
+    }
+    for (const double off : {-1.0, -0.5, 0.5, 1.0}) consider(centre + off * bin_hz);
+    best.searched = places_of_frequency(best.chi2, 0.5 * static_cast<double>(n));
+    best.p_value = of_several(chi2_tail(best.chi2, 2), best.searched);
+    return best;
 }
 
 std::optional<Candidate> spread(const TurnFit& fit, const Effect& effect, Values values) {
@@ -228,6 +274,29 @@ Values values_at_rest(const Effect& effect) {
     return values;
 }
 
+std::vector<double> frequencies_as_likely(const TurnFit& fit, const Effect& effect, double hz, double chi2_apart) {
+    std::vector<double> found;
+    if (!effect.adds_angle() || first_of(effect, Role::frequency) == nullptr) return found;
+    const TurnModel::Prediction without = fit.model().predict(fit.parameters());
+    const TurnSeries& series = fit.model().series();
+    const auto chosen = at_frequency(fit, without, effect, hz);
+    if (!chosen) return found;
+    const double width_hz = 1.0 / (static_cast<double>(series.size()) * series.interval_s);
+    for (const double image : seen_by_beat(fit.model(), hz)) {
+        if (!band_of(series).has(image) || std::abs(image - hz) < 2.0 * width_hz) continue;
+        Candidate best{&effect, {}};
+        double at = image;
+        for (const double off : {-0.5, -0.25, 0.0, 0.25, 0.5}) {
+            auto candidate = at_frequency(fit, without, effect, image + off * width_hz);
+            if (!candidate || candidate->chi2 <= best.chi2) continue;
+            best = std::move(*candidate);
+            at = image + off * width_hz;
+        }
+        if (best.chi2 > chosen->chi2 - chi2_apart) found.push_back(at);
+    }
+    return found;
+}
+
 std::vector<Candidate> screen(const TurnFit& fit) {
     const TurnModel::Prediction without = fit.model().predict(fit.parameters());
     const auto registry = effects::registry();
@@ -239,7 +308,7 @@ std::vector<Candidate> screen(const TurnFit& fit) {
         const Values rest = values_at_rest(*effect);
         try {
             if (first_of(*effect, Role::frequency) != nullptr) {
-                if (effect->adds_angle()) found[k] = at_some_frequency(fit, without, *effect, rest);
+                if (effect->adds_angle()) found[k] = at_some_frequency(fit, without, *effect);
             } else if (first_of(*effect, Role::time) != nullptr) {
                 if (effect->adds_angle()) found[k] = at_some_time(fit, without, *effect, rest);
             } else if (first_of(*effect, Role::deviation) != nullptr) {

@@ -20,6 +20,12 @@ struct Candidate {
 /// by score tests (Rao 1948; Engle 1984, "Wald, likelihood ratio and Lagrange multiplier tests").
 std::vector<Candidate> screen(const TurnFit& fit);
 
+/// Other frequencies at which that line [Hz] would explain as much of what the fit, without it, has left, to within so
+/// much of chi-squared: those that the beat of the lock-in's kicks with the rotation turns into it. None for effects
+/// without a frequency.
+std::vector<double> frequencies_as_likely(const TurnFit& fit, const effects::Effect& effect, double hz,
+                                          double chi2_apart);
+
 /// Parameters of an effect at which it does nothing.
 effects::Values values_at_rest(const effects::Effect& effect);
 

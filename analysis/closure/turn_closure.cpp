@@ -222,6 +222,25 @@ void drop_needless(const record::Record& record, const Rows& rows, std::shared_p
     }
 }
 
+/// A line that may as well be another one, which the lock-in's kicks turn into it.
+std::optional<std::string> note_on_frequency(const TurnFit& without, const TurnFit& with,
+                                             const effects::Effect& effect) {
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        if (parameter.role != effects::Role::frequency) continue;
+        const double hz = with.parameters().find(effect.name())->values.at(std::string(parameter.name));
+        std::string others;
+        for (const double other : frequencies_as_likely(without, effect, hz, 2.0 * tie)) {
+            others += (others.empty() ? "" : " or ") + fmt::format("{:.4g}", other);
+        }
+        if (others.empty()) return std::nullopt;
+        return fmt::format(
+            "{} of {:.4g} Hz: one of {} Hz would explain nearly as much, since the lock-in's kicks let either be seen "
+            "at the other by the beat of the input rate; a record at another input rate would tell",
+            effect.name(), hz, others);
+    }
+    return std::nullopt;
+}
+
 /// The figures of the final model: fitted to the whole record.
 void take_figures(const record::Turns& turns, const Fitted& whole, Closure& closure) {
     for (const Estimate& estimate : whole.fit->estimates()) {
@@ -305,6 +324,7 @@ Closure close_turns(const record::Record& record) {
         std::string effect;
     };
     std::optional<Earlier> earlier;
+    std::vector<std::pair<std::string, std::string>> of_frequencies;  // notes, by effect
     std::vector<std::string> partners;  // of the effects that were added last, still to come
 
     // What stood in for another is dropped again, and what is the dither's own is no step: more rounds than steps.
@@ -353,6 +373,9 @@ Closure close_turns(const record::Record& record) {
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
         if (!earlier && choice.on_random) earlier = {now, closure.steps, step.effect};
         const Score before = heldout(*now->fit);
+        if (auto note = note_on_frequency(*now->fit, *best.fitted->fit, *best.candidate.effect)) {
+            of_frequencies.emplace_back(step.effect, std::move(*note));
+        }
         now = best.fitted;
         read_shape_again(record, rows, now);
         drop_needless(record, rows, now, closure.steps);
@@ -386,6 +409,11 @@ Closure close_turns(const record::Record& record) {
     if (is_of_even_density(now->fit->innovations(), now->fit->rows())) {
         closure.notes.push_back(
             "the injected noise is flatter than a normal one: the size of the residual over the phase is not tested");
+    }
+    for (auto& [effect, note] : of_frequencies) {
+        const bool stays = std::any_of(closure.steps.begin(), closure.steps.end(),
+                                       [&](const Step& step) { return step.effect == effect; });
+        if (stays) closure.notes.push_back(std::move(note));
     }
     for (std::string& note : notes_on_amplitude(*now)) closure.notes.push_back(std::move(note));
     closure.log_likelihood_gain = now->fit->log_likelihood() - base_log_likelihood;

@@ -104,6 +104,26 @@ TEST(TurnLoop, AStrongLineTakesTheZeroRatePointsAlong) {
     EXPECT_LT(deviation(closure.base, "bias_deg_h", truth.bias_deg_h), 4.0);
 }
 
+/// Phases of either kind of turn beat with the dither at half its frequency nearly, and a vibration near that with
+/// them: its image of 1.2 Hz stands higher above the noise than what is seen at its own frequency.
+TEST(TurnLoop, AVibrationIsNotTakenForItsBeat) {
+    Truth truth;
+    truth.scale_factor_arcsec = 0.5;
+    truth.input_rate_deg_h = 93.3;
+    truth.dither_peak_rate_deg_s = 103.19;
+    truth.readout_noise = 0.005;
+    truth.rates.base_vibration = {60.5, 0.008, 0.0};
+    truth.turns = 8000;
+    truth.seed = 8;
+    const Closure closure = close_loop(generate({&truth, 1}).front());
+    print("beat", closure);
+    EXPECT_EQ(closure.verdict, Verdict::closed);
+    ASSERT_EQ(closure.steps.size(), 1U);
+    EXPECT_LT(deviation(closure.steps[0].parameters, "frequency_hz", 60.5), 4.0);
+    EXPECT_LT(deviation(closure.steps[0].parameters, "rate_deg_h", 0.008), 4.0);
+    EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("base_vibration of 60.5 Hz: one of 1.17")));
+}
+
 TEST(TurnLoop, ASwingOfTheAmplitudeIsTheDithersOwn) {
     std::vector<Truth> truths;
     for (const double period_s : {0.9, 11.0}) {
