@@ -251,6 +251,9 @@ std::optional<SampleCandidate> bent_line(const SampleFit& now, const SampleConte
 
 void screen_line(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
     constexpr double worth_looking = 0.01;
+    // The level of the spectrum about a line is itself a random number, and of a resampled record a part of a line is
+    // in its images: what the regression says is closer.
+    constexpr double worth_mending = 0.2;
     // Above that a base hardly moves.
     constexpr double fast_hz = 30.0;
     std::vector<double> e = now.innovations();
@@ -296,9 +299,8 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
         for (OfferedLine& line : declared_lines(now, in, e, width_hz)) offered.push_back(std::move(line));
     }
     for (const OfferedLine& line : offered) {
-        if (!(line.found.p_value < worth_looking)) continue;
+        if (!(line.found.p_value < worth_mending)) continue;
         if (scattered && std::abs(line.found.frequency_hz - lines.scattered_hz) < beside_hz) continue;
-        // The level of the spectrum about a line is itself a random number: what the regression says is closer.
         const SampleLine mended = refined(line.found, line.drifts);
         // What hardly drifts is told as well without.
         if (line.drifts && !(std::abs(mended.course.drifts[0]) * duration_s * duration_s > 1.0)) continue;
