@@ -159,13 +159,9 @@ std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Predi
 /// Frequencies of a rate that would show at this one too, or there alone: the lock-in's kicks follow the phase, whose
 /// beat with a vibration is a rate that stands in the record as if it were one of its own.
 std::array<double, 4> seen_by_beat(const TurnModel& model, double hz) {
-    const TurnSeries& series = model.series();
-    const std::size_t last = (series.size() - 1) / 2 * 2;  // of the first one's kind
-    const double beat_hz =
-        (model.phase_rad()[last] - model.phase_rad().front()) / (units::two_pi * series.time_s[last]);
-    const double turns_hz = 1.0 / series.interval_s;
-    const auto folded = [&](double f) { return std::abs(std::remainder(f, turns_hz)); };
-    const double dither_hz = 0.5 * turns_hz;
+    const double beat_hz = model.beat_hz();
+    const double dither_hz = 0.5 / model.series().interval_s;
+    const auto folded = [&](double f) { return std::abs(std::remainder(f, 2.0 * dither_hz)); };
     return {folded(hz + beat_hz), folded(hz - beat_hz), folded(hz + dither_hz + beat_hz),
             folded(hz + dither_hz - beat_hz)};
 }

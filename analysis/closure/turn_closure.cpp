@@ -106,21 +106,43 @@ bool follows_column(const View& view) {
            view.test.where == Where::amplitude;
 }
 
+/// Whether it is a line where one that follows the phase would be: at a harmonic of the beat, and of the dither's
+/// frequency with it, to within what the record can tell.
+bool is_on_beat(const TurnModel& model, const ActiveEffect& line) {
+    constexpr int harmonics = 6;  // which views of the phase have
+    for (const effects::Parameter& parameter : line.effect->parameters()) {
+        if (parameter.role != effects::Role::frequency) continue;
+        const double hz = line.values.at(std::string(parameter.name));
+        const double dither_hz = 0.5 / model.series().interval_s;
+        const double apart_hz = 1.0 / model.series().time_s.back();
+        for (int k = 1; k <= harmonics; ++k) {
+            for (const double beat_hz : {k * model.beat_hz(), -k * model.beat_hz()}) {
+                if (std::abs(std::remainder(hz - beat_hz, dither_hz)) < apart_hz) return true;
+            }
+        }
+    }
+    return false;
+}
+
 /// Whether some view of the residual explains more than the best effect, the noise fitted anew beside either: then
 /// that one is only what comes nearest to something that the library does not have.
 ///
 /// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do, who
-/// are kicks of first order only. Injected noise of a radian leaves nothing of that.
+/// are kicks of first order only; where it is at a harmonic of the phases' beat, half as much will do for these.
+/// Injected noise of a radian leaves nothing of that.
 ///
 /// Gives the most that such a view explains.
 std::optional<double> something_else(const TurnFit& fit, const Choice& choice) {
     constexpr std::size_t looked_at = 4;
     constexpr double first_order = 0.02;
+    constexpr double half = 0.5;
     constexpr double noise_of_column = 0.1;
     auto views = view_residual(fit);
     std::erase_if(views, [](const View& view) { return !view.columns || view.test.merit < tie; });
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
     if (views.size() > looked_at) views.resize(looked_at);
+    const ActiveEffect* chosen = choice.chosen->fitted->fit->parameters().find(choice.chosen->candidate.effect->name());
+    const bool on_beat = chosen != nullptr && is_on_beat(fit.model(), *chosen);
     double rival = 0.0;
     for (const Held& held : choice.held) rival = std::max(rival, held.merit);
     std::optional<double> most;
@@ -129,7 +151,10 @@ std::optional<double> something_else(const TurnFit& fit, const Choice& choice) {
         const bool beats_all = std::all_of(choice.held.begin(), choice.held.end(), [&](const Held& held) {
             const bool in_step =
                 view.test.where == Where::phase && held.effect->adds_angle() && fit.parameters().injected_sd_rad < 1.0;
-            if (in_step) return merit > std::min(held.merit - tie, (1.0 - first_order) * held.merit);
+            if (in_step) {
+                const double share = on_beat && held.effect == chosen->effect ? half : 1.0 - first_order;
+                return merit > std::min(held.merit - tie, share * held.merit);
+            }
             if (!is_random_rate(*held.effect)) return merit > held.merit + tie;
             // A random rate can follow what jumps nearly as well as the jumps themselves, and what follows another
             // column better than a column with noise of its own.

@@ -319,6 +319,11 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     return prediction;
 }
 
+double TurnModel::beat_hz() const {
+    const std::size_t last = (series_.size() - 1) / 2 * 2;  // of the first one's kind
+    return (phase_rad_[last] - phase_rad_.front()) / (units::two_pi * series_.time_s[last]);
+}
+
 TurnNoise TurnModel::noise(const TurnParameters& parameters) const {
     TurnNoise noise;
     noise.injected_rad2 = parameters.injected_sd_rad * parameters.injected_sd_rad;

@@ -72,6 +72,10 @@ class TurnModel {
     /// Kicks at the mean input rate.
     TurnKicks mean_kicks(const TurnParameters& parameters) const;
 
+    /// Fringes a second by which the phase goes on from one turn of a kind to the next, in the mean over the record: the
+    /// kicks' beat, but for multiples of the dither's frequency.
+    double beat_hz() const;
+
     const TurnSeries& series() const { return series_; }
     const std::vector<double>& phase_rad() const { return phase_rad_; }
 
