@@ -273,6 +273,17 @@ TEST(ClosureSuite, NothingOutsideTheLibraryHasItsName) {
     }
 }
 
+TEST(LongClosureSuite, WhatFollowsThePhaseIsNoVibration) {
+    // Kicks at three times the phase come at three times their beat, 18.17 Hz, where a line explains more than kicks of
+    // first order do.
+    Case of{.kind = Kind::foreign, .truth = {}, .condition = &conditions[0], .direct = true, .seed = 50030};
+    of.foreign = {{"lockin_third_harmonic", {{"ratio", 0.10778}, {"phase_rad", 2.7158}}}};
+    of.where = ringlock::closure::Where::phase;
+    const Outcome outcome = judged({of}).front();
+    EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named;
+    EXPECT_FALSE(outcome.false_name) << outcome.named;
+}
+
 TEST(ClosureSuite, TwoRatesAreNotOneRandomRate) {
     // A random rate follows a ramp and a temperature at once, better than either of them does.
     Case of{.kind = Kind::pair, .truth = {}, .multiple = 4.0, .condition = &conditions[2], .seed = 350, .turns = turns};
