@@ -335,6 +335,7 @@ void test_lines(const TurnFit& fit, std::vector<View>& views) {
                              }
                              return columns;
                          }});
+        views.back().hz = static_cast<double>(line.bin) * bin_hz;
     };
     report("lines", lines[drifts / 2], places, 0.0);
     // A line that holds its frequency is not one that drifts by a little.

@@ -106,55 +106,60 @@ bool follows_column(const View& view) {
            view.test.where == Where::amplitude;
 }
 
-/// Whether it is a line where one that follows the phase would be: at a harmonic of the beat, and of the dither's
-/// frequency with it, to within what the record can tell.
-bool is_on_beat(const TurnModel& model, const ActiveEffect& line) {
+/// Whether a line is where what follows the phase makes one in a gyro whose phases come in step: at a harmonic of their
+/// beat, give or take the dither's frequency, to within what the record can tell.
+bool is_on_beat(const TurnFit& fit, double hz) {
     constexpr int harmonics = 6;  // which views of the phase have
-    for (const effects::Parameter& parameter : line.effect->parameters()) {
-        if (parameter.role != effects::Role::frequency) continue;
-        const double hz = line.values.at(std::string(parameter.name));
-        const double dither_hz = 0.5 / model.series().interval_s;
-        const double apart_hz = 1.0 / model.series().time_s.back();
-        for (int k = 1; k <= harmonics; ++k) {
-            for (const double beat_hz : {k * model.beat_hz(), -k * model.beat_hz()}) {
-                if (std::abs(std::remainder(hz - beat_hz, dither_hz)) < apart_hz) return true;
-            }
-        }
+    if (!(fit.parameters().injected_sd_rad < 1.0)) return false;
+    const TurnSeries& series = fit.model().series();
+    const double beat_hz = fit.model().beat_hz();
+    const double dither_hz = 0.5 / series.interval_s;
+    for (int k = -harmonics; k <= harmonics; ++k) {
+        const double apart_hz = std::abs(std::remainder(hz - k * beat_hz, dither_hz));
+        if (k != 0 && apart_hz * series.time_s.back() < 1.0) return true;
     }
     return false;
 }
+
+std::optional<double> frequency_hz_of(const TurnFit& fit, const effects::Effect& effect) {
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        if (parameter.role != effects::Role::frequency) continue;
+        return fit.parameters().find(effect.name())->values.at(std::string(parameter.name));
+    }
+    return std::nullopt;
+}
+
+/// What a view of the phase counts beside a line on the beat.
+constexpr double beside_beat = 2.0;
 
 /// Whether some view of the residual explains more than the best effect, the noise fitted anew beside either: then
 /// that one is only what comes nearest to something that the library does not have.
 ///
 /// A gyro whose phases come in step makes lines of whatever follows them: a rate must explain more than they do, who
-/// are kicks of first order only; where it is at a harmonic of the phases' beat, half as much will do for these.
+/// are kicks of first order only; where it is at a harmonic of the phases' beat, these count twice.
 /// Injected noise of a radian leaves nothing of that.
 ///
 /// Gives the most that such a view explains.
 std::optional<double> something_else(const TurnFit& fit, const Choice& choice) {
     constexpr std::size_t looked_at = 4;
     constexpr double first_order = 0.02;
-    constexpr double half = 0.5;
     constexpr double noise_of_column = 0.1;
     auto views = view_residual(fit);
     std::erase_if(views, [](const View& view) { return !view.columns || view.test.merit < tie; });
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
     if (views.size() > looked_at) views.resize(looked_at);
-    const ActiveEffect* chosen = choice.chosen->fitted->fit->parameters().find(choice.chosen->candidate.effect->name());
-    const bool on_beat = chosen != nullptr && is_on_beat(fit.model(), *chosen);
+    const auto hz = frequency_hz_of(*choice.chosen->fitted->fit, *choice.chosen->candidate.effect);
+    const bool on_beat = hz && is_on_beat(fit, *hz);
     double rival = 0.0;
     for (const Held& held : choice.held) rival = std::max(rival, held.merit);
     std::optional<double> most;
     for (const View& view : views) {
-        const double merit = refitted_merit(fit, view, rival);
+        const double counts = on_beat && view.test.where == Where::phase ? beside_beat : 1.0;
+        const double merit = counts * refitted_merit(fit, view, rival);
         const bool beats_all = std::all_of(choice.held.begin(), choice.held.end(), [&](const Held& held) {
             const bool in_step =
                 view.test.where == Where::phase && held.effect->adds_angle() && fit.parameters().injected_sd_rad < 1.0;
-            if (in_step) {
-                const double share = on_beat && held.effect == chosen->effect ? half : 1.0 - first_order;
-                return merit > std::min(held.merit - tie, share * held.merit);
-            }
+            if (in_step) return merit > std::min(held.merit - tie, (1.0 - first_order) * held.merit);
             if (!is_random_rate(*held.effect)) return merit > held.merit + tie;
             // A random rate can follow what jumps nearly as well as the jumps themselves, and what follows another
             // column better than a column with noise of its own.
@@ -182,7 +187,7 @@ bool two_explain(const record::Record& record, const Rows& rows, const Choice& c
 /// Tests of what the model has left; where structure lies, if any passes the level.
 ///
 /// Of the views that fail, the regression that explains most, the noise fitted anew beside it; where none does, the
-/// test that is least probable by chance.
+/// test that is least probable by chance. Lines on the beat of phases that come in step count half.
 void test_what_is_left(const TurnFit& fit, Closure& closure) {
     constexpr std::size_t looked_at = 4;
     auto views = view_residual(fit);
@@ -200,7 +205,9 @@ void test_what_is_left(const TurnFit& fit, Closure& closure) {
     if (!views.front().columns) return;
     double most = 0.0;
     for (std::size_t k = 0; k < std::min(looked_at, views.size()) && views[k].columns; ++k) {
-        const double merit = refitted_merit(fit, views[k], std::numeric_limits<double>::infinity());
+        const bool on_beat = views[k].hz && is_on_beat(fit, *views[k].hz);
+        const double merit =
+            refitted_merit(fit, views[k], std::numeric_limits<double>::infinity()) / (on_beat ? beside_beat : 1.0);
         if (merit <= most) continue;
         most = merit;
         closure.unexplained = views[k].test;
@@ -250,20 +257,17 @@ void drop_needless(const record::Record& record, const Rows& rows, std::shared_p
 /// A line that may as well be another one, which the lock-in's kicks turn into it.
 std::optional<std::string> note_on_frequency(const TurnFit& without, const TurnFit& with,
                                              const effects::Effect& effect) {
-    for (const effects::Parameter& parameter : effect.parameters()) {
-        if (parameter.role != effects::Role::frequency) continue;
-        const double hz = with.parameters().find(effect.name())->values.at(std::string(parameter.name));
-        std::string others;
-        for (const double other : frequencies_as_likely(without, effect, hz, 2.0 * tie)) {
-            others += (others.empty() ? "" : " or ") + fmt::format("{:.4g}", other);
-        }
-        if (others.empty()) return std::nullopt;
-        return fmt::format(
-            "{} of {:.4g} Hz: one of {} Hz would explain nearly as much, since the lock-in's kicks let either be seen "
-            "at the other by the beat of the input rate; a record at another input rate would tell",
-            effect.name(), hz, others);
+    const auto hz = frequency_hz_of(with, effect);
+    if (!hz) return std::nullopt;
+    std::string others;
+    for (const double other : frequencies_as_likely(without, effect, *hz, 2.0 * tie)) {
+        others += (others.empty() ? "" : " or ") + fmt::format("{:.4g}", other);
     }
-    return std::nullopt;
+    if (others.empty()) return std::nullopt;
+    return fmt::format(
+        "{} of {:.4g} Hz: one of {} Hz would explain nearly as much, since the lock-in's kicks let either be seen "
+        "at the other by the beat of the input rate; a record at another input rate would tell",
+        effect.name(), *hz, others);
 }
 
 /// The figures of the final model: fitted to the whole record.
