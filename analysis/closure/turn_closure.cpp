@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -353,8 +354,8 @@ Closure close_turns(const record::Record& record) {
         std::string effect;
     };
     std::optional<Earlier> earlier;
-    std::vector<std::pair<std::string, std::string>> of_frequencies;  // notes, by effect
-    std::vector<std::string> partners;  // of the effects that were added last, still to come
+    std::map<std::string, std::string> of_frequencies;  // notes, by effect
+    std::vector<std::string> partners;                  // of the effects that were added last, still to come
 
     // What stood in for another is dropped again, and what is the dither's own is no step: more rounds than steps.
     for (std::size_t round = 0; round < 3 * most_steps && closure.steps.size() < most_steps; ++round) {
@@ -402,8 +403,9 @@ Closure close_turns(const record::Record& record) {
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
         if (!earlier && choice.on_random) earlier = {now, closure.steps, step.effect};
         const Score before = heldout(*now->fit);
+        of_frequencies.erase(step.effect);  // of when it was in the model before
         if (auto note = note_on_frequency(*now->fit, *best.fitted->fit, *best.candidate.effect)) {
-            of_frequencies.emplace_back(step.effect, std::move(*note));
+            of_frequencies.emplace(step.effect, std::move(*note));
         }
         now = best.fitted;
         read_shape_again(record, rows, now);
@@ -439,10 +441,10 @@ Closure close_turns(const record::Record& record) {
         closure.notes.push_back(
             "the injected noise is flatter than a normal one: the size of the residual over the phase is not tested");
     }
-    for (auto& [effect, note] : of_frequencies) {
+    for (const auto& [effect, note] : of_frequencies) {
         const bool stays = std::any_of(closure.steps.begin(), closure.steps.end(),
-                                       [&](const Step& step) { return step.effect == effect; });
-        if (stays) closure.notes.push_back(std::move(note));
+                                       [&name = effect](const Step& step) { return step.effect == name; });
+        if (stays) closure.notes.push_back(note);
     }
     for (std::string& note : notes_on_amplitude(*now)) closure.notes.push_back(std::move(note));
     closure.log_likelihood_gain = now->fit->log_likelihood() - base_log_likelihood;
