@@ -24,6 +24,7 @@ struct Step {
     double p_value = 1.0;
     std::vector<std::string> confounded_with;  ///< effects that explain this record as well
     std::string experiment;                    ///< what would tell them apart
+    std::string note = {};                     ///< of its parameters; empty: nothing to be said
 };
 
 /// One-step predictions of the final model.

@@ -17,18 +17,12 @@ namespace ringlock::closure {
 namespace {
 
 using effects::Effect;
+using effects::first_of;
 using effects::Parameter;
 using effects::Role;
 using effects::Values;
 
 std::string name_of(const Parameter& parameter) { return std::string(parameter.name); }
-
-const Parameter* first_of(const Effect& effect, Role role) {
-    for (const Parameter& parameter : effect.parameters()) {
-        if (parameter.role == role) return &parameter;
-    }
-    return nullptr;
-}
 
 /// What the effect with these values adds to the phases, over `per`.
 Regressor added(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect, const Values& values,
@@ -186,6 +180,10 @@ std::optional<Candidate> at_frequency(const TurnFit& fit, const TurnModel::Predi
     return Candidate{&effect, std::move(values), score.chi2};
 }
 
+void keep_better(Candidate& best, std::optional<Candidate> other) {
+    if (other && other->chi2 > best.chi2) best = std::move(*other);
+}
+
 /// Frequencies that a rate may have.
 struct Band {
     double lowest_hz, highest_hz;
@@ -234,17 +232,11 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
     }
     if (places.empty()) return std::nullopt;
     Candidate best{&effect, values_at_rest(effect)};
-    double centre = 0.0;
-    const auto consider = [&](double hz) {
-        auto candidate = at_frequency(fit, without, effect, hz);
-        if (!candidate || candidate->chi2 <= best.chi2) return false;
-        best = std::move(*candidate);
-        return true;
-    };
-    for (const double hz : places) {
-        if (consider(hz)) centre = hz;
+    for (const double hz : places) keep_better(best, at_frequency(fit, without, effect, hz));
+    const double centre = best.values.at(name_of(*first_of(effect, Role::frequency)));
+    for (const double off : {-1.0, -0.5, 0.5, 1.0}) {
+        keep_better(best, at_frequency(fit, without, effect, centre + off * bin_hz));
     }
-    for (const double off : {-1.0, -0.5, 0.5, 1.0}) consider(centre + off * bin_hz);
     best.searched = places_of_frequency(best.chi2, 0.5 * static_cast<double>(n));
     best.p_value = of_several(chi2_tail(best.chi2, 2), best.searched);
     return best;
@@ -272,7 +264,6 @@ Values values_at_rest(const Effect& effect) {
 
 std::vector<double> frequencies_as_likely(const TurnFit& fit, const Effect& effect, double hz, double chi2_apart) {
     std::vector<double> found;
-    if (!effect.adds_angle() || first_of(effect, Role::frequency) == nullptr) return found;
     const TurnModel::Prediction without = fit.model().predict(fit.parameters());
     const TurnSeries& series = fit.model().series();
     const auto chosen = at_frequency(fit, without, effect, hz);
@@ -281,14 +272,12 @@ std::vector<double> frequencies_as_likely(const TurnFit& fit, const Effect& effe
     for (const double image : seen_by_beat(fit.model(), hz)) {
         if (!band_of(series).has(image) || std::abs(image - hz) < 2.0 * width_hz) continue;
         Candidate best{&effect, {}};
-        double at = image;
         for (const double off : {-0.5, -0.25, 0.0, 0.25, 0.5}) {
-            auto candidate = at_frequency(fit, without, effect, image + off * width_hz);
-            if (!candidate || candidate->chi2 <= best.chi2) continue;
-            best = std::move(*candidate);
-            at = image + off * width_hz;
+            keep_better(best, at_frequency(fit, without, effect, image + off * width_hz));
         }
-        if (best.chi2 > chosen->chi2 - chi2_apart) found.push_back(at);
+        if (!best.values.empty() && best.chi2 > chosen->chi2 - chi2_apart) {
+            found.push_back(best.values.at(name_of(*first_of(effect, Role::frequency))));
+        }
     }
     return found;
 }

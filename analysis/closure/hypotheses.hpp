@@ -21,8 +21,8 @@ struct Candidate {
 std::vector<Candidate> screen(const TurnFit& fit);
 
 /// Other frequencies at which that line [Hz] would explain as much of what the fit, without it, has left, to within so
-/// much of chi-squared: those that the beat of the lock-in's kicks with the rotation turns into it. None for effects
-/// without a frequency.
+/// much of chi-squared: those that the beat of the lock-in's kicks with the rotation turns into it.
+/// `effect` has a frequency.
 std::vector<double> frequencies_as_likely(const TurnFit& fit, const effects::Effect& effect, double hz,
                                           double chi2_apart);
 

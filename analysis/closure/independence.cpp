@@ -79,7 +79,6 @@ void doubt_ellipse(const TurnFit& fit, TurnFit::Score& score) {
 }
 
 void test_phase(const TurnFit& fit, std::vector<View>& views) {
-    constexpr int harmonics = 6;
     // The innovation is a part of the phase that is read: what they have to do with each other where nothing is missing
     // is known of normal ones (Stein, Annals of Statistics 9, 1981, 1135) and of those whose shape is.
     const bool known = fit.parameters().shape || !is_of_even_density(fit.innovations(), fit.rows());
@@ -89,20 +88,20 @@ void test_phase(const TurnFit& fit, std::vector<View>& views) {
         double most = 0.0;
         double cost = 0.0;
         int at = 0;
-        for (int k = 1; k <= harmonics; ++k) {
+        for (int k = 1; k <= harmonics_of_phase; ++k) {
             auto score = fit.score(harmonic(fit, k, kicks));
             if (!kicks && k <= 2) doubt_ellipse(fit, score);
             const double p = chi2_tail(score.chi2, score.rank);
             if (at > 0 && p >= least) continue;
             least = p;
             at = k;
-            cost = score.rank + std::log(static_cast<double>(harmonics));
+            cost = score.rank + std::log(static_cast<double>(harmonics_of_phase));
             most = 0.5 * score.chi2 - cost;
         }
         views.push_back(
             {{Where::phase,
               kicks ? "kicks at harmonics of the turn's phase" : "phase read at harmonics of the turn's phase",
-              of_several(least, harmonics), fmt::format("harmonic {}", at), most},
+              of_several(least, harmonics_of_phase), fmt::format("harmonic {}", at), most},
              cost,
              [&fit, at, kicks] { return harmonic(fit, at, kicks); },
              // Beyond, phases no longer follow from what is added to them: any noise could be had so.

@@ -9,6 +9,9 @@
 
 namespace ringlock::closure {
 
+/// Of the turn's phase, that views of the residual look at.
+inline constexpr int harmonics_of_phase = 6;
+
 /// Where structure lies that a model has left.
 enum class Where { phase, time, frequency, temperature, rate, amplitude };
 std::string_view name_of(Where where);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -110,12 +109,11 @@ bool follows_column(const View& view) {
 /// Whether a line is where what follows the phase makes one in a gyro whose phases come in step: at a harmonic of their
 /// beat, give or take the dither's frequency, to within what the record can tell.
 bool is_on_beat(const TurnFit& fit, double hz) {
-    constexpr int harmonics = 6;  // which views of the phase have
     if (!(fit.parameters().injected_sd_rad < 1.0)) return false;
     const TurnSeries& series = fit.model().series();
     const double beat_hz = fit.model().beat_hz();
     const double dither_hz = 0.5 / series.interval_s;
-    for (int k = -harmonics; k <= harmonics; ++k) {
+    for (int k = -harmonics_of_phase; k <= harmonics_of_phase; ++k) {
         const double apart_hz = std::abs(std::remainder(hz - k * beat_hz, dither_hz));
         if (k != 0 && apart_hz * series.time_s.back() < 1.0) return true;
     }
@@ -123,11 +121,9 @@ bool is_on_beat(const TurnFit& fit, double hz) {
 }
 
 std::optional<double> frequency_hz_of(const TurnFit& fit, const effects::Effect& effect) {
-    for (const effects::Parameter& parameter : effect.parameters()) {
-        if (parameter.role != effects::Role::frequency) continue;
-        return fit.parameters().find(effect.name())->values.at(std::string(parameter.name));
-    }
-    return std::nullopt;
+    const effects::Parameter* frequency = effects::first_of(effect, effects::Role::frequency);
+    if (frequency == nullptr) return std::nullopt;
+    return fit.parameters().find(effect.name())->values.at(std::string(frequency->name));
 }
 
 /// What a view of the phase counts beside a line on the beat.
@@ -255,16 +251,15 @@ void drop_needless(const record::Record& record, const Rows& rows, std::shared_p
     }
 }
 
-/// A line that may as well be another one, which the lock-in's kicks turn into it.
-std::optional<std::string> note_on_frequency(const TurnFit& without, const TurnFit& with,
-                                             const effects::Effect& effect) {
+/// Of a line that may as well be another one, which the lock-in's kicks turn into it; else nothing.
+std::string note_on_frequency(const TurnFit& without, const TurnFit& with, const effects::Effect& effect) {
     const auto hz = frequency_hz_of(with, effect);
-    if (!hz) return std::nullopt;
+    if (!hz) return {};
     std::string others;
     for (const double other : frequencies_as_likely(without, effect, *hz, 2.0 * tie)) {
         others += (others.empty() ? "" : " or ") + fmt::format("{:.4g}", other);
     }
-    if (others.empty()) return std::nullopt;
+    if (others.empty()) return {};
     return fmt::format(
         "{} of {:.4g} Hz: one of {} Hz would explain nearly as much, since the lock-in's kicks let either be seen "
         "at the other by the beat of the input rate; a record at another input rate would tell",
@@ -354,8 +349,7 @@ Closure close_turns(const record::Record& record) {
         std::string effect;
     };
     std::optional<Earlier> earlier;
-    std::map<std::string, std::string> of_frequencies;  // notes, by effect
-    std::vector<std::string> partners;                  // of the effects that were added last, still to come
+    std::vector<std::string> partners;  // of the effects that were added last, still to come
 
     // What stood in for another is dropped again, and what is the dither's own is no step: more rounds than steps.
     for (std::size_t round = 0; round < 3 * most_steps && closure.steps.size() < most_steps; ++round) {
@@ -403,10 +397,7 @@ Closure close_turns(const record::Record& record) {
         if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
         if (!earlier && choice.on_random) earlier = {now, closure.steps, step.effect};
         const Score before = heldout(*now->fit);
-        of_frequencies.erase(step.effect);  // of when it was in the model before
-        if (auto note = note_on_frequency(*now->fit, *best.fitted->fit, *best.candidate.effect)) {
-            of_frequencies.emplace(step.effect, std::move(*note));
-        }
+        step.note = note_on_frequency(*now->fit, *best.fitted->fit, *best.candidate.effect);
         now = best.fitted;
         read_shape_again(record, rows, now);
         drop_needless(record, rows, now, closure.steps);
@@ -441,10 +432,8 @@ Closure close_turns(const record::Record& record) {
         closure.notes.push_back(
             "the injected noise is flatter than a normal one: the size of the residual over the phase is not tested");
     }
-    for (const auto& [effect, note] : of_frequencies) {
-        const bool stays = std::any_of(closure.steps.begin(), closure.steps.end(),
-                                       [&name = effect](const Step& step) { return step.effect == name; });
-        if (stays) closure.notes.push_back(note);
+    for (const Step& step : closure.steps) {
+        if (!step.note.empty()) closure.notes.push_back(step.note);
     }
     for (std::string& note : notes_on_amplitude(*now)) closure.notes.push_back(std::move(note));
     closure.log_likelihood_gain = now->fit->log_likelihood() - base_log_likelihood;
@@ -459,11 +448,9 @@ std::vector<ActiveEffect> since_first_turn(std::vector<ActiveEffect> effects, co
     const double start_s = record.turns->time_s.front();
     for (ActiveEffect& active : effects) {
         if (!active.effect->adds_angle()) continue;
-        const auto parameters = active.effect->parameters();
         const auto of = [&](effects::Role role) -> double* {
-            const auto found = std::find_if(parameters.begin(), parameters.end(),
-                                            [&](const effects::Parameter& p) { return p.role == role; });
-            return found == parameters.end() ? nullptr : &active.values.at(std::string(found->name));
+            const effects::Parameter* found = effects::first_of(*active.effect, role);
+            return found == nullptr ? nullptr : &active.values.at(std::string(found->name));
         };
         if (double* time = of(effects::Role::time)) *time = std::max(0.0, *time - start_s);
         double* phase = of(effects::Role::phase);

@@ -152,7 +152,7 @@ class Fits {
     }
     TurnParameters with_share(double share) const {
         // Some effects are a phase and nothing else.
-        const bool has_size = count_of(*candidate_.effect, {effects::Role::size}) > 0;
+        const bool has_size = effects::first_of(*candidate_.effect, effects::Role::size) != nullptr;
         TurnParameters parameters = start_;
         for (const effects::Parameter& parameter : candidate_.effect->parameters()) {
             if (parameter.role == (has_size ? effects::Role::size : effects::Role::phase)) {
@@ -256,9 +256,7 @@ std::shared_ptr<Fitted> fit_or_none(const record::Record& record, const TurnPara
 double cost_of_choice() { return std::log(static_cast<double>(effects::registry().size())); }
 
 bool is_random_rate(const effects::Effect& effect) {
-    const auto parameters = effect.parameters();
-    return std::any_of(parameters.begin(), parameters.end(),
-                       [](const auto& p) { return p.role == effects::Role::deviation; });
+    return effects::first_of(effect, effects::Role::deviation) != nullptr;
 }
 
 double p_of_gain(double gain, const effects::Effect& effect) { return chi2_tail(2.0 * gain, free_parameters(effect)); }

@@ -39,10 +39,7 @@ bool fitted_in_phase(const effects::Effect& effect, effects::Role role) {
            !told_by_other_columns(effect);
 }
 
-bool has_phase(const effects::Effect& effect) {
-    const auto all = effect.parameters();
-    return std::any_of(all.begin(), all.end(), [](const auto& p) { return p.role == effects::Role::phase; });
-}
+bool has_phase(const effects::Effect& effect) { return effects::first_of(effect, effects::Role::phase) != nullptr; }
 
 }  // namespace
 
@@ -327,8 +324,7 @@ void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) c
     auto k = static_cast<Eigen::Index>(nuisances() + base_columns);
     for (const ActiveEffect& active : parameters_.effects) {
         const auto all = active.effect->parameters();
-        const bool has_size =
-            std::any_of(all.begin(), all.end(), [](const auto& p) { return p.role == effects::Role::size; });
+        const bool has_size = effects::first_of(*active.effect, effects::Role::size) != nullptr;
         for (const effects::Parameter& parameter : all) {
             if (!fitted_in_phase(*active.effect, parameter.role)) continue;
             const double limit = parameter.role == effects::Role::time        ? part * duration_s

@@ -166,6 +166,9 @@ std::span<const Effect* const> registry();
 /// The effect of that name or null.
 const Effect* find(std::string_view name);
 
+/// The first parameter of that role or null.
+const Parameter* first_of(const Effect& effect, Role role);
+
 /// Names of effects that are planned but cannot be simulated yet, in order.
 std::span<const std::string_view> planned();
 

@@ -45,6 +45,12 @@ const Effect* find(std::string_view name) {
     return found == all.end() ? nullptr : *found;
 }
 
+const Parameter* first_of(const Effect& effect, Role role) {
+    const auto all = effect.parameters();
+    const auto found = std::find_if(all.begin(), all.end(), [role](const Parameter& p) { return p.role == role; });
+    return found == all.end() ? nullptr : &*found;
+}
+
 std::span<const std::string_view> planned() { return {}; }
 
 }  // namespace ringlock::effects
