@@ -126,6 +126,11 @@ std::optional<double> frequency_hz_of(const TurnFit& fit, const effects::Effect&
     return fit.parameters().find(effect.name())->values.at(std::string(frequency->name));
 }
 
+bool is_line_on_beat(const TurnFit& fit, const Contender& contender) {
+    const auto hz = frequency_hz_of(*contender.fitted->fit, *contender.candidate.effect);
+    return hz && is_on_beat(fit, *hz);
+}
+
 /// What a view of the phase counts beside a line on the beat.
 constexpr double beside_beat = 2.0;
 
@@ -145,8 +150,7 @@ std::optional<double> something_else(const TurnFit& fit, const Choice& choice) {
     std::erase_if(views, [](const View& view) { return !view.columns || view.test.merit < tie; });
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
     if (views.size() > looked_at) views.resize(looked_at);
-    const auto hz = frequency_hz_of(*choice.chosen->fitted->fit, *choice.chosen->candidate.effect);
-    const bool on_beat = hz && is_on_beat(fit, *hz);
+    const bool on_beat = is_line_on_beat(fit, *choice.chosen);
     double rival = 0.0;
     for (const Held& held : choice.held) rival = std::max(rival, held.merit);
     std::optional<double> most;
@@ -172,12 +176,12 @@ std::optional<double> something_else(const TurnFit& fit, const Choice& choice) {
 /// the chosen one makes up for what a view explains. Rates by twos could follow nearly anything.
 bool two_explain(const record::Record& record, const Rows& rows, const Choice& choice, double merit_of_view) {
     constexpr std::size_t looked_at = 3;
-    const auto of_coupling = [](const Contender& contender) {
-        return !contender.candidate.effect->adds_angle() && !is_random_rate(*contender.candidate.effect);
-    };
     const Contest beside = hold_contest(record, *choice.chosen->fitted, rows, looked_at, Among::not_random);
     if (beside.side || beside.contenders.empty() || !passes(beside.contenders.front().p_value)) return false;
-    if (!of_coupling(*choice.chosen) && !of_coupling(beside.contenders.front())) return false;
+    if (!is_of_coupling(*choice.chosen->candidate.effect) &&
+        !is_of_coupling(*beside.contenders.front().candidate.effect)) {
+        return false;
+    }
     return choice.chosen->merit + beside.contenders.front().merit - cost_of_choice() > merit_of_view;
 }
 
@@ -354,8 +358,8 @@ Closure close_turns(const record::Record& record) {
     // What stood in for another is dropped again, and what is the dither's own is no step: more rounds than steps.
     for (std::size_t round = 0; round < 3 * most_steps && closure.steps.size() < most_steps; ++round) {
         if (heldout(*now->fit).error < numerics_rad) break;
-        const Contest contest = hold_contest(record, *now, rows, most_contenders);
-        const Choice choice = choose(record, contest, rows);
+        Contest contest = hold_contest(record, *now, rows, most_contenders);
+        Choice choice = choose(record, contest, rows);
         // A locked gyro's lock-in takes amplitudes up, unless noise is injected.
         const TurnParameters& found = now->fit->parameters();
         const bool shows = now->series.all_phases_come || found.injected_sd_rad > found.readout_sd_rad;
@@ -369,11 +373,21 @@ Closure close_turns(const record::Record& record) {
             }
         }
         if (choice.chosen == nullptr) break;
-        const Contender& best = *choice.chosen;
         if (!contest.side) {
             const auto view = something_else(*now->fit, choice);
-            if (view && !two_explain(record, rows, choice, *view)) break;
+            if (view && is_line_on_beat(*now->fit, *choice.chosen)) {
+                // What follows the phase may be an effect of the coupling by itself, rather than anything else.
+                std::erase_if(contest.contenders, [&](const Contender& c) {
+                    return is_line_on_beat(*now->fit, c) || is_random_rate(*c.candidate.effect);
+                });
+                choice = choose(record, contest, rows);
+                if (choice.chosen == nullptr || !is_of_coupling(*choice.chosen->candidate.effect)) break;
+                if (something_else(*now->fit, choice)) break;
+            } else if (view && !two_explain(record, rows, choice, *view)) {
+                break;
+            }
         }
+        const Contender& best = *choice.chosen;
         Step step;
         step.effect = std::string(best.candidate.effect->name());
         step.p_value = choice.p_value;

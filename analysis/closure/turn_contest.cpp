@@ -115,9 +115,8 @@ class Fits {
         needed_ = now_.fit->log_likelihood() + needed;
         // Coupling, threshold and bias move together: from next to nothing the first step takes all of them along.
         const effects::Effect& effect = *candidate_.effect;
-        const bool of_coupling = !effect.adds_angle() && !is_random_rate(effect) && !told_by_other_columns(effect);
-        if (of_coupling) from(with_share(0.01));
-        if (!of_coupling || !gained(nearly_all * candidate_.chi2)) from(start_);
+        if (is_of_coupling(effect)) from(with_share(0.01));
+        if (!is_of_coupling(effect) || !gained(nearly_all * candidate_.chi2)) from(start_);
         // Without it the rest may have gone far astray.
         if (is_random_rate(effect) || on_phase(effect) || (strong_rate_ && !gained(0.25 * candidate_.chi2))) {
             anew(alike);
@@ -257,6 +256,10 @@ double cost_of_choice() { return std::log(static_cast<double>(effects::registry(
 
 bool is_random_rate(const effects::Effect& effect) {
     return effects::first_of(effect, effects::Role::deviation) != nullptr;
+}
+
+bool is_of_coupling(const effects::Effect& effect) {
+    return !effect.adds_angle() && !is_random_rate(effect) && !told_by_other_columns(effect);
 }
 
 double p_of_gain(double gain, const effects::Effect& effect) { return chi2_tail(2.0 * gain, free_parameters(effect)); }

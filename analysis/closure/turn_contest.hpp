@@ -37,6 +37,9 @@ double cost_of_choice();
 /// Random rates can follow whatever the library does not have, more or less.
 bool is_random_rate(const effects::Effect& effect);
 
+/// Effects that change the kicks and that the phases alone tell of.
+bool is_of_coupling(const effects::Effect& effect);
+
 /// Probability of so large a gain of the log-likelihood by chance, by all parameters of the effect.
 double p_of_gain(double gain, const effects::Effect& effect);
 /// Whether that is rare enough for one of all effects of the library.

@@ -284,6 +284,16 @@ TEST(LongClosureSuite, WhatFollowsThePhaseIsNoVibration) {
     EXPECT_FALSE(outcome.false_name) << outcome.named;
 }
 
+TEST(LongClosureSuite, AnEffectOfTheCouplingIsNamedBesideItsLine) {
+    // Beside a ramp what the detectors' phase adds is a line at the beat, 19.61 Hz, that explains more than either.
+    Case of{.kind = Kind::several, .truth = {}, .multiple = 30.0, .condition = &other_gyro, .seed = 2124};
+    of.truth = {{"dither_asymmetry", {{"ratio", -7.2793e-05}}},
+                {"detector_phase_offset", {{"phase_rad", 0.030307}}},
+                {"bias_ramp", {{"deg_h_per_h", -0.016693}}}};
+    const Outcome outcome = judged({of}).front();
+    EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named;
+}
+
 TEST(ClosureSuite, TwoRatesAreNotOneRandomRate) {
     // A random rate follows a ramp and a temperature at once, better than either of them does.
     Case of{.kind = Kind::pair, .truth = {}, .multiple = 4.0, .condition = &conditions[2], .seed = 350, .turns = turns};
