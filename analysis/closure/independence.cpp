@@ -39,8 +39,8 @@ double largest(const std::vector<double>& values) {
     return most;
 }
 
-/// Harmonic k of the phase at the turns: as kicks, or as errors of the reading.
-Columns harmonic(const TurnFit& fit, int k, bool kicks) {
+/// Harmonic k of the phase at the turns: as kicks, or as errors of the reading; `times` such a factor at each turn.
+Columns harmonic(const TurnFit& fit, int k, bool kicks, const std::vector<double>& times) {
     const auto& model = fit.model();
     const std::size_t n = model.series().size();
     const NoiseShape* shape = fit.parameters().shape.get();
@@ -51,7 +51,9 @@ Columns harmonic(const TurnFit& fit, int k, bool kicks) {
     for (std::size_t i = 0; i < n; ++i) {
         const double angle = k * model.phase_rad()[i];
         const double d = model.series().direction[i];
-        const double values[4] = {std::cos(angle), std::sin(angle), d * std::cos(angle), d * std::sin(angle)};
+        const double cosine = times[i] * std::cos(angle);
+        const double sine = times[i] * std::sin(angle);
+        const double values[4] = {cosine, sine, d * cosine, d * sine};
         const double slopes[4] = {-k * values[1], k * values[0], -k * values[3], k * values[2]};
         for (std::size_t c = 0; c < 4; ++c) {
             columns[c].series[i] = (kicks ? sums[c] : 0.0) + share * values[c];
@@ -60,9 +62,28 @@ Columns harmonic(const TurnFit& fit, int k, bool kicks) {
             sums[c] += values[c];
         }
         if (shape == nullptr) continue;
-        const std::complex<double> left = share * shape->at(i)[static_cast<std::size_t>(k - 1)];
+        const std::complex<double> left = share * times[i] * shape->at(i)[static_cast<std::size_t>(k - 1)];
         const double lefts[4] = {left.real(), left.imag(), d * left.real(), d * left.imag()};
         for (std::size_t c = 0; c < 4; ++c) columns[c].left[i] = lefts[c];
+    }
+    return columns;
+}
+
+Columns harmonic(const TurnFit& fit, int k, bool kicks) {
+    return harmonic(fit, k, kicks, std::vector<double>(fit.model().series().size(), 1.0));
+}
+
+/// Kicks whose size and place go up and down with so many periods over the record.
+Columns kicks_that_change(const TurnFit& fit, double periods) {
+    const std::size_t n = fit.model().series().size();
+    Columns columns;
+    for (const bool sine : {false, true}) {
+        std::vector<double> times(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            const double angle = units::two_pi * periods * static_cast<double>(i) / static_cast<double>(n);
+            times[i] = sine ? std::sin(angle) : std::cos(angle);
+        }
+        for (Regressor& column : harmonic(fit, 1, true, times)) columns.push_back(std::move(column));
     }
     return columns;
 }
@@ -107,6 +128,27 @@ void test_phase(const TurnFit& fit, std::vector<View>& views) {
              // Beyond, phases no longer follow from what is added to them: any noise could be had so.
              0.3 / at});
     }
+}
+
+/// A lock-in that does not stay what it is: kicks at the phase, times slow swings.
+void test_kicks_over_time(const TurnFit& fit, std::vector<View>& views) {
+    constexpr std::size_t places = 40;
+    const auto periods_of = [](std::size_t place) { return 0.5 * static_cast<double>(place + 1); };
+    std::vector<TurnFit::Score> scores(places);
+    oneapi::tbb::parallel_for(std::size_t{0}, places, [&](std::size_t place) {
+        scores[place] = fit.score(kicks_that_change(fit, periods_of(place)));
+    });
+    const auto most =
+        std::max_element(scores.begin(), scores.end(), [](const auto& a, const auto& b) { return a.chi2 < b.chi2; });
+    const TurnFit::Score& score = *most;
+    const double periods = periods_of(static_cast<std::size_t>(most - scores.begin()));
+    if (score.rank == 0) return;
+    const double cost = score.rank + std::log(static_cast<double>(places));
+    views.push_back({{Where::time, "kicks that change in time", of_several(chi2_tail(score.chi2, score.rank), places),
+                      fmt::format("{:g} periods over the record", periods), 0.5 * score.chi2 - cost},
+                     cost,
+                     [&fit, periods] { return kicks_that_change(fit, periods); },
+                     0.3});
 }
 
 /// Amplitude of the dither at the turns over its mean: second differences of the phases, in which no rate is, the
@@ -400,6 +442,7 @@ double refitted_merit(const TurnFit& fit, const View& view, double rival) {
 std::vector<View> view_residual(const TurnFit& fit) {
     std::vector<View> views;
     test_phase(fit, views);
+    test_kicks_over_time(fit, views);
     test_rates(fit, views);
     test_steps(fit, views);
     test_levels(fit, views);
