@@ -149,7 +149,10 @@ Drive::Drive(const Truth& truth) {
                             truth.bias_per_rate_squared_h_deg * input * input +
                             truth.bias_per_relative_amplitude_deg_h * (amplitude_rad[j] / nominal - 1.0);
         rate_rad_s[j] = phase_per_arcsec * rate;  // 1 deg/h is 1 arcsec/s
-        b_rad_s[j] = phase_per_arcsec * truth.lockin_threshold_deg_h * (1.0 + truth.lockin_temperature_per_k * warmer);
+        const double middle_s = 0.5 * (turn_s[j] + turn_s[j + 1]);
+        const SwingOfCoupling& swing = truth.lockin_swing;
+        b_rad_s[j] = phase_per_arcsec * truth.lockin_threshold_deg_h * (1.0 + truth.lockin_temperature_per_k * warmer) *
+                     (1.0 + swing.ratio * std::sin(two_pi * middle_s / swing.period_s));
     }
 }
 

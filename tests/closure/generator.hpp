@@ -42,6 +42,11 @@ struct HarmonicOfCoupling {
     double ratio = 0.0;
     double phase_rad = 0.0;
 };
+/// A threshold that goes up and down: 1 + ratio sin(2 pi t/period) times as large.
+struct SwingOfCoupling {
+    double ratio = 0.0;
+    double period_s = 60.0;
+};
 struct ReadoutEllipse {
     double gain = 0.0;
     double offset_sin = 0.0;
@@ -97,6 +102,7 @@ struct Truth {
 
     // Effects that the library does not have
     HarmonicOfCoupling lockin_third_harmonic;
+    SwingOfCoupling lockin_swing;
     double bias_per_rate_squared_h_deg = 0.0;        ///< bias = this times the square of the input rate [1/(deg/h)]
     double bias_per_relative_amplitude_deg_h = 0.0;  ///< bias = this times the half cycle's relative amplitude change
 

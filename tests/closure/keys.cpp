@@ -57,6 +57,8 @@ constexpr Key<Truth> turn_numbers[] = {
     RINGLOCK_KEY(Truth, "scale_factor_error.relative", scale_factor_error),
     RINGLOCK_KEY(Truth, "lockin_third_harmonic.ratio", lockin_third_harmonic.ratio),
     RINGLOCK_KEY(Truth, "lockin_third_harmonic.phase_rad", lockin_third_harmonic.phase_rad),
+    RINGLOCK_KEY(Truth, "lockin_swing.ratio", lockin_swing.ratio),
+    RINGLOCK_KEY(Truth, "lockin_swing.period_s", lockin_swing.period_s),
     RINGLOCK_KEY(Truth, "bias_per_rate_squared_h_deg", bias_per_rate_squared_h_deg),
     RINGLOCK_KEY(Truth, "bias_per_relative_amplitude_deg_h", bias_per_relative_amplitude_deg_h),
 };

@@ -342,19 +342,19 @@ std::vector<Case> foreign_cases(std::size_t each, std::uint64_t series) {
     std::vector<Case> cases;
     std::mt19937_64 random(77 + series);
     const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    const auto add = [&](std::size_t condition, Where where, Added added) {
+        Case of;
+        of.kind = Kind::foreign;
+        of.condition = &conditions[condition];
+        of.direct = true;
+        of.seed = seeds_of_series * series + 50000 + cases.size();
+        of.where = where;
+        of.foreign = {std::move(added)};
+        cases.push_back(std::move(of));
+    };
+    // From what shows itself well to what is evident: sizes are even in their logarithms.
+    const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
     for (std::size_t k = 0; k < each; ++k) {
-        const auto add = [&](std::size_t condition, Where where, Added added) {
-            Case of;
-            of.kind = Kind::foreign;
-            of.condition = &conditions[condition];
-            of.direct = true;
-            of.seed = seeds_of_series * series + 50000 + cases.size();
-            of.where = where;
-            of.foreign = {std::move(added)};
-            cases.push_back(std::move(of));
-        };
-        // From what shows itself well to what is evident: sizes are even in their logarithms.
-        const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
         const bool injected = k % 2 == 1;
         add(k % 2, Where::phase,
             {"lockin_third_harmonic",
@@ -368,6 +368,11 @@ std::vector<Case> foreign_cases(std::size_t each, std::uint64_t series) {
               {"chirp_hz_per_s", even(1e-3, 2e-2) * (k % 3 == 0 ? -1.0 : 1.0)},
               {"rate_deg_h", injected ? even(3.0, 30.0) : even(0.02, 1.0)},
               {"phase_rad", between(-3.0, 3.0)}}});
+    }
+    for (std::size_t k = 0; k < each; ++k) {
+        const bool injected = k % 2 == 1;
+        add(k % 2, Where::time,
+            {"lockin_swing", {{"ratio", injected ? even(0.1, 0.5) : even(2e-3, 0.2)}, {"period_s", even(6.0, 130.0)}}});
     }
     return cases;
 }

@@ -263,7 +263,7 @@ TEST(LongClosureSuite, ALineAndASecondHarmonicAreNotSomethingElse) {
 
 TEST(ClosureSuite, NothingOutsideTheLibraryHasItsName) {
     std::vector<Case> all = foreign_cases(1);
-    ASSERT_EQ(all.size(), 5U);
+    ASSERT_EQ(all.size(), 6U);
     for (Case& of : all) of.turns = turns;
     const std::vector<Outcome> outcomes = judged(all);  // the generator takes all of them at a time
     for (std::size_t k = 0; k < all.size(); ++k) {
@@ -282,6 +282,15 @@ TEST(LongClosureSuite, WhatFollowsThePhaseIsNoVibration) {
     const Outcome outcome = judged({of}).front();
     EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named;
     EXPECT_FALSE(outcome.false_name) << outcome.named;
+}
+
+TEST(ClosureSuite, ALockInThatDriftsIsNoRandomRate) {
+    // Kicks of a threshold that is not the mean one add up to a walk beside injected noise.
+    Case of{.kind = Kind::foreign, .truth = {}, .condition = &conditions[1], .direct = true, .seed = 7};
+    of.foreign = {{"lockin_swing", {{"ratio", 0.3}, {"period_s", 120.0}}}};
+    of.where = ringlock::closure::Where::time;
+    const Outcome outcome = judged({of}).front();
+    EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named << " " << outcome.where;
 }
 
 TEST(LongClosureSuite, AnEffectOfTheCouplingIsNamedBesideItsLine) {
