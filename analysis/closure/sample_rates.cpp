@@ -3,7 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "analysis/closure/chance.hpp"
@@ -15,10 +17,110 @@
 #include "analysis/closure/sample_views.hpp"
 #include "analysis/closure/two_levels.hpp"
 #include "analysis/closure/two_states.hpp"
+#include "engine/core/units.hpp"
 
 namespace ringlock::closure {
 
 namespace {
+
+/// Rates that go with a power of time, as few of them as the record asks for (Schwarz, Annals of Statistics 6, 1978,
+/// 461).
+void test_powers_of_time(const SampleFit& fit, Views& views) {
+    constexpr std::size_t degrees = 6;
+    const std::size_t n = fit.series().size();
+    Columns powers;
+    Columns taken;
+    SampleFit::Score score;
+    std::size_t degree = 0;
+    double most = 0.0;
+    for (std::size_t k = 1; k <= degrees; ++k) {
+        std::vector<double> rate(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            const double x = 2.0 * static_cast<double>(i) / static_cast<double>(n - 1) - 1.0;
+            rate[i] = std::cos(static_cast<double>(k) * std::acos(std::clamp(x, -1.0, 1.0)));
+        }
+        taken.push_back(fit.as_taken(rate));
+        powers.push_back(std::move(rate));
+        score = fit.score(taken);
+        const double merit = 0.5 * (score.chi2 - score.rank * std::log(static_cast<double>(n)));
+        if (degree > 0 && merit <= most) continue;
+        most = merit;
+        degree = k;
+    }
+    if (score.rank == 0) return;
+    powers.resize(degree);
+    views.push_back({{Where::time, "rates that are polynomials of time", chi2_tail(score.chi2, score.rank),
+                      fmt::format("degree {}", degree), 0.5 * score.chi2 - score.rank},
+                     static_cast<double>(degree) + std::log(static_cast<double>(degrees)),
+                     [powers = std::make_shared<const Columns>(std::move(powers))] { return regressors(*powers); }});
+}
+
+/// Where a regression on the columns of some place explains most: such a view, each column a parameter, and the place.
+struct Places {
+    std::size_t count;
+    std::function<Columns(std::size_t place)> columns;
+    std::function<std::string(std::size_t place)> said;
+};
+void test_places(const SampleFit& fit, const char* view, const Places& of, Views& views) {
+    double chi2 = 0.0;
+    int rank = 0;
+    std::size_t at = 0;
+    for (std::size_t place = 0; place < of.count; ++place) {
+        Columns taken;
+        for (const auto& column : of.columns(place)) taken.push_back(fit.as_taken(column));
+        const auto score = fit.score(taken);
+        if (score.rank == 0 || score.chi2 <= chi2) continue;
+        chi2 = score.chi2;
+        rank = score.rank;
+        at = place;
+    }
+    if (rank == 0) return;
+    const double cost = rank + std::log(static_cast<double>(of.count));
+    const double p = of_several(chi2_tail(chi2, rank), static_cast<double>(of.count));
+    views.push_back({{Where::time, view, p, of.said(at), 0.5 * chi2 - cost}, cost, [columns = of.columns, at] {
+                         return regressors(columns(at));
+                     }});
+}
+
+/// A rate that goes up and down too slowly for a line.
+void test_slow_swings(const SampleFit& fit, Views& views) {
+    const std::size_t n = fit.series().size();
+    const auto periods = [](std::size_t place) { return 0.25 * static_cast<double>(place + 1); };
+    const auto swing = [n, periods](std::size_t place) {
+        Columns columns(2, std::vector<double>(n));
+        for (std::size_t i = 0; i < n; ++i) {
+            const double angle = units::two_pi * periods(place) * static_cast<double>(i) / static_cast<double>(n);
+            columns[0][i] = std::cos(angle);
+            columns[1][i] = std::sin(angle);
+        }
+        return columns;
+    };
+    const auto said = [periods](std::size_t place) {
+        return fmt::format("{:g} periods over the record", periods(place));
+    };
+    test_places(fit, "a rate that swings slowly", {32, swing, said}, views);
+}
+
+/// A rate that settles after the start.
+void test_settling(const SampleFit& fit, Views& views) {
+    const auto& time_s = fit.series().time_s;
+    const double duration_s = time_s.back() - time_s.front();
+    // By steps of which the half changes next to nothing.
+    const auto constant_s = [duration_s](std::size_t place) {
+        return duration_s * std::pow(1.4, -static_cast<double>(place));
+    };
+    const auto settles = [&time_s, constant_s](std::size_t place) {
+        Columns columns(1, std::vector<double>(time_s.size()));
+        for (std::size_t i = 0; i < time_s.size(); ++i) {
+            columns[0][i] = std::exp(-(time_s[i] - time_s.front()) / constant_s(place));
+        }
+        return columns;
+    };
+    const auto said = [constant_s](std::size_t place) {
+        return fmt::format("with a time constant of {:.2g} s", constant_s(place));
+    };
+    test_places(fit, "a rate that settles", {14, settles, said}, views);
+}
 
 void test_rates(const SampleFit& fit, Views& views) {
     const SampleSeries& series = fit.series();
@@ -61,16 +163,6 @@ void test_rates(const SampleFit& fit, Views& views) {
             against(Where::rate, "rates that follow the input rate, its square and its cube", {one, square, cube});
         }
     }
-    std::vector<std::vector<double>> powers;
-    for (int k = 1; k <= 6; ++k) {
-        std::vector<double> rate(n);
-        for (std::size_t i = 0; i < n; ++i) {
-            rate[i] = std::cos(
-                k * std::acos(std::clamp(2.0 * static_cast<double>(i) / static_cast<double>(n - 1) - 1.0, -1.0, 1.0)));
-        }
-        powers.push_back(std::move(rate));
-    }
-    against(Where::time, "rates that are polynomials of time", std::move(powers));
     std::vector<double> roots;
     double best = 0.0;
     std::size_t at = 0;
@@ -255,6 +347,9 @@ void test_jumps(const SampleFit& fit, Views& views) {
 
 void view_rates(const SampleFit& fit, Views& views) {
     test_rates(fit, views);
+    test_powers_of_time(fit, views);
+    test_slow_swings(fit, views);
+    test_settling(fit, views);
     test_levels(fit, views);
     test_jumps(fit, views);
 }
