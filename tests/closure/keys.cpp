@@ -119,6 +119,8 @@ constexpr Key<T> shared_numbers[] = {
     RINGLOCK_KEY(T, "base_vibration.phase_rad", rates.base_vibration.phase_rad),
     RINGLOCK_KEY(T, "telegraph_bias.step_deg_h", rates.telegraph_bias.step_deg_h),
     RINGLOCK_KEY(T, "telegraph_bias.dwell_s", rates.telegraph_bias.dwell_s),
+    RINGLOCK_KEY(T, "settling.start_deg_h", rates.settling.start_deg_h),
+    RINGLOCK_KEY(T, "settling.constant_s", rates.settling.constant_s),
     RINGLOCK_KEY(T, "chirped_line.frequency_hz", rates.chirped_line.frequency_hz),
     RINGLOCK_KEY(T, "chirped_line.chirp_hz_per_s", rates.chirped_line.chirp_hz_per_s),
     RINGLOCK_KEY(T, "chirped_line.rate_deg_h", rates.chirped_line.rate_deg_h),

@@ -96,6 +96,12 @@ std::vector<double> mean_rates(const RateTruth& truth, std::uint64_t seed, std::
     for (std::size_t i = 0; i < rates.size(); ++i) {
         const double from = edges_s[i];
         const double to = edges_s[i + 1];
+        const RateSettling& settling = truth.settling;
+        if (settling.start_deg_h != 0.0) {
+            const double lost = std::expm1(-(to - from) / settling.constant_s);
+            rates[i] -=
+                settling.start_deg_h * settling.constant_s / (to - from) * std::exp(-from / settling.constant_s) * lost;
+        }
         if (step.step_deg_h != 0.0 && step.time_s < to) {
             rates[i] += step.step_deg_h * std::min(1.0, (to - step.time_s) / (to - from));
         }

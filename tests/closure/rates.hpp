@@ -60,6 +60,11 @@ struct RateTelegraph {
     double step_deg_h = 0.0;
     double dwell_s = 10.0;
 };
+/// A rate that settles: `start_deg_h` at first, and an e-th part of it after every `constant_s`.
+struct RateSettling {
+    double start_deg_h = 0.0;
+    double constant_s = 60.0;
+};
 
 struct RateTruth {
     RateStep bias_step;
@@ -71,6 +76,7 @@ struct RateTruth {
     RateLine base_vibration;
     RateTelegraph telegraph_bias;  ///< not in the library
     RateChirp chirped_line;        ///< not in the library
+    RateSettling settling;         ///< not in the library
 };
 
 /// Mean rates [deg/h, which is arcsec/s] over the intervals between consecutive `edges_s`, the first at 0 or later.

@@ -155,6 +155,21 @@ TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
     EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::time);
 }
 
+// A gyro that settles after it was switched on, and a sway of three and a half periods, were called a random walk.
+TEST(ClosureSampleSuite, ACourseInTimeIsNoRandomRate) {
+    SampleTruth settles = short_record(7);
+    settles.rates.settling = {8.0, 40.0};
+    SampleTruth sways = short_record(8);
+    sways.rates.base_vibration = {3.5 / 160.0, 3.0, 0.7};
+    for (const SampleTruth& truth : {settles, sways}) {
+        const auto found = ringlock::closure::close_samples(generate_samples(truth));
+        EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
+        EXPECT_TRUE(found.steps.empty()) << found.steps.front().effect;
+        ASSERT_TRUE(found.unexplained);
+        EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::time) << found.unexplained->description();
+    }
+}
+
 // Jumps between two levels explain more than any random rate, and more than the line: it is looked for beside the
 // random rate that comes nearest.
 TEST(ClosureSampleSuite, ALineBesideARateOfNoNameIsNamed) {
