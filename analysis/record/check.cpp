@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <span>
 
 #include "analysis/record/readers.hpp"
@@ -28,6 +29,9 @@ double median(std::vector<double> values) {
     std::nth_element(values.begin(), middle, values.end());
     return *middle;
 }
+
+/// Of an output, in any unit: squares and sums of more have no digit left for what is beside it.
+constexpr double largest_reading = 1e15;
 
 class Checker {
    public:
@@ -71,11 +75,17 @@ class Checker {
         return false;
     }
 
-    /// True where all values are finite.
-    bool finite(const std::string& column, std::span<const double> values) {
+    /// True where all values are finite, and none so large that sums with it lose what others are.
+    bool finite(const std::string& column, std::span<const double> values,
+                double largest = std::numeric_limits<double>::infinity()) {
         Tally bad;
+        Tally huge;
         for (std::size_t i = 0; i < values.size(); ++i) {
-            if (!std::isfinite(values[i])) bad.note(i);
+            if (!std::isfinite(values[i])) {
+                bad.note(i);
+            } else if (std::abs(values[i]) > largest) {
+                huge.note(i);
+            }
         }
         report(Severity::error, column, bad, [&](std::size_t i) {
             return fmt::format(
@@ -83,7 +93,13 @@ class Checker {
                 "knowingly)",
                 values[i]);
         });
-        return bad.count == 0;
+        report(Severity::error, column, huge, [&](std::size_t i) {
+            return fmt::format(
+                "is {}; no reading is beyond {:g}, and beside one no other counts (look for the row in what "
+                "wrote the record)",
+                values[i], largest);
+        });
+        return bad.count == 0 && huge.count == 0;
     }
 
     bool in_order(const std::string& column, std::span<const double> time_s) {
@@ -135,7 +151,8 @@ class Checker {
 
         const bool times_finite = finite(time, t.time_s);
         const bool ordered = times_finite && in_order(time, t.time_s);
-        const bool detectors = finite("/turns/sin", t.sine) & finite("/turns/cos", t.cosine);
+        const bool detectors =
+            finite("/turns/sin", t.sine, largest_reading) & finite("/turns/cos", t.cosine, largest_reading);
         check_acceleration("/turns/accel_before_rad_s2", t.accel_before_rad_s2);
         check_acceleration("/turns/accel_after_rad_s2", t.accel_after_rad_s2);
         const bool alternate = check_directions(t.direction);
@@ -332,7 +349,7 @@ class Checker {
         }
         const std::size_t n = s.size();
         if (n == 0) error(column, "has no rows");
-        const bool all_finite = counted || finite(column, s.values);
+        const bool all_finite = counted || finite(column, s.values, largest_reading);
         for (const auto& [name, values] : s.witnesses) {
             const std::string witness = fmt::format("/samples/{}", name);
             same_length(witness, values.size(), column, n);

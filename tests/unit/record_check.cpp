@@ -65,6 +65,8 @@ TEST(RecordCheck, NamesEveryFaultWithItsPlace) {
         {[](Record& r) { r.turns->accel_after_rad_s2.pop_back(); }, {"/turns/accel_after_rad_s2", "49 rows"}},
         {[](Record& r) { r.turns->time_s[7] = nan; }, {"/turns/time_s, row 7", "nan", "finite"}},
         {[](Record& r) { r.turns->sine[9] = infinity; }, {"/turns/sin, row 9", "inf"}},
+        {[](Record& r) { r.turns->cosine[8] = -1e160; },
+         {"/turns/cos, row 8", "is -1e+160", "no reading is beyond 1e+15"}},
         {[](Record& r) { r.turns->cosine[9] = r.turns->cosine[30] = -infinity; },
          {"/turns/cos, row 9", "-inf", "2 such rows"}},
         {[](Record& r) { std::swap(r.turns->time_s[4], r.turns->time_s[5]); },
