@@ -369,10 +369,13 @@ std::vector<Case> foreign_cases(std::size_t each, std::uint64_t series) {
               {"rate_deg_h", injected ? even(3.0, 30.0) : even(0.02, 1.0)},
               {"phase_rad", between(-3.0, 3.0)}}});
     }
+    // Off the period of the temperature, 0.4 of the record: a threshold of that period follows the temperature.
     for (std::size_t k = 0; k < each; ++k) {
         const bool injected = k % 2 == 1;
         add(k % 2, Where::time,
-            {"lockin_swing", {{"ratio", injected ? even(0.1, 0.5) : even(2e-3, 0.2)}, {"period_s", even(6.0, 130.0)}}});
+            {"lockin_swing",
+             {{"ratio", injected ? even(0.1, 0.5) : even(2e-3, 0.2)},
+              {"period_s", k % 3 == 0 ? even(6.0, 18.0) : even(35.0, 130.0)}}});
     }
     return cases;
 }
