@@ -99,6 +99,9 @@ void doubt_ellipse(const TurnFit& fit, TurnFit::Score& score) {
     score.chi2 = score.value.dot(covariance.ldlt().solve(score.value));
 }
 
+/// Of a kick's amplitude: beyond, phases no longer follow from what is added to them, and any noise could be had so.
+constexpr double largest_kick_rad = 0.3;
+
 void test_phase(const TurnFit& fit, std::vector<View>& views) {
     // The innovation is a part of the phase that is read: what they have to do with each other where nothing is missing
     // is known of normal ones (Stein, Annals of Statistics 9, 1981, 1135) and of those whose shape is.
@@ -125,8 +128,7 @@ void test_phase(const TurnFit& fit, std::vector<View>& views) {
               of_several(least, harmonics_of_phase), fmt::format("harmonic {}", at), most},
              cost,
              [&fit, at, kicks] { return harmonic(fit, at, kicks); },
-             // Beyond, phases no longer follow from what is added to them: any noise could be had so.
-             0.3 / at});
+             largest_kick_rad / at});
     }
 }
 
@@ -148,7 +150,7 @@ void test_kicks_over_time(const TurnFit& fit, std::vector<View>& views) {
                       fmt::format("{:g} periods over the record", periods), 0.5 * score.chi2 - cost},
                      cost,
                      [&fit, periods] { return kicks_that_change(fit, periods); },
-                     0.3});
+                     largest_kick_rad});
 }
 
 /// Amplitude of the dither at the turns over its mean: second differences of the phases, in which no rate is, the

@@ -23,6 +23,13 @@ namespace ringlock::closure {
 
 namespace {
 
+/// Rates as the record has them.
+Columns taken_by(const SampleFit& fit, const Columns& columns) {
+    Columns taken;
+    for (const auto& column : columns) taken.push_back(fit.as_taken(column));
+    return taken;
+}
+
 /// Rates that go with a power of time, as few of them as the record asks for (Schwarz, Annals of Statistics 6, 1978,
 /// 461).
 void test_powers_of_time(const SampleFit& fit, Views& views) {
@@ -66,9 +73,7 @@ void test_places(const SampleFit& fit, const char* view, const Places& of, Views
     int rank = 0;
     std::size_t at = 0;
     for (std::size_t place = 0; place < of.count; ++place) {
-        Columns taken;
-        for (const auto& column : of.columns(place)) taken.push_back(fit.as_taken(column));
-        const auto score = fit.score(taken);
+        const auto score = fit.score(taken_by(fit, of.columns(place)));
         if (score.rank == 0 || score.chi2 <= chi2) continue;
         chi2 = score.chi2;
         rank = score.rank;
@@ -105,7 +110,7 @@ void test_slow_swings(const SampleFit& fit, Views& views) {
 void test_settling(const SampleFit& fit, Views& views) {
     const auto& time_s = fit.series().time_s;
     const double duration_s = time_s.back() - time_s.front();
-    // By steps of which the half changes next to nothing.
+    // A constant between two of them loses little by either.
     const auto constant_s = [duration_s](std::size_t place) {
         return duration_s * std::pow(1.4, -static_cast<double>(place));
     };
@@ -126,9 +131,7 @@ void test_rates(const SampleFit& fit, Views& views) {
     const SampleSeries& series = fit.series();
     const std::size_t n = series.size();
     const auto against = [&](Where where, std::string view, Columns columns) {
-        Columns taken;
-        for (const auto& column : columns) taken.push_back(fit.as_taken(column));
-        const auto score = fit.score(taken);
+        const auto score = fit.score(taken_by(fit, columns));
         if (score.rank == 0) return;
         const double cost = score.rank;
         views.push_back(
