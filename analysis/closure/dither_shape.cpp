@@ -1,5 +1,7 @@
 #include "analysis/closure/dither_shape.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -196,6 +198,13 @@ struct PulseAngles {
         second = std::sqrt(2.0 * (first_rad + quarter_rad) / amplitude_rad);
     }
 
+    /// The acceleration that they show of a sine, over that where it turns: they are 2 asin(sqrt(d/(2 A))) of it away,
+    /// and roots of distances go as the sine of half of that.
+    double share_of_sine() const {
+        const auto angle = [](double root) { return 2.0 * std::asin(std::min(0.5 * root, 1.0)); };
+        return std::pow((second - first) / (angle(second) - angle(first)), 2);
+    }
+
     /// How much of the change of the acceleration at a turn of the dither, which is off by that angle, the two show of
     /// the half cycle that the phase's turn is in: with d(t) in two pieces, to first order in the change.
     double share_of_other(double off) const {
@@ -205,6 +214,76 @@ struct PulseAngles {
     }
 };
 
+/// Means of what accelerations show, and of what pulses do to them.
+struct Accelerations {
+    std::optional<BlockMean> sides, turns, even;  ///< none where the record has none
+    double jerk = 0.0;                            ///< what is taken off sides
+    double angle = 0.0;                           ///< w (t1 + t2)/2
+    double share_of_other = 1.0;
+};
+
+Accelerations accelerations(const record::Turns& turns, const TurnFit& fit, const PhaseFunctions& functions,
+                            const std::vector<double>& shares) {
+    const auto& series = fit.model().series();
+    const std::size_t n = series.size();
+    Accelerations found;
+    std::vector<double> sides(n, 0.0);
+    std::vector<double> minima(n, 0.0);
+    std::vector<double> even(n, 0.0);
+    std::vector<std::uint8_t> valid(n, 0);
+    std::size_t seen = 0;
+    double of_pulses = 0.0;
+    double of_rotation = 0.0;
+    double of_other = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!(turns.accel_before_rad_s2[i] > 0.0) || !(turns.accel_after_rad_s2[i] > 0.0)) continue;
+        const double before = std::log(turns.accel_before_rad_s2[i] / series.acceleration_rad_s2);
+        const double after = std::log(turns.accel_after_rad_s2[i] / series.acceleration_rad_s2);
+        if (std::abs(before) > 1.0 || std::abs(after) > 1.0) continue;
+        const double share = shares[i];
+        const PulseAngles pulses(series.direction[i], fit.model().phase_rad()[i], series.amplitude_rad);
+        const double jerk = share * (pulses.first + pulses.second) / 6.0;
+        const double sine = std::log(pulses.share_of_sine());
+        const double slower = 0.5 * std::log1p(-std::min(share * share, 0.5));
+        found.angle += pulses.first + pulses.second;
+        of_other += pulses.share_of_other(std::abs(share));
+        found.jerk += jerk;
+        of_pulses += sine;
+        of_rotation += slower;
+        sides[i] = 0.25 * series.direction[i] * (after - before) - jerk;
+        minima[i] = 0.25 * series.direction[i] * (after + before);
+        even[i] = 0.5 * (after + before) - sine - slower;
+        valid[i] = 1;
+        ++seen;
+    }
+    if (seen <= n / 4) return found;
+    const auto count = static_cast<double>(seen);
+    found.jerk /= count;
+    found.angle *= 0.5 / count;
+    found.share_of_other = of_other / count;
+    // Accelerations are computed from distances that the detectors have read: their ellipse is in them.
+    const gyro::Ellipse ellipse = fit.model().setup(fit.parameters()).ellipse;
+    const double least = 1e-5 + std::max({std::abs(ellipse.gain), std::abs(ellipse.offset_sin),
+                                          std::abs(ellipse.offset_cos), std::abs(ellipse.orthogonality_rad)});
+    const std::array<std::pair<int, double>, 1> itself{{{0, 1.0}}};
+    const auto [at_minima, at_maxima] = PhaseFunctions::mean_squares(take_phase(sides, valid, fit, functions, itself));
+    take_phase(minima, valid, fit, functions, itself);
+    take_phase(even, valid, fit, functions, itself);
+    // Of second order in the lock-in, the mean over all phases is no longer nothing (docs/closure.md):
+    // accelerations come out too small on both sides.
+    constexpr double second_order = 0.145;
+    const double smaller = second_order * (at_minima - at_maxima);
+    const double smaller_everywhere = 2.0 * second_order * (at_minima + at_maxima);
+    constexpr double of_clock = 0.1;  // what pulses and rotation do to accelerations is known to
+    found.sides = block_mean(sides, valid, fit.rows(), least);
+    found.turns = block_mean(minima, valid, fit.rows(), std::hypot(least, 0.5 * smaller));
+    found.turns->value += smaller;
+    found.even = block_mean(even, valid, fit.rows(),
+                            std::hypot(least, 0.5 * smaller_everywhere, of_clock * (of_pulses + of_rotation) / count));
+    found.even->value += smaller_everywhere;
+    return found;
+}
+
 }  // namespace
 
 DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
@@ -213,81 +292,67 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     const double w = units::pi / series.interval_s;
     const auto prediction = fit.model().predict(fit.parameters());
     const std::vector<double> left_rad_s = rate_left(fit, prediction);
+    std::vector<double> shares(n);
+    double mean_share = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        shares[i] = series.relative_rate(fit.parameters().bias_deg_h + series.input_rate_deg_h[i]) +
+                    left_rad_s[i] / (series.amplitude_rad * w);
+        mean_share += shares[i] / static_cast<double>(n);
+    }
+    const PhaseFunctions functions(fit);
+    const Accelerations seen = accelerations(turns, fit, functions, shares);
+    // Where the phase turns faster than a sine of that swing does, a rotation moves it by less.
+    const double less = seen.even && std::isfinite(seen.even->sd) ? std::expm1(-seen.even->value) : 0.0;
+    const double less_sd = seen.even && std::isfinite(seen.even->sd) ? seen.even->sd : 0.0;
     std::vector<double> late(n, 0.0);
     std::vector<std::uint8_t> valid(n, 0);
     for (std::size_t i = 1; i + 1 < n; ++i) {
         const double second = prediction.turn_s[i - 1] - 2.0 * prediction.turn_s[i] + prediction.turn_s[i + 1];
         // Such a rate moves the points where the phase stands still as any other does.
-        late[i] = -0.25 * series.direction[i] * second + left_rad_s[i] / series.acceleration_rad_s2;
+        late[i] =
+            -0.25 * series.direction[i] * second + left_rad_s[i] / series.acceleration_rad_s2 + less * shares[i] / w;
         valid[i] = 1;
     }
     // Clocks that find the zero-rate point from pulses do not follow the lock-in's shift of it all the way.
-    const PhaseFunctions functions(fit);
     const std::array<std::pair<int, double>, 3> neighbours{{{-1, 1.0}, {0, 2.0}, {1, 1.0}}};
     const Eigen::VectorXd of_late = take_phase(late, valid, fit, functions, neighbours);
     const auto [at_minima_s2, at_maxima_s2] = PhaseFunctions::mean_squares(of_late);
     // Of a turn and of both beside it.
     const double followed_s = std::sqrt(3.0 * (at_minima_s2 + at_maxima_s2));
     // Beneath: what the approximations of turn times leave, 1e-7 of an asymmetry, a fiftieth of what they do not
-    // follow, and what they would not of a rotation: middles between pulses lie off by w^2 t^2/6 of the shift.
-    double mean_share = 0.0;
-    const auto share_at = [&](std::size_t i) {
-        return series.relative_rate(fit.parameters().bias_deg_h + series.input_rate_deg_h[i]) +
-               left_rad_s[i] / (series.amplitude_rad * w);
-    };
-    for (std::size_t i = 0; i < n; ++i) mean_share += share_at(i) / static_cast<double>(n);
-    const double least_s =
-        std::hypot(5e-8 * series.interval_s, 0.02 * followed_s, mean_share / (series.amplitude_rad * w));
-    DitherShape shape{block_mean(late, valid, fit.rows(), least_s), {}, {}};
-    std::vector<double> sides(n, 0.0);
-    std::vector<double> minima(n, 0.0);
-    std::fill(valid.begin(), valid.end(), std::uint8_t{0});
-    std::size_t seen = 0;
-    double jerks = 0.0;
-    double angles = 0.0;
-    double of_other = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-        if (!(turns.accel_before_rad_s2[i] > 0.0) || !(turns.accel_after_rad_s2[i] > 0.0)) continue;
-        const double before = std::log(turns.accel_before_rad_s2[i] / series.acceleration_rad_s2);
-        const double after = std::log(turns.accel_after_rad_s2[i] / series.acceleration_rad_s2);
-        if (std::abs(before) > 1.0 || std::abs(after) > 1.0) continue;
-        const double share = share_at(i);
-        const PulseAngles pulses(series.direction[i], fit.model().phase_rad()[i], series.amplitude_rad);
-        const double jerk = share * (pulses.first + pulses.second) / 6.0;
-        angles += pulses.first + pulses.second;
-        of_other += pulses.share_of_other(std::abs(share));
-        jerks += jerk;
-        sides[i] = 0.25 * series.direction[i] * (after - before) - jerk;
-        minima[i] = 0.25 * series.direction[i] * (after + before);
-        valid[i] = 1;
-        ++seen;
-    }
-    if (seen > n / 4) {
-        // Accelerations are computed from distances that the detectors have read: their ellipse is in them.
-        const gyro::Ellipse ellipse = fit.model().setup(fit.parameters()).ellipse;
-        constexpr double of_jerk = 0.2;  // accelerations may be made of pulses in other ways
-        shape.sides_by_sine = 0.5 * angles / static_cast<double>(seen);
-        of_other /= static_cast<double>(seen);
-        shape.sides_by_ratio = 1.0 - of_other;
-        const double moved =
-            std::hypot(jerks / static_cast<double>(seen), (shape.sides_by_sine + of_other) * w * shape.late_s.value);
-        const double least_sides = of_jerk * moved;
-        const double least_ratio = 1e-5 + std::max({std::abs(ellipse.gain), std::abs(ellipse.offset_sin),
-                                                    std::abs(ellipse.offset_cos), std::abs(ellipse.orthogonality_rad)});
-        const std::array<std::pair<int, double>, 1> itself{{{0, 1.0}}};
-        const auto [at_minima, at_maxima] =
-            PhaseFunctions::mean_squares(take_phase(sides, valid, fit, functions, itself));
-        take_phase(minima, valid, fit, functions, itself);
-        // Of second order in the lock-in, the mean over all phases is no longer nothing (docs/closure.md):
-        // accelerations come out too small on both sides.
-        constexpr double second_order = 0.145;
-        const double smaller = second_order * (at_minima - at_maxima);
-        const double least_turns = std::hypot(least_ratio, 0.5 * smaller);
-        shape.sides = block_mean(sides, valid, fit.rows(), std::hypot(least_ratio, least_sides));
-        shape.turns = block_mean(minima, valid, fit.rows(), least_turns);
-        shape.turns->value += smaller;
-    }
+    // follow, what they would not of a rotation: middles between pulses lie off by w^2 t^2/6 of the shift; and what is
+    // not known of the acceleration.
+    const double least_s = std::hypot(std::hypot(5e-8 * series.interval_s, 0.02 * followed_s),
+                                      mean_share / (series.amplitude_rad * w), less_sd * mean_share / w);
+    DitherShape shape;
+    shape.late_s = block_mean(late, valid, fit.rows(), least_s);
+    shape.even = seen.even;
+    if (!seen.sides) return shape;
+    shape.sides = seen.sides;
+    shape.turns = seen.turns;
+    shape.sides_by_sine = seen.angle;
+    shape.sides_by_ratio = 1.0 - seen.share_of_other;
+    constexpr double of_jerk = 0.2;       // accelerations may be made of pulses in other ways
+    constexpr double of_harmonic = 10.0;  // a third harmonic changes it by 24 times itself, 9 times even
+    const double moved = std::hypot(seen.jerk, (seen.angle + seen.share_of_other) * w * shape.late_s.value);
+    const double least_sides = std::hypot(of_jerk, of_harmonic * seen.even->value) * moved;
+    shape.sides->sd = std::hypot(shape.sides->sd, least_sides);
     return shape;
+}
+
+std::string note_on_acceleration(const record::Turns& turns, const TurnFit& fit) {
+    constexpr double least = 0.002;
+    constexpr double beyond_doubt = 10.0;  // standard errors
+    if (!fit.model().series().all_phases_come) return {};
+    const auto even = dither_shape(turns, fit).even;
+    if (!even || !(std::abs(even->value) > std::max(least, beyond_doubt * even->sd))) return {};
+    return fmt::format(
+        "the phase's accelerations at the turns are {:.2g} % {} than those of a sine of the counted swing, as a third "
+        "harmonic of the dither's rate of {:.2g} % would make them, or counts lost in fast phase; the threshold is "
+        "then "
+        "{:.6g} deg/h",
+        100.0 * std::abs(std::expm1(even->value)), even->value > 0.0 ? "greater" : "smaller",
+        100.0 * 0.375 * even->value, fit.parameters().threshold_deg_h * std::exp(0.5 * even->value));
 }
 
 }  // namespace ringlock::closure

@@ -10,6 +10,7 @@
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decision.hpp"
 #include "analysis/closure/dither_amplitude.hpp"
+#include "analysis/closure/dither_shape.hpp"
 #include "analysis/closure/normality.hpp"
 #include "analysis/closure/side_channels.hpp"
 #include "analysis/closure/turn_contest.hpp"
@@ -450,6 +451,9 @@ Closure close_turns(const record::Record& record) {
         if (!step.note.empty()) closure.notes.push_back(step.note);
     }
     for (std::string& note : notes_on_amplitude(*now)) closure.notes.push_back(std::move(note));
+    if (std::string note = note_on_acceleration(turns, *now->fit); !note.empty()) {
+        closure.notes.push_back(std::move(note));
+    }
     closure.log_likelihood_gain = now->fit->log_likelihood() - base_log_likelihood;
     take_residual(turns, *now, closure);
     take_figures(turns, *fit_record(record, now->fit->parameters(), Rows(turns.size(), 1)), closure);

@@ -357,6 +357,27 @@ TEST(ClosureEffect, DitherSecondHarmonicMakesAccelerationsAtMinimaAndMaximaUnequ
     }
 }
 
+// Of a swing that stays: (1 + 3 k)/(1 + k/3).
+TEST(ClosureEffect, DitherThirdHarmonicMakesAccelerationsGreaterThanSwings) {
+    Truth truth = usual();
+    truth.lockin_threshold_deg_h = 0.0;
+    truth.input_rate_deg_h = 0.0;
+    const double ratio = 0.02;
+    truth.dither_third_harmonic = ratio;
+    const Generated made = one(truth);
+    const record::Turns& turns = *made.record.turns;
+    const double w = 2.0 * pi * truth.dither_frequency_hz;
+    for (std::size_t i = 0; i < truth.turns; ++i) {
+        const double expected = swing_rad(truth) * w * w * (1.0 + 3.0 * ratio) / (1.0 + ratio / 3.0);
+        EXPECT_NEAR(turns.accel_before_rad_s2[i] / expected, 1.0, 1e-3);
+        EXPECT_NEAR(turns.accel_after_rad_s2[i] / expected, 1.0, 1e-3);
+        EXPECT_NEAR(turns.time_s[i], made.trajectory.dither_turn_s[i], 1e-12);
+        if (i == 0) continue;
+        const double quarters = std::abs(static_cast<double>(turns.quarter_count[i] - turns.quarter_count[i - 1]));
+        EXPECT_NEAR(quarters * 0.5 * pi, 2.0 * swing_rad(truth), 2.0);
+    }
+}
+
 TEST(ClosureEffect, RatesAddUpToTheirFormulas) {
     std::vector<Truth> truths;
     std::vector<double (*)(double, double)> rates;  // deg/h over [from, to]

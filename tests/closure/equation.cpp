@@ -135,6 +135,7 @@ TEST(ClosureEquation, IsOfTenthOrder) {
     harmonics.third_ratio = same(0.03);
     harmonics.turn_asymmetry = same(0.1);
     harmonics.dither_ratio = same(0.01);
+    harmonics.dither_third_ratio = same(0.02);
     for (const LaneDevice& device : {plain_device(), harmonics}) {
         Lanes exact, coarse, fine, usual;
         integrate_half(device, half, 1.0, around(), {0.5, 0.15}, exact);

@@ -164,7 +164,7 @@ struct Device {
     V coupling_phase, coupling_sine, coupling_cosine;
     V second_sine, second_cosine, third_sine, third_cosine;  // ratios included
     V turn_asymmetry;
-    V dither_ratio, dither_sine, dither_cosine;
+    V dither_ratio, dither_sine, dither_cosine, dither_third;
     V line, line_w;  // of the phase rate
     V stiffness;     // bound of |F'|
     V phase_step;
@@ -183,6 +183,7 @@ RINGLOCK_INLINE Device device_of(const LaneDevice& from, const Accuracy& accurac
     d.third_cosine *= third;
     d.turn_asymmetry = load(from.turn_asymmetry);
     d.dither_ratio = load(from.dither_ratio);
+    d.dither_third = load(from.dither_third_ratio);
     sine_cosine(load(from.dither_phase_rad), d.dither_sine, d.dither_cosine);
     d.line = load(from.line_rad_s);
     d.line_w = load(from.line_w_rad_s);
@@ -210,9 +211,10 @@ RINGLOCK_INLINE Side choose(const M& first, const Side& x, const Side& y) {
             x.line_phase};
 }
 
-/// Drive at a time from the turn: sine and cosine of w u, of 2 w u + f and of v u + l, the plain phase gained, and g.
+/// Drive at a time from the turn: sine and cosine of w u, of 2 w u + f, of 3 w u and of v u + l, the plain phase
+/// gained, and g.
 struct Place {
-    V s, c, s2, c2, line_s, line_c;
+    V s, c, s2, c2, s3, c3, line_s, line_c;
     V phase, rate;
 };
 template <bool extras>
@@ -228,6 +230,10 @@ RINGLOCK_INLINE Place place_at(const Device& d, const Side& side, double directi
         at.c2 = cosine2 * d.dither_cosine - sine2 * d.dither_sine;
         at.phase += 0.5 * side.amplitude * d.dither_ratio * (d.dither_cosine - at.c2);
         at.rate += side.amplitude * side.w * d.dither_ratio * at.s2;
+        at.s3 = at.s * (3.0 - 4.0 * at.s * at.s);
+        at.c3 = at.c * (1.0 - 4.0 * at.s * at.s);
+        at.phase += side.amplitude * direction * d.dither_third * (1.0 - at.c3) / 3.0;
+        at.rate += side.amplitude * side.w * direction * d.dither_third * at.s3;
         V start_s, start_c;
         sine_cosine(side.line_phase, start_s, start_c);
         sine_cosine(d.line_w * u + side.line_phase, at.line_s, at.line_c);
@@ -282,6 +288,9 @@ RINGLOCK_INLINE V step_gain(const Device& d, const Side& side, double direction,
         b[i] = side.b * h;
         if constexpr (extras) {
             phase[i] += side.amplitude * d.dither_ratio * (at.c2 * sz * sz + at.s2 * sz * (1.0 - vz));
+            V sz3, vz3;
+            of_small(3.0 * side.w * t, sz3, vz3);
+            phase[i] += side.amplitude * direction * d.dither_third * (at.c3 * vz3 + at.s3 * sz3) / 3.0;
             V line_sz, line_vz;
             of_small(d.line_w * t, line_sz, line_vz);
             phase[i] += d.line / d.line_w * (at.line_c * line_vz + at.line_s * line_sz);
@@ -334,7 +343,9 @@ RINGLOCK_INLINE void integrate(const LaneDevice& device, const LaneHalf& half, d
         store(all(0.0), delta_rad);
         return;
     }
-    const V near = side.w * root_of(side.amplitude * (1.0 + 2.0 * magnitude(d.dither_ratio))) / accuracy.turn_step;
+    const V near = side.w *
+                   root_of(side.amplitude * (1.0 + 2.0 * magnitude(d.dither_ratio) + 3.0 * magnitude(d.dither_third))) /
+                   accuracy.turn_step;
     const V far = 1.0 / d.phase_step;
     V u = all(0.0);
     V delta = all(0.0);
@@ -388,7 +399,7 @@ RINGLOCK_INLINE bool find(const LaneDevice& device, const LaneHalf& half_before,
     const Side before = side_of(half_before);
     const Side after = side_of(half_after);
     const V start = load(phase_rad);
-    const V harmonic = 1.0 + 2.0 * s * d.dither_ratio * d.dither_cosine;
+    const V harmonic = 1.0 + 2.0 * s * d.dither_ratio * d.dither_cosine + 3.0 * d.dither_third;
     const V slope_before = before.amplitude * before.w * before.w * harmonic;
     const V slope_after = after.amplitude * after.w * after.w * harmonic;
 
@@ -410,7 +421,8 @@ RINGLOCK_INLINE bool find(const LaneDevice& device, const LaneHalf& half_before,
         V slope = side.amplitude * side.w * side.w * at.c;  // of the upright rate; b F' psi' vanishes with psi'
         if constexpr (extras) {
             slope +=
-                2.0 * s * side.amplitude * side.w * side.w * d.dither_ratio * at.c2 + s * d.line * d.line_w * at.line_c;
+                side.amplitude * side.w * side.w * (2.0 * s * d.dither_ratio * at.c2 + 3.0 * d.dither_third * at.c3) +
+                s * d.line * d.line_w * at.line_c;
         }
         const V upright = s * rate;
         V change = -upright / (slope > 0.0 ? slope : all(1.0));

@@ -10,7 +10,7 @@
 /// c(t) the cosine of the dither's phase, 1 at minima and -1 at maxima. Along the half cycle that follows a turn of
 /// direction s (+1 a minimum, -1 a maximum), u the time since the turn and w = pi/duration,
 ///
-///     g = R + A w (s sin(w u) + h sin(2 w u + f)) + L sin(v u + l).
+///     g = R + A w (s sin(w u) + h sin(2 w u + f) + s k sin(3 w u)) + L sin(v u + l).
 ///
 /// The same expression holds before the turn, u < 0, with A, w, R and b of the half cycle that ends there; l is the
 /// line's phase at the turn.
@@ -38,6 +38,7 @@ struct alignas(64) LaneDevice {
     Lanes third_ratio{}, third_phase_rad{};
     Lanes turn_asymmetry{};
     Lanes dither_ratio{}, dither_phase_rad{};  ///< second harmonic of the dither rate
+    Lanes dither_third_ratio{};                ///< k: the third
     Lanes line_rad_s{}, line_w_rad_s{};        ///< L and v
     bool extras = false;                       ///< whether any of these but the coupling phase is in use
 };

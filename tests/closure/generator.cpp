@@ -55,6 +55,7 @@ void check(const Truth& truth) {
     if (!positive(truth.dither_peak_rate_deg_s)) refuse("dither_peak_rate_deg_s must be positive");
     if (!(truth.lockin_threshold_deg_h >= 0.0)) refuse("lockin_threshold_deg_h must not be negative");
     if (!(std::abs(truth.dither_asymmetry) < 0.9)) refuse("dither_asymmetry must lie between -0.9 and 0.9");
+    if (!(std::abs(truth.dither_third_harmonic) < 0.2)) refuse("dither_third_harmonic must be below 0.2");
     if (!(std::abs(truth.dither_second_harmonic.ratio) < 0.5)) refuse("dither_second_harmonic.ratio must be below 0.5");
     if (!(truth.missed_counts_per_turn >= 0.0 && truth.missed_counts_per_turn <= 1.0)) {
         refuse("missed_counts_per_turn must lie between 0 and 1");
@@ -243,7 +244,7 @@ class Instrument {
 bool has_extras(const Truth& truth) {
     return truth.lockin_second_harmonic.ratio != 0.0 || truth.lockin_third_harmonic.ratio != 0.0 ||
            truth.lockin_turn_asymmetry != 0.0 || truth.dither_second_harmonic.ratio != 0.0 ||
-           truth.rates.base_vibration.rate_deg_h != 0.0;
+           truth.dither_third_harmonic != 0.0 || truth.rates.base_vibration.rate_deg_h != 0.0;
 }
 
 void describe(const Truth& truth, const Drive& drive, record::Record& record) {
@@ -310,6 +311,7 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
         device.turn_asymmetry[lane] = truth.lockin_turn_asymmetry;
         device.dither_ratio[lane] = truth.dither_second_harmonic.ratio;
         device.dither_phase_rad[lane] = truth.dither_second_harmonic.phase_rad;
+        device.dither_third_ratio[lane] = truth.dither_third_harmonic;
         device.line_rad_s[lane] = two_pi / truth.scale_factor_arcsec * truth.rates.base_vibration.rate_deg_h;
         device.line_w_rad_s[lane] = two_pi * truth.rates.base_vibration.frequency_hz;
     }
@@ -320,6 +322,7 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
     Lanes start{};
     Lanes delta{};
     LaneExtremum extremum;
+    const auto swing_of_first = [&](std::size_t lane) { return 1.0 + truth_of(lane).dither_third_harmonic / 3.0; };
     const auto fill = [&](std::size_t j, LaneHalf& half) {
         for (std::size_t lane = 0; lane < lanes; ++lane) {
             const std::size_t from = lane < which.size() ? lane : 0;
@@ -328,7 +331,8 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
             std::size_t k = j;
             if (k >= drive.amplitude_rad.size())
                 k = drive.amplitude_rad.size() - 1 - (k + drive.amplitude_rad.size() + 1) % 2;
-            half.amplitude_rad[lane] = drive.amplitude_rad[k];
+            // With its third harmonic the dither swings as far as without.
+            half.amplitude_rad[lane] = drive.amplitude_rad[k] / swing_of_first(lane);
             half.duration_s[lane] = drive.duration_s[k];
             half.rate_rad_s[lane] = drive.rate_rad_s[k];
             half.b_rad_s[lane] = drive.b_rad_s[k];
@@ -347,8 +351,9 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
         integrate_half(device, before, Drive::direction(turn - 1), start, accuracy, delta);
         for (std::size_t lane = 0; lane < which.size(); ++lane) {
             mean_rate[lane] = before.rate_rad_s[lane] + line_rad[lane] / before.duration_s[lane];
-            const double swing = mean_rate[lane] * before.duration_s[lane] +
-                                 2.0 * Drive::direction(turn - 1) * before.amplitude_rad[lane];
+            const double amplitude = before.amplitude_rad[lane] * swing_of_first(lane);
+            const double swing =
+                mean_rate[lane] * before.duration_s[lane] + 2.0 * Drive::direction(turn - 1) * amplitude;
             phases[lane].add(swing);
             phases[lane].add(delta[lane]);
             lockin[lane] += delta[lane];
@@ -369,7 +374,7 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
             trajectory.lockin_rad.push_back(lockin[lane]);
             trajectory.zero_rate_phase_rad.push_back(at_extremum.rest_rad());
             trajectory.plain_rad.push_back(plain[lane]);
-            trajectory.amplitude_rad.push_back(before.amplitude_rad[lane]);
+            trajectory.amplitude_rad.push_back(before.amplitude_rad[lane] * swing_of_first(lane));
             trajectory.rate_rad_s.push_back(mean_rate[lane]);
             trajectory.b_rad_s.push_back(before.b_rad_s[lane]);
         }

@@ -101,6 +101,7 @@ struct Truth {
     RateTruth rates;  ///< those of the library and others that are rates of their own
 
     // Effects that the library does not have
+    double dither_third_harmonic = 0.0;  ///< of the dither rate, in phase with the first, the swing kept
     HarmonicOfCoupling lockin_third_harmonic;
     SwingOfCoupling lockin_swing;
     double bias_per_rate_squared_h_deg = 0.0;        ///< bias = this times the square of the input rate [1/(deg/h)]

@@ -54,6 +54,7 @@ constexpr Key<Truth> turn_numbers[] = {
     RINGLOCK_KEY(Truth, "dither_asymmetry.ratio", dither_asymmetry),
     RINGLOCK_KEY(Truth, "dither_second_harmonic.ratio", dither_second_harmonic.ratio),
     RINGLOCK_KEY(Truth, "dither_second_harmonic.phase_rad", dither_second_harmonic.phase_rad),
+    RINGLOCK_KEY(Truth, "dither_third_harmonic.ratio", dither_third_harmonic),
     RINGLOCK_KEY(Truth, "scale_factor_error.relative", scale_factor_error),
     RINGLOCK_KEY(Truth, "lockin_third_harmonic.ratio", lockin_third_harmonic.ratio),
     RINGLOCK_KEY(Truth, "lockin_third_harmonic.phase_rad", lockin_third_harmonic.phase_rad),

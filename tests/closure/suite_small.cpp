@@ -10,11 +10,13 @@
 #include <numbers>
 #include <string>
 
+#include "analysis/closure/closure.hpp"
 #include "analysis/closure/decision.hpp"
 #include "analysis/closure/dither_shape.hpp"
 #include "analysis/closure/turn_contest.hpp"
 #include "analysis/closure/two_levels.hpp"
 #include "analysis/closure/two_states.hpp"
+#include "tests/closure/generator.hpp"
 #include "tests/closure/suite.hpp"
 
 namespace ringlock::test::closure {
@@ -204,6 +206,27 @@ TEST(DitherShape, AccelerationsComeOutTooSmallOfSecondOrder) {
         }
         EXPECT_NEAR(both / sides, -0.145, 0.002) << b;
     }
+}
+
+// The phase turns faster than a sine of the counted swing: a rotation moves zero-rate points by less.
+TEST(ClosureSuite, AThirdHarmonicOfTheDitherIsNoOtherShape) {
+    Truth truth;
+    truth.scale_factor_arcsec = 0.55;
+    truth.dither_frequency_hz = 310.0;
+    truth.dither_peak_rate_deg_s = 130.0;
+    truth.input_rate_deg_h = 300.0;
+    truth.readout_noise = 0.005;
+    truth.turns = 5000;
+    truth.seed = 815;
+    truth.dither_third_harmonic = 0.003;
+    const record::Record record = generate({&truth, 1}).front();
+    const auto fitted = ringlock::closure::fit_record(record, {}, ringlock::closure::Rows(record.turns->size(), 1));
+    const auto shape = ringlock::closure::dither_shape(*record.turns, *fitted->fit);
+    EXPECT_NEAR(shape.even->value, 3.0 * 0.003 - 0.003 / 3.0, 4.0 * shape.even->sd);
+    EXPECT_LT(shape.even->sd, 3e-4);
+    const auto closure = ringlock::closure::close_loop(record);
+    EXPECT_EQ(closure.verdict, ringlock::closure::Verdict::nothing_missing);
+    EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("third harmonic of the dither's rate of 0.3")));
 }
 
 // A lock-in of which much is at minima makes their accelerations smaller, of second order.
