@@ -241,7 +241,8 @@ TurnFit::Equations TurnFit::equations(const Whitening& whitening, bool guessed) 
     const Eigen::Index used = guessed ? y.size() / 2 : y.size();
     Eigen::VectorXd scale;
     const auto column_of = [this](std::size_t k) -> const Regressor& { return columns_[k].of; };
-    const Eigen::MatrixXd x = counted(whitening, prediction_.frame, count, column_of, scale);
+    Eigen::MatrixXd x = counted(whitening, prediction_.frame, count, column_of, scale);
+    if (!guessed) follow_gains(whitening, x, scale);
     Eigen::MatrixXd normal = x.topRows(used).transpose() * x.topRows(used);
     Eigen::VectorXd right = x.topRows(used).transpose() * y.head(used);
     for (std::size_t k = 0; k < count && !guessed; ++k) {
@@ -252,6 +253,36 @@ TurnFit::Equations TurnFit::equations(const Whitening& whitening, bool guessed) 
     add_priors(scale, normal, &right);
     hold_back(scale, normal);
     return {std::move(normal), std::move(right), std::move(scale)};
+}
+
+/// How innovations go with what changes the filter's gains as well. What the lock-in makes of each reading's error adds
+/// up, and so does what these errors are thought to be: of an effect that is far from its size that is a rotation, a
+/// hundred times what the fit feels, which a step must let the bias take.
+void TurnFit::follow_gains(const Whitening& whitening, Eigen::MatrixXd& x, Eigen::VectorXd& scale) const {
+    const TurnNoise noise = model_->noise(parameters_);
+    const std::size_t n = rows_.size();
+    oneapi::tbb::parallel_for(Eigen::Index{0}, x.cols(), [&](Eigen::Index k) {
+        const Regressor& of = columns_[static_cast<std::size_t>(k)].of;
+        if (of.slope.empty()) return;
+        const double step = 1e-3 / scale(k);
+        const auto innovations_at = [&](double value) {
+            TurnFrame frame = prediction_.frame;
+            std::vector<double> rest = rest_;
+            of.take(value, rest, frame);
+            const Whitening there(frame, noise);
+            std::vector<double> innovations = there.apply(rest);
+            for (std::size_t i = 0; i < n; ++i) innovations[i] *= there.sd_rad()[i] / whitening.sd_rad()[i];
+            return innovations;
+        };
+        const std::vector<double> lower = innovations_at(-step);
+        const std::vector<double> upper = innovations_at(step);
+        for (std::size_t i = 0; i < n; ++i) {
+            x(static_cast<Eigen::Index>(i), k) = rows_[i] ? (lower[i] - upper[i]) / (2.0 * step * scale(k)) : 0.0;
+        }
+        const double norm = std::max(x.col(k).norm(), 1e-300);
+        x.col(k) /= norm;
+        scale(k) *= norm;
+    });
 }
 
 /// Times, frequencies and phases are far from linear. Where a whole step goes far or leads uphill: a part of it, which

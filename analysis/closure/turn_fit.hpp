@@ -137,6 +137,7 @@ class TurnFit {
         Eigen::VectorXd right, scale;
     };
     Equations equations(const Whitening& whitening, bool guessed) const;
+    void follow_gains(const Whitening& whitening, Eigen::MatrixXd& x, Eigen::VectorXd& scale) const;
     /// Such a step, shorter where that is better, in the squares under a noise that is guessed or in the objective.
     /// Tells whether another may gain something.
     bool go_down(const Equations& equations, const Whitening* guessed);

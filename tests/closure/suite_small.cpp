@@ -208,6 +208,28 @@ TEST(DitherShape, AccelerationsComeOutTooSmallOfSecondOrder) {
     }
 }
 
+// What a strong harmonic does to the gains of the filter is a rotation: steps that left it out crept, and gave up short
+// of the summit.
+TEST(LongClosureSuite, AStrongSecondHarmonicIsFoundBehindAStep) {
+    Truth truth;
+    truth.scale_factor_arcsec = 0.6044;
+    truth.lockin_threshold_deg_h = 222.8;
+    truth.dither_frequency_hz = 218.34;
+    truth.dither_peak_rate_deg_s = 82.035;
+    truth.bias_deg_h = 0.9378;
+    truth.input_rate_deg_h = 235.393;
+    truth.readout_noise = 0.01;
+    truth.lockin_second_harmonic = {0.14, 1.0};
+    truth.rates.bias_step = {0.02, 14.656};
+    truth.turns = 12000;
+    truth.seed = 665;
+    const auto closure = ringlock::closure::close_loop(generate({&truth, 1}).front());
+    EXPECT_EQ(closure.verdict, ringlock::closure::Verdict::closed);
+    EXPECT_THAT(closure.steps, testing::UnorderedElementsAre(
+                                   testing::Field(&ringlock::closure::Step::effect, "bias_step"),
+                                   testing::Field(&ringlock::closure::Step::effect, "lockin_second_harmonic")));
+}
+
 // The phase turns faster than a sine of the counted swing: a rotation moves zero-rate points by less.
 TEST(ClosureSuite, AThirdHarmonicOfTheDitherIsNoOtherShape) {
     Truth truth;
