@@ -19,7 +19,11 @@ namespace {
 void validate_record(const std::string& path) {
     const record::Record record = record::read_record(path);
     tell_warnings(path, record);
-    put(fmt::format("{}: a valid record: {}\n", path, record_text(record)));
+    const bool to_close = record.turns ? record.turns->size() >= record::fewest_turns_to_close
+                                       : record.samples->size() >= record::fewest_samples_to_close;
+    const std::string too_short = fmt::format("; too short for `ringlock closure`, which needs {} turns, or {} samples",
+                                              record::fewest_turns_to_close, record::fewest_samples_to_close);
+    put(fmt::format("{}: a valid record: {}{}\n", path, record_text(record), to_close ? "" : too_short));
 }
 
 void validate(const std::string& path) {
@@ -42,6 +46,7 @@ void validate(const std::string& path) {
         scenario::parse_file(path);
         return put(fmt::format("{}: a valid scenario\n", path));
     }
+    if (extension == ".csv") return validate_record(path);
     try {
         validate_record(path);
     } catch (const InputError& error) {

@@ -24,7 +24,8 @@ std::string experiment_for(const std::string& effect, const std::vector<std::str
         return effect == name || std::find(others.begin(), others.end(), name) != others.end();
     };
     if (has("dither_residue")) {
-        return "declare the dither's frequency, or record with another dither frequency or sampling rate";
+        return "declare the dither's frequency if the record does not, or record with another dither frequency or "
+               "sampling rate";
     }
     if (has("bias_temperature") || has("lockin_temperature")) {
         return "record with the temperature changed against time: held, then stepped up and down";

@@ -143,10 +143,12 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
     }
     joined.miscounts = lost_quarters(quarters);
     const std::int64_t first = joined.miscounts.front();
+    // Whose own zero may be further off than a floating number can count quarters.
+    const std::int64_t whole_fringes = turns.quarter_count[0] / 4 * 4;
     for (std::size_t i = 0; i < n; ++i) {
         const std::int64_t now = joined.miscounts[i];
         if (i > 0 && now != joined.miscounts[i - 1]) joined.miscounted.push_back(i);
-        const std::int64_t count = turns.quarter_count[i] + (count_again ? now : first);
+        const std::int64_t count = turns.quarter_count[i] - whole_fringes + (count_again ? now : first);
         const double middle = (static_cast<double>(count) + 0.5) * quarter_rad;
         joined.phase_rad[i] = angle[i] + units::two_pi * std::round((middle - angle[i]) / units::two_pi);
     }
@@ -210,12 +212,12 @@ void take_rotation_from_swings(double half_swing_rad, TurnSeries& series) {
 }  // namespace
 
 TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
-    constexpr std::size_t fewest = 400;
     const record::Turns& turns = *record.turns;
     const std::size_t n = turns.size();
-    if (n < fewest) {
-        throw InputError(fmt::format(
-            "/turns: {} turns are too few to fit and to predict; a closed loop needs at least {}", n, fewest));
+    if (n < record::fewest_turns_to_close) {
+        throw InputError(
+            fmt::format("/turns: {} turns are too few to fit and to predict; a closed loop needs at least {}", n,
+                        record::fewest_turns_to_close));
     }
     TurnSeries series;
     const record::Declared& declared = record.declared;

@@ -329,10 +329,62 @@ class Checker {
         }
         const double share = static_cast<double>(other.count) / static_cast<double>(n);
         if (share <= 0.03) return;
+        if (runs_backwards(t)) {
+            error(
+                "/turns/sin",
+                "turns the other way than quarter_count, in all quadrants: sin and cos are swapped, or one of them or "
+                "the count has the wrong sign; write sin = sin psi, cos = cos psi, quarter_count = floor(psi/(pi/2)) "
+                "of the same phase psi");
+            return;
+        }
+        if (const double times = acceleration_over_swing(t); std::abs(std::log(times)) > std::log(2.0)) {
+            error("/turns/quarter_count",
+                  fmt::format("swings by so little or so much that accelerations are {:.3g} times those of such a "
+                              "swing, and names other quarter fringes than the detectors: it must count quarter "
+                              "fringes, four to a fringe",
+                              times));
+            return;
+        }
         warn(row("/turns/quarter_count", other.first),
              fmt::format("names another quarter fringe than the detectors, here and at {:.3g} % of the turns (counts "
                          "may have been missed)",
                          100.0 * share));
+    }
+
+    /// Whether quadrants of the detectors go down where the count goes up: sums of both stay, differences do not.
+    static bool runs_backwards(const Turns& t) {
+        constexpr double nearly_all = 0.9;
+        constexpr double far_from_all = 0.7;
+        std::array<std::size_t, 4> sums{};
+        std::array<std::size_t, 4> differences{};
+        for (std::size_t i = 0; i < t.size(); ++i) {
+            const double quarters = std::atan2(t.sine[i], t.cosine[i]) * 4.0 / units::two_pi;
+            const auto quadrant = static_cast<std::int64_t>(std::floor(quarters)) + 4;
+            const std::int64_t counted = (t.quarter_count[i] % 4 + 4) % 4;
+            ++sums[static_cast<std::size_t>((quadrant + counted) % 4)];
+            ++differences[static_cast<std::size_t>((quadrant - counted + 4) % 4)];
+        }
+        const auto most = [&](const std::array<std::size_t, 4>& of) {
+            return static_cast<double>(*std::max_element(of.begin(), of.end())) / static_cast<double>(t.size());
+        };
+        return most(sums) > nearly_all && most(differences) < far_from_all;
+    }
+
+    /// Mean acceleration over that of a dither with the counted swing; 1 where the record has none.
+    static double acceleration_over_swing(const Turns& t) {
+        const std::size_t n = t.size();
+        const double w = 0.5 * units::two_pi * static_cast<double>(n - 1) / (t.time_s.back() - t.time_s.front());
+        double counts = 0.0;
+        std::vector<double> seen;
+        for (std::size_t i = 0; i < n; ++i) {
+            if (t.accel_before_rad_s2[i] > 0.0) seen.push_back(t.accel_before_rad_s2[i]);
+            if (i > 0) counts += std::abs(static_cast<double>(t.quarter_count[i] - t.quarter_count[i - 1]));
+        }
+        if (seen.size() < n / 4 || !(counts > 0.0)) return 1.0;
+        const auto middle = seen.begin() + static_cast<std::ptrdiff_t>(seen.size() / 2);
+        std::nth_element(seen.begin(), middle, seen.end());
+        const double amplitude_rad = 0.5 * counts / static_cast<double>(n - 1) * 0.25 * units::two_pi;
+        return *middle / (amplitude_rad * w * w);
     }
 
     void check_samples(const Samples& s) {

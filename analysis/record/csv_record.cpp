@@ -130,6 +130,11 @@ class CsvReader {
                             "them",
                             name_of(SampleKind::angle_increment_arcsec)));
         }
+        const bool of_turns = std::any_of(columns_.begin(), columns_.end(), [](const Column& column) {
+            return column.name == "direction" || column.name == "sin" || column.name == "cos";
+        });
+        if (of_turns)
+            fail("has columns of turns; a record of turns is HDF5 (docs/record.md), the text form has samples only");
         std::set<std::string> seen;
         std::vector<std::string> kinds;
         for (Column& column : columns_) {

@@ -34,6 +34,10 @@ struct Turns {
 
 enum class SampleKind { angle_increment_arcsec, angle_arcsec, quarter_count };
 
+/// Less than that is a record, but none that a closed loop can fit and predict.
+constexpr std::size_t fewest_turns_to_close = 400;
+constexpr std::size_t fewest_samples_to_close = 1000;
+
 /// Uniform samples without gaps.
 struct Samples {
     double rate_hz = 0.0;

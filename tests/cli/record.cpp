@@ -31,8 +31,10 @@ TEST_F(RecordProgram, ValidatesBothForms) {
     record::write_record((directory_ / "r.h5").string(), full_record());
     Outcome r = run({"validate", "r.h5"});
     EXPECT_EQ(r.status, 0) << r.err;
-    EXPECT_THAT(r.out, AllOf(HasSubstr("r.h5: a valid record: 50 turns"), HasSubstr("40 angle increments at 100 Hz"),
-                             HasSubstr("accel_x"), HasSubstr("temperature"), HasSubstr("reference")));
+    EXPECT_THAT(r.out, AllOf(HasSubstr("r.h5: a valid record: 50 turns"),
+                             HasSubstr("too short for `ringlock closure`, which needs 400 turns"),
+                             HasSubstr("40 angle increments at 100 Hz"), HasSubstr("accel_x"), HasSubstr("temperature"),
+                             HasSubstr("reference")));
     EXPECT_EQ(r.err, "");
     write("r.csv", "# rate_hz = 10\n# sensor = 3\nquarter_count\n1\n2\n4\n");
     r = run({"validate", "r.csv"});

@@ -201,6 +201,42 @@ TEST(RecordCheck, MissedCountsAreAWarningOnly) {
     EXPECT_EQ(errors(record) + warnings(record), "");
 }
 
+/// Detectors that read this of the phase.
+Record of_detectors(std::size_t rows, double (*sine)(double, double), double (*cosine)(double, double)) {
+    Record record = of_turns(rows);
+    for (std::size_t i = 0; i < rows; ++i) {
+        const double s = record.turns->sine[i];
+        const double c = record.turns->cosine[i];
+        record.turns->sine[i] = sine(s, c);
+        record.turns->cosine[i] = cosine(s, c);
+    }
+    return record;
+}
+
+TEST(RecordCheck, DetectorsThatTurnTheOtherWayAreAFault) {
+    const auto s = [](double sine, double) { return sine; };
+    const auto c = [](double, double cosine) { return cosine; };
+    const auto minus_s = [](double sine, double) { return -sine; };
+    const auto minus_c = [](double, double cosine) { return -cosine; };
+    EXPECT_THAT(errors(of_detectors(400, c, s)), HasSubstr("sin and cos are swapped"));
+    EXPECT_THAT(errors(of_detectors(400, s, minus_c)), HasSubstr("the wrong sign"));
+    EXPECT_THAT(errors(of_detectors(400, minus_s, c)), HasSubstr("the wrong sign"));
+    // Both together only count from another quarter, as any counter may.
+    EXPECT_EQ(errors(of_detectors(400, minus_s, minus_c)), "");
+    EXPECT_EQ(errors(of_detectors(400, c, minus_s)), "");
+    EXPECT_EQ(errors(of_detectors(400, s, c)), "");
+}
+
+TEST(RecordCheck, FringesInPlaceOfQuartersAreAFault) {
+    Record record = of_turns(400);
+    for (auto& count : record.turns->quarter_count) count = count >= 0 ? count / 4 : (count - 3) / 4;
+    EXPECT_THAT(errors(record), AllOf(HasSubstr("/turns/quarter_count"), HasSubstr("four to a fringe")));
+    // One that loses pulses by the hundred is an effect.
+    record = of_turns(400);
+    for (auto& count : record.turns->quarter_count) count = static_cast<std::int64_t>(0.8 * static_cast<double>(count));
+    EXPECT_EQ(errors(record), "");
+}
+
 TEST(RecordTrack, IsLinearBetweenItsRowsAndConstantBeyond) {
     const Track track{{1.0, 2.0, 4.0}, {10.0, 20.0, 0.0}};
     EXPECT_EQ(track.at(-5.0), 10.0);
