@@ -98,6 +98,11 @@ constexpr Key<SampleTruth> sample_numbers[] = {
     RINGLOCK_KEY(SampleTruth, "noise_modulation.period_s", noise_modulation.period_s),
     RINGLOCK_KEY(SampleTruth, "bias_per_rate_squared_h_deg", bias_per_rate_squared_h_deg),
     RINGLOCK_KEY(SampleTruth, "bias_per_temperature_slope_deg_h_s_per_k", bias_per_temperature_slope_deg_h_s_per_k),
+    RINGLOCK_KEY(SampleTruth, "late_temperature.deg_h_per_k", late_temperature.deg_h_per_k),
+    RINGLOCK_KEY(SampleTruth, "late_temperature.lag_s", late_temperature.lag_s),
+    RINGLOCK_KEY(SampleTruth, "slow_acceleration.rms_m_s2", slow_acceleration.rms_m_s2),
+    RINGLOCK_KEY(SampleTruth, "slow_acceleration.time_s", slow_acceleration.time_s),
+    RINGLOCK_KEY(SampleTruth, "slow_acceleration.deg_h_s2_per_m", slow_acceleration.deg_h_s2_per_m),
 };
 
 /// What both kinds of truth have.
@@ -122,6 +127,9 @@ constexpr Key<T> shared_numbers[] = {
     RINGLOCK_KEY(T, "telegraph_bias.dwell_s", rates.telegraph_bias.dwell_s),
     RINGLOCK_KEY(T, "settling.start_deg_h", rates.settling.start_deg_h),
     RINGLOCK_KEY(T, "settling.constant_s", rates.settling.constant_s),
+    RINGLOCK_KEY(T, "slow_swing.frequency_hz", rates.slow_swing.frequency_hz),
+    RINGLOCK_KEY(T, "slow_swing.rate_deg_h", rates.slow_swing.rate_deg_h),
+    RINGLOCK_KEY(T, "slow_swing.phase_rad", rates.slow_swing.phase_rad),
     RINGLOCK_KEY(T, "chirped_line.frequency_hz", rates.chirped_line.frequency_hz),
     RINGLOCK_KEY(T, "chirped_line.chirp_hz_per_s", rates.chirped_line.chirp_hz_per_s),
     RINGLOCK_KEY(T, "chirped_line.rate_deg_h", rates.chirped_line.rate_deg_h),

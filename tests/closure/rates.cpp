@@ -107,6 +107,7 @@ std::vector<double> mean_rates(const RateTruth& truth, std::uint64_t seed, std::
         }
         rates[i] += truth.bias_ramp_deg_h_per_h * 0.5 * (from + to) / 3600.0;
         if (truth.base_vibration.rate_deg_h != 0.0) rates[i] += mean_of(truth.base_vibration, from, to);
+        if (truth.slow_swing.rate_deg_h != 0.0) rates[i] += mean_of(truth.slow_swing, from, to);
         if (truth.chirped_line.rate_deg_h != 0.0) {
             // Gauss's rule of three points: good to 1e-6 for an eighth of a period
             const double middle = 0.5 * (from + to);

@@ -22,6 +22,7 @@ enum class Purpose : std::uint32_t {
     case_motion,
     witness,
     residue_wander,
+    slow_acceleration,
 };
 
 class Random {
@@ -77,6 +78,7 @@ struct RateTruth {
     RateTelegraph telegraph_bias;  ///< not in the library
     RateChirp chirped_line;        ///< not in the library
     RateSettling settling;         ///< not in the library
+    RateLine slow_swing;           ///< of a few periods: not in the library
 };
 
 /// Mean rates [deg/h, which is arcsec/s] over the intervals between consecutive `edges_s`, the first at 0 or later.

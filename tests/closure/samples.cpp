@@ -56,6 +56,19 @@ double at_time(const std::vector<double>& values, double from_hz, double time_s)
     return values[i] + share * (values[i + 1] - values[i]);
 }
 
+/// At consecutive readings of the source, stationary.
+std::vector<double> markov(const SlowAcceleration& of, std::size_t size, double rate_hz, Random random) {
+    std::vector<double> x(size, 0.0);
+    if (of.rms_m_s2 == 0.0) return x;
+    const double kept = std::exp(-1.0 / (rate_hz * of.time_s));
+    double now = of.rms_m_s2 * random.normal();
+    for (double& value : x) {
+        value = now;
+        now = kept * now + of.rms_m_s2 * std::sqrt(1.0 - kept * kept) * random.normal();
+    }
+    return x;
+}
+
 void check(const SampleTruth& truth) {
     if (!(truth.rate_hz > 0.0)) throw InputError("truth: rate_hz must be positive");
     if (truth.size == 0) throw InputError("truth: size must be positive");
@@ -107,11 +120,19 @@ record::Record generate_samples(const SampleTruth& truth) {
     for (std::size_t i = 0; i <= intervals; ++i) time_s[i] = static_cast<double>(i) / source_hz;
 
     std::vector<double> rate = mean_rates(truth.rates, truth.seed, time_s);
+    const std::vector<double> acceleration =
+        markov(truth.slow_acceleration, intervals + 1, source_hz, {truth.seed, Purpose::slow_acceleration});
+    const double followed = -std::expm1(-1.0 / (source_hz * truth.late_temperature.lag_s));
+    double late_k = 0.0;
     for (std::size_t i = 0; i < intervals; ++i) {
         const double from = time_s[i];
         const double to = time_s[i + 1];
         rate[i] += truth.mean_rate_deg_h;
         rate[i] += truth.bias_temperature_deg_h_per_k * truth.temperature.mean_change_k(from, to);
+        const double before_k = late_k;
+        late_k += followed * (truth.temperature.mean_change_k(from, to) - late_k);
+        rate[i] += truth.late_temperature.deg_h_per_k * 0.5 * (before_k + late_k);
+        rate[i] += truth.slow_acceleration.deg_h_s2_per_m * 0.5 * (acceleration[i] + acceleration[i + 1]);
         for (const RateLine& line : truth.lines) rate[i] += mean_of(line, from, to);
         if (!truth.input_profile_deg_h.empty()) {
             // Simpson's rule: exact between the rows of the profile
@@ -241,12 +262,13 @@ record::Record generate_samples(const SampleTruth& truth) {
         return 0.5 * (at_time(values, source_hz, static_cast<double>(k) / truth.rate_hz) +
                       at_time(values, source_hz, static_cast<double>(k + 1) / truth.rate_hz));
     };
-    if (truth.accelerometers || truth.case_motion.rms_arcsec != 0.0) {
+    if (truth.accelerometers || truth.case_motion.rms_arcsec != 0.0 || truth.slow_acceleration.rms_m_s2 != 0.0) {
         for (const char* name : {"accel_x", "accel_y", "accel_z"}) {
             std::vector<double>& witness = samples.witnesses[name];
             const bool sees = truth.case_motion.rms_arcsec != 0.0 && truth.case_motion.witness == name;
             for (std::size_t k = 0; k < truth.size; ++k) {
                 double value = truth.accelerometer_noise * noise.normal();
+                if (name[6] == 'x') value += mean_of_ends(acceleration, k);
                 if (name[6] == 'z') value += gravity_m_s2;
                 if (sees) {
                     value += gravity_m_s2 / arcsec_per_rad *

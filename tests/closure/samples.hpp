@@ -75,6 +75,21 @@ struct NoiseModulation {
     double period_s = 60.0;
 };
 
+/// A bias that follows the temperature through a mass between thermometer and gyro, as warm as the thermometer at the
+/// start: y' = (temperature - y)/lag; not in the library.
+struct LateTemperature {
+    double deg_h_per_k = 0.0;
+    double lag_s = 30.0;
+};
+
+/// An acceleration along accel_x, a first-order Markov process, which the witness sees, and a bias in proportion to it;
+/// the bias is not in the library.
+struct SlowAcceleration {
+    double rms_m_s2 = 0.0;
+    double time_s = 30.0;
+    double deg_h_s2_per_m = 0.0;
+};
+
 struct SampleTruth {
     double rate_hz = 100.0;
     std::size_t size = 100000;
@@ -106,6 +121,8 @@ struct SampleTruth {
     NoiseModulation noise_modulation;
     double bias_per_rate_squared_h_deg = 0.0;  ///< of the profile: deg/h per (deg/h)^2
     double bias_per_temperature_slope_deg_h_s_per_k = 0.0;
+    LateTemperature late_temperature;
+    SlowAcceleration slow_acceleration;
     double saturation_arcsec = 0.0;  ///< increments of the source are clipped here; 0: never
 
     std::optional<record::Declared> declared;  ///< not given: K where counts are put out

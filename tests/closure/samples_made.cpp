@@ -253,6 +253,39 @@ TEST(ClosureSamples, TemperatureIsAWitness) {
     }
 }
 
+// A first-order lag of a ramp is late by the lag, but for how it begins.
+TEST(ClosureSamples, ABiasMayFollowTheTemperatureLate) {
+    SampleTruth truth;
+    truth.size = 6000;
+    truth.temperature.ramp_k_per_h = 3600.0;
+    truth.late_temperature = {2.0, 10.0};
+    const record::Record made = generate_samples(truth);
+    for (std::size_t k = 0; k < truth.size; k += 100) {
+        const double t = (static_cast<double>(k) + 0.5) / 100.0;
+        // Steps of a thousandth of the lag
+        EXPECT_NEAR(made.samples->values[k], 2.0 * (t - 10.0 + 10.0 * std::exp(-t / 10.0)) / 100.0, 1e-3 / 100.0) << k;
+    }
+}
+
+TEST(ClosureSamples, ABiasMayFollowAnAcceleration) {
+    SampleTruth truth;
+    truth.size = 100000;
+    truth.accelerometer_noise = 0.0;
+    truth.slow_acceleration = {0.01, 2.0, 500.0};
+    const record::Record made = generate_samples(truth);
+    const std::vector<double>& seen = made.samples->witnesses.at("accel_x");
+    double squares = 0.0;
+    double neighbours = 0.0;
+    for (std::size_t k = 0; k < truth.size; ++k) {
+        EXPECT_NEAR(made.samples->values[k], 500.0 * seen[k] / 100.0, 1e-9);
+        squares += seen[k] * seen[k] / static_cast<double>(truth.size);
+        if (k >= 200) neighbours += seen[k] * seen[k - 200] / static_cast<double>(truth.size);
+    }
+    // 1000 s at a correlation time of 2 s: 500 independent values
+    EXPECT_NEAR(squares / 1e-4, 1.0, 4.0 * std::sqrt(2.0 / 500.0));
+    EXPECT_NEAR(neighbours / squares, std::exp(-1.0), 4.0 / std::sqrt(500.0));
+}
+
 TEST(ClosureSamples, SaturationClipsIncrements) {
     SampleTruth truth;
     truth.size = 20000;
