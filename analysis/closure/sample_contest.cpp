@@ -295,12 +295,16 @@ std::vector<Contest::Rival> Contest::rivals(bool resampled, bool moved) const {
     auto views = view_samples(*now_.fit, lattice_arcsec_);
     std::erase_if(views, [](const View& view) { return view.test.merit < closure::tie; });
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
-    if (views.size() > looked_at) {
-        // Jumps are looked at in any case: a random rate can follow them, and no other view says what they are.
-        const auto jumps = std::find_if(views.begin() + looked_at, views.end(), [](const View& v) { return v.jumps; });
-        if (jumps != views.end()) std::swap(views[looked_at - 1], *jumps);
-        views.resize(looked_at);
-    }
+    std::vector<Where> columns;
+    std::size_t place = 0;
+    std::erase_if(views, [&](const View& view) {
+        // Jumps are looked at in any case: a random rate can follow them, and no other view says what they are. So is
+        // what follows another column of the record most: courses in time come near to that as well.
+        const bool follows = view.columns && view.test.where != Where::time && !view.hz;
+        const bool first = follows && std::find(columns.begin(), columns.end(), view.test.where) == columns.end();
+        if (first) columns.push_back(view.test.where);
+        return place++ >= looked_at && !view.jumps && !first;
+    });
     std::vector<Rival> found;
     for (const View& view : views) {
         const bool repeats = view.test.view == repeating_variance;

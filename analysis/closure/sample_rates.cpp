@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -22,13 +21,6 @@
 namespace ringlock::closure {
 
 namespace {
-
-/// Rates as the record has them.
-Columns taken_by(const SampleFit& fit, const Columns& columns) {
-    Columns taken;
-    for (const auto& column : columns) taken.push_back(fit.as_taken(column));
-    return taken;
-}
 
 /// Rates that go with a power of time, as few of them as the record asks for (Schwarz, Annals of Statistics 6, 1978,
 /// 461).
@@ -62,31 +54,6 @@ void test_powers_of_time(const SampleFit& fit, Views& views) {
                      [powers = std::make_shared<const Columns>(std::move(powers))] { return regressors(*powers); }});
 }
 
-/// Where a regression on the columns of some place explains most: such a view, each column a parameter, and the place.
-struct Places {
-    std::size_t count;
-    std::function<Columns(std::size_t place)> columns;
-    std::function<std::string(std::size_t place)> said;
-};
-void test_places(const SampleFit& fit, const char* view, const Places& of, Views& views) {
-    double chi2 = 0.0;
-    int rank = 0;
-    std::size_t at = 0;
-    for (std::size_t place = 0; place < of.count; ++place) {
-        const auto score = fit.score(taken_by(fit, of.columns(place)));
-        if (score.rank == 0 || score.chi2 <= chi2) continue;
-        chi2 = score.chi2;
-        rank = score.rank;
-        at = place;
-    }
-    if (rank == 0) return;
-    const double cost = rank + std::log(static_cast<double>(of.count));
-    const double p = of_several(chi2_tail(chi2, rank), static_cast<double>(of.count));
-    views.push_back({{Where::time, view, p, of.said(at), 0.5 * chi2 - cost}, cost, [columns = of.columns, at] {
-                         return regressors(columns(at));
-                     }});
-}
-
 /// A rate that goes up and down too slowly for a line.
 void test_slow_swings(const SampleFit& fit, Views& views) {
     const std::size_t n = fit.series().size();
@@ -103,7 +70,7 @@ void test_slow_swings(const SampleFit& fit, Views& views) {
     const auto said = [periods](std::size_t place) {
         return fmt::format("{:g} periods over the record", periods(place));
     };
-    test_places(fit, "a rate that swings slowly", {32, swing, said}, views);
+    test_places(fit, Where::time, "a rate that swings slowly", {32, swing, said}, views);
 }
 
 /// A rate that settles after the start.
@@ -124,48 +91,12 @@ void test_settling(const SampleFit& fit, Views& views) {
     const auto said = [constant_s](std::size_t place) {
         return fmt::format("with a time constant of {:.2g} s", constant_s(place));
     };
-    test_places(fit, "a rate that settles", {14, settles, said}, views);
+    test_places(fit, Where::time, "a rate that settles", {14, settles, said}, views);
 }
 
-void test_rates(const SampleFit& fit, Views& views) {
+void test_steps(const SampleFit& fit, Views& views) {
     const SampleSeries& series = fit.series();
     const std::size_t n = series.size();
-    const auto against = [&](Where where, std::string view, Columns columns) {
-        const auto score = fit.score(taken_by(fit, columns));
-        if (score.rank == 0) return;
-        const double cost = score.rank;
-        views.push_back(
-            {{where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
-             cost,
-             [columns = std::make_shared<const Columns>(std::move(columns))] { return regressors(*columns); }});
-    };
-    if (!series.temperature_change_k.empty()) {
-        const auto& t = series.temperature_change_k;
-        std::vector<double> square(n);
-        std::vector<double> slope(n, 0.0);
-        const std::size_t apart = std::max<std::size_t>(1, n / 200);
-        for (std::size_t i = 0; i < n; ++i) {
-            square[i] = t[i] * t[i];
-            const std::size_t a = i > apart ? i - apart : 0;
-            const std::size_t b = std::min(n - 1, i + apart);
-            slope[i] = (t[b] - t[a]) / static_cast<double>(b - a);
-        }
-        against(Where::temperature, "rates that follow temperature, its square and its slope", {t, square, slope});
-    }
-    if (!series.input_rate_deg_h.empty()) {
-        const auto& x = series.input_rate_deg_h;
-        const auto [low, high] = std::minmax_element(x.begin(), x.end());
-        if (*high > *low) {
-            const double most = std::max(std::abs(*high), std::abs(*low));
-            std::vector<double> one(n), square(n), cube(n);
-            for (std::size_t i = 0; i < n; ++i) {
-                one[i] = x[i] / most;
-                square[i] = one[i] * one[i];
-                cube[i] = one[i] * square[i];
-            }
-            against(Where::rate, "rates that follow the input rate, its square and its cube", {one, square, cube});
-        }
-    }
     std::vector<double> roots;
     double best = 0.0;
     std::size_t at = 0;
@@ -349,7 +280,7 @@ void test_jumps(const SampleFit& fit, Views& views) {
 }  // namespace
 
 void view_rates(const SampleFit& fit, Views& views) {
-    test_rates(fit, views);
+    test_steps(fit, views);
     test_powers_of_time(fit, views);
     test_slow_swings(fit, views);
     test_settling(fit, views);

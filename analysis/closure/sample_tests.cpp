@@ -196,7 +196,7 @@ double refitted_merit(const SampleFit& fit, const View& view, double of_a_coeffi
     const auto columns = view.columns();
     for (const auto& column : columns) {
         model.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(column.series)});
-        model.columns.back().as_recorded = view.test.where == Where::frequency;
+        model.columns.back().as_recorded = view.hz.has_value();
     }
     const SampleFit with(fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near);
     return with.gain_over(fit) - view.cost - of_a_coefficient * static_cast<double>(columns.size());
@@ -207,6 +207,7 @@ std::vector<View> view_samples(const SampleFit& fit, double lattice_arcsec) {
     test_correlation(fit, views);
     test_spectrum(fit, views);
     view_sizes(fit, lattice_arcsec, views);
+    view_followed(fit, views);
     view_rates(fit, views);
     test_lines(fit, views);
     if (!fit.series().witnesses.empty()) {

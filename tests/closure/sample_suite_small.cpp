@@ -170,6 +170,53 @@ TEST(ClosureSampleSuite, ACourseInTimeIsNoRandomRate) {
     }
 }
 
+/// Nothing of the library is in the record, and the answer says so at that place.
+void expect_unexplained(const record::Record& record, ringlock::closure::Where where) {
+    const auto found = ringlock::closure::close_samples(record);
+    EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
+    EXPECT_TRUE(found.steps.empty()) << found.steps.front().effect;
+    ASSERT_TRUE(found.unexplained);
+    EXPECT_EQ(found.unexplained->where, where) << found.unexplained->description();
+}
+
+// Biases that go with an acceleration, slow or fast, were called a random walk and a motion of the case.
+TEST(ClosureSampleSuite, ARateThatFollowsAWitnessIsNeitherRandomNorAMotion) {
+    for (const double time_s : {3.0, 40.0}) {
+        SampleTruth truth = short_record(9);
+        truth.slow_acceleration = {0.01, time_s, 500.0};
+        expect_unexplained(generate_samples(truth), ringlock::closure::Where::frequency);
+    }
+}
+
+// A bias that follows the temperature through a thermal mass was called a random walk.
+TEST(ClosureSampleSuite, ARateThatFollowsTheTemperatureLateIsNoRandomRate) {
+    SampleTruth truth = short_record(10);
+    truth.temperature.swing_k = 2.0;
+    truth.temperature.period_s = 70.0;
+    truth.thermometer_noise_k = 0.01;
+    truth.late_temperature = {3.0, 30.0};
+    expect_unexplained(generate_samples(truth), ringlock::closure::Where::temperature);
+}
+
+// The instrument that tells the input is late, or noisy, which was called a bias instability.
+TEST(ClosureSampleSuite, AnInputThatIsToldLateOrWithNoiseHasItsPlace) {
+    SampleTruth truth = short_record(11);
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> normal;
+    for (double t = 0.0; t < 163.0; t += 1.0) {
+        truth.input_profile_deg_h.time_s.push_back(t);
+        truth.input_profile_deg_h.value.push_back(100.0 * std::sin(t / 10.0));
+    }
+    record::Record noisy = generate_samples(truth);
+    for (double& rate : noisy.input_rate_deg_h.value) rate += 2.0 * normal(random);
+    expect_unexplained(noisy, ringlock::closure::Where::rate);
+    double rate = 0.0;
+    for (double& value : truth.input_profile_deg_h.value) value = rate += 30.0 * normal(random);
+    record::Record late = generate_samples(truth);
+    for (double& time_s : late.input_rate_deg_h.time_s) time_s += 0.3;
+    expect_unexplained(late, ringlock::closure::Where::rate);
+}
+
 // Jumps between two levels explain more than any random rate, and more than the line: it is looked for beside the
 // random rate that comes nearest.
 TEST(ClosureSampleSuite, ALineBesideARateOfNoNameIsNamed) {
