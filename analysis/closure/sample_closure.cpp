@@ -118,16 +118,21 @@ void SampleLoop::finish(Closure& closure) {
     closure.verdict = verdict_of(closure);
 }
 
+/// What is disturbed beside the model as it has grown, of all rows that can be told.
+Disturbed SampleLoop::still_disturbed() const {
+    // With all that is there, as a place in it may be known by nothing else.
+    const Rows all = all_rows();
+    SampleFit whole(series_, now_.fit->model(), all, SampleFit::Noise::held);
+    whole = refine_steps(std::move(whole), all);
+    return find_disturbed(whole, all);
+}
+
 /// An effect that has come into the model may be what seemed to disturb a part of the record: whether any of that part
 /// is to be looked at again.
 bool SampleLoop::restore() {
     constexpr double little = 0.05;
     if (disturbed_.share == 0.0) return false;
-    // With all that is there, as a place in it may be known by nothing else.
-    const Rows all = all_rows();
-    SampleFit whole(series_, now_.fit->model(), all, SampleFit::Noise::held);
-    whole = refine_steps(std::move(whole), all);
-    const Disturbed still = find_disturbed(whole, all);
+    const Disturbed still = still_disturbed();
     double before = 0.0;
     double left = 0.0;
     Disturbed less = still;
@@ -165,6 +170,7 @@ Closure SampleLoop::run() {
         look_beside_nearest(closure);
     }
     take_back_lines(closure);
+    test_left_out(closure);
     finish(closure);
     return closure;
 }

@@ -62,6 +62,7 @@ class SampleLoop {
     void go_without_random(Closure& closure);
     void look_beside_nearest(Closure& closure);
     bool keep_names(int first_step, const std::function<bool(const SampleStep&)>& keeps, Closure& closure);
+    Disturbed still_disturbed() const;
     bool restore();
     void take_lattice(Closure& closure);
     const SampleContender& take_likelier(const SampleChoice& choice, Step& step);
@@ -76,6 +77,7 @@ class SampleLoop {
     std::optional<Stripped> stripped(const SampleStep& told, const std::string& added) const;
     void drop_needless(const std::string& added);
     void test_what_is_left(Closure& closure) const;
+    void test_left_out(Closure& closure) const;
     void finish(Closure& closure);
 
     void find_coarse_steps(Closure& closure);

@@ -15,18 +15,25 @@
 
 namespace ringlock::closure {
 
+namespace {
+
+ResidualTest test_of(const Disturbed& disturbed) {
+    const bool any = disturbed.share > 0.0;
+    return {Where::time, fmt::format("stretches of {:.3g} s far larger than the others", disturbed.length_s),
+            any ? disturbed.p_value : 1.0,
+            any ? fmt::format("{:.1f} % of the record, most at {:.6g} s, {:.3g} times the usual variance",
+                              100.0 * disturbed.share, disturbed.at_s, disturbed.worst)
+                : ""};
+}
+
+}  // namespace
+
 /// Tests of what the model has left; where structure lies, if any passes the level: by the regression that explains
 /// most, the noise fitted anew beside it; where none does, by the test that is least probable by chance.
 void SampleLoop::test_what_is_left(Closure& closure) const {
     constexpr std::size_t looked_at = 4;
     auto views = view_samples(*now_.fit, lattice_step());
-    const Disturbed still = find_disturbed(*now_.fit, whole_);
-    views.push_back(
-        {{Where::time, fmt::format("stretches of {:.3g} s far larger than the others", still.length_s),
-          still.share > 0.0 ? still.p_value : 1.0,
-          still.share > 0.0 ? fmt::format("{:.1f} % of the record, most at {:.6g} s, {:.3g} times the usual variance",
-                                          100.0 * still.share, still.at_s, still.worst)
-                            : ""}});
+    views.push_back({test_of(find_disturbed(*now_.fit, whole_))});
     if (rounded_.drawn()) views.push_back({rounded_.test(*now_.fit)});
     closure.tests.clear();
     for (const View& view : views) closure.tests.push_back(view.test);
@@ -45,6 +52,23 @@ void SampleLoop::test_what_is_left(Closure& closure) const {
         most = merit;
         closure.unexplained = views[k].test;
     }
+}
+
+/// Stretches that nothing was fitted to, as they are far larger than the others, are structure as well. They are no
+/// rate and no line, so that what has been named stays.
+void SampleLoop::test_left_out(Closure& closure) const {
+    if (std::find(disturbed_.rows.begin(), disturbed_.rows.end(), 1) == disturbed_.rows.end()) return;
+    const ResidualTest test = test_of(still_disturbed());
+    const auto same =
+        std::find_if(closure.tests.begin(), closure.tests.end(), [&](const auto& t) { return t.view == test.view; });
+    if (same != closure.tests.end() && same->p_value < test.p_value) return;
+    if (same == closure.tests.end()) {
+        closure.tests.push_back(test);
+    } else {
+        *same = test;
+    }
+    const auto count = static_cast<double>(closure.tests.size());
+    if (!closure.unexplained && of_several(test.p_value, count) < level_of_residual) closure.unexplained = test;
 }
 
 void SampleLoop::begin_again(const State& at) {

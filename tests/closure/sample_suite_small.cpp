@@ -217,6 +217,21 @@ TEST(ClosureSampleSuite, AnInputThatIsToldLateOrWithNoiseHasItsPlace) {
     expect_unexplained(late, ringlock::closure::Where::rate);
 }
 
+// What is left out of the fits as it is far larger than the rest is structure, and takes no name.
+TEST(ClosureSampleSuite, AJumpOfTheAngleIsStructure) {
+    SampleTruth truth = short_record(12);
+    record::Record jumps = generate_samples(truth);
+    jumps.samples->values[9000] += 4.0;
+    expect_unexplained(jumps, ringlock::closure::Where::time);
+    truth.rates.rate_random_walk_deg_h_rt_h = 30.0;
+    record::Record walks = generate_samples(truth);
+    walks.samples->values[9000] += 4.0;
+    const auto found = ringlock::closure::close_samples(walks);
+    EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
+    ASSERT_EQ(found.steps.size(), 1U);
+    EXPECT_EQ(found.steps[0].effect, "rate_random_walk");
+}
+
 // Jumps between two levels explain more than any random rate, and more than the line: it is looked for beside the
 // random rate that comes nearest.
 TEST(ClosureSampleSuite, ALineBesideARateOfNoNameIsNamed) {
