@@ -277,6 +277,39 @@ void settle(SampleCase& of) {
     }
 }
 
+/// Rates that go with time, temperature or acceleration otherwise than the library has it.
+static std::vector<SampleCase> foreign_rates(std::size_t each, std::uint64_t series) {
+    std::vector<SampleCase> cases;
+    std::mt19937_64 random(79 + series);
+    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
+    for (std::size_t k = 0; k < each; ++k) {
+        const auto add = [&](std::size_t condition, Where where, Added added) {
+            SampleCase of;
+            of.kind = Kind::foreign;
+            of.condition = &sample_conditions[condition];
+            of.seed = seeds_of_series * series + 65000 + cases.size();
+            of.where = where;
+            of.foreign = {std::move(added)};
+            cases.push_back(std::move(of));
+        };
+        const double sign = k % 2 == 0 ? 1.0 : -1.0;
+        add(k % 3, Where::time,
+            {"settling", {{"start_deg_h", sign * even(2.0, 20.0)}, {"constant_s", even(20.0, 150.0)}}});
+        add(k % 3, Where::time,
+            {"slow_swing",
+             {{"frequency_hz", between(1.2, 6.0) / duration_of(cases.back())},
+              {"rate_deg_h", even(2.0, 20.0)},
+              {"phase_rad", between(-3.0, 3.0)}}});
+        add(k % 2 == 0 ? 2 : 5, Where::frequency,
+            {"slow_acceleration",
+             {{"rms_m_s2", 0.01}, {"time_s", even(3.0, 60.0)}, {"deg_h_s2_per_m", sign * even(200.0, 2000.0)}}});
+        add(k % 2 == 0 ? 3 : 5, Where::temperature,
+            {"late_temperature", {{"deg_h_per_k", sign * even(1.5, 15.0)}, {"lag_s", even(10.0, 80.0)}}});
+    }
+    return cases;
+}
+
 std::vector<SampleCase> foreign_sample_cases(std::size_t each, std::uint64_t series) {
     std::vector<SampleCase> cases;
     std::mt19937_64 random(78 + series);
@@ -308,6 +341,7 @@ std::vector<SampleCase> foreign_sample_cases(std::size_t each, std::uint64_t ser
         add(k % 3, Where::time, {"noise_modulation", {{"depth", even(0.15, 0.7)}, {"period_s", between(25.0, 120.0)}}});
         add(0, Where::amplitude, {"saturation_arcsec", {{"", 0.3 * between(2.5, 4.0)}}});
     }
+    for (SampleCase& of : foreign_rates(each, series)) cases.push_back(std::move(of));
     return cases;
 }
 
