@@ -298,8 +298,8 @@ std::vector<Contest::Rival> Contest::rivals(bool resampled, bool moved) const {
     std::vector<Where> columns;
     std::size_t place = 0;
     std::erase_if(views, [&](const View& view) {
-        // Jumps are looked at in any case: a random rate can follow them, and no other view says what they are. So is
-        // what follows another column of the record most: courses in time come near to that as well.
+        // Jumps are looked at in any case, which a random rate can follow and no other view tells, and what follows
+        // another column of the record most: courses in time come near to that.
         const bool follows = view.columns && view.test.where != Where::time && !view.hz;
         const bool first = follows && std::find(columns.begin(), columns.end(), view.test.where) == columns.end();
         if (first) columns.push_back(view.test.where);
@@ -373,7 +373,8 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
             more = closure::tie;
         }
         most = std::max(most, merit + more);
-        if (rival.of_states) most = std::max(most, *rival.of_states - closure::tie);
+        // A process as well, as a random rate is: within a tie nothing tells them apart.
+        if (rival.of_states) most = std::max(most, *rival.of_states + (random ? closure::tie : -closure::tie));
     }
     return most;
 }

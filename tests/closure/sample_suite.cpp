@@ -277,8 +277,10 @@ void settle(SampleCase& of) {
     }
 }
 
+namespace {
+
 /// Rates that go with time, temperature or acceleration otherwise than the library has it.
-static std::vector<SampleCase> foreign_rates(std::size_t each, std::uint64_t series) {
+std::vector<SampleCase> foreign_rates(std::size_t each, std::uint64_t series) {
     std::vector<SampleCase> cases;
     std::mt19937_64 random(79 + series);
     const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
@@ -309,6 +311,8 @@ static std::vector<SampleCase> foreign_rates(std::size_t each, std::uint64_t ser
     }
     return cases;
 }
+
+}  // namespace
 
 std::vector<SampleCase> foreign_sample_cases(std::size_t each, std::uint64_t series) {
     std::vector<SampleCase> cases;

@@ -144,15 +144,26 @@ SampleTruth short_record(std::uint64_t seed) {
     return truth;
 }
 
-// A bias of two states, 3 deg/h apart, was called bias_instability.
-TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
-    SampleTruth truth = short_record(5);
-    truth.rates.telegraph_bias = {3.0, 20.0};
-    const auto found = ringlock::closure::close_samples(generate_samples(truth));
+/// Nothing of the library is in the record, and the answer says so at that place.
+void expect_unexplained(const record::Record& record, ringlock::closure::Where where) {
+    const auto found = ringlock::closure::close_samples(record);
     EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
-    EXPECT_TRUE(found.steps.empty());
+    EXPECT_TRUE(found.steps.empty()) << found.steps.front().effect;
     ASSERT_TRUE(found.unexplained);
-    EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::time);
+    EXPECT_EQ(found.unexplained->where, where) << found.unexplained->description();
+}
+
+// A bias of two states, 3 deg/h apart, was called bias_instability, and one that jumps four times a random walk.
+TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
+    SampleTruth often = short_record(5);
+    often.rates.telegraph_bias = {3.0, 20.0};
+    SampleTruth seldom = short_record(61);
+    seldom.white_angle_arcsec = 0.1;
+    seldom.rates.quantum_noise_deg_rt_h = 0.006;
+    seldom.rates.telegraph_bias = {0.6, 50.0};
+    for (const SampleTruth& truth : {often, seldom}) {
+        expect_unexplained(generate_samples(truth), ringlock::closure::Where::time);
+    }
 }
 
 // A gyro that settles after it was switched on, and a sway of three and a half periods, were called a random walk.
@@ -162,21 +173,8 @@ TEST(ClosureSampleSuite, ACourseInTimeIsNoRandomRate) {
     SampleTruth sways = short_record(8);
     sways.rates.base_vibration = {3.5 / 160.0, 3.0, 0.7};
     for (const SampleTruth& truth : {settles, sways}) {
-        const auto found = ringlock::closure::close_samples(generate_samples(truth));
-        EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
-        EXPECT_TRUE(found.steps.empty()) << found.steps.front().effect;
-        ASSERT_TRUE(found.unexplained);
-        EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::time) << found.unexplained->description();
+        expect_unexplained(generate_samples(truth), ringlock::closure::Where::time);
     }
-}
-
-/// Nothing of the library is in the record, and the answer says so at that place.
-void expect_unexplained(const record::Record& record, ringlock::closure::Where where) {
-    const auto found = ringlock::closure::close_samples(record);
-    EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
-    EXPECT_TRUE(found.steps.empty()) << found.steps.front().effect;
-    ASSERT_TRUE(found.unexplained);
-    EXPECT_EQ(found.unexplained->where, where) << found.unexplained->description();
 }
 
 // Biases that go with an acceleration, slow or fast, were called a random walk and a motion of the case.
