@@ -3,21 +3,26 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <utility>
 
 #include "analysis/closure/chance.hpp"
+#include "analysis/closure/sample_tests.hpp"
 #include "analysis/closure/sample_views.hpp"
 
 namespace ringlock::closure {
 
 namespace {
 
-/// Values behind a lag of first order, which begins at rest: y' = (x - y)/lag. None where that is no time.
+/// Values behind a lag of first order: y' = (x - y)/lag. What is before the first is as they are in the mean over the
+/// first lag, since a single one may be all noise.
 std::vector<double> lagged(std::vector<double> values, double interval_s, double lag_s) {
     if (!(lag_s > 0.0)) return values;
     const double kept = std::exp(-interval_s / lag_s);
-    double y = values.front();
+    const auto first = std::clamp<std::size_t>(static_cast<std::size_t>(lag_s / interval_s), 1, values.size());
+    double y = std::accumulate(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(first), 0.0) /
+               static_cast<double>(first);
     for (double& x : values) x = y = kept * y + (1.0 - kept) * x;
     return values;
 }
@@ -76,16 +81,20 @@ void test_temperature(const SampleFit& fit, Views& views) {
     }
     test_columns(fit, Where::temperature, "rates that follow temperature, its square and its slope", {t, square, slope},
                  views);
-    // A mass between thermometer and gyro. Short lags are the slope.
+    // A mass between thermometer and gyro, which may be warmer or colder at the start. Short lags are the slope.
     const auto lag_s = [&series](std::size_t place) {
         return 0.5 * duration_s(series) * std::pow(1.6, -static_cast<double>(place));
     };
     const auto columns = [&series, lag_s](std::size_t place) -> Columns {
         const auto& now = series.temperature_change_k;
-        return {now, lagged(now, series.interval_s, lag_s(place))};
+        std::vector<double> start(now.size());
+        for (std::size_t i = 0; i < start.size(); ++i) {
+            start[i] = std::exp(-static_cast<double>(i) * series.interval_s / lag_s(place));
+        }
+        return {now, lagged(now, series.interval_s, lag_s(place)), std::move(start)};
     };
     const auto said = [lag_s](std::size_t place) { return fmt::format("by {:.2g} s", lag_s(place)); };
-    test_places(fit, Where::temperature, "rates that follow the temperature late", {7, columns, said}, views);
+    test_places(fit, Where::temperature, "rates that follow the temperature late", {7, columns, said, 1}, views);
 }
 
 void test_input(const SampleFit& fit, Views& views) {
@@ -140,7 +149,7 @@ void test_accelerations(const SampleFit& fit, Views& views) {
     const auto said = [lag_s](std::size_t place) {
         return place == 0 ? std::string() : fmt::format("{:.2g} s late", lag_s(place));
     };
-    test_places(fit, Where::frequency, "rates that follow the witnesses", {4, columns, said}, views);
+    test_places(fit, Where::frequency, std::string(followed_witnesses), {4, columns, said}, views);
 }
 
 }  // namespace

@@ -113,9 +113,11 @@ void SampleLoop::look_beside_nearest(Closure& closure) {
         around_hz.push_back(now_.told.back().hz);
         add_all(closure, line);
     }
-    // What is left of a line lies about it, and a rate that is left takes another's shape.
+    const bool of_witness = left && left->view == followed_witnesses;
+    // What is left of a line lies about it, a rate that is left takes another's shape, and one that goes with an
+    // acceleration that of a motion.
     const auto keeps = [&](const SampleStep& told) {
-        if (!line) return !is_slow_rate(told.effect);
+        if (!line) return !is_slow_rate(told.effect) && !(of_witness && told.effect == "case_motion");
         if (!is_line(told.effect)) return !is_random_rate(told.effect);
         return std::none_of(around_hz.begin(), around_hz.end(),
                             [&](double hz) { return std::abs(hz - told.hz) < beside_hz; });

@@ -25,6 +25,9 @@ inline constexpr std::string_view repeating_variance = "variance and covariance 
 /// The view of a rate that jumps to and fro between two levels.
 inline constexpr std::string_view jumping_rate = "a rate that jumps between two levels";
 
+/// The view of a rate that goes with accelerations.
+inline constexpr std::string_view followed_witnesses = "rates that follow the witnesses";
+
 /// Holds the innovations that count against everything that the record has: time, frequency, the place in the record
 /// modulo small numbers, witnesses, temperature, input rate, their own size. The views refer to the fit.
 /// \param lattice_arcsec  steps of the values, which are not normal then

@@ -15,7 +15,7 @@ Columns taken_by(const SampleFit& fit, const Columns& columns) {
     return taken;
 }
 
-void test_places(const SampleFit& fit, Where where, const char* view, const Places& of, Views& views) {
+void test_places(const SampleFit& fit, Where where, const std::string& view, const Places& of, Views& views) {
     double chi2 = 0.0;
     int rank = 0;
     std::size_t at = 0;
@@ -27,7 +27,9 @@ void test_places(const SampleFit& fit, Where where, const char* view, const Plac
         at = place;
     }
     if (rank == 0) return;
-    const double cost = rank + std::log(static_cast<double>(of.count));
+    // Schwarz, Annals of Statistics 6, 1978, 461.
+    const double integrated = of.courses * (0.5 * std::log(static_cast<double>(fit.series().size())) - 1.0);
+    const double cost = rank + integrated + std::log(static_cast<double>(of.count));
     const double p = of_several(chi2_tail(chi2, rank), static_cast<double>(of.count));
     views.push_back({{where, view, p, of.said(at), 0.5 * chi2 - cost}, cost, [columns = of.columns, at] {
                          return regressors(columns(at));

@@ -177,16 +177,18 @@ TEST(ClosureSampleSuite, ACourseInTimeIsNoRandomRate) {
     }
 }
 
-// Biases that go with an acceleration, slow or fast, were called a random walk and a motion of the case.
+// Biases that go with an acceleration, slow or fast, were called a random walk and a motion of the case, the latter
+// also beside a random rate of no name.
 TEST(ClosureSampleSuite, ARateThatFollowsAWitnessIsNeitherRandomNorAMotion) {
     for (const double time_s : {3.0, 40.0}) {
-        SampleTruth truth = short_record(9);
+        SampleTruth truth = short_record(6);
         truth.slow_acceleration = {0.01, time_s, 500.0};
         expect_unexplained(generate_samples(truth), ringlock::closure::Where::frequency);
     }
 }
 
-// A bias that follows the temperature through a thermal mass was called a random walk.
+// A bias that follows the temperature through a thermal mass was called a random walk, and so was one whose mass was
+// warmer than the thermometer at the start.
 TEST(ClosureSampleSuite, ARateThatFollowsTheTemperatureLateIsNoRandomRate) {
     SampleTruth truth = short_record(10);
     truth.temperature.swing_k = 2.0;
@@ -194,6 +196,16 @@ TEST(ClosureSampleSuite, ARateThatFollowsTheTemperatureLateIsNoRandomRate) {
     truth.thermometer_noise_k = 0.01;
     truth.late_temperature = {3.0, 30.0};
     expect_unexplained(generate_samples(truth), ringlock::closure::Where::temperature);
+    constexpr std::ptrdiff_t before = 12000;
+    truth.size += before;
+    truth.temperature.period_s = 50.0;
+    truth.temperature.ramp_k_per_h = 60.0;
+    truth.late_temperature.lag_s = 40.0;
+    record::Record later = generate_samples(truth);
+    for (auto* column : {&later.samples->values, &later.samples->witnesses.at("temperature_c")}) {
+        column->erase(column->begin(), column->begin() + before);
+    }
+    expect_unexplained(later, ringlock::closure::Where::temperature);
 }
 
 // The instrument that tells the input is late, or noisy, which was called a bias instability.
