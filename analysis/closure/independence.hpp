@@ -40,6 +40,7 @@ struct View {
     /// Merit where it is fitted anew otherwise than by a regression, if it is; by a search, that is gone through with
     /// only where it comes near the merit of a rival.
     std::function<double(double rival)> refitted = {};
+    int courses = 0;  ///< so many of the columns of what is not of time are courses in time of any size
 };
 
 /// Gain of the log-likelihood by the regression, the noise fitted anew beside it and its coefficients integrated out,

@@ -61,7 +61,7 @@ class Contest {
     /// What a view of the residual explains, the noise fitted anew beside it.
     struct Rival {
         double merit = 0.0;
-        double coefficients = 0.0;
+        double courses = 0.0;  ///< in time, that it has coefficients of
         Where where = Where::time;
         bool jumps = false;
         bool repeats = false;                    ///< a variance that does
@@ -316,7 +316,8 @@ std::vector<Contest::Rival> Contest::rivals(bool resampled, bool moved) const {
                     .by_variance = view.by_variance};
         if (view.columns) {
             rival.merit = refitted_merit(*now_.fit, view);
-            rival.coefficients = static_cast<double>(view.columns().size());
+            const bool courses = view.test.where == Where::time && !view.jumps;
+            rival.courses = courses ? static_cast<double>(view.columns().size()) : view.courses;
         }
         if (repeats && resampled) rival.merit = std::max(rival.merit, view.refitted(0.0));
         const bool levels = view.test.view == jumping_rate;
@@ -361,15 +362,14 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
         // Several effects are chosen from many: against what follows another column of the record they get nothing for
         // being of the library. A course in time follows all of them.
         double more = account.members.size() > 1 && rival.where != Where::time ? 0.0 : -closure::tie;
-        if (random && rival.where == Where::time && !rival.jumps) {
-            // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
-            // course in time (Schwarz 1978).
-            merit -= rival.coefficients * (0.5 * std::log(static_cast<double>(rows)) - 1.0);
-        } else if (random) {
+        // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
+        // course in time (Schwarz 1978).
+        if (random) merit -= rival.courses * (0.5 * std::log(static_cast<double>(rows)) - 1.0);
+        if (random && (rival.where != Where::time || rival.jumps)) {
             // What follows jumps, or another column of the record, a random rate can follow nearly as well. The course
             // of jumps is searched stretch by stretch and loses a part of what they explain.
             more = rival.jumps ? std::max(closure::tie, 0.1 * account.merit) : closure::tie;
-        } else if (rival.jumps && account.members.size() > 1) {
+        } else if (!random && rival.jumps && account.members.size() > 1) {
             more = closure::tie;
         }
         most = std::max(most, merit + more);

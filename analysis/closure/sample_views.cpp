@@ -27,13 +27,12 @@ void test_places(const SampleFit& fit, Where where, const std::string& view, con
         at = place;
     }
     if (rank == 0) return;
-    // Schwarz, Annals of Statistics 6, 1978, 461.
-    const double integrated = of.courses * (0.5 * std::log(static_cast<double>(fit.series().size())) - 1.0);
-    const double cost = rank + integrated + std::log(static_cast<double>(of.count));
+    const double cost = rank + std::log(static_cast<double>(of.count));
     const double p = of_several(chi2_tail(chi2, rank), static_cast<double>(of.count));
     views.push_back({{where, view, p, of.said(at), 0.5 * chi2 - cost}, cost, [columns = of.columns, at] {
                          return regressors(columns(at));
                      }});
+    views.back().courses = of.courses;
 }
 
 }  // namespace ringlock::closure

@@ -22,7 +22,7 @@ struct Places {
     std::size_t count;
     std::function<Columns(std::size_t place)> columns;
     std::function<std::string(std::size_t place)> said;
-    int courses = 0;  ///< so many of the columns are courses in time of any size, whose coefficients are integrated out
+    int courses = 0;  ///< of the view
 };
 /// The view of the place where a regression on its columns explains most, each column and the place a parameter.
 void test_places(const SampleFit& fit, Where where, const std::string& view, const Places& of, Views& views);
