@@ -130,11 +130,6 @@ class CsvReader {
                             "them",
                             name_of(SampleKind::angle_increment_arcsec)));
         }
-        const bool of_turns = std::any_of(columns_.begin(), columns_.end(), [](const Column& column) {
-            return column.name == "direction" || column.name == "sin" || column.name == "cos";
-        });
-        if (of_turns)
-            fail("has columns of turns; a record of turns is HDF5 (docs/record.md), the text form has samples only");
         std::set<std::string> seen;
         std::vector<std::string> kinds;
         for (Column& column : columns_) {
@@ -158,18 +153,23 @@ class CsvReader {
                 record_.ignored.push_back(fmt::format("line {}: column {}", number_, shown(column.name)));
             }
         }
-        if (kinds.size() == 1) return;
+        const bool turns = seen.contains("direction") || seen.contains("sin") || seen.contains("cos");
+        if (kinds.size() == 1 && !turns) return;
         if (kinds.size() > 1) {
             fail(fmt::format("has the columns {}; a record has one of them", listed(kinds)));
         }
         std::vector<std::string> names;
         for (const Column& column : columns_) names.push_back(shown(column.name));
-        const bool turns = seen.contains("direction") || seen.contains("sin") || seen.contains("cos");
-        fail(fmt::format(
-            "has no column of samples; columns are {}; one of angle_increment_arcsec, angle_arcsec and "
-            "quarter_count is needed{}",
-            listed(names),
-            turns ? " (only samples have a text form; turns must be written as HDF5, docs/record.md)" : ""));
+        if (turns) {
+            fail(
+                fmt::format("has columns of turns: {}; only samples have a text form, turns must be written as HDF5 "
+                            "(docs/record.md)",
+                            listed(names)));
+        }
+        fail(
+            fmt::format("has no column of samples; columns are {}; one of angle_increment_arcsec, angle_arcsec and "
+                        "quarter_count is needed",
+                        listed(names)));
     }
 
     void row(std::string_view text) {

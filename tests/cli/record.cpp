@@ -14,6 +14,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 class RecordProgram : public ProgramTest {
    protected:
@@ -52,7 +53,11 @@ TEST_F(RecordProgram, SaysWhatIsWrongAndWhere) {
         expect_refused(arguments, AllOf(HasSubstr("r.h5: /turns/sin, row 5"), HasSubstr("r.h5: /turns/time_s, row 9")));
     }
     write("r.csv", "# rate_hz = 10\nangle_arcsec\n1\nnan\n");
-    expect_refused({"validate", "r.csv"}, AllOf(HasSubstr("r.csv:4: column angle_arcsec"), HasSubstr(".toml")));
+    expect_refused({"validate", "r.csv"}, AllOf(HasSubstr("r.csv:4: column angle_arcsec"), Not(HasSubstr(".toml"))));
+    // What is called neither a table nor a scenario may be either.
+    write("r", "# rate_hz = 10\nangle_arcsec\n1\nnan\n");
+    expect_refused({"validate", "r"},
+                   AllOf(HasSubstr("r:4: column angle_arcsec"), HasSubstr("scenarios end in .toml")));
     expect_refused({"import", "r.csv", "-o", "o.h5"}, HasSubstr("r.csv:4:"));
     expect_refused({"validate", "missing.csv"}, HasSubstr("missing.csv"));
     expect_refused({"validate", "."}, HasSubstr("directory"));

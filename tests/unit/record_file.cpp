@@ -483,7 +483,7 @@ TEST_F(RecordFile, TextThatIsNoRecordIsRefusedWithItsPlace) {
         {rate + "angle_arcsec,angle_increment_arcsec\n1,2\n", {":2:", "one of them"}},
         {rate + "angle_arcsec,angle_arcsec\n1,2\n", {":2:", "angle_arcsec stands twice"}},
         {rate + "angle_arcsec,accel_x,accel_x\n1,2,3\n", {"accel_x stands twice"}},
-        {"time_s,direction,quarter_count,sin,cos\n0,1,2,3,4\n", {":1:", "columns of turns", "HDF5"}},
+        {"time_s,direction,quarter_count,sin,cos\n0,1,2,3,4\n", {"columns of turns", "HDF5"}},
         {rate + "angle_arcsec,\n1,2\n", {":2:", "no name"}},
         {rate + "angle_arcsec,accel_x\n1,2\n3\n", {":4:", "1 column", "header has 2"}},
         {rate + "angle_arcsec,accel_x\n1,2\n3,4,5\n", {":4:", "3 columns", "header has 2"}},
