@@ -44,13 +44,29 @@ void SampleLoop::test_what_is_left(Closure& closure) const {
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.p_value < b.test.p_value; });
     closure.unexplained = views.front().test;
     std::sort(views.begin(), views.end(), [](const View& a, const View& b) { return a.test.merit > b.test.merit; });
+    if (views.size() > looked_at) views.resize(looked_at);
     double most = 0.0;
-    for (std::size_t k = 0; k < std::min(looked_at, views.size()); ++k) {
-        if (!views[k].columns && !(views[k].test.merit > 0.0)) continue;
-        const double merit = views[k].columns ? refitted_merit(*now_.fit, views[k]) : views[k].test.merit;
+    const View* regression = nullptr;
+    for (const View& view : views) {
+        if (!view.columns) continue;
+        const double merit = refitted_merit(*now_.fit, view);
         if (merit <= most) continue;
         most = merit;
-        closure.unexplained = views[k].test;
+        regression = &view;
+        closure.unexplained = view.test;
+    }
+    // A strong rate looks like lines: such as are none beside it.
+    std::vector<View> beside;
+    if (regression != nullptr) beside = view_samples(fit_beside(*now_.fit, *regression), lattice_step());
+    for (const View& view : views) {
+        if (view.columns || !(view.test.merit > most)) continue;
+        const bool stays =
+            beside.empty() || std::any_of(beside.begin(), beside.end(), [&](const View& other) {
+                return other.test.view == view.test.view && of_several(other.test.p_value, count) < level_of_residual;
+            });
+        if (!stays) continue;
+        most = view.test.merit;
+        closure.unexplained = view.test;
     }
 }
 

@@ -191,15 +191,17 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
     return least;
 }
 
-double refitted_merit(const SampleFit& fit, const View& view, double of_a_coefficient) {
+SampleFit fit_beside(const SampleFit& fit, const View& view) {
     SampleModel model = fit.model();
-    const auto columns = view.columns();
-    for (const auto& column : columns) {
+    for (const auto& column : view.columns()) {
         model.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(column.series)});
         model.columns.back().as_recorded = view.hz.has_value();
     }
-    const SampleFit with(fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near);
-    return with.gain_over(fit) - view.cost - of_a_coefficient * static_cast<double>(columns.size());
+    return {fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near};
+}
+
+double refitted_merit(const SampleFit& fit, const View& view) {
+    return fit_beside(fit, view).gain_over(fit) - view.cost;
 }
 
 std::vector<View> view_samples(const SampleFit& fit, double lattice_arcsec) {

@@ -43,8 +43,10 @@ struct UnsteadyLine {
 };
 UnsteadyLine unsteady_line(const SampleFit& fit);
 
-/// Gain of the log-likelihood by the view's regression, the noise fitted anew beside it, less its cost and so much for
-/// each coefficient.
-double refitted_merit(const SampleFit& fit, const View& view, double of_a_coefficient = 0.0);
+/// The model with the view's regression, the noise fitted anew beside it.
+SampleFit fit_beside(const SampleFit& fit, const View& view);
+
+/// Gain of the log-likelihood by that, less the view's cost.
+double refitted_merit(const SampleFit& fit, const View& view);
 
 }  // namespace ringlock::closure

@@ -297,7 +297,7 @@ std::vector<SampleCase> foreign_rates(std::size_t each, std::uint64_t series) {
         };
         const double sign = k % 2 == 0 ? 1.0 : -1.0;
         add(k % 3, Where::time,
-            {"settling", {{"start_deg_h", sign * even(2.0, 20.0)}, {"constant_s", even(20.0, 150.0)}}});
+            {"settling", {{"start_deg_h", sign * even(6.0, 60.0)}, {"constant_s", even(15.0, 75.0)}}});
         add(k % 3, Where::time,
             {"slow_swing",
              {{"frequency_hz", between(1.2, 6.0) / duration_of(cases.back())},

@@ -172,7 +172,11 @@ TEST(ClosureSampleSuite, ACourseInTimeIsNoRandomRate) {
     settles.rates.settling = {8.0, 40.0};
     SampleTruth sways = short_record(8);
     sways.rates.base_vibration = {3.5 / 160.0, 3.0, 0.7};
-    for (const SampleTruth& truth : {settles, sways}) {
+    // One that looks like a line as well.
+    SampleTruth strong = short_record(9);
+    strong.size = 30000;
+    strong.rates.settling = {6.7, 20.0};
+    for (const SampleTruth& truth : {settles, sways, strong}) {
         expect_unexplained(generate_samples(truth), ringlock::closure::Where::time);
     }
 }
