@@ -123,9 +123,9 @@ SampleSeries prepare_samples(const record::Record& record) {
         }
     }
     const std::size_t n = series.increment.size();
-    if (n < record::fewest_samples_to_close) {
-        throw InputError(fmt::format("/samples: {} of them are too few for the closed loop; at least {} are needed", n,
-                                     record::fewest_samples_to_close));
+    if (samples.size() < record::fewest_samples_to_close) {
+        throw InputError(fmt::format("/samples: {} of them are too few for the closed loop; at least {} are needed",
+                                     samples.size(), record::fewest_samples_to_close));
     }
     if (!changes(series.increment)) throw InputError("/samples: they never change; there is nothing to fit");
     for (std::size_t i = 0; i < n; ++i) {

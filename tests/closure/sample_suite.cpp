@@ -279,74 +279,81 @@ void settle(SampleCase& of) {
 
 namespace {
 
+/// Cases of effects outside the library, with seeds that follow one another.
+class ForeignCases {
+   public:
+    ForeignCases(std::uint64_t first_seed, std::uint64_t of_draws) : first_seed_(first_seed), random_(of_draws) {}
+
+    void add(std::size_t condition, Where where, Added added) {
+        SampleCase of;
+        of.kind = Kind::foreign;
+        of.condition = &sample_conditions[condition];
+        of.seed = first_seed_ + cases.size();
+        of.where = where;
+        of.foreign = {std::move(added)};
+        cases.push_back(std::move(of));
+    }
+    double between(double a, double b) { return std::uniform_real_distribution<double>(a, b)(random_); }
+    /// From what shows itself well to what is evident: sizes are even in their logarithms.
+    double even(double a, double b) { return std::exp(between(std::log(a), std::log(b))); }
+
+    std::vector<SampleCase> cases;
+
+   private:
+    std::uint64_t first_seed_;
+    std::mt19937_64 random_;
+};
+
 /// Rates that go with time, temperature or acceleration otherwise than the library has it.
 std::vector<SampleCase> foreign_rates(std::size_t each, std::uint64_t series) {
-    std::vector<SampleCase> cases;
-    std::mt19937_64 random(79 + series);
-    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
-    const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
+    ForeignCases foreign(seeds_of_series * series + 65000, 79 + series);
     for (std::size_t k = 0; k < each; ++k) {
-        const auto add = [&](std::size_t condition, Where where, Added added) {
-            SampleCase of;
-            of.kind = Kind::foreign;
-            of.condition = &sample_conditions[condition];
-            of.seed = seeds_of_series * series + 65000 + cases.size();
-            of.where = where;
-            of.foreign = {std::move(added)};
-            cases.push_back(std::move(of));
-        };
         const double sign = k % 2 == 0 ? 1.0 : -1.0;
-        add(k % 3, Where::time,
-            {"settling", {{"start_deg_h", sign * even(6.0, 60.0)}, {"constant_s", even(15.0, 75.0)}}});
-        add(k % 3, Where::time,
-            {"slow_swing",
-             {{"frequency_hz", between(1.2, 6.0) / duration_of(cases.back())},
-              {"rate_deg_h", even(2.0, 20.0)},
-              {"phase_rad", between(-3.0, 3.0)}}});
-        add(k % 2 == 0 ? 2 : 5, Where::frequency,
-            {"slow_acceleration",
-             {{"rms_m_s2", 0.01}, {"time_s", even(3.0, 60.0)}, {"deg_h_s2_per_m", sign * even(200.0, 2000.0)}}});
-        add(k % 2 == 0 ? 3 : 5, Where::temperature,
-            {"late_temperature", {{"deg_h_per_k", sign * even(1.5, 15.0)}, {"lag_s", even(10.0, 80.0)}}});
+        foreign.add(
+            k % 3, Where::time,
+            {"settling", {{"start_deg_h", sign * foreign.even(6.0, 60.0)}, {"constant_s", foreign.even(15.0, 75.0)}}});
+        foreign.add(k % 3, Where::time,
+                    {"slow_swing",
+                     {{"frequency_hz", foreign.between(1.2, 6.0) / duration_of(foreign.cases.back())},
+                      {"rate_deg_h", foreign.even(2.0, 20.0)},
+                      {"phase_rad", foreign.between(-3.0, 3.0)}}});
+        foreign.add(k % 2 == 0 ? 2 : 5, Where::frequency,
+                    {"slow_acceleration",
+                     {{"rms_m_s2", 0.01},
+                      {"time_s", foreign.even(3.0, 60.0)},
+                      {"deg_h_s2_per_m", sign * foreign.even(200.0, 2000.0)}}});
+        foreign.add(k % 2 == 0 ? 3 : 5, Where::temperature,
+                    {"late_temperature",
+                     {{"deg_h_per_k", sign * foreign.even(1.5, 15.0)}, {"lag_s", foreign.even(10.0, 80.0)}}});
     }
-    return cases;
+    return foreign.cases;
 }
 
 }  // namespace
 
 std::vector<SampleCase> foreign_sample_cases(std::size_t each, std::uint64_t series) {
-    std::vector<SampleCase> cases;
-    std::mt19937_64 random(78 + series);
-    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
-    // From what shows itself well to what is evident: sizes are even in their logarithms.
-    const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
+    ForeignCases foreign(seeds_of_series * series + 60000, 78 + series);
     for (std::size_t k = 0; k < each; ++k) {
-        const auto add = [&](std::size_t condition, Where where, Added added) {
-            SampleCase of;
-            of.kind = Kind::foreign;
-            of.condition = &sample_conditions[condition];
-            of.seed = seeds_of_series * series + 60000 + cases.size();
-            of.where = where;
-            of.foreign = {std::move(added)};
-            cases.push_back(std::move(of));
-        };
         const double sign = k % 2 == 0 ? 1.0 : -1.0;
-        add(k % 3, Where::time,
-            {"telegraph_bias", {{"step_deg_h", sign * even(1.5, 15.0)}, {"dwell_s", even(10.0, 60.0)}}});
-        add(k % 3, Where::frequency,
-            {"swinging_line",
-             {{"frequency_hz", between(3.0, 25.0)},
-              {"rate_deg_h", even(10.0, 60.0)},
-              {"deviation_hz", even(0.05, 0.5)},
-              {"period_s", between(30.0, 100.0)}}});
-        add(4, Where::rate, {"bias_per_rate_squared_h_deg", {{"", sign * even(2e-5, 4e-4)}}});
-        add(3 + k % 2, Where::temperature,
-            {"bias_per_temperature_slope_deg_h_s_per_k", {{"", sign * even(50.0, 500.0)}}});
-        add(k % 3, Where::time, {"noise_modulation", {{"depth", even(0.15, 0.7)}, {"period_s", between(25.0, 120.0)}}});
-        add(0, Where::amplitude, {"saturation_arcsec", {{"", 0.3 * between(2.5, 4.0)}}});
+        foreign.add(k % 3, Where::time,
+                    {"telegraph_bias",
+                     {{"step_deg_h", sign * foreign.even(1.5, 15.0)}, {"dwell_s", foreign.even(10.0, 60.0)}}});
+        foreign.add(k % 3, Where::frequency,
+                    {"swinging_line",
+                     {{"frequency_hz", foreign.between(3.0, 25.0)},
+                      {"rate_deg_h", foreign.even(10.0, 60.0)},
+                      {"deviation_hz", foreign.even(0.05, 0.5)},
+                      {"period_s", foreign.between(30.0, 100.0)}}});
+        foreign.add(4, Where::rate, {"bias_per_rate_squared_h_deg", {{"", sign * foreign.even(2e-5, 4e-4)}}});
+        foreign.add(3 + k % 2, Where::temperature,
+                    {"bias_per_temperature_slope_deg_h_s_per_k", {{"", sign * foreign.even(50.0, 500.0)}}});
+        foreign.add(
+            k % 3, Where::time,
+            {"noise_modulation", {{"depth", foreign.even(0.15, 0.7)}, {"period_s", foreign.between(25.0, 120.0)}}});
+        foreign.add(0, Where::amplitude, {"saturation_arcsec", {{"", 0.3 * foreign.between(2.5, 4.0)}}});
     }
-    for (SampleCase& of : foreign_rates(each, series)) cases.push_back(std::move(of));
-    return cases;
+    for (SampleCase& of : foreign_rates(each, series)) foreign.cases.push_back(std::move(of));
+    return foreign.cases;
 }
 
 Outcome judge(const SampleCase& of, const record::Record& record) {

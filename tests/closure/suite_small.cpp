@@ -212,17 +212,22 @@ TEST(DitherShape, AccelerationsComeOutTooSmallOfSecondOrder) {
 // of the summit.
 TEST(LongClosureSuite, AStrongSecondHarmonicIsFoundBehindAStep) {
     Truth truth;
-    truth.scale_factor_arcsec = 0.6044;
-    truth.lockin_threshold_deg_h = 222.8;
-    truth.dither_frequency_hz = 218.34;
+    truth.scale_factor_arcsec = 0.60439;
+    truth.lockin_threshold_deg_h = 222.81;
+    truth.dither_frequency_hz = 218.3394;
     truth.dither_peak_rate_deg_s = 82.035;
     truth.bias_deg_h = 0.9378;
+    truth.initial_phase_rad = 0.7;
     truth.input_rate_deg_h = 235.393;
     truth.readout_noise = 0.01;
-    truth.lockin_second_harmonic = {0.14, 1.0};
-    truth.rates.bias_step = {0.02, 14.656};
-    truth.turns = 12000;
-    truth.seed = 665;
+    truth.lockin_second_harmonic = {0.2, -1.5};
+    truth.rates.bias_step = {0.01996459, 14.656};
+    truth.turns = 16000;
+    truth.seed = 18;
+    truth.declared = record::Declared{};
+    truth.declared->scale_factor_arcsec = truth.scale_factor_arcsec;
+    truth.declared->lockin_threshold_deg_h = 235.956;
+    truth.declared->input_rate_deg_h = truth.input_rate_deg_h;
     const auto closure = ringlock::closure::close_loop(generate({&truth, 1}).front());
     EXPECT_EQ(closure.verdict, ringlock::closure::Verdict::closed);
     EXPECT_THAT(closure.steps, testing::UnorderedElementsAre(
