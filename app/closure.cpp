@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "analysis/closure/report.hpp"
+#include "analysis/closure/report/report.hpp"
 #include "analysis/record/record.hpp"
 #include "analysis/report/closure_page.hpp"
 #include "app/command.hpp"

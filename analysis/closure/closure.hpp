@@ -2,10 +2,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "analysis/closure/independence.hpp"
-#include "analysis/closure/turn_fit.hpp"
+#include "analysis/closure/types.hpp"
 #include "analysis/record/record.hpp"
 
 /// The closed loop with measured data: fit, residual, trace, add, report (docs/closure.md).
@@ -58,20 +58,5 @@ struct Closure {
 /// Runs the loop on the record's turns, or on its samples where it has no turns. Throws InputError where the record
 /// does not suffice.
 Closure close_loop(const record::Record& record);
-
-/// The model with these effects fitted to a record of turns, nothing searched: what a loop that knows what is in the
-/// record reaches. Effects start from the values given.
-Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
-
-/// The same for a record of samples; the residual is not tested.
-Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects);
-
-/// Standard errors of the parameters of effects at the values given, those of the true model: by Fisher's information
-/// in the whole record of turns.
-std::vector<Estimate> information_on_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
-
-/// The two loops.
-Closure close_turns(const record::Record& record);
-Closure close_samples(const record::Record& record);
 
 }  // namespace ringlock::closure

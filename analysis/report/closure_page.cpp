@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/closure/chance.hpp"
-#include "analysis/closure/report.hpp"
+#include "analysis/closure/report/report.hpp"
+#include "analysis/closure/stats/p_values.hpp"
 #include "analysis/report/plot.hpp"
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"

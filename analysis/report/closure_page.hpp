@@ -3,7 +3,7 @@
 #include <string>
 
 #include "analysis/closure/closure.hpp"
-#include "analysis/closure/predictive.hpp"
+#include "analysis/closure/report/predictive.hpp"
 
 namespace ringlock::report {
 

@@ -25,7 +25,37 @@ declare -A may=(
     [analysis/record]="analysis/allan analysis/noise engine/core engine/store"
     [analysis/instrument]="analysis/record engine/*"
     [analysis/study]="analysis/allan analysis/noise engine/*"
-    [analysis/closure]="analysis/instrument analysis/record analysis/noise analysis/allan engine/*"
+    # The closed loop has rooms of its own: its halves, turns and samples, never include each other.
+    [analysis/closure]="engine/core engine/effects analysis/record"
+    [analysis/closure/stats]="analysis/closure engine/core engine/simd"
+    [analysis/closure/decide]="analysis/closure analysis/closure/stats engine/core engine/effects"
+    [analysis/closure/turns/model]="analysis/closure analysis/closure/stats analysis/closure/decide analysis/record
+        engine/*"
+    [analysis/closure/turns/fit]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/turns/model analysis/record engine/*"
+    [analysis/closure/turns/screen]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/turns/model analysis/closure/turns/fit analysis/record engine/*"
+    [analysis/closure/turns/residual]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/turns/model analysis/closure/turns/fit analysis/record engine/*"
+    [analysis/closure/turns/loop]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/turns/* analysis/record engine/*"
+    [analysis/closure/samples/model]="analysis/closure analysis/closure/stats analysis/closure/decide analysis/record
+        engine/*"
+    [analysis/closure/samples/fit]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/samples/model analysis/record engine/*"
+    [analysis/closure/samples/screen]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/samples/model analysis/closure/samples/fit analysis/record engine/*"
+    [analysis/closure/samples/residual]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/samples/model analysis/closure/samples/fit analysis/record engine/*"
+    [analysis/closure/samples/rounded]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/samples/model analysis/closure/samples/fit analysis/record engine/*"
+    [analysis/closure/samples/loop]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/samples/* analysis/record engine/*"
+    [analysis/closure/loop]="analysis/closure analysis/closure/decide analysis/closure/turns/loop
+        analysis/closure/samples/loop analysis/record"
+    [analysis/closure/report]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/turns/model analysis/closure/samples/model analysis/instrument analysis/record
+        analysis/noise analysis/allan engine/*"
     [analysis/report]="analysis/* engine/*"
     [app]="analysis/* engine/*"
     [tests]="app analysis/* engine/*"
@@ -37,9 +67,12 @@ complain() {
     bad=$((bad + 1))
 }
 
-# The room of a path: two folders deep in engine and analysis, one elsewhere.
+# The room of a path: its folder in the closed loop, two folders deep elsewhere in engine and analysis, one in the rest.
 room_of() {
     case "$1" in
+        analysis/closure/*)
+            room="${1%/*}"
+            ;;
         engine/*/* | analysis/*/*)
             local rest="${1#*/}"
             room="${1%%/*}/${rest%%/*}"

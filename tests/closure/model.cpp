@@ -7,13 +7,13 @@
 #include <random>
 #include <string>
 
-#include "analysis/closure/chance.hpp"
-#include "analysis/closure/decision.hpp"
-#include "analysis/closure/miscounts.hpp"
-#include "analysis/closure/noise_shape.hpp"
-#include "analysis/closure/turn_fit.hpp"
-#include "analysis/closure/turn_kicks.hpp"
-#include "analysis/closure/whitening.hpp"
+#include "analysis/closure/decide/rows.hpp"
+#include "analysis/closure/stats/p_values.hpp"
+#include "analysis/closure/turns/fit/fit.hpp"
+#include "analysis/closure/turns/model/kicks.hpp"
+#include "analysis/closure/turns/model/noise_shape.hpp"
+#include "analysis/closure/turns/model/whitening.hpp"
+#include "analysis/closure/turns/screen/miscounts.hpp"
 #include "engine/core/units.hpp"
 #include "engine/gyro/device.hpp"
 #include "engine/gyro/theory.hpp"
@@ -419,7 +419,7 @@ TEST(MissedCounts, AreNotLostWhereTheNextTurnTakesThemBack) {
 
 TEST(HeldOutRows, AreATenthInFourBlocks) {
     for (const std::size_t size : {1600U, 16000U, 184718U}) {
-        const auto chooses = rows_that_choose(size);
+        const auto chooses = training_rows(size);
         ASSERT_EQ(chooses.size(), size);
         std::size_t reported = 0;
         std::size_t blocks = 0;

@@ -1,5 +1,5 @@
 // The predictive check: a model that has all makes such records, one that lacks something does not.
-#include "analysis/closure/predictive.hpp"
+#include "analysis/closure/report/predictive.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -11,7 +11,8 @@
 #include <string>
 
 #include "analysis/closure/closure.hpp"
-#include "analysis/closure/report.hpp"
+#include "analysis/closure/report/report.hpp"
+#include "analysis/closure/turns/loop/loop.hpp"
 #include "analysis/instrument/simulate.hpp"
 #include "analysis/report/closure_page.hpp"
 #include "engine/core/units.hpp"

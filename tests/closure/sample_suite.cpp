@@ -10,10 +10,11 @@
 #include <random>
 
 #include "analysis/closure/closure.hpp"
-#include "analysis/closure/sample_contest.hpp"
-#include "analysis/closure/sample_fit.hpp"
-#include "analysis/closure/sample_motion.hpp"
-#include "analysis/closure/sample_screen.hpp"
+#include "analysis/closure/samples/fit/fit.hpp"
+#include "analysis/closure/samples/fit/motion.hpp"
+#include "analysis/closure/samples/loop/contest.hpp"
+#include "analysis/closure/samples/loop/loop.hpp"
+#include "analysis/closure/samples/screen/screen.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
 #include "tests/closure/keys.hpp"

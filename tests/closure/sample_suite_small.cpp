@@ -10,11 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "analysis/closure/chance.hpp"
 #include "analysis/closure/closure.hpp"
-#include "analysis/closure/sample_filter.hpp"
-#include "analysis/closure/sample_fit.hpp"
-#include "analysis/closure/sample_line_search.hpp"
+#include "analysis/closure/samples/fit/fit.hpp"
+#include "analysis/closure/samples/fit/line_search.hpp"
+#include "analysis/closure/samples/loop/loop.hpp"
+#include "analysis/closure/samples/model/filter.hpp"
+#include "analysis/closure/stats/p_values.hpp"
 #include "tests/closure/sample_suite.hpp"
 
 namespace ringlock::test::closure {

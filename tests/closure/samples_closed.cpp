@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "analysis/closure/closure.hpp"
-#include "analysis/closure/sample_fit.hpp"
-#include "analysis/closure/sample_series.hpp"
+#include "analysis/closure/samples/fit/fit.hpp"
+#include "analysis/closure/samples/model/series.hpp"
 #include "analysis/record/record.hpp"
 #include "tests/closure/heldout.hpp"
 #include "tests/closure/samples.hpp"

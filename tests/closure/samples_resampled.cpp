@@ -8,7 +8,8 @@
 #include <string>
 
 #include "analysis/closure/closure.hpp"
-#include "analysis/closure/sample_source.hpp"
+#include "analysis/closure/samples/loop/loop.hpp"
+#include "analysis/closure/samples/model/source.hpp"
 #include "tests/closure/samples.hpp"
 
 namespace ringlock::test::closure {

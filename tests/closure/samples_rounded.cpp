@@ -9,9 +9,10 @@
 #include <vector>
 
 #include "analysis/closure/closure.hpp"
-#include "analysis/closure/sample_rounded_summit.hpp"
-#include "analysis/closure/sample_score.hpp"
-#include "analysis/closure/sample_unrounding.hpp"
+#include "analysis/closure/samples/fit/score.hpp"
+#include "analysis/closure/samples/loop/loop.hpp"
+#include "analysis/closure/samples/rounded/summit.hpp"
+#include "analysis/closure/samples/rounded/unrounding.hpp"
 #include "tests/closure/heldout.hpp"
 #include "tests/closure/samples.hpp"
 

@@ -13,7 +13,8 @@
 #include <string>
 #include <vector>
 
-#include "analysis/closure/decision.hpp"
+#include "analysis/closure/options.hpp"
+#include "analysis/closure/turns/loop/loop.hpp"
 #include "analysis/instrument/simulate.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
@@ -391,7 +392,7 @@ double gain_asked(const std::vector<std::string>& missing, double library) {
             return p.role != effects::Role::time && p.role != effects::Role::frequency;
         });
         const boost::math::chi_squared chi2(static_cast<double>(freedom));
-        const double level = ringlock::closure::level_of_effects / library;
+        const double level = ringlock::closure::options.level_of_effects / library;
         least = std::min(least, 0.5 * boost::math::quantile(boost::math::complement(chi2, level)));
     }
     return std::isfinite(least) ? least : none;

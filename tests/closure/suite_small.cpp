@@ -11,11 +11,11 @@
 #include <string>
 
 #include "analysis/closure/closure.hpp"
-#include "analysis/closure/decision.hpp"
-#include "analysis/closure/dither_shape.hpp"
-#include "analysis/closure/turn_contest.hpp"
-#include "analysis/closure/two_levels.hpp"
-#include "analysis/closure/two_states.hpp"
+#include "analysis/closure/options.hpp"
+#include "analysis/closure/stats/two_levels.hpp"
+#include "analysis/closure/stats/two_states.hpp"
+#include "analysis/closure/turns/loop/contest.hpp"
+#include "analysis/closure/turns/screen/dither_shape.hpp"
 #include "tests/closure/generator.hpp"
 #include "tests/closure/suite.hpp"
 
@@ -443,8 +443,8 @@ TEST(RandomRates, MayLookLikeARamp) {
             const double walk = std::max(0.0, (taken * squares - cost).maxCoeff());
             if (std::max(ramp, walk) < seen) continue;
             shown += 1.0;
-            by_four += ramp - walk > ringlock::closure::tie ? 1.0 : 0.0;
-            by_more += ramp - walk > ringlock::closure::tie_with_random ? 1.0 : 0.0;
+            by_four += ramp - walk > ringlock::closure::options.tie ? 1.0 : 0.0;
+            by_more += ramp - walk > ringlock::closure::options.tie_with_random ? 1.0 : 0.0;
         }
         EXPECT_LT(by_more / shown, ringlock::closure::level) << size;
         most_by_four = std::max(most_by_four, by_four / shown);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "analysis/closure/closure.hpp"
-#include "analysis/closure/report.hpp"
+#include "analysis/closure/report/report.hpp"
 #include "analysis/instrument/simulate.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"

@@ -1,5 +1,5 @@
 // Normal numbers between two bounds, against Boost.Math, on every instruction set.
-#include "analysis/closure/normals_between.hpp"
+#include "analysis/closure/stats/normals_between.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,28 @@
+#pragma once
+#include <initializer_list>
+
+#include "engine/effects/effect.hpp"
+
+/// How much evidence an effect of the library needs: its free parameters and the choice among all effects, by the roles
+/// that an effect gives its parameters.
+namespace ringlock::closure {
+
+/// Number of parameters of the effect with one of these roles.
+int count_of(const effects::Effect& effect, std::initializer_list<effects::Role> roles);
+
+/// Whether the effect is a random rate: such a process can follow, more or less, anything that the library lacks.
+bool is_random_rate(const effects::Effect& effect);
+
+/// Cost of choosing one more effect among all of the library [nats].
+double cost_of_choice();
+
+/// Significance level of each single effect when all of the library is tried.
+double level_of_one_effect();
+
+/// Whether so small a p-value is rare enough for one of all effects of the library.
+bool passes(double p_value);
+
+/// Probability of so large a gain of the log-likelihood by chance, with all free parameters of the effect.
+double p_of_gain(double gain, const effects::Effect& effect);
+
+}  // namespace ringlock::closure

@@ -1,0 +1,15 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "analysis/closure/closure.hpp"
+
+/// What is said of a closed model: the verdict, and what would resolve a tie.
+namespace ringlock::closure {
+
+/// What would tell two effects apart that this record cannot.
+std::string experiment_for(const std::string& effect, const std::vector<std::string>& others);
+
+Verdict verdict_of(const Closure& closure);
+
+}  // namespace ringlock::closure

@@ -1,0 +1,342 @@
+#include "analysis/closure/samples/fit/figures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "analysis/closure/options.hpp"
+#include "analysis/closure/samples/fit/lines.hpp"
+#include "analysis/closure/samples/fit/motion.hpp"
+#include "analysis/closure/samples/fit/repeats_and_witness.hpp"
+#include "analysis/closure/samples/fit/steps.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+/// Time of the middle of the record, on its clock.
+double middle_of(const SampleSeries& series) {
+    return series.time_s[0] - 0.5 * series.interval_s +
+           0.5 * static_cast<double>(series.size() - 1) * series.interval_s;
+}
+
+/// Frequency at which a declared dither, or a harmonic of it, is read as this line; the line's own where there is none.
+struct Unaliased {
+    double hz;
+    double drift_sign = 1.0;
+    double from_hz_times = 0.0;  ///< that the source's rate is in it
+};
+Unaliased unaliased(double hz, const SampleFit& fit, const record::Declared& declared) {
+    if (!declared.dither_frequency_hz) return {hz};
+    const double from_hz = fit.model().noise.from_hz;
+    for (int h = 1; h <= 3; ++h) {
+        const double of_dither = h * *declared.dither_frequency_hz;
+        const Alias shown = alias(of_dither, from_hz > 0.0 ? from_hz : fit.series().rate_hz);
+        if (std::abs(shown.hz - hz) >= options.samples.declared_dither_error * of_dither) continue;
+        const double sign = shown.folded ? -1.0 : 1.0;
+        return {of_dither + sign * (hz - shown.hz), sign, from_hz > 0.0 ? std::round(of_dither / from_hz) : 0.0};
+    }
+    return {hz};
+}
+
+void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared& declared, double from_hz_sd,
+               std::vector<Estimate>& all) {
+    const SampleSeries& series = fit.series();
+    const auto& columns = fit.model().columns;
+    const SampleColumn& column = columns[cosine];
+    const std::string& effect = column.effect;
+    const LineCourse& course = column.course;
+    const double a = column.value;
+    const double b = columns[cosine + 1].value;
+    const auto slopes = line_slopes(fit, course, a, b);
+    const Eigen::MatrixXd joint = fit.joint_covariance(slopes);
+    const auto of_a = static_cast<Eigen::Index>(cosine);
+    const auto of_hz = static_cast<Eigen::Index>(columns.size());
+    const double amplitude = std::max(std::hypot(a, b), 1e-300);
+    // Of the amplitude and of the phase in the middle, by a, b
+    const Eigen::Vector2d along(a / amplitude, b / amplitude);
+    const double amplitude_sd = std::sqrt(std::max(0.0, along.dot(joint.block<2, 2>(of_a, of_a) * along)));
+    const Unaliased real = unaliased(course.hz, fit, declared);
+    const double hz_sd = std::sqrt(std::max(0.0, joint(of_hz, of_hz)));
+    if (effect == "dither_residue") {
+        all.push_back({effect, "frequency_hz", real.hz, std::hypot(hz_sd, real.from_hz_times * from_hz_sd)});
+        if (course.free == 1) {
+            // It is held at zero; the error says what of it would not show.
+            LineCourse drifting = course;
+            drifting.free = 2;
+            const auto more = fit.joint_covariance(line_slopes(fit, drifting, a, b));
+            all.push_back({effect, drift_names[0], 0.0, std::sqrt(std::max(0.0, more(of_hz + 1, of_hz + 1)))});
+        }
+        for (std::size_t k = 1; k < course.free; ++k) {
+            const auto at = of_hz + static_cast<Eigen::Index>(k);
+            all.push_back({effect, drift_names[k - 1], real.drift_sign * course.coefficient(k),
+                           std::sqrt(std::max(0.0, joint(at, at)))});
+        }
+        const double gain = std::max(1e-9, 2.0 * std::abs(std::sin(units::pi * course.hz * series.interval_s)));
+        all.push_back({effect, "amplitude_arcsec", amplitude / gain, amplitude_sd / gain});
+        return;
+    }
+    all.push_back({effect, "frequency_hz", course.hz, hz_sd});
+    // Increments are those of a rate integrated over each interval.
+    const double gain = std::sin(units::pi * course.hz * series.interval_s) / (units::pi * course.hz);
+    all.push_back({effect, "rate_deg_h", amplitude / std::abs(gain), amplitude_sd / std::abs(gain)});
+    // a cos + b sin = A sin(phase + 2 pi f (t + middle)), t from the middle
+    const double middle_s = middle_of(series);
+    const double turns = course.hz * middle_s;
+    const double sign = std::copysign(1.0, gain);
+    const double phase = std::atan2(sign * a, sign * b) - units::two_pi * (turns - std::floor(turns));
+    Eigen::VectorXd by = Eigen::VectorXd::Zero(joint.rows());
+    by(of_a) = b / (amplitude * amplitude);
+    by(of_a + 1) = -a / (amplitude * amplitude);
+    by(of_hz) = -units::two_pi * middle_s;
+    all.push_back(
+        {effect, "phase_rad", std::remainder(phase, units::two_pi), std::sqrt(std::max(0.0, by.dot(joint * by)))});
+}
+
+/// Mean and standard deviation of the time of a step under its likelihood, which is no parabola.
+Estimate time_of_step(const SampleFit& fit, std::size_t at) {
+    const SampleSeries& series = fit.series();
+    const std::size_t n = series.size();
+    const SampleColumn& column = fit.model().columns[at];
+    const std::size_t row = row_of_step(column);
+    SampleModel model = fit.model();
+    model.columns.erase(model.columns.begin() + static_cast<std::ptrdiff_t>(at));
+    const SampleFit without(series, std::move(model), fit.rows(), SampleFit::Noise::held);
+    const auto chi2_at = [&](std::size_t place) { return std::pow(root_of_step(without, place), 2); };
+    const double top = chi2_at(row);
+    // So far to either side that the likelihood is gone, then evenly
+    std::size_t reach = 1;
+    while (reach < n / 4) {
+        const std::size_t before = row > reach ? row - reach : 1;
+        const std::size_t after = std::min(n - 2, row + reach);
+        if (top - chi2_at(before) > 25.0 && top - chi2_at(after) > 25.0) break;
+        reach *= 2;
+    }
+    const std::size_t step = std::max<std::size_t>(1, reach / 40);
+    double sum = 0.0;
+    double first = 0.0;
+    double second = 0.0;
+    for (std::size_t k = row > reach ? row - reach : 1; k <= std::min(n - 2, row + reach); k += step) {
+        const double weight = std::exp(0.5 * (chi2_at(k) - top));
+        const double time = series.time_s[k] - series.interval_s - series.time_s[row];
+        sum += weight;
+        first += weight * time;
+        second += weight * time * time;
+    }
+    const double mean = first / sum;
+    // Within a row nothing tells.
+    const double within = series.interval_s * static_cast<double>(step);
+    return {"bias_step", "time_s", series.time_s[row] + mean,
+            std::sqrt(std::max(0.0, second / sum - mean * mean) + within * within / 12.0)};
+}
+
+double of_readings_hz(const SampleFit& fit) {
+    return fit.model().noise.from_hz > 0.0 ? fit.model().noise.from_hz : fit.series().rate_hz;
+}
+
+/// Mean square of a resonance's angle between two frequencies, by the spectrum of the autoregression that it is.
+double power_between(const SampleNoise::Resonance& resonance, double from_hz, double to_hz, double rate_hz) {
+    constexpr int parts = 64;
+    const double r = std::exp(-units::pi * resonance.width_hz / rate_hz);
+    const double a = 2.0 * r * std::cos(units::two_pi * resonance.hz / rate_hz);
+    const double b = r * r;
+    const double driven = resonance.arcsec * resonance.arcsec * (1.0 - b) * ((1.0 + b) * (1.0 + b) - a * a) / (1.0 + b);
+    const double low = std::max(from_hz, 0.0);
+    const double width = (std::min(to_hz, 0.5 * rate_hz) - low) / parts;
+    double sum = 0.0;
+    for (int k = 0; k < parts; ++k) {
+        const double w = units::two_pi * (low + (k + 0.5) * width) / rate_hz;
+        const std::complex<double> z = std::polar(1.0, -w);
+        sum += 2.0 / rate_hz * driven / std::norm(1.0 - a * z + b * z * z) * width;
+    }
+    return sum;
+}
+
+/// What a witness does not tell of a motion, with the relative errors of their amplitudes.
+struct Untold {
+    std::vector<SampleNoise::Resonance> resonances;
+    std::vector<double> relative;
+};
+
+Untold untold_in(const SampleFit& fit, int step) {
+    const SampleModel errors = fit.noise_errors();
+    Untold untold;
+    for (std::size_t k = 0; k < fit.model().resonances.size(); ++k) {
+        if (fit.model().resonance_steps[k] != step) continue;
+        const SampleNoise::Resonance& resonance = fit.model().noise.resonances[k];
+        untold.resonances.push_back(resonance);
+        untold.relative.push_back(errors.noise.resonances[k].arcsec / std::max(resonance.arcsec, 1e-12));
+    }
+    return untold;
+}
+
+/// Weak motion is told by two numbers, a response of many lags would be mostly noise: the motion as a resonance of its
+/// own beside these.
+Untold untold_beside(const SampleFit& fit, const SampleFit& whole) {
+    SampleModel beside = whole.model();
+    beside.motion.assign(fit.series().size(), 0.0);
+    for (const SampleColumn& column : fit.model().columns) {
+        if (column.effect != "case_motion") continue;
+        for (std::size_t i = 0; i < beside.motion.size(); ++i) beside.motion[i] += column.value * (*column.series)[i];
+    }
+    const SampleFit left(fit.series(), std::move(beside), fit.rows(), SampleFit::Noise::near);
+    const SampleNoise::Resonance& resonance = left.model().noise.resonances.front();
+    const double sd = left.noise_errors().noise.resonances.front().arcsec;
+    return {{resonance}, {sd / std::max(resonance.arcsec, 1e-12)}};
+}
+
+/// The motion's angle as a resonance of its own, whatever the witness tells of it. Noises that stood in for it where it
+/// was taken out may go on to: those that were told beside it are tried as well.
+SampleFit motion_as_resonance(const SampleFit& fit, const SampleFit& bare, const WitnessMotion& told, int step) {
+    const double centre_hz = std::max(told.centre_hz, 0.01);
+    std::optional<SampleFit> best;
+    for (const SampleModel& from : {bare.model(), without_motion(fit.model())}) {
+        SampleModel with = bare.model();
+        with.noise = from.noise;
+        with.flicker_deg_h = from.flicker_deg_h;
+        with.motion_from_hz = slowest_of_motion * centre_hz;
+        with.resonances.insert(with.resonances.begin(), "case_motion");
+        with.resonance_steps.insert(with.resonance_steps.begin(), step);
+        with.noise.resonances.insert(with.noise.resonances.begin(),
+                                     {std::max(told.rms_arcsec, 1e-6), centre_hz, 0.5 * centre_hz});
+        SampleFit whole(fit.series(), std::move(with), fit.rows(), SampleFit::Noise::free);
+        if (!best || whole.log_likelihood() > best->log_likelihood()) best.emplace(std::move(whole));
+    }
+    return std::move(*best);
+}
+
+std::vector<Estimate> whites_of(const SampleNoise& noise, const SampleNoise& errors) {
+    const double to_deg = units::deg_rt_h_per_arcsec_rt_s;
+    return {{"", "white_angle_arcsec", noise.angle_arcsec, errors.angle_arcsec},
+            {"", "white_rate_deg_rt_h", noise.rate_arcsec_rt_s * to_deg, errors.rate_arcsec_rt_s * to_deg}};
+}
+
+/// What the motion is, and what its witness leaves of it.
+void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estimate>& all,
+                 std::vector<Estimate>& whites, std::vector<std::string>& notes) {
+    const SampleSeries& series = fit.series();
+    const auto& [name, witness] = series.witnesses[step.witness];
+    all.push_back({"case_motion", "witness", static_cast<double>(name.back() - 'x'), 0.0, name});
+    const SampleFit bare(series, without_motion(fit.model()), fit.rows(), SampleFit::Noise::near);
+    const WitnessMotion told = fit_witness(bare, witness);
+    const double centre = std::max(told.centre_hz, 0.01);
+    const SampleFit whole = motion_as_resonance(fit, bare, told, step.step);
+    const auto& motion = whole.model().noise.resonances.front();
+    const SampleNoise errors = whole.noise_errors().noise;
+    const SampleNoise::Resonance& error = errors.resonances.front();
+    const bool seen = whole.log_likelihood() - bare.log_likelihood() > 20.0;
+    // The witness's own noise comes in with what it tells of a strong motion, and is none of the gyro's. A motion that
+    // is no resonance leaves more beside it than there is.
+    if (seen && step.strong && whole.model().noise.angle_arcsec < fit.model().noise.angle_arcsec) {
+        whites = whites_of(whole.model().noise, errors);
+    }
+    double coherence = unknown;
+    double coherence_sd = unknown;
+    if (seen) {
+        // What is still needed beside what the witness tells, of the power where the motion is: elsewhere it is what
+        // the witness cannot tell.
+        const Untold untold = step.strong ? untold_in(fit, step.step) : untold_beside(fit, whole);
+        const auto power = [&](const SampleNoise::Resonance& of) {
+            return power_between(of, motion.hz - motion.width_hz, motion.hz + motion.width_hz, of_readings_hz(fit));
+        };
+        double squares = 0.0;
+        double squares_sd = 0.0;
+        for (std::size_t k = 0; k < untold.resonances.size(); ++k) {
+            const double part = power(untold.resonances[k]);
+            squares += part;
+            if (untold.relative[k] > 0.0) squares_sd += std::pow(2.0 * part * untold.relative[k], 2);
+        }
+        squares_sd = std::sqrt(squares_sd);
+        const double all_of_it = power(motion);
+        const double left = std::min(1.0, squares / all_of_it);
+        coherence = 1.0 - left;
+        const double relative = 0.5 * squares_sd / std::max(squares, 1e-300);
+        // Of n independent spectra: (1 - c) sqrt(2 c/n) (Bendat and Piersol 2010, table 9.6); of their power's
+        // logarithm the standard error is 1/sqrt(n).
+        coherence_sd = relative < 0.25 ? left * std::sqrt(8.0 * coherence) * relative : squares_sd / all_of_it;
+    } else {
+        notes.push_back(
+            "the motion is known by its witness alone: its own spectrum does not stand out from the noise, "
+            "so that coherence, rms, centre and width have no standard error");
+    }
+    all.push_back({"case_motion", "coherence", seen ? coherence : told.coherence, coherence_sd});
+    all.push_back({"case_motion", "rms_arcsec", seen ? motion.arcsec : told.rms_arcsec, seen ? error.arcsec : unknown});
+    all.push_back({"case_motion", "centre_hz", seen ? motion.hz : centre, seen ? error.hz : unknown});
+    all.push_back({"case_motion", "width_hz", seen ? motion.width_hz : 0.5 * centre, seen ? error.width_hz : unknown});
+}
+
+}  // namespace
+
+SampleFigures figures_of(const SampleFit& fit, const std::vector<SampleStep>& steps, const record::Declared& declared) {
+    const SampleModel& model = fit.model();
+    const SampleModel errors = fit.noise_errors();
+    SampleFigures figures;
+    // It is that at the temperature of the start.
+    double of_start = 0.0;
+    for (const SampleColumn& column : model.columns) {
+        if (column.effect == "bias_temperature") of_start = column.value * fit.series().temperature_start_sd_k;
+    }
+    figures.base.push_back({"", "mean_rate_deg_h", model.columns[0].value, std::hypot(model.columns[0].sd, of_start)});
+    std::vector<Estimate> whites = whites_of(model.noise, errors.noise);
+    for (const SampleStep& step : steps) {
+        auto& all = figures.steps.emplace_back();
+        const std::string& effect = step.effect;
+        if (effect == "case_motion") {
+            take_motion(fit, step, all, whites, figures.notes);
+            continue;
+        }
+        for (std::size_t k = 0; k < model.columns.size(); ++k) {
+            const SampleColumn& column = model.columns[k];
+            if (column.step != step.step || column.effect != effect || column.name == "sine") continue;
+            if (column.name == "cosine") {
+                take_line(fit, k, declared, errors.noise.from_hz, all);
+                continue;
+            }
+            all.push_back({effect, column.name, column.value, column.sd});
+            if (effect == "bias_step") all.push_back(time_of_step(fit, k));
+        }
+        if (effect == "rate_random_walk") {
+            // The walk goes by its variance; of a root the relative error is half.
+            const double root = std::sqrt(model.noise.walk_arcsec2_s3);
+            const double sd = errors.noise.walk_arcsec2_s3;
+            all.push_back({effect, "deg_h_rt_h", 60.0 * root, 60.0 * 0.5 * sd / std::max(root, 1e-300)});
+        }
+        if (effect == "bias_instability") all.push_back({effect, "deg_h", model.flicker_deg_h, errors.flicker_deg_h});
+        if (effect == "resampling") {
+            all.push_back(
+                {effect, "from_hz", model.noise.from_hz, step.other_hz.empty() ? errors.noise.from_hz : unknown});
+            for (const double hz : step.other_hz) {
+                figures.notes.push_back(fmt::format(
+                    "a source of {:.6g} Hz explains the record as well as {:.6g} Hz: from_hz has no standard error", hz,
+                    model.noise.from_hz));
+            }
+        }
+        for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+            if (model.resonance_steps[k] != step.step) continue;
+            // A line that wanders
+            const auto& line = model.noise.resonances[k];
+            const auto& sd = errors.noise.resonances[k];
+            const Unaliased real = unaliased(line.hz, fit, declared);
+            all.push_back(
+                {effect, "frequency_hz", real.hz, std::hypot(sd.hz, real.from_hz_times * errors.noise.from_hz)});
+            all.push_back(
+                {effect, "amplitude_arcsec", std::numbers::sqrt2 * line.arcsec, std::numbers::sqrt2 * sd.arcsec});
+            all.push_back({effect, "wander_hz", line.width_hz, sd.width_hz});
+            break;
+        }
+    }
+    figures.base.insert(figures.base.end(), whites.begin(), whites.end());
+    return figures;
+}
+
+}  // namespace ringlock::closure

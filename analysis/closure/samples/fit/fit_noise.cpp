@@ -1,0 +1,560 @@
+// The random part of the fit, by the likelihood of what the columns leave.
+#include <oneapi/tbb/parallel_for.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include "analysis/closure/samples/fit/fit.hpp"
+#include "analysis/closure/samples/model/lanes.hpp"
+#include "analysis/closure/stats/column_regression.hpp"
+#include "engine/core/interrupt.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+using Point = std::vector<double>;
+/// Of several points at once, in much less time than one after the other.
+using Values = std::function<std::vector<double>(const std::vector<Point>&)>;
+
+/// Nelder and Mead (Computer Journal 7, 308, 1965): smallest value of a function of a few numbers. All places that a
+/// step may go to are looked at together.
+Point smallest(const Values& f, const Point& start, double size, int steps) {
+    const std::size_t n = start.size();
+    std::vector<Point> places(n + 1, start);
+    for (std::size_t i = 0; i < n; ++i) places[i + 1][i] += size;
+    std::vector<double> values = f(places);
+    std::vector<std::pair<double, Point>> corners;
+    for (std::size_t c = 0; c <= n; ++c) corners.emplace_back(values[c], places[c]);
+    const auto lower = [](const auto& a, const auto& b) { return a.first < b.first; };
+    for (; steps > 0; --steps) {
+        std::sort(corners.begin(), corners.end(), lower);
+        const double best = corners.front().first;
+        auto& worst = corners.back();
+        if (worst.first - best < 0.01) break;
+        Point centre(n, 0.0);
+        for (std::size_t c = 0; c < n; ++c) {
+            for (std::size_t i = 0; i < n; ++i) centre[i] += corners[c].second[i] / static_cast<double>(n);
+        }
+        places.assign(4, centre);
+        constexpr double reflected = -1.0;
+        constexpr double expanded = -2.0;
+        constexpr double outside = -0.5;
+        constexpr double inside = 0.5;
+        const double along[] = {reflected, expanded, outside, inside};
+        for (std::size_t k = 0; k < places.size(); ++k) {
+            for (std::size_t i = 0; i < n; ++i) places[k][i] += along[k] * (worst.second[i] - centre[i]);
+        }
+        values = f(places);
+        std::size_t taken = 0;
+        if (values[0] < best) {
+            taken = values[1] < values[0] ? 1 : 0;
+        } else if (!(values[0] < corners[n - 1].first)) {
+            taken = values[0] < worst.first ? 2 : 3;
+            if (!(values[taken] < std::min(values[0], worst.first))) {
+                places.clear();
+                for (std::size_t c = 1; c <= n; ++c) {
+                    Point& place = places.emplace_back(corners[c].second);
+                    for (std::size_t i = 0; i < n; ++i) place[i] = 0.5 * (place[i] + corners.front().second[i]);
+                }
+                values = f(places);
+                for (std::size_t c = 1; c <= n; ++c) corners[c] = {values[c - 1], places[c - 1]};
+                continue;
+            }
+        }
+        worst = {values[taken], places[taken]};
+    }
+    return std::min_element(corners.begin(), corners.end(), lower)->second;
+}
+
+struct Free {
+    double* value;
+    bool logarithmic;
+    double scale = 1.0;      ///< of its steps
+    bool of_source = false;  ///< of a resampled record
+    bool of_clock = false;   ///< when that source takes its samples
+};
+
+constexpr std::size_t whites = 2;  // the first of the knobs
+constexpr double nothing = 1e-4;   // of white noises, beside the other
+
+std::vector<Free> knobs(SampleModel& model) {
+    std::vector<Free> all{{&model.noise.angle_arcsec, true}, {&model.noise.rate_arcsec_rt_s, true}};
+    if (model.walk) all.push_back({&model.noise.walk_arcsec2_s3, true});
+    if (model.flicker) all.push_back({&model.flicker_deg_h, true});
+    for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+        auto& resonance = model.noise.resonances[k];
+        all.push_back({&resonance.arcsec, true});
+        // A wandering line is narrow: its frequency is known to its width.
+        all.push_back({&resonance.hz, true, std::min(1.0, resonance.width_hz / resonance.hz)});
+        all.push_back({&resonance.width_hz, true});
+    }
+    if (model.noise.swing_hz > 0.0) {
+        all.push_back({&model.noise.swing_cos, false});
+        all.push_back({&model.noise.swing_sin, false});
+    }
+    if (model.noise.from_hz > 0.0) {
+        all.push_back({&model.noise.from_phase, false, 1.0, true, true});
+        all.push_back({&model.from_shift, false, 1.0, true, true});
+        all.push_back({&model.noise.blur_arcsec, true, 1.0, true});
+    }
+    return all;
+}
+
+std::vector<double> places_of(SampleModel model) {
+    std::vector<double> places;
+    for (const Free& knob : knobs(model))
+        places.push_back(knob.logarithmic ? std::log(std::max(*knob.value, 1e-300)) / knob.scale : *knob.value);
+    return places;
+}
+
+/// What is not told at all must not spoil what is.
+Eigen::MatrixXd inverse_of_information(const Eigen::MatrixXd& information) {
+    const Eigen::VectorXd over = information.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
+    Eigen::MatrixXd scaled = over.asDiagonal() * information * over.asDiagonal();
+    scaled.diagonal().array() += 1e-9;
+    const Eigen::MatrixXd inverse = scaled.ldlt().solve(Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols()));
+    return over.asDiagonal() * inverse * over.asDiagonal();
+}
+
+}  // namespace
+
+std::vector<SampleNoise::Term> flicker_terms(double deg_h, double shortest_s, double longest_s) {
+    // B^2/(2 pi f) by Markov rates: each of the variance (B^2/pi) ln(ratio), the integral of the density over the band
+    // that it stands for, doubled for both signs. The slowest is as good as constant over the record.
+    constexpr int most = 8;
+    const double last_s = std::sqrt(10.0) * longest_s;
+    const double ratio = std::max(std::sqrt(10.0), std::pow(last_s / shortest_s, 1.0 / (most - 1)));
+    std::vector<SampleNoise::Term> terms;
+    for (double t = shortest_s; t < 1.001 * last_s && terms.size() < most; t *= ratio) {
+        terms.push_back({t, deg_h * deg_h / units::pi * std::log(ratio)});
+    }
+    return terms;
+}
+
+/// The white noises by the variance of the rest and the covariance of neighbours, as if there were no others.
+void SampleFit::take_whites(SampleNoise& noise) const {
+    const Rows& rows = *rows_;
+    double sum = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 0; i < rest_.size(); ++i) {
+        if (!rows[i]) continue;
+        sum += rest_[i];
+        count += 1.0;
+    }
+    const double mean = sum / std::max(count, 1.0);
+    double white = 0.0;
+    double next = 0.0;
+    double pairs = 0.0;
+    for (std::size_t i = 1; i < rest_.size(); ++i) {
+        if (!rows[i - 1] || !rows[i]) continue;
+        white += (rest_[i] - mean) * (rest_[i] - mean);
+        next += (rest_[i - 1] - mean) * (rest_[i] - mean);
+        pairs += 1.0;
+    }
+    white /= std::max(pairs, 1.0);
+    const double angle = std::clamp(-next / std::max(pairs, 1.0), 1e-3 * white, 0.499 * white);
+    noise.angle_arcsec = std::sqrt(angle);
+    noise.rate_arcsec_rt_s = std::sqrt((white - 2.0 * angle) * series_->rate_hz);
+}
+
+std::vector<double> SampleFit::evaluate(const std::vector<SampleModel>& models, std::span<const double> rest,
+                                        const Rows& rows) const {
+    check_interrupt();
+    std::vector<SampleNoise> noises;
+    for (const SampleModel& model : models) noises.push_back(model.noise);
+    auto values = SampleFilter::minus_log_likelihoods(noises, series_->interval_s, rest, rows);
+    for (double& value : values) value = std::isfinite(value) ? value : 1e300;
+    return values;
+}
+
+/// The model with its knobs at these places.
+SampleModel SampleFit::at(const std::vector<double>& x) const {
+    const double duration_s = series_->interval_s * static_cast<double>(series_->size());
+    SampleModel model = model_;
+    auto free = knobs(model);
+    for (std::size_t i = 0; i < free.size(); ++i)
+        *free[i].value = free[i].logarithmic ? std::exp(x[i] * free[i].scale) : x[i];
+    for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+        auto& resonance = model.noise.resonances[k];
+        const double rate_hz = model.noise.from_hz > 0.0 ? model.noise.from_hz : series_->rate_hz;
+        if (resonance.hz > 0.5 * rate_hz || resonance.width_hz > 3.0 * rate_hz) resonance.arcsec = 0.0;
+        const bool slow = std::hypot(resonance.hz, 0.5 * resonance.width_hz) < model.motion_from_hz;
+        if (slow && model.resonances[k] == "case_motion") resonance.arcsec = 0.0;
+    }
+    if (model.noise.from_hz > 0.0) {
+        // About the middle of the record, so that rate and place are told apart.
+        const double shift_hz = 0.1 * model.from_shift / duration_s;
+        model.noise.from_hz += shift_hz;
+        model.noise.from_phase -= 0.5 * shift_hz * duration_s;
+        model.noise.from_phase -= std::floor(model.noise.from_phase);
+        model.from_shift = 0.0;
+    }
+    if (model.flicker) model.noise.terms = flicker_terms(model.flicker_deg_h, 4.0 * series_->interval_s, duration_s);
+    return model;
+}
+
+/// The values of columns are fitted anew for each place of the clock: what it moves is freed of what these can take of
+/// it (Golub and Pereyra, SIAM Journal on Numerical Analysis 10, 413, 1973; Kaufman, BIT 15, 49, 1975).
+SampleFit::ByClock SampleFit::by_clock(const std::vector<double>& x, const Rows& rows,
+                                       const std::vector<bool>& held) const {
+    constexpr double step = 1e-4;
+    ByClock by;
+    by.moved.resize(x.size());
+    SampleModel own = model_;
+    const auto all = knobs(own);
+    std::vector<std::size_t> free;
+    for (std::size_t j = 0; j < all.size(); ++j) {
+        if (all[j].of_clock && (held.empty() || !held[j])) free.push_back(j);
+    }
+    if (free.empty()) {
+        by.rest = rest_;
+        return by;
+    }
+    SampleModel model = at(x);
+    const SampleFilter filter(model.noise, rest_.size(), series_->interval_s);
+    const std::vector<Shared> taken = taken_by(model);
+    std::vector<std::vector<double>> whitened;
+    for (const Shared& column : taken) whitened.push_back(filter.apply(*column));
+    const ColumnRegression regression(whitened, rows);
+    by.rest = rest_of(model);
+    const Eigen::VectorXd correction = regression.of(filter.apply(by.rest));
+    for (std::size_t k = 0; k < taken.size(); ++k) {
+        const double more = correction(static_cast<Eigen::Index>(k));
+        model.columns[k].value += more;
+        for (std::size_t i = 0; i < by.rest.size(); ++i) by.rest[i] -= more * (*taken[k])[i];
+    }
+    for (const std::size_t j : free) {
+        auto beside = x;
+        beside[j] += step;
+        const SampleNoise there = at(beside).noise;
+        SampleModel moved = model;
+        moved.noise.from_hz = there.from_hz;
+        moved.noise.from_phase = there.from_phase;
+        std::vector<double> change = rest_of(moved);
+        for (std::size_t i = 0; i < change.size(); ++i) change[i] = (change[i] - by.rest[i]) / step;
+        by.moved[j] = regression.freed(filter.apply(change));
+    }
+    return by;
+}
+
+/// Minus the log-likelihood, columns fitted anew where the record was resampled.
+double SampleFit::value_at(const std::vector<double>& x, const Rows& rows) const {
+    return evaluate({at(x)}, by_clock(x, rows, {}).rest, rows).front();
+}
+
+/// Of the likelihood, with Fisher's information: sum over the rows of (dS/S)(dS/S)'/2 + (dr)(dr)'/S, r the innovations
+/// and S their variances (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter", 1989, section
+/// 3.4.5).
+SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows, const std::vector<bool>& held) const {
+    constexpr double step = 1e-4;
+    const std::size_t n = rest_.size();
+    const auto m = static_cast<Eigen::Index>(x.size());
+    Slope slope;
+    slope.gradient = Eigen::VectorXd::Zero(m);
+    slope.information = Eigen::MatrixXd::Zero(m, m);
+    const ByClock by = by_clock(x, rows, held);
+    const SampleStates here(at(x).noise, series_->interval_s);
+    std::vector<std::size_t> moves;
+    std::vector<SampleStates> moved_there;
+    for (std::size_t j = 0; j < x.size(); ++j) {
+        if (!held.empty() && held[j]) continue;
+        auto beside = x;
+        beside[j] += step;
+        SampleStates there(at(beside).noise, series_->interval_s);
+        if (!there.is_like(here)) continue;  // beyond the end of its range
+        moves.push_back(j);
+        moved_there.push_back(there);
+    }
+    // d log(sd) and d(innovation) of each knob
+    std::vector<std::vector<float>> log_sd(x.size(), std::vector<float>(n, 0.0F));
+    std::vector<std::vector<float>> moved(x.size(), std::vector<float>(n, 0.0F));
+    const auto parts = std::max<std::size_t>(1, (moves.size() + most_lanes - 2) / (most_lanes - 1));
+    oneapi::tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t part) {
+        check_interrupt();
+        const std::size_t first = part * (most_lanes - 1);
+        const std::size_t some = std::min(most_lanes - 1, moves.size() - first);
+        std::vector<SampleStates> lanes{here};
+        for (std::size_t k = 0; k < some; ++k) lanes.push_back(moved_there[first + k]);
+        std::array<double, most_lanes> gradient{};
+        double value = 0.0;
+        filter_lanes(lanes, by.rest, [&](std::size_t i, const double* e, const double* variances) {
+            if (!rows[i]) return;
+            const double sd = std::sqrt(variances[0]);
+            const double white = e[0] / sd;
+            value += 0.5 * white * white + std::log(sd);
+            for (std::size_t k = 0; k < some; ++k) {
+                const double sd_there = std::sqrt(variances[k + 1]);
+                const double of_log = std::log1p((sd_there - sd) / sd) / step;
+                const auto& moves_rest = by.moved[moves[first + k]];
+                const double of_rest = moves_rest.empty() ? 0.0 : moves_rest[i];
+                const double of_e = (e[k + 1] / sd_there - white) / step + of_rest;
+                gradient[k] += white * of_e + of_log;
+                log_sd[moves[first + k]][i] = static_cast<float>(of_log);
+                moved[moves[first + k]][i] = static_cast<float>(of_e + white * of_log);
+            }
+        });
+        if (part == 0) slope.value = value;
+        for (std::size_t k = 0; k < some; ++k) {
+            slope.gradient(static_cast<Eigen::Index>(moves[first + k])) = gradient[k];
+        }
+    });
+    for (Eigen::Index a = 0; a < m; ++a) {
+        for (Eigen::Index b = 0; b <= a; ++b) {
+            const auto& la = log_sd[static_cast<std::size_t>(a)];
+            const auto& lb = log_sd[static_cast<std::size_t>(b)];
+            const auto& ma = moved[static_cast<std::size_t>(a)];
+            const auto& mb = moved[static_cast<std::size_t>(b)];
+            double sum = 0.0;
+            for (std::size_t i = 0; i < n; ++i) {
+                sum += 2.0 * static_cast<double>(la[i]) * static_cast<double>(lb[i]) +
+                       static_cast<double>(ma[i]) * static_cast<double>(mb[i]);
+            }
+            slope.information(a, b) = slope.information(b, a) = sum;
+        }
+    }
+    return slope;
+}
+
+/// Fisher's scoring, damped (Levenberg and Marquardt): steps by the information where the likelihood rises.
+void SampleFit::score_noise(std::vector<double>& x, const Rows& rows, const std::vector<bool>& held) const {
+    constexpr int most_rounds = 25;
+    constexpr double longest = 1.5;
+    constexpr double enough = 2e-3;  // of the log-likelihood
+    double damping = 1e-3;
+    Slope now = slope(x, rows, held);
+    for (int round = 0; round < most_rounds && damping < 1e7; ++round) {
+        bool better = false;
+        double gained = 0.0;
+        while (!better && damping < 1e7) {
+            Eigen::MatrixXd damped = now.information;
+            damped.diagonal() *= 1.0 + damping;
+            damped.diagonal().array() += 1e-6;
+            Eigen::VectorXd step = damped.ldlt().solve(-now.gradient);
+            if (!step.allFinite()) break;
+            const double most = step.cwiseAbs().maxCoeff();
+            if (most > longest) step *= longest / most;
+            if (-now.gradient.dot(step) < enough) return;
+            auto next = x;
+            for (std::size_t i = 0; i < x.size(); ++i) next[i] += step(static_cast<Eigen::Index>(i));
+            // Most steps are taken, and the next begins with the slope there.
+            Slope there = slope(next, rows, held);
+            if (there.value < now.value) {
+                better = true;
+                gained = now.value - there.value;
+                x = std::move(next);
+                now = std::move(there);
+                damping = std::max(1e-6, 0.1 * damping);
+            } else {
+                damping *= 10.0;
+            }
+        }
+        if (!better || gained < enough) return;
+    }
+}
+
+/// The white noises by the differences of neighbours, of whose variance the readings' errors have that share.
+void SampleFit::share_whites(SampleNoise& noise, double share) const {
+    double squares = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 1; i < rest_.size(); ++i) {
+        if (!(*rows_)[i - 1] || !(*rows_)[i]) continue;
+        squares += std::pow(rest_[i] - rest_[i - 1], 2);
+        count += 1.0;
+    }
+    squares /= std::max(count, 1.0);
+    noise.angle_arcsec = std::sqrt(share * squares / 6.0);
+    noise.rate_arcsec_rt_s = std::sqrt((1.0 - share) * squares / (2.0 * series_->interval_s));
+}
+
+/// Whether one of the white noises is nothing beside the other.
+bool SampleFit::gone(const SampleNoise& noise) const {
+    const double root_s = std::sqrt(series_->interval_s);
+    const double scale = std::hypot(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s);
+    return std::min(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s) < nothing * scale;
+}
+
+/// White noises that stand at zero, made small: from nothing they could not grow, and it would tell nothing of them.
+void SampleFit::raise_whites(SampleNoise& noise) const {
+    constexpr double small = 1e-2;
+    const double root_s = std::sqrt(series_->interval_s);
+    const double scale = std::hypot(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s);
+    if (noise.angle_arcsec < nothing * scale) noise.angle_arcsec = small * scale;
+    if (noise.rate_arcsec_rt_s * root_s < nothing * scale) noise.rate_arcsec_rt_s = small * scale / root_s;
+}
+
+/// The knobs for the places of resonances that one point has and the other has not.
+std::vector<bool> SampleFit::places_of_lost(const std::vector<double>& before, const std::vector<double>& after) const {
+    SampleModel own = model_;
+    const auto all = knobs(own);
+    const SampleModel had = at(before);
+    const SampleModel has = at(after);
+    std::vector<bool> lost(all.size(), false);
+    for (std::size_t k = 0; k < own.noise.resonances.size(); ++k) {
+        if (!(had.noise.resonances[k].arcsec > 0.0) || has.noise.resonances[k].arcsec > 0.0) continue;
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            const auto& resonance = own.noise.resonances[k];
+            lost[i] = lost[i] || all[i].value == &resonance.hz || all[i].value == &resonance.width_hz;
+        }
+    }
+    return lost;
+}
+
+void SampleFit::fit_noise() {
+    const bool had_both = !gone(model_.noise);
+    raise_whites(model_.noise);
+    // So does a part of what a witness leaves of a motion: a line beside it may have had no use for it.
+    auto& resonances = model_.noise.resonances;
+    for (std::size_t k = 1; k < resonances.size(); ++k) {
+        const bool of_one_motion = model_.resonances[k] == "case_motion" && model_.resonances[k - 1] == "case_motion";
+        if (of_one_motion && resonances[k].arcsec < 1e-2 * resonances[k - 1].arcsec) {
+            resonances[k] = resonances[k - 1];
+            resonances[k].arcsec *= 0.3;
+            resonances[k].width_hz *= 3.0;
+        }
+    }
+    std::vector<double> start = places_of(model_);
+    const std::size_t n = rest_.size();
+    const bool resampled = model_.noise.from_hz > 0.0;
+    const bool narrow = !model_.resonances.empty();
+    if (!resampled) {
+        // What has just come into the model may have been most of the noise: far from there the likelihood is flat.
+        SampleModel anew = model_;
+        take_whites(anew.noise);
+        double least = evaluate({at(start)}, rest_, *rows_).front();
+        const auto try_from = [&](const SampleModel& model) {
+            auto other = places_of(model);
+            const double value = evaluate({at(other)}, rest_, *rows_).front();
+            if (!(value < least)) return;
+            least = value;
+            start = std::move(other);
+        };
+        try_from(anew);
+        // Beside a rate that wanders neighbours are alike, and hide what is white: their differences show it.
+        for (const double share : {0.05, 0.5, 0.95}) {
+            if (!model_.walk && !model_.flicker) break;
+            share_whites(anew.noise, share);
+            try_from(anew);
+        }
+    }
+    std::vector<double> as_it_was = start;
+    if (!searched_ && (resampled || narrow)) {
+        // The likelihood may have several tops: by a simplex on a part of the record first, from where it stopped until
+        // that gains nothing, for it may have fallen flat. Of a source by where it takes its samples and what is white;
+        // the rest is as it was without it.
+        const std::size_t part = std::min<std::size_t>(n, resampled ? 15000 : 20000);
+        std::vector<std::size_t> turned;
+        const std::vector<Free> own = knobs(model_);
+        for (std::size_t i = 0; i < own.size(); ++i) {
+            if (!resampled || own[i].of_source || i < whites) turned.push_back(i);
+        }
+        const auto with = [&](const Point& some) {
+            Point all = start;
+            for (std::size_t k = 0; k < turned.size(); ++k) all[turned[k]] = some[k];
+            return all;
+        };
+        const auto on_part = [&](const std::vector<Point>& points) {
+            std::vector<SampleModel> models;
+            for (const Point& some : points) models.push_back(at(with(some)));
+            return evaluate(models, std::span<const double>(rest_.data(), part), *rows_);
+        };
+        Point some;
+        for (const std::size_t i : turned) some.push_back(start[i]);
+        const int steps = 18 * static_cast<int>(some.size());
+        double value = on_part({some}).front();
+        for (int i = 0; i < 3; ++i) {
+            some = smallest(on_part, some, 0.3, steps);
+            const double now = on_part({some}).front();
+            if (value - now < 0.5) break;
+            value = now;
+        }
+        start = with(some);
+    }
+    score_noise(start, *rows_, {});
+    if (!resampled && had_both && gone(at(start).noise)) {
+        // Where one of the white noises goes to nothing, there may be another top with both.
+        SampleModel both = at(start);
+        share_whites(both.noise, 0.5);
+        auto other = places_of(both);
+        score_noise(other, *rows_, {});
+        const auto values = evaluate({at(start), at(other)}, rest_, *rows_);
+        if (values[1] < values[0]) start = std::move(other);
+    }
+    // A resonance that goes beyond the end of its range does not come back.
+    const std::vector<bool> lost = places_of_lost(as_it_was, start);
+    if (std::find(lost.begin(), lost.end(), true) != lost.end()) {
+        score_noise(as_it_was, *rows_, lost);
+        if (value_at(as_it_was, *rows_) < value_at(start, *rows_)) start = std::move(as_it_was);
+    }
+    if (resampled) {
+        // Rows that are settled to their digits say how exactly the source's times are known, so well that numbers are
+        // rounded there by more than the noise tells elsewhere.
+        model_ = at(start);
+        filter_by(model_.noise);
+        fit_columns();
+        start = places_of(model_);
+        std::vector<bool> held;
+        for (const Free& knob : knobs(model_)) held.push_back(knob.of_source);
+        auto told = start;
+        score_noise(told, telling_, held);
+        const auto values = evaluate({at(told), at(start)}, rest_, *rows_);
+        if (values[0] < values[1]) start = std::move(told);
+    }
+    model_ = at(start);
+    filter_by(model_.noise);
+}
+
+SampleModel SampleFit::noise_errors() const {
+    SampleModel errors = model_;
+    SampleModel values = model_;
+    raise_whites(values.noise);
+    const std::vector<double> x = places_of(values);
+    const auto own = knobs(values);
+    Eigen::MatrixXd information = slope(x, telling_, {}).information;
+    if (model_.noise.from_hz > 0.0) {
+        // The source's times, and how far readings are off its lines, are told by the rows that tell nothing else. How
+        // far they are off goes with their errors.
+        const Eigen::MatrixXd by_all = slope(x, *rows_, {}).information;
+        for (std::size_t a = 0; a < x.size(); ++a) {
+            for (std::size_t b = 0; b < x.size(); ++b) {
+                const auto i = static_cast<Eigen::Index>(a);
+                const auto j = static_cast<Eigen::Index>(b);
+                if (own[a].of_clock != own[b].of_clock) information(i, j) = 0.0;
+                if (own[a].of_source && own[b].of_source) information(i, j) = by_all(i, j);
+            }
+        }
+    }
+    Eigen::MatrixXd covariance = inverse_of_information(information);
+    for (std::size_t a = 0; a < x.size(); ++a) {
+        // What stands at zero, its lower bound, moves no other.
+        constexpr double at_zero = 1.5;  // standard error of the logarithm
+        const auto i = static_cast<Eigen::Index>(a);
+        if (own[a].of_clock || !own[a].of_source || !(std::sqrt(covariance(i, i)) > at_zero)) continue;
+        const double own_information = information(i, i);
+        information.row(i).setZero();
+        information.col(i).setZero();
+        information(i, i) = own_information;
+        covariance = inverse_of_information(information);
+    }
+    const auto slots = knobs(errors);
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+        const auto k = static_cast<Eigen::Index>(i);
+        double sd = std::sqrt(std::max(0.0, covariance(k, k)));
+        if (own[i].logarithmic) {
+            sd *= own[i].scale * *own[i].value;
+            // Near zero it is the square that the record knows, to 2 value sd.
+            if (sd > *own[i].value) sd = std::sqrt(2.0 * *own[i].value * sd);
+        }
+        *slots[i].value = sd;
+    }
+    const double duration_s = series_->interval_s * static_cast<double>(series_->size());
+    if (model_.noise.from_hz > 0.0) errors.noise.from_hz = 0.1 * errors.from_shift / duration_s;
+    return errors;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,164 @@
+#include "analysis/closure/samples/fit/lines.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// A step of the coefficients no longer than where the next is surely better told.
+void step_course(LineCourse& course, const Eigen::VectorXd& off, double duration_s) {
+    if (course.free <= 2) {
+        const double most = 2.0 / (duration_s * duration_s);
+        course.hz += std::clamp(off[0], -0.3 / duration_s, 0.3 / duration_s);
+        if (course.free == 2) course.drifts[0] += std::clamp(off[1], -most, most);
+        return;
+    }
+    // Coefficients of a polynomial make up for each other: all go together.
+    constexpr double most_cycles = 0.3;
+    constexpr int places = 64;
+    double share = 1.0;
+    LineCourse step;
+    for (std::size_t k = 0; k < course.free; ++k) step.coefficient(k) = off[static_cast<Eigen::Index>(k)];
+    for (int i = -places; i <= places; ++i) {
+        const double turns = std::abs(step.turns(0.5 * duration_s * i / places));
+        if (share * turns > most_cycles) share = most_cycles / turns;
+    }
+    for (std::size_t k = 0; k < course.free; ++k) course.coefficient(k) += share * step.coefficient(k);
+}
+
+SampleLine refined_from(const SampleFit& fit, SampleLine line) {
+    const double duration_s = static_cast<double>(fit.series().size()) * fit.series().interval_s;
+    const int most = line.course.free > 2 ? 20 : 6;
+    for (int round = 0; round < most; ++round) {
+        auto columns = fit.line(line.course);
+        const auto score = fit.score(columns);
+        if (score.rank < 2) return line;
+        line.chi2 = score.chi2;
+        for (auto& slope : line_slopes(fit, line.course, score.value[0], score.value[1])) {
+            columns.push_back(std::move(slope));
+        }
+        const auto all = fit.score(columns);
+        SampleLine next = line;
+        step_course(next.course, Eigen::VectorXd::Map(&all.value[2], static_cast<Eigen::Index>(line.course.free)),
+                    duration_s);
+        next.chi2 = fit.score(fit.line(next.course)).chi2;
+        if (!(next.chi2 > line.chi2)) break;
+        const double gained = next.chi2 - line.chi2;
+        line = next;
+        if (gained < 1e-3) break;
+    }
+    return line;
+}
+
+}  // namespace
+
+bool is_line(const std::string& effect) { return effect == "dither_residue" || effect == "base_vibration"; }
+
+std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const LineCourse& course, double a, double b) {
+    const double duration_s = static_cast<double>(fit.series().size()) * fit.series().interval_s;
+    // So small a part of a cycle at either end of the record that the next term does not matter.
+    constexpr double part = 1e-4;
+    std::vector<std::vector<double>> slopes;
+    for (std::size_t k = 0; k < course.free; ++k) {
+        const double off = part * LineCourse::a_cycle(k, duration_s);
+        LineCourse beside = course;
+        beside.coefficient(k) += off;
+        const auto more = fit.line(beside);
+        beside.coefficient(k) -= 2.0 * off;
+        const auto less = fit.line(beside);
+        std::vector<double>& slope = slopes.emplace_back(more[0].size());
+        for (std::size_t i = 0; i < slope.size(); ++i) {
+            slope[i] = 0.5 / off * (a * (more[0][i] - less[0][i]) + b * (more[1][i] - less[1][i]));
+        }
+    }
+    return slopes;
+}
+
+void set_line(SampleModel& model, std::size_t cosine, const SampleSeries& series, const LineCourse& course) {
+    auto columns = line_columns(series.size(), series.rate_hz, course);
+    for (std::size_t k = 0; k < 2; ++k) {
+        model.columns[cosine + k].series = std::make_shared<const std::vector<double>>(std::move(columns[k]));
+        model.columns[cosine + k].course = course;
+    }
+}
+
+SampleLine refine_line(const SampleFit& fit, const LineCourse& shown) {
+    SampleLine best{shown, -1.0};
+    for (const Alias& of : of_source(shown.hz, fit.series().rate_hz, fit.model().noise.from_hz)) {
+        const SampleLine line = refined_from(fit, {shown.shown_at(of.hz, of.folded)});
+        if (line.chi2 > best.chi2) best = line;
+    }
+    return best;
+}
+
+bool scatters(const SampleFit& fit, std::vector<double> innovations, const FoundLines& found, const SampleLine& line) {
+    constexpr double near_hz = 1.0;
+    if (!(found.scattered > line.chi2 + much_scattered)) return false;
+    // A strong line raises the level about it, which powers are over, and hides others near it: what is left of it is a
+    // good part of its own power, over the level as well.
+    const auto columns = fit.line(line.course);
+    const auto score = fit.score(columns);
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+        const auto white = fit.filter().apply(columns[c]);
+        for (std::size_t i = 0; i < white.size(); ++i) {
+            if (innovations[i] != 0.0) innovations[i] -= score.value[c] * white[i];
+        }
+    }
+    const FoundLines left = find_lines(innovations, fit.series().rate_hz);
+    const bool same = std::abs(left.scattered_hz - found.scattered_hz) < near_hz;
+    return same && left.scattered > found.scattered / 3.0 + much_scattered &&
+           left.scattered_squares > found.scattered_squares / 3.0;
+}
+
+SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, const Rows& rows,
+                                const std::string& effect, int step) {
+    const SampleSeries& series = fit.series();
+    double squares = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (!rows[i]) continue;
+        squares += fit.innovations()[i] * fit.innovations()[i];
+        count += 1.0;
+    }
+    // Power over the level is chi-squared of two a piece; the angle's increments have 2 sin of it.
+    const double sd = fit.sd(0) * std::sqrt(squares / count);
+    const double gain = 2.0 * std::sin(units::pi * found.scattered_hz / series.rate_hz);
+    const double rms = sd * std::sqrt(found.scattered / count) / std::max(gain, 1e-6);
+    const double duration_s = static_cast<double>(series.size()) * series.interval_s;
+    SampleModel model = fit.model();
+    model.noise.resonances.push_back({rms, found.scattered_hz, 64.0 / duration_s});
+    model.resonances.push_back(effect);
+    model.resonance_steps.push_back(step);
+    return model;
+}
+
+SampleFit refine_lines(SampleFit fit, const Rows& rows) {
+    const SampleSeries& series = fit.series();
+    const double duration_s = series.interval_s * static_cast<double>(series.size());
+    for (int round = 0; round < 2; ++round) {
+        SampleModel model = fit.model();
+        bool any = false;
+        for (std::size_t k = 0; k + 1 < model.columns.size(); ++k) {
+            const SampleColumn& cosine = model.columns[k];
+            if (cosine.name != "cosine") continue;
+            any = true;
+            LineCourse course = cosine.course;
+            const auto score = fit.score(line_slopes(fit, course, cosine.value, model.columns[k + 1].value));
+            // Where it cannot be said better than within a cycle over the record there is nothing to be mended.
+            step_course(course, Eigen::VectorXd::Map(score.value.data(), static_cast<Eigen::Index>(course.free)),
+                        duration_s);
+            set_line(model, k, series, course);
+        }
+        if (!any) break;
+        fit = SampleFit(series, std::move(model), rows, SampleFit::Noise::near);
+    }
+    return fit;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,18 @@
+#pragma once
+#include <vector>
+
+#include "analysis/closure/samples/fit/fit.hpp"
+
+namespace ringlock::closure {
+
+/// What is left of a motion is no slower than that share of its centre: it would be a rate that drifts.
+inline constexpr double slowest_of_motion = 0.2;
+
+/// What a motion in proportion to a witness adds to the increments, and the same a quarter of a cycle later.
+std::vector<std::vector<double>> motion_columns(const std::vector<double>& witness);
+void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witness, int step);
+SampleModel without_motion(SampleModel model);
+/// The model with all that a witness tells of a motion, lag by lag, and what it does not tell as two resonances.
+SampleModel moved_as(const SampleFit& now, std::size_t witness, int step);
+
+}  // namespace ringlock::closure

@@ -1,0 +1,110 @@
+#include "analysis/closure/samples/fit/steps.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+
+namespace ringlock::closure {
+
+SampleColumn step_column(const SampleSeries& series, std::size_t row) {
+    auto values = std::make_shared<std::vector<double>>(series.size(), 0.0);
+    std::fill(values->begin() + static_cast<std::ptrdiff_t>(row), values->end(), series.interval_s);
+    return {.effect = "bias_step", .name = "step_deg_h", .series = std::move(values)};
+}
+
+double root_of_step(const SampleFit& fit, std::size_t row) {
+    const auto score = fit.score({fit.taken(step_column(fit.series(), row))});
+    return score.rank == 0 ? 0.0 : std::copysign(std::sqrt(score.chi2), score.value[0]);
+}
+
+std::optional<Jump> jump_beside_random(const SampleFit& fit) {
+    if (!fit.model().walk && !fit.model().flicker) return std::nullopt;
+    const SampleColumn step = step_column(fit.series(), fit.series().size() / 2);
+    return largest_jump(fit.innovations(), fit.rows(), fit.filter().apply(*step.series));
+}
+
+std::size_t refine_place(const SampleFit& without, std::size_t row, std::size_t reach) {
+    // Nearer to an end a step can hardly be told from how the record begins, or ends.
+    const std::size_t first = std::max<std::size_t>(1, without.series().size() / places_of_a_step);
+    const std::size_t last = without.series().size() - 1 - first;
+    double best = std::abs(root_of_step(without, row));
+    for (std::size_t d = reach; d > 0; d /= 2) {
+        for (const std::size_t at : {std::max(first, row - std::min(row, d)), std::min(last, row + d)}) {
+            const double root = std::abs(root_of_step(without, at));
+            if (root <= best) continue;
+            best = root;
+            row = at;
+        }
+    }
+    return row;
+}
+
+namespace {
+
+SampleFit without_column(const SampleFit& fit, std::size_t column, const Rows& rows) {
+    SampleModel model = fit.model();
+    model.columns.erase(model.columns.begin() + static_cast<std::ptrdiff_t>(column));
+    return {fit.series(), std::move(model), rows, SampleFit::Noise::held};
+}
+
+SampleFit with_place(const SampleFit& fit, std::size_t column, std::size_t row, const Rows& rows) {
+    SampleModel model = fit.model();
+    model.columns[column].series = step_column(fit.series(), row).series;
+    return {fit.series(), std::move(model), rows, SampleFit::Noise::near};
+}
+
+}  // namespace
+
+std::size_t row_of_step(const SampleColumn& step) {
+    const auto& values = *step.series;
+    return static_cast<std::size_t>(std::find_if(values.begin(), values.end(), [](double x) { return x != 0.0; }) -
+                                    values.begin());
+}
+
+SampleFit refine_steps(SampleFit fit, const Rows& rows) {
+    constexpr int rounds = 3;
+    for (int round = 0; round < rounds; ++round) {
+        bool moved = false;
+        for (std::size_t k = 0; k < fit.model().columns.size(); ++k) {
+            if (fit.model().columns[k].effect != "bias_step") continue;
+            const std::size_t row = row_of_step(fit.model().columns[k]);
+            const std::size_t at =
+                refine_place(without_column(fit, k, rows), row, fit.series().size() / (2 * places_of_a_step));
+            if (at == row) continue;
+            moved = true;
+            fit = with_place(fit, k, at, rows);
+        }
+        if (!moved) break;
+    }
+    return fit;
+}
+
+SampleFit place_in_gaps(SampleFit fit, const Rows& rows, const Rows& known) {
+    constexpr std::size_t places = 32;
+    for (std::size_t k = 0; k < fit.model().columns.size(); ++k) {
+        if (fit.model().columns[k].effect != "bias_step") continue;
+        const std::size_t row = row_of_step(fit.model().columns[k]);
+        std::size_t from = row;
+        std::size_t to = row;
+        while (from > 1 && !rows[from - 1]) --from;
+        while (to + 2 < rows.size() && !rows[to]) ++to;
+        if (from == to) continue;
+        Rows all = rows;
+        for (std::size_t i = from; i < to; ++i) all[i] = known[i];
+        const SampleFit without = without_column(fit, k, all);
+        std::size_t at = row;
+        double most = 0.0;
+        for (std::size_t p = 0; p <= places; ++p) {
+            const std::size_t place = from + (to - from) * p / places;
+            const double root = std::abs(root_of_step(without, place));
+            if (root > most) at = place;
+            most = std::max(most, root);
+        }
+        at = refine_place(without, at, std::max<std::size_t>(1, (to - from) / (2 * places)));
+        if (at != row) fit = with_place(fit, k, at, rows);
+    }
+    return fit;
+}
+
+}  // namespace ringlock::closure

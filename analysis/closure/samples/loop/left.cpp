@@ -1,0 +1,193 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/closure/options.hpp"
+#include "analysis/closure/samples/fit/lines.hpp"
+#include "analysis/closure/samples/loop/loop.hpp"
+#include "analysis/closure/samples/residual/tests.hpp"
+#include "analysis/closure/stats/p_values.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+ResidualTest test_of(const Disturbed& disturbed) {
+    const bool any = disturbed.share > 0.0;
+    return {Where::time, fmt::format("stretches of {:.3g} s far larger than the others", disturbed.length_s),
+            any ? disturbed.p_value : 1.0,
+            any ? fmt::format("{:.1f} % of the record, most at {:.6g} s, {:.3g} times the usual variance",
+                              100.0 * disturbed.share, disturbed.at_s, disturbed.worst)
+                : ""};
+}
+
+}  // namespace
+
+/// Tests of what the model has left; where structure lies, if any passes the level: by the regression that explains
+/// most, the noise fitted anew beside it; where none does, by the test that is least probable by chance.
+void SampleLoop::test_what_is_left(Closure& closure) const {
+    constexpr std::size_t looked_at = 4;
+    auto views = view_samples(*now_.fit, lattice_step());
+    views.push_back({test_of(find_disturbed(*now_.fit, whole_))});
+    if (rounded_.drawn()) views.push_back({rounded_.test(*now_.fit)});
+    closure.tests.clear();
+    for (const SampleView& view : views) closure.tests.push_back(view.test);
+    closure.unexplained.reset();
+    const auto count = static_cast<double>(views.size());
+    std::erase_if(views, [&](const SampleView& view) {
+        return of_several(view.test.p_value, count) >= options.level_of_residual;
+    });
+    if (views.empty()) return;
+    std::sort(views.begin(), views.end(),
+              [](const SampleView& a, const SampleView& b) { return a.test.p_value < b.test.p_value; });
+    closure.unexplained = views.front().test;
+    std::sort(views.begin(), views.end(),
+              [](const SampleView& a, const SampleView& b) { return a.test.merit > b.test.merit; });
+    if (views.size() > looked_at) views.resize(looked_at);
+    double most = 0.0;
+    const SampleView* regression = nullptr;
+    for (const SampleView& view : views) {
+        if (!view.columns) continue;
+        const double merit = refitted_merit(*now_.fit, view);
+        if (merit <= most) continue;
+        most = merit;
+        regression = &view;
+        closure.unexplained = view.test;
+    }
+    // A strong rate looks like lines: such as are none beside it.
+    std::vector<SampleView> beside;
+    if (regression != nullptr) beside = view_samples(fit_beside(*now_.fit, *regression), lattice_step());
+    for (const SampleView& view : views) {
+        if (view.columns || !(view.test.merit > most)) continue;
+        const bool stays = beside.empty() || std::any_of(beside.begin(), beside.end(), [&](const SampleView& other) {
+                               return other.test.view == view.test.view &&
+                                      of_several(other.test.p_value, count) < options.level_of_residual;
+                           });
+        if (!stays) continue;
+        most = view.test.merit;
+        closure.unexplained = view.test;
+    }
+}
+
+/// Stretches that nothing was fitted to, as they are far larger than the others, are structure as well. They are no
+/// rate and no line, so that what has been named stays.
+void SampleLoop::test_left_out(Closure& closure) const {
+    if (std::find(disturbed_.rows.begin(), disturbed_.rows.end(), 1) == disturbed_.rows.end()) return;
+    const ResidualTest test = test_of(still_disturbed());
+    const auto same =
+        std::find_if(closure.tests.begin(), closure.tests.end(), [&](const auto& t) { return t.view == test.view; });
+    if (same != closure.tests.end() && same->p_value < test.p_value) return;
+    if (same == closure.tests.end()) {
+        closure.tests.push_back(test);
+    } else {
+        *same = test;
+    }
+    const auto count = static_cast<double>(closure.tests.size());
+    if (!closure.unexplained && of_several(test.p_value, count) < options.level_of_residual) closure.unexplained = test;
+}
+
+void SampleLoop::begin_again(const State& at) {
+    now_ = at;
+    // It was fitted to what was drawn then.
+    if (rounded_.drawn()) now_.fit = rounded_.draw(now_.fit, draws_of_step);
+}
+
+/// A rate is left that the random one has only come nearest to: several of the library together, if they leave nothing
+/// and are likelier; else no rate is named, and what was found beside it that is none stays.
+void SampleLoop::go_without_random(Closure& closure) {
+    const State followed = now_;
+    const std::optional<ResidualTest> left = closure.unexplained;
+    const std::vector<ResidualTest> tests = closure.tests;
+    begin_again(*earlier_);
+    add_all(closure, false);
+    test_what_is_left(closure);
+    if (!closure.unexplained && now_.fit->gain_over(*followed.fit) > 0.0) return;
+    begin_again(followed);
+    closure.unexplained = left;
+    closure.tests = tests;
+    const auto keeps = [](const SampleStep& told) { return !is_slow_rate(told.effect); };
+    if (keep_names(earlier_->told.empty() ? 0 : earlier_->told.back().step + 1, keeps, closure)) return;
+    begin_again(*earlier_);
+    test_what_is_left(closure);
+}
+
+/// A rate or a line is left that the library does not have, and in the way of what else there is: that is looked for
+/// beside what comes nearest to it.
+void SampleLoop::look_beside_nearest(Closure& closure) {
+    constexpr int most = 3;
+    const State without = now_;
+    const int first = next_step_;
+    const std::optional<ResidualTest> left = closure.unexplained;
+    const std::vector<ResidualTest> tests = closure.tests;
+    const bool line = is_line(nearest_->candidate.effect);
+    std::vector<double> around_hz;
+    for (int k = 0; k < most && nearest_ && is_line(nearest_->candidate.effect) == line; ++k) {
+        SampleChoice choice;
+        choice.chosen = std::exchange(nearest_, {});
+        take(choice, closure);
+        around_hz.push_back(now_.told.back().hz);
+        add_all(closure, line);
+    }
+    const bool of_witness = left && left->view == followed_witnesses;
+    // What is left of a line lies about it, a rate that is left takes another's shape, and one that goes with an
+    // acceleration that of a motion.
+    const auto keeps = [&](const SampleStep& told) {
+        if (!line) return !is_slow_rate(told.effect) && !(of_witness && told.effect == "case_motion");
+        if (!is_line(told.effect)) return !is_random_rate(told.effect);
+        return std::none_of(around_hz.begin(), around_hz.end(),
+                            [&](double hz) { return std::abs(hz - told.hz) < beside_hz; });
+    };
+    if (!keep_names(first, keeps, closure)) begin_again(without);
+    closure.unexplained = left;
+    closure.tests = tests;
+}
+
+/// Of what was added from that step on, some loses its name.
+/// \return whether anything keeps it
+bool SampleLoop::keep_names(int first_step, const std::function<bool(const SampleStep&)>& keeps, Closure& closure) {
+    const auto since = [&](const SampleStep& told) { return told.step >= first_step; };
+    const auto stays = [&](const SampleStep& told) { return since(told) && keeps(told); };
+    if (std::none_of(now_.told.begin(), now_.told.end(), stays)) return false;
+    for (std::size_t k = now_.told.size(); k-- > 0;) {
+        if (!since(now_.told[k]) || stays(now_.told[k])) continue;
+        closure.notes.push_back(fmt::format(
+            "{} follows what may be nothing that the library has: it is in the model, so that the rest can be "
+            "told, and is not named",
+            now_.steps[k].effect));
+        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
+        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+    return true;
+}
+
+/// A line of the library keeps its amplitude, and its frequency but for a drift. One that does not, as its own
+/// amplitudes in time or lines beside it show, is none and is not named. What a strong one does beside, by a hundredth
+/// of its power, is left, but takes the name from none.
+void SampleLoop::take_back_lines(Closure& closure) {
+    if (!closure.unexplained) return;
+    const UnsteadyLine line = unsteady_line(*now_.fit);
+    constexpr double little = 0.02;
+    const bool fails = line.off > little &&
+                       of_several(line.p_value, static_cast<double>(closure.tests.size())) < options.level_of_residual;
+    const bool beside = line.beside > little;
+    if (!fails && !beside) return;
+    for (std::size_t k = 0; k < now_.told.size(); ++k) {
+        if (now_.told[k].step != line.step) continue;
+        const std::string at = fmt::format("at {:.6g} Hz", line.hz);
+        closure.unexplained = ResidualTest{beside ? Where::frequency : Where::amplitude,
+                                           "a line that does not keep its amplitude or its frequency",
+                                           fails ? line.p_value : closure.unexplained->p_value, at};
+        closure.notes.push_back(
+            fmt::format("the line {} is in the model, so that the rest can be told, and is not named", at));
+        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
+        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+        return;
+    }
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,111 @@
+#pragma once
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/closure/closure.hpp"
+#include "analysis/closure/decide/rows.hpp"
+#include "analysis/closure/samples/fit/figures.hpp"
+#include "analysis/closure/samples/fit/fit.hpp"
+#include "analysis/closure/samples/fit/repeats_and_witness.hpp"
+#include "analysis/closure/samples/fit/score.hpp"
+#include "analysis/closure/samples/loop/contest.hpp"
+#include "analysis/closure/samples/model/series.hpp"
+#include "analysis/closure/samples/residual/tests.hpp"
+#include "analysis/closure/samples/rounded/rounded.hpp"
+#include "analysis/record/record.hpp"
+
+namespace ringlock::closure {
+
+/// The closed loop on one record of samples: its course is in run.cpp, the growth of the model in grow.cpp, and the
+/// tests of the residual in left.cpp.
+class SampleLoop {
+   public:
+    explicit SampleLoop(const record::Record& record)
+        : record_(record),
+          series_(prepare_samples(record)),
+          rounded_(series_),
+          chosen_(training_rows(series_.size())) {}
+
+    Closure run();
+    Closure fit(const std::vector<ActiveEffect>& effects);
+
+   private:
+    /// Of increments that were rounded, after every step.
+    static constexpr int draws_of_step = 2;
+    /// The model as it has grown, with what was added.
+    struct State {
+        std::shared_ptr<SampleFit> fit;
+        std::vector<Step> steps;
+        std::vector<SampleStep> told;  ///< as many
+        std::vector<double> lines_hz;
+        std::vector<std::string> notes;  ///< on these steps
+        /// What is added after another that was chosen with it is as confounded.
+        std::vector<std::pair<std::string, std::vector<std::string>>> of_partners;
+    };
+    /// Of values as they are looked at: those that were drawn are in none that could be seen.
+    double lattice_step() const {
+        if (rounded_.drawn()) return 1e-9 * rounded_.step_arcsec();
+        return counted_step() > 0.0 ? counted_step() : lattice_.step_arcsec;
+    }
+    double counted_step() const { return series_.counted ? 0.25 * series_.scale_factor_arcsec : 0.0; }
+    std::vector<double> chosen_increments() const;
+    Rows all_rows() const;
+    void begin(Closure& closure);
+    void close(Closure& closure);
+    void take_known(const std::vector<ActiveEffect>& effects, Closure& closure);
+    void add_all(Closure& closure, bool random_rates);
+    void begin_again(const State& at);
+    void go_without_random(Closure& closure);
+    void look_beside_nearest(Closure& closure);
+    bool keep_names(int first_step, const std::function<bool(const SampleStep&)>& keeps, Closure& closure);
+    Disturbed still_disturbed() const;
+    bool restore();
+    void take_lattice(Closure& closure);
+    const SampleContender& take_likelier(const SampleChoice& choice, Step& step);
+    void take(const SampleChoice& choice, Closure& closure);
+    void take_back_lines(Closure& closure);
+    void move_case(SampleStep& told, SampleFit::Noise noise);
+    bool move_anew();
+    struct Stripped {
+        SampleModel model;
+        int parameters = 1;  ///< that it has less
+    };
+    std::optional<Stripped> stripped(const SampleStep& told, const std::string& added) const;
+    void drop_needless(const std::string& added);
+    void test_what_is_left(Closure& closure) const;
+    void test_left_out(Closure& closure) const;
+    void finish(Closure& closure);
+
+    void find_coarse_steps(Closure& closure);
+    SampleScore score(const SampleFit& fit) const;
+    SampleFigures figures();
+
+    const record::Record& record_;
+    SampleSeries series_;
+    RoundedSamples rounded_;
+    Rows chosen_;
+    Rows rows_;  ///< chosen and not disturbed
+    Rows reported_;
+    Rows whole_;
+    Disturbed disturbed_;
+    Lattice lattice_;
+    double used_step_ = 0.0;  ///< of the lattice in the model
+    std::shared_ptr<SampleFit> base_;
+    State now_;
+    std::optional<State> earlier_;              ///< before the first random rate
+    std::shared_ptr<SampleContender> nearest_;  ///< of SampleChoice, where nothing was chosen any more
+    int next_step_ = 0;
+};
+
+/// Runs the loop on a record of samples. Throws InputError where the record does not suffice.
+Closure close_samples(const record::Record& record);
+
+/// The model with these effects fitted, without any search; the residual is not tested. Effects start from the values
+/// given.
+Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects);
+
+}  // namespace ringlock::closure

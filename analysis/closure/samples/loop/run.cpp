@@ -1,0 +1,223 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/closure/closure.hpp"
+#include "analysis/closure/decide/verdict.hpp"
+#include "analysis/closure/options.hpp"
+#include "analysis/closure/samples/fit/lines.hpp"
+#include "analysis/closure/samples/fit/steps.hpp"
+#include "analysis/closure/samples/loop/loop.hpp"
+#include "analysis/closure/samples/screen/known.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// Of a record; where it is more, that is what the record is like.
+constexpr double most_disturbed = 0.6;
+
+/// What an effect that has been added explains is not disturbed: so often it is looked at again.
+constexpr int most_looks = 3;
+
+}  // namespace
+
+/// What a witness tells at lags, it does not tell at the ends of the record; what it left untold at the start, a narrow
+/// motion remembers for longer.
+Rows SampleLoop::all_rows() const {
+    constexpr std::size_t remembered = 4;
+    Rows all(series_.size(), 1);
+    if (series_.witnesses.empty()) return all;
+    const auto lags = static_cast<std::size_t>(witness_lags(series_.rate_hz));
+    const std::size_t most = all.size() / 20;
+    std::fill_n(all.begin(), std::min(remembered * lags, most), 0);
+    std::fill_n(all.rbegin(), std::min(lags, most), 0);
+    return all;
+}
+
+void SampleLoop::begin(Closure& closure) {
+    closure.unit = "arcsec";
+    closure.level = options.level;
+    whole_ = all_rows();
+    rounded_.restore();
+    rows_.resize(chosen_.size());
+    reported_.resize(chosen_.size());
+    for (std::size_t i = 0; i < chosen_.size(); ++i) {
+        rows_[i] = whole_[i] && chosen_[i] ? 1 : 0;
+        reported_[i] = whole_[i] && !chosen_[i] ? 1 : 0;
+    }
+    if (series_.scale_factor_assumed) {
+        closure.notes.push_back(fmt::format(
+            "the record declares no scale factor; {:g} arcsec per fringe assumed, with which all rates scale",
+            series_.scale_factor_arcsec));
+    }
+    if (series_.input_late_s > 0.0) {
+        closure.notes.push_back(
+            fmt::format("the known input goes with the samples {:.3g} s later: their times are not those "
+                        "of the ends of their intervals",
+                        series_.input_late_s));
+    }
+    now_ = {};
+    next_step_ = 0;
+    now_.fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
+    closure.heldout_before = score_of(*now_.fit, reported_, 0.0).error;
+    if (disturbed_.rows.empty()) disturbed_ = find_disturbed(*now_.fit, whole_);
+    if (disturbed_.share >= most_disturbed) disturbed_.rows.assign(disturbed_.rows.size(), 0);
+    if (disturbed_.share > 0.0 && disturbed_.share < most_disturbed) {
+        const double with = closure.heldout_before;
+        for (std::size_t i = 0; i < rows_.size(); ++i) {
+            if (!disturbed_.rows[i]) continue;
+            rows_[i] = reported_[i] = whole_[i] = 0;
+        }
+        now_.fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
+        closure.notes.push_back(fmt::format(
+            "{:.1f} % of the record is disturbed, up to {:.3g} times the usual variance, most at {:.6g} s; nothing is "
+            "fitted to it, held-out errors leave it out ({:.6g} arcsec before with it)",
+            100.0 * disturbed_.share, disturbed_.worst, disturbed_.at_s, with));
+        closure.heldout_before = score_of(*now_.fit, reported_, 0.0).error;
+    }
+    base_ = now_.fit;
+}
+
+SampleScore SampleLoop::score(const SampleFit& fit) const {
+    return rounded_.drawn() ? rounded_.score_of(fit, reported_) : score_of(fit, reported_, used_step_);
+}
+
+/// What is reported: errors of the blocks held out, parameters of a last fit to the whole record.
+void SampleLoop::finish(Closure& closure) {
+    const SampleScore last = score(*now_.fit);
+    closure.heldout_after = last.error;
+    closure.noise_floor = last.floor;
+    closure.log_likelihood_gain = last.log_likelihood - score(*base_).log_likelihood;
+    closure.residual.time_s = series_.time_s;
+    for (std::size_t i = 0; i < series_.size(); ++i) {
+        closure.residual.innovation.push_back(now_.fit->innovations()[i] * now_.fit->sd(i));
+        closure.residual.sd.push_back(now_.fit->sd(i));
+    }
+    closure.residual.reported = reported_;
+    double input = record_.declared.input_rate_deg_h.value_or(0.0);
+    if (!series_.input_rate_deg_h.empty()) {
+        input = 0.0;
+        for (const double x : series_.input_rate_deg_h) input += x / static_cast<double>(series_.size());
+    }
+    closure.mean_input_rate_deg_h = input;
+    SampleFigures figures = this->figures();
+    closure.rounding_in_noise = !rounded_.drawn();
+    closure.base = std::move(figures.base);
+    closure.steps = std::move(now_.steps);
+    for (std::size_t k = 0; k < closure.steps.size(); ++k) {
+        if (closure.steps[k].parameters.empty()) closure.steps[k].parameters = std::move(figures.steps[k]);
+    }
+    for (auto* notes : {&now_.notes, &figures.notes}) {
+        for (std::string& note : *notes) closure.notes.push_back(std::move(note));
+    }
+    closure.verdict = verdict_of(closure);
+}
+
+/// What is disturbed beside the model as it has grown, of all rows that can be told.
+Disturbed SampleLoop::still_disturbed() const {
+    // With all that is there, as a place in it may be known by nothing else.
+    const Rows all = all_rows();
+    SampleFit whole(series_, now_.fit->model(), all, SampleFit::Noise::held);
+    whole = refine_steps(std::move(whole), all);
+    return find_disturbed(whole, all);
+}
+
+/// An effect that has come into the model may be what seemed to disturb a part of the record: whether any of that part
+/// is to be looked at again.
+bool SampleLoop::restore() {
+    constexpr double little = 0.05;
+    if (disturbed_.share == 0.0) return false;
+    const Disturbed still = still_disturbed();
+    double before = 0.0;
+    double left = 0.0;
+    Disturbed less = still;
+    for (std::size_t i = 0; i < less.rows.size(); ++i) {
+        less.rows[i] = disturbed_.rows[i] && still.rows[i] ? 1 : 0;
+        before += disturbed_.rows[i];
+        left += less.rows[i];
+    }
+    if (!(left < (1.0 - little) * before)) return false;
+    less.share = left / static_cast<double>(less.rows.size());
+    disturbed_ = std::move(less);
+    return true;
+}
+
+/// Of a fit to the whole record.
+SampleFigures SampleLoop::figures() {
+    const auto of = [&](const SampleFit& fit) {
+        return figures_of(refine_steps(refine_lines(fit, whole_), whole_), now_.told, record_.declared);
+    };
+    const SampleFit whole(series_, now_.fit->model(), whole_, SampleFit::Noise::near);
+    return rounded_.drawn() ? rounded_.figures_of(whole, of) : of(whole);
+}
+
+Closure SampleLoop::run() {
+    Closure closure;
+    for (int look = 0; look < most_looks; ++look) {
+        closure = {};
+        close(closure);
+        if (!restore()) break;
+    }
+    test_what_is_left(closure);
+    if (closure.unexplained && earlier_) {
+        go_without_random(closure);
+    } else if (closure.unexplained && nearest_) {
+        look_beside_nearest(closure);
+    }
+    take_back_lines(closure);
+    test_left_out(closure);
+    finish(closure);
+    return closure;
+}
+
+void SampleLoop::close(Closure& closure) {
+    begin(closure);
+    take_lattice(closure);
+    earlier_.reset();
+    add_all(closure, true);
+}
+
+void SampleLoop::take_known(const std::vector<ActiveEffect>& effects, Closure& closure) {
+    begin(closure);
+    KnownEffects known = known_effects(*now_.fit, effects);
+    for (const SampleStep& told : known.told) {
+        Step& step = now_.steps.emplace_back();
+        step.effect = told.effect;
+        if (told.effect != "count_quantization") continue;
+        lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
+        used_step_ = lattice_.printed_arcsec;
+        step.parameters.push_back({told.effect, "step_arcsec", lattice_.step_arcsec, lattice_.step_sd_arcsec});
+    }
+    now_.told = std::move(known.told);
+    now_.fit = std::make_shared<SampleFit>(series_, std::move(known.model), rows_, known.noise);
+    for (SampleStep& told : now_.told) {
+        if (told.effect == "case_motion" && !series_.witnesses.empty()) move_case(told, known.noise);
+    }
+    if (series_.counted || used_step_ > 0.0) find_coarse_steps(closure);
+}
+
+/// Whatever is known to be there, at the values given or near them; what is left is not looked at.
+Closure SampleLoop::fit(const std::vector<ActiveEffect>& effects) {
+    Closure closure;
+    for (int look = 0; look < most_looks; ++look) {
+        closure = {};
+        take_known(effects, closure);
+        if (!restore()) break;
+    }
+    finish(closure);
+    return closure;
+}
+
+Closure close_samples(const record::Record& record) { return SampleLoop(record).run(); }
+
+Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects) {
+    return SampleLoop(record).fit(effects);
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,60 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace ringlock::closure {
+
+/// How the frequency of a line goes through a record: a polynomial of the time from the middle. A dither follows the
+/// temperature of its springs, evenly over minutes, on a curve over an hour.
+struct LineCourse {
+    static constexpr std::size_t most = 6;
+    double hz = 0.0;  ///< in the middle
+    /// Derivatives of the frequency there, from the first on [Hz/s, Hz/s^2, ...].
+    std::array<double, most - 1> drifts{};
+    std::size_t free = 1;  ///< coefficients that are fitted: 1, it keeps its frequency; 2, it drifts evenly
+
+    double coefficient(std::size_t k) const { return k == 0 ? hz : drifts[k - 1]; }
+    double& coefficient(std::size_t k) { return k == 0 ? hz : drifts[k - 1]; }
+    /// Cycles from the middle on.
+    double turns(double since_middle_s) const {
+        double sum = 0.0;
+        double power = 1.0;
+        for (std::size_t k = 0; k < most; ++k) {
+            power *= since_middle_s / static_cast<double>(k + 1);
+            sum += coefficient(k) * power;
+        }
+        return sum;
+    }
+    double frequency_hz(double since_middle_s) const {
+        double sum = 0.0;
+        double power = 1.0;
+        for (std::size_t k = 0; k < most; ++k) {
+            sum += coefficient(k) * power;
+            power *= since_middle_s / static_cast<double>(k + 1);
+        }
+        return sum;
+    }
+    /// Of a coefficient, so much as makes a cycle at either end of a record of that length.
+    static double a_cycle(std::size_t k, double duration_s) {
+        double unit = 1.0;
+        for (std::size_t j = 0; j <= k; ++j) unit *= static_cast<double>(j + 1) / (0.5 * duration_s);
+        return unit;
+    }
+    /// As it shows where frequencies are read as others, and go down there as they go up where `folded`.
+    LineCourse shown_at(double other_hz, bool folded) const {
+        LineCourse other = *this;
+        other.hz = other_hz;
+        if (folded) {
+            for (double& drift : other.drifts) drift = -drift;
+        }
+        return other;
+    }
+    static LineCourse still(double hz) { return {hz, {}, 1}; }
+    static LineCourse even(double hz, double drift_hz_per_s) { return {hz, {drift_hz_per_s}, 2}; }
+};
+
+/// The angle of a line at each sample, zero in the middle.
+std::vector<double> line_phase(std::size_t size, double rate_hz, const LineCourse& course);
+
+}  // namespace ringlock::closure

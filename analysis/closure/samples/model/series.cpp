@@ -1,0 +1,254 @@
+#include "analysis/closure/samples/model/series.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+#include "analysis/closure/stats/p_values.hpp"
+#include "engine/core/error.hpp"
+#include "engine/core/units.hpp"
+#include "engine/scenario/scenario.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+bool changes(const std::vector<double>& values) {
+    return std::any_of(values.begin(), values.end(), [&](double v) { return v != values.front(); });
+}
+
+/// Greatest common divisor of numbers that are known to `tolerance`.
+double common_divisor(double a, double b, double tolerance) {
+    while (b > tolerance) {
+        const double rest = std::abs(a - std::round(a / b) * b);
+        a = b;
+        b = rest;
+    }
+    return a;
+}
+
+/// The known input in the middle of each interval. A sample belongs to its end; where the increments say by far that
+/// the other instrument's clock means the start, or the middle, they are believed.
+void take_input(const record::Record& record, SampleSeries& series) {
+    constexpr double by_far = 30.0;  // of chi-squared
+    const std::size_t n = series.size();
+    double least = 0.0;
+    for (const double late : {-0.5, 0.0, 0.5}) {
+        std::vector<double> input;
+        for (const double t : series.time_s) input.push_back(record.input_rate_deg_h.at(t + late * series.interval_s));
+        double sum = 0.0;
+        double squares = 0.0;
+        for (std::size_t i = 0; i < n; ++i) {
+            const double left = series.increment[i] - input[i] * series.interval_s;
+            sum += left;
+            squares += left * left;
+        }
+        squares -= sum * sum / static_cast<double>(n);
+        const bool first = series.input_rate_deg_h.empty();
+        if (!first && !(squares < least * (1.0 - by_far / static_cast<double>(n)))) continue;
+        least = squares;
+        series.input_rate_deg_h = std::move(input);
+        series.input_late_s = (late + 0.5) * series.interval_s;
+    }
+}
+
+struct Smoothed {
+    std::vector<double> values;
+    double start_sd = 0.0;
+};
+
+/// A thermometer's noise is faster than any temperature: straight lines through a 500th of the record about each row,
+/// at the ends those through the first of them and the last.
+Smoothed smooth(const std::vector<double>& values) {
+    const std::size_t n = values.size();
+    const std::size_t half = std::min(std::max<std::size_t>(1, n / 1000), (n - 1) / 2);
+    std::vector<double> sums(n + 1, 0.0);
+    for (std::size_t i = 0; i < n; ++i) sums[i + 1] = sums[i] + values[i];
+    const auto mean_about = [&](std::size_t middle) {
+        return (sums[middle + half + 1] - sums[middle - half]) / static_cast<double>(2 * half + 1);
+    };
+    const auto slope_about = [&](std::size_t middle) {
+        double by = 0.0;
+        double squares = 0.0;
+        for (std::size_t k = 1; k <= half; ++k) {
+            by += static_cast<double>(k) * (values[middle + k] - values[middle - k]);
+            squares += 2.0 * static_cast<double>(k * k);
+        }
+        return by / squares;
+    };
+    const std::size_t last = n - 1 - half;
+    const double first_slope = slope_about(half);
+    const double last_slope = slope_about(last);
+    Smoothed smoothed;
+    for (std::size_t i = 0; i < n; ++i) {
+        const std::size_t middle = std::clamp(i, half, last);
+        const double off = static_cast<double>(i) - static_cast<double>(middle);
+        smoothed.values.push_back(mean_about(middle) + off * (i < middle ? first_slope : last_slope));
+    }
+    double squares = 0.0;
+    for (std::size_t i = 0; i <= 2 * half; ++i) {
+        const double off = static_cast<double>(i) - static_cast<double>(half);
+        squares += std::pow(values[i] - mean_about(half) - off * first_slope, 2);
+    }
+    // At the end of a line through m values its error is 2/sqrt(m) of theirs, m large.
+    smoothed.start_sd =
+        2.0 * std::sqrt(squares / static_cast<double>(2 * half - 1) / static_cast<double>(2 * half + 1));
+    return smoothed;
+}
+
+}  // namespace
+
+SampleSeries prepare_samples(const record::Record& record) {
+    if (!record.samples) throw InputError("the record has neither /turns nor /samples");
+    const record::Samples& samples = *record.samples;
+    SampleSeries series;
+    series.rate_hz = samples.rate_hz;
+    series.interval_s = 1.0 / samples.rate_hz;
+    std::size_t first = 0;
+    if (samples.kind == record::SampleKind::angle_increment_arcsec) {
+        series.increment = samples.values;
+    } else {
+        series.counted = samples.kind == record::SampleKind::quarter_count;
+        const scenario::Scenario standard;
+        series.scale_factor_assumed = series.counted && !record.declared.scale_factor_arcsec;
+        series.scale_factor_arcsec = record.declared.scale_factor_arcsec.value_or(standard.gyro.scale_factor_arcsec);
+        first = 1;
+        for (std::size_t k = 1; k < samples.size(); ++k) {
+            series.increment.push_back(series.counted
+                                           ? 0.25 * series.scale_factor_arcsec *
+                                                 static_cast<double>(samples.counts[k] - samples.counts[k - 1])
+                                           : samples.values[k] - samples.values[k - 1]);
+        }
+    }
+    const std::size_t n = series.increment.size();
+    if (samples.size() < record::fewest_samples_to_close) {
+        throw InputError(fmt::format("/samples: {} of them are too few for the closed loop; at least {} are needed",
+                                     samples.size(), record::fewest_samples_to_close));
+    }
+    if (!changes(series.increment)) throw InputError("/samples: they never change; there is nothing to fit");
+    for (std::size_t i = 0; i < n; ++i) {
+        series.time_s.push_back(samples.t0_s + static_cast<double>(i + first) * series.interval_s);
+    }
+    for (const auto& [name, values] : samples.witnesses) {
+        if (!changes(values)) continue;
+        std::vector<double> cut(values.begin() + static_cast<std::ptrdiff_t>(first), values.end());
+        if (name == "temperature_c") {
+            series.temperature_change_k = std::move(cut);
+        } else {
+            series.witnesses.emplace_back(name, std::move(cut));
+        }
+    }
+    if (series.temperature_change_k.empty() && !record.temperature_c.empty() && changes(record.temperature_c.value)) {
+        for (const double t : series.time_s) series.temperature_change_k.push_back(record.temperature_c.at(t));
+    }
+    if (!series.temperature_change_k.empty()) {
+        const Smoothed smoothed = smooth(series.temperature_change_k);
+        series.temperature_start_sd_k = smoothed.start_sd;
+        series.temperature_change_k = smoothed.values;
+        for (double& value : series.temperature_change_k) value -= smoothed.values.front();
+    }
+    if (!record.input_rate_deg_h.empty()) take_input(record, series);
+    return series;
+}
+
+Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
+    Lattice lattice;
+    std::vector<double> sorted = increments;
+    std::sort(sorted.begin(), sorted.end());
+    const std::size_t n = sorted.size();
+    const double range = sorted.back() - sorted.front();
+    double total = 0.0;
+    for (const double x : increments) total += std::abs(x);
+    const double tolerance = 1e-9 * range + 1e-13 * total;
+    std::vector<double> levels{sorted.front()};
+    for (const double x : sorted) {
+        if (x - levels.back() > tolerance) levels.push_back(x);
+    }
+    // Without a lattice no two values of so many digits are the same.
+    if (levels.size() > n / 4 || levels.size() < 2) return lattice;
+    double step = std::max(std::abs(levels.front()), range);
+    for (const double x : levels) {
+        if (std::abs(x) > tolerance)
+            step = common_divisor(std::max(step, std::abs(x)), std::min(step, std::abs(x)),
+                                  20.0 * tolerance + 1e-6 * range);
+    }
+    // Best over the levels, each a whole multiple.
+    double xy = 0.0;
+    double yy = 0.0;
+    for (const double x : levels) {
+        const double m = std::round(x / step);
+        xy += x * m;
+        yy += m * m;
+    }
+    step = xy / yy;
+    for (const double x : levels) {
+        if (std::abs(x / step - std::round(x / step)) > 0.02) return lattice;
+    }
+    lattice.printed_arcsec = lattice.step_arcsec = step;
+    lattice.strength = 1.0;
+    lattice.p_value = 0.0;
+    lattice.step_sd_arcsec = 1e-9 * step;  // by the digits of the values
+    // A coarser one that the digits of the record blur: its characteristic function stands out between the bulk's, near
+    // zero, and the digits' own, at 1/printed.
+    std::vector<std::pair<double, double>> weights;  // level, how often; those not zero
+    double count = 0.0;
+    double second = 0.0;
+    const auto most = static_cast<std::int64_t>(std::llround(std::max(-sorted.front(), sorted.back()) / step));
+    if (most > 200000) return lattice;
+    std::vector<double> often(static_cast<std::size_t>(2 * most + 1), 0.0);
+    for (const double x : sorted) often[static_cast<std::size_t>(std::llround(x / step) + most)] += 1.0;
+    for (std::int64_t m = -most; m <= most; ++m) {
+        const double w = often[static_cast<std::size_t>(m + most)];
+        if (m == 0 || w == 0.0) continue;
+        weights.emplace_back(static_cast<double>(m) * step, w);
+        count += w;
+    }
+    const double quartile = 0.5 * (sorted[n * 7 / 8] - sorted[n / 8]);  // 1.15 sigma
+    for (const auto& [x, w] : weights) second += std::min(x * x, 9.0 * quartile * quartile + 1e-300) * w / count;
+    const double sigma = std::min(std::sqrt(second), sd_arcsec);
+    const auto characteristic = [&](double u) {
+        std::complex<double> sum = 0.0;
+        for (const auto& [x, w] : weights) sum += w * std::polar(1.0, units::two_pi * u * x);
+        return std::abs(sum) / count;
+    };
+    const double lowest = 1.5 / sigma;
+    const double highest = 0.5 / step;
+    if (!(lowest < highest)) return lattice;
+    const double du = 0.02 / sigma;
+    const auto places = static_cast<std::size_t>((highest - lowest) / du) + 1;
+    double best = 0.0;
+    double at = 0.0;
+    for (std::size_t k = 0; k < places; ++k) {
+        const double u = lowest + static_cast<double>(k) * du;
+        const double c = characteristic(u);
+        if (c > best) {
+            best = c;
+            at = u;
+        }
+    }
+    for (double d = du; d > 1e-7 * at; d *= 0.5) {
+        for (const double u : {at - d, at + d}) {
+            const double c = characteristic(u);
+            if (c > best) {
+                best = c;
+                at = u;
+            }
+        }
+    }
+    const double p = of_several(std::exp(-count * best * best), static_cast<double>(places));
+    if (best > 0.3 && p < 1e-6 && at < highest) {
+        lattice.step_arcsec = 1.0 / at;
+        lattice.strength = best;
+        lattice.p_value = p;
+        // A frequency from phases 2 pi u x with noise of which exp(i noise) has the mean c, cos(2 noise) c^4 where it
+        // is normal: variance (1 - c^4)/(2 c^2 N (2 pi sigma)^2) of u = 1/step.
+        const double c2 = best * best;
+        const double u_sd = std::sqrt((1.0 - c2 * c2) / (2.0 * c2 * count)) / (units::two_pi * sigma);
+        lattice.step_sd_arcsec = u_sd / (at * at);
+    }
+    return lattice;
+}
+
+}  // namespace ringlock::closure

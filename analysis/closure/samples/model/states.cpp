@@ -1,0 +1,108 @@
+#include "analysis/closure/samples/model/states.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/closure/stats/gauss_markov.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
+    resampled = noise.from_hz > 0.0;
+    const double dt = resampled ? 1.0 / noise.from_hz : interval_s;
+    count = 1;
+    f[0][0] = 1.0;
+    q[0][0] = noise.rate_arcsec_rt_s * noise.rate_arcsec_rt_s * dt;
+    Matrix& p = start;
+    if (noise.walk_arcsec2_s3 > 0.0) {
+        f[0][count] = dt;
+        f[count][count] = 1.0;
+        q[count][count] = noise.walk_arcsec2_s3 * dt;
+        q[0][count] = q[count][0] = 0.5 * q[count][count] * dt;
+        q[0][0] += q[count][count] * dt * dt / 3.0;
+        p[count][count] = q[count][count];
+        ++count;
+    }
+    for (const auto& term : noise.terms) {
+        if (count >= most - 5) break;
+        const GaussMarkovStep step(term.time_s, dt);
+        const double variance = term.variance_arcsec2_s2;
+        f[0][count] = step.gain_s;
+        f[count][count] = step.decay;
+        q[count][count] = variance * step.rate_variance;
+        q[0][count] = q[count][0] = variance * step.covariance_s;
+        q[0][0] += variance * step.angle_variance_s2;
+        p[count][count] = variance;
+        ++count;
+    }
+    std::vector<int> resonances;
+    for (const auto& resonance : noise.resonances) {
+        if (!(resonance.arcsec > 0.0) || count + 4 > most) continue;
+        resonances.push_back(count);
+        const double r = std::exp(-units::pi * resonance.width_hz * dt);
+        const double a = 2.0 * r * std::cos(units::two_pi * resonance.hz * dt);
+        const double b = r * r;
+        const double v = resonance.arcsec * resonance.arcsec;
+        f[count][count] = a;
+        f[count][count + 1] = -b;
+        f[count + 1][count] = 1.0;
+        // Variance over that of what drives it (Box and Jenkins, "Time Series Analysis", 1976, section 3.2.4)
+        q[count][count] = v * (1.0 - b) * ((1.0 + b) * (1.0 + b) - a * a) / (1.0 + b);
+        p[count][count] = p[count + 1][count + 1] = v;
+        p[count][count + 1] = p[count + 1][count] = v * a / (1.0 + b);
+        count += 2;
+    }
+    const double readout = noise.angle_arcsec * noise.angle_arcsec;
+    // The record begins at angle zero as it was read.
+    p[0][0] = readout;
+    floor = readout;
+    if (resampled) {
+        const int r0 = count;
+        const int r1 = count + 1;
+        f[r0][r1] = 1.0;
+        // r1 of the new tick = angle and resonance there + error; the noise of both is in q.
+        f[r1] = f[0];
+        for (int j = 0; j < count; ++j) q[r1][j] = q[0][j];
+        for (const int resonance : resonances) {
+            for (int j = 0; j < count; ++j) {
+                f[r1][j] += f[resonance][j];
+                q[r1][j] += q[resonance][j];
+            }
+        }
+        q[r1][r1] = q[0][0] + readout;
+        for (const int resonance : resonances) q[r1][r1] += q[resonance][resonance];
+        for (int j = 0; j < count; ++j) q[j][r1] = q[r1][j];
+        count += 2;
+        p[r0][r0] = p[r1][r1] = p[0][0] + q[r1][r1];
+        // Interpolated readings have no error of their own; digits have. They do not go with the noise: rows that are
+        // settled by others would count for a smaller one.
+        floor = noise.blur_arcsec * noise.blur_arcsec + noise.digits_arcsec * noise.digits_arcsec;
+        ratio = interval_s * noise.from_hz;
+        first_place = noise.from_phase;
+    } else {
+        h[0] = 1.0;
+        for (const int resonance : resonances) h[resonance] = 1.0;
+        swings = noise.swing_hz > 0.0;
+        swing_by_row = units::two_pi * noise.swing_hz * interval_s;
+        swing_cos = noise.swing_cos;
+        swing_sin = noise.swing_sin;
+    }
+    for (int i = 0; i < count; ++i) {
+        auto& terms = nonzero[i];
+        for (int j = 0; j < count; ++j) {
+            if (f[i][j] != 0.0) terms.at[terms.count++] = j;
+        }
+    }
+}
+
+bool SampleStates::is_like(const SampleStates& other) const {
+    const auto same_zeros = [&] {
+        return std::equal(h.begin(), h.end(), other.h.begin(),
+                          [](double a, double b) { return (a == 0.0) == (b == 0.0); });
+    };
+    return count == other.count && resampled == other.resampled && swings == other.swings && nonzero == other.nonzero &&
+           same_zeros();
+}
+
+}  // namespace ringlock::closure

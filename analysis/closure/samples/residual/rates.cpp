@@ -1,0 +1,291 @@
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "analysis/closure/samples/fit/lines.hpp"
+#include "analysis/closure/samples/fit/repeats_and_witness.hpp"
+#include "analysis/closure/samples/fit/steps.hpp"
+#include "analysis/closure/samples/residual/tests.hpp"
+#include "analysis/closure/samples/residual/views.hpp"
+#include "analysis/closure/stats/normality.hpp"
+#include "analysis/closure/stats/p_values.hpp"
+#include "analysis/closure/stats/two_levels.hpp"
+#include "analysis/closure/stats/two_states.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// Rates that go with a power of time, as few of them as the record asks for (Schwarz, Annals of Statistics 6, 1978,
+/// 461).
+void test_powers_of_time(const SampleFit& fit, Views& views) {
+    constexpr std::size_t degrees = 6;
+    const std::size_t n = fit.series().size();
+    Columns powers;
+    Columns taken;
+    SampleFit::Score score;
+    std::size_t degree = 0;
+    double most = 0.0;
+    for (std::size_t k = 1; k <= degrees; ++k) {
+        std::vector<double> rate(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            const double x = 2.0 * static_cast<double>(i) / static_cast<double>(n - 1) - 1.0;
+            rate[i] = std::cos(static_cast<double>(k) * std::acos(std::clamp(x, -1.0, 1.0)));
+        }
+        taken.push_back(fit.as_taken(rate));
+        powers.push_back(std::move(rate));
+        score = fit.score(taken);
+        const double merit = 0.5 * (score.chi2 - score.rank * std::log(static_cast<double>(n)));
+        if (degree > 0 && merit <= most) continue;
+        most = merit;
+        degree = k;
+    }
+    if (score.rank == 0) return;
+    powers.resize(degree);
+    views.push_back({{Where::time, "rates that are polynomials of time", chi2_tail(score.chi2, score.rank),
+                      fmt::format("degree {}", degree), 0.5 * score.chi2 - score.rank},
+                     static_cast<double>(degree) + std::log(static_cast<double>(degrees)),
+                     [powers = std::make_shared<const Columns>(std::move(powers))] { return *powers; }});
+}
+
+/// A rate that goes up and down too slowly for a line.
+void test_slow_swings(const SampleFit& fit, Views& views) {
+    const std::size_t n = fit.series().size();
+    const auto periods = [](std::size_t place) { return 0.25 * static_cast<double>(place + 1); };
+    const auto swing = [n, periods](std::size_t place) {
+        Columns columns(2, std::vector<double>(n));
+        for (std::size_t i = 0; i < n; ++i) {
+            const double angle = units::two_pi * periods(place) * static_cast<double>(i) / static_cast<double>(n);
+            columns[0][i] = std::cos(angle);
+            columns[1][i] = std::sin(angle);
+        }
+        return columns;
+    };
+    const auto said = [periods](std::size_t place) {
+        return fmt::format("{:g} periods over the record", periods(place));
+    };
+    test_places(fit, Where::time, "a rate that swings slowly", {32, swing, said}, views);
+}
+
+/// A rate that settles after the start.
+void test_settling(const SampleFit& fit, Views& views) {
+    const auto& time_s = fit.series().time_s;
+    const double duration_s = time_s.back() - time_s.front();
+    // A constant between two of them loses little by either.
+    const auto constant_s = [duration_s](std::size_t place) {
+        return duration_s * std::pow(1.4, -static_cast<double>(place));
+    };
+    const auto settles = [&time_s, constant_s](std::size_t place) {
+        Columns columns(1, std::vector<double>(time_s.size()));
+        for (std::size_t i = 0; i < time_s.size(); ++i) {
+            columns[0][i] = std::exp(-(time_s[i] - time_s.front()) / constant_s(place));
+        }
+        return columns;
+    };
+    const auto said = [constant_s](std::size_t place) {
+        return fmt::format("with a time constant of {:.2g} s", constant_s(place));
+    };
+    test_places(fit, Where::time, "a rate that settles", {14, settles, said}, views);
+}
+
+void test_steps(const SampleFit& fit, Views& views) {
+    const SampleSeries& series = fit.series();
+    const std::size_t n = series.size();
+    std::vector<double> roots;
+    double best = 0.0;
+    std::size_t at = 0;
+    constexpr std::size_t places = 40;
+    const auto step_at = [n](std::size_t row) {
+        std::vector<double> step(n, 0.0);
+        std::fill(step.begin() + static_cast<std::ptrdiff_t>(row), step.end(), 1.0);
+        return step;
+    };
+    for (std::size_t k = 1; k < places; ++k) {
+        const auto score = fit.score({fit.as_taken(step_at(n * k / places))});
+        const double root = score.rank > 0 ? std::copysign(std::sqrt(score.chi2), score.value[0]) : 0.0;
+        roots.push_back(root);
+        if (std::abs(root) > best) {
+            best = std::abs(root);
+            at = n * k / places;
+        }
+    }
+    const double cost = 2.0 + std::log(davies_places(best * best, roots));
+    views.push_back({{Where::time, "steps of the rate", davies_bound(best * best, roots),
+                      fmt::format("at {:.6g} s", series.time_s[at]), 0.5 * best * best - cost},
+                     cost,
+                     [step_at, at] { return Columns{step_at(at)}; }});
+}
+
+/// A rate of one where the shape of stretches is, of zero elsewhere, with the jumps moved to where they explain most.
+std::vector<double> two_level_rate(const SampleFit& fit, const Eigen::VectorXd& shape) {
+    const std::size_t n = fit.series().size();
+    const auto stretches = static_cast<std::size_t>(shape.size());
+    std::vector<std::size_t> jumps;
+    for (Eigen::Index k = 1; k < shape.size(); ++k) {
+        if (shape(k) != shape(k - 1)) jumps.push_back(n * static_cast<std::size_t>(k) / stretches);
+    }
+    const auto rate = [&] {
+        std::vector<double> out(n);
+        std::size_t next = 0;
+        double on = shape(0);
+        for (std::size_t i = 0; i < n; ++i) {
+            for (; next < jumps.size() && jumps[next] <= i; ++next) on = 1.0 - on;
+            out[i] = on;
+        }
+        return out;
+    };
+    double best = fit.score({fit.as_taken(rate())}).chi2;
+    const std::size_t length = std::max<std::size_t>(1, n / stretches);
+    for (std::size_t step = length / 2; step > length / 50; step /= 2) {
+        for (std::size_t& jump : jumps) {
+            for (const bool later : {false, true}) {
+                const std::size_t from = jump;
+                jump = later ? std::min(n, jump + step) : jump - std::min(jump, step);
+                const double chi2 =
+                    std::is_sorted(jumps.begin(), jumps.end()) ? fit.score({fit.as_taken(rate())}).chi2 : 0.0;
+                if (chi2 > best) {
+                    best = chi2;
+                } else {
+                    jump = from;
+                }
+            }
+        }
+    }
+    return rate();
+}
+
+/// The normal equations of a regression on the rates of stretches of the record, beside the columns of the model; and
+/// what these take off them.
+struct Stretches {
+    Eigen::MatrixXd normal, of_columns;
+    Eigen::VectorXd right;
+};
+
+Stretches regress_on_stretches(const SampleFit& fit, std::size_t stretches) {
+    const std::size_t n = fit.series().size();
+    // The filter forgets: of each stretch's series only what is not negligible.
+    struct Response {
+        std::size_t from = 0;
+        std::vector<float> values;
+    };
+    std::vector<Response> responses(stretches);
+    const auto& own = fit.whitened();
+    const auto m = static_cast<Eigen::Index>(own.size());
+    const auto k = static_cast<Eigen::Index>(stretches);
+    Eigen::MatrixXd cross(m, k);
+    Eigen::VectorXd right(k);
+    for (std::size_t s = 0; s < stretches; ++s) {
+        std::vector<double> column(n, 0.0);
+        std::fill(column.begin() + static_cast<std::ptrdiff_t>(n * s / stretches),
+                  column.begin() + static_cast<std::ptrdiff_t>(n * (s + 1) / stretches), fit.series().interval_s);
+        column = fit.filter().apply(fit.as_taken(column));
+        double most = 0.0;
+        for (const double x : column) most = std::max(most, std::abs(x));
+        std::size_t last = n;
+        while (last > 0 && std::abs(column[last - 1]) < 1e-5 * most) --last;
+        // Of a resampled record it begins with the source's interval before.
+        responses[s].from = n * s / stretches - std::min<std::size_t>(n * s / stretches, 4);
+        double sum = 0.0;
+        for (std::size_t i = responses[s].from; i < last; ++i) {
+            if (!fit.telling()[i]) column[i] = 0.0;
+            responses[s].values.push_back(static_cast<float>(column[i]));
+            sum += column[i] * fit.innovations()[i];
+        }
+        right(static_cast<Eigen::Index>(s)) = sum;
+        for (Eigen::Index c = 0; c < m; ++c) {
+            double product = 0.0;
+            const auto& w = own[static_cast<std::size_t>(c)];
+            for (std::size_t i = responses[s].from; i < last; ++i) product += column[i] * w[i];
+            cross(c, static_cast<Eigen::Index>(s)) = product;
+        }
+    }
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(k, k);
+    for (std::size_t a = 0; a < stretches; ++a) {
+        for (std::size_t b = a; b < stretches; ++b) {
+            const Response& x = responses[a];
+            const Response& y = responses[b];
+            const std::size_t last = std::min(x.from + x.values.size(), y.from + y.values.size());
+            double sum = 0.0;
+            for (std::size_t i = y.from; i < last; ++i)
+                sum += static_cast<double>(x.values[i - x.from]) * static_cast<double>(y.values[i - y.from]);
+            normal(static_cast<Eigen::Index>(a), static_cast<Eigen::Index>(b)) = sum;
+            normal(static_cast<Eigen::Index>(b), static_cast<Eigen::Index>(a)) = sum;
+        }
+    }
+    return {std::move(normal), cross.transpose() * fit.covariance() * cross, std::move(right)};
+}
+
+/// Gain of the log-likelihood by a rate of two states, the noise fitted anew beside it, less its numbers.
+double merit_of_states(const SampleFit& fit, const TwoStates& first) {
+    constexpr double numbers = 3.0;  // the step and two probabilities
+    const std::size_t n = fit.series().size();
+    const auto stretches = static_cast<std::size_t>(first.expected.size());
+    std::vector<double> rate(n);
+    for (std::size_t i = 0; i < n; ++i) {
+        rate[i] = fit.series().interval_s * first.expected(static_cast<Eigen::Index>(i * stretches / n));
+    }
+    SampleModel with = fit.model();
+    with.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(std::move(rate))});
+    SampleModel without = fit.model();
+    without.noise = SampleFit(fit.series(), std::move(with), fit.rows(), SampleFit::Noise::near).model().noise;
+    const SampleFit beside(fit.series(), std::move(without), fit.rows(), SampleFit::Noise::held);
+    // Jumps do not wait for the end of a stretch: as short as has nothing to do with any but its neighbours.
+    constexpr double little = 1e-3;
+    std::size_t finer = 4;
+    Stretches all = regress_on_stretches(beside, finer * stretches);
+    while (finer > 1 && all.normal.diagonal(2).cwiseAbs().maxCoeff() > little * all.normal.diagonal().maxCoeff()) {
+        finer /= 2;
+        all = regress_on_stretches(beside, finer * stretches);
+    }
+    Eigen::VectorXd shape(all.right.size());
+    for (Eigen::Index k = 0; k < shape.size(); ++k) {
+        shape(k) = (first.expected(k / static_cast<Eigen::Index>(finer)) - first.rate) / first.step;
+    }
+    return beside.gain_over(fit) + two_states(all.normal, all.right, shape).gain - numbers;
+}
+
+/// Rates of stretches of the record, for a rate that jumps to and fro.
+void test_levels(const SampleFit& fit, Views& views) {
+    constexpr std::size_t stretches = 120;
+    const Stretches all = regress_on_stretches(fit, stretches);
+    const TwoLevels found = two_levels(all.normal - all.of_columns, all.right);
+    // Jumps do not wait for the end of a stretch.
+    constexpr double of_places = 2.0;
+    const double cost = found.cost + of_places * found.changes;
+    SampleView view{
+        {Where::time, std::string(jumping_rate), found.p_value, fmt::format("{} jumps", found.changes), found.merit},
+        cost,
+        [&fit, found] { return Columns{two_level_rate(fit, found.shape)}; }};
+    view.jumps = found.changes > 1;  // one is the library's step
+    // Beside a random rate stretches are not on their own.
+    if (view.jumps && !fit.model().walk && !fit.model().flicker) {
+        const TwoStates states = two_states(all.normal, all.right, found.shape);
+        if (states.step != 0.0) view.refitted = [&fit, states](double) { return merit_of_states(fit, states); };
+    }
+    views.push_back(std::move(view));
+}
+
+void test_jumps(const SampleFit& fit, Views& views) {
+    if (const auto jump = jump_beside_random(fit)) {
+        views.emplace_back().test = test_of(*jump);
+    }
+}
+
+}  // namespace
+
+void view_rates(const SampleFit& fit, Views& views) {
+    test_steps(fit, views);
+    test_powers_of_time(fit, views);
+    test_slow_swings(fit, views);
+    test_settling(fit, views);
+    test_levels(fit, views);
+    test_jumps(fit, views);
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,204 @@
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "analysis/closure/samples/fit/line_search.hpp"
+#include "analysis/closure/samples/fit/repeats_and_witness.hpp"
+#include "analysis/closure/samples/residual/tests.hpp"
+#include "analysis/closure/samples/residual/views.hpp"
+#include "analysis/closure/stats/normality.hpp"
+#include "analysis/closure/stats/p_values.hpp"
+#include "analysis/closure/stats/whiteness.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// A variance that goes up and down at a frequency.
+struct Swing {
+    double cos = 0.0, sin = 0.0;  ///< of its logarithm
+    double gain = 0.0;            ///< of the log-likelihood
+};
+
+/// Of the innovations: fitted by Newton's method.
+Swing swing_of_variance(const SampleFit& fit, double hz) {
+    const auto& e = fit.innovations();
+    const auto phase = line_phase(e.size(), fit.series().rate_hz, LineCourse::still(hz));
+    Swing swing;
+    double mean = 0.0;
+    for (int round = 0; round < 8; ++round) {
+        Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();
+        Eigen::Vector3d slope = Eigen::Vector3d::Zero();
+        swing.gain = 0.0;
+        for (std::size_t i = 0; i < e.size(); ++i) {
+            if (!fit.telling()[i]) continue;
+            const Eigen::Vector3d x(1.0, std::cos(phase[i]), std::sin(phase[i]));
+            const double log_variance = mean * x(0) + swing.cos * x(1) + swing.sin * x(2);
+            const double ratio = e[i] * e[i] * std::exp(-log_variance);
+            swing.gain += 0.5 * (e[i] * e[i] - ratio - log_variance);
+            slope += 0.5 * (ratio - 1.0) * x;
+            curvature += 0.5 * x * x.transpose();
+        }
+        const Eigen::Vector3d step = curvature.ldlt().solve(slope);
+        mean += step(0);
+        swing.cos += step(1);
+        swing.sin += step(2);
+        if (step.norm() < 1e-5) break;
+    }
+    return swing;
+}
+
+/// Gain where it is the readings' errors whose variance does: the noise fitted anew with it. An innovation has the
+/// errors of the readings before as well, and shows less.
+double gain_of_swinging_errors(const SampleFit& fit, double hz, const Swing& seen) {
+    SampleModel model = fit.model();
+    const auto phase = line_phase(1, fit.series().rate_hz, LineCourse::still(hz))[0];
+    // From the phase of the innovations to one that begins with the record.
+    model.noise.swing_hz = hz;
+    model.noise.swing_cos = seen.cos * std::cos(phase) + seen.sin * std::sin(phase);
+    model.noise.swing_sin = seen.sin * std::cos(phase) - seen.cos * std::sin(phase);
+    return SampleFit(fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near).gain_over(fit);
+}
+
+void test_size(const SampleFit& fit, Views& views) {
+    const auto& e = fit.innovations();
+    const Rows& rows = fit.telling();
+    const std::size_t n = e.size();
+    const auto [mean, variance] = squares_of(e, rows);
+    views.push_back({size_over_time(e, rows, 40, 20.0)});
+    // Patterns of the place in the record: mean and size for each remainder.
+    double least = 1.0;
+    std::size_t at = 0;
+    for (std::size_t m = 2; m <= 16; ++m) {
+        double means = 0.0;
+        double sizes = 0.0;
+        std::vector<double> sum(m, 0.0);
+        std::vector<double> squares(m, 0.0);
+        std::vector<double> k(m, 0.0);
+        for (std::size_t i = 0; i < n; ++i) {
+            if (!rows[i]) continue;
+            sum[i % m] += e[i];
+            squares[i % m] += e[i] * e[i] - mean;
+            k[i % m] += 1.0;
+        }
+        for (std::size_t j = 0; j < m; ++j) {
+            if (k[j] < 20.0) continue;
+            means += sum[j] * sum[j] / (k[j] * mean);
+            sizes += squares[j] * squares[j] / (k[j] * variance);
+        }
+        const double p = std::min(chi2_tail(means, static_cast<int>(m)), chi2_tail(sizes, static_cast<int>(m) - 1));
+        if (p < least) {
+            least = p;
+            at = m;
+        }
+    }
+    views.push_back(
+        {{Where::time, "place in the record modulo 2 to 16", of_several(least, 30.0), fmt::format("modulo {}", at)}});
+    const FoundCycle cycle = find_cycle(e, rows, fit.series().rate_hz);
+    const double cost = 2.0 + std::log(cycle.searched);
+    const Swing swing = swing_of_variance(fit, cycle.frequency_hz);
+    SampleView view{{Where::time, std::string(repeating_variance), cycle.p_value,
+                     fmt::format("{:.6g} times a second", cycle.frequency_hz), swing.gain - cost}};
+    view.refitted = [&fit, hz = cycle.frequency_hz, swing, cost](double) {
+        return gain_of_swinging_errors(fit, hz, swing) - cost;
+    };
+    views.push_back(std::move(view));
+}
+
+void test_distribution(const SampleFit& fit, double lattice_arcsec, Views& views) {
+    const auto& e = fit.innovations();
+    const std::size_t n = e.size();
+    // Steps that are not small are no normal noise; sums of them are.
+    const bool steps = lattice_arcsec > 0.2 * fit.sd(n / 2);
+    if (const auto test = fourth_moments(e, fit.telling(), steps ? 16 : 1)) views.push_back({*test});
+    if (lattice_arcsec == 0.0) {
+        // No two values of so many digits are the same by chance, the largest least of all.
+        const auto& x = fit.series().increment;
+        const double high = *std::max_element(x.begin(), x.end());
+        const double low = *std::min_element(x.begin(), x.end());
+        const double tolerance = 1e-9 * (high - low);
+        // On one straight line between two readings of a source all are the same.
+        const bool on_lines = fit.model().noise.from_hz > 0.0;
+        int ties = 0;
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            if (on_lines && i > 0 && std::abs(x[i] - x[i - 1]) <= tolerance) continue;
+            ties += x[i] > high - tolerance || x[i] < low + tolerance ? 1 : 0;
+        }
+        if (ties > 4) {
+            views.push_back(
+                {{Where::amplitude, "values at the end of their range", 0.0, fmt::format("{} of them", ties)}});
+        }
+    }
+}
+
+}  // namespace
+
+void view_sizes(const SampleFit& fit, double lattice_arcsec, Views& views) {
+    test_size(fit, views);
+    test_distribution(fit, lattice_arcsec, views);
+}
+
+Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
+    const auto& e = fit.innovations();
+    const std::size_t n = e.size();
+    // Of rows that tell something: of a record with many to every reading of its source these are few.
+    std::size_t telling = 0;
+    for (std::size_t i = 0; i < n; ++i) telling += rows[i] && !fit.settled(i) ? 1 : 0;
+    constexpr std::size_t fewest = 50;
+    const std::size_t length = std::min(n, std::max(fewest * n / std::max<std::size_t>(telling, 1), n / 500));
+    const std::size_t windows = n / length;
+    std::vector<double> power(windows, 0.0);
+    std::vector<double> freedom(windows, 0.0);
+    for (std::size_t w = 0; w < windows; ++w) {
+        // About their mean: a rate that is another than elsewhere disturbs nothing.
+        double sum = 0.0;
+        double squares = 0.0;
+        double count = 0.0;
+        for (std::size_t i = w * length; i < (w + 1) * length; ++i) {
+            if (!rows[i] || fit.settled(i)) continue;
+            sum += e[i];
+            squares += e[i] * e[i];
+            count += 1.0;
+        }
+        if (count < 2.0) continue;
+        freedom[w] = count - 1.0;
+        power[w] = (squares - sum * sum / count) / freedom[w];
+    }
+    // Of those that have rows that count.
+    std::vector<double> sorted;
+    for (std::size_t w = 0; w < windows; ++w) {
+        if (freedom[w] > 0.0) sorted.push_back(power[w]);
+    }
+    if (sorted.empty()) sorted.push_back(0.0);
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    const double usual = std::max(*middle, 1e-300);
+    Disturbed disturbed;
+    disturbed.rows.assign(n, 0);
+    disturbed.length_s = static_cast<double>(length) * fit.series().interval_s;
+    double count = 0.0;
+    for (std::size_t w = 0; w < windows; ++w) {
+        if (freedom[w] == 0.0) continue;
+        const double ratio = power[w] / usual;
+        const double p =
+            of_several(chi2_tail(ratio * freedom[w], static_cast<int>(freedom[w])), static_cast<double>(windows));
+        if (ratio > disturbed.worst) {
+            disturbed.worst = ratio;
+            disturbed.at_s = fit.series().time_s[w * length];
+            disturbed.p_value = p;
+        }
+        if (ratio < 2.0 || p > 1e-6) continue;
+        // What comes up and goes down reaches into its neighbours.
+        const std::size_t a = w > 0 ? (w - 1) * length : 0;
+        const std::size_t b = w + 2 < windows ? (w + 2) * length : n;
+        for (std::size_t i = a; i < b; ++i) disturbed.rows[i] = 1;
+    }
+    for (const auto row : disturbed.rows) count += row;
+    disturbed.share = count / static_cast<double>(n);
+    return disturbed;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,209 @@
+#include "analysis/closure/samples/rounded/rounded.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "analysis/closure/stats/p_values.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+double variance_of_steps(double step_arcsec) { return step_arcsec * step_arcsec / 12.0; }
+
+}  // namespace
+
+void RoundedSamples::restore() {
+    series_.increment = measured_;
+    step_ = 0.0;
+    draws_ = 0;
+    summit_.reset();
+    wandering_.reset();
+}
+
+bool RoundedSamples::show(const SampleFit& fit, double step_arcsec) {
+    if (!(step_arcsec > 0.0) || fit.model().noise.from_hz > 0.0) return false;
+    const double sd = fit.sd(fit.series().size() / 2);
+    return rounding_shows(step_arcsec, std::sqrt(std::max(0.0, sd * sd - variance_of_steps(step_arcsec))));
+}
+
+std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double step_arcsec) {
+    constexpr int rounds = 2;
+    constexpr int draws = 2;
+    constexpr double least = 0.02;
+    constexpr std::size_t first_look = 6000;
+    constexpr int most_looks = 12;
+    step_ = step_arcsec;
+    SampleModel model = fit.model();
+    double& angle = model.noise.angle_arcsec;
+    angle = std::sqrt(std::max(angle * angle - variance_of_steps(step_), least * least * step_ * step_));
+    SampleFit now(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
+    // The rate's noise may have grown by what the rounding is on the way from one step to the next.
+    filters_ = filters_for(step_, now.sd(measured_.size() / 2));
+    summit_ = towards_summit(now, rounded(), first_look, most_looks);
+    wandering_.reset();
+    const SampleFit there(series_, summit_->model, fit.rows(), SampleFit::Noise::all_held);
+    filters_ = filters_for(step_, there.sd(measured_.size() / 2));
+    auto drawn = draw_by(summit_->model, summit_->model, fit.rows());
+    for (int round = 0; round < rounds; ++round) drawn = draw(std::move(drawn), draws);
+    return drawn;
+}
+
+std::shared_ptr<SampleFit> RoundedSamples::draw_by(const SampleModel& drawing, const SampleModel& model,
+                                                   const Rows& rows) {
+    const SampleFit by(series_, drawing, rows, SampleFit::Noise::all_held);
+    series_.increment = unround(by, rounded(), ++draws_);
+    return std::make_shared<SampleFit>(series_, model, rows, SampleFit::Noise::near);
+}
+
+std::shared_ptr<SampleFit> RoundedSamples::draw(std::shared_ptr<SampleFit> fit, int rounds) {
+    for (int round = 0; round < rounds; ++round) fit = draw_by(fit->model(), fit->model(), fit->rows());
+    const SampleModel drawing = likeliest(*fit);
+    const bool beside_walk = drawing.walk && !fit->model().walk;
+    return draw_by(drawing, beside_walk ? fit->model() : drawing, fit->rows());
+}
+
+/// By how much the variance of a rate that walks grows, as means of stretches differ from one to the next; zero where
+/// white noise alone may do that.
+double RoundedSamples::wander(const SampleFit& fit) const {
+    constexpr std::size_t stretches = 16;
+    constexpr double by_chance = 2.5;  // 15 degrees of freedom, one in a thousand
+    const std::vector<double> known = fit.determined();
+    const std::size_t length = measured_.size() / stretches;
+    const double length_s = series_.interval_s * static_cast<double>(length);
+    double before = 0.0;
+    double squares = 0.0;
+    for (std::size_t k = 0; k < stretches; ++k) {
+        double sum = 0.0;
+        for (std::size_t i = k * length; i < (k + 1) * length; ++i) sum += measured_[i] - known[i];
+        if (k > 0) squares += std::pow((sum - before) / length_s, 2) / static_cast<double>(stretches - 1);
+        before = sum;
+    }
+    const SampleNoise& noise = fit.model().noise;
+    const double of_readings = noise.angle_arcsec * noise.angle_arcsec + variance_of_steps(step_);
+    const double white =
+        2.0 * noise.rate_arcsec_rt_s * noise.rate_arcsec_rt_s / length_s + 6.0 * of_readings / (length_s * length_s);
+    return squares > by_chance * white ? 1.5 * squares / length_s : 0.0;
+}
+
+/// What the model lacks is drawn as its noise makes it. A slow rate that it lacks is drawn beside a walk, which follows
+/// it, where that is likelier by far.
+SampleModel RoundedSamples::likeliest(const SampleFit& fit) {
+    constexpr int climbs = 2;
+    constexpr int climbs_from_afar = 6;
+    constexpr double by_far = 12.0;
+    summit_ = find_summit(fit, rounded(), climbs, near(fit.model()));
+    const double walk = fit.model().walk || fit.model().flicker ? 0.0 : wander(fit);
+    if (walk == 0.0) return summit_->model;
+    SampleModel beside = summit_->model;
+    beside.walk = true;
+    beside.noise.walk_arcsec2_s3 = walk;
+    const SampleFit start(series_, std::move(beside), fit.rows(), SampleFit::Noise::all_held);
+    wandering_ =
+        towards_summit(start, rounded(), measured_.size(), climbs_from_afar, wandering_ ? &*wandering_ : nullptr);
+    return wandering_->log_likelihood > summit_->log_likelihood + by_far ? wandering_->model : summit_->model;
+}
+
+const RoundedSummit* RoundedSamples::near(const SampleModel& model) const {
+    if (model.walk && wandering_ && !(summit_ && summit_->model.walk)) return &*wandering_;
+    return summit_ ? &*summit_ : nullptr;
+}
+
+ResidualTest RoundedSamples::test(const SampleFit& fit) const {
+    // Beside steps that are very large few of the filters hit the moments at which the angle crosses them.
+    constexpr double of_filters = 0.1;
+    const Foretold foretold = foretell_rounded(fit, rounded());
+    double off = 0.0;
+    double said = 0.0;
+    double of_squares = 0.0;
+    for (std::size_t i = 0; i < measured_.size(); ++i) {
+        if (!fit.rows()[i]) continue;
+        const double variance = foretold.variance[i];
+        off += std::pow(measured_[i] - foretold.mean[i], 2);
+        said += variance;
+        of_squares += foretold.fourth_moment[i] - variance * variance;
+    }
+    const double z = (std::abs(off - said) - of_filters * said) / std::sqrt(std::max(of_squares, 1e-300));
+    return {Where::amplitude, "rounded increments beside what is foretold of them", z > 0.0 ? chi2_tail(z * z, 1) : 1.0,
+            fmt::format("off by {:.3g} of what is said", std::sqrt(off / std::max(said, 1e-300)))};
+}
+
+SampleScore RoundedSamples::score_of(const SampleFit& fit, const Rows& reported) const {
+    const Foretold foretold = foretell_rounded(fit, rounded());
+    SampleScore score;
+    double count = 0.0;
+    for (std::size_t i = 0; i < reported.size(); ++i) {
+        if (fit.rows()[i]) score.log_likelihood += foretold.log_probability[i];
+        if (!reported[i]) continue;
+        score.error += std::pow(measured_[i] - foretold.mean[i], 2);
+        score.floor += foretold.variance[i];
+        score.log_score += foretold.log_probability[i] - std::log(step_);
+        count += 1.0;
+    }
+    score.error = std::sqrt(score.error / std::max(count, 1.0));
+    score.floor = std::sqrt(score.floor / std::max(count, 1.0));
+    return score;
+}
+
+SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
+                                         const std::function<SampleFigures(const SampleFit&)>& figures) {
+    constexpr int several = 8;
+    constexpr int climbs = 4;
+    summit_ = find_summit(fit, rounded(), climbs, near(fit.model()));
+    const RoundedSummit& summit = *summit_;
+    std::vector<SampleFigures> all;
+    for (int k = 0; k < several; ++k) all.push_back(figures(*draw_by(summit.model, summit.model, fit.rows())));
+    SampleFigures mean = all.front();
+    const auto combine = [&](const auto& of) {
+        double sum = 0.0;
+        double squares = 0.0;
+        double within = 0.0;
+        for (SampleFigures& one : all) {
+            sum += of(one).value / several;
+            within += of(one).sd * of(one).sd / several;
+        }
+        for (SampleFigures& one : all) squares += std::pow(of(one).value - sum, 2) / (several - 1);
+        of(mean).value = sum;
+        of(mean).sd = std::sqrt(within + (1.0 + 1.0 / several) * squares);
+    };
+    for (std::size_t k = 0; k < mean.base.size(); ++k) {
+        combine([k](SampleFigures& of) -> Estimate& { return of.base[k]; });
+    }
+    for (std::size_t s = 0; s < mean.steps.size(); ++s) {
+        for (std::size_t k = 0; k < mean.steps[s].size(); ++k) {
+            combine([s, k](SampleFigures& of) -> Estimate& { return of.steps[s][k]; });
+        }
+    }
+    // Draws by one model are less apart than models that would do.
+    const SampleNoise& noise = summit.model.noise;
+    const auto known_to = [&](Estimate& estimate, double value, std::size_t of) {
+        if (!std::isfinite(summit.noise_log_sd[of])) return;
+        estimate.value = value;
+        estimate.sd = std::max(estimate.sd, value * summit.noise_log_sd[of]);
+    };
+    for (Estimate& estimate : mean.base) {
+        if (estimate.name == "mean_rate_deg_h") estimate.sd *= summit.column_times.front();
+        if (estimate.name == "white_angle_arcsec") known_to(estimate, noise.angle_arcsec, 0);
+        if (estimate.name == "white_rate_deg_rt_h") {
+            known_to(estimate, noise.rate_arcsec_rt_s * units::deg_rt_h_per_arcsec_rt_s, 1);
+        }
+    }
+    for (std::size_t s = 0; s < mean.steps.size(); ++s) {
+        for (Estimate& estimate : mean.steps[s]) {
+            double times = 1.0;
+            for (std::size_t k = 0; k < summit.column_times.size(); ++k) {
+                if (summit.model.columns[k].effect == estimate.effect) times = std::max(times, summit.column_times[k]);
+            }
+            estimate.sd *= times;
+            if (estimate.effect == "bias_instability") known_to(estimate, summit.model.flicker_deg_h, 2);
+            if (estimate.effect == "rate_random_walk") known_to(estimate, 60.0 * std::sqrt(noise.walk_arcsec2_s3), 2);
+        }
+    }
+    return mean;
+}
+
+}  // namespace ringlock::closure

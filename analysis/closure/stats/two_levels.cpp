@@ -1,0 +1,72 @@
+#include "analysis/closure/stats/two_levels.hpp"
+
+#include <algorithm>
+#include <boost/math/special_functions/binomial.hpp>
+#include <cmath>
+#include <vector>
+
+#include "analysis/closure/stats/p_values.hpp"
+
+namespace ringlock::closure {
+
+TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right) {
+    const Eigen::Index n = right.size();
+    const double floor = 1e-9 * normal.diagonal().maxCoeff();
+    if (!(floor > 0.0)) return {};
+    const double place = std::log(static_cast<double>(n - 1));
+    constexpr double of_levels = 1.0;  // the mean of both belongs to the bias
+    std::vector<int> high(static_cast<std::size_t>(n), 0);
+    const auto level = [&](Eigen::Index k) { return high[static_cast<std::size_t>(k)]; };
+    Eigen::VectorXd shape = Eigen::VectorXd::Zero(n);
+    TwoLevels best;
+    // Beyond these what is gained is rounding, which could be had for ever.
+    constexpr double gained = 1e-6;  // of the merit
+    const Eigen::Index most_steps = 4 * n;
+    for (Eigen::Index taken = 0; taken < most_steps; ++taken) {
+        const Eigen::VectorXd pull = normal * shape;
+        const double squares = shape.dot(pull);
+        const double product = shape.dot(right);
+        TwoLevels step = best;
+        Eigen::Index from = 0;
+        Eigen::Index to = 0;
+        for (Eigen::Index a = 0; a < n; ++a) {
+            double new_product = product;
+            double new_squares = squares;
+            Eigen::VectorXd cross = Eigen::VectorXd::Zero(n);  // normal times what has been turned over so far
+            for (Eigen::Index b = a; b < n; ++b) {
+                const double sign = 1.0 - 2.0 * level(b);
+                new_product += sign * right(b);
+                new_squares += sign * 2.0 * (pull(b) + cross(b)) + normal(b, b);
+                cross += sign * normal.col(b);
+                if (new_squares < floor) continue;
+                // A jump at either end of the range comes where there was none, and goes where there was one.
+                int changes = best.changes;
+                if (a > 0) changes += level(a) == level(a - 1) ? 1 : -1;
+                if (b + 1 < n) changes += level(b) == level(b + 1) ? 1 : -1;
+                if (changes == 0) continue;
+                const double chi2 = new_product * new_product / new_squares;
+                const double cost = of_levels + changes * place;
+                const double merit = 0.5 * chi2 - cost;
+                if (!(merit > step.merit)) continue;
+                step = {chi2, changes, merit, cost};
+                from = a;
+                to = b;
+            }
+        }
+        if (!(step.merit > best.merit + gained * std::abs(best.merit))) break;
+        best = step;
+        for (Eigen::Index k = from; k <= to; ++k) {
+            high[static_cast<std::size_t>(k)] ^= 1;
+            shape(k) = level(k);
+        }
+    }
+    if (best.changes == 0) return {};
+    const auto changes = static_cast<unsigned>(best.changes);
+    const double courses = boost::math::binomial_coefficient<double>(static_cast<unsigned>(n - 1), changes) *
+                           std::exp2(static_cast<double>(changes));
+    best.shape = shape;
+    best.p_value = of_several(chi2_tail(best.chi2, 1), courses);
+    return best;
+}
+
+}  // namespace ringlock::closure

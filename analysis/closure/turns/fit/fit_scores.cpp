@@ -1,0 +1,164 @@
+// What a fit tells: parameters with their errors, and scores of what it does not have.
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "analysis/closure/turns/fit/fit.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+Eigen::MatrixXd TurnFit::whitened_columns(Eigen::VectorXd& scale) const {
+    const auto column_of = [this](std::size_t k) -> const Regressor& { return columns_[k].of; };
+    return counted(*whitening_, prediction_.frame, columns_.size(), column_of, scale);
+}
+
+/// Observed information, in units of the columns' norms. Squares of whitened columns are that but for one thing: what
+/// the lock-in makes of a reading is in the column of a threshold, goes with the very noise of that reading, and is no
+/// information where the variance of the innovation says so as well.
+Eigen::MatrixXd TurnFit::information(Eigen::VectorXd& scale) const {
+    constexpr double part = 0.1;  // of a standard error
+    const Eigen::MatrixXd x = whitened_columns(scale);
+    const Eigen::MatrixXd squares = x.transpose() * x;
+    Eigen::MatrixXd normal = squares;
+    const TurnNoise noise = model_->noise(parameters_);
+    const auto count = static_cast<Eigen::Index>(columns_.size());
+    for (Eigen::Index k = 0; k < count; ++k) {
+        const Regressor& of = columns_[static_cast<std::size_t>(k)].of;
+        if (of.slope.empty()) continue;
+        const auto slopes_at = [&](double value) {
+            TurnFrame frame = prediction_.frame;
+            std::vector<double> rest = rest_;
+            of.take(value, rest, frame);
+            const Whitening whitening(frame, noise);
+            const Eigen::VectorXd y = counted(whitening, rest);
+            Eigen::VectorXd slopes(count);
+            for (Eigen::Index j = 0; j < count; ++j) {
+                const Regressor& by = columns_[static_cast<std::size_t>(j)].of;
+                slopes(j) = by.slope.empty() ? counted(whitening, frame, by).dot(y)
+                                             : slope_of_objective(frame, rest, by, 1e-3 / scale(j));
+            }
+            return Eigen::VectorXd(slopes.cwiseQuotient(scale));
+        };
+        normal.col(k) = (slopes_at(-part / scale(k)) - slopes_at(part / scale(k))) / (2.0 * part);
+        normal.row(k) = normal.col(k).transpose();
+    }
+    add_priors(scale, normal, nullptr);
+    if (normal.ldlt().isPositive()) return normal;
+    normal = squares;  // at the end of a range, or where nothing tells
+    add_priors(scale, normal, nullptr);
+    return normal;
+}
+
+std::vector<Estimate> TurnFit::estimates() const {
+    Eigen::VectorXd scale;
+    const Eigen::MatrixXd normal = information(scale);
+    const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
+    TurnParameters found = parameters_;
+    std::vector<Estimate> estimates;
+    for (std::size_t k = nuisances(); k < columns_.size(); ++k) {
+        Estimate estimate{columns_[k].effect, columns_[k].name, 0.0, 0.0};
+        const auto index = static_cast<Eigen::Index>(k);
+        estimate.sd = std::sqrt(std::max(covariance(index, index), 0.0)) / scale(index);
+        if (estimate.effect.empty()) {
+            estimate.value = estimate.name == "bias_deg_h" ? parameters_.bias_deg_h : parameters_.threshold_deg_h;
+        } else {
+            estimate.value = found.find(estimate.effect)->values.at(estimate.name);
+        }
+        estimates.push_back(std::move(estimate));
+    }
+    // Times and phases by the record's clock, which need not begin with the first turn.
+    const double start_s = model_->series().start_s;
+    for (const ActiveEffect& active : parameters_.effects) {
+        if (!active.effect->adds_angle()) continue;
+        std::optional<std::size_t> frequency;
+        std::optional<std::size_t> phase;
+        for (const effects::Parameter& parameter : active.effect->parameters()) {
+            for (std::size_t k = 0; k < estimates.size(); ++k) {
+                if (estimates[k].effect != active.effect->name() || estimates[k].name != parameter.name) continue;
+                if (parameter.role == effects::Role::time) estimates[k].value += start_s;
+                if (parameter.role == effects::Role::frequency) frequency = k;
+                if (parameter.role == effects::Role::phase) phase = k;
+            }
+        }
+        if (!frequency || !phase) continue;
+        const auto f = static_cast<Eigen::Index>(nuisances() + *frequency);
+        const auto p = static_cast<Eigen::Index>(nuisances() + *phase);
+        const double turned = units::two_pi * start_s;
+        estimates[*phase].value =
+            std::remainder(estimates[*phase].value - turned * estimates[*frequency].value, units::two_pi);
+        const double variance = covariance(p, p) / (scale(p) * scale(p)) +
+                                turned * turned * covariance(f, f) / (scale(f) * scale(f)) -
+                                2.0 * turned * covariance(p, f) / (scale(p) * scale(f));
+        estimates[*phase].sd = std::sqrt(std::max(variance, 0.0));
+    }
+    add_noise_estimates(estimates);
+    return estimates;
+}
+
+TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors, const TurnParameters& noise) const {
+    constexpr int most = 8;
+    constexpr double gained = 0.01;  // of the log-likelihood, by another pass
+    Regression regression{0.0, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(regressors.size()))};
+    TurnParameters trial = noise;
+    TurnFrame frame = prediction_.frame;
+    std::vector<double> rest = rest_;
+    const std::size_t own = columns_.size();
+    const auto column_of = [&](std::size_t k) -> const Regressor& {
+        return k < own ? columns_[k].of : regressors[k - own];
+    };
+    const double before = objective(parameters_, rest_);
+    for (int pass = 0; pass < most; ++pass) {
+        const Whitening whitening(frame, model_->noise(trial));
+        const Eigen::VectorXd y = counted(whitening, rest);
+        Eigen::VectorXd scale;
+        const Eigen::MatrixXd x = counted(whitening, frame, own + regressors.size(), column_of, scale);
+        const Eigen::MatrixXd normal = x.transpose() * x;
+        const Eigen::VectorXd right = x.transpose() * y;
+        Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(normal);
+        const Eigen::VectorXd value = decomposition.solve(right).cwiseQuotient(scale);
+        for (std::size_t k = 0; k < own + regressors.size(); ++k) {
+            column_of(k).take(value(static_cast<Eigen::Index>(k)), rest, frame);
+        }
+        regression.value += value.tail(static_cast<Eigen::Index>(regressors.size()));
+        trial = with_noise_of(frame, trial, rest);
+        const double gain = before - objective(frame, trial, rest);
+        const bool arrived = pass > 0 && gain - regression.gain < gained;
+        regression.gain = gain;
+        if (arrived) break;
+    }
+    regression.noise = std::move(trial);
+    return regression;
+}
+
+Eigen::VectorXd TurnFit::whitened(const Regressor& regressor) const {
+    Eigen::VectorXd column = counted(*whitening_, prediction_.frame, regressor);
+    const double all = column.norm();
+    column -= basis_ * (basis_.transpose() * column);
+    // What the model's own parameters can do as well leaves rounding only.
+    constexpr double told_apart = 1e-5;
+    if (column.norm() < told_apart * all) column.setZero();
+    return column;
+}
+
+Eigen::VectorXd TurnFit::residual() const { return below(innovations_, -1.0); }
+
+TurnFit::Score TurnFit::score(const std::vector<Regressor>& regressors) const {
+    const auto k = static_cast<Eigen::Index>(regressors.size());
+    const Eigen::VectorXd y = residual();
+    Eigen::MatrixXd x(y.size(), k);
+    oneapi::tbb::parallel_for(Eigen::Index{0}, k,
+                              [&](Eigen::Index j) { x.col(j) = whitened(regressors[static_cast<std::size_t>(j)]); });
+    Score score;
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(x.transpose() * x);
+    const Eigen::VectorXd projected = x.transpose() * y;
+    score.covariance = decomposition.pseudoInverse();
+    score.value = score.covariance * projected;
+    score.chi2 = projected.dot(score.value);
+    score.rank = static_cast<int>(decomposition.rank());
+    return score;
+}
+
+}  // namespace ringlock::closure

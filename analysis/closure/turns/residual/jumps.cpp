@@ -1,0 +1,230 @@
+#include "analysis/closure/turns/residual/jumps.hpp"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "analysis/closure/stats/p_values.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// The angle of a rate that is one or zero, and goes from either to the other at each of the jumps; `on` at first.
+std::vector<double> two_level_angle(const std::vector<double>& time, const std::vector<double>& jumps, double on) {
+    std::vector<double> sum(time.size(), 0.0);
+    std::size_t next = 0;
+    for (std::size_t i = 1; i < time.size(); ++i) {
+        double from = time[i - 1];
+        sum[i] = sum[i - 1];
+        for (; next < jumps.size() && jumps[next] < time[i]; ++next) {
+            sum[i] += on * (std::max(jumps[next], from) - from);
+            from = std::max(jumps[next], from);
+            on = 1.0 - on;
+        }
+        sum[i] += on * (time[i] - from);
+    }
+    return sum;
+}
+
+/// A rate that is at one of two levels, and jumps from either to the other.
+struct Jumping {
+    std::vector<double> jumps;  ///< [s], in order
+    double on = 0.0;            ///< at first: one or zero
+    double merit = -std::numeric_limits<double>::infinity();
+    TurnParameters noise = {};  ///< beside it
+
+    std::vector<double> angle(const TurnFit& fit) const {
+        return two_level_angle(fit.model().series().time_s, jumps, on);
+    }
+};
+
+/// The jumps of stretches moved to where they explain most under the noise of the fit.
+Jumping placed(const TurnFit& fit, const TwoLevels& levels) {
+    const double stretch_s = fit.model().series().time_s.back() / static_cast<double>(levels.shape.size());
+    Jumping found{.jumps = {}, .on = levels.shape(0)};
+    for (Eigen::Index k = 1; k < levels.shape.size(); ++k) {
+        if (levels.shape(k) != levels.shape(k - 1)) found.jumps.push_back(stretch_s * static_cast<double>(k));
+    }
+    const auto explained = [&fit](const Jumping& by) {
+        return std::is_sorted(by.jumps.begin(), by.jumps.end()) ? fit.score({by.angle(fit)}).chi2 : 0.0;
+    };
+    double best = explained(found);
+    for (double step_s = 0.5 * stretch_s; step_s > 0.02 * stretch_s; step_s *= 0.5) {
+        for (std::size_t k = 0; k < found.jumps.size(); ++k) {
+            std::array moved{found, found};
+            std::array<double, 2> chi2{};
+            moved[0].jumps[k] -= step_s;
+            moved[1].jumps[k] += step_s;
+            oneapi::tbb::parallel_for(std::size_t{0}, moved.size(),
+                                      [&](std::size_t i) { chi2[i] = explained(moved[i]); });
+            const std::size_t better = chi2[1] > chi2[0] ? 1 : 0;
+            if (!(chi2[better] > best)) continue;
+            best = chi2[better];
+            found = std::move(moved[better]);
+        }
+    }
+    return found;
+}
+
+/// The merit of jumps, and the noise fitted anew beside them, from one that is near.
+void judge(const TurnFit& fit, Jumping& jumping, const TurnParameters& near) {
+    constexpr double of_levels = 1.0;
+    const double place = std::log(static_cast<double>(stretches_of_levels - 1)) + cost_of_exact_places;
+    TurnFit::Regression regression = fit.regress({jumping.angle(fit)}, near);
+    jumping.merit = regression.gain - cost_of_amplitudes(regression.gain, 1) - of_levels -
+                    place * static_cast<double>(jumping.jumps.size());
+    jumping.noise = std::move(regression.noise);
+}
+
+/// Jumps moved to where they explain most with the noise that they leave: one that comes later leaves a step of the
+/// angle, so that all of them are one regression (Gauss and Newton).
+void move_jumps(const TurnFit& fit, Jumping& found) {
+    constexpr int most = 12;
+    constexpr double gained = 0.1;
+    constexpr double of_all = 1e-4;  // where jumps explain very much, what is compared is as rough
+    const auto& time = fit.model().series().time_s;
+    for (int pass = 0; pass < most && !found.jumps.empty(); ++pass) {
+        std::vector<Regressor> columns{found.angle(fit)};
+        double sign = found.on > 0.5 ? 1.0 : -1.0;  // a later jump stays longer at the level before it
+        for (const double jump : found.jumps) {
+            std::vector<double> late(time.size());
+            for (std::size_t i = 0; i < time.size(); ++i) late[i] = time[i] > jump ? sign : 0.0;
+            columns.emplace_back(std::move(late));
+            sign = -sign;
+        }
+        const Eigen::VectorXd value = fit.with_noise(found.noise)->score(columns).value;
+        const double before = found.merit;
+        // Too far, where jumps are near each other.
+        for (double share = 1.0; share > 0.1 && !(found.merit > before); share *= 0.5) {
+            Jumping moved{.jumps = found.jumps, .on = found.on};
+            for (std::size_t k = 0; k < moved.jumps.size(); ++k) {
+                moved.jumps[k] += share * value(static_cast<Eigen::Index>(k) + 1) / value(0);
+            }
+            if (!std::is_sorted(moved.jumps.begin(), moved.jumps.end())) continue;
+            if (!(moved.jumps.front() > 0.0 && moved.jumps.back() < time.back())) continue;
+            judge(fit, moved, found.noise);
+            if (moved.merit > found.merit) found = std::move(moved);
+        }
+        if (found.merit < before + std::max(gained, of_all * before)) break;
+    }
+}
+
+Jumping without_stay(const Jumping& all, std::size_t k) {
+    Jumping without{.jumps = all.jumps, .on = all.on};
+    const auto first = without.jumps.begin() + static_cast<std::ptrdiff_t>(k);
+    without.jumps.erase(first, first + 2);
+    return without;
+}
+
+/// Those that explain least under the noise as it is, first.
+std::vector<std::size_t> stays_by_use(const TurnFit& fit, const Jumping& all) {
+    const auto beside = fit.with_noise(all.noise);
+    std::vector<double> left(all.jumps.size() - 1);
+    oneapi::tbb::parallel_for(std::size_t{0}, left.size(),
+                              [&](std::size_t k) { left[k] = beside->score({without_stay(all, k).angle(fit)}).chi2; });
+    std::vector<std::size_t> order(left.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return left[a] > left[b]; });
+    return order;
+}
+
+/// Short stays that only made up for stretches that end elsewhere than jumps are no longer needed: half of all at once,
+/// or a quarter and so on, then each of those that explain least.
+bool drop_some(const TurnFit& fit, Jumping& found) {
+    constexpr std::size_t singles = 8;
+    if (found.jumps.size() < 3) return false;
+    const std::vector<std::size_t> order = stays_by_use(fit, found);
+    const auto better = [&](Jumping without) {
+        judge(fit, without, found.noise);
+        if (!(without.merit > found.merit)) return false;
+        found = std::move(without);
+        return true;
+    };
+    for (std::size_t most = found.jumps.size() / 2 - 1; most > 1; most /= 2) {
+        std::vector<std::size_t> dropped;  // whose jumps are no other's
+        for (const std::size_t k : order) {
+            const auto beside_it = [&](std::size_t other) { return other + 1 >= k && other <= k + 1; };
+            if (dropped.size() < most && std::none_of(dropped.begin(), dropped.end(), beside_it)) dropped.push_back(k);
+        }
+        std::sort(dropped.rbegin(), dropped.rend());
+        Jumping without{.jumps = found.jumps, .on = found.on};
+        for (const std::size_t k : dropped) without = without_stay(without, k);
+        if (better(std::move(without))) return true;
+    }
+    for (std::size_t i = 0; i < std::min(singles, order.size()); ++i) {
+        if (better(without_stay(found, order[i]))) return true;
+    }
+    return false;
+}
+
+bool drop_stays(const TurnFit& fit, Jumping& found) {
+    bool dropped = false;
+    while (drop_some(fit, found)) dropped = true;
+    return dropped;
+}
+
+Jumping with_their_noise(const TurnFit& fit, Jumping found, const TurnParameters& near) {
+    judge(fit, found, near);
+    move_jumps(fit, found);
+    while (drop_stays(fit, found)) move_jumps(fit, found);
+    return found;
+}
+
+}  // namespace
+
+TwoLevels levels_of_stretches(const TurnFit& fit, std::size_t stretches) {
+    const auto& time = fit.model().series().time_s;
+    const auto ramp_of = [&time, stretches](std::size_t k) {
+        const double length = time.back() / static_cast<double>(stretches);
+        const double start = length * static_cast<double>(k);
+        std::vector<double> ramp(time.size());
+        for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::clamp(time[i] - start, 0.0, length);
+        return ramp;
+    };
+    const Eigen::VectorXd residual = fit.residual();
+    Eigen::MatrixXd ramps(residual.size(), static_cast<Eigen::Index>(stretches));
+    oneapi::tbb::parallel_for(std::size_t{0}, stretches, [&](std::size_t k) {
+        ramps.col(static_cast<Eigen::Index>(k)) = fit.whitened(ramp_of(k));
+    });
+    // Squares in parts that are as much work each, the lower triangle of them.
+    constexpr Eigen::Index at_once = 24;
+    Eigen::MatrixXd squares(ramps.cols(), ramps.cols());
+    oneapi::tbb::parallel_for(Eigen::Index{0}, (ramps.cols() + at_once - 1) / at_once, [&](Eigen::Index part) {
+        const Eigen::Index first = part * at_once;
+        const Eigen::Index some = std::min(at_once, ramps.cols() - first);
+        squares.block(first, first, ramps.cols() - first, some).noalias() =
+            ramps.rightCols(ramps.cols() - first).transpose() * ramps.middleCols(first, some);
+    });
+    return two_levels(squares.selfadjointView<Eigen::Lower>(), ramps.transpose() * residual);
+}
+
+std::vector<double> placed_jumps(const TurnFit& fit, const TwoLevels& levels) { return placed(fit, levels).angle(fit); }
+
+double merit_of_jumps(const TurnFit& fit, const TwoLevels& levels, double rival) {
+    constexpr int most = 4;
+    constexpr std::size_t finer = 3;
+    constexpr double near = 0.9;
+    Jumping best = placed(fit, levels);
+    judge(fit, best, fit.parameters());
+    if (best.merit < near * rival) return best.merit;
+    const TurnParameters noise = best.noise;
+    best = with_their_noise(fit, std::move(best), noise);
+    for (int pass = 0; pass < most; ++pass) {
+        const auto beside = fit.with_noise(best.noise);
+        const TwoLevels again = levels_of_stretches(*beside, finer * stretches_of_levels);
+        if (again.changes == 0) break;
+        Jumping other = with_their_noise(fit, placed(*beside, again), best.noise);
+        if (!(other.merit > best.merit)) break;
+        best = std::move(other);
+    }
+    return best.merit;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,119 @@
+#include "analysis/closure/turns/residual/size_over_phase.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <boost/math/special_functions/erf.hpp>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "analysis/closure/stats/p_values.hpp"
+#include "analysis/closure/stats/whiteness.hpp"
+#include "analysis/closure/turns/model/kicks.hpp"
+#include "analysis/closure/turns/model/phase_table.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// The normal deviate that is as rare as an innovation of that size over its standard deviation: a few phases that
+/// hardly ever come weigh too much for squares.
+double size_deviate(double size) {
+    const double rarity = std::erfc(size / std::numbers::sqrt2);
+    return std::numbers::sqrt2 * boost::math::erfc_inv(2.0 * std::clamp(rarity, 1e-300, 1.0 - 1e-15));
+}
+
+/// The size that has that deviate.
+double size_of(double deviate) {
+    return std::numbers::sqrt2 * boost::math::erfc_inv(0.5 * std::erfc(deviate / std::numbers::sqrt2));
+}
+
+/// Cosine and sine of a phase and of its double.
+using Harmonics = Eigen::Vector4d;
+Harmonics harmonics_of(double phase_rad) {
+    return {std::cos(phase_rad), std::sin(phase_rad), std::cos(2.0 * phase_rad), std::sin(2.0 * phase_rad)};
+}
+
+/// An innovation is a part of the phase that comes of it: where phases are foretold alike turn after turn, sizes follow
+/// the phase even if nothing is missing. Means of harmonics of the phase psi times the size's deviate, with
+///
+///     psi = foretold + sd (normal innovation) + before(psi),
+///
+/// the last what the lock-in adds before the turn.
+PhaseTable<Harmonics> size_by_phase(const TurnKicks& kicks, int direction, double sd_rad) {
+    constexpr double end = 5.0;
+    const int points = static_cast<int>(std::ceil(2.0 * end * std::max(2.0, 2.0 * sd_rad)));
+    const double step = 2.0 * end / points;
+    return PhaseTable<Harmonics>([&](double foretold_rad) {
+        Harmonics mean = Harmonics::Zero();
+        for (int k = 0; k <= points; ++k) {
+            const double deviate = k * step - end;
+            const double weight = 0.5 * deviate * step * std::exp(-0.5 * deviate * deviate) / std::sqrt(units::two_pi);
+            const double size_rad = sd_rad * size_of(deviate);
+            for (const double innovation_rad : {size_rad, -size_rad}) {
+                mean += weight * harmonics_of(kicks.phase_after(direction, foretold_rad + innovation_rad));
+            }
+        }
+        return mean;
+    });
+}
+
+}  // namespace
+
+ResidualTest size_over_phase(const TurnFit& fit) {
+    const auto& e = fit.innovations();
+    const auto& rows = fit.rows();
+    const std::size_t n = e.size();
+    const double sd = std::sqrt(squares_of(e, rows).mean);
+    const auto& phase = fit.model().phase_rad();
+    const auto& series = fit.model().series();
+    const TurnKicks kicks = fit.model().mean_kicks(fit.parameters());
+    std::vector<double> size(n);
+    std::vector<double> sd_rad(n);  // without what the lock-in adds before the turn
+    std::vector<double> foretold(n);
+    double mean_size = 0.0;
+    double mean_sd_rad = 0.0;
+    double counted = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!rows[i]) continue;
+        size[i] = size_deviate(std::abs(e[i]) / sd);
+        const TurnKicks::Kick kick = kicks.at(series.direction[i], phase[i]);
+        sd_rad[i] = fit.sd_rad()[i] * std::abs(1.0 - fit.prediction().frame.before_slope[i]);
+        foretold[i] = phase[i] - kick.before_rad - sd_rad[i] * e[i];
+        mean_size += size[i];
+        mean_sd_rad += sd_rad[i];
+        counted += 1.0;
+    }
+    mean_size /= counted;
+    mean_sd_rad /= counted;
+    const PhaseTable<Harmonics> at_minima = size_by_phase(kicks, 1, mean_sd_rad);
+    const PhaseTable<Harmonics> at_maxima = size_by_phase(kicks, -1, mean_sd_rad);
+    const Eigen::Index columns = 8;
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(columns);
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(columns, columns);
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!rows[i]) continue;
+        const int direction = series.direction[i];
+        const Harmonics more =
+            harmonics_of(phase[i]) * (size[i] - mean_size) - (direction > 0 ? at_minima : at_maxima).at(foretold[i]);
+        Eigen::VectorXd row(columns);
+        row << more, static_cast<double>(direction) * more;
+        right += row;
+        covariance += row * row.transpose();
+    }
+    // What only the first turns of a locked gyro have tells nothing of the others.
+    constexpr double enough = 1e-3;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
+    double folded = 0.0;
+    int freedom = 0;
+    for (Eigen::Index k = 0; k < columns; ++k) {
+        if (axes.eigenvalues()(k) < enough * axes.eigenvalues().maxCoeff()) continue;
+        const double along = axes.eigenvectors().col(k).dot(right);
+        folded += along * along / axes.eigenvalues()(k);
+        ++freedom;
+    }
+    return {Where::phase, "size of the residual over the turn's phase", chi2_tail(folded, freedom), ""};
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,436 @@
+#include "analysis/closure/turns/residual/views.hpp"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numeric>
+#include <unsupported/Eigen/FFT>
+#include <utility>
+
+#include "analysis/closure/stats/normality.hpp"
+#include "analysis/closure/stats/p_values.hpp"
+#include "analysis/closure/stats/whiteness.hpp"
+#include "analysis/closure/turns/residual/jumps.hpp"
+#include "analysis/closure/turns/residual/size_over_phase.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+using Columns = std::vector<Regressor>;
+
+/// Running sum of a rate [1/s], as an angle: what a rate in proportion to it adds to the phase.
+std::vector<double> integral(const TurnFit& fit, const std::vector<double>& rate) {
+    const auto& time = fit.model().series().time_s;
+    std::vector<double> sum(rate.size(), 0.0);
+    for (std::size_t i = 1; i < rate.size(); ++i) {
+        sum[i] = sum[i - 1] + 0.5 * (rate[i] + rate[i - 1]) * (time[i] - time[i - 1]);
+    }
+    return sum;
+}
+
+double largest(const std::vector<double>& values) {
+    double most = 0.0;
+    for (const double value : values) most = std::max(most, std::abs(value));
+    return most;
+}
+
+/// Harmonic k of the phase at the turns: as kicks, or as errors of the reading; `times` such a factor at each turn.
+Columns harmonic(const TurnFit& fit, int k, bool kicks, const std::vector<double>& times) {
+    const auto& model = fit.model();
+    const std::size_t n = model.series().size();
+    const NoiseShape* shape = fit.parameters().shape.get();
+    const std::vector<double> zeros(n);
+    Columns columns(4, Regressor(zeros, zeros, zeros, shape != nullptr ? zeros : std::vector<double>()));
+    const double share = kicks ? 0.5 : 1.0;  // half a kick comes before the turn
+    double sums[4] = {};
+    for (std::size_t i = 0; i < n; ++i) {
+        const double angle = k * model.phase_rad()[i];
+        const double d = model.series().direction[i];
+        const double cosine = times[i] * std::cos(angle);
+        const double sine = times[i] * std::sin(angle);
+        const double values[4] = {cosine, sine, d * cosine, d * sine};
+        const double slopes[4] = {-k * values[1], k * values[0], -k * values[3], k * values[2]};
+        for (std::size_t c = 0; c < 4; ++c) {
+            columns[c].series[i] = (kicks ? sums[c] : 0.0) + share * values[c];
+            columns[c].slope[i] = share * slopes[c];
+            columns[c].kick[i] = kicks ? slopes[c] : 0.0;
+            sums[c] += values[c];
+        }
+        if (shape == nullptr) continue;
+        const std::complex<double> left = share * times[i] * shape->at(i)[static_cast<std::size_t>(k - 1)];
+        const double lefts[4] = {left.real(), left.imag(), d * left.real(), d * left.imag()};
+        for (std::size_t c = 0; c < 4; ++c) columns[c].left[i] = lefts[c];
+    }
+    return columns;
+}
+
+Columns harmonic(const TurnFit& fit, int k, bool kicks) {
+    return harmonic(fit, k, kicks, std::vector<double>(fit.model().series().size(), 1.0));
+}
+
+/// Kicks whose size and place go up and down with so many periods over the record.
+Columns kicks_that_change(const TurnFit& fit, double periods) {
+    const std::size_t n = fit.model().series().size();
+    Columns columns;
+    for (const bool sine : {false, true}) {
+        std::vector<double> times(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            const double angle = units::two_pi * periods * static_cast<double>(i) / static_cast<double>(n);
+            times[i] = sine ? std::sin(angle) : std::cos(angle);
+        }
+        for (Regressor& column : harmonic(fit, 1, true, times)) columns.push_back(std::move(column));
+    }
+    return columns;
+}
+
+/// The ellipse that is in the model is known from radii, as well as phases would tell it: amplitudes of the first two
+/// harmonics, to which it shifts the reading, have that error besides their own.
+void doubt_ellipse(const TurnFit& fit, TurnFit::Score& score) {
+    if (fit.parameters().find("readout_ellipse") == nullptr || score.rank != 4) return;
+    const auto counted = static_cast<double>(std::count(fit.rows().begin(), fit.rows().end(), 1));
+    const double sd = fit.model().series().radius_sd_rad;
+    Eigen::MatrixXd covariance = score.covariance;
+    covariance.diagonal().head(2).array() += 2.0 * sd * sd / counted;
+    score.chi2 = score.value.dot(covariance.ldlt().solve(score.value));
+}
+
+/// Of a kick's amplitude: beyond, phases no longer follow from what is added to them, and any noise could be had so.
+constexpr double largest_kick_rad = 0.3;
+
+void test_phase(const TurnFit& fit, std::vector<TurnView>& views) {
+    // The innovation is a part of the phase that is read: what they have to do with each other where nothing is missing
+    // is known of normal ones (Stein, Annals of Statistics 9, 1981, 1135) and of those whose shape is.
+    const bool known = fit.parameters().shape || !is_of_even_density(fit.innovations(), fit.rows());
+    for (const bool kicks : {true, false}) {
+        if (!kicks && !known) continue;
+        double least = 1.0;
+        double most = 0.0;
+        double cost = 0.0;
+        int at = 0;
+        for (int k = 1; k <= harmonics_of_phase; ++k) {
+            auto score = fit.score(harmonic(fit, k, kicks));
+            if (!kicks && k <= 2) doubt_ellipse(fit, score);
+            const double p = chi2_tail(score.chi2, score.rank);
+            if (at > 0 && p >= least) continue;
+            least = p;
+            at = k;
+            cost = score.rank + std::log(static_cast<double>(harmonics_of_phase));
+            most = 0.5 * score.chi2 - cost;
+        }
+        views.push_back(
+            {{Where::phase,
+              kicks ? "kicks at harmonics of the turn's phase" : "phase read at harmonics of the turn's phase",
+              of_several(least, harmonics_of_phase), fmt::format("harmonic {}", at), most},
+             cost,
+             [&fit, at, kicks] { return harmonic(fit, at, kicks); },
+             largest_kick_rad / at});
+    }
+}
+
+/// A lock-in that does not stay what it is: kicks at the phase, times slow swings.
+void test_kicks_over_time(const TurnFit& fit, std::vector<TurnView>& views) {
+    constexpr std::size_t places = 40;
+    const auto periods_of = [](std::size_t place) { return 0.5 * static_cast<double>(place + 1); };
+    std::vector<TurnFit::Score> scores(places);
+    oneapi::tbb::parallel_for(std::size_t{0}, places, [&](std::size_t place) {
+        scores[place] = fit.score(kicks_that_change(fit, periods_of(place)));
+    });
+    const auto most =
+        std::max_element(scores.begin(), scores.end(), [](const auto& a, const auto& b) { return a.chi2 < b.chi2; });
+    const TurnFit::Score& score = *most;
+    const double periods = periods_of(static_cast<std::size_t>(most - scores.begin()));
+    if (score.rank == 0) return;
+    const double cost = score.rank + std::log(static_cast<double>(places));
+    views.push_back({{Where::time, "kicks that change in time", of_several(chi2_tail(score.chi2, score.rank), places),
+                      fmt::format("{:g} periods over the record", periods), 0.5 * score.chi2 - cost},
+                     cost,
+                     [&fit, periods] { return kicks_that_change(fit, periods); },
+                     largest_kick_rad});
+}
+
+/// Amplitude of the dither at the turns over its mean: second differences of the phases, in which no rate is, the
+/// lock-in's kicks taken off. The first and the last repeat their neighbours'.
+std::vector<double> amplitude_at_turns(const TurnFit& fit) {
+    const auto& series = fit.model().series();
+    const auto& foretold = fit.prediction().phase_rad;
+    const auto& phase = fit.model().phase_rad();
+    const std::size_t n = series.size();
+    std::vector<double> amplitude(n, 1.0);
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+        double second = 0.0;
+        for (const std::size_t k : {i - 1, i, i, i + 1}) second += (k == i ? 1.0 : -1.0) * (phase[k] - foretold[k]);
+        amplitude[i] = -0.25 * series.direction[i] * second / series.amplitude_rad;
+    }
+    amplitude[0] = amplitude[1];
+    amplitude[n - 1] = amplitude[n - 2];
+    return amplitude;
+}
+
+/// Gain of the Kalman filter of a walk read with noise (Harvey 1989, section 4.1): variances by how differences grow
+/// with their lag, beyond what neighbours share.
+double gain_of_walk(const std::vector<double>& series) {
+    constexpr std::size_t lag = 8;
+    const std::size_t n = series.size();
+    double squares[3] = {};
+    const auto of_lag = [&](std::size_t k, std::size_t i) { return std::pow(series[i + k] - series[i], 2); };
+    for (std::size_t i = 0; i + 2 * lag < n; ++i) {
+        const double grown = of_lag(2 * lag, i) - of_lag(lag, i);
+        squares[0] += of_lag(lag, i) / static_cast<double>(n);
+        squares[1] += grown / static_cast<double>(n);
+        squares[2] += grown * grown / static_cast<double>(n);
+    }
+    // What is less than four standard errors may be none; sums of so many lags share what they have.
+    const double error = std::sqrt(squares[2] * 2.0 * lag / static_cast<double>(n));
+    const double walk = std::max(squares[1] - 4.0 * error, 0.0) / lag;
+    const double read = std::max(0.5 * (squares[0] - lag * walk), 0.0);
+    return std::clamp(2.0 * walk / (walk + std::sqrt(walk * walk + 4.0 * walk * read) + 1e-300), 1.0 / 200.0, 0.5);
+}
+
+void test_rates(const TurnFit& fit, std::vector<TurnView>& views) {
+    const auto& series = fit.model().series();
+    const std::size_t n = series.size();
+    const auto against = [&](Where where, std::string view, Columns columns) {
+        const auto score = fit.score(columns);
+        if (score.rank == 0) return;
+        const double cost = score.rank;
+        views.push_back({{where, std::move(view), chi2_tail(score.chi2, score.rank), "", 0.5 * score.chi2 - cost},
+                         cost,
+                         [columns = std::make_shared<const Columns>(std::move(columns))] { return *columns; }});
+    };
+    if (!series.temperature_change_k.empty() && largest(series.temperature_change_k) > 0.0) {
+        const auto& t = series.temperature_change_k;
+        std::vector<double> square(n);
+        for (std::size_t i = 0; i < n; ++i) square[i] = t[i] * t[i];
+        against(Where::temperature, "rates that follow temperature, its square and its slope",
+                {integral(fit, t), integral(fit, square), t});
+    }
+    const auto [low, high] = std::minmax_element(series.input_rate_deg_h.begin(), series.input_rate_deg_h.end());
+    if (*high > *low) {
+        std::vector<double> square(n);
+        std::vector<double> cube(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            const double x = series.input_rate_deg_h[i] / std::max(std::abs(*high), std::abs(*low));
+            square[i] = x * x;
+            cube[i] = x * x * x;
+        }
+        against(Where::rate, "rates that follow the input rate, its square and its cube",
+                {integral(fit, series.input_rate_deg_h), integral(fit, square), integral(fit, cube)});
+    }
+    // The amplitude of the cycles before, what the residual itself has done to it staying out.
+    const auto at_turn = std::make_shared<const std::vector<double>>(amplitude_at_turns(fit));
+    const double memory = gain_of_walk(*at_turn);
+    const auto stretch = static_cast<std::ptrdiff_t>(std::min<std::size_t>(n - 1, std::lround(2.0 / memory)));
+    const auto mean_of = [&](auto first) {
+        return std::accumulate(first, first + stretch, 0.0) / static_cast<double>(stretch);
+    };
+    std::vector<double> amplitude(n);
+    double mean = mean_of(at_turn->begin());
+    for (std::size_t i = 0; i < n; ++i) {
+        amplitude[i] = mean - 1.0;
+        if (i > 1) mean += memory * ((*at_turn)[i - 2] - mean);
+    }
+    const auto angles = [&fit](std::vector<double> change) {
+        const double scale = std::max(largest(change), 1e-12);
+        std::vector<double> square(change.size());
+        for (std::size_t i = 0; i < change.size(); ++i) {
+            change[i] /= scale;
+            square[i] = change[i] * change[i];
+        }
+        return Columns{integral(fit, change), integral(fit, square)};
+    };
+    against(Where::amplitude, "rates that follow the dither's amplitude and its square", angles(amplitude));
+    if (!views.empty() && views.back().test.where == Where::amplitude) {
+        // What it explains, once it is known to explain something: with the cycles after as well.
+        views.back().columns = [at_turn, amplitude, angles, memory, n, last = mean_of(at_turn->rbegin())] {
+            std::vector<double> change = amplitude;
+            double after = last;
+            for (std::size_t i = n; i-- > 0;) {
+                if (i + 1 < n) after += memory * ((*at_turn)[i] - after);
+                change[i] = 0.5 * (change[i] + after - 1.0);
+            }
+            return angles(change);
+        };
+    }
+    constexpr int degrees = 6;
+    Columns powers;
+    for (int k = 1; k <= degrees; ++k) {
+        std::vector<double> rate(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            const double x = 2.0 * static_cast<double>(i) / static_cast<double>(n - 1) - 1.0;
+            rate[i] = std::cos(k * std::acos(std::clamp(x, -1.0, 1.0)));
+        }
+        powers.push_back(integral(fit, rate));
+    }
+    against(Where::time, "rates that are polynomials of time", powers);
+}
+
+void test_steps(const TurnFit& fit, std::vector<TurnView>& views) {
+    constexpr int places = 80;
+    const auto& time = fit.model().series().time_s;
+    std::vector<double> roots(places - 1);
+    const auto ramp_of = [&time](std::size_t k) {
+        const double start = time.back() * static_cast<double>(k + 1) / places;
+        std::vector<double> ramp(time.size());
+        for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - start);
+        return ramp;
+    };
+    oneapi::tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t k) {
+        const auto score = fit.score({ramp_of(k)});
+        if (score.rank > 0 && score.covariance(0, 0) > 0.0) {
+            roots[k] = score.value(0) / std::sqrt(score.covariance(0, 0));
+        }
+    });
+    const auto most =
+        std::max_element(roots.begin(), roots.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+    const double chi2 = *most * *most;
+    const auto at = static_cast<std::size_t>(most - roots.begin());
+    const double cost = 2.0 + std::log(davies_places(chi2, roots));
+    views.push_back(
+        {{Where::time, "steps of the rate", davies_bound(chi2, roots),
+          fmt::format("at {:.6g} s", time.back() * static_cast<double>(at + 1) / places), 0.5 * chi2 - cost},
+         cost,
+         [ramp_of, at] { return Columns{ramp_of(at)}; }});
+}
+
+/// Rates of stretches of the record, for a rate that jumps to and fro.
+void test_levels(const TurnFit& fit, std::vector<TurnView>& views) {
+    const TwoLevels found = levels_of_stretches(fit);
+    TurnView& view = views.emplace_back();
+    view.test = {Where::time, "a rate that jumps between two levels", found.p_value,
+                 fmt::format("{} jumps", found.changes), found.merit};
+    view.cost = found.cost + cost_of_exact_places * found.changes;
+    view.columns = [&fit, found] { return Columns{placed_jumps(fit, found)}; };
+    view.jumps = found.changes > 1;
+    if (view.jumps) {
+        view.refitted = [&fit, found](double rival) { return merit_of_jumps(fit, found, rival); };
+    }
+}
+
+void test_whiteness(const TurnFit& fit, std::vector<TurnView>& views) {
+    const Correlations found = correlations_of(fit.innovations(), fit.rows());
+    double rising = 0.0;       // sum of correlations: slow changes
+    double alternating = 0.0;  // with alternating signs: changes of the dither's amplitude
+    for (std::size_t k = 1; k < found.root.size(); ++k) {
+        rising += found.root[k];
+        alternating += k % 2 == 0 ? found.root[k] : -found.root[k];
+    }
+    const Where where = std::abs(alternating) > std::abs(rising) ? Where::amplitude : Where::time;
+    views.push_back({found.test(where, "correlation with the 24 turns before")});
+}
+
+/// Lines, those that drift too.
+void test_lines(const TurnFit& fit, std::vector<TurnView>& views) {
+    constexpr int drifts = 81;
+    constexpr double apart = 3.0;  // periods over the record; half of it away a line has lost a tenth of its power
+    const auto& e = fit.innovations();
+    const auto& rows = fit.rows();
+    const std::size_t n = e.size();
+    std::size_t padded = 1;
+    while (padded < 2 * n) padded *= 2;
+    double power = 0.0;
+    for (std::size_t i = 0; i < n; ++i) power += rows[i] ? e[i] * e[i] : 0.0;
+    struct Line {
+        double power = 0.0;
+        std::size_t bin = 0;
+    };
+    std::vector<Line> lines(drifts);
+    const auto drift_of = [](std::size_t k) { return apart * (static_cast<double>(k) - drifts / 2); };
+    oneapi::tbb::parallel_for(std::size_t{0}, lines.size(), [&](std::size_t k) {
+        const double drift = drift_of(k);
+        std::vector<std::complex<double>> in(padded);
+        for (std::size_t i = 0; i < n; ++i) {
+            if (!rows[i]) continue;
+            const double x = static_cast<double>(i) / static_cast<double>(n) - 0.5;
+            in[i] = std::polar(e[i], -units::pi * drift * x * x);
+        }
+        std::vector<std::complex<double>> out;
+        Eigen::FFT<double> fft;
+        fft.fwd(out, in);
+        for (std::size_t bin = 4; bin < padded / 2; ++bin) {
+            if (std::norm(out[bin]) > lines[k].power) lines[k] = {std::norm(out[bin]), bin};
+        }
+    });
+    // Between the Fourier frequencies there is more to find than at them.
+    const double places = 1.5 * static_cast<double>(n);
+    const double bin_hz = 1.0 / (static_cast<double>(padded) * fit.model().series().interval_s);
+    const auto report = [&](const char* view, const Line& line, double searched, double drift) {
+        const double chi2 = 2.0 * line.power / power;
+        const double duration_s = static_cast<double>(n) * fit.model().series().interval_s;
+        const double periods = static_cast<double>(line.bin) * bin_hz * duration_s;
+        const double cost = 2.0 + std::log(searched);
+        views.push_back({{Where::frequency, view, of_several(chi2_tail(chi2, 2), searched),
+                          fmt::format("at {:.6g} Hz{}", static_cast<double>(line.bin) * bin_hz,
+                                      drift != 0.0 ? fmt::format(", drifting by {:.2g} Hz", drift / duration_s) : ""),
+                          0.5 * chi2 - cost},
+                         cost,
+                         [n, periods, drift] {
+                             Columns columns(2, std::vector<double>(n));
+                             for (std::size_t i = 0; i < n; ++i) {
+                                 const double x = static_cast<double>(i) / static_cast<double>(n) - 0.5;
+                                 const double angle = units::two_pi * periods * x + units::pi * drift * x * x;
+                                 columns[0].series[i] = std::cos(angle);
+                                 columns[1].series[i] = std::sin(angle);
+                             }
+                             return columns;
+                         }});
+        views.back().hz = static_cast<double>(line.bin) * bin_hz;
+    };
+    report("lines", lines[drifts / 2], places, 0.0);
+    // A line that holds its frequency is not one that drifts by a little.
+    lines[drifts / 2] = {};
+    const auto best =
+        std::max_element(lines.begin(), lines.end(), [](const Line& a, const Line& b) { return a.power < b.power; });
+    report("lines that drift", *best, drifts * places, drift_of(static_cast<std::size_t>(best - lines.begin())));
+}
+
+/// Random rates are normal, what stands in for them need not be.
+void test_normality(const TurnFit& fit, std::vector<TurnView>& views) {
+    constexpr std::size_t of_even_density = 16;  // sums of so many are normal enough
+    if (const auto test = fourth_moments(fit.innovations(), fit.rows(), 1, of_even_density)) views.push_back({*test});
+    const TurnNoise noise = fit.model().noise(fit.parameters());
+    if (noise.rates.empty() && noise.walk_rad2_per_s3 == 0.0) return;
+    const auto& time = fit.model().series().time_s;
+    std::vector<double> ramp(time.size());
+    for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - time[time.size() / 2]);
+    if (const auto jump = largest_jump(fit.innovations(), fit.rows(), fit.whitened_alone(ramp))) {
+        views.emplace_back().test = test_of(*jump);
+    }
+}
+
+void test_size(const TurnFit& fit, std::vector<TurnView>& views) {
+    views.push_back({size_over_time(fit.innovations(), fit.rows(), 20, 8.0)});
+    if (is_of_even_density(fit.innovations(), fit.rows())) return;
+    views.push_back({size_over_phase(fit)});
+}
+
+}  // namespace
+
+double refitted_merit(const TurnFit& fit, const TurnView& view, double rival) {
+    if (view.refitted) return view.refitted(rival);
+    const TurnFit::Regression regression = fit.regress(view.columns());
+    if (regression.value.cwiseAbs().maxCoeff() > view.largest) return -std::numeric_limits<double>::infinity();
+    // The view has taken off one for each of them.
+    const auto amplitudes = static_cast<int>(regression.value.size());
+    return regression.gain - (view.cost - amplitudes) - cost_of_amplitudes(regression.gain, amplitudes);
+}
+
+std::vector<TurnView> view_residual(const TurnFit& fit) {
+    std::vector<TurnView> views;
+    test_phase(fit, views);
+    test_kicks_over_time(fit, views);
+    test_rates(fit, views);
+    test_steps(fit, views);
+    test_levels(fit, views);
+    test_whiteness(fit, views);
+    test_lines(fit, views);
+    test_size(fit, views);
+    test_normality(fit, views);
+    return views;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,132 @@
+#include "analysis/closure/turns/screen/dither_amplitude.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <unsupported/Eigen/FFT>
+#include <vector>
+
+#include "analysis/closure/decide/evidence.hpp"
+#include "analysis/closure/stats/p_values.hpp"
+#include "analysis/closure/stats/whiteness.hpp"
+#include "engine/core/error.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// Highest peaks of the spectrum of the innovations, each the other way round at minima, up to the band's end [Hz].
+std::vector<double> highest_peaks(const TurnFit& fit, double band_hz) {
+    constexpr std::size_t most = 4;
+    constexpr std::size_t finer = 4;  // than the Fourier frequencies
+    const TurnSeries& series = fit.model().series();
+    const std::size_t n = series.size();
+    std::size_t padded = 1;
+    while (padded < finer * n) padded *= 2;
+    std::vector<double> in(padded, 0.0);
+    for (std::size_t i = 0; i < n; ++i) in[i] = fit.rows()[i] ? -series.direction[i] * fit.innovations()[i] : 0.0;
+    std::vector<std::complex<double>> out;
+    Eigen::FFT<double> fft;
+    fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
+    fft.fwd(out, in);
+    const double bin_hz = 1.0 / (static_cast<double>(padded) * series.interval_s);
+    // Half a period is what the polynomials of the amplitude follow.
+    const auto first = static_cast<std::size_t>(0.5 * static_cast<double>(padded) / static_cast<double>(n)) + 1;
+    const auto end = std::min(static_cast<std::size_t>(band_hz / bin_hz), padded / 2 - 1);
+    std::vector<std::size_t> bins;
+    for (std::size_t k = first; k < end; ++k) {
+        if (std::norm(out[k]) >= std::norm(out[k - 1]) && std::norm(out[k]) > std::norm(out[k + 1])) bins.push_back(k);
+    }
+    std::sort(bins.begin(), bins.end(),
+              [&](std::size_t a, std::size_t b) { return std::norm(out[a]) > std::norm(out[b]); });
+    if (bins.size() > most) bins.resize(most);
+    std::vector<double> peaks_hz;
+    for (const std::size_t k : bins) {
+        for (const double off : {-0.5, 0.0, 0.5}) peaks_hz.push_back((static_cast<double>(k) + off) * bin_hz);
+    }
+    return peaks_hz;
+}
+
+}  // namespace
+
+std::optional<AmplitudeModel> find_amplitude_swing(const record::Record& record, const Fitted& now, const Rows& rows) {
+    constexpr std::size_t most = 6;
+    const TurnFit& fit = *now.fit;
+    const TurnSeries& series = now.series;
+    TurnParameters with = fit.parameters();
+    if (with.swings.size() >= most) return std::nullopt;
+    const double band_hz = series.amplitude_band_hz();
+    AmplitudeSwing swing{};
+    double chi2 = 0.0;
+    for (const double hz : highest_peaks(fit, band_hz)) {
+        auto by = amplitude_by({hz, 0.0, 0.0}, series);
+        const auto score = fit.score({std::move(by[0]), std::move(by[1])});
+        if (score.rank < 2 || score.chi2 <= chi2) continue;
+        chi2 = score.chi2;
+        swing = {hz, score.value(0), score.value(1)};
+    }
+    // Between the Fourier frequencies there is more to find: half as many again (Quinn & Hannan 2001, section 3).
+    const double places = std::max(1.0, 1.5 * 2.0 * band_hz * series.time_s.back());
+    if (!passes(of_several(chi2_tail(chi2, 2), places))) return std::nullopt;
+    with.swings.push_back(swing);
+    AmplitudeModel found;
+    try {
+        found.fitted = fit_record(record, with, rows);
+    } catch (const RunError&) {
+        return std::nullopt;  // no motion of a gyro with such parameters can be followed
+    }
+    const double gain = found.fitted->fit->log_likelihood() - fit.log_likelihood();
+    if (!passes(of_several(chi2_tail(2.0 * gain, 2), places))) return std::nullopt;
+    found.merit = gain - cost_of_amplitudes(gain, 2) - std::log(places) - 1.0;
+    return found;
+}
+
+std::optional<AmplitudeModel> find_amplitude_memory(const record::Record& record, const Fitted& now, const Rows& rows) {
+    constexpr double worth_looking = 1e-3;
+    const TurnFit& fit = *now.fit;
+    if (fit.parameters().wander_forgets > 0.0) return std::nullopt;
+    if (correlations_of(fit.innovations(), rows).test(Where::amplitude, "").p_value > worth_looking)
+        return std::nullopt;
+    AmplitudeModel found;
+    for (const double forgets : {0.3, 0.03, 0.003}) {
+        TurnParameters with = fit.parameters();
+        with.wander_forgets = forgets;
+        // Of the white noise, too, a part may have been what is forgotten.
+        with.wander_sd_rad = std::max(with.wander_sd_rad, 0.5 * std::sqrt(forgets) * with.injected_sd_rad);
+        try {
+            auto fitted = fit_record(record, with, rows);
+            const double best = found.fitted ? found.fitted->fit->log_likelihood() : fit.log_likelihood();
+            if (fitted->fit->log_likelihood() > best) found.fitted = std::move(fitted);
+        } catch (const RunError&) {
+            // no motion of a gyro with such parameters can be followed
+        }
+    }
+    if (!found.fitted) return std::nullopt;
+    const double gain = found.fitted->fit->log_likelihood() - fit.log_likelihood();
+    if (!passes(chi2_tail(2.0 * gain, 1))) return std::nullopt;
+    found.merit = gain - cost_of_amplitudes(gain, 1);
+    return found;
+}
+
+std::vector<std::string> notes_on_amplitude(const Fitted& fitted) {
+    const TurnSeries& series = fitted.series;
+    std::vector<std::string> notes;
+    for (const AmplitudeSwing& swing : fitted.fit->parameters().swings) {
+        notes.push_back(fmt::format(
+            "the dither's amplitude swings by {:.2g} of itself at {:.4g} Hz, which the model follows; a vibration of "
+            "the base at {:.6g} Hz would look the same; closed.toml is without it",
+            std::hypot(swing.cosine_rad, swing.sine_rad) / series.amplitude_rad, std::abs(swing.hz),
+            0.5 / series.interval_s - std::abs(swing.hz)));
+    }
+    if (fitted.fit->parameters().wander_forgets > 0.0) {
+        notes.push_back(
+            fmt::format("the wander of the dither's amplitude is forgotten within {:.3g} s, as by a resonator that "
+                        "noise drives; closed.toml has a walk of the same steps in its place",
+                        series.interval_s / fitted.fit->parameters().wander_forgets));
+    }
+    return notes;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,358 @@
+#include "analysis/closure/turns/screen/dither_shape.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+constexpr std::size_t stretches = 120;
+
+/// Where a stretch begins. Whole cycles, so that parities weigh alike.
+std::size_t begin_of(std::size_t stretch, std::size_t turns) {
+    return stretch == stretches ? turns : (turns * stretch / stretches) & ~std::size_t{1};
+}
+
+/// Rate that the phases have beyond what is foretold of them, stretch by stretch: that of a random process, or of what
+/// is not in the model yet [rad/s].
+std::vector<double> rate_left(const TurnFit& fit, const TurnModel::Prediction& prediction) {
+    const auto& series = fit.model().series();
+    const std::size_t n = series.size();
+    std::vector<double> rate(n, 0.0);
+    for (std::size_t s = 0; s < stretches; ++s) {
+        const std::size_t begin = begin_of(s, n);
+        const std::size_t end = begin_of(s + 1, n);
+        if (end < begin + 8) continue;
+        // Beside an offset and another amplitude of the dither.
+        Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+        Eigen::Vector3d right = Eigen::Vector3d::Zero();
+        for (std::size_t i = begin; i < end; ++i) {
+            const Eigen::Vector3d row{series.time_s[i] - series.time_s[begin], 1.0,
+                                      static_cast<double>(series.direction[i])};
+            normal += row * row.transpose();
+            right += row * (fit.model().phase_rad()[i] - prediction.phase_rad[i]);
+        }
+        const Eigen::Vector3d found = normal.ldlt().solve(right);
+        std::fill(rate.begin() + static_cast<std::ptrdiff_t>(begin), rate.begin() + static_cast<std::ptrdiff_t>(end),
+                  found(0));
+    }
+    return rate;
+}
+
+/// Mean and standard error of a series over the turns that count, from its means over stretches; `valid` marks
+/// turns that have a value.
+BlockMean block_mean(const std::vector<double>& series, const std::vector<std::uint8_t>& valid, const Rows& rows,
+                     double floor) {
+    const std::size_t n = series.size();
+    BlockMean mean;
+    double sum = 0.0;
+    double squares = 0.0;
+    double k = 0.0;
+    for (std::size_t s = 0; s < stretches; ++s) {
+        double total = 0.0;
+        std::size_t count = 0;
+        bool counts = true;
+        for (std::size_t i = begin_of(s, n); i < begin_of(s + 1, n); ++i) {
+            counts = counts && rows[i];
+            if (!valid[i]) continue;
+            total += series[i];
+            ++count;
+        }
+        if (count < 4) continue;
+        const double value = total / static_cast<double>(count);
+        mean.of_stretch.push_back(value);
+        mean.counts.push_back(counts);
+        if (!counts) continue;
+        sum += value;
+        squares += value * value;
+        k += 1.0;
+    }
+    if (k < 8.0) {
+        mean.sd = std::numeric_limits<double>::infinity();
+        return mean;
+    }
+    mean.value = sum / k;
+    const double variance = std::max(0.0, (squares - k * mean.value * mean.value) / (k - 1.0)) / k;
+    mean.sd = std::sqrt(variance + floor * floor);
+    return mean;
+}
+
+constexpr double quarter_rad = 0.5 * units::pi;
+
+/// How far the pulses next to a turn are, on both sides of it, in quarters of a fringe.
+double quarters_to_pulse(int direction, double phase_rad) {
+    const double quarters = phase_rad / quarter_rad;
+    return direction > 0 ? std::floor(quarters) + 1.0 - quarters : quarters - std::floor(quarters);
+}
+
+/// What follows the phase at a turn, by functions of it: minima and maxima each by themselves, and without its mean
+/// over all phases. Pulses of quarter fringes are what times and accelerations are made of. From one of them to the
+/// next such a function is smooth in the root of the distance to the pulse, to which the time to it goes.
+class PhaseFunctions {
+   public:
+    static constexpr Eigen::Index cells = 4;
+    static constexpr Eigen::Index powers = 5;
+    static constexpr Eigen::Index columns = 2 * cells * powers;
+
+    explicit PhaseFunctions(const TurnFit& fit) {
+        const auto& series = fit.model().series();
+        cell_.reserve(series.size());
+        root_.reserve(series.size());
+        for (std::size_t i = 0; i < series.size(); ++i) {
+            const double phase_rad = fit.model().phase_rad()[i];
+            const auto cell = static_cast<Eigen::Index>(std::fmod(std::floor(phase_rad / quarter_rad), 4.0) + 4.0) % 4;
+            cell_.push_back((series.direction[i] > 0 ? 0 : cells * powers) + cell * powers);
+            root_.push_back(std::sqrt(quarters_to_pulse(series.direction[i], phase_rad)));
+        }
+    }
+    /// Adds them at a turn, times that, to a row.
+    void add(std::size_t turn, double times, Eigen::Ref<Eigen::VectorXd> row) const {
+        add(cell_[turn], root_[turn], times, row);
+    }
+    /// Mean square over all phases of what has these coefficients: at minima, at maxima.
+    static std::array<double, 2> mean_squares(const Eigen::VectorXd& coefficients) {
+        constexpr int places = 16;  // of a cell
+        std::array<double, 2> sums{};
+        Eigen::VectorXd row(columns);
+        for (Eigen::Index cell = 0; cell < 2 * cells; ++cell) {
+            for (int k = 0; k < places; ++k) {
+                row.setZero();
+                add(cell * powers, std::sqrt((k + 0.5) / places), 1.0, row);
+                const double value = coefficients.dot(row);
+                sums[static_cast<std::size_t>(cell / cells)] += value * value / (cells * places);
+            }
+        }
+        return sums;
+    }
+
+   private:
+    static void add(Eigen::Index cell, double root, double times, Eigen::Ref<Eigen::VectorXd> row) {
+        const Eigen::Index of_direction = cell / (cells * powers) * (cells * powers);
+        double power = 1.0;
+        for (Eigen::Index k = 0; k < powers; ++k, power *= root) {
+            row(cell + k) += times * power;
+            // Of a quarter of all phases each, over which the root to the k has a mean of 2/(k + 2).
+            const double mean = 0.5 / static_cast<double>(k + 2);
+            for (Eigen::Index other = 0; other < cells; ++other) row(of_direction + other * powers + k) -= times * mean;
+        }
+    }
+
+    std::vector<Eigen::Index> cell_;  ///< where its functions begin
+    std::vector<double> root_;
+};
+
+/// What follows the phases, by functions of those of these turns beside each, with such weights: coefficients.
+using Beside = std::span<const std::pair<int, double>>;
+Eigen::VectorXd take_phase(std::vector<double>& series, const std::vector<std::uint8_t>& valid, const TurnFit& fit,
+                           const PhaseFunctions& functions, Beside turns) {
+    constexpr Eigen::Index columns = 2 + PhaseFunctions::columns;
+    const std::size_t n = series.size();
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(columns, columns);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(columns);
+    Eigen::VectorXd row(columns);
+    const auto fill = [&](std::size_t i) {
+        row.setZero();
+        for (const auto& [offset, weight] : turns) {
+            functions.add(i + static_cast<std::size_t>(offset), weight, row.tail<PhaseFunctions::columns>());
+        }
+    };
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!valid[i] || !fit.rows()[i]) continue;
+        fill(i);
+        // The mean of minima and that of maxima stay.
+        row(fit.model().series().direction[i] > 0 ? 0 : 1) = 1.0;
+        normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
+        right += row * series[i];
+    }
+    normal.diagonal().array() += 1e-9 * normal.trace();
+    const Eigen::VectorXd c = normal.selfadjointView<Eigen::Lower>().ldlt().solve(right);
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!valid[i]) continue;
+        fill(i);
+        series[i] -= c.dot(row);
+    }
+    return c.tail<PhaseFunctions::columns>();
+}
+
+/// w t of the two pulses of quarter fringes next to a turn.
+///
+/// Where the phase stands still off the dither's turn by an angle d, |d| << 1, the acceleration changes by w d of
+/// itself a second. With sqrt(a) = sqrt(2) (sqrt(d_2) - sqrt(d_1))/(t_2 - t_1) of pulses at distances d_1, d_2 it comes
+/// out too large by d w (t_1 + t_2)/3 of it on one side of the turn, and too small on the other: a rotation by the
+/// share x of the dither's peak rate, d = x, adds x w (t_1 + t_2)/6 to `sides`.
+struct PulseAngles {
+    double first, second;
+
+    PulseAngles(int direction, double phase_rad, double amplitude_rad) {
+        const double first_rad = quarter_rad * quarters_to_pulse(direction, phase_rad);
+        first = std::sqrt(2.0 * first_rad / amplitude_rad);
+        second = std::sqrt(2.0 * (first_rad + quarter_rad) / amplitude_rad);
+    }
+
+    /// The acceleration that they show of a sine, over that where it turns: they are 2 asin(sqrt(d/(2 A))) of it away,
+    /// and roots of distances go as the sine of half of that.
+    double share_of_sine() const {
+        const auto angle = [](double root) { return 2.0 * std::asin(std::min(0.5 * root, 1.0)); };
+        return std::pow((second - first) / (angle(second) - angle(first)), 2);
+    }
+
+    /// How much of the change of the acceleration at a turn of the dither, which is off by that angle, the two show of
+    /// the half cycle that the phase's turn is in: with d(t) in two pieces, to first order in the change.
+    double share_of_other(double off) const {
+        if (off >= second) return 1.0;
+        if (off <= first) return off * off / (first * second);
+        return (2.0 * off - off * off / second - first) / (second - first);
+    }
+};
+
+/// Means of what accelerations show, and of what pulses do to them.
+struct Accelerations {
+    std::optional<BlockMean> sides, turns, even;  ///< none where the record has none
+    double jerk = 0.0;                            ///< what is taken off sides
+    double angle = 0.0;                           ///< w (t1 + t2)/2
+    double share_of_other = 1.0;
+};
+
+Accelerations accelerations(const record::Turns& turns, const TurnFit& fit, const PhaseFunctions& functions,
+                            const std::vector<double>& shares) {
+    const auto& series = fit.model().series();
+    const std::size_t n = series.size();
+    Accelerations found;
+    std::vector<double> sides(n, 0.0);
+    std::vector<double> minima(n, 0.0);
+    std::vector<double> even(n, 0.0);
+    std::vector<std::uint8_t> valid(n, 0);
+    std::size_t seen = 0;
+    double of_pulses = 0.0;
+    double of_rotation = 0.0;
+    double of_other = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        if (!(turns.accel_before_rad_s2[i] > 0.0) || !(turns.accel_after_rad_s2[i] > 0.0)) continue;
+        const double before = std::log(turns.accel_before_rad_s2[i] / series.acceleration_rad_s2);
+        const double after = std::log(turns.accel_after_rad_s2[i] / series.acceleration_rad_s2);
+        if (std::abs(before) > 1.0 || std::abs(after) > 1.0) continue;
+        const double share = shares[i];
+        const PulseAngles pulses(series.direction[i], fit.model().phase_rad()[i], series.amplitude_rad);
+        const double jerk = share * (pulses.first + pulses.second) / 6.0;
+        const double sine = std::log(pulses.share_of_sine());
+        const double slower = 0.5 * std::log1p(-std::min(share * share, 0.5));
+        found.angle += pulses.first + pulses.second;
+        of_other += pulses.share_of_other(std::abs(share));
+        found.jerk += jerk;
+        of_pulses += sine;
+        of_rotation += slower;
+        sides[i] = 0.25 * series.direction[i] * (after - before) - jerk;
+        minima[i] = 0.25 * series.direction[i] * (after + before);
+        even[i] = 0.5 * (after + before) - sine - slower;
+        valid[i] = 1;
+        ++seen;
+    }
+    if (seen <= n / 4) return found;
+    const auto count = static_cast<double>(seen);
+    found.jerk /= count;
+    found.angle *= 0.5 / count;
+    found.share_of_other = of_other / count;
+    // Accelerations are computed from distances that the detectors have read: their ellipse is in them.
+    const gyro::Ellipse ellipse = fit.model().setup(fit.parameters()).ellipse;
+    const double least = 1e-5 + std::max({std::abs(ellipse.gain), std::abs(ellipse.offset_sin),
+                                          std::abs(ellipse.offset_cos), std::abs(ellipse.orthogonality_rad)});
+    const std::array<std::pair<int, double>, 1> itself{{{0, 1.0}}};
+    const auto [at_minima, at_maxima] = PhaseFunctions::mean_squares(take_phase(sides, valid, fit, functions, itself));
+    take_phase(minima, valid, fit, functions, itself);
+    take_phase(even, valid, fit, functions, itself);
+    // Of second order in the lock-in, the mean over all phases is no longer nothing (docs/closure.md):
+    // accelerations come out too small on both sides.
+    constexpr double second_order = 0.145;
+    const double smaller = second_order * (at_minima - at_maxima);
+    const double smaller_everywhere = 2.0 * second_order * (at_minima + at_maxima);
+    constexpr double of_clock = 0.1;  // what pulses and rotation do to accelerations is known to
+    found.sides = block_mean(sides, valid, fit.rows(), least);
+    found.turns = block_mean(minima, valid, fit.rows(), std::hypot(least, 0.5 * smaller));
+    found.turns->value += smaller;
+    found.even = block_mean(even, valid, fit.rows(),
+                            std::hypot(least, 0.5 * smaller_everywhere, of_clock * (of_pulses + of_rotation) / count));
+    found.even->value += smaller_everywhere;
+    return found;
+}
+
+}  // namespace
+
+DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
+    const auto& series = fit.model().series();
+    const std::size_t n = series.size();
+    const double w = units::pi / series.interval_s;
+    const auto prediction = fit.model().predict(fit.parameters());
+    const std::vector<double> left_rad_s = rate_left(fit, prediction);
+    std::vector<double> shares(n);
+    double mean_share = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+        shares[i] = series.relative_rate(fit.parameters().bias_deg_h + series.input_rate_deg_h[i]) +
+                    left_rad_s[i] / (series.amplitude_rad * w);
+        mean_share += shares[i] / static_cast<double>(n);
+    }
+    const PhaseFunctions functions(fit);
+    const Accelerations seen = accelerations(turns, fit, functions, shares);
+    // Where the phase turns faster than a sine of that swing does, a rotation moves it by less.
+    const double less = seen.even && std::isfinite(seen.even->sd) ? std::expm1(-seen.even->value) : 0.0;
+    const double less_sd = seen.even && std::isfinite(seen.even->sd) ? seen.even->sd : 0.0;
+    std::vector<double> late(n, 0.0);
+    std::vector<std::uint8_t> valid(n, 0);
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+        const double second = prediction.turn_s[i - 1] - 2.0 * prediction.turn_s[i] + prediction.turn_s[i + 1];
+        // Such a rate moves the points where the phase stands still as any other does.
+        late[i] =
+            -0.25 * series.direction[i] * second + left_rad_s[i] / series.acceleration_rad_s2 + less * shares[i] / w;
+        valid[i] = 1;
+    }
+    // Clocks that find the zero-rate point from pulses do not follow the lock-in's shift of it all the way.
+    const std::array<std::pair<int, double>, 3> neighbours{{{-1, 1.0}, {0, 2.0}, {1, 1.0}}};
+    const Eigen::VectorXd of_late = take_phase(late, valid, fit, functions, neighbours);
+    const auto [at_minima_s2, at_maxima_s2] = PhaseFunctions::mean_squares(of_late);
+    // Of a turn and of both beside it.
+    const double followed_s = std::sqrt(3.0 * (at_minima_s2 + at_maxima_s2));
+    // Beneath: what the approximations of turn times leave, 1e-7 of an asymmetry, a fiftieth of what they do not
+    // follow, what they would not of a rotation: middles between pulses lie off by w^2 t^2/6 of the shift; and what is
+    // not known of the acceleration.
+    const double least_s = std::hypot(std::hypot(5e-8 * series.interval_s, 0.02 * followed_s),
+                                      mean_share / (series.amplitude_rad * w), less_sd * mean_share / w);
+    DitherShape shape;
+    shape.late_s = block_mean(late, valid, fit.rows(), least_s);
+    shape.even = seen.even;
+    if (!seen.sides) return shape;
+    shape.sides = seen.sides;
+    shape.turns = seen.turns;
+    shape.sides_by_sine = seen.angle;
+    shape.sides_by_ratio = 1.0 - seen.share_of_other;
+    constexpr double of_jerk = 0.2;       // accelerations may be made of pulses in other ways
+    constexpr double of_harmonic = 10.0;  // a third harmonic changes it by 24 times itself, 9 times even
+    const double moved = std::hypot(seen.jerk, (seen.angle + seen.share_of_other) * w * shape.late_s.value);
+    const double least_sides = std::hypot(of_jerk, of_harmonic * seen.even->value) * moved;
+    shape.sides->sd = std::hypot(shape.sides->sd, least_sides);
+    return shape;
+}
+
+std::string note_on_acceleration(const record::Turns& turns, const TurnFit& fit) {
+    constexpr double least = 0.002;
+    constexpr double beyond_doubt = 10.0;  // standard errors
+    if (!fit.model().series().all_phases_come) return {};
+    const auto even = dither_shape(turns, fit).even;
+    if (!even || !(std::abs(even->value) > std::max(least, beyond_doubt * even->sd))) return {};
+    return fmt::format(
+        "the phase's accelerations at the turns are {:.2g} % {} than those of a sine of the counted swing, as a third "
+        "harmonic of the dither's rate of {:.2g} % would make them, or counts lost in fast phase; the threshold is "
+        "then "
+        "{:.6g} deg/h",
+        100.0 * std::abs(std::expm1(even->value)), even->value > 0.0 ? "greater" : "smaller",
+        100.0 * 0.375 * even->value, fit.parameters().threshold_deg_h * std::exp(0.5 * even->value));
+}
+
+}  // namespace ringlock::closure

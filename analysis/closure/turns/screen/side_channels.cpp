@@ -1,0 +1,225 @@
+#include "analysis/closure/turns/screen/side_channels.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/closure/stats/p_values.hpp"
+#include "analysis/closure/turns/screen/miscounts.hpp"
+#include "engine/core/units.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+using effects::Effect;
+
+/// Chi-squared of a mean, with the doubt of its standard error in it: what a normal deviate of the same rarity has.
+double chi2_of(const BlockMean& mean, double expected) {
+    if (!std::isfinite(mean.sd) || mean.sd == 0.0) return 0.0;
+    const double t = std::abs(mean.value - expected) / mean.sd;
+    const auto counted = static_cast<double>(std::count(mean.counts.begin(), mean.counts.end(), 1));
+    // Wallace (1959): a normal deviate as rare as t.
+    const double freedom = counted - 1.0;
+    return freedom * std::log1p(t * t / freedom) * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) *
+           (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
+}
+
+/// Asymmetry r and second harmonic (sine s, cosine c of its phase times its ratio) by what the columns tell, with
+/// l = w late:
+///
+///     l = (pi/2) r - s,     sides = j r - k s,     turns = c,     j = sides_by_ratio, k = sides_by_sine.
+struct ShapeFit {
+    double ratio = 0.0, ratio_sd = 0.0;
+    double sine = 0.0, sine_sd = 0.0;
+    double cosine = 0.0, cosine_sd = 0.0;
+    double left = 0.0;  ///< chi-squared of what they do not account for
+
+    ShapeFit(const DitherShape& shape, double w, bool asymmetry, bool harmonic) {
+        const Eigen::Vector2d of_ratio{0.5 * units::pi, shape.sides_by_ratio};
+        const Eigen::Vector2d of_sine{-1.0, -shape.sides_by_sine};
+        const bool sides = shape.sides && std::isfinite(shape.sides->sd);
+        const Eigen::Vector2d told{w * shape.late_s.value, sides ? shape.sides->value : 0.0};
+        const Eigen::Vector2d weight{std::pow(w * shape.late_s.sd, -2), sides ? std::pow(shape.sides->sd, -2) : 0.0};
+        if (asymmetry && harmonic && sides) {
+            Eigen::Matrix2d model;
+            model << of_ratio, of_sine;
+            const Eigen::Matrix2d back = model.inverse();
+            const Eigen::Vector2d found = back * told;
+            const Eigen::Matrix2d covariance = back * weight.cwiseInverse().asDiagonal() * back.transpose();
+            ratio = found(0);
+            ratio_sd = std::sqrt(covariance(0, 0));
+            sine = found(1);
+            sine_sd = std::sqrt(covariance(1, 1));
+        } else if (asymmetry || harmonic) {
+            const Eigen::Vector2d& model = asymmetry ? of_ratio : of_sine;
+            const double information = model.cwiseAbs2().dot(weight);
+            (asymmetry ? ratio_sd : sine_sd) = std::sqrt(1.0 / information);
+            if (information > 0.0) {
+                (asymmetry ? ratio : sine) = model.cwiseProduct(told).dot(weight) / information;
+            }
+        }
+        if (harmonic && shape.turns && std::isfinite(shape.turns->sd)) {
+            cosine = shape.turns->value;
+            cosine_sd = shape.turns->sd;
+        }
+        const Eigen::Vector2d expected = ratio * of_ratio + sine * of_sine;
+        left = chi2_of(shape.late_s, expected(0) / w);
+        if (shape.sides) left += chi2_of(*shape.sides, expected(1));
+        if (shape.turns) left += chi2_of(*shape.turns, cosine);
+    }
+
+    double harmonic_ratio() const { return std::hypot(sine, cosine); }
+    double harmonic_phase_rad() const { return std::atan2(sine, cosine); }
+
+    void tell_asymmetry(Candidate& candidate) const {
+        candidate.values.at("ratio") = ratio;
+        candidate.sd["ratio"] = ratio_sd;
+    }
+    void tell_harmonic(Candidate& candidate) const {
+        const double f = harmonic_phase_rad();
+        candidate.values.at("ratio") = harmonic_ratio();
+        candidate.values.at("phase_rad") = f;
+        candidate.sd["ratio"] = std::hypot(std::sin(f) * sine_sd, std::cos(f) * cosine_sd);
+        candidate.sd["phase_rad"] = std::hypot(std::cos(f) * sine_sd, std::sin(f) * cosine_sd) / harmonic_ratio();
+    }
+};
+
+}  // namespace
+
+std::optional<TurnParameters> shape_read_again(const record::Turns& turns, const TurnFit& fit) {
+    constexpr double same = 0.1;  // standard errors
+    TurnParameters parameters = fit.parameters();
+    ActiveEffect* asymmetry = parameters.find("dither_asymmetry");
+    ActiveEffect* harmonic = parameters.find("dither_second_harmonic");
+    if (asymmetry == nullptr && harmonic == nullptr) return std::nullopt;
+    const ShapeFit told(dither_shape(turns, fit), units::pi / fit.model().series().interval_s, asymmetry != nullptr,
+                        harmonic != nullptr);
+    bool moved = false;
+    if (asymmetry != nullptr) {
+        double& ratio = asymmetry->values.at("ratio");
+        moved = std::abs(told.ratio - ratio) > same * told.ratio_sd;
+        ratio = told.ratio;
+    }
+    if (harmonic != nullptr) {
+        double& ratio = harmonic->values.at("ratio");
+        double& phase_rad = harmonic->values.at("phase_rad");
+        moved = moved || std::abs(told.sine - ratio * std::sin(phase_rad)) > same * told.sine_sd ||
+                std::abs(told.cosine - ratio * std::cos(phase_rad)) > same * told.cosine_sd;
+        ratio = told.harmonic_ratio();
+        phase_rad = told.harmonic_phase_rad();
+    }
+    return moved ? std::optional(parameters) : std::nullopt;
+}
+
+RadiusFold radius_fold(const record::Turns& turns, const Rows& rows) {
+    RadiusFold fold;
+    double amplitude = 0.0;  // of the cosine, in which offsets are told
+    for (std::size_t i = 0; i < turns.size(); ++i) amplitude += std::hypot(turns.sine[i], turns.cosine[i]);
+    amplitude /= static_cast<double>(turns.size());
+    // Gauss and Newton: radius - 1 = gain sin^2 + offset_sin sin + offset_cos cos - orthogonality sin cos + (scale).
+    for (int pass = 0; pass < 8; ++pass) {
+        Eigen::Matrix<double, 5, 5> normal = Eigen::Matrix<double, 5, 5>::Zero();
+        Eigen::Matrix<double, 5, 1> right = Eigen::Matrix<double, 5, 1>::Zero();
+        double squares = 0.0;
+        double count = 0.0;
+        double scale = 0.0;
+        std::vector<double> radius(turns.size());
+        std::vector<double> angle(turns.size());
+        const gyro::Ellipse& e = fold.ellipse;
+        for (std::size_t i = 0; i < turns.size(); ++i) {
+            const double s = (turns.sine[i] / amplitude - e.offset_sin) / (1.0 + e.gain);
+            double c = turns.cosine[i] / amplitude - e.offset_cos;
+            c = (c + s * std::sin(e.orthogonality_rad)) / std::cos(e.orthogonality_rad);
+            radius[i] = std::hypot(s, c);
+            angle[i] = std::atan2(s, c);
+            if (rows[i]) {
+                scale += radius[i];
+                count += 1.0;
+            }
+        }
+        scale /= count;
+        for (std::size_t i = 0; i < turns.size(); ++i) {
+            if (!rows[i]) continue;
+            const double s = std::sin(angle[i]);
+            const double c = std::cos(angle[i]);
+            const double y = radius[i] / scale - 1.0;
+            const Eigen::Matrix<double, 5, 1> x{s * s - 0.5, s, c, -s * c, 1.0};
+            normal += x * x.transpose();
+            right += x * y;
+            squares += y * y;
+        }
+        const Eigen::Matrix<double, 5, 5> inverse = normal.inverse();
+        const Eigen::Matrix<double, 5, 1> step = inverse * right;
+        const double variance = std::max((squares - step.dot(right)) / (count - 5.0), 1e-24);
+        if (pass == 0) {
+            const double without = squares - right(4) * right(4) / normal(4, 4);
+            const double with = squares - step.dot(right);
+            fold.chi2 = (without - with) / variance;
+        }
+        amplitude *= scale;
+        fold.ellipse.gain += step(0);
+        fold.ellipse.offset_sin += step(1);
+        fold.ellipse.offset_cos += step(2);
+        fold.ellipse.orthogonality_rad += step(3);
+        fold.covariance = variance * inverse.topLeftCorner<4, 4>();
+    }
+    return fold;
+}
+
+std::vector<Candidate> screen_side_channels(const record::Turns& turns, const TurnFit& fit, const JoinedPhase& joined,
+                                            bool again) {
+    std::vector<Candidate> candidates;
+    TurnParameters p = fit.parameters();
+    const auto wanted = [&](std::string_view name) -> const Effect* {
+        return again || p.find(name) == nullptr ? effects::find(name) : nullptr;
+    };
+    if (const Effect* effect = wanted("readout_ellipse")) {
+        const RadiusFold fold = radius_fold(turns, fit.rows());
+        Candidate candidate{effect, values_at_rest(*effect), fold.chi2, chi2_tail(fold.chi2, 4), 1.0};
+        candidate.values.at("gain") = fold.ellipse.gain;
+        candidate.values.at("offset_sin") = fold.ellipse.offset_sin;
+        candidate.values.at("offset_cos") = fold.ellipse.offset_cos;
+        candidate.values.at("orthogonality_rad") = fold.ellipse.orthogonality_rad;
+        const char* const names[] = {"gain", "offset_sin", "offset_cos", "orthogonality_rad"};
+        for (Eigen::Index k = 0; k < 4; ++k) candidate.sd[names[k]] = std::sqrt(fold.covariance(k, k));
+        candidates.push_back(candidate);
+    }
+    if (const Effect* effect = wanted("missed_counts")) {
+        // The margin by which a miscount is told is six standard deviations of the phase: none comes by chance.
+        double missed = 0.0;
+        for (const std::size_t i : joined.miscounted) missed += fit.rows()[i];
+        const auto n = static_cast<double>(std::count(fit.rows().begin(), fit.rows().end(), 1));
+        constexpr double by_chance = 1e-9;
+        const double surprise = missed > 0.0 ? missed * std::log(missed / (n * by_chance)) - missed : 0.0;
+        Candidate candidate{effect, values_at_rest(*effect), 2.0 * surprise, chi2_tail(2.0 * surprise, 1), 1.0};
+        if (missed > 0.0) {
+            const MissedShare share = share_of_missed_counts(turns, joined, fit.rows());
+            candidate.values.at("probability_per_turn") = share.probability_per_turn;
+            candidate.sd["probability_per_turn"] = share.sd;
+        }
+        candidates.push_back(candidate);
+    }
+    if (!fit.model().series().all_phases_come) return candidates;
+    const Effect* asymmetry = wanted("dither_asymmetry");
+    const Effect* harmonic = wanted("dither_second_harmonic");
+    if (asymmetry == nullptr && harmonic == nullptr) return candidates;
+    const DitherShape shape = dither_shape(turns, fit);
+    const double w = units::pi / fit.model().series().interval_s;
+    const bool has_asymmetry = p.find("dither_asymmetry") != nullptr;
+    const bool has_harmonic = p.find("dither_second_harmonic") != nullptr;
+    if (asymmetry != nullptr) {
+        const ShapeFit with(shape, w, true, has_harmonic);
+        const double chi2 = std::max(0.0, ShapeFit(shape, w, false, has_harmonic).left - with.left);
+        candidates.push_back({asymmetry, values_at_rest(*asymmetry), chi2, chi2_tail(chi2, 1), 1.0});
+        with.tell_asymmetry(candidates.back());
+    }
+    if (harmonic != nullptr) {
+        const ShapeFit with(shape, w, has_asymmetry, true);
+        const double chi2 = std::max(0.0, ShapeFit(shape, w, has_asymmetry, false).left - with.left);
+        candidates.push_back({harmonic, values_at_rest(*harmonic), chi2, chi2_tail(chi2, 2), 1.0});
+        with.tell_harmonic(candidates.back());
+    }
+    return candidates;
+}
+
+}  // namespace ringlock::closure
