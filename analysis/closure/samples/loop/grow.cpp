@@ -17,6 +17,7 @@
 #include "analysis/closure/samples/screen/screen.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/interrupt.hpp"
 
 namespace ringlock::closure {
 
@@ -73,7 +74,7 @@ void SampleLoop::take_lattice(Closure& closure) {
             lattice_.printed_arcsec, 100.0 * lattice_.strength));
     }
     Step taken;
-    taken.effect = "count_quantization";
+    taken.effect = effects::find("count_quantization");
     taken.p_value = lattice_.p_value;
     const SampleScore before = score_of(*now_.fit, reported_, 0.0);
     // Blurred steps are not where the values are: the digits are.
@@ -103,6 +104,8 @@ void SampleLoop::find_coarse_steps(Closure& closure) {
 /// Adds what earns its place, until nothing does.
 void SampleLoop::add_all(Closure& closure, bool random_rates) {
     while (now_.steps.size() < options.most_steps) {
+        check_interrupt();
+        monitor_.tell("searching the library");
         const SampleChoice choice = choose_on_samples(
             record_.declared, {now_.fit, now_.lines_hz, next_step_, random_rates}, whole_, lattice_step());
         nearest_ = choice.nearest;
@@ -126,9 +129,10 @@ const SampleContender& SampleLoop::take_likelier(const SampleChoice& choice, Ste
     const SampleContender& taken = other ? *choice.other_random : *choice.chosen;
     const SampleContender& left = other ? *choice.chosen : *choice.other_random;
     auto& tied = step.confounded_with;
-    std::erase_if(
-        tied, [&](const std::string& name) { return name == left.candidate.effect || name == taken.candidate.effect; });
-    if (std::abs(gain) < options.tie) tied.push_back(left.candidate.effect);
+    std::erase_if(tied, [&](const effects::Effect* other) {
+        return other->name() == left.candidate.effect || other->name() == taken.candidate.effect;
+    });
+    if (std::abs(gain) < options.tie) tied.push_back(effects::find(left.candidate.effect));
     if (other) step.p_value = taken.candidate.p_value;
     return taken;
 }
@@ -137,20 +141,21 @@ const SampleContender& SampleLoop::take_likelier(const SampleChoice& choice, Ste
 void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     Step step;
     step.p_value = choice.p_value;
-    step.confounded_with = choice.confounded_with;
+    for (const std::string& name : choice.confounded_with) step.confounded_with.push_back(effects::find(name));
     const SampleScore before = score(*now_.fit);
     const SampleContender& best = take_likelier(choice, step);
     const std::string effect = best.candidate.effect;
-    step.effect = effect;
+    step.effect = effects::find(effect);
     for (const auto& [partner, names] : now_.of_partners) {
         if (partner != effect) continue;
         for (const std::string& name : names) {
             const auto& named = step.confounded_with;
-            if (std::find(named.begin(), named.end(), name) == named.end()) step.confounded_with.push_back(name);
+            const effects::Effect* other = effects::find(name);
+            if (std::find(named.begin(), named.end(), other) == named.end()) step.confounded_with.push_back(other);
         }
     }
     now_.of_partners.insert(now_.of_partners.end(), choice.of_partners.begin(), choice.of_partners.end());
-    if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
+    if (!step.confounded_with.empty()) step.experiment = experiment_for(*step.effect, step.confounded_with);
     drop_needless(effect);
     for (int k = 0; k < most_motions && move_anew();) ++k;
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
@@ -182,6 +187,7 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
                             now_.lines_hz.back()));
         }
     }
+    monitor_.tell(fmt::format("added {}", step.effect->name()));
     now_.steps.push_back(std::move(step));
 }
 

@@ -158,7 +158,7 @@ bool SampleLoop::keep_names(int first_step, const std::function<bool(const Sampl
         closure.notes.push_back(fmt::format(
             "{} follows what may be nothing that the library has: it is in the model, so that the rest can be "
             "told, and is not named",
-            now_.steps[k].effect));
+            now_.steps[k].effect->name()));
         now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
         now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
     }

@@ -106,6 +106,7 @@ void SampleLoop::finish(Closure& closure) {
         for (const double x : series_.input_rate_deg_h) input += x / static_cast<double>(series_.size());
     }
     closure.mean_input_rate_deg_h = input;
+    monitor_.tell("fitting the whole record");
     SampleFigures figures = this->figures();
     closure.rounding_in_noise = !rounded_.drawn();
     closure.base = std::move(figures.base);
@@ -161,9 +162,11 @@ Closure SampleLoop::run() {
     Closure closure;
     for (int look = 0; look < most_looks; ++look) {
         closure = {};
+        monitor_.tell("fitting the base model");
         close(closure);
         if (!restore()) break;
     }
+    monitor_.tell("testing the residual");
     test_what_is_left(closure);
     if (closure.unexplained && earlier_) {
         go_without_random(closure);
@@ -188,7 +191,7 @@ void SampleLoop::take_known(const std::vector<ActiveEffect>& effects, Closure& c
     KnownEffects known = known_effects(*now_.fit, effects);
     for (const SampleStep& told : known.told) {
         Step& step = now_.steps.emplace_back();
-        step.effect = told.effect;
+        step.effect = effects::find(told.effect);
         if (told.effect != "count_quantization") continue;
         lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
         used_step_ = lattice_.printed_arcsec;
@@ -214,7 +217,9 @@ Closure SampleLoop::fit(const std::vector<ActiveEffect>& effects) {
     return closure;
 }
 
-Closure close_samples(const record::Record& record) { return SampleLoop(record).run(); }
+Closure close_samples(const record::Record& record, const Monitor& monitor) {
+    return SampleLoop(record, monitor).run();
+}
 
 Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects) {
     return SampleLoop(record).fit(effects);
