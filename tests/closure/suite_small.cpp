@@ -446,7 +446,7 @@ TEST(RandomRates, MayLookLikeARamp) {
             by_four += ramp - walk > ringlock::closure::options.tie ? 1.0 : 0.0;
             by_more += ramp - walk > ringlock::closure::options.tie_with_random ? 1.0 : 0.0;
         }
-        EXPECT_LT(by_more / shown, ringlock::closure::level) << size;
+        EXPECT_LT(by_more / shown, ringlock::closure::options.level) << size;
         most_by_four = std::max(most_by_four, by_four / shown);
     }
     EXPECT_NEAR(most_by_four, 0.05, 0.01);
