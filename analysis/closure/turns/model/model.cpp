@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "analysis/closure/decide/evidence.hpp"
+#include "analysis/closure/options.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 #include "engine/gyro/device.hpp"
@@ -101,7 +102,7 @@ double TurnModel::temperature_change_k(std::size_t turn) const {
 
 std::vector<double> TurnModel::smooth(const std::vector<double>& turn_s) const {
     // A resonator keeps its time far better than a zero-rate point can be told from pulses that the lock-in moves.
-    constexpr std::ptrdiff_t reach = 64;  // turns to either side, of one parity each
+    constexpr std::ptrdiff_t reach = options.turns.model.smoothing_turns;  // of one parity each
     const auto n = static_cast<std::ptrdiff_t>(turn_s.size());
     std::vector<double> smoothed(turn_s.size());
     const double start = turn_s.front();
@@ -276,9 +277,8 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
             most_deg_h = std::max(most_deg_h, std::abs(added_deg_h[i]));
         }
         // How far zero-rate points move in the time within which the phase turns: what of a kick that changes.
-        constexpr double felt = 1e-3;
         const double acceleration_rad_s2 = device.half_cycle(1, series_.amplitude_rad).end_acceleration_rad_s2();
-        if (c * most_deg_h > felt * std::sqrt(acceleration_rad_s2)) {
+        if (c * most_deg_h > options.turns.model.rate_felt_by_kicks * std::sqrt(acceleration_rad_s2)) {
             kick_of =
                 std::make_shared<const Kicks>(kicks_at(device_setup, beside_bias_deg_h, factors, parameters.shape));
             swing = dither_swings(*kick_of, beside_bias_deg_h);
@@ -342,7 +342,7 @@ TurnNoise TurnModel::noise(const TurnParameters& parameters) const {
         noise.walk_rad2_per_s3 += c * c * rate.walk_deg2_h2_per_s;
         for (const effects::GaussMarkov& term : rate.terms) {
             // What hardly changes within the record is bias.
-            if (term.time_s > 30.0 * series_.time_s.back()) continue;
+            if (term.time_s > options.turns.model.longest_correlation * series_.time_s.back()) continue;
             noise.rates.push_back({term.time_s, c * c * term.variance_deg2_h2});
         }
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/closure/turns/screen/miscounts.hpp"
 #include "engine/core/units.hpp"
@@ -87,7 +88,7 @@ struct ShapeFit {
 }  // namespace
 
 std::optional<TurnParameters> shape_read_again(const record::Turns& turns, const TurnFit& fit) {
-    constexpr double same = 0.1;  // standard errors
+    const double same = options.turns.side_channels.same_shape;
     TurnParameters parameters = fit.parameters();
     ActiveEffect* asymmetry = parameters.find("dither_asymmetry");
     ActiveEffect* harmonic = parameters.find("dither_second_harmonic");
@@ -185,11 +186,10 @@ std::vector<Candidate> screen_side_channels(const record::Turns& turns, const Tu
         candidates.push_back(candidate);
     }
     if (const Effect* effect = wanted("missed_counts")) {
-        // The margin by which a miscount is told is six standard deviations of the phase: none comes by chance.
         double missed = 0.0;
         for (const std::size_t i : joined.miscounted) missed += fit.rows()[i];
         const auto n = static_cast<double>(std::count(fit.rows().begin(), fit.rows().end(), 1));
-        constexpr double by_chance = 1e-9;
+        const double by_chance = options.turns.side_channels.miscount_by_chance;
         const double surprise = missed > 0.0 ? missed * std::log(missed / (n * by_chance)) - missed : 0.0;
         Candidate candidate{effect, values_at_rest(*effect), 2.0 * surprise, chi2_tail(2.0 * surprise, 1), 1.0};
         if (missed > 0.0) {
