@@ -7,7 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/options.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
@@ -25,22 +24,14 @@ ActiveEffect* TurnParameters::find(std::string_view effect) {
     return const_cast<ActiveEffect*>(std::as_const(*this).find(effect));
 }
 
-bool told_by_other_columns(const effects::Effect& effect) {
-    const gyro::Setup plain;
-    gyro::Setup setup;
-    effects::Values values;
-    for (const effects::Parameter& parameter : effect.parameters()) {
-        const bool counts = parameter.role == effects::Role::size || parameter.role == effects::Role::probability;
-        values[std::string(parameter.name)] = counts ? 1e-3 : 0.0;
-    }
-    effect.configure(values, setup);
-    return setup.dither_asymmetry_ratio != plain.dither_asymmetry_ratio ||
-           setup.dither_harmonic_ratio != plain.dither_harmonic_ratio || setup.ellipse.gain != plain.ellipse.gain ||
-           setup.missed_count_probability != plain.missed_count_probability;
+const ActiveEffect* TurnParameters::find(const effects::Effect* effect) const {
+    const auto found =
+        std::find_if(effects.begin(), effects.end(), [&](const ActiveEffect& a) { return a.effect == effect; });
+    return found == effects.end() ? nullptr : &*found;
 }
 
-bool is_of_coupling(const effects::Effect& effect) {
-    return !effect.adds_angle() && !is_random_rate(effect) && !told_by_other_columns(effect);
+ActiveEffect* TurnParameters::find(const effects::Effect* effect) {
+    return const_cast<ActiveEffect*>(std::as_const(*this).find(effect));
 }
 
 TurnModel::TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad, ReadingErrors known)

@@ -92,7 +92,7 @@ Columns kicks_that_change(const TurnFit& fit, double periods) {
 /// The ellipse that is in the model is known from radii, as well as phases would tell it: amplitudes of the first two
 /// harmonics, to which it shifts the reading, have that error besides their own.
 void doubt_ellipse(const TurnFit& fit, TurnFit::Score& score) {
-    if (fit.parameters().find("readout_ellipse") == nullptr || score.rank != 4) return;
+    if (fit.parameters().find(effect_roles().ellipse.effect) == nullptr || score.rank != 4) return;
     const auto counted = static_cast<double>(std::count(fit.rows().begin(), fit.rows().end(), 1));
     const double sd = fit.model().series().radius_sd_rad;
     Eigen::MatrixXd covariance = score.covariance;

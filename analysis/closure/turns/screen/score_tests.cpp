@@ -253,16 +253,6 @@ std::optional<Candidate> spread(const TurnFit& fit, const Effect& effect, Values
 
 }  // namespace
 
-Values values_at_rest(const Effect& effect) {
-    Values values;
-    for (const Parameter& parameter : effect.parameters()) {
-        const bool active = parameter.role == Role::size || parameter.role == Role::deviation ||
-                            parameter.role == Role::probability || parameter.role == Role::phase;
-        values[name_of(parameter)] = active ? 0.0 : parameter.default_value;
-    }
-    return values;
-}
-
 std::vector<double> frequencies_as_likely(const TurnFit& fit, const Effect& effect, double hz, double chi2_apart) {
     std::vector<double> found;
     const TurnModel::Prediction without = fit.model().predict(fit.parameters());
