@@ -34,6 +34,9 @@ class BaseVibration final : public Effect {
                    std::sin(units::two_pi * (turns - std::floor(turns)) + phase_rad);
         };
     }
+    Bounds bounds(const Values& values, const Exposure& /*exposure*/) const override {
+        return {.rate_deg_h = std::abs(values.at("rate_deg_h"))};
+    }
 };
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 
 #include "engine/effects/effect.hpp"
 
@@ -23,6 +24,9 @@ class BiasRamp final : public Effect {
         return [slope_arcsec_s2 = values.at("deg_h_per_h") / 3600.0](const Interval& at) {
             return slope_arcsec_s2 * (at.start_s + 0.5 * at.duration_s) * at.duration_s;
         };
+    }
+    Bounds bounds(const Values& values, const Exposure& exposure) const override {
+        return {.rate_deg_h = std::abs(values.at("deg_h_per_h")) * exposure.duration_h};
     }
 };
 

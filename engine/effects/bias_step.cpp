@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "engine/effects/effect.hpp"
 
@@ -23,6 +24,9 @@ class BiasStep final : public Effect {
         return [step_deg_h = values.at("step_deg_h"), time_s = values.at("time_s")](const Interval& at) {
             return step_deg_h * std::clamp(at.start_s + at.duration_s - time_s, 0.0, at.duration_s);
         };
+    }
+    Bounds bounds(const Values& values, const Exposure& /*exposure*/) const override {
+        return {.rate_deg_h = std::abs(values.at("step_deg_h"))};
     }
 };
 

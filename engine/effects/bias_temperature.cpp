@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 
 #include "engine/effects/effect.hpp"
 
@@ -27,6 +28,9 @@ class BiasTemperature final : public Effect {
             const double mean_change_k = 0.5 * (at.temperature_change_k[0] + at.temperature_change_k[1]);
             return deg_h_per_k * mean_change_k * at.duration_s;
         };
+    }
+    Bounds bounds(const Values& values, const Exposure& exposure) const override {
+        return {.rate_deg_h = std::abs(values.at("deg_h_per_k")) * exposure.temperature_change_k};
     }
 };
 

@@ -72,6 +72,24 @@ struct RateNoise {
 /// Variance of the angle [arcsec^2] that the rate adds in the first `duration_s` after the start.
 double angle_variance_arcsec2(const RateNoise& noise, double duration_s);
 
+/// Standard deviation [deg/h] of the rate's mean over `average_s` at the end of a run of `duration_h`, or a little
+/// more: for rates that remember longer than that mean lasts, the standard deviation of the rate itself is taken.
+double rate_sd_deg_h(const RateNoise& noise, double average_s, double duration_h);
+
+/// The most that a gyro is exposed to over a run.
+struct Exposure {
+    double duration_h = 0.0;
+    double temperature_change_k = 0.0;       ///< largest magnitude of the temperature less that at the start
+    double temperature_slope_k_per_h = 0.0;  ///< largest magnitude
+    double input_rate_deg_h = 0.0;           ///< largest magnitude, the dither apart
+};
+
+/// How far an effect can take a gyro, chance apart: magnitudes that are not exceeded at any time of a run.
+struct Bounds {
+    double rate_deg_h = 0.0;          ///< of the rate that it adds
+    double threshold_relative = 0.0;  ///< of the change of the lock-in threshold, over the threshold
+};
+
 /// A random rate, given as the angle it adds.
 class RateProcess {
    public:
@@ -144,6 +162,8 @@ class Effect {
     virtual AddedAngle added_angle(const Values& /*values*/) const {
         return [](const Interval&) { return 0.0; };
     }
+    /// How far what it does without chance can go under that exposure; what changes in time must lie within.
+    virtual Bounds bounds(const Values& /*values*/, const Exposure& /*exposure*/) const { return {}; }
     /// The random rate that rate_process() draws from.
     virtual RateNoise rate_noise(const Values& /*values*/) const { return {}; }
     /// A random rate for one gyro, or null where the effect has none.

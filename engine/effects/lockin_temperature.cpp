@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 
 #include "engine/effects/effect.hpp"
 
@@ -24,6 +25,9 @@ class LockinTemperature final : public Effect {
     bool active(const Values& values) const override { return values.at("relative_per_k") != 0.0; }
     double threshold_factor(const Values& values, double temperature_change_k) const override {
         return 1.0 + values.at("relative_per_k") * temperature_change_k;
+    }
+    Bounds bounds(const Values& values, const Exposure& exposure) const override {
+        return {.threshold_relative = std::abs(values.at("relative_per_k")) * exposure.temperature_change_k};
     }
 };
 

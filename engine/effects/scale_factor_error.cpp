@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 
 #include "engine/effects/effect.hpp"
 
@@ -29,6 +30,9 @@ class ScaleFactorError final : public Effect {
             const double mean_rate_arcsec_s = 0.5 * (at.input_rate_deg_h[0] + at.input_rate_deg_h[1]);
             return relative * mean_rate_arcsec_s * at.duration_s;
         };
+    }
+    Bounds bounds(const Values& values, const Exposure& exposure) const override {
+        return {.rate_deg_h = std::abs(values.at("relative")) * exposure.input_rate_deg_h};
     }
 };
 

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "engine/core/units.hpp"
+#include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/fast_motion.hpp"
 
@@ -142,13 +143,34 @@ Finding turn_map_has_small_kicks(const Scenario& s) {
                     kick, largest)};
 }
 
+/// Keys of the rates that matter in comparison with the dither's, that of the largest first.
+std::vector<std::string> keys_of_rates(const Scenario& s) {
+    std::vector<std::pair<double, std::vector<std::string>>> rates;
+    rates.push_back({exposure(s).input_rate_deg_h,
+                     has_profile(s.input) ? std::vector<std::string>{"input.profile_rate_deg_h"}
+                                          : std::vector<std::string>{"input.rate_deg_h", "input.sweep_stop_deg_h"}});
+    for (const EffectBounds& bounds : bounds_of_effects(s)) {
+        const double rate = bounds.certain.rate_deg_h + sigmas * bounds.rate_sd_deg_h;
+        if (rate > 0.01 * peak_rate_deg_h(s)) rates.emplace_back(rate, keys_of(*bounds.effect));
+    }
+    std::stable_sort(rates.begin(), rates.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    std::vector<std::string> keys;
+    for (const auto& [rate, names] : rates) keys.insert(keys.end(), names.begin(), names.end());
+    return keys;
+}
+
 Finding turn_map_has_fast_middles(const Scenario& s) {
     if (s.propagation.method != PropagationMethod::turn_map || fast_middles(s)) return {};
+    std::vector<std::string> keys = keys_of_rates(s);
+    for (const char* key :
+         {"noise_injection.turn_phase_rms_rad", "dither.peak_rate_deg_s", "dither.frequency_hz",
+          "gyro.scale_factor_arcsec", "gyro.lockin_threshold_deg_h", "calibration.threshold_error_relative",
+          "ensemble.dither_amplitude_sd_relative", "ensemble.dither_asymmetry_sd_ratio",
+          "ensemble.lockin_threshold_sd_relative", "propagation.method"}) {
+        keys.emplace_back(key);
+    }
     return Complaint{
-        {"input.rate_deg_h", "input.sweep_stop_deg_h", "noise_injection.turn_phase_rms_rad", "dither.peak_rate_deg_s",
-         "dither.frequency_hz", "gyro.scale_factor_arcsec", "gyro.lockin_threshold_deg_h",
-         "calibration.threshold_error_relative", "ensemble.dither_amplitude_sd_relative",
-         "ensemble.dither_asymmetry_sd_ratio", "ensemble.lockin_threshold_sd_relative", "propagation.method"},
+        std::move(keys),
         "with what rates, noise, effects and spread may take from it, the dither is too slow in the middle of some "
         "half "
         "cycle for the turn map (which needs a phase that runs fast there); set propagation.method = \"direct\" or a "
@@ -203,7 +225,7 @@ Finding keys_are_the_instruments(const Scenario& s) {
     if (r.detector_bandwidth_hz != standard.detector_bandwidth_hz) key = "readout.detector_bandwidth_hz";
     if (r.adc_bits != standard.adc_bits) key = "readout.adc_bits";
     if (key.empty()) return {};
-    return Complaint{{key, "readout.model"},
+    return Complaint{{std::string(key), "readout.model"},
                      fmt::format("{} is a property of the instrument, which this readout model leaves out; set "
                                  "readout.model = \"instrument\"",
                                  key)};

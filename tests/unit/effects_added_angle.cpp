@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -64,6 +65,24 @@ TEST(AddedAngles, AreTheIntegralsOfTheStatedRates) {
             EXPECT_NEAR(find(s.name)->added_angle(s.values)(between(from, to)), expected, 1e-6)
                 << s.name << " from " << from << " to " << to;
         }
+    }
+}
+
+// 20 s under a temperature of 3 K to -2 K and a rate of -40 to 80 deg/h: no rate is faster than its bound, and some
+// are as fast, which an effect that leaves its bound at zero is not.
+TEST(AddedAngles, StayWithinTheirBounds) {
+    const Exposure exposure{20.0 / 3600.0, 3.0, 0.25 * 3600.0, 80.0};
+    for (const Stated& s : stated()) {
+        const Effect& effect = *find(s.name);
+        const double bound = effect.bounds(s.values, exposure).rate_deg_h;
+        double fastest = 0.0;
+        for (int i = 0; i < 20000; ++i) {
+            const Interval at = between(1e-3 * i, 1e-3 * (i + 1));
+            fastest = std::max(fastest, std::abs(effect.added_angle(s.values)(at)) / at.duration_s);
+        }
+        EXPECT_LE(fastest, bound * (1.0 + 1e-12)) << s.name;
+        EXPECT_GE(fastest, 0.99 * bound) << s.name;
+        EXPECT_GT(bound, 0.0) << s.name;
     }
 }
 
