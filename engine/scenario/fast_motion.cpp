@@ -27,11 +27,18 @@ double varying_rate_deg_h(const Scenario& s) {
     return certain + sigmas * random;
 }
 
-/// Half of what the input's profile spans [deg/h].
+/// Half of what the input's profile can span within the turns that a run makes its tables for at one time [deg/h].
 double profile_half_span_deg_h(const Scenario& s) {
+    constexpr double turns = 128.0;
     if (!has_profile(s.input)) return 0.0;
+    const auto& times = s.input.profile_time_s;
+    const auto& rates = s.input.profile_rate_deg_h;
+    double steepest = 0.0;
+    for (std::size_t i = 1; i < std::min(times.size(), rates.size()); ++i) {
+        steepest = std::max(steepest, std::abs(rates[i] - rates[i - 1]) / (times[i] - times[i - 1]));
+    }
     const auto [lowest, highest] = input_range(s.input);
-    return 0.5 * (highest - lowest);
+    return 0.5 * std::min(highest - lowest, steepest * turns / (2.0 * s.dither.frequency_hz));
 }
 
 /// The varying rate with the room that tables leave on either side, see lane_propagator.cpp: up to twice what varies or
