@@ -49,8 +49,25 @@ struct Interval {
     double input_rate_deg_h[2] = {0.0, 0.0};      ///< of the case, the dither apart
 };
 
-/// Rotation [arcsec] over an interval.
-using AddedAngle = std::function<double(const Interval&)>;
+/// What an effect does to a gyro over an interval, chance apart. Angles of intervals that follow each other add up.
+/// Threshold and phase of the coupling are those in the middle of the interval. The engine keeps both constant over
+/// each half cycle of the dither and asks for them at the instant in its middle: an interval without duration, both
+/// ends of which are alike.
+struct Change {
+    double angle_arcsec = 0.0;        ///< rotation that the output gains
+    double threshold_factor = 1.0;    ///< of the lock-in threshold
+    double coupling_phase_rad = 0.0;  ///< by which the whole coupling moves: F(psi) becomes F(psi + phase)
+};
+
+/// The change over an interval: a pure function of it.
+using ChangeOver = std::function<Change(const Interval&)>;
+
+/// What of Change an effect can set; the rest stays as it is by default.
+struct Changes {
+    bool angle = false;
+    bool threshold = false;
+    bool coupling_phase = false;
+};
 
 /// A stationary random rate of exponential autocorrelation, variance exp(-|t|/time).
 struct GaussMarkov {
@@ -84,10 +101,11 @@ struct Exposure {
     double input_rate_deg_h = 0.0;           ///< largest magnitude, the dither apart
 };
 
-/// How far an effect can take a gyro, chance apart: magnitudes that are not exceeded at any time of a run.
+/// How far an effect can take a gyro, chance apart: magnitudes that Change does not exceed at any time of a run.
 struct Bounds {
-    double rate_deg_h = 0.0;          ///< of the rate that it adds
-    double threshold_relative = 0.0;  ///< of the change of the lock-in threshold, over the threshold
+    double rate_deg_h = 0.0;          ///< of the angle over the duration
+    double threshold_relative = 0.0;  ///< of the threshold's factor less one
+    double coupling_phase_rad = 0.0;
 };
 
 /// A random rate, given as the angle it adds.
@@ -154,15 +172,14 @@ class Effect {
     virtual bool active(const Values& values) const = 0;
     /// Changes constants of the gyro. The default does nothing.
     virtual void configure(const Values& /*values*/, gyro::Setup& /*setup*/) const {}
-    /// What the lock-in threshold is multiplied by when the temperature has changed by so much since the start.
-    virtual double threshold_factor(const Values& /*values*/, double /*temperature_change_k*/) const { return 1.0; }
-    /// True where added_angle() is not always zero.
-    virtual bool adds_angle() const { return false; }
-    /// Rotation that the effect adds to the output, chance apart; angles of intervals that follow each other add up.
-    virtual AddedAngle added_angle(const Values& /*values*/) const {
-        return [](const Interval&) { return 0.0; };
+    /// What change() sets.
+    virtual Changes changes() const { return {}; }
+    bool adds_angle() const { return changes().angle; }
+    /// What the effect does in time, chance apart.
+    virtual ChangeOver change(const Values& /*values*/) const {
+        return [](const Interval&) { return Change{}; };
     }
-    /// How far what it does without chance can go under that exposure; what changes in time must lie within.
+    /// How far change() can go under that exposure.
     virtual Bounds bounds(const Values& /*values*/, const Exposure& /*exposure*/) const { return {}; }
     /// The random rate that rate_process() draws from.
     virtual RateNoise rate_noise(const Values& /*values*/) const { return {}; }
