@@ -95,6 +95,23 @@ number_fault 1 "a.cpp:3: a constant" 'constexpr double least_share = 0.5;' 'room
 number_fault 1 "a line is PATH" '' 'room/a.cpp | least_share'
 expect 2 "no folder" closure_numbers.sh "$folder/list.txt" attic
 
+# name_fault STATUS WORDS LINE: a tree with two effects whose engine/gyro/device.cpp has LINE.
+name_fault() {
+    clean_tree
+    mkdir -p engine/effects
+    printf '#define RINGLOCK_EFFECTS(X) \\\n    X(bias_step) \\\n    X(quantum_noise)\n' >engine/effects/registry.cpp
+    echo 'return "bias_step";' >engine/effects/bias_step.cpp
+    echo "$3" >>engine/gyro/device.cpp
+    expect "$1" "$2" effect_names.sh engine app
+}
+name_fault 0 "call none of 2 effects" '// bias_step, "bias_steps", "a bias_step" and effects::bias_steps are no effects'
+name_fault 1 "engine/gyro/device.cpp:4:" 'if (effect.name() == "bias_step") return;'
+name_fault 1 "engine/gyro/device.cpp:4:" 'return effects::quantum_noise();'
+name_fault 1 "engine/gyro/device.cpp:4:" 'complain("effects.bias_step.time_s");'
+expect 2 "no sources" effect_names.sh engine/attic
+rm engine/effects/registry.cpp
+expect 2 "no effects" effect_names.sh engine
+
 # text_fault STATUS WORDS LINE: a fresh repository whose one file has LINE. Slashes and words are put together here, for
 # this file is read by the same check.
 text_fault() {
