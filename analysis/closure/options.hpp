@@ -2,6 +2,7 @@
 #include <cstddef>
 
 #include "analysis/closure/options_samples.hpp"
+#include "analysis/closure/options_stats.hpp"
 #include "analysis/closure/options_turns.hpp"
 
 /// Every number that decides what the closed loop names, with its reason and source.
@@ -36,6 +37,7 @@ struct Options {
     std::size_t blocks_in_a_row = 10;
     std::size_t held_out_block = 5;
 
+    StatsOptions stats = {};
     TurnOptions turns = {};
     SampleOptions samples = {};
 };

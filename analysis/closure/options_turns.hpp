@@ -3,8 +3,279 @@
 
 namespace ringlock::closure {
 
-/// Numbers that decide what is named on a record of turns.
+/// Numbers that decide what is named on a record of turns, room by room.
 struct TurnOptions {
+    /// Reading of a record: count and quadrature joined, and what a fit needs (turns/model/series).
+    struct Reading {
+        /// A phase counts as seen at all turns if each twelfth of a fringe holds at least a quarter of an even share,
+        /// at minima and at maxima. A locked gyro stays at a few phases, where structure in the phase cannot be told
+        /// from structure of the dither.
+        std::size_t phase_bins = 12;
+        double least_share_of_even = 0.25;
+
+        /// Turns whose most frequent difference between count and quadrature is taken for the counter's zero.
+        std::size_t turns_for_zero = 64;
+        /// A miscount is seen where the phase lies further outside the counted quarter than this margin [quarters]:
+        /// edges of the counter may be off by 0.15, and six standard deviations of the phase are added so that none
+        /// comes by noise. At 0.4 the next quarter would be as near.
+        double edge_margin = 0.15;
+        double noise_margin_sd = 6.0;
+        double most_margin = 0.4;
+        /// Largest probability of a miscount per turn with which the chain of miscounts begins [1].
+        double most_miscounts_per_turn = 0.5;
+
+        /// Radii further from the median than this are no noise of the detectors [robust standard deviations].
+        double radius_outlier_sd = 6.0;
+
+        /// Largest rotation, relative to the dither's peak rate, at which records are closed [1]. The half cycles then
+        /// have two thirds of their length and more; nearer to the peak rate the phase hardly reverses.
+        double most_rotation = 0.5;
+        /// Least mean swing of the phase over a half cycle [rad]. With less the phase hardly runs free between two
+        /// turns, and the expansion of the kicks in harmonics does not hold.
+        double least_swing_rad = 100.0;
+
+        /// Frequencies this near the dither's belong to its amplitude: relative to its frequency [1], and at least so
+        /// many periods in the record, below which they are drift.
+        double amplitude_band = 0.01;
+        double fewest_periods = 3.0;
+    };
+    Reading reading;
+
+    /// Prediction of the phases (turns/model/model).
+    struct Model {
+        /// Times of the dither's turns are means over this many turns to either side, as a resonator keeps its time far
+        /// better than a zero-rate point is known from pulses that the lock-in moves.
+        std::ptrdiff_t smoothing_turns = 64;
+        /// Kicks are computed at the rates that effects add if these move the zero-rate points by more than this share
+        /// of the time within which the phase turns [1], a relative change of the kicks that no record shows.
+        double rate_felt_by_kicks = 1e-3;
+        /// A Gauss-Markov rate with a longer correlation time than this is bias [durations of the record]: it changes
+        /// by a quarter of its standard deviation within the record.
+        double longest_correlation = 30.0;
+    };
+    Model model;
+
+    /// Maximum likelihood (turns/fit).
+    struct Fit {
+        /// Degree of the polynomial in time that the dither's amplitude follows.
+        std::size_t degree_of_amplitude = 4;
+
+        /// Standard deviations of the prior on bias and threshold, relative to the declared threshold [1]. They matter
+        /// for a locked gyro only, which shows a combination of both; any other record overrides them.
+        double bias_prior = 0.1;
+        double threshold_prior = 1.0;
+
+        /// Reading errors are estimated, and the kicks linearised about the estimate, if that changes their mean
+        /// variance by more than this share of the readout's [1]. It is small because models that are compared must be
+        /// linear about the same phases, or one gains by that alone.
+        double reading_errors_matter = 1e-4;
+
+        /// A radius of the quadrature with less noise than this says nothing of the noise of the phase [rad].
+        double least_radius_sd_rad = 1e-7;
+        /// A noise that explains less than this may have swallowed an effect [nats]: more than an effect has that is
+        /// hard to see. Score tests are then repeated without it.
+        double weak_noise = 100.0;
+        /// Another start of the noise is climbed if it begins less than this below the present summit [nats]: the
+        /// summits of one likelihood are near each other.
+        double summits_apart = 20.0;
+
+        /// Effort: passes of Gauss and Newton between two fits of the noise, in a fit without weak noise, and rounds of
+        /// both together.
+        int passes = 4;
+        int passes_without_noise = 20;
+        int most_rounds = 24;
+        /// Rounds go on for gains above `gained` at first, from round `soon` on for gains above `gained_late` only
+        /// [nats], and end where `rounds_ahead` more as good as the last would not reach the log-likelihood needed.
+        int soon = 6;
+        double gained = 0.01;
+        double gained_late = 10.0;
+        double rounds_ahead = 100.0;
+        /// Passes in which the density of bounded noise is found: the lock-in is not right before the last of them.
+        int passes_of_shape = 3;
+
+        /// Values of one standard deviation from which a fit starts; the likeliest is taken.
+        struct Grid {
+            double first, end, factor;
+        };
+        Grid injected_rad = {1e-4, 1e3, 4.0};
+        Grid wander_rad = {1e-7, 1e2, 10.0};
+        /// Shares of the injected noise that are tried for a wander whose noise went to nothing [1].
+        Grid wander_of_injected = {0.5, 1e-4, 0.25};
+        /// Injected noise and wander that are tried in place of each other, relative to the readout's noise [1].
+        double other_injected = 0.05;
+        double other_wander = 1e-3;
+        /// Standard deviations of a random effect that are tried: so many, each a tenth of the one before.
+        int decades_of_spread = 11;
+
+        /// A column of which less than this is left beside the model's own columns is one of them but for rounding [1]:
+        /// the record cannot tell it from the model's parameters.
+        double told_apart = 1e-5;
+
+        /// Passes of a regression with the noise fitted anew.
+        int most_regression_passes = 8;
+    };
+    Fit fit;
+
+    /// Score tests of the library (turns/screen/score_tests).
+    struct ScoreTests {
+        /// Effort: times tried over the record; the best is refined to this part of the distance between two.
+        int times = 80;
+        int refined_times = 8;
+        /// Effort: highest peaks of the spectrum that are tested; for the first of them also the frequencies whose beat
+        /// with the kicks would show there.
+        std::size_t peaks = 8;
+        std::size_t peaks_with_images = 4;
+        /// Frequencies nearer than this are one line [inverse durations of the record].
+        double line_width = 2.0;
+    };
+    ScoreTests score_tests;
+
+    /// Effects that other columns than the phase show (turns/screen/side_channels).
+    struct SideChannels {
+        /// A dither shape that is read again is the same if no parameter moves by more than this [standard errors].
+        double same_shape = 0.1;
+        /// Probability that noise makes a miscount at one turn [1]: the margin is six standard deviations of the phase
+        /// (Reading::noise_margin_sd), two-sided 2e-9, one side of which can be passed.
+        double miscount_by_chance = 1e-9;
+    };
+    SideChannels side_channels;
+
+    /// The dither's shape by times and accelerations at the turns (turns/screen/dither_shape).
+    struct DitherShape {
+        /// Stretches of the record whose scatter gives standard errors without a noise model; fewest turns in a stretch
+        /// for its rate and for its mean, and fewest stretches with one.
+        std::size_t stretches = 120;
+        std::size_t fewest_turns_for_rate = 8;
+        std::size_t fewest_turns_for_mean = 4;
+        double fewest_stretches = 8.0;
+
+        /// Accelerations count that differ from the dither's by a factor of less than exp(this), if more than this
+        /// share of the turns has one [1].
+        double most_log_acceleration = 1.0;
+        double least_share = 0.25;
+        /// Least standard error of an acceleration's logarithm [1].
+        double least_acceleration = 1e-5;
+        /// Accelerations by two pulses come out too small by this times the mean square of what they follow of the
+        /// phase, in second order of the lock-in. Integrated numerically (test
+        /// `DitherShape.AccelerationsComeOutTooSmallOfSecondOrder`).
+        double second_order = 0.145;
+        /// How well corrections are known, relative to themselves [1]: that of second order, and what pulses and
+        /// rotation do to accelerations.
+        double doubt_of_second_order = 0.5;
+        double doubt_of_pulses = 0.1;
+
+        /// Least standard error of the lateness: relative to the interval, what approximations of turn times leave,
+        /// 1e-7 of an asymmetry; and relative to what clocks do not follow of the lock-in's shift [1].
+        double least_late = 5e-8;
+        double doubt_of_followed = 0.02;
+        /// Accelerations may be made of pulses in other ways: share of the jerk's correction [1].
+        double doubt_of_jerk = 0.2;
+        /// A third harmonic of the dither changes the jerk by 24 times itself and the even acceleration by 9 times: so
+        /// many times the even part is its doubt [1].
+        double doubt_by_harmonic = 10.0;
+
+        /// Accelerations that differ from the dither's by more than this [1] and by more than so many standard errors
+        /// are noted. A note needs no level, but must not come by chance.
+        double noted = 0.002;
+        double noted_sd = 10.0;
+    };
+    DitherShape dither_shape;
+
+    /// The dither's amplitude (turns/screen/dither_amplitude).
+    struct DitherAmplitude {
+        /// Most swings of the amplitude that the model follows.
+        std::size_t most_swings = 6;
+        /// Effort: highest peaks of the spectrum that are tested.
+        std::size_t peaks = 4;
+        /// Independent frequencies in the band, relative to the Fourier frequencies: half as many again, as there is
+        /// more to find between them (Quinn and Hannan, The Estimation and Tracking of Frequency, 2001, section 3).
+        double places_per_bin = 1.5;
+        /// Cost of a swing in addition to its amplitudes and the search [nats]: its frequency, fitted between two
+        /// places.
+        double cost_of_frequency = 1.0;
+        /// P-value of correlated innovations below which a wander that is forgotten is fitted; it then has to pass the
+        /// level of an effect.
+        double memory_worth_fitting = 1e-3;
+        /// Values of interval over correlation time from which that fit starts [1], and the share of the injected noise
+        /// that may have been what is forgotten.
+        double forgets[3] = {0.3, 0.03, 0.003};
+        double share_of_injected = 0.5;
+    };
+    DitherAmplitude dither_amplitude;
+
+    /// How often pulses are missed (turns/screen/miscounts).
+    struct Miscounts {
+        /// Effort: most passes of the algorithm of Baum et al.
+        int most_passes = 100;
+    };
+    Miscounts miscounts;
+
+    /// Tests of the residual (turns/residual).
+    struct Residual {
+        /// Harmonics of the phase that kicks and readings are tested at. The library has two; six leave room for what
+        /// it does not have.
+        int harmonics = 6;
+        /// Largest amplitude of a kick that is an alternative [rad], that of harmonic k over k. Beyond, the phase no
+        /// longer follows from what is added to it, and any noise could be explained.
+        double largest_kick_rad = 0.3;
+        /// Kicks that change in time: half a period in the record, one, and so on, so many in all.
+        std::size_t kick_periods = 40;
+        /// The dither's amplitude is followed by a filter whose gain is estimated from differences over this lag
+        /// [turns] and over twice as many; growth within this many standard errors is none; and the gain is kept in
+        /// this range.
+        std::size_t amplitude_lag = 8;
+        double no_growth_sd = 4.0;
+        double least_gain = 1.0 / 200.0;
+        double most_gain = 0.5;
+        /// Degree of the polynomial in time that rates are tested for.
+        int degree_of_rates = 6;
+        /// Places of a step of the rate.
+        int steps = 80;
+        /// Drifts of a line that are tested, odd, and how far apart [periods over the record]: at half of that distance
+        /// a line has lost a tenth of its power.
+        int drifts = 81;
+        double drifts_apart = 3.0;
+        /// Lowest bin of the padded spectrum that can be a line: two periods in the record. Slower is drift.
+        std::size_t lowest_bin = 4;
+        /// Independent frequencies per Fourier frequency (Quinn and Hannan 2001, section 3).
+        double places_per_bin = 1.5;
+        /// Sums of fewer innovations than this may be flatter than normal ones: bounded noise is no structure, and sums
+        /// of so many are normal enough.
+        std::size_t bounded_sums = 16;
+        /// Stretches of the record whose size of the residual is compared, and fewest training rows of each.
+        std::size_t stretches_of_size = 20;
+        double fewest_rows_of_size = 8.0;
+        /// Directions of size over phase with less than this of the largest variance are left out [1]: only the first
+        /// turns of a locked gyro have them.
+        double least_direction = 1e-3;
+    };
+    Residual residual;
+
+    /// A rate that jumps between two levels (turns/residual/jumps).
+    struct Jumps {
+        /// Stretches of the record in which jumps are searched, and how many times finer under the noise they leave.
+        std::size_t stretches = 120;
+        std::size_t finer = 3;
+        /// Cost of the exact place of each jump within its stretch [nats].
+        double cost_of_place = 2.0;
+        /// Jumps are fitted with their own noise if they come to this share of the rival's merit [1]. A rate that
+        /// wanders leaves them far behind, and has many.
+        double near_rival = 0.9;
+        /// Effort: searches under the noise that jumps leave, passes that move all jumps together, and single stays
+        /// that are tried without.
+        int most_searches = 4;
+        int most_moves = 12;
+        std::size_t most_single_stays = 8;
+        /// Moves end at gains below this [nats], or below this share of the merit, as comparisons of so large merits
+        /// are as rough.
+        double gained = 0.1;
+        double gained_of_merit = 1e-4;
+        /// Places are first found to this part of a stretch, and a joint move is shortened to this part of itself [1].
+        double place_precision = 0.02;
+        double least_share_of_move = 0.1;
+    };
+    Jumps jumps;
+
     /// The choice of effects (turns/loop).
     struct Loop {
         /// Held-out error below which the residual is the rounding of sums of that many numbers, here and where the
@@ -60,7 +331,7 @@ struct TurnOptions {
         /// Rounds of the loop for each step that it may end with.
         std::size_t rounds_per_step = 3;
     };
-    Loop loop = {};
+    Loop loop;
 };
 
 }  // namespace ringlock::closure

@@ -281,10 +281,9 @@ class Reader {
     /// Each broken rule is reported at the first of its keys that the file names.
     void apply_rules() {
         for (const Complaint& complaint : check(scenario_)) {
-            const auto named = std::find_if(complaint.keys.begin(), complaint.keys.end(), [this](std::string_view key) {
-                return places_.contains(std::string(key));
-            });
-            const std::string key(named == complaint.keys.end() ? complaint.keys.front() : *named);
+            const auto named = std::find_if(complaint.keys.begin(), complaint.keys.end(),
+                                            [this](const std::string& key) { return places_.contains(key); });
+            const std::string& key = named == complaint.keys.end() ? complaint.keys.front() : *named;
             const auto place = places_.find(key);
             note(place == places_.end() ? toml::source_position{} : place->second,
                  fmt::format("key \"{}\" = {}: {}", key, current_value(key), complaint.problem));

@@ -26,7 +26,7 @@ struct Bounds {
 };
 
 struct Key {
-    std::string section;  ///< "ensemble", "effects.quantum_noise"
+    std::string section;  ///< "ensemble", "effects.NAME"
     std::string name;     ///< with its unit
     Type type;
     Bounds bounds;                   ///< of integers, reals and each of a list of reals

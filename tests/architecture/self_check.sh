@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Shows that the other two can fail: `self_check.sh FOLDER` makes trees in FOLDER/made_up, a clean one that must pass
+# Shows that the other checks can fail: `self_check.sh FOLDER` makes trees in FOLDER/made_up, a clean one that must pass
 # and, one at a time, faults that must each be found and named.
 set -euo pipefail
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd -P)"
@@ -24,10 +24,10 @@ clean_tree() {
     printf '#include "app/command.hpp"\n' | tee tests/unit/command.cpp >app/main.cpp
 }
 
-# expect STATUS WORDS SCRIPT: SCRIPT on the tree ends with STATUS and its output has WORDS.
+# expect STATUS WORDS SCRIPT ARGUMENT...: SCRIPT on the tree ends with STATUS and its output has WORDS.
 expect() {
     local status=0 output
-    output="$("$here/$3" "$folder" 2>&1)" || status=$?
+    output="$("$here/$3" "$folder" "${@:4}" 2>&1)" || status=$?
     checks=$((checks + 1))
     if [[ $status -ne $1 || $output != *"$2"* ]]; then
         echo "$3: expected status $1 and '$2', got status $status and: $output"
@@ -67,6 +67,50 @@ include_fault "sources are called" engine/gyro/device.h '#pragma once'
 include_fault "room 'engine/attic' has no line" engine/attic/old.cpp '// nothing'
 include_fault "room 'engine' has no line" engine/loose.cpp '// nothing'
 include_fault "is not beside it" engine/ensemble/device.cpp '#include "engine/gyro/device.hpp"'
+
+# number_fault STATUS WORDS LINE [ENTRY]: a room of the closed loop whose source has LINE, and a list with ENTRY.
+number_fault() {
+    cd "$here"
+    rm -rf "$folder"
+    mkdir -p "$folder/analysis/closure/room"
+    printf '%s\n' 'constexpr double least = options.room.least;  // 0.5' 'if (x < least && k > 0) return "x < 5";' "$3" \
+        >"$folder/analysis/closure/room/a.cpp"
+    printf '# path | name | reason\n%s\n' "${4-}" >"$folder/list.txt"
+    expect "$1" "$2" closure_numbers.sh "$folder/list.txt" room
+}
+number_fault 0 "1 files" 'constexpr std::size_t terms_4 = rows_2; if (size() > 2 || k == 1.0) return x4 < y_3;'
+number_fault 0 "1 files" 'constexpr int twice(int x) { return 2 * x; }'
+number_fault 1 "a.cpp:3: a constant that is no field of Options: least_share" 'constexpr double least_share = 0.5;'
+number_fault 1 "a.cpp:3: a constant that is no field of Options: cost" '    static constexpr double cost = 2.0;'
+number_fault 1 "a.cpp:3: a constant that is no field of Options: sizes" 'inline constexpr double sizes[] = {0.1, 0.2};'
+number_fault 1 "a.cpp:3: a constant that is no field of Options: tries" '    const std::size_t tries = 7;'
+number_fault 1 "a.cpp:3: a constant that is no field of Options: cost" "$(printf 'constexpr double cost =\n 4.0;')"
+number_fault 1 "a.cpp:3: a comparison with a number: p < 1e-6" '    if (p < 1e-6) break;'
+number_fault 1 "a.cpp:3: a comparison with a number: gain > 0.3 * best" 'return k > 1 && gain > 0.3 * best ? a : b;'
+number_fault 1 "a.cpp:3: a comparison with a number: k < 40" 'for (int k = 0; k < 40; ++k) {'
+number_fault 0 "1 files" 'for (int k = 0; k < 40; ++k) {' 'room/a.cpp | k < 40 | steps'
+number_fault 0 "1 files" 'constexpr double least_share = 0.5;' 'room/a.cpp | least_share | half'
+number_fault 1 "applies to nothing: room/a.cpp | most" 'constexpr double most = options.most;' 'room/a.cpp | most | half'
+number_fault 1 "a.cpp:3: a constant" 'constexpr double least_share = 0.5;' 'room/b.cpp | least_share | half'
+number_fault 1 "a line is PATH" '' 'room/a.cpp | least_share'
+expect 2 "no folder" closure_numbers.sh "$folder/list.txt" attic
+
+# name_fault STATUS WORDS LINE: a tree with two effects whose engine/gyro/device.cpp has LINE.
+name_fault() {
+    clean_tree
+    mkdir -p engine/effects
+    printf '#define RINGLOCK_EFFECTS(X) \\\n    X(bias_step) \\\n    X(quantum_noise)\n' >engine/effects/registry.cpp
+    echo 'return "bias_step";' >engine/effects/bias_step.cpp
+    echo "$3" >>engine/gyro/device.cpp
+    expect "$1" "$2" effect_names.sh engine app
+}
+name_fault 0 "call none of 2 effects" '// bias_step, "bias_steps", "a bias_step" and effects::bias_steps are no effects'
+name_fault 1 "engine/gyro/device.cpp:4:" 'if (effect.name() == "bias_step") return;'
+name_fault 1 "engine/gyro/device.cpp:4:" 'return effects::quantum_noise();'
+name_fault 1 "engine/gyro/device.cpp:4:" 'complain("effects.bias_step.time_s");'
+expect 2 "no sources" effect_names.sh engine/attic
+rm engine/effects/registry.cpp
+expect 2 "no effects" effect_names.sh engine
 
 # text_fault STATUS WORDS LINE: a fresh repository whose one file has LINE. Slashes and words are put together here, for
 # this file is read by the same check.

@@ -155,7 +155,8 @@ TEST(SampleClosure, AWanderingLineIsNotTheMotionBesideIt) {
 TEST(SampleClosure, ALineThatStandsStillMayBeEither) {
     SampleTruth truth = usual();
     truth.dither_residue = {137.3, 0.0, 0.05, 0.0};
-    EXPECT_EQ(closure::names_of(only_step(closed(truth), "dither_residue").confounded_with), std::vector<std::string>{"base_vibration"});
+    EXPECT_EQ(closure::names_of(only_step(closed(truth), "dither_residue").confounded_with),
+              std::vector<std::string>{"base_vibration"});
     truth.declared.emplace().dither_frequency_hz = 137.2;
     EXPECT_TRUE(only_step(closed(truth), "dither_residue").confounded_with.empty());
     truth = usual();

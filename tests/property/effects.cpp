@@ -85,7 +85,7 @@ TEST(EffectProperty, OutputsMoveByTheAngleThatAnEffectSaysItAdds) {
             const double change_k = scenario::temperature_change_k(without.environment, time_s);
             const double rate = base.setup.input_rate_deg_h;
             const double expected =
-                effect->added_angle(with.effects[name])({0.0, time_s, {0.0, change_k}, {rate, rate}});
+                effect->change(with.effects[name])({0.0, time_s, {0.0, change_k}, {rate, rate}}).angle_arcsec;
             // Rounding of some hundred half cycles.
             ASSERT_NEAR(moved.angle_arcsec(0, k) - base.angle_arcsec(0, k), expected, 1e-9 + 1e-12 * std::abs(expected))
                 << name << " minimum " << k << "\n"

@@ -15,6 +15,7 @@
 #include "analysis/allan/allan.hpp"
 #include "analysis/closure/report/closed_scenario.hpp"
 #include "analysis/closure/samples/model/series.hpp"
+#include "analysis/closure/turns/model/effect_roles.hpp"
 #include "analysis/closure/turns/model/model.hpp"
 #include "analysis/closure/turns/model/series.hpp"
 #include "analysis/instrument/simulate.hpp"

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "analysis/closure/options.hpp"
 #include "engine/core/interrupt.hpp"
 
 namespace ringlock::closure {
@@ -26,8 +27,7 @@ CountChain::CountChain(const CountedQuarters& counted, double edge)
             double x = counted.off[i] - static_cast<double>(lost);
             x -= quarters * std::round(x / quarters);
             // However far off it is: something else has happened, and the chain goes on.
-            constexpr double never = 1e-12;
-            seen_[i][lost] = std::max(never, inside(x, sd));
+            seen_[i][lost] = std::max(options.stats.count_chain.never, inside(x, sd));
         }
         // Down to a minimum the count stays too high by what it misses.
         step_[i] = counted.direction[i] > 0 ? quarters - 1 : 1;
@@ -79,7 +79,8 @@ double CountChain::forward(double p) {
 
 std::vector<std::int64_t> CountChain::likeliest_course(double p) const {
     // Of the steps from 0 to 3 quarters the way that the direction has it; the last is one back.
-    const double chances[quarters] = {1.0 - p, p, 1e-4 * p, 1e-2 * p};
+    const double chances[quarters] = {1.0 - p, p, options.stats.count_chain.two_at_once * p,
+                                      options.stats.count_chain.against_direction * p};
     double costs[quarters];
     std::transform(std::begin(chances), std::end(chances), costs, [](double chance) { return -std::log(chance); });
     const std::size_t n = seen_.size();

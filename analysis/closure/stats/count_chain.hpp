@@ -24,10 +24,7 @@ class CountChain {
     static constexpr std::size_t quarters = 4;
     using Chances = std::array<double, quarters>;
 
-    /// Where a counter may see the edges of a quarter [quarters], standard deviation: it may have noise of its own, and
-    /// edges elsewhere than the quadrature's.
-    static constexpr double edges[] = {1e-4, 0.03, 0.1};
-
+    /// \param edge  standard deviation of where the counter sees the edges of a quarter [quarters]
     CountChain(const CountedQuarters& counted, double edge);
 
     struct Pass {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 
 namespace ringlock::closure {
@@ -37,9 +38,8 @@ Excess excess_of(std::span<const double> values) {
 }  // namespace
 
 bool is_of_even_density(std::span<const double> innovations) {
-    constexpr double beyond_doubt = 1e-6;
     const auto [kurtosis, z] = excess_of(innovations);
-    return kurtosis < 0.0 && chi2_tail(z * z, 1) < beyond_doubt;
+    return kurtosis < 0.0 && chi2_tail(z * z, 1) < options.stats.normality.flat_p_value;
 }
 
 bool is_of_even_density(const std::vector<double>& innovations, const Rows& rows) {
@@ -52,12 +52,13 @@ bool is_of_even_density(const std::vector<double>& innovations, const Rows& rows
 
 std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovations, const Rows& rows,
                                            std::size_t shortest, std::size_t shortest_bounded) {
+    const StatsOptions::Normality& of = options.stats.normality;
     const std::size_t n = innovations.size();
     double least = 1.0;
     std::size_t at = 0;
     double tried = 0.0;
     double excess = 0.0;
-    for (std::size_t m = 1; m * 400 < n; m *= 4) {
+    for (std::size_t m = 1; m * of.rows_per_sum < n; m *= of.growth_of_sums) {
         if (m < shortest) continue;
         std::vector<double> sums;
         for (std::size_t a = 0; a + m <= n; a += m) {
@@ -69,7 +70,7 @@ std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovation
             }
             if (all) sums.push_back(sum);
         }
-        if (sums.size() < 200) break;
+        if (sums.size() < of.fewest_sums) break;
         const auto [kurtosis, z] = excess_of(sums);
         const double p = chi2_tail(z * z, 1);
         tried += 1.0;
@@ -87,18 +88,18 @@ std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovation
 
 std::optional<Jump> largest_jump(const std::vector<double>& innovations, const Rows& rows,
                                  const std::vector<double>& response) {
-    constexpr double least_places = 40.0;
+    const StatsOptions::Jumps& of = options.stats.jumps;
     const std::size_t n = innovations.size();
     const std::size_t middle = n / 2;
     double all = 0.0;
     for (std::size_t i = middle; i < n; ++i) all += response[i] * response[i];
     Jump jump;
     double part = 0.0;
-    while (part < 0.9 * all && middle + jump.length < n) {
+    while (part < of.share_of_response * all && middle + jump.length < n) {
         part += response[middle + jump.length] * response[middle + jump.length];
         ++jump.length;
     }
-    const std::size_t stride = std::max<std::size_t>(1, jump.length / 16);
+    const std::size_t stride = std::max<std::size_t>(1, jump.length / of.places_per_length);
     for (std::size_t a = 0; a + jump.length <= n; a += stride) {
         double sum = 0.0;
         double weight = 0.0;
@@ -108,13 +109,13 @@ std::optional<Jump> largest_jump(const std::vector<double>& innovations, const R
             sum += h * innovations[a + i];
             weight += h * h;
         }
-        if (!(weight > 0.3 * part)) continue;
+        if (!(weight > of.share_counted * part)) continue;
         jump.places += 1.0;
         if (sum * sum / weight <= jump.chi2) continue;
         jump.chi2 = sum * sum / weight;
         jump.row = a;
     }
-    if (jump.places < least_places) return std::nullopt;
+    if (jump.places < of.fewest_places) return std::nullopt;
     return jump;
 }
 

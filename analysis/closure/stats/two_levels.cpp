@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 
 namespace ringlock::closure {
@@ -14,14 +15,14 @@ TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right
     const double floor = 1e-9 * normal.diagonal().maxCoeff();
     if (!(floor > 0.0)) return {};
     const double place = std::log(static_cast<double>(n - 1));
-    constexpr double of_levels = 1.0;  // the mean of both belongs to the bias
+    const double of_levels = options.stats.two_levels.cost_of_levels;
     std::vector<int> high(static_cast<std::size_t>(n), 0);
     const auto level = [&](Eigen::Index k) { return high[static_cast<std::size_t>(k)]; };
     Eigen::VectorXd shape = Eigen::VectorXd::Zero(n);
     TwoLevels best;
     // Beyond these what is gained is rounding, which could be had for ever.
     constexpr double gained = 1e-6;  // of the merit
-    const Eigen::Index most_steps = 4 * n;
+    const Eigen::Index most_steps = options.stats.two_levels.most_steps_per_stretch * n;
     for (Eigen::Index taken = 0; taken < most_steps; ++taken) {
         const Eigen::VectorXd pull = normal * shape;
         const double squares = shape.dot(pull);

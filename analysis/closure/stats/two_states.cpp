@@ -5,12 +5,14 @@
 #include <cmath>
 #include <vector>
 
+#include "analysis/closure/options.hpp"
+
 namespace ringlock::closure {
 
 namespace {
 
-constexpr double least_chance = 1e-4;
-constexpr double most_chance = 0.5;
+constexpr double least_chance = options.stats.two_levels.least_chance;
+constexpr double most_chance = options.stats.two_levels.most_chance;
 
 using Pair = std::array<double, 2>;
 
@@ -124,13 +126,12 @@ class Chain {
 }  // namespace
 
 TwoStates two_states(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right, const Eigen::VectorXd& shape) {
-    constexpr int most_passes = 200;
     constexpr double little = 1e-3;
     TwoStates states;
     if (right.size() < 2) return states;
     Chain chain(normal, right);
     chain.start(shape, states);
-    for (int pass = 0; pass < most_passes; ++pass) {
+    for (int pass = 0; pass < options.stats.two_levels.most_passes; ++pass) {
         const double before = states.gain;
         chain.expect(states);
         if (pass > 0 && states.gain < before + little) break;

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/types.hpp"
 
 /// Whether innovations are white: independent of those before, and of one variance.
@@ -11,7 +12,7 @@ namespace ringlock::closure {
 
 /// Correlations of the innovations that count with those before, in standard errors by their own scatter.
 struct Correlations {
-    std::array<double, 25> root{};  ///< [lag]; none at 0
+    std::array<double, options.stats.lags + 1> root{};  ///< [lag]; none at 0
 
     ResidualTest test(Where where, std::string view) const;
 };

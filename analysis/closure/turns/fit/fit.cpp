@@ -7,6 +7,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "analysis/closure/options.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 
@@ -14,7 +15,7 @@ namespace ringlock::closure {
 
 namespace {
 
-constexpr std::size_t drift_terms = 4;    // polynomials of the dither's amplitude
+constexpr std::size_t drift_terms = options.turns.fit.degree_of_amplitude;
 constexpr std::size_t swing_columns = 3;  // of a swing of the amplitude: two amplitudes and the frequency
 constexpr std::size_t base_columns = 2;   // bias and threshold, after the nuisances
 
@@ -88,7 +89,7 @@ TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows,
     prediction_ = model_->predict(parameters_);
     columns_ = columns(prediction_);
     if (parameters_.injected_sd_rad > 0.0) fit_nuisances();
-    fit_deterministic(4);
+    fit_deterministic(options.turns.fit.passes);
     fit_noise();
     climb();
     if (-objective(parameters_, rest_) > needed_) {
@@ -117,18 +118,14 @@ std::unique_ptr<TurnFit> TurnFit::with_noise(const TurnParameters& of) const {
 }
 
 void TurnFit::climb() {
-    constexpr int most = 24;
-    constexpr int soon = 6;
-    constexpr double gained = 0.01;
-    constexpr double well = 10.0;   // worth going on where the way is long
-    constexpr double rounds = 100;  // as good as the last, that it would take: too far
-    for (int round = 0; round < most; ++round) {
+    const TurnOptions::Fit& of = options.turns.fit;
+    for (int round = 0; round < of.most_rounds; ++round) {
         const double before = objective(parameters_, rest_);
-        fit_deterministic(4);
+        fit_deterministic(options.turns.fit.passes);
         fit_noise();
         const double now = objective(parameters_, rest_);
-        if (before - now < (round < soon ? gained : well)) break;
-        if (-now + rounds * (before - now) < needed_) break;
+        if (before - now < (round < of.soon ? of.gained : of.gained_late)) break;
+        if (-now + of.rounds_ahead * (before - now) < needed_) break;
     }
 }
 
@@ -436,7 +433,7 @@ double TurnFit::objective_at(const TurnModel::Prediction& prediction) const {
 
 TurnFit::Belief TurnFit::belief_of(const TurnParameters& parameters) const {
     const double declared = std::max(model_->series().setup.lockin_threshold_deg_h, 1.0);
-    Belief belief{0.0, 0.0, 0.1 * declared, declared};
+    Belief belief{0.0, 0.0, options.turns.fit.bias_prior * declared, options.turns.fit.threshold_prior * declared};
     belief.bias = (model_->series().mean_rate_deg_h - parameters.bias_deg_h) / belief.bias_sd_deg_h;
     belief.threshold = (declared - parameters.threshold_deg_h) / belief.threshold_sd_deg_h;
     return belief;
@@ -459,14 +456,13 @@ ReadingErrors TurnFit::reading_errors() const {
     // About the phase that was read a kick has kick' v, of which the part of v matters that is not known, and
     // kick'' v^2 / 2, of which all but the mean does: variances of left kick'^2 and R^2 kick''^2 / 2. Models beside one
     // another must be linear about the same, or one gains by that alone: long before it can be seen.
-    constexpr double matters = 1e-4;
     const double readout_rad2 = parameters_.readout_sd_rad * parameters_.readout_sd_rad;
     if (parameters_.injected_sd_rad > parameters_.readout_sd_rad) return {};
     ReadingErrors errors = whitening_->reading_errors(rest_);
     const auto& left_rad2 = errors.variance_rad2;
     const double mean_rad2 =
         std::accumulate(left_rad2.begin(), left_rad2.end(), 0.0) / static_cast<double>(left_rad2.size());
-    if (mean_rad2 * matters > 0.5 * readout_rad2 * readout_rad2) return {};
+    if (mean_rad2 * options.turns.fit.reading_errors_matter > 0.5 * readout_rad2 * readout_rad2) return {};
     return errors;
 }
 

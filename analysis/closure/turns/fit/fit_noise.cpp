@@ -11,6 +11,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/fit/fit.hpp"
 #include "engine/core/error.hpp"
 
@@ -20,7 +21,6 @@ namespace {
 
 constexpr double no_noise = 1e-9;  // rad: far below what shows
 constexpr const char* forgets_name = "amplitude_correlation_s";
-constexpr double least_radius_sd_rad = 1e-7;  // below: a radius that shows no noise tells nothing of the phase's
 
 double square(double value) { return value * value; }
 
@@ -125,7 +125,8 @@ void quiet_solver() {
 void TurnFit::try_wander() {
     if (parameters_.wander_sd_rad > 10.0 * no_noise) return;
     std::vector<TurnParameters> grid;
-    for (double share = 0.5; share > 1e-4; share *= 0.25) {
+    const TurnOptions::Fit::Grid shares = options.turns.fit.wander_of_injected;
+    for (double share = shares.first; share > shares.end; share *= shares.factor) {
         grid.push_back(parameters_);
         grid.back().wander_sd_rad = share * parameters_.injected_sd_rad;
     }
@@ -149,26 +150,25 @@ void TurnFit::try_other_noise() {
             own(other) = no_noise;
             try_from(other);
         }
-        if (own(parameters_) > 1e-3 * readout) continue;
+        if (own(parameters_) > options.turns.fit.other_wander * readout) continue;
         // In place of the other one.
         other = parameters_;
-        other.injected_sd_rad = injected ? 0.05 * readout : no_noise;
-        other.wander_sd_rad = injected ? no_noise : 1e-3 * readout;
+        other.injected_sd_rad = injected ? options.turns.fit.other_injected * readout : no_noise;
+        other.wander_sd_rad = injected ? no_noise : options.turns.fit.other_wander * readout;
         try_from(other);
     }
 }
 
 std::unique_ptr<TurnFit> TurnFit::with_less_noise() const {
-    constexpr double hardly = 100.0;  // of the log-likelihood: more than effects have that are hard to see
-    constexpr int passes = 20;
     std::unique_ptr<TurnFit> least;
     for (double TurnParameters::*own : {&TurnParameters::wander_sd_rad, &TurnParameters::injected_sd_rad}) {
         TurnParameters less = least ? least->parameters_ : parameters_;
         if (less.*own < 10.0 * no_noise || less.*own > less.readout_sd_rad) continue;
         less.*own = no_noise;
         try {
-            std::unique_ptr<TurnFit> without(new TurnFit(*this, std::move(less), passes));
-            if (without->log_likelihood() > log_likelihood_ - hardly) least = std::move(without);
+            std::unique_ptr<TurnFit> without(
+                new TurnFit(*this, std::move(less), options.turns.fit.passes_without_noise));
+            if (without->log_likelihood() > log_likelihood_ - options.turns.fit.weak_noise) least = std::move(without);
         } catch (const RunError&) {
             // no motion of a gyro with such parameters can be followed
         }
@@ -184,11 +184,9 @@ void TurnFit::try_from(const TurnParameters& other) {
     const std::vector<Column> columns_from = columns_;
     const bool moved_from = moved_;
     const double before = objective(parameters_, rest_);
-    // Summits are near one another, or one of them is none.
-    constexpr double near = 20.0;
     parameters_ = other;
     fit_noise();
-    if (objective(parameters_, rest_) < before + near) climb();
+    if (objective(parameters_, rest_) < before + options.turns.fit.summits_apart) climb();
     if (objective(parameters_, rest_) < before) return;
     parameters_ = from;
     nuisance_ = nuisance_from;
@@ -208,7 +206,7 @@ std::vector<double> TurnFit::objectives(const TurnFrame& frame, const std::vecto
     for (double& sum : sums) sum += left;
     // The radius of the quadrature has the noise of the phase: as many degrees of freedom again.
     const double radius = model_->series().radius_sd_rad;
-    for (std::size_t k = 0; k < sums.size() && radius > least_radius_sd_rad; ++k) {
+    for (std::size_t k = 0; k < sums.size() && radius > options.turns.fit.least_radius_sd_rad; ++k) {
         const double readout = parameters[k].readout_sd_rad;
         const double over = radius / std::max(readout, 1e-12);
         sums[k] += static_cast<double>(rest.size()) * (0.5 * over * over + std::log(readout));
@@ -223,7 +221,7 @@ double TurnFit::objective(const TurnFrame& frame, const TurnParameters& paramete
 
 /// By what normal noise leaves, where the lock-in is not quite right yet: more than once.
 void TurnFit::shape_noise() {
-    const int passes = parameters_.shape ? 1 : 3;
+    const int passes = parameters_.shape ? 1 : options.turns.fit.passes_of_shape;
     const auto& series = model_->series();
     for (int pass = 0; pass < passes; ++pass) {
         const TurnKicks kicks = model_->mean_kicks(parameters_);
@@ -250,8 +248,12 @@ void TurnFit::fit_noise() {
     TurnParameters trial = parameters_;
     if (trial.injected_sd_rad == 0.0) {
         std::vector<TurnParameters> grid;
-        for (trial.injected_sd_rad = 1e-4; trial.injected_sd_rad < 1e3; trial.injected_sd_rad *= 4.0) {
-            for (trial.wander_sd_rad = 1e-7; trial.wander_sd_rad < 1e2; trial.wander_sd_rad *= 10.0) {
+        const TurnOptions::Fit::Grid injected = options.turns.fit.injected_rad;
+        const TurnOptions::Fit::Grid wander = options.turns.fit.wander_rad;
+        for (double sd_rad = injected.first; sd_rad < injected.end; sd_rad *= injected.factor) {
+            trial.injected_sd_rad = sd_rad;
+            for (double of_rad = wander.first; of_rad < wander.end; of_rad *= wander.factor) {
+                trial.wander_sd_rad = of_rad;
                 grid.push_back(trial);
             }
         }
@@ -292,7 +294,7 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
             derivatives.col(k) = here.change(Innovations(frame, model_->noise(with(at)), rest), rows_) / step;
         });
         information += derivatives.transpose() * derivatives;
-        if (model_->series().radius_sd_rad > least_radius_sd_rad) {
+        if (model_->series().radius_sd_rad > options.turns.fit.least_radius_sd_rad) {
             information(2, 2) += 2.0 * static_cast<double>(rest.size());
         }
     }
@@ -350,7 +352,7 @@ void TurnFit::add_noise_estimates(std::vector<Estimate>& estimates) const {
     }
     Eigen::MatrixXd matrix = derivatives.transpose() * derivatives;
     // The radius of the quadrature tells of the readout's noise as much again.
-    if (model_->series().radius_sd_rad > least_radius_sd_rad) {
+    if (model_->series().radius_sd_rad > options.turns.fit.least_radius_sd_rad) {
         matrix(2, 2) += 0.5 * static_cast<double>(rest_.size()) / square(square(*turned[2].value));
     }
     const Eigen::VectorXd scale = matrix.diagonal().cwiseMax(1e-300).cwiseSqrt();
@@ -385,7 +387,7 @@ TurnFit::Spread TurnFit::spread(const ActiveEffect& effect, const std::string& p
     };
     const double step = std::log(10.0);
     std::vector<TurnParameters> grid;
-    for (int k = 0; k < 11; ++k) {
+    for (int k = 0; k < options.turns.fit.decades_of_spread; ++k) {
         deviation = most * std::pow(10.0, -k);
         grid.push_back(trial);
     }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/fit/fit.hpp"
 #include "engine/core/units.hpp"
 
@@ -99,7 +100,6 @@ std::vector<Estimate> TurnFit::estimates() const {
 }
 
 TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors, const TurnParameters& noise) const {
-    constexpr int most = 8;
     constexpr double gained = 0.01;  // of the log-likelihood, by another pass
     Regression regression{0.0, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(regressors.size()))};
     TurnParameters trial = noise;
@@ -110,7 +110,7 @@ TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors, c
         return k < own ? columns_[k].of : regressors[k - own];
     };
     const double before = objective(parameters_, rest_);
-    for (int pass = 0; pass < most; ++pass) {
+    for (int pass = 0; pass < options.turns.fit.most_regression_passes; ++pass) {
         const Whitening whitening(frame, model_->noise(trial));
         const Eigen::VectorXd y = counted(whitening, rest);
         Eigen::VectorXd scale;
@@ -137,9 +137,7 @@ Eigen::VectorXd TurnFit::whitened(const Regressor& regressor) const {
     Eigen::VectorXd column = counted(*whitening_, prediction_.frame, regressor);
     const double all = column.norm();
     column -= basis_ * (basis_.transpose() * column);
-    // What the model's own parameters can do as well leaves rounding only.
-    constexpr double told_apart = 1e-5;
-    if (column.norm() < told_apart * all) column.setZero();
+    if (column.norm() < options.turns.fit.told_apart * all) column.setZero();
     return column;
 }
 

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <utility>
 
+#include "analysis/closure/turns/model/effect_roles.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::closure {

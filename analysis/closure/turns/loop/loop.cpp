@@ -14,6 +14,7 @@
 #include "analysis/closure/stats/normality.hpp"
 #include "analysis/closure/turns/loop/figures.hpp"
 #include "analysis/closure/turns/loop/rivals.hpp"
+#include "analysis/closure/turns/model/effect_roles.hpp"
 #include "analysis/closure/turns/screen/dither_amplitude.hpp"
 #include "analysis/closure/turns/screen/dither_shape.hpp"
 #include "analysis/closure/turns/screen/side_channels.hpp"

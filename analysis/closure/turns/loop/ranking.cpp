@@ -9,6 +9,7 @@
 #include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/loop/candidate_fit.hpp"
+#include "analysis/closure/turns/model/effect_roles.hpp"
 #include "analysis/closure/turns/screen/side_channels.hpp"
 
 namespace ringlock::closure {

@@ -8,6 +8,7 @@
 
 #include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/options.hpp"
+#include "analysis/closure/turns/model/effect_roles.hpp"
 
 namespace ringlock::closure {
 

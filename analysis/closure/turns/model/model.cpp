@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "analysis/closure/decide/evidence.hpp"
+#include "analysis/closure/options.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 #include "engine/gyro/device.hpp"
@@ -24,38 +24,14 @@ ActiveEffect* TurnParameters::find(std::string_view effect) {
     return const_cast<ActiveEffect*>(std::as_const(*this).find(effect));
 }
 
-namespace {
-
-/// A gyro's constants with the effect at small values: what the effect changes can be seen in them.
-gyro::Setup probed(const effects::Effect& effect) {
-    gyro::Setup setup;
-    effects::Values values;
-    for (const effects::Parameter& parameter : effect.parameters()) {
-        const bool counts = parameter.role == effects::Role::size || parameter.role == effects::Role::probability;
-        values[std::string(parameter.name)] = counts ? 1e-3 : 0.0;
-    }
-    effect.configure(values, setup);
-    return setup;
+const ActiveEffect* TurnParameters::find(const effects::Effect* effect) const {
+    const auto found =
+        std::find_if(effects.begin(), effects.end(), [&](const ActiveEffect& a) { return a.effect == effect; });
+    return found == effects.end() ? nullptr : &*found;
 }
 
-}  // namespace
-
-bool told_by_other_columns(const effects::Effect& effect) {
-    const gyro::Setup plain;
-    const gyro::Setup setup = probed(effect);
-    return setup.dither_asymmetry_ratio != plain.dither_asymmetry_ratio ||
-           setup.dither_harmonic_ratio != plain.dither_harmonic_ratio || setup.ellipse.gain != plain.ellipse.gain ||
-           setup.missed_count_probability != plain.missed_count_probability;
-}
-
-bool changes_reading(const effects::Effect& effect) {
-    const gyro::Setup plain;
-    const gyro::Setup setup = probed(effect);
-    return setup.ellipse != plain.ellipse || setup.missed_count_probability != plain.missed_count_probability;
-}
-
-bool is_of_coupling(const effects::Effect& effect) {
-    return !effect.adds_angle() && !is_random_rate(effect) && !told_by_other_columns(effect);
+ActiveEffect* TurnParameters::find(const effects::Effect* effect) {
+    return const_cast<ActiveEffect*>(std::as_const(*this).find(effect));
 }
 
 TurnModel::TurnModel(const TurnSeries& series, const std::vector<double>& phase_rad, ReadingErrors known)
@@ -117,7 +93,7 @@ double TurnModel::temperature_change_k(std::size_t turn) const {
 
 std::vector<double> TurnModel::smooth(const std::vector<double>& turn_s) const {
     // A resonator keeps its time far better than a zero-rate point can be told from pulses that the lock-in moves.
-    constexpr std::ptrdiff_t reach = 64;  // turns to either side, of one parity each
+    constexpr std::ptrdiff_t reach = options.turns.model.smoothing_turns;  // of one parity each
     const auto n = static_cast<std::ptrdiff_t>(turn_s.size());
     std::vector<double> smoothed(turn_s.size());
     const double start = turn_s.front();
@@ -186,9 +162,9 @@ std::vector<double> TurnModel::added_rad(const Prediction& prediction, const eff
     const double c = units::two_pi / series_.setup.scale_factor_arcsec;
     std::vector<double> phase(series_.size());
     double angle_arcsec = 0.0;
-    const effects::AddedAngle added_arcsec = effect.added_angle(values);
+    const effects::ChangeOver change = effect.change(values);
     for (std::size_t i = 0; i < phase.size(); ++i) {
-        angle_arcsec += added_arcsec(prediction.intervals[i]);
+        angle_arcsec += change(prediction.intervals[i]).angle_arcsec;
         phase[i] = c * angle_arcsec;
     }
     return phase;
@@ -240,13 +216,13 @@ std::vector<double> TurnModel::added_rates_deg_h(const TurnParameters& parameter
     for (const ActiveEffect& active : parameters.effects) {
         if (!active.effect->adds_angle()) continue;
         added_deg_h.resize(turn_s.size());
-        const effects::AddedAngle added_arcsec = active.effect->added_angle(active.values);
+        const effects::ChangeOver change = active.effect->change(active.values);
         for (std::size_t i = 0; i < turn_s.size(); ++i) {
             const double change_k = temperature_change_k(i);
             const double input_deg_h = series_.input_rate_deg_h[i];
             const effects::Interval about{
                 turn_s[i] - 0.5 * moment_s, moment_s, {change_k, change_k}, {input_deg_h, input_deg_h}};
-            added_deg_h[i] += added_arcsec(about) / moment_s;
+            added_deg_h[i] += change(about).angle_arcsec / moment_s;
         }
     }
     return added_deg_h;
@@ -267,9 +243,14 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     prediction.phase_rad.resize(n);
     const double c = device.phase_per_arcsec;
     std::vector<double> factors(n, 1.0);
-    for (std::size_t i = 0; i < n; ++i) {
-        for (const ActiveEffect& active : parameters.effects) {
-            factors[i] *= active.effect->threshold_factor(active.values, temperature_change_k(i));
+    for (const ActiveEffect& active : parameters.effects) {
+        if (!active.effect->changes().threshold) continue;
+        const effects::ChangeOver change = active.effect->change(active.values);
+        for (std::size_t i = 0; i < n; ++i) {
+            const double change_k = temperature_change_k(i);
+            const double input_deg_h = series_.input_rate_deg_h[i];
+            const effects::Interval at{series_.time_s[i], 0.0, {change_k, change_k}, {input_deg_h, input_deg_h}};
+            factors[i] *= change(at).threshold_factor;
         }
     }
     const bool one_threshold = std::all_of(factors.begin(), factors.end(), [](double factor) { return factor == 1.0; });
@@ -292,9 +273,8 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
             most_deg_h = std::max(most_deg_h, std::abs(added_deg_h[i]));
         }
         // How far zero-rate points move in the time within which the phase turns: what of a kick that changes.
-        constexpr double felt = 1e-3;
         const double acceleration_rad_s2 = device.half_cycle(1, series_.amplitude_rad).end_acceleration_rad_s2();
-        if (c * most_deg_h > felt * std::sqrt(acceleration_rad_s2)) {
+        if (c * most_deg_h > options.turns.model.rate_felt_by_kicks * std::sqrt(acceleration_rad_s2)) {
             kick_of =
                 std::make_shared<const Kicks>(kicks_at(device_setup, beside_bias_deg_h, factors, parameters.shape));
             swing = dither_swings(*kick_of, beside_bias_deg_h);
@@ -304,9 +284,9 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         prediction.intervals = intervals(turn_s);
     }
     const std::vector<double> input_arcsec = series_.input_angles_arcsec(turn_s);
-    std::vector<effects::AddedAngle> added_arcsec;
+    std::vector<effects::ChangeOver> changes;
     for (const ActiveEffect& active : parameters.effects) {
-        if (active.effect->adds_angle()) added_arcsec.push_back(active.effect->added_angle(active.values));
+        if (active.effect->adds_angle()) changes.push_back(active.effect->change(active.values));
     }
     double lockin = 0.0;
     double angle_arcsec = 0.0;
@@ -325,7 +305,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         const std::size_t last = i > 0 ? i - 1 : 0;
         const effects::Interval& interval = prediction.intervals[i];
         angle_arcsec += interval.duration_s * parameters.bias_deg_h + (input_arcsec[i] - input_arcsec[last]);
-        for (const effects::AddedAngle& added : added_arcsec) angle_arcsec += added(interval);
+        for (const effects::ChangeOver& change : changes) angle_arcsec += change(interval).angle_arcsec;
 
         prediction.phase_rad[i] = lockin + before_rad + c * angle_arcsec;
         lockin += before_rad + after_rad;
@@ -358,7 +338,7 @@ TurnNoise TurnModel::noise(const TurnParameters& parameters) const {
         noise.walk_rad2_per_s3 += c * c * rate.walk_deg2_h2_per_s;
         for (const effects::GaussMarkov& term : rate.terms) {
             // What hardly changes within the record is bias.
-            if (term.time_s > 30.0 * series_.time_s.back()) continue;
+            if (term.time_s > options.turns.model.longest_correlation * series_.time_s.back()) continue;
             noise.rates.push_back({term.time_s, c * c * term.variance_deg2_h2});
         }
     }

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/closure/turns/model/effect_roles.hpp"
 #include "analysis/closure/turns/model/kicks.hpp"
 #include "analysis/closure/turns/model/noise_shape.hpp"
 #include "analysis/closure/turns/model/series.hpp"
@@ -38,17 +39,10 @@ struct TurnParameters {
 
     ActiveEffect* find(std::string_view effect);
     const ActiveEffect* find(std::string_view effect) const;
+    /// The same by the effect itself; null also for a null pointer, an effect that the library lacks.
+    ActiveEffect* find(const effects::Effect* effect);
+    const ActiveEffect* find(const effects::Effect* effect) const;
 };
-
-/// Whether times, accelerations or the quadrature circle tell of the effect by themselves: the dither's shape, the
-/// detectors, the counter.
-bool told_by_other_columns(const effects::Effect& effect);
-
-/// Whether the effect changes the phases as they are read: the detectors or the counter. The record is then read anew.
-bool changes_reading(const effects::Effect& effect);
-
-/// Whether the effect changes the kicks and is seen in the phases alone.
-bool is_of_coupling(const effects::Effect& effect);
 
 /// The phases that parameters foretell for the turns of a record, chance apart.
 class TurnModel {

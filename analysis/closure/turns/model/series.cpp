@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/count_chain.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
@@ -31,14 +32,15 @@ std::int64_t most_frequent_quarter(const std::vector<double>& quarters, std::siz
 }
 
 bool all_phases_come(const std::vector<double>& phase_rad, const std::vector<int>& direction) {
-    constexpr std::size_t bins = 12;
+    constexpr std::size_t bins = options.turns.reading.phase_bins;
     double counts[2][bins] = {};
     for (std::size_t i = 0; i < phase_rad.size(); ++i) {
         const double fringes = phase_rad[i] / units::two_pi;
         const auto bin = static_cast<std::size_t>((fringes - std::floor(fringes)) * static_cast<double>(bins)) % bins;
         counts[direction[i] > 0 ? 0 : 1][bin] += 1.0;
     }
-    const double least = 0.25 * 0.5 * static_cast<double>(phase_rad.size()) / static_cast<double>(bins);
+    const double least = options.turns.reading.least_share_of_even * 0.5 * static_cast<double>(phase_rad.size()) /
+                         static_cast<double>(bins);
     for (const auto& of : counts) {
         for (const double count : of) {
             if (count < least) return false;
@@ -49,13 +51,14 @@ bool all_phases_come(const std::vector<double>& phase_rad, const std::vector<int
 
 /// Quarters that the counter has lost, turn by turn; near none at the first.
 std::vector<std::int64_t> lost_quarters(const CountedQuarters& counted) {
+    const TurnOptions::Reading& of = options.turns.reading;
     const std::size_t n = counted.off.size();
     std::vector<std::int64_t> lost(n);
-    std::int64_t now = most_frequent_quarter(counted.off, std::min<std::size_t>(n, 64));
+    std::int64_t now = most_frequent_quarter(counted.off, std::min(n, of.turns_for_zero));
     if (now > 2) now -= 4;
     std::size_t changes = 0;
     for (std::size_t i = 0; i < n; ++i) {
-        const double margin = 0.5 + std::min(0.15 + 6.0 * counted.sd[i], 0.4);
+        const double margin = 0.5 + std::min(of.edge_margin + of.noise_margin_sd * counted.sd[i], of.most_margin);
         double rest = counted.off[i] - static_cast<double>(now);
         rest -= 4.0 * std::round(0.25 * rest);
         if (std::abs(rest) > margin) {
@@ -67,9 +70,9 @@ std::vector<std::int64_t> lost_quarters(const CountedQuarters& counted) {
     if (changes == 0) return lost;
     // Near the edges of quarters some hide, and where many are lost there are two at once or four: what is likeliest of
     // all.
-    const double p = std::min(0.5, static_cast<double>(changes) / static_cast<double>(n));
+    const double p = std::min(of.most_miscounts_per_turn, static_cast<double>(changes) / static_cast<double>(n));
     double likeliest = -std::numeric_limits<double>::infinity();
-    for (const double edge : CountChain::edges) {
+    for (const double edge : options.stats.count_chain.edge_sds) {
         CountChain chain(counted, edge);
         const double log_likelihood = chain.log_likelihood(p);
         if (!(log_likelihood > likeliest)) continue;
@@ -114,7 +117,7 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
     const double robust = 1.4826 * median(sorted);
     std::size_t counted = 0;
     for (const double r : radius) {
-        if (r > 6.0 * robust) continue;
+        if (r > options.turns.reading.radius_outlier_sd * robust) continue;
         squares += r * r;
         ++counted;
     }
@@ -184,7 +187,7 @@ namespace {
 /// Amplitude and swings of the dither from those of the phase. Of the swings, which are relative, only what the
 /// rotation changes from turn to turn is taken.
 void take_rotation_from_swings(double half_swing_rad, TurnSeries& series) {
-    constexpr double most_share = 0.5;
+    constexpr double most_share = options.turns.reading.most_rotation;
     constexpr int passes = 12;  // each a tenth of the one before, or less
     const auto n = static_cast<double>(series.size());
     const auto rate_deg_h = [&](std::size_t i) { return series.mean_rate_deg_h + series.input_rate_deg_h[i]; };
@@ -258,11 +261,12 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
     }
     for (int side = 0; side < 2; ++side) swings_of[side] /= static_cast<double>(counts_of[side]);
     const double swings = 0.5 * (swings_of[0] + swings_of[1]);
-    if (!(std::min(swings_of[0], swings_of[1]) > 100.0)) {
+    const double least_swing_rad = options.turns.reading.least_swing_rad;
+    if (!(std::min(swings_of[0], swings_of[1]) > least_swing_rad)) {
         throw InputError(
             fmt::format("/turns: half cycles swing by {:.4g} rad of phase on average; minima (direction 1) "
-                        "must be followed by maxima (-1) at least 100 rad above them",
-                        swings));
+                        "must be followed by maxima (-1) at least {:g} rad above them",
+                        swings, least_swing_rad));
     }
     for (std::size_t i = 0; i + 1 < n; ++i) series.swing[i] /= swings_of[turns.direction[i] > 0 ? 0 : 1];
     series.swing[n - 1] = 1.0;

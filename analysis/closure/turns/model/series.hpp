@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/record/record.hpp"
 #include "engine/core/units.hpp"
 #include "engine/gyro/setup.hpp"
@@ -60,7 +61,10 @@ struct TurnSeries {
     }
     /// What comes so near the dither's frequency is its amplitude: no vibration of the base could do it without moving
     /// the dither as much. Beside what drifts in fewer than three periods.
-    double amplitude_band_hz() const { return std::max(0.01 * 0.5 / interval_s, 3.0 / time_s.back()); }
+    double amplitude_band_hz() const {
+        const TurnOptions::Reading& of = options.turns.reading;
+        return std::max(of.amplitude_band * 0.5 / interval_s, of.fewest_periods / time_s.back());
+    }
     /// Integral of the input rate from the first turn on to each of these times [arcsec], exact between the rows of the
     /// reference. Fastest where each time is near the last.
     std::vector<double> input_angles_arcsec(std::span<const double> times_s) const;

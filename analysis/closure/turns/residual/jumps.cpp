@@ -10,6 +10,7 @@
 #include <numeric>
 #include <utility>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 
 namespace ringlock::closure {
@@ -56,7 +57,7 @@ Jumping placed(const TurnFit& fit, const TwoLevels& levels) {
         return std::is_sorted(by.jumps.begin(), by.jumps.end()) ? fit.score({by.angle(fit)}).chi2 : 0.0;
     };
     double best = explained(found);
-    for (double step_s = 0.5 * stretch_s; step_s > 0.02 * stretch_s; step_s *= 0.5) {
+    for (double step_s = 0.5 * stretch_s; step_s > options.turns.jumps.place_precision * stretch_s; step_s *= 0.5) {
         for (std::size_t k = 0; k < found.jumps.size(); ++k) {
             std::array moved{found, found};
             std::array<double, 2> chi2{};
@@ -75,8 +76,9 @@ Jumping placed(const TurnFit& fit, const TwoLevels& levels) {
 
 /// The merit of jumps, and the noise fitted anew beside them, from one that is near.
 void judge(const TurnFit& fit, Jumping& jumping, const TurnParameters& near) {
-    constexpr double of_levels = 1.0;
-    const double place = std::log(static_cast<double>(stretches_of_levels - 1)) + cost_of_exact_places;
+    const double of_levels = options.stats.two_levels.cost_of_levels;
+    const double place =
+        std::log(static_cast<double>(options.turns.jumps.stretches - 1)) + options.turns.jumps.cost_of_place;
     TurnFit::Regression regression = fit.regress({jumping.angle(fit)}, near);
     jumping.merit = regression.gain - cost_of_amplitudes(regression.gain, 1) - of_levels -
                     place * static_cast<double>(jumping.jumps.size());
@@ -86,11 +88,9 @@ void judge(const TurnFit& fit, Jumping& jumping, const TurnParameters& near) {
 /// Jumps moved to where they explain most with the noise that they leave: one that comes later leaves a step of the
 /// angle, so that all of them are one regression (Gauss and Newton).
 void move_jumps(const TurnFit& fit, Jumping& found) {
-    constexpr int most = 12;
-    constexpr double gained = 0.1;
-    constexpr double of_all = 1e-4;  // where jumps explain very much, what is compared is as rough
+    const TurnOptions::Jumps& of = options.turns.jumps;
     const auto& time = fit.model().series().time_s;
-    for (int pass = 0; pass < most && !found.jumps.empty(); ++pass) {
+    for (int pass = 0; pass < of.most_moves && !found.jumps.empty(); ++pass) {
         std::vector<Regressor> columns{found.angle(fit)};
         double sign = found.on > 0.5 ? 1.0 : -1.0;  // a later jump stays longer at the level before it
         for (const double jump : found.jumps) {
@@ -102,7 +102,7 @@ void move_jumps(const TurnFit& fit, Jumping& found) {
         const Eigen::VectorXd value = fit.with_noise(found.noise)->score(columns).value;
         const double before = found.merit;
         // Too far, where jumps are near each other.
-        for (double share = 1.0; share > 0.1 && !(found.merit > before); share *= 0.5) {
+        for (double share = 1.0; share > of.least_share_of_move && !(found.merit > before); share *= 0.5) {
             Jumping moved{.jumps = found.jumps, .on = found.on};
             for (std::size_t k = 0; k < moved.jumps.size(); ++k) {
                 moved.jumps[k] += share * value(static_cast<Eigen::Index>(k) + 1) / value(0);
@@ -112,7 +112,7 @@ void move_jumps(const TurnFit& fit, Jumping& found) {
             judge(fit, moved, found.noise);
             if (moved.merit > found.merit) found = std::move(moved);
         }
-        if (found.merit < before + std::max(gained, of_all * before)) break;
+        if (found.merit < before + std::max(of.gained, of.gained_of_merit * before)) break;
     }
 }
 
@@ -138,7 +138,6 @@ std::vector<std::size_t> stays_by_use(const TurnFit& fit, const Jumping& all) {
 /// Short stays that only made up for stretches that end elsewhere than jumps are no longer needed: half of all at once,
 /// or a quarter and so on, then each of those that explain least.
 bool drop_some(const TurnFit& fit, Jumping& found) {
-    constexpr std::size_t singles = 8;
     if (found.jumps.size() < 3) return false;
     const std::vector<std::size_t> order = stays_by_use(fit, found);
     const auto better = [&](Jumping without) {
@@ -158,7 +157,7 @@ bool drop_some(const TurnFit& fit, Jumping& found) {
         for (const std::size_t k : dropped) without = without_stay(without, k);
         if (better(std::move(without))) return true;
     }
-    for (std::size_t i = 0; i < std::min(singles, order.size()); ++i) {
+    for (std::size_t i = 0; i < std::min(options.turns.jumps.most_single_stays, order.size()); ++i) {
         if (better(without_stay(found, order[i]))) return true;
     }
     return false;
@@ -208,17 +207,15 @@ TwoLevels levels_of_stretches(const TurnFit& fit, std::size_t stretches) {
 std::vector<double> placed_jumps(const TurnFit& fit, const TwoLevels& levels) { return placed(fit, levels).angle(fit); }
 
 double merit_of_jumps(const TurnFit& fit, const TwoLevels& levels, double rival) {
-    constexpr int most = 4;
-    constexpr std::size_t finer = 3;
-    constexpr double near = 0.9;
+    const TurnOptions::Jumps& of = options.turns.jumps;
     Jumping best = placed(fit, levels);
     judge(fit, best, fit.parameters());
-    if (best.merit < near * rival) return best.merit;
+    if (best.merit < of.near_rival * rival) return best.merit;
     const TurnParameters noise = best.noise;
     best = with_their_noise(fit, std::move(best), noise);
-    for (int pass = 0; pass < most; ++pass) {
+    for (int pass = 0; pass < of.most_searches; ++pass) {
         const auto beside = fit.with_noise(best.noise);
-        const TwoLevels again = levels_of_stretches(*beside, finer * stretches_of_levels);
+        const TwoLevels again = levels_of_stretches(*beside, of.finer * of.stretches);
         if (again.changes == 0) break;
         Jumping other = with_their_noise(fit, placed(*beside, again), best.noise);
         if (!(other.merit > best.merit)) break;

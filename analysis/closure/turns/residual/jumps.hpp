@@ -2,19 +2,15 @@
 #include <cstddef>
 #include <vector>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/two_levels.hpp"
 #include "analysis/closure/turns/fit/fit.hpp"
 
 /// A rate that jumps to and fro between two levels, in what a fit of turns has left.
 namespace ringlock::closure {
 
-/// Jumps do not wait for the end of a stretch: what the exact place of each costs [nats].
-inline constexpr double cost_of_exact_places = 2.0;
-
-inline constexpr std::size_t stretches_of_levels = 120;
-
 /// Two levels in stretches of the record, under the noise of the fit.
-TwoLevels levels_of_stretches(const TurnFit& fit, std::size_t stretches = stretches_of_levels);
+TwoLevels levels_of_stretches(const TurnFit& fit, std::size_t stretches = options.turns.jumps.stretches);
 
 /// The angle of such a rate, with jumps of stretches moved to where they explain most under the noise of the fit: one
 /// at one level, zero at the other [s].

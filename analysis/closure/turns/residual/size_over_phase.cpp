@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/closure/stats/whiteness.hpp"
 #include "analysis/closure/turns/model/kicks.hpp"
@@ -102,13 +103,11 @@ ResidualTest size_over_phase(const TurnFit& fit) {
         right += row;
         covariance += row * row.transpose();
     }
-    // What only the first turns of a locked gyro have tells nothing of the others.
-    constexpr double enough = 1e-3;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
     double folded = 0.0;
     int freedom = 0;
     for (Eigen::Index k = 0; k < columns; ++k) {
-        if (axes.eigenvalues()(k) < enough * axes.eigenvalues().maxCoeff()) continue;
+        if (axes.eigenvalues()(k) < options.turns.residual.least_direction * axes.eigenvalues().maxCoeff()) continue;
         const double along = axes.eigenvectors().col(k).dot(right);
         folded += along * along / axes.eigenvalues()(k);
         ++freedom;

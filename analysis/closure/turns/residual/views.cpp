@@ -10,6 +10,7 @@
 #include <unsupported/Eigen/FFT>
 #include <utility>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/normality.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/closure/stats/whiteness.hpp"
@@ -91,16 +92,13 @@ Columns kicks_that_change(const TurnFit& fit, double periods) {
 /// The ellipse that is in the model is known from radii, as well as phases would tell it: amplitudes of the first two
 /// harmonics, to which it shifts the reading, have that error besides their own.
 void doubt_ellipse(const TurnFit& fit, TurnFit::Score& score) {
-    if (fit.parameters().find("readout_ellipse") == nullptr || score.rank != 4) return;
+    if (fit.parameters().find(effect_roles().ellipse.effect) == nullptr || score.rank != 4) return;
     const auto counted = static_cast<double>(std::count(fit.rows().begin(), fit.rows().end(), 1));
     const double sd = fit.model().series().radius_sd_rad;
     Eigen::MatrixXd covariance = score.covariance;
     covariance.diagonal().head(2).array() += 2.0 * sd * sd / counted;
     score.chi2 = score.value.dot(covariance.ldlt().solve(score.value));
 }
-
-/// Of a kick's amplitude: beyond, phases no longer follow from what is added to them, and any noise could be had so.
-constexpr double largest_kick_rad = 0.3;
 
 void test_phase(const TurnFit& fit, std::vector<TurnView>& views) {
     // The innovation is a part of the phase that is read: what they have to do with each other where nothing is missing
@@ -128,13 +126,13 @@ void test_phase(const TurnFit& fit, std::vector<TurnView>& views) {
               of_several(least, harmonics_of_phase), fmt::format("harmonic {}", at), most},
              cost,
              [&fit, at, kicks] { return harmonic(fit, at, kicks); },
-             largest_kick_rad / at});
+             options.turns.residual.largest_kick_rad / at});
     }
 }
 
 /// A lock-in that does not stay what it is: kicks at the phase, times slow swings.
 void test_kicks_over_time(const TurnFit& fit, std::vector<TurnView>& views) {
-    constexpr std::size_t places = 40;
+    constexpr std::size_t places = options.turns.residual.kick_periods;
     const auto periods_of = [](std::size_t place) { return 0.5 * static_cast<double>(place + 1); };
     std::vector<TurnFit::Score> scores(places);
     oneapi::tbb::parallel_for(std::size_t{0}, places, [&](std::size_t place) {
@@ -150,7 +148,7 @@ void test_kicks_over_time(const TurnFit& fit, std::vector<TurnView>& views) {
                       fmt::format("{:g} periods over the record", periods), 0.5 * score.chi2 - cost},
                      cost,
                      [&fit, periods] { return kicks_that_change(fit, periods); },
-                     largest_kick_rad});
+                     options.turns.residual.largest_kick_rad});
 }
 
 /// Amplitude of the dither at the turns over its mean: second differences of the phases, in which no rate is, the
@@ -174,7 +172,9 @@ std::vector<double> amplitude_at_turns(const TurnFit& fit) {
 /// Gain of the Kalman filter of a walk read with noise (Harvey 1989, section 4.1): variances by how differences grow
 /// with their lag, beyond what neighbours share.
 double gain_of_walk(const std::vector<double>& series) {
-    constexpr std::size_t lag = 8;
+    const TurnOptions::Residual& of = options.turns.residual;
+    const std::size_t lag = of.amplitude_lag;
+    const auto turns_apart = static_cast<double>(lag);
     const std::size_t n = series.size();
     double squares[3] = {};
     const auto of_lag = [&](std::size_t k, std::size_t i) { return std::pow(series[i + k] - series[i], 2); };
@@ -184,11 +184,12 @@ double gain_of_walk(const std::vector<double>& series) {
         squares[1] += grown / static_cast<double>(n);
         squares[2] += grown * grown / static_cast<double>(n);
     }
-    // What is less than four standard errors may be none; sums of so many lags share what they have.
-    const double error = std::sqrt(squares[2] * 2.0 * lag / static_cast<double>(n));
-    const double walk = std::max(squares[1] - 4.0 * error, 0.0) / lag;
-    const double read = std::max(0.5 * (squares[0] - lag * walk), 0.0);
-    return std::clamp(2.0 * walk / (walk + std::sqrt(walk * walk + 4.0 * walk * read) + 1e-300), 1.0 / 200.0, 0.5);
+    // Differences over twice the lag share their values with as many others.
+    const double error = std::sqrt(squares[2] * 2.0 * turns_apart / static_cast<double>(n));
+    const double walk = std::max(squares[1] - of.no_growth_sd * error, 0.0) / turns_apart;
+    const double read = std::max(0.5 * (squares[0] - turns_apart * walk), 0.0);
+    return std::clamp(2.0 * walk / (walk + std::sqrt(walk * walk + 4.0 * walk * read) + 1e-300), of.least_gain,
+                      of.most_gain);
 }
 
 void test_rates(const TurnFit& fit, std::vector<TurnView>& views) {
@@ -256,7 +257,7 @@ void test_rates(const TurnFit& fit, std::vector<TurnView>& views) {
             return angles(change);
         };
     }
-    constexpr int degrees = 6;
+    constexpr int degrees = options.turns.residual.degree_of_rates;
     Columns powers;
     for (int k = 1; k <= degrees; ++k) {
         std::vector<double> rate(n);
@@ -270,7 +271,7 @@ void test_rates(const TurnFit& fit, std::vector<TurnView>& views) {
 }
 
 void test_steps(const TurnFit& fit, std::vector<TurnView>& views) {
-    constexpr int places = 80;
+    constexpr int places = options.turns.residual.steps;
     const auto& time = fit.model().series().time_s;
     std::vector<double> roots(places - 1);
     const auto ramp_of = [&time](std::size_t k) {
@@ -303,7 +304,7 @@ void test_levels(const TurnFit& fit, std::vector<TurnView>& views) {
     TurnView& view = views.emplace_back();
     view.test = {Where::time, "a rate that jumps between two levels", found.p_value,
                  fmt::format("{} jumps", found.changes), found.merit};
-    view.cost = found.cost + cost_of_exact_places * found.changes;
+    view.cost = found.cost + options.turns.jumps.cost_of_place * found.changes;
     view.columns = [&fit, found] { return Columns{placed_jumps(fit, found)}; };
     view.jumps = found.changes > 1;
     if (view.jumps) {
@@ -320,13 +321,13 @@ void test_whiteness(const TurnFit& fit, std::vector<TurnView>& views) {
         alternating += k % 2 == 0 ? found.root[k] : -found.root[k];
     }
     const Where where = std::abs(alternating) > std::abs(rising) ? Where::amplitude : Where::time;
-    views.push_back({found.test(where, "correlation with the 24 turns before")});
+    views.push_back({found.test(where, fmt::format("correlation with the {} turns before", options.stats.lags))});
 }
 
 /// Lines, those that drift too.
 void test_lines(const TurnFit& fit, std::vector<TurnView>& views) {
-    constexpr int drifts = 81;
-    constexpr double apart = 3.0;  // periods over the record; half of it away a line has lost a tenth of its power
+    constexpr int drifts = options.turns.residual.drifts;
+    constexpr double apart = options.turns.residual.drifts_apart;
     const auto& e = fit.innovations();
     const auto& rows = fit.rows();
     const std::size_t n = e.size();
@@ -351,12 +352,11 @@ void test_lines(const TurnFit& fit, std::vector<TurnView>& views) {
         std::vector<std::complex<double>> out;
         Eigen::FFT<double> fft;
         fft.fwd(out, in);
-        for (std::size_t bin = 4; bin < padded / 2; ++bin) {
+        for (std::size_t bin = options.turns.residual.lowest_bin; bin < padded / 2; ++bin) {
             if (std::norm(out[bin]) > lines[k].power) lines[k] = {std::norm(out[bin]), bin};
         }
     });
-    // Between the Fourier frequencies there is more to find than at them.
-    const double places = 1.5 * static_cast<double>(n);
+    const double places = options.turns.residual.places_per_bin * static_cast<double>(n);
     const double bin_hz = 1.0 / (static_cast<double>(padded) * fit.model().series().interval_s);
     const auto report = [&](const char* view, const Line& line, double searched, double drift) {
         const double chi2 = 2.0 * line.power / power;
@@ -390,8 +390,8 @@ void test_lines(const TurnFit& fit, std::vector<TurnView>& views) {
 
 /// Random rates are normal, what stands in for them need not be.
 void test_normality(const TurnFit& fit, std::vector<TurnView>& views) {
-    constexpr std::size_t of_even_density = 16;  // sums of so many are normal enough
-    if (const auto test = fourth_moments(fit.innovations(), fit.rows(), 1, of_even_density)) views.push_back({*test});
+    const std::size_t bounded = options.turns.residual.bounded_sums;
+    if (const auto test = fourth_moments(fit.innovations(), fit.rows(), 1, bounded)) views.push_back({*test});
     const TurnNoise noise = fit.model().noise(fit.parameters());
     if (noise.rates.empty() && noise.walk_rad2_per_s3 == 0.0) return;
     const auto& time = fit.model().series().time_s;
@@ -403,7 +403,8 @@ void test_normality(const TurnFit& fit, std::vector<TurnView>& views) {
 }
 
 void test_size(const TurnFit& fit, std::vector<TurnView>& views) {
-    views.push_back({size_over_time(fit.innovations(), fit.rows(), 20, 8.0)});
+    const TurnOptions::Residual& of = options.turns.residual;
+    views.push_back({size_over_time(fit.innovations(), fit.rows(), of.stretches_of_size, of.fewest_rows_of_size)});
     if (is_of_even_density(fit.innovations(), fit.rows())) return;
     views.push_back({size_over_phase(fit)});
 }

@@ -2,12 +2,13 @@
 #include <vector>
 
 #include "analysis/closure/decide/view.hpp"
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/fit/fit.hpp"
 
 namespace ringlock::closure {
 
 /// Of the turn's phase, that views of the residual look at.
-inline constexpr int harmonics_of_phase = 6;
+inline constexpr int harmonics_of_phase = options.turns.residual.harmonics;
 
 using TurnView = View<Regressor>;
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "analysis/closure/decide/evidence.hpp"
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/closure/stats/whiteness.hpp"
 
@@ -18,7 +19,7 @@ namespace {
 
 /// Highest peaks of the spectrum of the innovations, each the other way round at minima, up to the band's end [Hz].
 std::vector<double> highest_peaks(const TurnFit& fit, double band_hz) {
-    constexpr std::size_t most = 4;
+    constexpr std::size_t most = options.turns.dither_amplitude.peaks;
     constexpr std::size_t finer = 4;  // than the Fourier frequencies
     const TurnSeries& series = fit.model().series();
     const std::size_t n = series.size();
@@ -51,11 +52,11 @@ std::vector<double> highest_peaks(const TurnFit& fit, double band_hz) {
 }  // namespace
 
 std::optional<AmplitudeModel> find_amplitude_swing(const TurnProblem& problem, const Fitted& now) {
-    constexpr std::size_t most = 6;
+    const TurnOptions::DitherAmplitude& of = options.turns.dither_amplitude;
     const TurnFit& fit = *now.fit;
     const TurnSeries& series = now.series();
     TurnParameters with = fit.parameters();
-    if (with.swings.size() >= most) return std::nullopt;
+    if (with.swings.size() >= of.most_swings) return std::nullopt;
     const double band_hz = series.amplitude_band_hz();
     AmplitudeSwing swing{};
     double chi2 = 0.0;
@@ -66,8 +67,7 @@ std::optional<AmplitudeModel> find_amplitude_swing(const TurnProblem& problem, c
         chi2 = score.chi2;
         swing = {hz, score.value(0), score.value(1)};
     }
-    // Between the Fourier frequencies there is more to find: half as many again (Quinn & Hannan 2001, section 3).
-    const double places = std::max(1.0, 1.5 * 2.0 * band_hz * series.time_s.back());
+    const double places = std::max(1.0, of.places_per_bin * 2.0 * band_hz * series.time_s.back());
     if (!passes(of_several(chi2_tail(chi2, 2), places))) return std::nullopt;
     with.swings.push_back(swing);
     AmplitudeModel found;
@@ -75,22 +75,23 @@ std::optional<AmplitudeModel> find_amplitude_swing(const TurnProblem& problem, c
     if (!found.fitted) return std::nullopt;
     const double gain = found.fitted->fit->log_likelihood() - fit.log_likelihood();
     if (!passes(of_several(chi2_tail(2.0 * gain, 2), places))) return std::nullopt;
-    found.merit = gain - cost_of_amplitudes(gain, 2) - std::log(places) - 1.0;
+    found.merit = gain - cost_of_amplitudes(gain, 2) - std::log(places) - of.cost_of_frequency;
     return found;
 }
 
 std::optional<AmplitudeModel> find_amplitude_memory(const TurnProblem& problem, const Fitted& now) {
-    constexpr double worth_looking = 1e-3;
+    const TurnOptions::DitherAmplitude& of = options.turns.dither_amplitude;
     const TurnFit& fit = *now.fit;
     if (fit.parameters().wander_forgets > 0.0) return std::nullopt;
-    if (correlations_of(fit.innovations(), problem.rows()).test(Where::amplitude, "").p_value > worth_looking)
+    if (correlations_of(fit.innovations(), problem.rows()).test(Where::amplitude, "").p_value > of.memory_worth_fitting)
         return std::nullopt;
     AmplitudeModel found;
-    for (const double forgets : {0.3, 0.03, 0.003}) {
+    for (const double forgets : of.forgets) {
         TurnParameters with = fit.parameters();
         with.wander_forgets = forgets;
         // Of the white noise, too, a part may have been what is forgotten.
-        with.wander_sd_rad = std::max(with.wander_sd_rad, 0.5 * std::sqrt(forgets) * with.injected_sd_rad);
+        with.wander_sd_rad =
+            std::max(with.wander_sd_rad, of.share_of_injected * std::sqrt(forgets) * with.injected_sd_rad);
         auto fitted = problem.fit_or_none(with);
         const double best = found.fitted ? found.fitted->log_likelihood() : fit.log_likelihood();
         if (fitted && fitted->log_likelihood() > best) found.fitted = std::move(fitted);

@@ -9,13 +9,15 @@
 #include <span>
 #include <utility>
 
+#include "analysis/closure/options.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
 
 namespace {
 
-constexpr std::size_t stretches = 120;
+constexpr const TurnOptions::DitherShape& of_shape = options.turns.dither_shape;
+constexpr std::size_t stretches = of_shape.stretches;
 
 /// Where a stretch begins. Whole cycles, so that parities weigh alike.
 std::size_t begin_of(std::size_t stretch, std::size_t turns) {
@@ -31,7 +33,7 @@ std::vector<double> rate_left(const TurnFit& fit, const TurnModel::Prediction& p
     for (std::size_t s = 0; s < stretches; ++s) {
         const std::size_t begin = begin_of(s, n);
         const std::size_t end = begin_of(s + 1, n);
-        if (end < begin + 8) continue;
+        if (end < begin + of_shape.fewest_turns_for_rate) continue;
         // Beside an offset and another amplitude of the dither.
         Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
         Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -67,7 +69,7 @@ BlockMean block_mean(const std::vector<double>& series, const std::vector<std::u
             total += series[i];
             ++count;
         }
-        if (count < 4) continue;
+        if (count < of_shape.fewest_turns_for_mean) continue;
         const double value = total / static_cast<double>(count);
         mean.of_stretch.push_back(value);
         mean.counts.push_back(counts);
@@ -76,7 +78,7 @@ BlockMean block_mean(const std::vector<double>& series, const std::vector<std::u
         squares += value * value;
         k += 1.0;
     }
-    if (k < 8.0) {
+    if (k < of_shape.fewest_stretches) {
         mean.sd = std::numeric_limits<double>::infinity();
         return mean;
     }
@@ -239,7 +241,7 @@ Accelerations accelerations(const record::Turns& turns, const TurnFit& fit, cons
         if (!(turns.accel_before_rad_s2[i] > 0.0) || !(turns.accel_after_rad_s2[i] > 0.0)) continue;
         const double before = std::log(turns.accel_before_rad_s2[i] / series.acceleration_rad_s2);
         const double after = std::log(turns.accel_after_rad_s2[i] / series.acceleration_rad_s2);
-        if (std::abs(before) > 1.0 || std::abs(after) > 1.0) continue;
+        if (std::max(std::abs(before), std::abs(after)) > of_shape.most_log_acceleration) continue;
         const double share = shares[i];
         const PulseAngles pulses(series.direction[i], fit.model().phase_rad()[i], series.amplitude_rad);
         const double jerk = share * (pulses.first + pulses.second) / 6.0;
@@ -256,30 +258,30 @@ Accelerations accelerations(const record::Turns& turns, const TurnFit& fit, cons
         valid[i] = 1;
         ++seen;
     }
-    if (seen <= n / 4) return found;
+    if (!(static_cast<double>(seen) > of_shape.least_share * static_cast<double>(n))) return found;
     const auto count = static_cast<double>(seen);
     found.jerk /= count;
     found.angle *= 0.5 / count;
     found.share_of_other = of_other / count;
     // Accelerations are computed from distances that the detectors have read: their ellipse is in them.
     const gyro::Ellipse ellipse = fit.model().setup(fit.parameters()).ellipse;
-    const double least = 1e-5 + std::max({std::abs(ellipse.gain), std::abs(ellipse.offset_sin),
-                                          std::abs(ellipse.offset_cos), std::abs(ellipse.orthogonality_rad)});
+    const double least =
+        of_shape.least_acceleration + std::max({std::abs(ellipse.gain), std::abs(ellipse.offset_sin),
+                                                std::abs(ellipse.offset_cos), std::abs(ellipse.orthogonality_rad)});
     const std::array<std::pair<int, double>, 1> itself{{{0, 1.0}}};
     const auto [at_minima, at_maxima] = PhaseFunctions::mean_squares(take_phase(sides, valid, fit, functions, itself));
     take_phase(minima, valid, fit, functions, itself);
     take_phase(even, valid, fit, functions, itself);
     // Of second order in the lock-in, the mean over all phases is no longer nothing (docs/closure.md):
     // accelerations come out too small on both sides.
-    constexpr double second_order = 0.145;
-    const double smaller = second_order * (at_minima - at_maxima);
-    const double smaller_everywhere = 2.0 * second_order * (at_minima + at_maxima);
-    constexpr double of_clock = 0.1;  // what pulses and rotation do to accelerations is known to
+    const double smaller = of_shape.second_order * (at_minima - at_maxima);
+    const double smaller_everywhere = 2.0 * of_shape.second_order * (at_minima + at_maxima);
     found.sides = block_mean(sides, valid, fit.rows(), least);
-    found.turns = block_mean(minima, valid, fit.rows(), std::hypot(least, 0.5 * smaller));
+    found.turns = block_mean(minima, valid, fit.rows(), std::hypot(least, of_shape.doubt_of_second_order * smaller));
     found.turns->value += smaller;
     found.even = block_mean(even, valid, fit.rows(),
-                            std::hypot(least, 0.5 * smaller_everywhere, of_clock * (of_pulses + of_rotation) / count));
+                            std::hypot(least, of_shape.doubt_of_second_order * smaller_everywhere,
+                                       of_shape.doubt_of_pulses * (of_pulses + of_rotation) / count));
     found.even->value += smaller_everywhere;
     return found;
 }
@@ -322,8 +324,9 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     // Beneath: what the approximations of turn times leave, 1e-7 of an asymmetry, a fiftieth of what they do not
     // follow, what they would not of a rotation: middles between pulses lie off by w^2 t^2/6 of the shift; and what is
     // not known of the acceleration.
-    const double least_s = std::hypot(std::hypot(5e-8 * series.interval_s, 0.02 * followed_s),
-                                      mean_share / (series.amplitude_rad * w), less_sd * mean_share / w);
+    const double least_s =
+        std::hypot(std::hypot(of_shape.least_late * series.interval_s, of_shape.doubt_of_followed * followed_s),
+                   mean_share / (series.amplitude_rad * w), less_sd * mean_share / w);
     DitherShape shape;
     shape.late_s = block_mean(late, valid, fit.rows(), least_s);
     shape.even = seen.even;
@@ -332,20 +335,17 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     shape.turns = seen.turns;
     shape.sides_by_sine = seen.angle;
     shape.sides_by_ratio = 1.0 - seen.share_of_other;
-    constexpr double of_jerk = 0.2;       // accelerations may be made of pulses in other ways
-    constexpr double of_harmonic = 10.0;  // a third harmonic changes it by 24 times itself, 9 times even
     const double moved = std::hypot(seen.jerk, (seen.angle + seen.share_of_other) * w * shape.late_s.value);
-    const double least_sides = std::hypot(of_jerk, of_harmonic * seen.even->value) * moved;
+    const double least_sides =
+        std::hypot(of_shape.doubt_of_jerk, of_shape.doubt_by_harmonic * seen.even->value) * moved;
     shape.sides->sd = std::hypot(shape.sides->sd, least_sides);
     return shape;
 }
 
 std::string note_on_acceleration(const record::Turns& turns, const TurnFit& fit) {
-    constexpr double least = 0.002;
-    constexpr double beyond_doubt = 10.0;  // standard errors
     if (!fit.model().series().all_phases_come) return {};
     const auto even = dither_shape(turns, fit).even;
-    if (!even || !(std::abs(even->value) > std::max(least, beyond_doubt * even->sd))) return {};
+    if (!even || !(std::abs(even->value) > std::max(of_shape.noted, of_shape.noted_sd * even->sd))) return {};
     return fmt::format(
         "the phase's accelerations at the turns are {:.2g} % {} than those of a sine of the counted swing, as a third "
         "harmonic of the dither's rate of {:.2g} % would make them, or counts lost in fast phase; the threshold is "

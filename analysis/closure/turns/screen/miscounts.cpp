@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/count_chain.hpp"
 #include "engine/core/units.hpp"
 
@@ -27,18 +28,18 @@ CountedQuarters counted_quarters(const record::Turns& turns, const JoinedPhase& 
 MissedShare share_of_missed_counts(const record::Turns& turns, const JoinedPhase& joined, const Rows& rows) {
     const auto n = static_cast<double>(std::count(rows.begin(), rows.end(), 1));
     const double missed = std::max(1.0, static_cast<double>(joined.miscounted.size()));
-    const double begun = std::min(0.5, missed / static_cast<double>(turns.size()));
+    const double begun =
+        std::min(options.turns.reading.most_miscounts_per_turn, missed / static_cast<double>(turns.size()));
     MissedShare share;
     double likeliest = 0.0;
     bool first = true;
     const CountedQuarters counted = counted_quarters(turns, joined);
-    for (const double edge : CountChain::edges) {
+    for (const double edge : options.stats.count_chain.edge_sds) {
         CountChain chain(counted, edge);
-        constexpr int most_passes = 100;
         constexpr double enough = 1e-6;
         double p = begun;
         double log_likelihood = 0.0;
-        for (int k = 0; k < most_passes; ++k) {
+        for (int k = 0; k < options.turns.miscounts.most_passes; ++k) {
             const CountChain::Pass pass = chain.pass(p, rows);
             const double next = std::clamp(pass.steps / n, 1e-9, 1.0 - 1e-9);
             const bool there = std::abs(next - p) < enough * p;

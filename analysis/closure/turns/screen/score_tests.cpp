@@ -8,6 +8,7 @@
 #include <complex>
 #include <unsupported/Eigen/FFT>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
@@ -110,7 +111,8 @@ std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Predi
     const Parameter& size = *first_of(effect, Role::size);
     const Parameter& time = *first_of(effect, Role::time);
     const double end = fit.model().series().time_s.back();
-    constexpr int places = 80;
+    constexpr int places = options.turns.score_tests.times;
+    constexpr int finer = options.turns.score_tests.refined_times;
     const auto score_at = [&](double t, double& value) {
         Values at = values;
         at.at(name_of(size)) = 1.0;
@@ -140,8 +142,8 @@ std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Predi
     const std::vector<double> roots = consider(times);
     const double centre = candidate.values.at(name_of(time));
     times.clear();
-    for (int k = -7; k <= 7; ++k) {
-        if (k != 0) times.push_back(centre + end / places * k / 8.0);
+    for (int k = 1 - finer; k < finer; ++k) {
+        if (k != 0) times.push_back(centre + end / places * k / finer);
     }
     consider(times);
     candidate.chi2 = best * best;
@@ -192,7 +194,7 @@ struct Band {
 
 /// Slower than three periods in the record is drift; next to half the turns' rate it is the dither's amplitude.
 Band band_of(const TurnSeries& series) {
-    return {3.0 / (static_cast<double>(series.size()) * series.interval_s),
+    return {options.turns.reading.fewest_periods / (static_cast<double>(series.size()) * series.interval_s),
             0.5 / series.interval_s - series.amplitude_band_hz()};
 }
 
@@ -212,8 +214,7 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
     fft.fwd(out, in);
     const double bin_hz = 1.0 / (static_cast<double>(padded) * series.interval_s);
     // What else the model could do of a line the spectrum does not know: the highest peaks are looked at closely.
-    constexpr std::size_t looked_at = 8;
-    constexpr std::size_t images_of = 4;
+    const TurnOptions::ScoreTests& of = options.turns.score_tests;
     std::vector<std::size_t> peaks;
     for (std::size_t k = 1; k < padded / 2; ++k) {
         if (!band.has(static_cast<double>(k) * bin_hz)) continue;
@@ -221,11 +222,11 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
     }
     std::sort(peaks.begin(), peaks.end(),
               [&](std::size_t a, std::size_t b) { return std::norm(out[a]) > std::norm(out[b]); });
-    if (peaks.size() > looked_at) peaks.resize(looked_at);
+    if (peaks.size() > of.peaks) peaks.resize(of.peaks);
     std::vector<double> places;
     for (std::size_t k = 0; k < peaks.size(); ++k) {
         places.push_back(static_cast<double>(peaks[k]) * bin_hz);
-        if (k >= images_of) continue;
+        if (k >= of.peaks_with_images) continue;
         for (const double hz : seen_by_beat(fit.model(), places.back())) {
             if (band.has(hz)) places.push_back(hz);
         }
@@ -252,16 +253,6 @@ std::optional<Candidate> spread(const TurnFit& fit, const Effect& effect, Values
 
 }  // namespace
 
-Values values_at_rest(const Effect& effect) {
-    Values values;
-    for (const Parameter& parameter : effect.parameters()) {
-        const bool active = parameter.role == Role::size || parameter.role == Role::deviation ||
-                            parameter.role == Role::probability || parameter.role == Role::phase;
-        values[name_of(parameter)] = active ? 0.0 : parameter.default_value;
-    }
-    return values;
-}
-
 std::vector<double> frequencies_as_likely(const TurnFit& fit, const Effect& effect, double hz, double chi2_apart) {
     std::vector<double> found;
     const TurnModel::Prediction without = fit.model().predict(fit.parameters());
@@ -270,7 +261,8 @@ std::vector<double> frequencies_as_likely(const TurnFit& fit, const Effect& effe
     if (!chosen) return found;
     const double width_hz = 1.0 / (static_cast<double>(series.size()) * series.interval_s);
     for (const double image : seen_by_beat(fit.model(), hz)) {
-        if (!band_of(series).has(image) || std::abs(image - hz) < 2.0 * width_hz) continue;
+        if (!band_of(series).has(image) || std::abs(image - hz) < options.turns.score_tests.line_width * width_hz)
+            continue;
         Candidate best{&effect, {}};
         for (const double off : {-0.5, -0.25, 0.0, 0.25, 0.5}) {
             keep_better(best, at_frequency(fit, without, effect, image + off * width_hz));

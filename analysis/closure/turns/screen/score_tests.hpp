@@ -28,7 +28,4 @@ std::vector<Candidate> screen(const TurnFit& fit);
 std::vector<double> frequencies_as_likely(const TurnFit& fit, const effects::Effect& effect, double hz,
                                           double chi2_apart);
 
-/// Parameters of an effect at which it does nothing.
-effects::Values values_at_rest(const effects::Effect& effect);
-
 }  // namespace ringlock::closure

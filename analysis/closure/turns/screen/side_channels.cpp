@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/closure/turns/screen/miscounts.hpp"
 #include "engine/core/units.hpp"
@@ -71,38 +72,39 @@ struct ShapeFit {
     double harmonic_ratio() const { return std::hypot(sine, cosine); }
     double harmonic_phase_rad() const { return std::atan2(sine, cosine); }
 
-    void tell_asymmetry(Candidate& candidate) const {
-        candidate.values.at("ratio") = ratio;
-        candidate.sd["ratio"] = ratio_sd;
+    void tell(const EffectRoles::Asymmetry& names, Candidate& candidate) const {
+        candidate.values.at(names.ratio) = ratio;
+        candidate.sd[names.ratio] = ratio_sd;
     }
-    void tell_harmonic(Candidate& candidate) const {
+    void tell(const EffectRoles::Harmonic& names, Candidate& candidate) const {
         const double f = harmonic_phase_rad();
-        candidate.values.at("ratio") = harmonic_ratio();
-        candidate.values.at("phase_rad") = f;
-        candidate.sd["ratio"] = std::hypot(std::sin(f) * sine_sd, std::cos(f) * cosine_sd);
-        candidate.sd["phase_rad"] = std::hypot(std::cos(f) * sine_sd, std::sin(f) * cosine_sd) / harmonic_ratio();
+        candidate.values.at(names.ratio) = harmonic_ratio();
+        candidate.values.at(names.phase_rad) = f;
+        candidate.sd[names.ratio] = std::hypot(std::sin(f) * sine_sd, std::cos(f) * cosine_sd);
+        candidate.sd[names.phase_rad] = std::hypot(std::cos(f) * sine_sd, std::sin(f) * cosine_sd) / harmonic_ratio();
     }
 };
 
 }  // namespace
 
 std::optional<TurnParameters> shape_read_again(const record::Turns& turns, const TurnFit& fit) {
-    constexpr double same = 0.1;  // standard errors
+    const double same = options.turns.side_channels.same_shape;
     TurnParameters parameters = fit.parameters();
-    ActiveEffect* asymmetry = parameters.find("dither_asymmetry");
-    ActiveEffect* harmonic = parameters.find("dither_second_harmonic");
+    const EffectRoles& roles = effect_roles();
+    ActiveEffect* asymmetry = parameters.find(roles.asymmetry.effect);
+    ActiveEffect* harmonic = parameters.find(roles.harmonic.effect);
     if (asymmetry == nullptr && harmonic == nullptr) return std::nullopt;
     const ShapeFit told(dither_shape(turns, fit), units::pi / fit.model().series().interval_s, asymmetry != nullptr,
                         harmonic != nullptr);
     bool moved = false;
     if (asymmetry != nullptr) {
-        double& ratio = asymmetry->values.at("ratio");
+        double& ratio = asymmetry->values.at(roles.asymmetry.ratio);
         moved = std::abs(told.ratio - ratio) > same * told.ratio_sd;
         ratio = told.ratio;
     }
     if (harmonic != nullptr) {
-        double& ratio = harmonic->values.at("ratio");
-        double& phase_rad = harmonic->values.at("phase_rad");
+        double& ratio = harmonic->values.at(roles.harmonic.ratio);
+        double& phase_rad = harmonic->values.at(roles.harmonic.phase_rad);
         moved = moved || std::abs(told.sine - ratio * std::sin(phase_rad)) > same * told.sine_sd ||
                 std::abs(told.cosine - ratio * std::cos(phase_rad)) > same * told.cosine_sd;
         ratio = told.harmonic_ratio();
@@ -169,55 +171,56 @@ RadiusFold radius_fold(const record::Turns& turns, const Rows& rows) {
 std::vector<Candidate> screen_side_channels(const record::Turns& turns, const TurnFit& fit, const JoinedPhase& joined,
                                             bool again) {
     std::vector<Candidate> candidates;
-    TurnParameters p = fit.parameters();
-    const auto wanted = [&](std::string_view name) -> const Effect* {
-        return again || p.find(name) == nullptr ? effects::find(name) : nullptr;
-    };
-    if (const Effect* effect = wanted("readout_ellipse")) {
+    const TurnParameters& p = fit.parameters();
+    const EffectRoles& roles = effect_roles();
+    const auto wanted = [&](const Effect* effect) { return effect != nullptr && (again || p.find(effect) == nullptr); };
+    if (const EffectRoles::Ellipse& of = roles.ellipse; wanted(of.effect)) {
         const RadiusFold fold = radius_fold(turns, fit.rows());
-        Candidate candidate{effect, values_at_rest(*effect), fold.chi2, chi2_tail(fold.chi2, 4), 1.0};
-        candidate.values.at("gain") = fold.ellipse.gain;
-        candidate.values.at("offset_sin") = fold.ellipse.offset_sin;
-        candidate.values.at("offset_cos") = fold.ellipse.offset_cos;
-        candidate.values.at("orthogonality_rad") = fold.ellipse.orthogonality_rad;
-        const char* const names[] = {"gain", "offset_sin", "offset_cos", "orthogonality_rad"};
-        for (Eigen::Index k = 0; k < 4; ++k) candidate.sd[names[k]] = std::sqrt(fold.covariance(k, k));
+        Candidate candidate{of.effect, values_at_rest(*of.effect), fold.chi2, chi2_tail(fold.chi2, 4), 1.0};
+        candidate.values.at(of.gain) = fold.ellipse.gain;
+        candidate.values.at(of.offset_sin) = fold.ellipse.offset_sin;
+        candidate.values.at(of.offset_cos) = fold.ellipse.offset_cos;
+        candidate.values.at(of.orthogonality_rad) = fold.ellipse.orthogonality_rad;
+        Eigen::Index k = 0;
+        for (const std::string& name : {of.gain, of.offset_sin, of.offset_cos, of.orthogonality_rad}) {
+            candidate.sd[name] = std::sqrt(fold.covariance(k, k));
+            ++k;
+        }
         candidates.push_back(candidate);
     }
-    if (const Effect* effect = wanted("missed_counts")) {
-        // The margin by which a miscount is told is six standard deviations of the phase: none comes by chance.
+    if (const EffectRoles::MissedCounts& of = roles.missed_counts; wanted(of.effect)) {
         double missed = 0.0;
         for (const std::size_t i : joined.miscounted) missed += fit.rows()[i];
         const auto n = static_cast<double>(std::count(fit.rows().begin(), fit.rows().end(), 1));
-        constexpr double by_chance = 1e-9;
+        const double by_chance = options.turns.side_channels.miscount_by_chance;
         const double surprise = missed > 0.0 ? missed * std::log(missed / (n * by_chance)) - missed : 0.0;
-        Candidate candidate{effect, values_at_rest(*effect), 2.0 * surprise, chi2_tail(2.0 * surprise, 1), 1.0};
+        Candidate candidate{of.effect, values_at_rest(*of.effect), 2.0 * surprise, chi2_tail(2.0 * surprise, 1), 1.0};
         if (missed > 0.0) {
             const MissedShare share = share_of_missed_counts(turns, joined, fit.rows());
-            candidate.values.at("probability_per_turn") = share.probability_per_turn;
-            candidate.sd["probability_per_turn"] = share.sd;
+            candidate.values.at(of.probability) = share.probability_per_turn;
+            candidate.sd[of.probability] = share.sd;
         }
         candidates.push_back(candidate);
     }
     if (!fit.model().series().all_phases_come) return candidates;
-    const Effect* asymmetry = wanted("dither_asymmetry");
-    const Effect* harmonic = wanted("dither_second_harmonic");
+    const Effect* asymmetry = wanted(roles.asymmetry.effect) ? roles.asymmetry.effect : nullptr;
+    const Effect* harmonic = wanted(roles.harmonic.effect) ? roles.harmonic.effect : nullptr;
     if (asymmetry == nullptr && harmonic == nullptr) return candidates;
     const DitherShape shape = dither_shape(turns, fit);
     const double w = units::pi / fit.model().series().interval_s;
-    const bool has_asymmetry = p.find("dither_asymmetry") != nullptr;
-    const bool has_harmonic = p.find("dither_second_harmonic") != nullptr;
+    const bool has_asymmetry = p.find(roles.asymmetry.effect) != nullptr;
+    const bool has_harmonic = p.find(roles.harmonic.effect) != nullptr;
     if (asymmetry != nullptr) {
         const ShapeFit with(shape, w, true, has_harmonic);
         const double chi2 = std::max(0.0, ShapeFit(shape, w, false, has_harmonic).left - with.left);
         candidates.push_back({asymmetry, values_at_rest(*asymmetry), chi2, chi2_tail(chi2, 1), 1.0});
-        with.tell_asymmetry(candidates.back());
+        with.tell(roles.asymmetry, candidates.back());
     }
     if (harmonic != nullptr) {
         const ShapeFit with(shape, w, has_asymmetry, true);
         const double chi2 = std::max(0.0, ShapeFit(shape, w, has_asymmetry, false).left - with.left);
         candidates.push_back({harmonic, values_at_rest(*harmonic), chi2, chi2_tail(chi2, 2), 1.0});
-        with.tell_harmonic(candidates.back());
+        with.tell(roles.harmonic, candidates.back());
     }
     return candidates;
 }
