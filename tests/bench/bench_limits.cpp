@@ -28,7 +28,7 @@
 #include "engine/dither/lane_dither.hpp"
 #include "engine/ensemble/block.hpp"
 #include "engine/ensemble/draw.hpp"
-#include "engine/ensemble/told.hpp"
+#include "engine/ensemble/calibration.hpp"
 #include "engine/gyro/theory.hpp"
 #include "engine/readout/fraction_recovery.hpp"
 #include "engine/scenario/arm.hpp"

@@ -8,7 +8,7 @@
 
 #include "engine/core/units.hpp"
 #include "engine/ensemble/draw.hpp"
-#include "engine/ensemble/told.hpp"
+#include "engine/ensemble/calibration.hpp"
 #include "engine/gyro/device.hpp"
 #include "engine/scenario/arm.hpp"
 
