@@ -50,9 +50,9 @@ void take_device_of_turns(const record::Record& record, const Closure& closure, 
     scenario.record.kind = scenario::RecordKind::turns;
     scenario.record.trajectory =
         noisy ? scenario::RecordTrajectory::noise_injected : scenario::RecordTrajectory::uncompensated;
-    scenario.arms = noisy ? std::vector<std::string>{"ideal", "noise_injected", "noise_injected+compensated",
-                                                     "noise_injected+compensated_exact"}
-                          : std::vector<std::string>{"ideal", "uncompensated", "compensated", "compensated_exact"};
+    scenario.arms = noisy ? scenario::parse_arms({"ideal", "noise_injected", "noise_injected+compensated",
+                                                  "noise_injected+compensated_exact"})
+                          : scenario::parse_arms({"ideal", "uncompensated", "compensated", "compensated_exact"});
 }
 
 void take_device_of_samples(const record::Record& record, const Closure& closure, Scenario& scenario) {
@@ -84,8 +84,8 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
         scenario.readout.model = scenario::ReadoutModel::ideal;
         scenario.gyro.scale_factor_arcsec = scale_factor_arcsec;
     }
-    // A turn at every reading, so that none is interpolated and each has an error of its own, and fringes enough between
-    // turns.
+    // A turn at every reading, so that none is interpolated and each has an error of its own, and fringes enough
+    // between turns.
     const double halves = std::max(1.0, std::ceil(2.0 / readings_hz));
     scenario.dither.frequency_hz = 0.5 * halves * readings_hz;
     constexpr double fringes = 200.0;
@@ -97,7 +97,7 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
     scenario.record.kind = scenario::RecordKind::samples;
     scenario.record.rate_hz = samples.rate_hz;
     scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
-    scenario.arms = {"ideal", "uncompensated"};
+    scenario.arms = scenario::parse_arms({"ideal", "uncompensated"});
 }
 
 }  // namespace
