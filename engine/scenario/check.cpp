@@ -264,8 +264,8 @@ Finding pulses_are_there(const Scenario& s) {
 /// Largest rate of the phase in fringes a second: the dither's, with its spread, and the input.
 double peak_beat_hz(const Scenario& s) {
     const double spread = 1.0 + sigmas * s.ensemble.dither_amplitude_sd_relative;
-    const double input = std::max(std::abs(s.input.rate_deg_h), std::abs(s.input.sweep_stop_deg_h));
-    return (peak_rate_deg_h(s) * spread * (1.0 + largest_asymmetry(s)) + input) / s.gyro.scale_factor_arcsec;
+    return (peak_rate_deg_h(s) * spread * (1.0 + largest_asymmetry(s)) + exposure(s).input_rate_deg_h) /
+           s.gyro.scale_factor_arcsec;
 }
 
 Finding comparators_follow_the_fringes(const Scenario& s) {
