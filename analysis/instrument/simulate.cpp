@@ -29,7 +29,7 @@ constexpr std::int64_t most_rows = 200'000'000;
 /// The scenario with the one arm that is recorded, its rules checked.
 Scenario with_trajectory(Scenario scenario) {
     const bool noisy = scenario.record.trajectory == scenario::RecordTrajectory::noise_injected;
-    scenario.arms = {noisy ? "noise_injected" : "uncompensated"};
+    scenario.arms = scenario::parse_arms({noisy ? "noise_injected" : "uncompensated"});
     const auto complaints = scenario::check(scenario);
     if (!complaints.empty()) {
         throw InputError(
@@ -206,8 +206,7 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
         throw InputError(fmt::format("key \"record.rate_hz\" = {:g}: a record of {:g} s holds no sample",
                                      s.record.rate_hz, s.ensemble.duration_s));
     }
-    const std::vector<scenario::Arm> arms = {scenario::parse_arm(s.arms.front())};
-    ensemble::GyroBlock block(s, arms, gyro, 1, ensemble::Detail::hardware);
+    ensemble::GyroBlock block(s, s.arms, gyro, 1, ensemble::Detail::hardware);
     const ensemble::Schedule schedule(s);
 
     std::int64_t turn = 0;
@@ -224,7 +223,7 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
     advance(settle_turns, [](std::int64_t, std::size_t) {});
 
     record::Record out;
-    out.title = fmt::format("gyro {} of seed {}, {}", gyro, s.ensemble.seed, s.arms.front());
+    out.title = fmt::format("gyro {} of seed {}, {}", gyro, s.ensemble.seed, s.arms.front().name);
     out.instrument = "simulated ring laser gyro";
     out.source = fmt::format("ringlock {} record", version());
     const double start_s = block.turn_time_s(settle_turns, 0);

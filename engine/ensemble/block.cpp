@@ -17,7 +17,7 @@
 #include "engine/ensemble/changes.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/output_counts.hpp"
-#include "engine/ensemble/told.hpp"
+#include "engine/ensemble/calibration.hpp"
 #include "engine/ensemble/trajectory_kind.hpp"
 #include "engine/propagate/lane_propagator.hpp"
 #include "engine/readout/ellipse_correction.hpp"
@@ -152,9 +152,9 @@ class Branch {
         interpolated_ = electronics.interpolate;
         if (scenario.readout.ellipse_correction) ellipse_.emplace(devices_.size());
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
-            std::vector<gyro::Device> told = devices_;
-            for (gyro::Device& device : told) device.coupling.b_rad_s = told_b_rad_s(scenario, device);
-            recovery_.emplace(told, electronics, amplitude_rms_rad(scenario, devices_, kind));
+            std::vector<gyro::Device> calibrated = devices_;
+            for (gyro::Device& device : calibrated) device.coupling.b_rad_s = calibrated_b_rad_s(scenario, device);
+            recovery_.emplace(calibrated, electronics, amplitude_rms_rad(scenario, devices_, kind));
         }
     }
 

@@ -10,7 +10,6 @@
 
 #include "engine/core/units.hpp"
 #include "engine/scenario/active_effects.hpp"
-#include "engine/scenario/arm.hpp"
 #include "engine/scenario/fast_motion.hpp"
 
 namespace ringlock::scenario {
@@ -198,8 +197,7 @@ Finding turn_map_has_fast_middles(const Scenario& s) {
 }
 
 Finding noise_leaves_the_dither(const Scenario& s) {
-    const bool injected = std::any_of(s.arms.begin(), s.arms.end(),
-                                      [](const std::string& name) { return parse_arm(name).noise_injected; });
+    const bool injected = std::any_of(s.arms.begin(), s.arms.end(), [](const Arm& arm) { return arm.noise_injected; });
     const double most = phase_amplitude_rad(s) / (sigmas * std::numbers::sqrt2);
     if (!injected || s.noise_injection.turn_phase_rms_rad <= most) return {};
     return Complaint{
@@ -254,11 +252,11 @@ Finding keys_are_the_instruments(const Scenario& s) {
 
 Finding pulses_are_there(const Scenario& s) {
     if (s.readout.model != ReadoutModel::latched) return {};
-    for (const std::string& name : s.arms) {
-        const Compensator compensator = parse_arm(name).compensator;
-        if (compensator != Compensator::extrapolated && compensator != Compensator::adaptive) continue;
-        return Complaint{{"arms.names", "readout.model"},
-                         fmt::format("arm \"{}\" needs the pulses' times; set readout.model = \"instrument\"", name)};
+    for (const Arm& arm : s.arms) {
+        if (arm.compensator != Compensator::extrapolated && arm.compensator != Compensator::adaptive) continue;
+        return Complaint{
+            {"arms.names", "readout.model"},
+            fmt::format("arm \"{}\" needs the pulses' times; set readout.model = \"instrument\"", arm.name)};
     }
     return {};
 }
@@ -266,8 +264,8 @@ Finding pulses_are_there(const Scenario& s) {
 /// Largest rate of the phase in fringes a second: the dither's, with its spread, and the input.
 double peak_beat_hz(const Scenario& s) {
     const double spread = 1.0 + sigmas * s.ensemble.dither_amplitude_sd_relative;
-    const double input = std::max(std::abs(s.input.rate_deg_h), std::abs(s.input.sweep_stop_deg_h));
-    return (peak_rate_deg_h(s) * spread * (1.0 + largest_asymmetry(s)) + input) / s.gyro.scale_factor_arcsec;
+    return (peak_rate_deg_h(s) * spread * (1.0 + largest_asymmetry(s)) + exposure(s).input_rate_deg_h) /
+           s.gyro.scale_factor_arcsec;
 }
 
 Finding comparators_follow_the_fringes(const Scenario& s) {

@@ -8,7 +8,6 @@
 #include "engine/gyro/device.hpp"
 #include "engine/gyro/fast_motion.hpp"
 #include "engine/scenario/active_effects.hpp"
-#include "engine/scenario/arm.hpp"
 
 namespace ringlock::scenario {
 
@@ -102,8 +101,7 @@ bool fast_middles(const Scenario& s) {
     const double noise_rad = 8.0 / std::numbers::sqrt2 * s.noise_injection.turn_phase_rms_rad;
     bool driven[2] = {};    // without and with noise injected
     bool inverted[2] = {};  // by a compensator with tables of its own
-    for (const std::string& name : s.arms) {
-        const Arm arm = parse_arm(name);
+    for (const Arm& arm : s.arms) {
         driven[arm.noise_injected] = true;
         inverted[arm.noise_injected] |=
             arm.compensator == Compensator::exact || arm.compensator == Compensator::adaptive;

@@ -209,6 +209,11 @@ TEST(ScenarioRules, TheInstrumentFollowsTheFringes) {
     EXPECT_THAT(complaint(instrument + "detector_bandwidth_hz = 5e5"),
                 AllOf(HasSubstr("s.toml:3:"), HasSubstr("the counter loses fringes")));
     EXPECT_EQ(complaint(instrument + "detector_bandwidth_hz = 0"), "");
+    // 796000 fringes a second by the dither, 380000 more by the fastest rate of the profile.
+    const std::string narrow = instrument + "detector_bandwidth_hz = 9e5\n[input]\n";
+    EXPECT_EQ(complaint(narrow), "");
+    EXPECT_THAT(complaint(narrow + "profile_time_s = [0, 9]\nprofile_rate_deg_h = [0, -190000]"),
+                HasSubstr("the counter loses fringes"));
     EXPECT_THAT(complaint(instrument + "comparator_hysteresis_relative = 0.01"),
                 AllOf(HasSubstr("s.toml:3:"), HasSubstr("at least 4 times the noise")));
     EXPECT_THAT(complaint(instrument + "[effects.readout_ellipse]\noffset_sin = 0.3"),
