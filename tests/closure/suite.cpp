@@ -15,6 +15,7 @@
 
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/loop/loop.hpp"
+#include "analysis/closure/turns/model/model.hpp"
 #include "analysis/instrument/simulate.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
