@@ -20,6 +20,7 @@ class LockinTemperature final : public Effect {
                "each "
                "half cycle.";
     }
+    Follows follows() const override { return Follows::temperature; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("relative_per_k") != 0.0; }
     double threshold_factor(const Values& values, double temperature_change_k) const override {

@@ -21,6 +21,7 @@ class ScaleFactorError final : public Effect {
                "cycle: "
                "that is a larger dither.peak_rate_deg_s, and left to it (docs/effects.md).";
     }
+    Follows follows() const override { return Follows::input_rate; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("relative") != 0.0; }
     bool adds_angle() const override { return true; }
