@@ -19,7 +19,7 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
     : series_(&series), rows_(&rows), model_(std::move(model)), searched_(noise == Noise::near) {
     if (model_.columns.empty()) {
         model_.columns.push_back(
-            {"", "mean_rate_deg_h", std::make_shared<std::vector<double>>(series.size(), series.interval_s)});
+            {nullptr, "mean_rate_deg_h", std::make_shared<std::vector<double>>(series.size(), series.interval_s)});
         take_off();
         double mean = 0.0;
         for (const double x : rest_) mean += x / static_cast<double>(series.size());

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "analysis/closure/samples/fit/fit.hpp"
+#include "analysis/closure/samples/fit/motion.hpp"
 #include "analysis/closure/samples/model/lanes.hpp"
 #include "analysis/closure/stats/column_regression.hpp"
 #include "engine/core/interrupt.hpp"
@@ -185,7 +186,7 @@ SampleModel SampleFit::at(const std::vector<double>& x) const {
         const double rate_hz = model.noise.from_hz > 0.0 ? model.noise.from_hz : series_->rate_hz;
         if (resonance.hz > 0.5 * rate_hz || resonance.width_hz > 3.0 * rate_hz) resonance.arcsec = 0.0;
         const bool slow = std::hypot(resonance.hz, 0.5 * resonance.width_hz) < model.motion_from_hz;
-        if (slow && model.resonances[k] == "case_motion") resonance.arcsec = 0.0;
+        if (slow && is_motion(model.resonances[k].effect)) resonance.arcsec = 0.0;
     }
     if (model.noise.from_hz > 0.0) {
         // About the middle of the record, so that rate and place are told apart.
@@ -411,7 +412,7 @@ void SampleFit::fit_noise() {
     // So does a part of what a witness leaves of a motion: a line beside it may have had no use for it.
     auto& resonances = model_.noise.resonances;
     for (std::size_t k = 1; k < resonances.size(); ++k) {
-        const bool of_one_motion = model_.resonances[k] == "case_motion" && model_.resonances[k - 1] == "case_motion";
+        const bool of_one_motion = is_motion(model_.resonances[k].effect) && is_motion(model_.resonances[k - 1].effect);
         if (of_one_motion && resonances[k].arcsec < 1e-2 * resonances[k - 1].arcsec) {
             resonances[k] = resonances[k - 1];
             resonances[k].arcsec *= 0.3;

@@ -58,8 +58,6 @@ SampleLine refined_from(const SampleFit& fit, SampleLine line) {
 
 }  // namespace
 
-bool is_line(const std::string& effect) { return effect == "dither_residue" || effect == "base_vibration"; }
-
 std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const LineCourse& course, double a, double b) {
     const double duration_s = static_cast<double>(fit.series().size()) * fit.series().interval_s;
     // So small a part of a cycle at either end of the record that the next term does not matter.
@@ -117,7 +115,7 @@ bool scatters(const SampleFit& fit, std::vector<double> innovations, const Found
 }
 
 SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, const Rows& rows,
-                                const std::string& effect, int step) {
+                                const effects::Effect* effect, int step) {
     const SampleSeries& series = fit.series();
     double squares = 0.0;
     double count = 0.0;
@@ -133,8 +131,7 @@ SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, c
     const double duration_s = static_cast<double>(series.size()) * series.interval_s;
     SampleModel model = fit.model();
     model.noise.resonances.push_back({rms, found.scattered_hz, 64.0 / duration_s});
-    model.resonances.push_back(effect);
-    model.resonance_steps.push_back(step);
+    model.resonances.push_back({effect, step});
     return model;
 }
 

@@ -7,8 +7,10 @@
 /// Steps of the rate, and where in the record they are.
 namespace ringlock::closure {
 
-/// A rate of one from that row on.
-SampleColumn step_column(const SampleSeries& series, std::size_t row);
+/// The column of an effect that steps: a rate of one from that row on. Steps are searched at whole rows, so that this
+/// is not the closed form of the effect, which rounding lets begin a row early.
+SampleColumn step_column(const effects::Effect& effect, const SampleSeries& series, std::size_t row);
+bool is_step(const SampleColumn& column);
 std::size_t row_of_step(const SampleColumn& step);
 
 /// What a step at that row explains, its sign that of the step.

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/decide/verdict.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
@@ -25,7 +26,7 @@ namespace {
 /// Frequency of the line that a step added, as it is read. Others may have come behind it: a motion that is told anew.
 double line_hz(const SampleModel& model, int step) {
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
-        if (model.resonance_steps[k] == step) return model.noise.resonances[k].hz;
+        if (model.resonances[k].step == step) return model.noise.resonances[k].hz;
     }
     const auto of_step = [step](const SampleColumn& c) { return c.step == step && c.name == "cosine"; };
     const auto found = std::find_if(model.columns.begin(), model.columns.end(), of_step);
@@ -56,7 +57,8 @@ void SampleLoop::take_lattice(Closure& closure) {
         return;
     }
     lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
-    if (lattice_.step_arcsec == 0.0) return;
+    const effects::Effect* effect = first_that_shows(OnSamples::resolution);
+    if (lattice_.step_arcsec == 0.0 || effect == nullptr) return;
     const double step = lattice_.step_arcsec;
     const double sd = now_.fit->sd(series_.size() / 2);
     // Steps add step^2/12 to the variance: less than a thousandth of it changes nothing that is told here.
@@ -72,8 +74,9 @@ void SampleLoop::take_lattice(Closure& closure) {
             "of the characteristic function is left",
             lattice_.printed_arcsec, 100.0 * lattice_.strength));
     }
-    Step taken;
-    taken.effect = "count_quantization";
+    AddedEffect added{.effect = effect, .id = next_id_++};
+    Step& taken = added.step;
+    taken.effect = effect->name();
     taken.p_value = lattice_.p_value;
     const SampleScore before = score_of(*now_.fit, reported_, 0.0);
     // Blurred steps are not where the values are: the digits are.
@@ -83,9 +86,8 @@ void SampleLoop::take_lattice(Closure& closure) {
     taken.heldout_error_before = before.error;
     taken.heldout_error_after = after.error;
     taken.heldout_log_score_gain = after.log_score - before.log_score;
-    taken.parameters.push_back({"count_quantization", "step_arcsec", step, lattice_.step_sd_arcsec});
-    now_.steps.push_back(std::move(taken));
-    now_.told.push_back({"count_quantization", next_step_++});
+    taken.parameters.push_back(step_of_lattice(*effect));
+    now_.added.push_back(std::move(added));
 }
 
 /// Steps whose rounding follows the angle.
@@ -102,19 +104,19 @@ void SampleLoop::find_coarse_steps(Closure& closure) {
 
 /// Adds what earns its place, until nothing does.
 void SampleLoop::add_all(Closure& closure, bool random_rates) {
-    while (now_.steps.size() < options.most_steps) {
+    while (now_.added.size() < options.most_steps) {
         const SampleChoice choice = choose_on_samples(
-            record_.declared, {now_.fit, now_.lines_hz, next_step_, random_rates}, whole_, lattice_step());
+            record_.declared, {now_.fit, now_.lines_hz, next_id_, random_rates}, whole_, lattice_step());
         nearest_ = choice.nearest;
         if (!choice.chosen) break;
-        if (!earlier_ && is_random_rate(choice.chosen->candidate.effect)) earlier_ = now_;
+        if (!earlier_ && is_random_rate(*choice.chosen->effect)) earlier_ = now_;
         take(choice, closure);
     }
 }
 
 /// What was rounded was drawn by the model without a random rate, and says little of which one it is: the rounded
 /// values say that. The likelier is taken, with the fit to what was drawn by it.
-const SampleContender& SampleLoop::take_likelier(const SampleChoice& choice, Step& step) {
+const SampleCandidate& SampleLoop::take_likelier(const SampleChoice& choice, Step& step, Effects& tied) {
     now_.fit = choice.chosen->fit;
     if (!rounded_.drawn() || !choice.other_random) return *choice.chosen;
     const auto drawn = rounded_.draw(choice.chosen->fit, draws_of_step);
@@ -123,13 +125,11 @@ const SampleContender& SampleLoop::take_likelier(const SampleChoice& choice, Ste
     const double gain = score(*now_.fit).log_likelihood - without;
     const bool other = gain > 0.0;
     if (!other) now_.fit = rounded_.draw(drawn, 1);
-    const SampleContender& taken = other ? *choice.other_random : *choice.chosen;
-    const SampleContender& left = other ? *choice.chosen : *choice.other_random;
-    auto& tied = step.confounded_with;
-    std::erase_if(
-        tied, [&](const std::string& name) { return name == left.candidate.effect || name == taken.candidate.effect; });
-    if (std::abs(gain) < options.tie) tied.push_back(left.candidate.effect);
-    if (other) step.p_value = taken.candidate.p_value;
+    const SampleCandidate& taken = other ? *choice.other_random : *choice.chosen;
+    const SampleCandidate& left = other ? *choice.chosen : *choice.other_random;
+    std::erase_if(tied, [&](const effects::Effect* one) { return one == left.effect || one == taken.effect; });
+    if (std::abs(gain) < options.tie) tied.push_back(left.effect);
+    if (other) step.p_value = taken.p_value;
     return taken;
 }
 
@@ -137,28 +137,28 @@ const SampleContender& SampleLoop::take_likelier(const SampleChoice& choice, Ste
 void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     Step step;
     step.p_value = choice.p_value;
-    step.confounded_with = choice.confounded_with;
+    Effects tied = choice.confounded_with;
     const SampleScore before = score(*now_.fit);
-    const SampleContender& best = take_likelier(choice, step);
-    const std::string effect = best.candidate.effect;
-    step.effect = effect;
-    for (const auto& [partner, names] : now_.of_partners) {
-        if (partner != effect) continue;
-        for (const std::string& name : names) {
-            const auto& named = step.confounded_with;
-            if (std::find(named.begin(), named.end(), name) == named.end()) step.confounded_with.push_back(name);
+    const SampleCandidate& best = take_likelier(choice, step, tied);
+    const effects::Effect& effect = *best.effect;
+    for (const auto& [partner, alternatives] : now_.of_partners) {
+        if (partner != &effect) continue;
+        for (const effects::Effect* one : alternatives) {
+            if (std::find(tied.begin(), tied.end(), one) == tied.end()) tied.push_back(one);
         }
     }
     now_.of_partners.insert(now_.of_partners.end(), choice.of_partners.begin(), choice.of_partners.end());
-    if (!step.confounded_with.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
+    step.effect = effect.name();
+    for (const effects::Effect* one : tied) step.confounded_with.emplace_back(one->name());
+    if (!tied.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
     drop_needless(effect);
     for (int k = 0; k < most_motions && move_anew();) ++k;
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
-    now_.told.push_back({.effect = effect,
-                         .step = next_step_++,
-                         .witness = best.candidate.witness,
-                         .strong = best.candidate.strong,
-                         .other_hz = choice.other_hz});
+    now_.added.push_back({.effect = &effect,
+                          .id = next_id_++,
+                          .witness = best.witness,
+                          .strong = best.strong,
+                          .other_hz = choice.other_hz});
     if (rounded_.drawn()) {
         now_.fit = rounded_.draw(now_.fit, draws_of_step);
         // What was drawn without a motion tells little of it.
@@ -172,35 +172,36 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     step.heldout_error_after = after.error;
     step.heldout_log_score_gain = after.log_score - before.log_score;
     if (is_line(effect)) {
-        const double hz = line_hz(now_.fit->model(), now_.told.back().step);
+        const double hz = line_hz(now_.fit->model(), now_.added.back().id);
         now_.lines_hz.push_back(alias(hz, series_.rate_hz).hz);
-        now_.told.back().hz = now_.lines_hz.back();
-        if (best.candidate.wanders) {
+        now_.added.back().hz = now_.lines_hz.back();
+        if (best.wanders) {
             now_.notes.push_back(
                 fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "
                             "samples before as a narrow resonance",
                             now_.lines_hz.back()));
         }
     }
-    now_.steps.push_back(std::move(step));
+    now_.added.back().step = std::move(step);
 }
 
-/// The model without what that step added, if it may only have stood in for the effect that was added last.
-std::optional<SampleLoop::Stripped> SampleLoop::stripped(const SampleStep& told, const std::string& added) const {
+/// The model without that effect, if it may only have stood in for the effect that was added last.
+std::optional<SampleLoop::Stripped> SampleLoop::stripped(const AddedEffect& of, const effects::Effect& last) const {
     Stripped without{now_.fit->model()};
     SampleModel& model = without.model;
-    if (told.effect == "rate_random_walk") {
+    const OnSamples as = on_samples(*of.effect);
+    if (as == OnSamples::walk) {
         model.walk = false;
         model.noise.walk_arcsec2_s3 = 0.0;
-    } else if (told.effect == "bias_instability") {
+    } else if (as == OnSamples::flicker) {
         model.flicker = false;
         model.noise.terms.clear();
-    } else if (told.effect.starts_with("bias_") || told.effect == "scale_factor_error") {
-        std::erase_if(model.columns, [&](const SampleColumn& c) { return c.effect == told.effect; });
-        if (told.effect == "bias_step") without.parameters = 2;
-    } else if (is_line(told.effect) && added == "resampling") {
-        // Of a line that was resampled there are images, each a line to who does not know that.
-        const auto of_step = [&](const SampleColumn& c) { return c.step == told.step; };
+    } else if (as == OnSamples::rate || as == OnSamples::step) {
+        std::erase_if(model.columns, [&](const SampleColumn& c) { return c.effect == of.effect; });
+        if (as == OnSamples::step) without.parameters = 2;
+    } else if (is_line(*of.effect) && on_samples(last) == OnSamples::transport) {
+        // A line that was resampled has images, each of which looks like a line until the resampling is known.
+        const auto of_step = [&](const SampleColumn& c) { return c.step == of.id; };
         const auto cosine = std::find_if(model.columns.begin(), model.columns.end(), of_step);
         if (cosine == model.columns.end()) return std::nullopt;
         without.parameters = 2 + static_cast<int>(cosine->course.free);
@@ -211,23 +212,23 @@ std::optional<SampleLoop::Stripped> SampleLoop::stripped(const SampleStep& told,
     return without;
 }
 
-/// Effects that stood in for the one added last are no longer needed beside it.
-void SampleLoop::drop_needless(const std::string& added) {
-    for (std::size_t k = now_.told.size(); k-- > 0;) {
-        auto without = stripped(now_.told[k], added);
+/// Removes effects that only stood in for the one that was added last.
+void SampleLoop::drop_needless(const effects::Effect& last) {
+    for (std::size_t k = now_.added.size(); k-- > 0;) {
+        const AddedEffect& one = now_.added[k];
+        auto without = stripped(one, last);
         if (!without) continue;
         auto fitted = std::make_shared<SampleFit>(series_, std::move(without->model), rows_, SampleFit::Noise::near);
         const double chi2 = 2.0 * (now_.fit->gain_over(*fitted));
         if (passes_on_samples(chi2_tail(chi2, without->parameters))) continue;
         now_.fit = std::move(fitted);
-        if (is_line(now_.told[k].effect)) {
-            std::erase(now_.lines_hz, now_.told[k].hz);
+        if (is_line(*one.effect)) {
+            std::erase(now_.lines_hz, one.hz);
             now_.notes.push_back(
-                fmt::format("a line at {:.6g} Hz was in the model until {} came in, beside which it is nothing",
-                            now_.told[k].hz, added));
+                fmt::format("a line at {:.6g} Hz was removed from the model: with {} the record does not need it",
+                            one.hz, last.name()));
         }
-        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
-        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+        now_.added.erase(now_.added.begin() + static_cast<std::ptrdiff_t>(k));
     }
 }
 
@@ -235,30 +236,30 @@ void SampleLoop::drop_needless(const std::string& added) {
 /// was a part of.
 bool SampleLoop::move_anew() {
     bool any = false;
-    for (SampleStep& told : now_.told) {
-        if (told.effect != "case_motion") continue;
+    for (AddedEffect& added : now_.added) {
+        if (!is_motion(added.effect)) continue;
         const SampleFit still(series_, without_motion(now_.fit->model()), rows_, SampleFit::Noise::held);
-        auto moved = std::make_shared<SampleFit>(series_, moved_as(still, told.witness, told.step), rows_,
-                                                 SampleFit::Noise::near);
-        const double more = told.strong ? 1.0 : 2.0 * witness_lags(series_.rate_hz) - 1.0;
+        auto moved = std::make_shared<SampleFit>(series_, moved_as(still, *added.effect, added.witness, added.id),
+                                                 rows_, SampleFit::Noise::near);
+        const double more = added.strong ? 1.0 : 2.0 * witness_lags(series_.rate_hz) - 1.0;
         if (!(moved->gain_over(*now_.fit) > more)) continue;
         now_.fit = std::move(moved);
-        told.strong = true;
+        added.strong = true;
         any = true;
     }
     return any;
 }
 
 /// A motion of the case that is known to be there, by two numbers or lag by lag.
-void SampleLoop::move_case(SampleStep& told, SampleFit::Noise noise) {
+void SampleLoop::move_case(AddedEffect& motion, SampleFit::Noise noise) {
     SampleModel model = now_.fit->model();
-    add_motion(model, series_, told.witness, told.step);
+    add_motion(model, series_, *motion.effect, motion.witness, motion.id);
     auto weak = std::make_shared<SampleFit>(series_, std::move(model), rows_, noise);
-    auto strong = std::make_shared<SampleFit>(series_, moved_as(*now_.fit, told.witness, told.step), rows_,
-                                              SampleFit::Noise::near);
+    auto strong = std::make_shared<SampleFit>(series_, moved_as(*now_.fit, *motion.effect, motion.witness, motion.id),
+                                              rows_, SampleFit::Noise::near);
     const double more = 2.0 * witness_lags(series_.rate_hz) - 1.0;
-    told.strong = strong->gain_over(*weak) > more;
-    now_.fit = told.strong ? std::move(strong) : std::move(weak);
+    motion.strong = strong->gain_over(*weak) > more;
+    now_.fit = motion.strong ? std::move(strong) : std::move(weak);
 }
 
 }  // namespace ringlock::closure

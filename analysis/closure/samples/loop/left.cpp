@@ -7,8 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
+#include "analysis/closure/samples/fit/motion.hpp"
 #include "analysis/closure/samples/loop/loop.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
 #include "analysis/closure/stats/p_values.hpp"
@@ -110,8 +112,8 @@ void SampleLoop::go_without_random(Closure& closure) {
     begin_again(followed);
     closure.unexplained = left;
     closure.tests = tests;
-    const auto keeps = [](const SampleStep& told) { return !is_slow_rate(told.effect); };
-    if (keep_names(earlier_->told.empty() ? 0 : earlier_->told.back().step + 1, keeps, closure)) return;
+    const auto keeps = [](const AddedEffect& added) { return !is_slow_rate(*added.effect); };
+    if (keep_names(earlier_->added.empty() ? 0 : earlier_->added.back().id + 1, keeps, closure)) return;
     begin_again(*earlier_);
     test_what_is_left(closure);
 }
@@ -121,46 +123,45 @@ void SampleLoop::go_without_random(Closure& closure) {
 void SampleLoop::look_beside_nearest(Closure& closure) {
     constexpr int most = 3;
     const State without = now_;
-    const int first = next_step_;
+    const int first = next_id_;
     const std::optional<ResidualTest> left = closure.unexplained;
     const std::vector<ResidualTest> tests = closure.tests;
-    const bool line = is_line(nearest_->candidate.effect);
+    const bool line = is_line(*nearest_->effect);
     std::vector<double> around_hz;
-    for (int k = 0; k < most && nearest_ && is_line(nearest_->candidate.effect) == line; ++k) {
+    for (int k = 0; k < most && nearest_ && is_line(*nearest_->effect) == line; ++k) {
         SampleChoice choice;
         choice.chosen = std::exchange(nearest_, {});
         take(choice, closure);
-        around_hz.push_back(now_.told.back().hz);
+        around_hz.push_back(now_.added.back().hz);
         add_all(closure, line);
     }
     const bool of_witness = left && left->view == followed_witnesses;
     // What is left of a line lies about it, a rate that is left takes another's shape, and one that goes with an
     // acceleration that of a motion.
-    const auto keeps = [&](const SampleStep& told) {
-        if (!line) return !is_slow_rate(told.effect) && !(of_witness && told.effect == "case_motion");
-        if (!is_line(told.effect)) return !is_random_rate(told.effect);
+    const auto keeps = [&](const AddedEffect& added) {
+        if (!line) return !is_slow_rate(*added.effect) && !(of_witness && is_motion(added.effect));
+        if (!is_line(*added.effect)) return !is_random_rate(*added.effect);
         return std::none_of(around_hz.begin(), around_hz.end(),
-                            [&](double hz) { return std::abs(hz - told.hz) < beside_hz; });
+                            [&](double hz) { return std::abs(hz - added.hz) < beside_hz; });
     };
     if (!keep_names(first, keeps, closure)) begin_again(without);
     closure.unexplained = left;
     closure.tests = tests;
 }
 
-/// Of what was added from that step on, some loses its name.
-/// \return whether anything keeps it
-bool SampleLoop::keep_names(int first_step, const std::function<bool(const SampleStep&)>& keeps, Closure& closure) {
-    const auto since = [&](const SampleStep& told) { return told.step >= first_step; };
-    const auto stays = [&](const SampleStep& told) { return since(told) && keeps(told); };
-    if (std::none_of(now_.told.begin(), now_.told.end(), stays)) return false;
-    for (std::size_t k = now_.told.size(); k-- > 0;) {
-        if (!since(now_.told[k]) || stays(now_.told[k])) continue;
-        closure.notes.push_back(fmt::format(
-            "{} follows what may be nothing that the library has: it is in the model, so that the rest can be "
-            "told, and is not named",
-            now_.steps[k].effect));
-        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
-        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+/// Effects that were added from that one on stay in the model, but those that `keeps` refuses are not reported.
+/// \return whether any is reported
+bool SampleLoop::keep_names(int first_id, const std::function<bool(const AddedEffect&)>& keeps, Closure& closure) {
+    const auto since = [&](const AddedEffect& added) { return added.id >= first_id; };
+    const auto stays = [&](const AddedEffect& added) { return since(added) && keeps(added); };
+    if (std::none_of(now_.added.begin(), now_.added.end(), stays)) return false;
+    for (std::size_t k = now_.added.size(); k-- > 0;) {
+        if (!since(now_.added[k]) || stays(now_.added[k])) continue;
+        closure.notes.push_back(
+            fmt::format("{} was fitted only as a placeholder for structure that no effect of the library explains, and "
+                        "is not reported",
+                        now_.added[k].effect->name()));
+        now_.added.erase(now_.added.begin() + static_cast<std::ptrdiff_t>(k));
     }
     return true;
 }
@@ -176,16 +177,15 @@ void SampleLoop::take_back_lines(Closure& closure) {
                        of_several(line.p_value, static_cast<double>(closure.tests.size())) < options.level_of_residual;
     const bool beside = line.beside > little;
     if (!fails && !beside) return;
-    for (std::size_t k = 0; k < now_.told.size(); ++k) {
-        if (now_.told[k].step != line.step) continue;
+    for (std::size_t k = 0; k < now_.added.size(); ++k) {
+        if (now_.added[k].id != line.step) continue;
         const std::string at = fmt::format("at {:.6g} Hz", line.hz);
         closure.unexplained = ResidualTest{beside ? Where::frequency : Where::amplitude,
                                            "a line that does not keep its amplitude or its frequency",
                                            fails ? line.p_value : closure.unexplained->p_value, at};
-        closure.notes.push_back(
-            fmt::format("the line {} is in the model, so that the rest can be told, and is not named", at));
-        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
-        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+        closure.notes.push_back(fmt::format(
+            "the line {} was fitted only so that other effects can be identified, and is not reported", at));
+        now_.added.erase(now_.added.begin() + static_cast<std::ptrdiff_t>(k));
         return;
     }
 }

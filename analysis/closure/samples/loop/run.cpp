@@ -11,6 +11,7 @@
 #include "analysis/closure/decide/verdict.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
+#include "analysis/closure/samples/fit/motion.hpp"
 #include "analysis/closure/samples/fit/steps.hpp"
 #include "analysis/closure/samples/loop/loop.hpp"
 #include "analysis/closure/samples/screen/known.hpp"
@@ -63,7 +64,7 @@ void SampleLoop::begin(Closure& closure) {
                         series_.input_late_s));
     }
     now_ = {};
-    next_step_ = 0;
+    next_id_ = 0;
     now_.fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
     closure.heldout_before = score_of(*now_.fit, reported_, 0.0).error;
     if (disturbed_.rows.empty()) disturbed_ = find_disturbed(*now_.fit, whole_);
@@ -109,9 +110,9 @@ void SampleLoop::finish(Closure& closure) {
     SampleFigures figures = this->figures();
     closure.rounding_in_noise = !rounded_.drawn();
     closure.base = std::move(figures.base);
-    closure.steps = std::move(now_.steps);
-    for (std::size_t k = 0; k < closure.steps.size(); ++k) {
-        if (closure.steps[k].parameters.empty()) closure.steps[k].parameters = std::move(figures.steps[k]);
+    for (std::size_t k = 0; k < now_.added.size(); ++k) {
+        Step& step = closure.steps.emplace_back(std::move(now_.added[k].step));
+        if (step.parameters.empty()) step.parameters = std::move(figures.steps[k]);
     }
     for (auto* notes : {&now_.notes, &figures.notes}) {
         for (std::string& note : *notes) closure.notes.push_back(std::move(note));
@@ -151,7 +152,7 @@ bool SampleLoop::restore() {
 /// Of a fit to the whole record.
 SampleFigures SampleLoop::figures() {
     const auto of = [&](const SampleFit& fit) {
-        return figures_of(refine_steps(refine_lines(fit, whole_), whole_), now_.told, record_.declared);
+        return figures_of(refine_steps(refine_lines(fit, whole_), whole_), now_.added, record_.declared);
     };
     const SampleFit whole(series_, now_.fit->model(), whole_, SampleFit::Noise::near);
     return rounded_.drawn() ? rounded_.figures_of(whole, of) : of(whole);
@@ -186,18 +187,17 @@ void SampleLoop::close(Closure& closure) {
 void SampleLoop::take_known(const std::vector<ActiveEffect>& effects, Closure& closure) {
     begin(closure);
     KnownEffects known = known_effects(*now_.fit, effects);
-    for (const SampleStep& told : known.told) {
-        Step& step = now_.steps.emplace_back();
-        step.effect = told.effect;
-        if (told.effect != "count_quantization") continue;
+    now_.added = std::move(known.added);
+    for (AddedEffect& added : now_.added) {
+        added.step.effect = added.effect->name();
+        if (on_samples(*added.effect) != OnSamples::resolution) continue;
         lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
         used_step_ = lattice_.printed_arcsec;
-        step.parameters.push_back({told.effect, "step_arcsec", lattice_.step_arcsec, lattice_.step_sd_arcsec});
+        added.step.parameters.push_back(step_of_lattice(*added.effect));
     }
-    now_.told = std::move(known.told);
     now_.fit = std::make_shared<SampleFit>(series_, std::move(known.model), rows_, known.noise);
-    for (SampleStep& told : now_.told) {
-        if (told.effect == "case_motion" && !series_.witnesses.empty()) move_case(told, known.noise);
+    for (AddedEffect& added : now_.added) {
+        if (is_motion(added.effect) && !series_.witnesses.empty()) move_case(added, known.noise);
     }
     if (series_.counted || used_step_ > 0.0) find_coarse_steps(closure);
 }

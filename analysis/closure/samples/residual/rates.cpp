@@ -231,7 +231,7 @@ double merit_of_states(const SampleFit& fit, const TwoStates& first) {
         rate[i] = fit.series().interval_s * first.expected(static_cast<Eigen::Index>(i * stretches / n));
     }
     SampleModel with = fit.model();
-    with.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(std::move(rate))});
+    with.columns.push_back({nullptr, "view", std::make_shared<const std::vector<double>>(std::move(rate))});
     SampleModel without = fit.model();
     without.noise = SampleFit(fit.series(), std::move(with), fit.rows(), SampleFit::Noise::near).model().noise;
     const SampleFit beside(fit.series(), std::move(without), fit.rows(), SampleFit::Noise::held);

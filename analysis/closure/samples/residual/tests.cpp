@@ -107,7 +107,7 @@ void test_spectrum(const SampleFit& fit, Views& views) {
         const double share = std::min(lines.scattered_squares / std::max(squares, 1e-300), 1.0 - 1e-9);
         view.by_variance = std::min(gain, -0.5 * rows * std::log1p(-share)) - cost;
         view.refitted = [&fit, lines, cost](double) {
-            const SampleFit with(fit.series(), with_wandering_line(fit, lines, fit.rows(), "", -1), fit.rows());
+            const SampleFit with(fit.series(), with_wandering_line(fit, lines, fit.rows(), nullptr, -1), fit.rows());
             return with.gain_over(fit) - cost;
         };
     }
@@ -195,7 +195,7 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
 SampleFit fit_beside(const SampleFit& fit, const SampleView& view) {
     SampleModel model = fit.model();
     for (auto& column : view.columns()) {
-        model.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(std::move(column))});
+        model.columns.push_back({nullptr, "view", std::make_shared<const std::vector<double>>(std::move(column))});
         model.columns.back().as_recorded = view.hz.has_value();
     }
     return {fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near};

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/units.hpp"
 
@@ -196,11 +197,15 @@ SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
         for (Estimate& estimate : mean.steps[s]) {
             double times = 1.0;
             for (std::size_t k = 0; k < summit.column_times.size(); ++k) {
-                if (summit.model.columns[k].effect == estimate.effect) times = std::max(times, summit.column_times[k]);
+                const effects::Effect* effect = summit.model.columns[k].effect;
+                const bool same = effect != nullptr && effect->name() == estimate.effect;
+                if (same) times = std::max(times, summit.column_times[k]);
             }
             estimate.sd *= times;
-            if (estimate.effect == "bias_instability") known_to(estimate, summit.model.flicker_deg_h, 2);
-            if (estimate.effect == "rate_random_walk") known_to(estimate, 60.0 * std::sqrt(noise.walk_arcsec2_s3), 2);
+            const effects::Effect* effect = effects::find(estimate.effect);
+            if (effect == nullptr) continue;
+            if (on_samples(*effect) == OnSamples::flicker) known_to(estimate, summit.model.flicker_deg_h, 2);
+            if (on_samples(*effect) == OnSamples::walk) known_to(estimate, deviation_of_walk(*effect, noise), 2);
         }
     }
     return mean;

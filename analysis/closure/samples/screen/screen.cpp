@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/line_search.hpp"
@@ -28,15 +29,28 @@ std::shared_ptr<const std::vector<double>> shared(std::vector<double> values) {
     return std::make_shared<const std::vector<double>>(std::move(values));
 }
 
-SampleColumn rate_column(const SampleSeries& series, std::string effect, std::string name,
-                         const std::function<double(std::size_t)>& rate) {
-    std::vector<double> values(series.size());
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = rate(i) * series.interval_s;
-    return {.effect = std::move(effect), .name = std::move(name), .series = shared(std::move(values))};
+/// The model has columns of the effect.
+bool has(const SampleModel& model, const effects::Effect* effect) {
+    return std::any_of(model.columns.begin(), model.columns.end(), [&](const auto& c) { return c.effect == effect; });
 }
 
-bool has(const SampleModel& model, std::string_view effect) {
-    return std::any_of(model.columns.begin(), model.columns.end(), [&](const auto& c) { return c.effect == effect; });
+/// The model has columns of effects that show in this way.
+bool has(const SampleModel& model, OnSamples as) {
+    return std::any_of(model.columns.begin(), model.columns.end(),
+                       [&](const auto& c) { return c.effect != nullptr && on_samples(*c.effect) == as; });
+}
+
+/// A candidate of the first effect that shows in this way; the others of that kind make the same model. None where the
+/// library has no such effect.
+std::optional<SampleCandidate> candidate_of(OnSamples as) {
+    const Effects all = effects_that_show(as);
+    if (all.empty()) return std::nullopt;
+    return SampleCandidate{.effect = all.front(), .confounded = {all.begin() + 1, all.end()}};
+}
+
+/// Effects that show in this way make the candidate's model as well.
+void confound(SampleCandidate& candidate, OnSamples as) {
+    for (const effects::Effect* effect : effects_that_show(as)) candidate.confounded.push_back(effect);
 }
 
 void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
@@ -70,7 +84,8 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
         out.push_back(std::move(c));
     };
     for (SampleColumn& column : rate_columns(in.series)) one(std::move(column));
-    if (has(model, "bias_step")) return;
+    auto candidate = candidate_of(OnSamples::step);
+    if (!candidate || has(model, OnSamples::step)) return;
     // Steps: everywhere, coarsely, then about the best.
     std::vector<double> roots;
     double best = 0.0;
@@ -87,10 +102,10 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     }
     double as_good = 0.0;
     for (const double root : roots) as_good += std::exp(0.5 * (root * root - best * best));
-    SampleCandidate c{.effect = "bias_step",
-                      .model = model,
-                      .p_value = davies_bound(best * best, roots),
-                      .places = static_cast<double>(places) / as_good};
+    SampleCandidate& c = *candidate;
+    c.model = model;
+    c.p_value = davies_bound(best * best, roots);
+    c.places = static_cast<double>(places) / as_good;
     at = refine_place(now, at, n / places / 2);
     best = root_of_worth * std::abs(root_of_step(now, at));
     c.searched = places_of_step(best * best, 0.5 / static_cast<double>(places));
@@ -107,17 +122,21 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
         }
     }
     if (c.p_value > 0.01) return;
-    c.model.columns.push_back(step_column(in.series, at));
+    c.model.columns.push_back(step_column(*c.effect, in.series, at));
     c.model.columns.back().step = in.step;
     out.push_back(std::move(c));
 }
 
 void screen_noises(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
-    const auto one = [&](const std::string& effect, SampleModel model) {
+    const auto one = [&](OnSamples as, SampleModel model) {
+        auto candidate = candidate_of(as);
+        if (!candidate) return;
         const SampleFit fit(in.series, std::move(model), in.rows, SampleFit::Noise::near);
         const double chi2 = std::max(0.0, 2.0 * fit.gain_over(now));
+        candidate->model = fit.model();
         // A variance cannot be negative: half of the time there is no gain at all (Chernoff 1954).
-        out.push_back({.effect = effect, .model = fit.model(), .p_value = 0.5 * chi2_tail(chi2, 1)});
+        candidate->p_value = 0.5 * chi2_tail(chi2, 1);
+        out.push_back(*std::move(candidate));
     };
     const double duration_s = static_cast<double>(in.series.size()) * in.series.interval_s;
     const double known =
@@ -139,21 +158,21 @@ void screen_noises(const SampleFit& now, const SampleContext& in, std::vector<Sa
         SampleModel model = now.model();
         model.walk = true;
         model.noise.walk_arcsec2_s3 = 10.0 * known * known / duration_s;
-        one("rate_random_walk", model);
+        one(OnSamples::walk, std::move(model));
     }
     if (!now.model().flicker) {
         SampleModel model = now.model();
         model.flicker = true;
         model.flicker_deg_h = 3.0 * known;
         model.noise.terms = flicker_terms(model.flicker_deg_h, 4.0 * in.series.interval_s, duration_s);
-        one("bias_instability", model);
+        one(OnSamples::flicker, std::move(model));
     }
 }
 
-/// How the level of two effects goes to lines. Lines that keep their frequency have that of `base_vibration`. That of
-/// `dither_residue` goes to lines that drift; where a dither is declared nearly all of it to what shows near its
-/// frequency and its harmonics, one half to lines that keep and one to those that drift: a declaration makes these
-/// likely.
+/// Lines have the level of two effects. Lines that keep their frequency have that of a line in the input rate. That of
+/// a line in the output goes to lines that drift; where a dither is declared, nearly all of it goes to lines near its
+/// frequency and its harmonics, one half to lines that keep their frequency and one to those that drift: a declaration
+/// makes these likely.
 struct LineShares {
     double drifting = 1.0;
     double declared = 0.0;
@@ -207,17 +226,18 @@ std::vector<OfferedLine> declared_lines(const SampleFit& now, const SampleContex
     return {still, drifting};
 }
 
-SampleCandidate wandering_line(const SampleFit& now, const SampleContext& in, const FoundLines& lines, double p_value) {
-    SampleCandidate c{.effect = "dither_residue",
-                      .model = {},
-                      .p_value = p_value,
-                      .searched = lines.tracked.searched,
-                      .parameters = 3,
-                      .freedom = 3,
-                      .hz = lines.scattered_hz,
-                      .wanders = true};
-    c.model = with_wandering_line(now, lines, in.rows, c.effect, in.step);
-    return c;
+std::optional<SampleCandidate> wandering_line(const SampleFit& now, const SampleContext& in, const FoundLines& lines,
+                                              double p_value) {
+    auto candidate = candidate_of(OnSamples::angle_line);
+    if (!candidate) return std::nullopt;
+    candidate->p_value = p_value;
+    candidate->searched = lines.tracked.searched;
+    candidate->parameters = 3;
+    candidate->freedom = 3;
+    candidate->hz = lines.scattered_hz;
+    candidate->wanders = true;
+    candidate->model = with_wandering_line(now, lines, in.rows, candidate->effect, in.step);
+    return candidate;
 }
 
 /// Whether it would be a rate that changes, were it everywhere as slow as where it is slowest.
@@ -233,21 +253,22 @@ bool is_slow(const LineCourse& course, double duration_s) {
 /// A line on a curve, where power is scattered that none which drifts evenly has.
 std::optional<SampleCandidate> bent_line(const SampleFit& now, const SampleContext& in, const FoundLines& lines,
                                          const std::vector<double>& e) {
+    auto candidate = candidate_of(OnSamples::angle_line);
+    if (!candidate) return std::nullopt;
     const FoundCourse found = follow_bends(e, in.series.rate_hz, lines);
     if (found.course.free < 3) return std::nullopt;
     const SampleLine line = refine_line(now, found.course);
     if (is_slow(line.course, static_cast<double>(in.series.size()) * in.series.interval_s)) return std::nullopt;
     if (scatters(now, e, lines, line)) return std::nullopt;
     const double searched = places_of_bends(line.chi2, 0.5 * static_cast<double>(e.size()), found.course.free);
-    SampleCandidate c{.effect = "dither_residue",
-                      .model = now.model(),
-                      .p_value = of_several(chi2_tail(line.chi2, 2), searched),
-                      .searched = searched,
-                      .parameters = 2,
-                      .freedom = 2,
-                      .hz = lines.scattered_hz};
-    add_line(c.model, in.series, line.course, c.effect, in.step);
-    return c;
+    candidate->model = now.model();
+    candidate->p_value = of_several(chi2_tail(line.chi2, 2), searched);
+    candidate->searched = searched;
+    candidate->parameters = 2;
+    candidate->freedom = 2;
+    candidate->hz = lines.scattered_hz;
+    add_line(candidate->model, in.series, line.course, *candidate->effect, in.step);
+    return candidate;
 }
 
 void screen_line(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
@@ -276,14 +297,13 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
         const SampleLine drifting = refined(likeliest, true);
         // Slow ones are what a base does as well.
         const bool declared = near_declared(now, in, lines.scattered_hz);
-        const auto offer = [&](SampleCandidate c) {
-            c.nameless = !declared && lines.scattered_hz <= fast_hz;
-            if (!declared) c.confounded = {"base_vibration"};
-            out.push_back(std::move(c));
+        const auto offer = [&](std::optional<SampleCandidate> candidate) {
+            if (!candidate) return;
+            candidate->nameless = !declared && lines.scattered_hz <= fast_hz;
+            if (!declared) confound(*candidate, OnSamples::rate_line);
+            out.push_back(*std::move(candidate));
         };
-        if (lines.scattered > drifting.chi2 + much_scattered) {
-            if (auto bent = bent_line(now, in, lines, e)) offer(*std::move(bent));
-        }
+        if (lines.scattered > drifting.chi2 + much_scattered) offer(bent_line(now, in, lines, e));
         if (scatters(now, e, lines, drifting.chi2 > still.chi2 ? drifting : still)) {
             offer(wandering_line(now, in, lines, likeliest.p_value));
             scattered = true;
@@ -307,16 +327,18 @@ void screen_line(const SampleFit& now, const SampleContext& in, std::vector<Samp
         if (line.drifts && !(std::abs(mended.course.drifts[0]) * duration_s * duration_s > 1.0)) continue;
         const bool fast = mended.course.hz > fast_hz;
         const bool dither = line.declared || line.drifts;
-        SampleCandidate c{.effect = dither || fast ? "dither_residue" : "base_vibration",
-                          .model = now.model(),
-                          .p_value = of_several(chi2_tail(mended.chi2, 2), line.found.searched),
-                          .searched = line.found.searched,
-                          .parameters = 2,
-                          .freedom = 2,
-                          .hz = line.found.frequency_hz};
-        if (!dither) c.confounded.emplace_back(fast ? "base_vibration" : "dither_residue");
-        add_line(c.model, in.series, mended.course, c.effect, in.step);
-        out.push_back(std::move(c));
+        const OnSamples as = dither || fast ? OnSamples::angle_line : OnSamples::rate_line;
+        auto candidate = candidate_of(as);
+        if (!candidate) continue;
+        candidate->model = now.model();
+        candidate->p_value = of_several(chi2_tail(mended.chi2, 2), line.found.searched);
+        candidate->searched = line.found.searched;
+        candidate->parameters = 2;
+        candidate->freedom = 2;
+        candidate->hz = line.found.frequency_hz;
+        if (!dither) confound(*candidate, fast ? OnSamples::rate_line : OnSamples::angle_line);
+        add_line(candidate->model, in.series, mended.course, *candidate->effect, in.step);
+        out.push_back(*std::move(candidate));
     }
 }
 
@@ -348,7 +370,8 @@ SampleModel with_lines_of_source(const SampleFit& now, SampleModel model) {
         });
     }
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
-        if (!is_line(model.resonances[k])) continue;
+        const effects::Effect* effect = model.resonances[k].effect;
+        if (effect == nullptr || !is_line(*effect)) continue;
         choose(model.noise.resonances[k].hz,
                [k](SampleModel& there, const Alias& of) { there.noise.resonances[k].hz = of.hz; });
     }
@@ -430,14 +453,16 @@ void screen_resampling(const SampleFit& now, const SampleContext& in, std::vecto
     if (now.model().noise.from_hz > 0.0) return;
     const FoundCycle cycle = find_cycle(now.innovations(), in.rows, in.series.rate_hz);
     if (!(cycle.p_value < options.level_of_effects)) return;
+    auto candidate = candidate_of(OnSamples::transport);
+    if (!candidate) return;
+    candidate->p_value = cycle.p_value;
+    candidate->searched = cycle.searched;
+    candidate->parameters = 2;
+    candidate->freedom = 2;
+    candidate->noise = SampleFit::Noise::free;
     const auto offer = [&](SampleModel model) {
-        out.push_back({.effect = "resampling",
-                       .model = with_lines_of_source(now, std::move(model)),
-                       .p_value = cycle.p_value,
-                       .searched = cycle.searched,
-                       .parameters = 2,
-                       .freedom = 2,
-                       .noise = SampleFit::Noise::free});
+        out.push_back(*candidate);
+        out.back().model = with_lines_of_source(now, std::move(model));
     };
     if (const auto source = find_straight_lines(in.series.increment, in.series.rate_hz)) {
         for (const Errors errors : {Errors::as_they_are, Errors::of_readings}) {
@@ -492,19 +517,20 @@ std::optional<SampleCandidate> weak_motion(const SampleFit& now, const SampleCon
     const auto count = static_cast<double>(in.series.witnesses.size());
     const double p = rank > 0 ? of_several(chi2_tail(best, rank), 2.0 * count) : 1.0;
     if (!(p < options.level_of_effects)) return std::nullopt;
-    SampleCandidate c{.effect = "case_motion",
-                      .model = now.model(),
-                      .p_value = p,
-                      .searched = 2.0 * count,
-                      .parameters = rank,
-                      .freedom = rank};
-    add_motion(c.model, in.series, at, in.step);
-    c.witness = at;
-    return c;
+    auto candidate = candidate_of(OnSamples::motion);
+    if (!candidate) return std::nullopt;
+    candidate->model = now.model();
+    candidate->p_value = p;
+    candidate->searched = 2.0 * count;
+    candidate->parameters = rank;
+    candidate->freedom = rank;
+    candidate->witness = at;
+    add_motion(candidate->model, in.series, *candidate->effect, at, in.step);
+    return candidate;
 }
 
 void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
-    if (in.series.witnesses.empty() || !now.model().motion.empty() || has(now.model(), "case_motion")) return;
+    if (in.series.witnesses.empty() || !now.model().motion.empty() || has(now.model(), OnSamples::motion)) return;
     const auto weak = weak_motion(now, in);
     FoundWitness witness = find_witness(now.innovations(), in.rows, in.series);
     // A motion of few frequencies shows by two numbers first, however strong it is.
@@ -514,14 +540,16 @@ void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector
     }
     if (weak) out.push_back(*weak);
     if (!(witness.p_value < options.level_of_effects)) return;
-    out.push_back({.effect = "case_motion",
-                   .model = moved_as(now, witness.index, in.step),
-                   .p_value = witness.p_value,
-                   .searched = static_cast<double>(in.series.witnesses.size()),
-                   .parameters = 2 * witness.lags + 1,
-                   .freedom = 2 * witness.lags + 1,
-                   .strong = true,
-                   .witness = witness.index});
+    auto candidate = candidate_of(OnSamples::motion);
+    if (!candidate) return;
+    candidate->model = moved_as(now, *candidate->effect, witness.index, in.step);
+    candidate->p_value = witness.p_value;
+    candidate->searched = static_cast<double>(in.series.witnesses.size());
+    candidate->parameters = 2 * witness.lags + 1;
+    candidate->freedom = 2 * witness.lags + 1;
+    candidate->strong = true;
+    candidate->witness = witness.index;
+    out.push_back(*std::move(candidate));
 }
 
 }  // namespace
@@ -530,29 +558,44 @@ SampleModel resampled_from(const SampleFit& now, double from_hz) {
     return best_placed(now, from_hz, Errors::as_they_are).model;
 }
 
-std::vector<SampleColumn> rate_columns(const SampleSeries& series) {
+std::vector<SampleColumn> rate_columns(const SampleSeries& series, std::span<const effects::Effect* const> library) {
+    const bool warms = !series.temperature_change_k.empty();
+    const bool turns = !series.input_rate_deg_h.empty();
+    const std::size_t last = series.size() - 1;
+    // What the record was exposed to in that row. Temperatures and input rates are those of the middle of the interval,
+    // and go on from there as steeply as from the row before to the row behind.
+    const auto exposure = [&](std::size_t row) {
+        effects::Interval at{.start_s = static_cast<double>(row) * series.interval_s, .duration_s = series.interval_s};
+        const auto ends = [&](const std::vector<double>& values, double(&both)[2]) {
+            const std::size_t before = row == 0 ? 0 : row - 1;
+            const std::size_t behind = std::min(row + 1, last);
+            const double half = 0.5 * (values[behind] - values[before]) / static_cast<double>(behind - before);
+            both[0] = values[row] - half;
+            both[1] = values[row] + half;
+        };
+        if (warms) ends(series.temperature_change_k, at.temperature_change_k);
+        if (turns) ends(series.input_rate_deg_h, at.input_rate_deg_h);
+        return at;
+    };
     std::vector<SampleColumn> columns;
-    columns.push_back(rate_column(series, "bias_ramp", "deg_h_per_h", [&](std::size_t i) {
-        return (static_cast<double>(i) + 0.5) * series.interval_s / 3600.0;
-    }));
-    if (!series.temperature_change_k.empty()) {
-        columns.push_back(rate_column(series, "bias_temperature", "deg_h_per_k",
-                                      [&](std::size_t i) { return series.temperature_change_k[i]; }));
-    }
-    if (!series.input_rate_deg_h.empty()) {
-        const auto [low, high] = std::minmax_element(series.input_rate_deg_h.begin(), series.input_rate_deg_h.end());
-        if (*high > *low) {
-            columns.push_back(rate_column(series, "scale_factor_error", "relative",
-                                          [&](std::size_t i) { return series.input_rate_deg_h[i]; }));
-        }
+    for (const effects::Effect* effect : effects_that_show(OnSamples::rate, library)) {
+        const auto angle = unit_angle(*effect);
+        std::vector<double> values(series.size());
+        for (std::size_t i = 0; i < values.size(); ++i) values[i] = angle(exposure(i));
+        // A rate that does not change is part of the mean rate.
+        const auto [low, high] = std::minmax_element(values.begin(), values.end());
+        if (!(*high > *low)) continue;
+        columns.push_back({.effect = effect,
+                           .name = std::string(parameter_of(*effect, effects::Role::size).name),
+                           .series = shared(std::move(values))});
     }
     return columns;
 }
 
-void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const std::string& effect,
+void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const effects::Effect& effect,
               int step) {
     for (const char* name : {"cosine", "sine"}) {
-        model.columns.push_back({effect, name, nullptr});
+        model.columns.push_back({.effect = &effect, .name = name});
         model.columns.back().step = step;
     }
     set_line(model, model.columns.size() - 2, series, course);

@@ -1,8 +1,9 @@
 #pragma once
+#include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/model/series.hpp"
@@ -10,10 +11,11 @@
 
 namespace ringlock::closure {
 
-/// A model of samples that the loop may go on with.
+/// One effect that may be added to a model of samples: as the screening found it, and as it turned out when it was
+/// fitted in full.
 struct SampleCandidate {
-    std::string effect = {};
-    SampleModel model = {};
+    const effects::Effect* effect = nullptr;
+    SampleModel model = {};  ///< to be fitted
     double p_value = 1.0;
     double searched = 1.0;
     /// All over those that explain as much, which the likelihood integrated over them costs: as searched, else.
@@ -26,7 +28,11 @@ struct SampleCandidate {
     bool nameless = false;    ///< nothing of the library, and only to be in nobody's way
     std::size_t witness = 0;  ///< in the series, of a motion
     SampleFit::Noise noise = SampleFit::Noise::near;
-    std::vector<std::string> confounded = {};  ///< the same model by other names
+    Effects confounded = {};  ///< that make the same model
+
+    std::shared_ptr<SampleFit> fit = {};  ///< in full; null while the candidate is only screened
+    double merit = 0.0;                   ///< gain of the log-likelihood less its search and its parameters
+    bool passes = false;                  ///< the level of one effect, by that gain
 };
 
 /// What the screening of samples goes by.
@@ -39,9 +45,11 @@ struct SampleContext {
     bool slow = false;                    ///< slow rates only
 };
 
-/// Rates in proportion to one number that the record can tell of: time, temperature, input rate.
-std::vector<SampleColumn> rate_columns(const SampleSeries& series);
-void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const std::string& effect,
+/// A column of each effect of the library that is a rate of known shape over this record: in proportion to time, to the
+/// temperature or how it changes, to the input rate. Effects whose rate does not change in it have none.
+std::vector<SampleColumn> rate_columns(const SampleSeries& series,
+                                       std::span<const effects::Effect* const> library = effects::registry());
+void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const effects::Effect& effect,
               int step);
 /// The model as of samples taken at another rate and interpolated, from where in the source's interval the likelihood
 /// likes best.
