@@ -214,7 +214,7 @@ SampleFit motion_as_resonance(const SampleFit& fit, const SampleFit& bare, const
         SampleModel with = bare.model();
         with.noise = from.noise;
         with.flicker_deg_h = from.flicker_deg_h;
-        with.motion_from_hz = slowest_of_motion * centre_hz;
+        with.motion_from_hz = options.samples.fit.slowest_of_motion * centre_hz;
         with.resonances.insert(with.resonances.begin(), owner);
         with.noise.resonances.insert(with.noise.resonances.begin(),
                                      {std::max(told.rms_arcsec, 1e-6), centre_hz, 0.5 * centre_hz});
@@ -247,7 +247,7 @@ void take_motion(const SampleFit& fit, const AddedEffect& added, std::vector<Est
     const auto& motion = whole.model().noise.resonances.front();
     const SampleNoise errors = whole.noise_errors().noise;
     const SampleNoise::Resonance& error = errors.resonances.front();
-    const bool seen = whole.log_likelihood() - bare.log_likelihood() > 20.0;
+    const bool seen = whole.log_likelihood() - bare.log_likelihood() > options.samples.fit.motion_stands_out;
     // The witness's own noise comes in with what it tells of a strong motion, and is none of the gyro's. A motion that
     // is no resonance leaves more beside it than there is.
     if (seen && added.strong && whole.model().noise.angle_arcsec < fit.model().noise.angle_arcsec) {

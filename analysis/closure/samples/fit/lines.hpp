@@ -24,12 +24,6 @@ void set_line(SampleModel& model, std::size_t cosine, const SampleSeries& series
 /// have the line. Of a resampled record, what its source has there.
 SampleLine refine_line(const SampleFit& fit, const LineCourse& shown);
 
-/// What is left of a line, or made of one, is nearer to it than that.
-inline constexpr double beside_hz = 1.0;
-
-/// More in pieces than a line has may be chance [chi-squared].
-inline constexpr double much_scattered = 60.0;
-
 /// Whether the power that stands out in pieces of the innovations is that of a line which does not keep its phase: it
 /// is still there when the line that explains most has been taken off. The innovations are zero where they do not
 /// count.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "analysis/closure/decide/effect_queries.hpp"
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/repeats_and_witness.hpp"
 
 namespace ringlock::closure {
@@ -96,7 +97,7 @@ SampleModel moved_as(const SampleFit& now, const effects::Effect& effect, std::s
     const WitnessMotion motion = fit_witness(now, watched);
     SampleModel model = now.model();
     model.motion = motion.increments;
-    model.motion_from_hz = slowest_of_motion * motion.centre_hz;
+    model.motion_from_hz = options.samples.fit.slowest_of_motion * motion.centre_hz;
     // What the witness does not tell moves like what it tells; its own noise hides the edges of that, which are wider.
     const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
     const double centre_hz = std::max(motion.centre_hz, 0.01);
@@ -107,8 +108,9 @@ SampleModel moved_as(const SampleFit& now, const effects::Effect& effect, std::s
         trial.noise = begun_with(now, motion.increments, untold, centre_hz, where);
         SampleFit fit(now.series(), std::move(trial), now.rows());
         // What is narrow and elsewhere is a line, and none of the motion.
-        const bool line = where == Untold::at_half_the_rate &&
-                          fit.model().noise.resonances.back().width_hz < 0.1 * now.series().rate_hz;
+        const bool line =
+            where == Untold::at_half_the_rate && fit.model().noise.resonances.back().width_hz <
+                                                     options.samples.fit.narrowest_at_half_rate * now.series().rate_hz;
         if (!first || (!line && fit.log_likelihood() > first->log_likelihood())) first.emplace(std::move(fit));
     }
     // Once more with what is left as the noise.

@@ -5,9 +5,6 @@
 
 namespace ringlock::closure {
 
-/// What is left of a motion is no slower than that share of its centre: it would be a rate that drifts.
-inline constexpr double slowest_of_motion = 0.2;
-
 /// What a motion in proportion to a witness adds to the increments, and the same a quarter of a cycle later.
 std::vector<std::vector<double>> motion_columns(const std::vector<double>& witness);
 void add_motion(SampleModel& model, const SampleSeries& series, const effects::Effect& effect, std::size_t witness,

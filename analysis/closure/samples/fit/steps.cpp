@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "analysis/closure/decide/effect_queries.hpp"
+#include "analysis/closure/options.hpp"
 
 namespace ringlock::closure {
 
@@ -43,7 +44,7 @@ std::optional<Jump> jump_beside_random(const SampleFit& fit) {
 
 std::size_t refine_place(const SampleFit& without, std::size_t row, std::size_t reach) {
     // Nearer to an end a step can hardly be told from how the record begins, or ends.
-    const std::size_t first = std::max<std::size_t>(1, without.series().size() / places_of_a_step);
+    const std::size_t first = std::max<std::size_t>(1, without.series().size() / options.samples.fit.places_of_a_step);
     const std::size_t last = without.series().size() - 1 - first;
     double best = std::abs(root_of_step(without, row));
     for (std::size_t d = reach; d > 0; d /= 2) {
@@ -86,8 +87,8 @@ SampleFit refine_steps(SampleFit fit, const Rows& rows) {
         for (std::size_t k = 0; k < fit.model().columns.size(); ++k) {
             if (!is_step(fit.model().columns[k])) continue;
             const std::size_t row = row_of_step(fit.model().columns[k]);
-            const std::size_t at =
-                refine_place(without_column(fit, k, rows), row, fit.series().size() / (2 * places_of_a_step));
+            const std::size_t at = refine_place(without_column(fit, k, rows), row,
+                                                fit.series().size() / (2 * options.samples.fit.places_of_a_step));
             if (at == row) continue;
             moved = true;
             fit = with_place(fit, k, at, rows);
@@ -98,7 +99,7 @@ SampleFit refine_steps(SampleFit fit, const Rows& rows) {
 }
 
 SampleFit place_in_gaps(SampleFit fit, const Rows& rows, const Rows& known) {
-    constexpr std::size_t places = 32;
+    const std::size_t places = options.samples.fit.places_in_a_gap;
     for (std::size_t k = 0; k < fit.model().columns.size(); ++k) {
         if (!is_step(fit.model().columns[k])) continue;
         const std::size_t row = row_of_step(fit.model().columns[k]);

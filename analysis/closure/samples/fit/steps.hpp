@@ -16,9 +16,6 @@ std::size_t row_of_step(const SampleColumn& step);
 /// What a step at that row explains, its sign that of the step.
 double root_of_step(const SampleFit& fit, std::size_t row);
 
-/// Of which a record is searched for a step before the likeliest is refined.
-inline constexpr std::size_t places_of_a_step = 80;
-
 /// The largest of the innovations' own, where the model has a random rate, beside which a step is forgotten soon.
 std::optional<Jump> jump_beside_random(const SampleFit& fit);
 

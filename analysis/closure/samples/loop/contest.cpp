@@ -12,7 +12,7 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/fit/steps.hpp"
-#include "analysis/closure/samples/residual/tests.hpp"
+#include "analysis/closure/samples/loop/rivals.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 
 namespace ringlock::closure {
@@ -21,15 +21,13 @@ bool passes_on_samples(double p_value) { return p_value * effects_on_samples() <
 
 namespace {
 
-constexpr double worth_looking = 0.01;
-
 bool shows(const SampleCandidate& candidate, OnSamples as) { return on_samples(*candidate.effect) == as; }
 
 double p_of_gain(double gain, const SampleCandidate& candidate) {
     return of_several(chi2_tail(2.0 * gain, candidate.freedom), candidate.searched);
 }
 
-/// The contest on one state of the model.
+/// Compares all effects that may be added to one state of the model.
 class Contest {
    public:
     Contest(const record::Declared& declared, const SampleState& now, const Rows& known, double lattice_arcsec)
@@ -45,27 +43,15 @@ class Contest {
    private:
     using Shared = std::shared_ptr<SampleCandidate>;
     enum class Wanted { all, slow };
-    /// What may explain a record: an effect, or several, each added beside those before it.
+    /// An explanation of the record: one effect, or several, each fitted with those before it.
     struct CandidateSet {
         std::vector<Shared> members;
         double merit = 0.0;
-        double p_value = 1.0;  ///< of the first, beside the second
+        double p_value = 1.0;  ///< of the first, given the second
 
         bool has(const effects::Effect* effect) const;
         bool has(OnSamples as) const;
         bool random() const;
-    };
-    /// What a view of the residual explains, the noise fitted anew beside it.
-    struct Rival {
-        double merit = 0.0;
-        double courses = 0.0;  ///< in time, that it has coefficients of
-        Where where = Where::time;
-        bool jumps = false;
-        bool repeats = false;                    ///< a variance that does
-        std::optional<double> hz = {};           ///< of a line
-        std::optional<double> by_variance = {};  ///< of one whose power is scattered
-        double of_a_motion = 0.0;                ///< merit beside what has resonances of its own
-        std::optional<double> of_states = {};    ///< merit of jumps, their course integrated out
     };
 
     std::vector<SampleCandidate> screened(const SampleState& state, Wanted wanted) const;
@@ -80,7 +66,6 @@ class Contest {
                                         const std::vector<SampleCandidate>& candidates) const;
     double p_beside(const SampleCandidate& first, const SampleCandidate& second, const std::vector<Shared>& firsts,
                     const std::vector<SampleCandidate>& candidates) const;
-    std::vector<Rival> rivals(bool resampled, bool moved) const;
     static double bar(const CandidateSet& set, const std::vector<Rival>& rivals, std::size_t rows);
     bool beside_each_other(const SampleCandidate& a, const SampleCandidate& b) const;
     Shared set_aside(std::vector<Shared>& all, const std::vector<Rival>& against) const;
@@ -121,12 +106,11 @@ std::vector<SampleCandidate> Contest::screened(const SampleState& state, Wanted 
 Contest::Shared Contest::fitted(const SampleState& state, SampleCandidate candidate) const {
     SampleFit fit(series_, candidate.model, rows_, candidate.noise);
     // Places were found by the noise as it was, which a large effect was a part of, and without that effect.
-    constexpr double large = 50.0;
     const auto& columns = fit.model().columns;
     const bool steps = std::any_of(columns.begin(), columns.end(), [&](const SampleColumn& column) {
         return is_step(column) && column.step >= now_.step;
     });
-    if (steps && fit.gain_over(*state.fit) > large) {
+    if (steps && fit.gain_over(*state.fit) > options.samples.contest.placed_again) {
         fit = refine_steps(place_in_gaps(std::move(fit), rows_, known_), rows_);
     }
     return judged(state, std::move(candidate), std::move(fit));
@@ -141,7 +125,7 @@ Contest::Shared Contest::judged(const SampleState& state, SampleCandidate candid
     return std::make_shared<SampleCandidate>(std::move(candidate));
 }
 
-/// A step alone is elsewhere than beside what is added next: it is taken where it will be.
+/// A step that was chosen in a set is placed where the whole set has it, which is elsewhere than for the step alone.
 Contest::Shared Contest::placed(Shared first, const SampleModel& all) const {
     if (!shows(*first, OnSamples::step)) return first;
     SampleModel model = first->fit->model();
@@ -152,24 +136,23 @@ Contest::Shared Contest::placed(Shared first, const SampleModel& all) const {
     return judged(now_, *first, SampleFit(series_, std::move(model), rows_, SampleFit::Noise::near));
 }
 
-/// What the screening lets pass, each fitted in full, and still passes; the likeliest first. Scores are of the noise as
-/// it is, which may have swallowed a slow rate: of these more are looked at.
+/// Candidates of the screening that pass when they are fitted in full, the likeliest first. Slow rates and lines are
+/// fitted at weaker scores as well: the noise that scores go by may have absorbed them.
 std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
                                                  std::vector<SampleCandidate> candidates) const {
     std::erase_if(candidates, [](const SampleCandidate& candidate) {
-        const bool worth =
-            (is_slow_rate(*candidate.effect) || is_line(*candidate.effect)) && candidate.p_value < worth_looking;
+        const bool worth = (is_slow_rate(*candidate.effect) || is_line(*candidate.effect)) &&
+                           candidate.p_value < options.samples.contest.worth_looking;
         return !passes_on_samples(candidate.p_value) && !worth;
     });
     // Rates that a record may be resampled from take long to fit, and explain much the same: where the likeliest by
     // either kind of errors are far from the leader, the others are as well.
-    constexpr std::size_t kinds = 2;
-    constexpr double far = 0.5;
+    const SampleContestOptions& by = options.samples.contest;
     const auto resampled = [](const SampleCandidate& c) { return shows(c, OnSamples::transport); };
     std::vector<SampleCandidate> later;
     std::size_t rates = 0;
     std::erase_if(candidates, [&](SampleCandidate& candidate) {
-        if (!resampled(candidate) || rates++ < kinds) return false;
+        if (!resampled(candidate) || rates++ < by.first_sources) return false;
         later.push_back(std::move(candidate));
         return true;
     });
@@ -188,7 +171,7 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
         double& of_these = resampled(*contender) ? most_resampled : most;
         of_these = std::max(of_these, contender->merit);
     }
-    if (!(most_resampled > 0.0 && most_resampled < far * most)) fit_all(std::move(later));
+    if (!(most_resampled > 0.0 && most_resampled < by.far * most)) fit_all(std::move(later));
     std::erase_if(all, [](const Shared& contender) { return !contender->passes; });
     std::sort(all.begin(), all.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
     // Those rates crowd nobody out.
@@ -196,7 +179,7 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
     std::size_t count_resampled = 0;
     std::erase_if(all, [&](const Shared& contender) {
         std::size_t& of_these = resampled(*contender) ? count_resampled : count;
-        return of_these++ >= options.most_contenders + 2;
+        return of_these++ >= options.most_contenders + by.more_contenders;
     });
     return all;
 }
@@ -205,7 +188,7 @@ SampleState Contest::beside(const SampleState& state, const SampleCandidate& con
     return {contender.fit, state.lines_hz, state.step + 1, state.random_rates};
 }
 
-/// Probability of what the first gains over the second alone; of both, where only the two of them show anything.
+/// Probability of the gain by the first over the second alone; of the gain by both, if the first does not pass alone.
 double Contest::p_beside(const SampleCandidate& first, const SampleCandidate& second, const std::vector<Shared>& firsts,
                          const std::vector<SampleCandidate>& candidates) const {
     const double others = 0.5 * (effects_on_samples() - 1.0);  // of all pairs, for each effect
@@ -228,8 +211,8 @@ double Contest::p_beside(const SampleCandidate& first, const SampleCandidate& se
                                   others * first.searched * second.searched));
 }
 
-/// One effect and what explains most beside it: the likeliest random rate, and the likeliest of the others with the
-/// likeliest beside both.
+/// Sets that begin with one effect: with the likeliest random rate; with the likeliest other rate; and with that and
+/// the likeliest third.
 std::vector<Contest::CandidateSet> Contest::sets_from(const Shared& first, const std::vector<Shared>& firsts,
                                                       const std::vector<SampleCandidate>& candidates) const {
     // That there are so many others to choose from.
@@ -257,11 +240,11 @@ std::vector<Contest::CandidateSet> Contest::sets_from(const Shared& first, const
     return found;
 }
 
-/// One effect at a time may explain less than a random rate, or a view, where several of the library together explain
-/// more; and one may hide another. The first need not pass alone, if it does beside the second.
+/// Sets of slow rates. Several effects together may explain more than a random rate or a residual test where each alone
+/// explains less, and one may hide another: the first need not pass alone if it does with the second.
 std::vector<Contest::CandidateSet> Contest::sets(const std::vector<Shared>& all,
                                                  const std::vector<SampleCandidate>& candidates) const {
-    constexpr std::size_t starts = 4;
+    const std::size_t starts = options.samples.contest.set_starts;
     std::vector<Shared> firsts;
     bool random = false;
     for (const Shared& contender : all) {
@@ -274,7 +257,7 @@ std::vector<Contest::CandidateSet> Contest::sets(const std::vector<Shared>& all,
         const bool known =
             std::any_of(all.begin(), all.end(), [&](const Shared& c) { return c->effect == candidate.effect; });
         if (known || !is_slow_rate(*candidate.effect) || is_random_rate(*candidate.effect)) continue;
-        if (candidate.p_value < worth_looking) firsts.push_back(fitted(now_, candidate));
+        if (candidate.p_value < options.samples.contest.worth_looking) firsts.push_back(fitted(now_, candidate));
     }
     std::sort(firsts.begin(), firsts.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
     if (firsts.size() > starts + (random ? 1 : 0)) firsts.resize(starts + (random ? 1 : 0));
@@ -286,49 +269,9 @@ std::vector<Contest::CandidateSet> Contest::sets(const std::vector<Shared>& all,
     return candidate_sets;
 }
 
-/// The views of the residual that explain most, each fitted with the noise anew; where the record may be resampled, a
-/// variance that repeats as well; where the case may have moved, power that scatters about a line.
-std::vector<Contest::Rival> Contest::rivals(bool resampled, bool moved) const {
-    constexpr std::size_t looked_at = 4;
-    auto views = view_samples(*now_.fit, lattice_arcsec_);
-    std::erase_if(views, [](const SampleView& view) { return view.test.merit < options.tie; });
-    std::sort(views.begin(), views.end(),
-              [](const SampleView& a, const SampleView& b) { return a.test.merit > b.test.merit; });
-    std::vector<Where> columns;
-    std::size_t place = 0;
-    std::erase_if(views, [&](const SampleView& view) {
-        // Jumps are looked at in any case, which a random rate can follow and no other view tells, and what follows
-        // another column of the record most: courses in time come near to that.
-        const bool follows = view.columns && view.test.where != Where::time && !view.hz;
-        const bool first = follows && std::find(columns.begin(), columns.end(), view.test.where) == columns.end();
-        if (first) columns.push_back(view.test.where);
-        return place++ >= looked_at && !view.jumps && !first;
-    });
-    std::vector<Rival> found;
-    for (const SampleView& view : views) {
-        const bool repeats = view.test.view == repeating_variance;
-        Rival rival{.merit = view.test.merit,
-                    .where = view.test.where,
-                    .jumps = view.jumps,
-                    .repeats = repeats,
-                    .hz = view.hz,
-                    .by_variance = view.by_variance};
-        if (view.columns) {
-            rival.merit = refitted_merit(*now_.fit, view);
-            const bool courses = view.test.where == Where::time && !view.jumps;
-            rival.courses = courses ? static_cast<double>(view.columns().size()) : view.courses;
-        }
-        if (repeats && resampled) rival.merit = std::max(rival.merit, view.refitted(0.0));
-        const bool levels = view.test.view == jumping_rate;
-        if (levels && view.refitted) rival.of_states = view.refitted(0.0);
-        rival.of_a_motion = !repeats && !levels && view.refitted && moved ? view.refitted(0.0) : rival.merit;
-        found.push_back(rival);
-    }
-    return found;
-}
-
-/// What an set must explain: where a view does more, the set is only what comes nearest to something that the
-/// library does not have. What a view must have more than an effect to be taken for the truth is off it.
+/// Merit that a set must exceed: where a residual test explains more, the set is only a proxy for something that the
+/// library does not have. A residual test must explain more than an effect, by the margins below, to be taken for the
+/// truth.
 double Contest::bar(const CandidateSet& set, const std::vector<Rival>& rivals, std::size_t rows) {
     const bool random = set.random();
     const bool moves = std::all_of(set.members.begin(), set.members.end(), [](const Shared& member) {
@@ -341,7 +284,7 @@ double Contest::bar(const CandidateSet& set, const std::vector<Rival>& rivals, s
         // A line is nothing of another that is far from it.
         const SampleCandidate& first = *set.members.front();
         if (rival.hz && set.members.size() == 1 && is_line(*first.effect) &&
-            std::abs(*rival.hz - first.hz) > beside_hz) {
+            std::abs(*rival.hz - first.hz) > options.samples.lines.beside_hz) {
             continue;
         }
         double merit = set.has(OnSamples::motion) ? rival.of_a_motion : rival.merit;
@@ -352,9 +295,9 @@ double Contest::bar(const CandidateSet& set, const std::vector<Rival>& rivals, s
         if (rival.repeats && set.has(OnSamples::transport)) {
             // On straight lines the variance swings by half, no more and no less. What they are blurred by makes that
             // less, as any other swing may be.
-            constexpr double little = 0.3;
             const SampleNoise& noise = set.members.front()->fit->model().noise;
-            merit += noise.blur_arcsec < little * noise.angle_arcsec ? -options.tie : options.tie;
+            merit +=
+                noise.blur_arcsec < options.samples.contest.blurred * noise.angle_arcsec ? -options.tie : options.tie;
             most = std::max(most, merit);
             continue;
         }
@@ -367,7 +310,7 @@ double Contest::bar(const CandidateSet& set, const std::vector<Rival>& rivals, s
         if (random && (rival.where != Where::time || rival.jumps)) {
             // What follows jumps, or another column of the record, a random rate can follow nearly as well. The course
             // of jumps is searched stretch by stretch and loses a part of what they explain.
-            more = rival.jumps ? std::max(options.tie, 0.1 * set.merit) : options.tie;
+            more = rival.jumps ? std::max(options.tie, options.samples.contest.lost_of_jumps * set.merit) : options.tie;
         } else if (!random && rival.jumps && set.members.size() > 1) {
             more = options.tie;
         }
@@ -378,8 +321,8 @@ double Contest::bar(const CandidateSet& set, const std::vector<Rival>& rivals, s
     return most;
 }
 
-/// Whether two effects of different kinds explain different things: one is needed beside the other as well. Such may
-/// have the same merit, and are no answer in each other's place.
+/// True if one of two effects of different kinds still improves the fit when the other is present. Two such effects are
+/// not alternatives, even if their merit is equal.
 bool Contest::beside_each_other(const SampleCandidate& a, const SampleCandidate& b) const {
     const auto kind = [](const SampleCandidate& contender) {
         const effects::Effect& effect = *contender.effect;
@@ -408,8 +351,8 @@ bool Contest::beside_each_other(const SampleCandidate& a, const SampleCandidate&
     return both.gain_over(*other.fit) > options.tie;
 }
 
-/// All that explains as much without the first is tied to it. Where others are added next, one of these is tied to each
-/// of them instead.
+/// Ties to the chosen effect every effect that explains as much in its place. If a set was chosen, the alternatives are
+/// distributed over its members.
 void Contest::tie(const CandidateSet& best, const std::vector<CandidateSet>& as_likely, SampleChoice& choice) {
     const effects::Effect* effect = choice.chosen->effect;
     const auto add = [](Effects& all, const effects::Effect* one) {
@@ -441,8 +384,9 @@ void Contest::tie(const CandidateSet& best, const std::vector<CandidateSet>& as_
     }
 }
 
-/// Contenders that are no answer go.
-/// \return what has no name, if there is such
+/// Removes contenders that cannot be the answer: those without a name, and resampling where a repeating variance
+/// explains more.
+/// \return the likeliest contender without a name, or null
 Contest::Shared Contest::set_aside(std::vector<Shared>& all, const std::vector<Rival>& against) const {
     Shared unnamed;
     std::erase_if(all, [&](const Shared& contender) {
@@ -458,7 +402,7 @@ Contest::Shared Contest::set_aside(std::vector<Shared>& all, const std::vector<R
     return unnamed;
 }
 
-/// Where nothing holds: what comes nearest to a rate or to a line that the library does not have.
+/// The effect to be used as a placeholder where nothing can be chosen: the closest to an unknown rate or line, or null.
 Contest::Shared Contest::nearest(const std::vector<Shared>& all, const Shared& unnamed) {
     if (all.empty() || (unnamed && unnamed->merit > all.front()->merit)) return unnamed;
     const effects::Effect& leader = *all.front()->effect;
@@ -476,7 +420,9 @@ SampleChoice Contest::choose() {
     const auto may_be_of = [&](OnSamples as) {
         return std::any_of(all.begin(), all.end(), [as](const Shared& c) { return shows(*c, as); });
     };
-    if (!all.empty()) against = rivals(may_be_of(OnSamples::transport), may_be_of(OnSamples::motion));
+    if (!all.empty()) {
+        against = rivals_of(*now_.fit, lattice_arcsec_, may_be_of(OnSamples::transport), may_be_of(OnSamples::motion));
+    }
     const auto holds = [&](const CandidateSet& set) { return set.merit > bar(set, against, series_.size()); };
     const Shared unnamed = set_aside(all, against);
     std::vector<CandidateSet> candidate_sets;
@@ -488,7 +434,7 @@ SampleChoice Contest::choose() {
     const bool random_leads = !all.empty() && candidate_sets.front().random();
     if (!led || is_slow_rate(*all.front()->effect)) {
         for (CandidateSet& set : sets(all, candidates)) candidate_sets.push_back(std::move(set));
-        if (all.empty() && !candidate_sets.empty()) against = rivals(false, false);
+        if (all.empty() && !candidate_sets.empty()) against = rivals_of(*now_.fit, lattice_arcsec_, false, false);
     }
     std::stable_sort(candidate_sets.begin(), candidate_sets.end(),
                      [](const CandidateSet& a, const CandidateSet& b) { return a.merit > b.merit; });
@@ -554,7 +500,9 @@ SampleChoice Contest::choose() {
     for (const CandidateSet& set : as_likely) {
         const double hz = set.members.front()->fit->model().noise.from_hz;
         if (!shows(*choice.chosen, OnSamples::transport) || !set.has(OnSamples::transport)) continue;
-        const auto near = [&](double other_hz) { return std::abs(hz - other_hz) < 1e-3 * series_.rate_hz; };
+        const auto near = [&](double other_hz) {
+            return std::abs(hz - other_hz) < options.samples.contest.same_source * series_.rate_hz;
+        };
         if (!near(from_hz) && std::none_of(choice.other_hz.begin(), choice.other_hz.end(), near)) {
             choice.other_hz.push_back(hz);
         }

@@ -9,13 +9,13 @@
 #include "analysis/closure/samples/screen/screen.hpp"
 #include "analysis/record/record.hpp"
 
-/// Which effect of the library a record of samples supports most: the second half of what screening begins.
+/// Which effect of the library a record of samples supports most, after the screening.
 namespace ringlock::closure {
 
 /// Whether so small a p-value is rare enough for one of all effects that show on samples.
 bool passes_on_samples(double p_value);
 
-/// A model of the samples, with what is looked for next.
+/// A model of the samples, and what may be added to it.
 struct SampleState {
     std::shared_ptr<SampleFit> fit;
     std::vector<double> lines_hz = {};  ///< that are in the model
@@ -30,20 +30,19 @@ using Partners = std::vector<std::pair<const effects::Effect*, Effects>>;
 /// What to add, if anything.
 struct SampleChoice {
     std::shared_ptr<SampleCandidate> chosen;
-    double p_value = 1.0;  ///< beside what explains the record with it
+    double p_value = 1.0;  ///< given the effects that are chosen with it
     Effects confounded_with;
     Partners of_partners;                                ///< where it was chosen with others that are added next
     std::vector<double> other_hz;                        ///< rates that explain a resampled record as well
     std::shared_ptr<SampleCandidate> other_random = {};  ///< the likeliest other random rate, where one is chosen
-    /// Where a rate or a line leads, but a view explains more, and nothing is chosen: the likeliest random rate, or
-    /// that line. It comes nearest to what is there, and what is something else can be told beside it.
+    /// Where a rate or a line leads but a residual test explains more, so that nothing is chosen: the likeliest random
+    /// rate, or that line, as a placeholder with which other effects can be found.
     std::shared_ptr<SampleCandidate> nearest = {};
 };
 
-/// The likeliest effect, or the first of the likeliest two or three, with all that are as likely tied to it. None where
-/// nothing of the library passes, or where a view of the residual explains more.
-/// \param known           rows that are no part of the choice, but say where between those that are a step is
-/// \param lattice_arcsec  steps of the values
+/// The likeliest effect, or the first of the likeliest set of two or three, tied to all that are as likely. None where
+/// no effect of the library passes, or where a residual test explains more. \param known           rows that, in
+/// addition to the training rows, place a step in a gap between these \param lattice_arcsec  steps of the values
 SampleChoice choose_on_samples(const record::Declared& declared, const SampleState& now, const Rows& known,
                                double lattice_arcsec);
 

@@ -23,7 +23,8 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Frequency of the line that a step added, as it is read. Others may have come behind it: a motion that is told anew.
+/// Frequency, as the record shows it, of the line that was added with that number. It need not be the last component of
+/// the model, since a motion that is fitted again moves to the end.
 double line_hz(const SampleModel& model, int step) {
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
         if (model.resonances[k].step == step) return model.noise.resonances[k].hz;
@@ -34,12 +35,9 @@ double line_hz(const SampleModel& model, int step) {
     return found->course.hz;
 }
 
-/// As a motion is told anew by what has come in, or has been drawn, beside it.
-constexpr int most_motions = 6;
-
 }  // namespace
 
-/// Values that nothing is held out of: steps are chosen like any other effect.
+/// Increments of the training rows: the step of a lattice is chosen by them like any other effect.
 std::vector<double> SampleLoop::chosen_increments() const {
     std::vector<double> values;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -50,8 +48,9 @@ std::vector<double> SampleLoop::chosen_increments() const {
 
 void SampleLoop::take_lattice(Closure& closure) {
     if (series_.counted) {
-        closure.notes.push_back(fmt::format(
-            "counts are whole by their kind: steps of {:.6g} arcsec are no missing effect", counted_step()));
+        closure.notes.push_back(
+            fmt::format("the data are integer counts: their steps of {:.6g} arcsec are expected and no missing effect",
+                        counted_step()));
         find_coarse_steps(closure);
         if (rounded_.drawn()) closure.heldout_before = score(*now_.fit).error;
         return;
@@ -61,13 +60,13 @@ void SampleLoop::take_lattice(Closure& closure) {
     if (lattice_.step_arcsec == 0.0 || effect == nullptr) return;
     const double step = lattice_.step_arcsec;
     const double sd = now_.fit->sd(series_.size() / 2);
-    // Steps add step^2/12 to the variance: less than a thousandth of it changes nothing that is told here.
-    if (step * step / 12.0 < 1e-3 * sd * sd) {
+    // Steps add step^2/12 to the variance.
+    if (step * step / 12.0 < options.samples.loop.negligible_steps * sd * sd) {
         closure.notes.push_back(fmt::format(
-            "values come in steps of {:.6g} arcsec, too fine to matter beside {:.3g} arcsec of noise", step, sd));
+            "values come in steps of {:.6g} arcsec, which are negligible against {:.3g} arcsec of noise", step, sd));
         return;
     }
-    const bool blurred = lattice_.step_arcsec > 1.5 * lattice_.printed_arcsec;
+    const bool blurred = lattice_.step_arcsec > options.samples.loop.coarser_than_printed * lattice_.printed_arcsec;
     if (blurred) {
         closure.notes.push_back(fmt::format(
             "values are written in steps of {:.6g} arcsec; beneath them is a coarser one, of which {:.0f} % "
@@ -79,7 +78,7 @@ void SampleLoop::take_lattice(Closure& closure) {
     taken.effect = effect->name();
     taken.p_value = lattice_.p_value;
     const SampleScore before = score_of(*now_.fit, reported_, 0.0);
-    // Blurred steps are not where the values are: the digits are.
+    // Values do not lie on a blurred lattice, but on that of the printed digits.
     used_step_ = blurred ? lattice_.printed_arcsec : step;
     find_coarse_steps(closure);
     const SampleScore after = score(*now_.fit);
@@ -90,9 +89,10 @@ void SampleLoop::take_lattice(Closure& closure) {
     now_.added.push_back(std::move(added));
 }
 
-/// Steps whose rounding follows the angle.
+/// Replaces increments in coarse steps, whose rounding follows the angle, by increments that are drawn within the
+/// steps.
 void SampleLoop::find_coarse_steps(Closure& closure) {
-    const bool blurred = lattice_.step_arcsec > 1.5 * lattice_.printed_arcsec;
+    const bool blurred = lattice_.step_arcsec > options.samples.loop.coarser_than_printed * lattice_.printed_arcsec;
     const double step = series_.counted ? counted_step() : blurred ? 0.0 : lattice_.step_arcsec;
     if (!RoundedSamples::show(*now_.fit, step)) return;
     now_.fit = rounded_.begin(*now_.fit, step);
@@ -102,7 +102,7 @@ void SampleLoop::find_coarse_steps(Closure& closure) {
                     step));
 }
 
-/// Adds what earns its place, until nothing does.
+/// Adds effects until none improves the model by enough.
 void SampleLoop::add_all(Closure& closure, bool random_rates) {
     while (now_.added.size() < options.most_steps) {
         const SampleChoice choice = choose_on_samples(
@@ -114,14 +114,14 @@ void SampleLoop::add_all(Closure& closure, bool random_rates) {
     }
 }
 
-/// What was rounded was drawn by the model without a random rate, and says little of which one it is: the rounded
-/// values say that. The likelier is taken, with the fit to what was drawn by it.
+/// Takes the likelier of two random rates. Increments that were drawn by a model without a random rate say little about
+/// which one it is; the likelihood of the rounded increments decides.
 const SampleCandidate& SampleLoop::take_likelier(const SampleChoice& choice, Step& step, Effects& tied) {
     now_.fit = choice.chosen->fit;
     if (!rounded_.drawn() || !choice.other_random) return *choice.chosen;
-    const auto drawn = rounded_.draw(choice.chosen->fit, draws_of_step);
+    const auto drawn = rounded_.draw(choice.chosen->fit, options.samples.loop.draws);
     const double without = score(*drawn).log_likelihood;
-    now_.fit = rounded_.draw(choice.other_random->fit, draws_of_step);
+    now_.fit = rounded_.draw(choice.other_random->fit, options.samples.loop.draws);
     const double gain = score(*now_.fit).log_likelihood - without;
     const bool other = gain > 0.0;
     if (!other) now_.fit = rounded_.draw(drawn, 1);
@@ -152,7 +152,7 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     for (const effects::Effect* one : tied) step.confounded_with.emplace_back(one->name());
     if (!tied.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
     drop_needless(effect);
-    for (int k = 0; k < most_motions && move_anew();) ++k;
+    for (int k = 0; k < options.samples.loop.most_motions && move_anew();) ++k;
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
     now_.added.push_back({.effect = &effect,
                           .id = next_id_++,
@@ -160,11 +160,12 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
                           .strong = best.strong,
                           .other_hz = choice.other_hz});
     if (rounded_.drawn()) {
-        now_.fit = rounded_.draw(now_.fit, draws_of_step);
-        // What was drawn without a motion tells little of it.
-        for (int k = 0; k < most_motions && move_anew(); ++k) now_.fit = rounded_.draw(now_.fit, 1);
+        now_.fit = rounded_.draw(now_.fit, options.samples.loop.draws);
+        // Increments that were drawn without a motion say little about it.
+        for (int k = 0; k < options.samples.loop.most_motions && move_anew(); ++k)
+            now_.fit = rounded_.draw(now_.fit, 1);
     } else if (series_.counted || used_step_ > 0.0) {
-        // What has been taken off may have been what the rounding was small beside.
+        // The rounding may have been small only against the effect that is now in the model.
         find_coarse_steps(closure);
     }
     const SampleScore after = score(*now_.fit);
@@ -177,8 +178,8 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
         now_.added.back().hz = now_.lines_hz.back();
         if (best.wanders) {
             now_.notes.push_back(
-                fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "
-                            "samples before as a narrow resonance",
+                fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is "
+                            "modelled as a narrow resonance and predicted from the samples before",
                             now_.lines_hz.back()));
         }
     }
@@ -232,8 +233,8 @@ void SampleLoop::drop_needless(const effects::Effect& last) {
     }
 }
 
-/// What a witness told of a motion, and what it left, was told beside the noise as it was, which what has been added
-/// was a part of.
+/// Fits motions of the case again: their response to the witness was estimated with noise that included the effect
+/// which has been added since. \return whether any fit improved
 bool SampleLoop::move_anew() {
     bool any = false;
     for (AddedEffect& added : now_.added) {
@@ -241,7 +242,8 @@ bool SampleLoop::move_anew() {
         const SampleFit still(series_, without_motion(now_.fit->model()), rows_, SampleFit::Noise::held);
         auto moved = std::make_shared<SampleFit>(series_, moved_as(still, *added.effect, added.witness, added.id),
                                                  rows_, SampleFit::Noise::near);
-        const double more = added.strong ? 1.0 : 2.0 * witness_lags(series_.rate_hz) - 1.0;
+        const double more =
+            added.strong ? options.samples.fit.motion_refitted : 2.0 * witness_lags(series_.rate_hz) - 1.0;
         if (!(moved->gain_over(*now_.fit) > more)) continue;
         now_.fit = std::move(moved);
         added.strong = true;
@@ -250,7 +252,7 @@ bool SampleLoop::move_anew() {
     return any;
 }
 
-/// A motion of the case that is known to be there, by two numbers or lag by lag.
+/// Fits a motion of the case that is known to be there: by two numbers, or lag by lag where that explains more.
 void SampleLoop::move_case(AddedEffect& motion, SampleFit::Noise noise) {
     SampleModel model = now_.fit->model();
     add_motion(model, series_, *motion.effect, motion.witness, motion.id);

@@ -34,8 +34,6 @@ class SampleLoop {
     Closure fit(const std::vector<ActiveEffect>& effects);
 
    private:
-    /// Of increments that were rounded, after every step.
-    static constexpr int draws_of_step = 2;
     /// The model as it has grown, with what was added.
     struct State {
         std::shared_ptr<SampleFit> fit;
@@ -44,7 +42,7 @@ class SampleLoop {
         std::vector<std::string> notes;  ///< on these steps
         Partners of_partners;            ///< of all choices
     };
-    /// Of values as they are looked at: those that were drawn are in none that could be seen.
+    /// Step of the values that fits and tests see; drawn increments have none that could be seen.
     double lattice_step() const {
         if (rounded_.drawn()) return 1e-9 * rounded_.step_arcsec();
         return counted_step() > 0.0 ? counted_step() : lattice_.step_arcsec;
@@ -100,7 +98,7 @@ class SampleLoop {
     std::shared_ptr<SampleFit> base_;
     State now_;
     std::optional<State> earlier_;              ///< before the first random rate
-    std::shared_ptr<SampleCandidate> nearest_;  ///< of SampleChoice, where nothing was chosen any more
+    std::shared_ptr<SampleCandidate> nearest_;  ///< of the last choice, which had nothing to add
     int next_id_ = 0;                           ///< of the next effect that is added
 };
 

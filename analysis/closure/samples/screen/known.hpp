@@ -6,7 +6,7 @@
 
 namespace ringlock::closure {
 
-/// A model that has effects whose values are known, or nearly so: a fit to start from.
+/// A model with effects whose values are known at least roughly, for a fit to start from.
 struct KnownEffects {
     SampleModel model;
     std::vector<AddedEffect> added;  ///< all of them; a motion is not in the model yet, but its witness is known

@@ -18,14 +18,15 @@ struct SampleCandidate {
     SampleModel model = {};  ///< to be fitted
     double p_value = 1.0;
     double searched = 1.0;
-    /// All over those that explain as much, which the likelihood integrated over them costs: as searched, else.
+    /// Places that were searched over those that explain as much: the cost of the search where the likelihood is
+    /// integrated over places. As `searched` if not given.
     std::optional<double> places = {};
     int parameters = 1;
-    int freedom = 1;          ///< of its chi-squared, beside what the search counts
+    int freedom = 1;          ///< degrees of freedom of its chi-squared, the search apart
     double hz = 0.0;          ///< of a line, where the record has it
     bool wanders = false;     ///< a line as a narrow resonance
-    bool strong = false;      ///< motion that is told at many lags
-    bool nameless = false;    ///< nothing of the library, and only to be in nobody's way
+    bool strong = false;      ///< a motion that is fitted at many lags of its witness
+    bool nameless = false;    ///< not a library effect; fitted so that it does not mask others
     std::size_t witness = 0;  ///< in the series, of a motion
     SampleFit::Noise noise = SampleFit::Noise::near;
     Effects confounded = {};  ///< that make the same model
@@ -35,7 +36,7 @@ struct SampleCandidate {
     bool passes = false;                  ///< the level of one effect, by that gain
 };
 
-/// What the screening of samples goes by.
+/// What the screening of samples needs to know of the loop.
 struct SampleContext {
     const record::Declared& declared;
     const SampleSeries& series;
@@ -51,11 +52,12 @@ std::vector<SampleColumn> rate_columns(const SampleSeries& series,
                                        std::span<const effects::Effect* const> library = effects::registry());
 void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const effects::Effect& effect,
               int step);
-/// The model as of samples taken at another rate and interpolated, from where in the source's interval the likelihood
-/// likes best.
+/// The model of readings that were taken at that rate and interpolated, with the likeliest place of the record's start
+/// within the source's interval.
 SampleModel resampled_from(const SampleFit& now, double from_hz);
 
-/// The effects that samples can tell of and that the fit does not have yet, held against what it has left.
+/// Candidates among the effects that show on samples and that the fit does not have yet, by score tests of its
+/// residual.
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in);
 
 }  // namespace ringlock::closure
