@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,23 +17,25 @@ std::string_view name_of(Verdict verdict);
 
 /// An effect that the loop has added.
 struct Step {
-    std::string effect;
+    const effects::Effect* effect = nullptr;
     std::vector<Estimate> parameters;
     double heldout_error_before = 0.0;
     double heldout_error_after = 0.0;
     double heldout_log_score_gain = 0.0;
     double p_value = 1.0;
-    std::vector<std::string> confounded_with;  ///< effects that explain this record as well
-    std::string experiment;                    ///< what would tell them apart
-    std::string note = {};                     ///< of its parameters; empty: nothing to be said
+    std::vector<const effects::Effect*> confounded_with;  ///< effects that explain this record as well
+    std::string experiment;                               ///< a record that would tell them apart
+    std::string note = {};                                ///< on its parameters; may be empty
+
+    std::string name() const { return std::string(effect->name()); }
 };
 
 /// One-step predictions of the final model.
 struct Residual {
     std::vector<double> time_s;
     std::vector<double> innovation;
-    std::vector<double> sd;              ///< that the model foretells
-    std::vector<std::uint8_t> reported;  ///< 1: held out, used for nothing but the report
+    std::vector<double> sd;              ///< predicted by the model
+    std::vector<std::uint8_t> reported;  ///< 1: held out, used for the report only
 };
 
 /// What a record says of the model.
@@ -44,7 +47,7 @@ struct Closure {
     double heldout_before = 0.0;
     double heldout_after = 0.0;
     double noise_floor = 0.0;
-    /// Of the model of all that was chosen over the base model, on the rows that choose [nats].
+    /// Log-likelihood gain of the final model over the base model on the training rows [nats].
     double log_likelihood_gain = 0.0;
     std::vector<ResidualTest> tests;  ///< of the final residual
     std::optional<ResidualTest> unexplained;
@@ -55,8 +58,18 @@ struct Closure {
     Residual residual;
 };
 
+/// Follows the loop while it runs.
+struct Monitor {
+    /// Called with a short description of each stage, on the thread that runs the loop; may be empty.
+    std::function<void(const std::string& stage)> on_stage = {};
+
+    void tell(const std::string& stage) const {
+        if (on_stage) on_stage(stage);
+    }
+};
+
 /// Runs the loop on the record's turns, or on its samples where it has no turns. Throws InputError where the record
-/// does not suffice.
-Closure close_loop(const record::Record& record);
+/// does not suffice, and Interrupted where a signal came (engine/core/interrupt.hpp).
+Closure close_loop(const record::Record& record, const Monitor& monitor = {});
 
 }  // namespace ringlock::closure

@@ -26,6 +26,12 @@ std::string ResidualTest::description() const {
     return fmt::format("{}{}{}, by chance p {}", view, detail.empty() ? "" : ", ", detail, probability(p_value));
 }
 
+std::vector<std::string> names_of(const std::vector<const effects::Effect*>& effects) {
+    std::vector<std::string> names;
+    for (const effects::Effect* effect : effects) names.emplace_back(effect->name());
+    return names;
+}
+
 std::string probability(double p) { return p < 1e-99 ? "< 1e-99" : fmt::format("{:.2g}", p); }
 
 }  // namespace ringlock::closure

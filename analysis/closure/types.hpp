@@ -41,6 +41,9 @@ struct ResidualTest {
     std::string description() const;
 };
 
+/// Names of effects, in their order.
+std::vector<std::string> names_of(const std::vector<const effects::Effect*>& effects);
+
 /// A p-value in two digits; "< 1e-99" where it is smaller than doubles resolve.
 std::string probability(double p);
 

@@ -122,7 +122,7 @@ std::vector<Picture> pictures(const std::string& source, const Closure& closure,
         error.x.push_back(number);
         error.y.push_back(after);
         steps.figure.curves.push_back(
-            {.label = fmt::format("{}: {}", k + 1, closure.steps[k].effect), .x = {number}, .y = {after}});
+            {.label = fmt::format("{}: {}", k + 1, closure.steps[k].effect->name()), .x = {number}, .y = {after}});
     }
     const double last = std::max<double>(1.0, static_cast<double>(closure.steps.size()));
     if (error.x.size() > 1) steps.figure.curves.push_back(std::move(error));
@@ -153,9 +153,9 @@ void add_steps(const Closure& closure, std::string& page) {
         for (const Estimate& e : step.parameters) {
             parameters += fmt::format("{}`{}` {}", parameters.empty() ? "" : "; ", e.name, cell(value_text(e)));
         }
-        page += fmt::format("| {} | `{}` | {} | {:.6g} | {:.6g} | {:.1f} | {} |\n", k + 1, step.effect, parameters,
-                            step.heldout_error_before, step.heldout_error_after, step.heldout_log_score_gain,
-                            closure::probability(step.p_value));
+        page += fmt::format("| {} | `{}` | {} | {:.6g} | {:.6g} | {:.1f} | {} |\n", k + 1, step.effect->name(),
+                            parameters, step.heldout_error_before, step.heldout_error_after,
+                            step.heldout_log_score_gain, closure::probability(step.p_value));
     }
     page += "\n";
     if (closure.steps.front().heldout_error_before < closure.heldout_before) {
@@ -165,8 +165,8 @@ void add_steps(const Closure& closure, std::string& page) {
     }
     for (const Step& step : closure.steps) {
         if (step.confounded_with.empty()) continue;
-        page += fmt::format("This record cannot tell `{}` from `{}`. What would: {}.\n\n", step.effect,
-                            fmt::join(step.confounded_with, "`, `"), step.experiment);
+        page += fmt::format("This record cannot tell `{}` from `{}`. What would: {}.\n\n", step.effect->name(),
+                            fmt::join(closure::names_of(step.confounded_with), "`, `"), step.experiment);
     }
 }
 

@@ -88,7 +88,7 @@ struct Contender {
 
 std::string answer_of(const Closure& closure) {
     std::string text;
-    for (const auto& step : closure.steps) text += (text.empty() ? "" : " + ") + step.effect;
+    for (const auto& step : closure.steps) text += (text.empty() ? "" : " + ") + step.name();
     if (text.empty()) return std::string(name_of(closure.verdict));
     return closure.verdict == ringlock::closure::Verdict::closed ? text : text + ", unexplained";
 }

@@ -163,9 +163,9 @@ TEST_F(Predictively, SamplesBeginAtATimeOfTheirOwn) {
     Closure closure;
     closure.base = {{"", "mean_rate_deg_h", 3.0, 0.1}};
     closure.steps.resize(2);
-    closure.steps[0].effect = "bias_step";
+    closure.steps[0].effect = effects::find("bias_step");
     closure.steps[0].parameters = {{"bias_step", "step_deg_h", 1.0, 0.1}, {"bias_step", "time_s", 1200.0, 1.0}};
-    closure.steps[1].effect = "base_vibration";
+    closure.steps[1].effect = effects::find("base_vibration");
     closure.steps[1].parameters = {{"base_vibration", "frequency_hz", 1.25025, 0.0},
                                    {"base_vibration", "rate_deg_h", 1.0, 0.1},
                                    {"base_vibration", "phase_rad", 0.1, 0.1}};

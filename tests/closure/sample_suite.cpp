@@ -393,7 +393,7 @@ Outcome judge(const SampleCase& of, const record::Record& record) {
     };
     // The base model beside an effect that is not there is another.
     const bool same = std::all_of(closure.steps.begin(), closure.steps.end(),
-                                  [&](const auto& step) { return has(step.effect.c_str()); });
+                                  [&](const auto& step) { return has(step.name().c_str()); });
     for (const Estimate& estimate : closure.base) {
         if (!same) break;
         const auto value = base.find(estimate.name);
@@ -405,14 +405,14 @@ Outcome judge(const SampleCase& of, const record::Record& record) {
         const auto named = std::count_if(closure.steps.begin(), closure.steps.end(),
                                          [&](const auto& other) { return other.effect == step.effect; });
         for (const Added& added : of.truth) {
-            if (added.effect != step.effect || named > 1) continue;
+            if (added.effect != step.name() || named > 1) continue;
             for (const Estimate& estimate : step.parameters) {
                 const auto value = added.values.find(estimate.name);
                 if (value == added.values.end() || !estimate.text.empty()) continue;
                 // Nothing tells a witness that sees less of the motion from one with more noise.
                 const double told = estimate.name == "coherence" ? coherence_with_noise(truth) : value->second;
                 outcome.deviations.push_back(
-                    {step.effect + "." + estimate.name, estimate.value, estimate.sd, off(estimate, told)});
+                    {step.name() + "." + estimate.name, estimate.value, estimate.sd, off(estimate, told)});
             }
         }
     }

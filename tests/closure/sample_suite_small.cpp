@@ -149,7 +149,7 @@ SampleTruth short_record(std::uint64_t seed) {
 void expect_unexplained(const record::Record& record, ringlock::closure::Where where) {
     const auto found = ringlock::closure::close_samples(record);
     EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
-    EXPECT_TRUE(found.steps.empty()) << found.steps.front().effect;
+    EXPECT_TRUE(found.steps.empty()) << found.steps.front().name();
     ASSERT_TRUE(found.unexplained);
     EXPECT_EQ(found.unexplained->where, where) << found.unexplained->description();
 }
@@ -244,7 +244,7 @@ TEST(ClosureSampleSuite, AJumpOfTheAngleIsStructure) {
     const auto found = ringlock::closure::close_samples(walks);
     EXPECT_EQ(found.verdict, ringlock::closure::Verdict::unexplained);
     ASSERT_EQ(found.steps.size(), 1U);
-    EXPECT_EQ(found.steps[0].effect, "rate_random_walk");
+    EXPECT_EQ(found.steps[0].name(), "rate_random_walk");
 }
 
 // Jumps between two levels explain more than any random rate, and more than the line: it is looked for beside the
@@ -258,7 +258,7 @@ TEST(ClosureSampleSuite, ALineBesideARateOfNoNameIsNamed) {
     ASSERT_TRUE(found.unexplained);
     EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::time);
     ASSERT_EQ(found.steps.size(), 1U);
-    EXPECT_EQ(found.steps[0].effect, "dither_residue");
+    EXPECT_EQ(found.steps[0].name(), "dither_residue");
     EXPECT_NEAR(found.steps[0].parameters[0].value, 37.3, 4.0 * found.steps[0].parameters[0].sd);
 }
 
@@ -276,7 +276,7 @@ TEST(ClosureSampleSuite, WhatIsBesideALineOfNoNameIsNamed) {
     ASSERT_TRUE(found.unexplained);
     EXPECT_EQ(found.unexplained->where, ringlock::closure::Where::frequency);
     std::set<std::string> named;
-    for (const auto& step : found.steps) named.insert(step.effect);
+    for (const auto& step : found.steps) named.insert(step.name());
     EXPECT_EQ(named, (std::set<std::string>{"bias_step", "dither_residue"}));
 }
 
@@ -292,7 +292,7 @@ TEST(ClosureSampleSuite, KnownInputIsNoStructure) {
     truth.scale_factor_error = 0.01;
     const auto found = ringlock::closure::close_samples(generate_samples(truth));
     ASSERT_EQ(found.steps.size(), 1U);
-    EXPECT_EQ(found.steps[0].effect, "scale_factor_error");
+    EXPECT_EQ(found.steps[0].name(), "scale_factor_error");
     const auto& relative = found.steps[0].parameters.at(0);
     EXPECT_NEAR(relative.value, 0.01, 4.0 * relative.sd);
 }
@@ -310,7 +310,7 @@ TEST(ClosureSampleSuite, ADeclaredDitherNeedsLess) {
     truth.declared.emplace().dither_frequency_hz = 437.0;
     const auto found = ringlock::closure::close_samples(generate_samples(truth));
     ASSERT_EQ(found.steps.size(), 1U);
-    EXPECT_EQ(found.steps[0].effect, "dither_residue");
+    EXPECT_EQ(found.steps[0].name(), "dither_residue");
     EXPECT_TRUE(found.steps[0].confounded_with.empty());
     EXPECT_NEAR(found.steps[0].parameters[0].value, 437.3, 4.0 * found.steps[0].parameters[0].sd);
 }
@@ -327,7 +327,7 @@ TEST(ClosureSampleSuite, TwoEffectsThatHideEachOtherAreNamed) {
     const auto found = ringlock::closure::close_samples(generate_samples(truth));
     ASSERT_EQ(found.steps.size(), 2U);
     for (const auto& step : found.steps) {
-        EXPECT_TRUE(step.effect == "bias_ramp" || step.effect == "scale_factor_error") << step.effect;
+        EXPECT_TRUE(step.name() == "bias_ramp" || step.name() == "scale_factor_error") << step.name();
     }
     EXPECT_GT(found.log_likelihood_gain, 20.0);
 }

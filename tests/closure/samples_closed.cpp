@@ -36,7 +36,7 @@ double value_of(const closure::Step& step, const std::string& name) {
     for (const auto& estimate : step.parameters) {
         if (estimate.name == name) return estimate.value;
     }
-    ADD_FAILURE() << step.effect << " has no " << name;
+    ADD_FAILURE() << step.name() << " has no " << name;
     return 0.0;
 }
 
@@ -45,11 +45,11 @@ closure::Step only_step(const closure::Closure& found, const std::string& effect
     EXPECT_EQ(found.verdict, closure::Verdict::closed) << (found.unexplained ? found.unexplained->description() : "");
     if (found.steps.size() != 1) {
         std::string names;
-        for (const auto& step : found.steps) names += " " + step.effect;
+        for (const auto& step : found.steps) names += " " + step.name();
         ADD_FAILURE() << found.steps.size() << " steps:" << names;
         return {};
     }
-    EXPECT_EQ(found.steps[0].effect, effect);
+    EXPECT_EQ(found.steps[0].name(), effect);
     EXPECT_LE(found.heldout_after, found.heldout_before * (1.0 + 1e-12));
     return found.steps[0];
 }
@@ -68,7 +68,7 @@ int false_alarms(std::uint64_t first, int records) {
         if (found.verdict != closure::Verdict::nothing_missing) {
             ++alarms;
             std::string what;
-            for (const auto& step : found.steps) what += step.effect + " ";
+            for (const auto& step : found.steps) what += step.name() + " ";
             if (found.unexplained) what += found.unexplained->description();
             std::printf("seed %llu: %s\n", static_cast<unsigned long long>(truth.seed), what.c_str());
         }
@@ -139,8 +139,8 @@ TEST(SampleClosure, AWanderingLineIsNotTheMotionBesideIt) {
     EXPECT_EQ(found.verdict, closure::Verdict::closed) << (found.unexplained ? found.unexplained->description() : "");
     std::set<std::string> named;
     for (const auto& step : found.steps) {
-        named.insert(step.effect);
-        if (step.effect != "dither_residue") continue;
+        named.insert(step.name());
+        if (step.name() != "dither_residue") continue;
         EXPECT_NEAR(value_of(step, "frequency_hz"), 37.3, 0.05);
         EXPECT_NEAR(value_of(step, "wander_hz"), 0.05, 0.025);
     }
@@ -155,7 +155,7 @@ TEST(SampleClosure, AWanderingLineIsNotTheMotionBesideIt) {
 TEST(SampleClosure, ALineThatStandsStillMayBeEither) {
     SampleTruth truth = usual();
     truth.dither_residue = {137.3, 0.0, 0.05, 0.0};
-    EXPECT_EQ(only_step(closed(truth), "dither_residue").confounded_with, std::vector<std::string>{"base_vibration"});
+    EXPECT_EQ(closure::names_of(only_step(closed(truth), "dither_residue").confounded_with), std::vector<std::string>{"base_vibration"});
     truth.declared.emplace().dither_frequency_hz = 137.2;
     EXPECT_TRUE(only_step(closed(truth), "dither_residue").confounded_with.empty());
     truth = usual();
@@ -247,8 +247,8 @@ TEST(LongSampleClosure, AMotionAndALineAreNamed) {
     const auto found = closed(truth);
     EXPECT_EQ(found.verdict, closure::Verdict::closed) << (found.unexplained ? found.unexplained->description() : "");
     ASSERT_EQ(found.steps.size(), 2U);
-    EXPECT_EQ(found.steps[0].effect, "case_motion");
-    EXPECT_EQ(found.steps[1].effect, "dither_residue");
+    EXPECT_EQ(found.steps[0].name(), "case_motion");
+    EXPECT_EQ(found.steps[1].name(), "dither_residue");
 }
 
 // A resonance at next to nothing is a random walk of the rate.
@@ -318,8 +318,8 @@ TEST(LongSampleClosure, AMotionBesideAStrongWalkIsToldAsItIs) {
         const auto found = closed(truth);
         EXPECT_EQ(found.verdict, closure::Verdict::closed);
         ASSERT_EQ(found.steps.size(), 2U);
-        EXPECT_EQ(found.steps[0].effect, "case_motion");
-        EXPECT_EQ(found.steps[1].effect, "rate_random_walk");
+        EXPECT_EQ(found.steps[0].name(), "case_motion");
+        EXPECT_EQ(found.steps[1].name(), "rate_random_walk");
         const auto near = [&](std::size_t step, const std::string& name, double value) {
             const auto& parameters = found.steps[step].parameters;
             const auto estimate =
@@ -353,7 +353,7 @@ TEST(LongSampleClosure, ARealGyroOnAVehicle) {
     EXPECT_EQ(found.verdict, closure::Verdict::unexplained);
     const auto has = [&](const std::string& effect) {
         return std::any_of(found.steps.begin(), found.steps.end(),
-                           [&](const auto& step) { return step.effect == effect; });
+                           [&](const auto& step) { return step.name() == effect; });
     };
     EXPECT_TRUE(has("count_quantization"));
     EXPECT_TRUE(has("case_motion"));

@@ -36,7 +36,7 @@ SampleTruth taken_at(double from_hz, std::uint64_t seed, std::size_t size = 3000
 void expect_only_resampling(const Closure& found) {
     EXPECT_EQ(found.verdict, Verdict::closed);
     ASSERT_EQ(found.steps.size(), 1U);
-    EXPECT_EQ(found.steps[0].effect, "resampling");
+    EXPECT_EQ(found.steps[0].name(), "resampling");
     // The noise is that of the samples as they were taken: four standard errors
     EXPECT_NEAR(found.base[1].value, 0.3, 4.0 * found.base[1].sd);
     EXPECT_NEAR(found.base[2].value, 0.01, 4.0 * found.base[2].sd);
@@ -80,7 +80,7 @@ TEST(ResampledRecords, DigitsThatGrowAreNoStructure) {
 
 /// Whether the answer has that rate, or says that the record cannot tell it from the one it has.
 bool tells(const Closure& found, double from_hz) {
-    if (found.steps.size() != 1 || found.steps[0].effect != "resampling") return false;
+    if (found.steps.size() != 1 || found.steps[0].name() != "resampling") return false;
     if (std::abs(found.steps[0].parameters[0].value - from_hz) < 1e-3) return true;
     const std::string other = fmt::format("a source of {:.6g} Hz", from_hz);
     return std::any_of(found.notes.begin(), found.notes.end(),
@@ -139,8 +139,8 @@ TEST(ResampledRecords, MotionIsResampledToo) {
     const Closure found = close_samples(generate_samples(truth));
     EXPECT_EQ(found.verdict, Verdict::closed);
     ASSERT_EQ(found.steps.size(), 2U);
-    EXPECT_EQ(found.steps[0].effect, "resampling");
-    EXPECT_EQ(found.steps[1].effect, "case_motion");
+    EXPECT_EQ(found.steps[0].name(), "resampling");
+    EXPECT_EQ(found.steps[1].name(), "case_motion");
 }
 
 // What a resampled record's source was given, it has on the straight lines between the source's times.
@@ -152,15 +152,15 @@ TEST(ResampledRecords, KnownInputIsResampledToo) {
     const auto found = close_samples(generate_samples(truth));
     EXPECT_EQ(found.verdict, Verdict::closed);
     ASSERT_EQ(found.steps.size(), 2U);
-    EXPECT_EQ(found.steps[0].effect, "resampling");
-    EXPECT_EQ(found.steps[1].effect, "scale_factor_error");
+    EXPECT_EQ(found.steps[0].name(), "resampling");
+    EXPECT_EQ(found.steps[1].name(), "scale_factor_error");
     const auto& relative = found.steps[1].parameters.at(0);
     EXPECT_NEAR(relative.value, 0.01, 4.0 * relative.sd);
 }
 
 const Estimate& named(const Closure& found, const std::string& effect, const std::string& parameter) {
     for (const Step& step : found.steps) {
-        if (step.effect != effect) continue;
+        if (step.name() != effect) continue;
         for (const Estimate& estimate : step.parameters) {
             if (estimate.name == parameter) return estimate;
         }

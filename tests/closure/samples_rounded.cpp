@@ -170,7 +170,7 @@ TEST(RoundedRecords, EffectsShowThroughTheSteps) {
     const Closure found = close_samples(generate_samples(truth));
     EXPECT_EQ(found.verdict, Verdict::closed);
     ASSERT_EQ(found.steps.size(), 1U);
-    EXPECT_EQ(found.steps[0].effect, "bias_step");
+    EXPECT_EQ(found.steps[0].name(), "bias_step");
     EXPECT_NEAR(found.steps[0].parameters[0].value, 6.0, 4.0 * found.steps[0].parameters[0].sd);
     EXPECT_LT(found.heldout_after, found.heldout_before);
 }
@@ -183,7 +183,7 @@ TEST(RoundedRecords, LargeStepsAreNamedAndLeaveNothing) {
     const Closure found = close_samples(generate_samples(truth));
     EXPECT_EQ(found.verdict, Verdict::closed);
     ASSERT_EQ(found.steps.size(), 1U);
-    EXPECT_EQ(found.steps[0].effect, "count_quantization");
+    EXPECT_EQ(found.steps[0].name(), "count_quantization");
     EXPECT_LT(found.heldout_after, found.heldout_before);
     EXPECT_NEAR(found.base[1].value, 0.3, 4.0 * found.base[1].sd);
 }
@@ -198,7 +198,7 @@ TEST(RoundedRecords, StepsOfFortyTimesTheNoiseLeaveNothing) {
     const Closure found = close_samples(generate_samples(truth));
     EXPECT_EQ(found.verdict, Verdict::closed);
     ASSERT_EQ(found.steps.size(), 1U);
-    EXPECT_EQ(found.steps[0].effect, "count_quantization");
+    EXPECT_EQ(found.steps[0].name(), "count_quantization");
     EXPECT_NEAR(found.base[0].value, 10.0, 4.0 * found.base[0].sd);
     EXPECT_NEAR(found.base[2].value, 0.005, 4.0 * found.base[2].sd);
 }
@@ -216,7 +216,7 @@ TEST(LongRoundedRecords, EffectsBeneathStepsOfTwentyTimesTheNoiseAreNamed) {
     EXPECT_EQ(found.verdict, Verdict::closed);
     std::vector<std::string> named;
     for (const auto& step : found.steps) {
-        named.push_back(step.effect);
+        named.push_back(step.name());
         EXPECT_TRUE(step.confounded_with.empty());
     }
     ASSERT_EQ(named, (std::vector<std::string>{"count_quantization", "rate_random_walk", "dither_residue"}));

@@ -416,9 +416,10 @@ std::vector<std::string> not_held(const std::set<std::string>& true_effects,
         }
         for (std::size_t s = 0; s < steps.size(); ++s) {
             const auto& others = steps[s].confounded_with;
-            const bool among = std::find(others.begin(), others.end(), wanted[k]) != others.end();
-            if (taken[s] || (steps[s].effect != wanted[k] && !among)) continue;
-            taken[s] = true_effects.contains(steps[s].effect);
+            const bool among = std::any_of(others.begin(), others.end(),
+                                           [&](const auto* other) { return other->name() == wanted[k]; });
+            if (taken[s] || (steps[s].name() != wanted[k] && !among)) continue;
+            taken[s] = true_effects.contains(steps[s].name());
             self(self, k + 1);
             taken[s] = false;
         }
@@ -444,11 +445,12 @@ void compare(const Closure& closure, std::optional<Where> where, const std::vect
     for (const Added& added : truth) true_effects.insert(added.effect);
     bool ties = false;
     for (const auto& step : closure.steps) {
-        outcome.named += (outcome.named.empty() ? "" : "+") + step.effect;
-        for (const std::string& other : step.confounded_with) outcome.named += "~" + other;
-        const bool named = true_effects.contains(step.effect);
-        const bool tied_to_truth = std::any_of(step.confounded_with.begin(), step.confounded_with.end(),
-                                               [&](const std::string& other) { return true_effects.contains(other); });
+        outcome.named += (outcome.named.empty() ? "" : "+") + step.name();
+        for (const auto* other : step.confounded_with) outcome.named += "~" + std::string(other->name());
+        const bool named = true_effects.contains(step.name());
+        const bool tied_to_truth =
+            std::any_of(step.confounded_with.begin(), step.confounded_with.end(),
+                        [&](const auto* other) { return true_effects.contains(std::string(other->name())); });
         ties = ties || (named ? !step.confounded_with.empty() : tied_to_truth);
         if (!named && !tied_to_truth) outcome.false_name = true;
     }
@@ -500,9 +502,9 @@ Outcome judge(const Case& of, const record::Record& record) {
     }
     for (const auto& step : closure.steps) {
         for (const Added& added : of.truth) {
-            if (added.effect != step.effect) continue;
+            if (added.effect != step.name()) continue;
             for (const Estimate& estimate : step.parameters) {
-                outcome.deviations.push_back({step.effect + "." + estimate.name, estimate.value, estimate.sd,
+                outcome.deviations.push_back({step.name() + "." + estimate.name, estimate.value, estimate.sd,
                                               deviation_of(estimate, added.values.at(estimate.name))});
             }
         }

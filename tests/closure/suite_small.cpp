@@ -14,7 +14,7 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/two_levels.hpp"
 #include "analysis/closure/stats/two_states.hpp"
-#include "analysis/closure/turns/loop/contest.hpp"
+#include "analysis/closure/turns/fit/fitted.hpp"
 #include "analysis/closure/turns/screen/dither_shape.hpp"
 #include "tests/closure/generator.hpp"
 #include "tests/closure/suite.hpp"
@@ -68,6 +68,11 @@ TEST(ClosureSuite, NamesWhatIsFourTimesItsLimit) {
     }
 }
 
+std::shared_ptr<ringlock::closure::Fitted> fitted_to_all(const record::Record& record,
+                                                         const ringlock::closure::TurnParameters& start) {
+    return ringlock::closure::TurnProblem(record, ringlock::closure::Rows(record.turns->size(), 1)).fit(start);
+}
+
 TEST(ClosureSuite, AnswersAreJudgedStepByStep) {
     const std::vector<Added> both = {{"dither_residue", {}}, {"base_vibration", {}}};
     const auto judged_as = [&](std::vector<ringlock::closure::Step> steps, const std::vector<Added>& truth) {
@@ -78,10 +83,10 @@ TEST(ClosureSuite, AnswersAreJudgedStepByStep) {
         compare(closure, std::nullopt, truth, outcome);
         return outcome;
     };
-    const auto step = [](const char* effect, std::vector<std::string> others) {
+    const auto step = [](const char* effect, const std::vector<std::string>& others) {
         ringlock::closure::Step of;
-        of.effect = effect;
-        of.confounded_with = std::move(others);
+        of.effect = effects::find(effect);
+        for (const std::string& other : others) of.confounded_with.push_back(effects::find(other));
         return of;
     };
     const auto vibration = step("base_vibration", {"dither_residue"});
@@ -141,7 +146,7 @@ TEST(ClosureSuite, ADetectorsPhaseIsFoundAlongWithTheThreshold) {
 /// What the columns beside the phase tell of the dither's shape in the record of a case.
 ringlock::closure::DitherShape shape_of(const Case& of) {
     const record::Record record = make({&of, 1}).front();
-    const auto fitted = ringlock::closure::fit_record(record, {}, ringlock::closure::Rows(record.turns->size(), 1));
+    const auto fitted = fitted_to_all(record, {});
     return ringlock::closure::dither_shape(*record.turns, *fitted->fit);
 }
 
@@ -231,8 +236,8 @@ TEST(LongClosureSuite, AStrongSecondHarmonicIsFoundBehindAStep) {
     const auto closure = ringlock::closure::close_loop(generate({&truth, 1}).front());
     EXPECT_EQ(closure.verdict, ringlock::closure::Verdict::closed);
     EXPECT_THAT(closure.steps, testing::UnorderedElementsAre(
-                                   testing::Field(&ringlock::closure::Step::effect, "bias_step"),
-                                   testing::Field(&ringlock::closure::Step::effect, "lockin_second_harmonic")));
+                                   testing::Property(&ringlock::closure::Step::name, "bias_step"),
+                                   testing::Property(&ringlock::closure::Step::name, "lockin_second_harmonic")));
 }
 
 // The phase turns faster than a sine of the counted swing: a rotation moves zero-rate points by less.
@@ -247,7 +252,7 @@ TEST(ClosureSuite, AThirdHarmonicOfTheDitherIsNoOtherShape) {
     truth.seed = 815;
     truth.dither_third_harmonic = 0.003;
     const record::Record record = generate({&truth, 1}).front();
-    const auto fitted = ringlock::closure::fit_record(record, {}, ringlock::closure::Rows(record.turns->size(), 1));
+    const auto fitted = fitted_to_all(record, {});
     const auto shape = ringlock::closure::dither_shape(*record.turns, *fitted->fit);
     EXPECT_NEAR(shape.even->value, 3.0 * 0.003 - 0.003 / 3.0, 4.0 * shape.even->sd);
     EXPECT_LT(shape.even->sd, 3e-4);
@@ -380,8 +385,7 @@ TEST(ClosureSuite, OneSummitOfTheLikelihoodWhateverTheStart) {
                 start.readout_sd_rad = 0.005;
                 start.threshold_deg_h = 300.0;
             }
-            const auto fitted =
-                ringlock::closure::fit_record(record, start, ringlock::closure::Rows(record.turns->size(), 1));
+            const auto fitted = fitted_to_all(record, start);
             found.push_back(fitted->fit->log_likelihood());
         }
         const double highest = *std::max_element(found.begin(), found.end());
@@ -403,7 +407,7 @@ TEST(ClosureSuite, AFastLineHasTheErrorsOfALine) {
         {{"frequency_hz", 70.3 + 0.1 / length_s}, {"rate_deg_h", 180.0}, {"phase_rad", 0.7}}};
     ringlock::closure::TurnParameters start;
     start.effects.push_back(line);
-    const auto fitted = ringlock::closure::fit_record(record, start, ringlock::closure::Rows(record.turns->size(), 1));
+    const auto fitted = fitted_to_all(record, start);
     std::map<std::string, ringlock::closure::Estimate> found;
     for (const ringlock::closure::Estimate& estimate : fitted->fit->estimates()) found[estimate.name] = estimate;
     const auto& frequency = found.at("frequency_hz");
@@ -446,7 +450,7 @@ TEST(RandomRates, MayLookLikeARamp) {
             by_four += ramp - walk > ringlock::closure::options.tie ? 1.0 : 0.0;
             by_more += ramp - walk > ringlock::closure::options.tie_with_random ? 1.0 : 0.0;
         }
-        EXPECT_LT(by_more / shown, ringlock::closure::level) << size;
+        EXPECT_LT(by_more / shown, ringlock::closure::options.level) << size;
         most_by_four = std::max(most_by_four, by_four / shown);
     }
     EXPECT_NEAR(most_by_four, 0.05, 0.01);

@@ -15,10 +15,10 @@ inline void print(const char* name, const ringlock::closure::Closure& closure) {
     std::printf("%s: %s, held-out error %.6g -> %.6g", name, std::string(name_of(closure.verdict)).c_str(),
                 closure.heldout_before, closure.heldout_after);
     for (const auto& step : closure.steps) {
-        std::printf("; %s p %.2g", step.effect.c_str(), step.p_value);
+        std::printf("; %s p %.2g", step.name().c_str(), step.p_value);
         for (const ringlock::closure::Estimate& e : step.parameters)
             std::printf(" %s %.5g +- %.2g", e.name.c_str(), e.value, e.sd);
-        for (const auto& other : step.confounded_with) std::printf(" ~%s", other.c_str());
+        for (const auto* other : step.confounded_with) std::printf(" ~%s", std::string(other->name()).c_str());
     }
     if (closure.unexplained) std::printf("; %s", closure.unexplained->description().c_str());
     std::printf("\n");

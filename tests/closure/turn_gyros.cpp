@@ -95,7 +95,7 @@ Truth swinging_threshold() {
 void expect_alone(const Closure& closure, const std::string& effect, const std::string& parameter, double value) {
     EXPECT_EQ(closure.verdict, Verdict::closed);
     ASSERT_EQ(closure.steps.size(), 1U);
-    EXPECT_EQ(closure.steps[0].effect, effect);
+    EXPECT_EQ(closure.steps[0].name(), effect);
     EXPECT_LT(deviation(closure.steps[0].parameters, parameter, value), 3.0);
 }
 
@@ -190,7 +190,7 @@ TEST(LongTurnLoop, ARateThatWalksIsNoShapeOfTheDither) {
     const Closure closure = close_loop(generate({&truth, 1}).front());
     print("walk", closure);
     ASSERT_EQ(closure.steps.size(), 1U);
-    EXPECT_EQ(closure.steps[0].effect, "rate_random_walk");
+    EXPECT_EQ(closure.steps[0].name(), "rate_random_walk");
     EXPECT_EQ(closure.verdict, Verdict::closed);
 }
 
@@ -208,7 +208,7 @@ TEST(TurnLoop, ASteepRampLeadsTheFitBack) {
     const Closure closure = close_loop(generate({&truth, 1}).front());
     print("steep ramp", closure);
     ASSERT_EQ(closure.steps.size(), 1U);
-    EXPECT_EQ(closure.steps[0].effect, "bias_ramp");
+    EXPECT_EQ(closure.steps[0].name(), "bias_ramp");
     EXPECT_TRUE(closure.steps[0].confounded_with.empty());
     EXPECT_LT(deviation(closure.steps[0].parameters, "deg_h_per_h", 4000.0), 4.0);
     EXPECT_LT(deviation(closure.base, "lockin_threshold_deg_h", 141.0), 4.0);
@@ -232,7 +232,7 @@ TEST(TurnLoop, AnEllipseOfASixthIsMadeRound) {
     print("ellipse", closure);
     EXPECT_EQ(closure.verdict, Verdict::closed);
     ASSERT_EQ(closure.steps.size(), 1U);
-    EXPECT_EQ(closure.steps[0].effect, "readout_ellipse");
+    EXPECT_EQ(closure.steps[0].name(), "readout_ellipse");
     EXPECT_LT(deviation(closure.steps[0].parameters, "gain", 0.176), 4.0);
     EXPECT_LT(deviation(closure.steps[0].parameters, "offset_sin", 0.095), 4.0);
     EXPECT_LT(deviation(closure.steps[0].parameters, "offset_cos", 0.0), 4.0);

@@ -92,7 +92,7 @@ Closure close_on_vibration(const char* name, const Truth& truth) {
     print(name, closure);
     EXPECT_EQ(closure.verdict, Verdict::closed);
     EXPECT_THAT(closure.steps,
-                testing::ElementsAre(testing::Field(&ringlock::closure::Step::effect, "base_vibration")));
+                testing::ElementsAre(testing::Property(&ringlock::closure::Step::name, "base_vibration")));
     return closure;
 }
 
@@ -189,7 +189,7 @@ TEST(TurnLoop, RoundingIsNoEffect) {
     print("second harmonic without noise", closed);
     EXPECT_EQ(closed.verdict, Verdict::closed);
     ASSERT_EQ(closed.steps.size(), 1U);
-    EXPECT_EQ(closed.steps[0].effect, "lockin_second_harmonic");
+    EXPECT_EQ(closed.steps[0].name(), "lockin_second_harmonic");
     EXPECT_LT(closed.heldout_after, 1e-6);
 }
 
@@ -270,7 +270,7 @@ TEST(LongTurnLoop, EvidentEffectsAreNamedAndNoOther) {
         const Closure closure = close_loop(records[k]);
         print("evident", closure);
         std::set<std::string> named;
-        for (const auto& step : closure.steps) named.insert(step.effect);
+        for (const auto& step : closure.steps) named.insert(step.name());
         EXPECT_EQ(closure.verdict, Verdict::closed) << k;
         EXPECT_EQ(named, records_of[k].named) << k;
     }
@@ -340,7 +340,7 @@ TEST_P(TurnLoopFinds, TheEffectThatIsMissing) {
     print(single.effect, closure);
     EXPECT_EQ(closure.verdict, Verdict::closed);
     ASSERT_EQ(closure.steps.size(), 1U);
-    EXPECT_EQ(closure.steps[0].effect, single.effect);
+    EXPECT_EQ(closure.steps[0].name(), single.effect);
     EXPECT_THAT(closure.steps[0].confounded_with, testing::IsEmpty());
     for (const auto& [name, value] : single.values) {
         EXPECT_LT(deviation(closure.steps[0].parameters, name, value), 4.0) << name;
@@ -426,7 +426,7 @@ TEST(TurnLoop, ReadsWhatAnotherSimulatorWrote) {
     print("second harmonic", second);
     EXPECT_EQ(second.verdict, Verdict::closed);
     ASSERT_EQ(second.steps.size(), 1U);
-    EXPECT_EQ(second.steps[0].effect, "lockin_second_harmonic");
+    EXPECT_EQ(second.steps[0].name(), "lockin_second_harmonic");
     EXPECT_LT(deviation(second.steps[0].parameters, "ratio", 0.03), 4.0);
     EXPECT_LT(deviation(second.steps[0].parameters, "phase_rad", -1.0), 4.0);
 

@@ -17,9 +17,11 @@ std::string_view name_of(Verdict verdict) {
     return "unexplained";
 }
 
-std::string experiment_for(const std::string& effect, const std::vector<std::string>& others) {
+std::string experiment_for(const effects::Effect& effect, const std::vector<const effects::Effect*>& others) {
     const auto has = [&](std::string_view name) {
-        return effect == name || std::find(others.begin(), others.end(), name) != others.end();
+        return effect.name() == name || std::any_of(others.begin(), others.end(), [&](const effects::Effect* other) {
+                   return other->name() == name;
+               });
     };
     if (has("dither_residue")) {
         return "declare the dither's frequency if the record does not, or record with another dither frequency or "

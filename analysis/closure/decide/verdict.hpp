@@ -8,7 +8,7 @@
 namespace ringlock::closure {
 
 /// What would tell two effects apart that this record cannot.
-std::string experiment_for(const std::string& effect, const std::vector<std::string>& others);
+std::string experiment_for(const effects::Effect& effect, const std::vector<const effects::Effect*>& others);
 
 Verdict verdict_of(const Closure& closure);
 

@@ -4,6 +4,8 @@
 
 namespace ringlock::closure {
 
-Closure close_loop(const record::Record& record) { return record.turns ? close_turns(record) : close_samples(record); }
+Closure close_loop(const record::Record& record, const Monitor& monitor) {
+    return record.turns ? close_turns(record, monitor) : close_samples(record, monitor);
+}
 
 }  // namespace ringlock::closure

@@ -68,8 +68,8 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
     double step_arcsec = scenario.effects.at("count_quantization").at("step_arcsec");
     double readings_hz = samples.rate_hz;
     for (const Step& step : closure.steps) {
-        if (step.effect == "count_quantization") step_arcsec = value_of(step.parameters, "step_arcsec", 0.0);
-        if (step.effect == "resampling") readings_hz = value_of(step.parameters, "from_hz", readings_hz);
+        if (step.effect->name() == "count_quantization") step_arcsec = value_of(step.parameters, "step_arcsec", 0.0);
+        if (step.effect->name() == "resampling") readings_hz = value_of(step.parameters, "from_hz", readings_hz);
     }
     // What is fitted as white noise of the angle has that of the steps in it.
     const double white = value_of(closure.base, "white_angle_arcsec", 0.0);
@@ -136,7 +136,7 @@ Scenario closed_scenario(const record::Record& record, const Closure& closure) {
         scenario.environment.temperature_ramp_k_per_h = (t.value.back() - t.value.front()) / span_h;
     }
     for (const Step& step : closure.steps) {
-        const auto found = scenario.effects.find(step.effect);
+        const auto found = scenario.effects.find(std::string(step.effect->name()));
         if (found == scenario.effects.end()) continue;
         for (const Estimate& estimate : step.parameters) {
             const auto value = found->second.find(estimate.name);

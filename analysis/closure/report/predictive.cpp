@@ -15,6 +15,7 @@
 #include "analysis/allan/allan.hpp"
 #include "analysis/closure/report/closed_scenario.hpp"
 #include "analysis/closure/samples/model/series.hpp"
+#include "analysis/closure/turns/model/model.hpp"
 #include "analysis/closure/turns/model/series.hpp"
 #include "analysis/instrument/simulate.hpp"
 #include "analysis/noise/spectrum.hpp"
@@ -121,15 +122,15 @@ class TurnSight {
    public:
     TurnSight(const record::Record& record, const Closure& closure) {
         for (const Step& step : closure.steps) {
-            if (step.effect == "missed_counts") count_again_ = true;
-            if (step.effect != "readout_ellipse") continue;
-            const effects::Effect& effect = *effects::find(step.effect);
+            const effects::Effect& effect = *step.effect;
+            if (!changes_reading(effect)) continue;
+            count_again_ |= effects::first_of(effect, effects::Role::probability) != nullptr;
             gyro::Setup setup;
             effects::Values values;
             for (const effects::Parameter& p : effect.parameters()) values[std::string(p.name)] = p.default_value;
             for (const Estimate& estimate : step.parameters) values[estimate.name] = estimate.value;
             effect.configure(values, setup);
-            ellipse_ = setup.ellipse;
+            if (setup.ellipse != gyro::Ellipse{}) ellipse_ = setup.ellipse;
         }
         measured_ = prepare(record, join(*record.turns, ellipse_, count_again_));
     }
@@ -322,13 +323,13 @@ std::vector<std::string> left_out(const Closure& closure) {
     std::vector<std::string> notes;
     const scenario::EffectSettings known = scenario::default_effect_settings();
     for (const Step& step : closure.steps) {
-        const auto effect = known.find(step.effect);
+        const auto effect = known.find(std::string(step.effect->name()));
         for (const Estimate& estimate : step.parameters) {
             if (effect != known.end() && effect->second.contains(estimate.name)) continue;
-            notes.push_back(
-                fmt::format("{} of {} is no parameter of a scenario: it is not simulated", estimate.name, step.effect));
+            notes.push_back(fmt::format("{} of {} is no parameter of a scenario: it is not simulated", estimate.name,
+                                        step.effect->name()));
         }
-        if (step.effect == "lockin_temperature") {
+        if (step.effect->name() == "lockin_temperature") {
             notes.emplace_back("the threshold follows a steady ramp of the temperature in the simulations");
         }
     }
@@ -399,11 +400,10 @@ Closure drawn(const Closure& closure, std::uint64_t seed) {
         e.value = of_either_sign ? e.value + z * e.sd : positive(e.value, e.sd, z);
     }
     for (Step& step : out.steps) {
-        const effects::Effect* effect = effects::find(step.effect);
         for (Estimate& e : step.parameters) {
             const double z = normal();
-            if (effect == nullptr || !std::isfinite(e.sd)) continue;
-            for (const effects::Parameter& parameter : effect->parameters()) {
+            if (!std::isfinite(e.sd)) continue;
+            for (const effects::Parameter& parameter : step.effect->parameters()) {
                 if (parameter.name != e.name || parameter.role == effects::Role::setting) continue;
                 const bool spread =
                     parameter.role == effects::Role::deviation || parameter.role == effects::Role::probability;

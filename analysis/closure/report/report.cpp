@@ -42,14 +42,14 @@ nlohmann::json to_json(const Closure& closure) {
     object["base"] = estimates_json(closure.base);
     object["steps"] = json::array();
     for (const Step& step : closure.steps) {
-        json s = {{"effect", step.effect},
+        json s = {{"effect", step.effect->name()},
                   {"parameters", estimates_json(step.parameters)},
                   {"heldout_error_before", number(step.heldout_error_before)},
                   {"heldout_error_after", number(step.heldout_error_after)},
                   {"heldout_log_score_gain", number(step.heldout_log_score_gain)},
                   {"p_value", number(step.p_value)}};
         if (!step.confounded_with.empty()) {
-            s["confounded_with"] = step.confounded_with;
+            s["confounded_with"] = names_of(step.confounded_with);
             s["experiment"] = step.experiment;
         }
         object["steps"].push_back(std::move(s));
@@ -102,14 +102,14 @@ std::string to_text(const Closure& closure) {
     for (std::size_t k = 0; k < closure.steps.size(); ++k) {
         const Step& step = closure.steps[k];
         line("");
-        line(fmt::format("step {}: {}   (by chance: p {})", k + 1, step.effect, probability(step.p_value)));
+        line(fmt::format("step {}: {}   (by chance: p {})", k + 1, step.effect->name(), probability(step.p_value)));
         for (const Estimate& e : step.parameters) {
             line(e.text.empty() ? value_text(e) : fmt::format("  {:<26} {:>14}", e.name, e.text));
         }
         line(fmt::format("  held-out error {:.6g} -> {:.6g} {}, log-score {:+.1f}", step.heldout_error_before,
                          step.heldout_error_after, closure.unit, step.heldout_log_score_gain));
         if (!step.confounded_with.empty()) {
-            line(fmt::format("  this record cannot tell it from: {}", fmt::join(step.confounded_with, ", ")));
+            line(fmt::format("  this record cannot tell it from: {}", fmt::join(names_of(step.confounded_with), ", ")));
             line(fmt::format("  what would: {}", step.experiment));
         }
     }
@@ -202,7 +202,7 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
         }
     };
     add("base", closure.base);
-    for (const Step& step : closure.steps) add(step.effect, step.parameters);
+    for (const Step& step : closure.steps) add(std::string(step.effect->name()), step.parameters);
     parameters.write("name", names, {"", "effect.parameter; the unit is in the name"});
     parameters.write("value", values, {"1", "estimate from the whole record"});
     parameters.write("std", sds, {"1", "standard error"});
@@ -218,7 +218,7 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
     std::vector<double> errors{closure.heldout_before};
     std::vector<double> gains{0.0};
     for (const Step& step : closure.steps) {
-        steps.push_back(step.effect);
+        steps.emplace_back(step.effect->name());
         errors.push_back(step.heldout_error_after);
         gains.push_back(step.heldout_log_score_gain);
     }

@@ -236,14 +236,14 @@ void take_motion(const SampleFit& fit, const AddedEffect& added, std::vector<Est
     const SampleSeries& series = fit.series();
     const auto& [name, witness] = series.witnesses[added.witness];
     const auto take = [&](std::string_view parameter, double value, double sd) -> Estimate& {
-        const effects::Effect& effect = *added.effect;
+        const effects::Effect& effect = added.effect();
         return all.emplace_back(estimate_of(effect, parameter_of(effect, parameter).name, value, sd));
     };
     take("witness", static_cast<double>(name.back() - 'x'), 0.0).text = name;
     const SampleFit bare(series, without_motion(fit.model()), fit.rows(), SampleFit::Noise::near);
     const WitnessMotion told = fit_witness(bare, witness);
     const double centre = std::max(told.centre_hz, 0.01);
-    const SampleFit whole = motion_as_resonance(fit, bare, told, {added.effect, added.id});
+    const SampleFit whole = motion_as_resonance(fit, bare, told, {&added.effect(), added.id});
     const auto& motion = whole.model().noise.resonances.front();
     const SampleNoise errors = whole.noise_errors().noise;
     const SampleNoise::Resonance& error = errors.resonances.front();
@@ -301,9 +301,9 @@ void take_walk(const effects::Effect& effect, const SampleNoise& noise, const Sa
 
 void take_resampling(const SampleFit& fit, const AddedEffect& added, double from_hz_sd, std::vector<Estimate>& all,
                      std::vector<std::string>& notes) {
-    const std::string_view parameter = parameter_of(*added.effect, Role::sampled).name;
+    const std::string_view parameter = parameter_of(added.effect(), Role::sampled).name;
     const double from_hz = fit.model().noise.from_hz;
-    all.push_back(estimate_of(*added.effect, parameter, from_hz, added.other_hz.empty() ? from_hz_sd : unknown));
+    all.push_back(estimate_of(added.effect(), parameter, from_hz, added.other_hz.empty() ? from_hz_sd : unknown));
     for (const double hz : added.other_hz) {
         notes.push_back(
             fmt::format("a source of {:.6g} Hz explains the record as well as {:.6g} Hz: {} has no standard error", hz,
@@ -346,7 +346,7 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<AddedEffect>& a
     std::vector<Estimate> whites = whites_of(model.noise, errors.noise);
     for (const AddedEffect& one : added) {
         auto& all = figures.steps.emplace_back();
-        const effects::Effect& effect = *one.effect;
+        const effects::Effect& effect = one.effect();
         const OnSamples as = on_samples(effect);
         if (as == OnSamples::motion) {
             take_motion(fit, one, all, whites, figures.notes);

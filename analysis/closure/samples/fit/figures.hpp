@@ -12,13 +12,14 @@ namespace ringlock::closure {
 
 /// An effect that is in a model: its part of the model, and what is reported of it.
 struct AddedEffect {
-    const effects::Effect* effect = nullptr;
+    Step step = {};                     ///< its parameters, unless they are known already, come from a last fit
     int id = 0;                         ///< the step of its columns and resonances
     std::size_t witness = 0;            ///< of a motion, in the series
     bool strong = false;                ///< a motion that is fitted at many lags of its witness
     double hz = 0.0;                    ///< of a line, where the record shows it
     std::vector<double> other_hz = {};  ///< rates that explain a resampled record as well
-    Step step = {};                     ///< its parameters, unless they are known already, come from a last fit
+
+    const effects::Effect& effect() const { return *step.effect; }
 };
 
 struct SampleFigures {

@@ -18,6 +18,7 @@
 #include "analysis/closure/samples/screen/screen.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/interrupt.hpp"
 
 namespace ringlock::closure {
 
@@ -73,9 +74,8 @@ void SampleLoop::take_lattice(Closure& closure) {
             "of the characteristic function is left",
             lattice_.printed_arcsec, 100.0 * lattice_.strength));
     }
-    AddedEffect added{.effect = effect, .id = next_id_++};
+    AddedEffect added{.step = {.effect = effect}, .id = next_id_++};
     Step& taken = added.step;
-    taken.effect = effect->name();
     taken.p_value = lattice_.p_value;
     const SampleScore before = score_of(*now_.fit, reported_, 0.0);
     // Values do not lie on a blurred lattice, but on that of the printed digits.
@@ -105,6 +105,8 @@ void SampleLoop::find_coarse_steps(Closure& closure) {
 /// Adds effects until none improves the model by enough.
 void SampleLoop::add_all(Closure& closure, bool random_rates) {
     while (now_.added.size() < options.most_steps) {
+        check_interrupt();
+        monitor_.tell("searching the library");
         const SampleChoice choice = choose_on_samples(
             record_.declared, {now_.fit, now_.lines_hz, next_id_, random_rates}, whole_, lattice_step());
         nearest_ = choice.nearest;
@@ -116,7 +118,7 @@ void SampleLoop::add_all(Closure& closure, bool random_rates) {
 
 /// Takes the likelier of two random rates. Increments that were drawn by a model without a random rate say little about
 /// which one it is; the likelihood of the rounded increments decides.
-const SampleCandidate& SampleLoop::take_likelier(const SampleChoice& choice, Step& step, Effects& tied) {
+const SampleCandidate& SampleLoop::take_likelier(const SampleChoice& choice, Step& step) {
     now_.fit = choice.chosen->fit;
     if (!rounded_.drawn() || !choice.other_random) return *choice.chosen;
     const auto drawn = rounded_.draw(choice.chosen->fit, options.samples.loop.draws);
@@ -127,6 +129,7 @@ const SampleCandidate& SampleLoop::take_likelier(const SampleChoice& choice, Ste
     if (!other) now_.fit = rounded_.draw(drawn, 1);
     const SampleCandidate& taken = other ? *choice.other_random : *choice.chosen;
     const SampleCandidate& left = other ? *choice.chosen : *choice.other_random;
+    auto& tied = step.confounded_with;
     std::erase_if(tied, [&](const effects::Effect* one) { return one == left.effect || one == taken.effect; });
     if (std::abs(gain) < options.tie) tied.push_back(left.effect);
     if (other) step.p_value = taken.p_value;
@@ -137,10 +140,12 @@ const SampleCandidate& SampleLoop::take_likelier(const SampleChoice& choice, Ste
 void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     Step step;
     step.p_value = choice.p_value;
-    Effects tied = choice.confounded_with;
+    step.confounded_with = choice.confounded_with;
     const SampleScore before = score(*now_.fit);
-    const SampleCandidate& best = take_likelier(choice, step, tied);
+    const SampleCandidate& best = take_likelier(choice, step);
     const effects::Effect& effect = *best.effect;
+    step.effect = &effect;
+    auto& tied = step.confounded_with;
     for (const auto& [partner, alternatives] : now_.of_partners) {
         if (partner != &effect) continue;
         for (const effects::Effect* one : alternatives) {
@@ -148,13 +153,11 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
         }
     }
     now_.of_partners.insert(now_.of_partners.end(), choice.of_partners.begin(), choice.of_partners.end());
-    step.effect = effect.name();
-    for (const effects::Effect* one : tied) step.confounded_with.emplace_back(one->name());
-    if (!tied.empty()) step.experiment = experiment_for(step.effect, step.confounded_with);
+    if (!tied.empty()) step.experiment = experiment_for(effect, tied);
     drop_needless(effect);
     for (int k = 0; k < options.samples.loop.most_motions && move_anew();) ++k;
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
-    now_.added.push_back({.effect = &effect,
+    now_.added.push_back({.step = std::move(step),
                           .id = next_id_++,
                           .witness = best.witness,
                           .strong = best.strong,
@@ -169,13 +172,14 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
         find_coarse_steps(closure);
     }
     const SampleScore after = score(*now_.fit);
-    step.heldout_error_before = before.error;
-    step.heldout_error_after = after.error;
-    step.heldout_log_score_gain = after.log_score - before.log_score;
+    AddedEffect& added = now_.added.back();
+    added.step.heldout_error_before = before.error;
+    added.step.heldout_error_after = after.error;
+    added.step.heldout_log_score_gain = after.log_score - before.log_score;
     if (is_line(effect)) {
-        const double hz = line_hz(now_.fit->model(), now_.added.back().id);
+        const double hz = line_hz(now_.fit->model(), added.id);
         now_.lines_hz.push_back(alias(hz, series_.rate_hz).hz);
-        now_.added.back().hz = now_.lines_hz.back();
+        added.hz = now_.lines_hz.back();
         if (best.wanders) {
             now_.notes.push_back(
                 fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is "
@@ -183,14 +187,14 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
                             now_.lines_hz.back()));
         }
     }
-    now_.added.back().step = std::move(step);
+    monitor_.tell(fmt::format("added {}", effect.name()));
 }
 
 /// The model without that effect, if it may only have stood in for the effect that was added last.
 std::optional<SampleLoop::Stripped> SampleLoop::stripped(const AddedEffect& of, const effects::Effect& last) const {
     Stripped without{now_.fit->model()};
     SampleModel& model = without.model;
-    const OnSamples as = on_samples(*of.effect);
+    const OnSamples as = on_samples(of.effect());
     if (as == OnSamples::walk) {
         model.walk = false;
         model.noise.walk_arcsec2_s3 = 0.0;
@@ -198,9 +202,9 @@ std::optional<SampleLoop::Stripped> SampleLoop::stripped(const AddedEffect& of, 
         model.flicker = false;
         model.noise.terms.clear();
     } else if (as == OnSamples::rate || as == OnSamples::step) {
-        std::erase_if(model.columns, [&](const SampleColumn& c) { return c.effect == of.effect; });
+        std::erase_if(model.columns, [&](const SampleColumn& c) { return c.effect == of.step.effect; });
         if (as == OnSamples::step) without.parameters = 2;
-    } else if (is_line(*of.effect) && on_samples(last) == OnSamples::transport) {
+    } else if (is_line(of.effect()) && on_samples(last) == OnSamples::transport) {
         // A line that was resampled has images, each of which looks like a line until the resampling is known.
         const auto of_step = [&](const SampleColumn& c) { return c.step == of.id; };
         const auto cosine = std::find_if(model.columns.begin(), model.columns.end(), of_step);
@@ -223,7 +227,7 @@ void SampleLoop::drop_needless(const effects::Effect& last) {
         const double chi2 = 2.0 * (now_.fit->gain_over(*fitted));
         if (passes_on_samples(chi2_tail(chi2, without->parameters))) continue;
         now_.fit = std::move(fitted);
-        if (is_line(*one.effect)) {
+        if (is_line(one.effect())) {
             std::erase(now_.lines_hz, one.hz);
             now_.notes.push_back(
                 fmt::format("a line at {:.6g} Hz was removed from the model: with {} the record does not need it",
@@ -238,9 +242,9 @@ void SampleLoop::drop_needless(const effects::Effect& last) {
 bool SampleLoop::move_anew() {
     bool any = false;
     for (AddedEffect& added : now_.added) {
-        if (!is_motion(added.effect)) continue;
+        if (!is_motion(added.step.effect)) continue;
         const SampleFit still(series_, without_motion(now_.fit->model()), rows_, SampleFit::Noise::held);
-        auto moved = std::make_shared<SampleFit>(series_, moved_as(still, *added.effect, added.witness, added.id),
+        auto moved = std::make_shared<SampleFit>(series_, moved_as(still, added.effect(), added.witness, added.id),
                                                  rows_, SampleFit::Noise::near);
         const double more =
             added.strong ? options.samples.fit.motion_refitted : 2.0 * witness_lags(series_.rate_hz) - 1.0;
@@ -255,9 +259,9 @@ bool SampleLoop::move_anew() {
 /// Fits a motion of the case that is known to be there: by two numbers, or lag by lag where that explains more.
 void SampleLoop::move_case(AddedEffect& motion, SampleFit::Noise noise) {
     SampleModel model = now_.fit->model();
-    add_motion(model, series_, *motion.effect, motion.witness, motion.id);
+    add_motion(model, series_, motion.effect(), motion.witness, motion.id);
     auto weak = std::make_shared<SampleFit>(series_, std::move(model), rows_, noise);
-    auto strong = std::make_shared<SampleFit>(series_, moved_as(*now_.fit, *motion.effect, motion.witness, motion.id),
+    auto strong = std::make_shared<SampleFit>(series_, moved_as(*now_.fit, motion.effect(), motion.witness, motion.id),
                                               rows_, SampleFit::Noise::near);
     const double more = 2.0 * witness_lags(series_.rate_hz) - 1.0;
     motion.strong = strong->gain_over(*weak) > more;

@@ -114,7 +114,7 @@ void SampleLoop::go_without_random(Closure& closure) {
     begin_again(followed);
     closure.unexplained = left;
     closure.tests = tests;
-    const auto keeps = [](const AddedEffect& added) { return !is_slow_rate(*added.effect); };
+    const auto keeps = [](const AddedEffect& added) { return !is_slow_rate(added.effect()); };
     if (keep_names(earlier_->added.empty() ? 0 : earlier_->added.back().id + 1, keeps, closure)) return;
     begin_again(*earlier_);
     test_what_is_left(closure);
@@ -141,8 +141,8 @@ void SampleLoop::look_beside_nearest(Closure& closure) {
     // Lines near a placeholder are what it leaves of the unknown line; a rate may be part of the unknown rate; and a
     // motion may be part of a rate that follows an acceleration.
     const auto keeps = [&](const AddedEffect& added) {
-        if (!line) return !is_slow_rate(*added.effect) && !(of_witness && is_motion(added.effect));
-        if (!is_line(*added.effect)) return !is_random_rate(*added.effect);
+        if (!line) return !is_slow_rate(added.effect()) && !(of_witness && is_motion(added.step.effect));
+        if (!is_line(added.effect())) return !is_random_rate(added.effect());
         return std::none_of(around_hz.begin(), around_hz.end(),
                             [&](double hz) { return std::abs(hz - added.hz) < options.samples.lines.beside_hz; });
     };
@@ -162,7 +162,7 @@ bool SampleLoop::keep_names(int first_id, const std::function<bool(const AddedEf
         closure.notes.push_back(
             fmt::format("{} was fitted only as a placeholder for structure that no effect of the library explains, and "
                         "is not reported",
-                        now_.added[k].effect->name()));
+                        now_.added[k].effect().name()));
         now_.added.erase(now_.added.begin() + static_cast<std::ptrdiff_t>(k));
     }
     return true;

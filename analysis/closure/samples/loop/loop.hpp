@@ -24,8 +24,9 @@ namespace ringlock::closure {
 /// tests of the residual in left.cpp.
 class SampleLoop {
    public:
-    explicit SampleLoop(const record::Record& record)
+    explicit SampleLoop(const record::Record& record, const Monitor& monitor = {})
         : record_(record),
+          monitor_(monitor),
           series_(prepare_samples(record)),
           rounded_(series_),
           chosen_(training_rows(series_.size())) {}
@@ -66,7 +67,7 @@ class SampleLoop {
     Disturbed still_disturbed() const;
     bool restore();
     void take_lattice(Closure& closure);
-    const SampleCandidate& take_likelier(const SampleChoice& choice, Step& step, Effects& tied);
+    const SampleCandidate& take_likelier(const SampleChoice& choice, Step& step);
     void take(const SampleChoice& choice, Closure& closure);
     void take_back_lines(Closure& closure);
     void move_case(AddedEffect& motion, SampleFit::Noise noise);
@@ -86,6 +87,7 @@ class SampleLoop {
     SampleFigures figures();
 
     const record::Record& record_;
+    const Monitor monitor_;
     SampleSeries series_;
     RoundedSamples rounded_;
     Rows chosen_;
@@ -103,7 +105,7 @@ class SampleLoop {
 };
 
 /// Runs the loop on a record of samples. Throws InputError where the record does not suffice.
-Closure close_samples(const record::Record& record);
+Closure close_samples(const record::Record& record, const Monitor& monitor = {});
 
 /// The model with these effects fitted, without any search; the residual is not tested. Effects start from the values
 /// given.

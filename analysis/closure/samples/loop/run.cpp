@@ -96,6 +96,7 @@ void SampleLoop::finish(Closure& closure) {
         for (const double x : series_.input_rate_deg_h) input += x / static_cast<double>(series_.size());
     }
     closure.mean_input_rate_deg_h = input;
+    monitor_.tell("fitting the whole record");
     SampleFigures figures = this->figures();
     closure.rounding_in_noise = !rounded_.drawn();
     closure.base = std::move(figures.base);
@@ -150,9 +151,11 @@ Closure SampleLoop::run() {
     Closure closure;
     for (int look = 0; look < options.samples.loop.most_looks; ++look) {
         closure = {};
+        monitor_.tell("fitting the base model");
         close(closure);
         if (!restore()) break;
     }
+    monitor_.tell("testing the residual");
     test_what_is_left(closure);
     if (closure.unexplained && earlier_) {
         go_without_random(closure);
@@ -177,15 +180,14 @@ void SampleLoop::take_known(const std::vector<ActiveEffect>& effects, Closure& c
     KnownEffects known = known_effects(*now_.fit, effects);
     now_.added = std::move(known.added);
     for (AddedEffect& added : now_.added) {
-        added.step.effect = added.effect->name();
-        if (on_samples(*added.effect) != OnSamples::resolution) continue;
+        if (on_samples(added.effect()) != OnSamples::resolution) continue;
         lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
         used_step_ = lattice_.printed_arcsec;
-        added.step.parameters.push_back(step_of_lattice(*added.effect));
+        added.step.parameters.push_back(step_of_lattice(added.effect()));
     }
     now_.fit = std::make_shared<SampleFit>(series_, std::move(known.model), rows_, known.noise);
     for (AddedEffect& added : now_.added) {
-        if (is_motion(added.effect) && !series_.witnesses.empty()) move_case(added, known.noise);
+        if (is_motion(added.step.effect) && !series_.witnesses.empty()) move_case(added, known.noise);
     }
     if (series_.counted || used_step_ > 0.0) find_coarse_steps(closure);
 }
@@ -202,7 +204,9 @@ Closure SampleLoop::fit(const std::vector<ActiveEffect>& effects) {
     return closure;
 }
 
-Closure close_samples(const record::Record& record) { return SampleLoop(record).run(); }
+Closure close_samples(const record::Record& record, const Monitor& monitor) {
+    return SampleLoop(record, monitor).run();
+}
 
 Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects) {
     return SampleLoop(record).fit(effects);

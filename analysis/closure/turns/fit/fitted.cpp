@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
+#include <mutex>
 #include <utility>
 
 #include "engine/core/error.hpp"
@@ -10,61 +12,103 @@ namespace ringlock::closure {
 
 namespace {
 
-/// The noise of the dither at the turns by how neighbouring swings of one sign differ, which have four of its values in
-/// them [rad].
+/// Noise of the dither at the turns [rad], estimated from the difference of successive swings of one sign, which holds
+/// four of its values.
 double injected_by_swings(const TurnSeries& series) {
     double squares = 0.0;
     for (std::size_t i = 0; i + 3 < series.size(); ++i) squares += std::pow(series.swing[i + 2] - series.swing[i], 2);
     return series.amplitude_rad * std::sqrt(squares / static_cast<double>(series.size()));
 }
 
-/// About the phases that the first fit tells (the iterated Kalman smoother: Bell, SIAM Journal on Optimization 4, 1994,
-/// 626). One pass is enough: another moves them by what is not linear in what the first was wrong by.
+/// Linearises the model about the phases that the first fit estimates (the iterated Kalman smoother: Bell, SIAM Journal
+/// on Optimization 4, 1994, 626). One pass is enough: the error of the first linearisation enters the next one squared.
 void linearise_again(Fitted& fitted, const Rows& rows, TurnFit::Effects effects) {
     ReadingErrors known = fitted.fit->reading_errors();
     if (known.mean_rad.empty()) return;
-    auto model = std::make_unique<TurnModel>(fitted.series, fitted.joined.phase_rad, std::move(known));
+    auto model = std::make_unique<TurnModel>(fitted.series(), fitted.joined().phase_rad, std::move(known));
     fitted.fit = std::make_unique<TurnFit>(*model, fitted.fit->parameters(), rows, effects);
     fitted.model = std::move(model);
 }
 
 }  // namespace
 
-std::shared_ptr<Fitted> fit_record(const record::Record& record, const TurnParameters& start, const Rows& rows,
-                                   TurnFit::Effects effects, double needed) {
+/// The latest readings of a record: many candidates are fitted to one of them.
+class TurnProblem::Readings {
+   public:
+    std::shared_ptr<const TurnReading> get(const record::Record& record, const gyro::Ellipse& ellipse,
+                                           bool count_again) {
+        const auto known = [&]() -> std::shared_ptr<const TurnReading> {
+            for (const Entry& entry : latest_) {
+                if (entry.ellipse == ellipse && entry.count_again == count_again) return entry.reading;
+            }
+            return nullptr;
+        };
+        {
+            const std::lock_guard lock(mutex_);
+            if (auto reading = known()) return reading;
+        }
+        auto reading = std::make_shared<TurnReading>();
+        reading->joined = join(*record.turns, ellipse, count_again);
+        reading->series = prepare(record, reading->joined);
+        const std::lock_guard lock(mutex_);
+        if (auto other = known()) return other;
+        latest_.push_front({ellipse, count_again, reading});
+        if (latest_.size() > kept) latest_.pop_back();
+        return reading;
+    }
+
+   private:
+    static constexpr std::size_t kept = 4;
+    struct Entry {
+        gyro::Ellipse ellipse;
+        bool count_again;
+        std::shared_ptr<const TurnReading> reading;
+    };
+    std::mutex mutex_;
+    std::deque<Entry> latest_;
+};
+
+TurnProblem::TurnProblem(const record::Record& record, Rows rows)
+    : TurnProblem(record, std::move(rows), std::make_shared<Readings>()) {}
+
+TurnProblem::TurnProblem(const record::Record& record, Rows rows, std::shared_ptr<Readings> readings)
+    : record_(&record), rows_(std::move(rows)), readings_(std::move(readings)) {}
+
+TurnProblem TurnProblem::whole() const { return {*record_, Rows(rows_.size(), 1), readings_}; }
+
+std::shared_ptr<Fitted> TurnProblem::fit(const TurnParameters& start, TurnFit::Effects effects, double needed) const {
     auto fitted = std::make_shared<Fitted>();
     gyro::Setup setup;
     bool count_again = false;
     for (const ActiveEffect& active : start.effects) {
-        if (active.effect->name() == "readout_ellipse") active.effect->configure(active.values, setup);
-        if (active.effect->name() == "missed_counts") count_again = true;
+        if (!changes_reading(*active.effect)) continue;
+        active.effect->configure(active.values, setup);
+        count_again |= effects::first_of(*active.effect, effects::Role::probability) != nullptr;
     }
-    fitted->joined = join(*record.turns, setup.ellipse, count_again);
-    fitted->series = prepare(record, fitted->joined);
-    fitted->model = std::make_unique<TurnModel>(fitted->series, fitted->joined.phase_rad);
+    fitted->reading = readings_->get(*record_, setup.ellipse, count_again);
+    fitted->model = std::make_unique<TurnModel>(fitted->series(), fitted->joined().phase_rad);
     TurnParameters parameters = start;
     const bool from_nothing = parameters.readout_sd_rad == 0.0;
     if (from_nothing) {
-        parameters.readout_sd_rad = std::max(fitted->joined.readout_sd_rad, 1e-6);
-        parameters.threshold_deg_h = fitted->series.setup.lockin_threshold_deg_h;
+        parameters.readout_sd_rad = std::max(fitted->joined().readout_sd_rad, 1e-6);
+        parameters.threshold_deg_h = fitted->series().setup.lockin_threshold_deg_h;
     }
-    fitted->fit = std::make_unique<TurnFit>(*fitted->model, parameters, rows, effects, needed);
+    fitted->fit = std::make_unique<TurnFit>(*fitted->model, parameters, rows_, effects, needed);
     if (from_nothing) {
-        // Where noise is injected the swings say how much: a fit that is not told may end beside a summit.
-        parameters.injected_sd_rad = injected_by_swings(fitted->series);
+        // Injected noise shows in the swings. A fit that starts without it may end at a lower maximum.
+        parameters.injected_sd_rad = injected_by_swings(fitted->series());
         if (parameters.injected_sd_rad > parameters.readout_sd_rad) {
-            auto other = std::make_unique<TurnFit>(*fitted->model, parameters, rows, effects);
-            if (other->log_likelihood() > fitted->fit->log_likelihood()) fitted->fit = std::move(other);
+            auto other = std::make_unique<TurnFit>(*fitted->model, parameters, rows_, effects);
+            if (other->log_likelihood() > fitted->log_likelihood()) fitted->fit = std::move(other);
         }
     }
-    if (fitted->fit->log_likelihood() > needed) linearise_again(*fitted, rows, effects);
+    if (fitted->log_likelihood() > needed) linearise_again(*fitted, rows_, effects);
     return fitted;
 }
 
-std::shared_ptr<Fitted> fit_or_none(const record::Record& record, const TurnParameters& start, const Rows& rows,
-                                    double needed) {
+std::shared_ptr<Fitted> TurnProblem::fit_or_none(const TurnParameters& start, double needed) const {
     try {
-        return fit_record(record, start, rows, TurnFit::Effects::fitted, needed);
+        return fit(start, TurnFit::Effects::fitted, needed);
     } catch (const RunError&) {
         return nullptr;
     }

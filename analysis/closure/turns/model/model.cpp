@@ -24,8 +24,10 @@ ActiveEffect* TurnParameters::find(std::string_view effect) {
     return const_cast<ActiveEffect*>(std::as_const(*this).find(effect));
 }
 
-bool told_by_other_columns(const effects::Effect& effect) {
-    const gyro::Setup plain;
+namespace {
+
+/// A gyro's constants with the effect at small values: what the effect changes can be seen in them.
+gyro::Setup probed(const effects::Effect& effect) {
     gyro::Setup setup;
     effects::Values values;
     for (const effects::Parameter& parameter : effect.parameters()) {
@@ -33,9 +35,23 @@ bool told_by_other_columns(const effects::Effect& effect) {
         values[std::string(parameter.name)] = counts ? 1e-3 : 0.0;
     }
     effect.configure(values, setup);
+    return setup;
+}
+
+}  // namespace
+
+bool told_by_other_columns(const effects::Effect& effect) {
+    const gyro::Setup plain;
+    const gyro::Setup setup = probed(effect);
     return setup.dither_asymmetry_ratio != plain.dither_asymmetry_ratio ||
            setup.dither_harmonic_ratio != plain.dither_harmonic_ratio || setup.ellipse.gain != plain.ellipse.gain ||
            setup.missed_count_probability != plain.missed_count_probability;
+}
+
+bool changes_reading(const effects::Effect& effect) {
+    const gyro::Setup plain;
+    const gyro::Setup setup = probed(effect);
+    return setup.ellipse != plain.ellipse || setup.missed_count_probability != plain.missed_count_probability;
 }
 
 bool is_of_coupling(const effects::Effect& effect) {

@@ -44,6 +44,9 @@ struct TurnParameters {
 /// detectors, the counter.
 bool told_by_other_columns(const effects::Effect& effect);
 
+/// Whether the effect changes the phases as they are read: the detectors or the counter. The record is then read anew.
+bool changes_reading(const effects::Effect& effect);
+
 /// Whether the effect changes the kicks and is seen in the phases alone.
 bool is_of_coupling(const effects::Effect& effect);
 

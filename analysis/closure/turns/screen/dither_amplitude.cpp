@@ -11,7 +11,6 @@
 #include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/closure/stats/whiteness.hpp"
-#include "engine/core/error.hpp"
 
 namespace ringlock::closure {
 
@@ -51,10 +50,10 @@ std::vector<double> highest_peaks(const TurnFit& fit, double band_hz) {
 
 }  // namespace
 
-std::optional<AmplitudeModel> find_amplitude_swing(const record::Record& record, const Fitted& now, const Rows& rows) {
+std::optional<AmplitudeModel> find_amplitude_swing(const TurnProblem& problem, const Fitted& now) {
     constexpr std::size_t most = 6;
     const TurnFit& fit = *now.fit;
-    const TurnSeries& series = now.series;
+    const TurnSeries& series = now.series();
     TurnParameters with = fit.parameters();
     if (with.swings.size() >= most) return std::nullopt;
     const double band_hz = series.amplitude_band_hz();
@@ -72,22 +71,19 @@ std::optional<AmplitudeModel> find_amplitude_swing(const record::Record& record,
     if (!passes(of_several(chi2_tail(chi2, 2), places))) return std::nullopt;
     with.swings.push_back(swing);
     AmplitudeModel found;
-    try {
-        found.fitted = fit_record(record, with, rows);
-    } catch (const RunError&) {
-        return std::nullopt;  // no motion of a gyro with such parameters can be followed
-    }
+    found.fitted = problem.fit_or_none(with);
+    if (!found.fitted) return std::nullopt;
     const double gain = found.fitted->fit->log_likelihood() - fit.log_likelihood();
     if (!passes(of_several(chi2_tail(2.0 * gain, 2), places))) return std::nullopt;
     found.merit = gain - cost_of_amplitudes(gain, 2) - std::log(places) - 1.0;
     return found;
 }
 
-std::optional<AmplitudeModel> find_amplitude_memory(const record::Record& record, const Fitted& now, const Rows& rows) {
+std::optional<AmplitudeModel> find_amplitude_memory(const TurnProblem& problem, const Fitted& now) {
     constexpr double worth_looking = 1e-3;
     const TurnFit& fit = *now.fit;
     if (fit.parameters().wander_forgets > 0.0) return std::nullopt;
-    if (correlations_of(fit.innovations(), rows).test(Where::amplitude, "").p_value > worth_looking)
+    if (correlations_of(fit.innovations(), problem.rows()).test(Where::amplitude, "").p_value > worth_looking)
         return std::nullopt;
     AmplitudeModel found;
     for (const double forgets : {0.3, 0.03, 0.003}) {
@@ -95,13 +91,9 @@ std::optional<AmplitudeModel> find_amplitude_memory(const record::Record& record
         with.wander_forgets = forgets;
         // Of the white noise, too, a part may have been what is forgotten.
         with.wander_sd_rad = std::max(with.wander_sd_rad, 0.5 * std::sqrt(forgets) * with.injected_sd_rad);
-        try {
-            auto fitted = fit_record(record, with, rows);
-            const double best = found.fitted ? found.fitted->fit->log_likelihood() : fit.log_likelihood();
-            if (fitted->fit->log_likelihood() > best) found.fitted = std::move(fitted);
-        } catch (const RunError&) {
-            // no motion of a gyro with such parameters can be followed
-        }
+        auto fitted = problem.fit_or_none(with);
+        const double best = found.fitted ? found.fitted->log_likelihood() : fit.log_likelihood();
+        if (fitted && fitted->log_likelihood() > best) found.fitted = std::move(fitted);
     }
     if (!found.fitted) return std::nullopt;
     const double gain = found.fitted->fit->log_likelihood() - fit.log_likelihood();
@@ -111,7 +103,7 @@ std::optional<AmplitudeModel> find_amplitude_memory(const record::Record& record
 }
 
 std::vector<std::string> notes_on_amplitude(const Fitted& fitted) {
-    const TurnSeries& series = fitted.series;
+    const TurnSeries& series = fitted.series();
     std::vector<std::string> notes;
     for (const AmplitudeSwing& swing : fitted.fit->parameters().swings) {
         notes.push_back(fmt::format(

@@ -16,11 +16,11 @@ struct AmplitudeModel {
 
 /// What of the innovations comes at frequencies so near the dither's that no vibration of the base could be told from
 /// the dither's own motion (amplitude_band_hz): none if that may be chance.
-std::optional<AmplitudeModel> find_amplitude_swing(const record::Record& record, const Fitted& now, const Rows& rows);
+std::optional<AmplitudeModel> find_amplitude_swing(const TurnProblem& problem, const Fitted& now);
 
 /// Where innovations go with those before: whether a wander of the amplitude that is forgotten, as by a resonator of
 /// low quality that noise drives, explains it.
-std::optional<AmplitudeModel> find_amplitude_memory(const record::Record& record, const Fitted& now, const Rows& rows);
+std::optional<AmplitudeModel> find_amplitude_memory(const TurnProblem& problem, const Fitted& now);
 
 /// What the report says of either.
 std::vector<std::string> notes_on_amplitude(const Fitted& fitted);

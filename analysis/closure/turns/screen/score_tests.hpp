@@ -1,8 +1,8 @@
 #pragma once
-#include <optional>
+#include <memory>
 #include <vector>
 
-#include "analysis/closure/turns/fit/fit.hpp"
+#include "analysis/closure/turns/fit/fitted.hpp"
 
 namespace ringlock::closure {
 
@@ -10,10 +10,12 @@ namespace ringlock::closure {
 struct Candidate {
     const effects::Effect* effect = nullptr;
     effects::Values values;
-    double chi2 = 0.0;        ///< twice the gain of the log-likelihood, noise as it is
-    double p_value = 1.0;     ///< of so much by chance, with the search over times and frequencies counted
-    double searched = 1.0;    ///< independent places that the search went over
-    effects::Values sd = {};  ///< standard errors, where the first estimate is the last
+    double chi2 = 0.0;                    ///< twice the gain of the log-likelihood, noise as it is
+    double p_value = 1.0;                 ///< of so much by chance, with the search over times and frequencies counted
+    double searched = 1.0;                ///< independent places that the search went over
+    effects::Values sd = {};              ///< standard errors, where the first estimate is the last
+    std::shared_ptr<Fitted> fitted = {};  ///< the model with it, once fitted in full; then p_value is of that fit
+    double merit = 0.0;  ///< of the full fit: gain of the log-likelihood, amplitudes integrated out, less its search
 };
 
 /// The effects of the library that act on phases at the turns, can be told on this record and are not in the fit yet,
