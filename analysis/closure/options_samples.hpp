@@ -1,6 +1,257 @@
 #pragma once
+#include <array>
+#include <cstddef>
 
+/// Numbers that decide what is named on a record of samples, room by room. "p" is a probability by chance.
 namespace ringlock::closure {
+
+/// The record: known input, source of a resampled record, lattice of the values, thermometer (samples/model).
+struct SampleRecordOptions {
+    /// The clock of the instrument that tells the input is taken to mean the start or the middle of each interval, and
+    /// not its end, only where that explains more by this [chi-squared].
+    double other_clock = 30.0;
+    /// Neighbouring increments lie on one straight line between two readings of the source where they differ by less
+    /// than this share of the range of all increments: values keep seven digits and more.
+    double same_line = 1e-7;
+    /// Fewer readings with a time of their own do not give the clock of a source.
+    std::size_t fewest_readings = 20;
+    /// Shortest interval of a source that straight lines can show [intervals of the record], so that lines have whole
+    /// intervals.
+    double shortest_source_interval = 2.0;
+    /// Times of readings are those of a clock where they are off its ticks by less [rms, intervals of the record].
+    double off_clock = 1e-3;
+    /// All levels must be a whole multiple of the step of a lattice within this share of it.
+    double off_lattice = 0.02;
+    /// Levels of more than one part in so many of all values are digits that never repeat, and no lattice.
+    std::size_t values_per_level = 4;
+    /// A coarser lattice beneath the printed digits must leave so much of the characteristic function of the values
+    /// (the length of the mean of exp(2 pi i value/step)), and be as improbable by chance.
+    double coarser_lattice_strength = 0.3;
+    double coarser_lattice_p = 1e-6;
+    /// Half of the length over which temperatures are smoothed is the record over this: a thermometer's noise is faster
+    /// than any temperature.
+    std::size_t smoothed_parts = 1000;
+};
+
+/// Fits (samples/fit).
+struct SampleFitOptions {
+    /// A row of a resampled record is settled by the rows before it, but for its digits, where its standard deviation
+    /// is less than this share of the largest one;
+    double settled_sd = 0.03;
+    /// or where digits that are coarser by this factor
+    double coarser_digits = 1.5;
+    /// make its standard deviation larger by this factor.
+    double settled_growth = 1.01;
+    /// Innovations are held against a witness at lags up to this on either side [s], but at no fewer and no more lags
+    /// than these.
+    double witness_lag_s = 0.25;
+    int fewest_witness_lags = 2;
+    int most_witness_lags = 40;
+    /// What a witness leaves of a motion is no slower than this share of the motion's centre frequency: at next to
+    /// nothing hertz it would be a random walk of the rate, which would then not be looked for.
+    double slowest_of_motion = 0.2;
+    /// A resonance at half the rate of the record that is narrower than this share of the rate is a line, and no part
+    /// of a motion.
+    double narrowest_at_half_rate = 0.1;
+    /// A motion whose resonance gains less than this without its witness does not stand out from the noise [nats]:
+    /// coherence, rms, centre and width have no standard error then.
+    double motion_stands_out = 20.0;
+    /// A motion is fitted again, beside an effect that was added, while that gains more [nats].
+    double motion_refitted = 1.0;
+    /// Places at which a record is searched for a step before the likeliest is refined, and places in a gap between
+    /// rows that count.
+    std::size_t places_of_a_step = 80;
+    std::size_t places_in_a_gap = 32;
+    /// Steps of values that are smaller than this share of the standard deviation do not show in held-out errors.
+    double fine_lattice = 0.02;
+};
+
+/// The search for lines (samples/fit/line_*).
+struct SampleLineOptions {
+    /// Below so many cycles over the record a line is a rate that changes.
+    double fewest_cycles = 8.0;
+    /// Of lines above this chi-squared nothing is left to chance: the one of most power is taken first, since a strong
+    /// line raises the level about itself.
+    double certain = 1000.0;
+    /// Lines that keep their frequency, that drift slowly and that drift by anything are searched: the likeliest is one
+    /// of so many.
+    double kinds = 3.0;
+    /// Power along tracks over pieces must be as improbable to be a line that does not keep its phase.
+    double scattered_p = 1e-6;
+    /// Power in pieces that a line does not have may be chance up to this [chi-squared].
+    double much_scattered = 60.0;
+    /// Power in pieces belongs to a line that does not keep its phase where more than one part in so many of it is left
+    /// when the likeliest line has been taken off.
+    double left_parts = 3.0;
+    /// What is left of a line, or made of one, is nearer to it than this [Hz].
+    double beside_hz = 1.0;
+    /// Price of each coefficient of a line's course on a curve [chi-squared]: 6 nats, as for a search over half a cycle
+    /// a piece.
+    double bend = 12.0;
+    /// Drifts that are followed over the whole record, either way [cycles over the record].
+    int slow_drift_cycles = 16;
+    /// Drifts that are followed about a line which shows in pieces [cycles].
+    double near_cycles = 64.0;
+    /// Drifts of a declared dither beyond this are left to the search over all frequencies [cycles].
+    double declared_drift_cycles = 128.0;
+};
+
+/// Candidates by score tests (samples/screen).
+struct SampleScreenOptions {
+    /// Scores of slow rates are weakened by how much more the sums of stretches move than white innovations would:
+    /// stretches of the record over `slow_parts` rows, of `slow_rows` at least, of which `slow_share` must count, and
+    /// only with more than `slow_sums` of them.
+    std::size_t slow_rows = 16;
+    std::size_t slow_parts = 1000;
+    double slow_share = 0.5;
+    double slow_sums = 20.0;
+    /// A step is a candidate below this p.
+    double step_p = 0.01;
+    /// Random rates are fitted only where `slow_cosines` cosines over the record explain it with less than this p: sums
+    /// over long stretches must move more than the white noises let them.
+    double random_rate_p = 0.05;
+    int slow_cosines = 12;
+    /// Lines below this p are looked at as lines that do not keep their phase.
+    double line_p = 0.01;
+    /// Lines below this p are refined by a regression: the level of a spectrum about a line is itself a random number.
+    double refined_line_p = 0.2;
+    /// A base hardly moves above this [Hz]: a line there is one of the output.
+    double fast_hz = 30.0;
+    /// Lines within so many cycles over the record of one that is in the model are what it left.
+    double known_line_cycles = 64.0;
+    /// A drift below so many cycles over the record, either way, is none.
+    double least_drift_cycles = 1.0;
+    /// Share of the level of output lines that goes to lines which drift anywhere, and to each of lines near the
+    /// declared dither that keep their frequency and that drift: a declaration makes these likely.
+    double drifting_share_if_declared = 0.1;
+    double declared_share = 0.45;
+    /// How the share near the declared dither goes to its harmonics: most is left of the dither itself.
+    std::array<double, 3> harmonic_shares = {0.7, 0.15, 0.15};
+    /// Rates that a record may be resampled from [of its own rate]: beyond these the variance of interpolated readings
+    /// hardly repeats. They are at a distance of the frequency that repeats from multiples up to `most_multiple`.
+    double slowest_source = 0.3;
+    double fastest_source = 4.5;
+    int most_multiple = 4;
+    /// Sources that are fitted in full: at least and at most so many, and between these all that are as likely by a
+    /// part of the record, with noises that are not fitted, which may be wrong by tens of nats.
+    std::size_t fewest_sources = 3;
+    std::size_t most_sources = 7;
+    double likely_source = 40.0;
+};
+
+/// Candidates compared with each other and with residual tests (samples/loop/contest).
+struct SampleContestOptions {
+    /// A slow rate or a line is fitted in full below this p, though its score does not pass: scores are of the noise as
+    /// it is, which may have swallowed it.
+    double worth_looking = 0.01;
+    /// A step that gains more is placed again [nats]: its place was found by noise that it was itself a part of.
+    double placed_again = 50.0;
+    /// Candidates of resampling that are fitted first, the likeliest by either kind of errors. The others explain much
+    /// the same and take long: they are left out where these come to less than `far` of the leader's merit.
+    std::size_t first_sources = 2;
+    double far = 0.5;
+    /// Contenders beyond Options::most_contenders that samples keep.
+    std::size_t more_contenders = 2;
+    /// Effects that sets of two or three are grown from.
+    std::size_t set_starts = 4;
+    /// Residual tests that are fitted as rivals, jumps and rates that follow another column apart.
+    std::size_t most_rivals = 4;
+    /// Resampling is blurred where interpolated readings are off the straight line by more than this share of their
+    /// errors: then the variance swings by less than half, as any other may, and resampling must explain more than
+    /// that by a tie.
+    double blurred = 0.3;
+    /// The course of jumps is searched stretch by stretch and loses a part of what they explain: a random rate must
+    /// explain more than jumps by a tie, and by this share of its own merit.
+    double lost_of_jumps = 0.1;
+    /// Sources of a resampled record are the same within this [of the record's rate].
+    double same_source = 1e-3;
+};
+
+/// Residual tests (samples/residual).
+struct SampleResidualOptions {
+    /// A line is refined before its test is believed below this p.
+    double line_p = 0.01;
+    /// Stretches that are compared for a line that does not keep its amplitude.
+    std::size_t line_stretches = 20;
+    /// Patterns of the place in the record are looked for modulo 2 up to this.
+    std::size_t most_modulo = 16;
+    /// Values in steps that are larger than this share of the standard deviation are not normal, and sums of them are
+    /// tested in their place.
+    double coarse_lattice = 0.2;
+    /// Equal values at the end of their range that may be there without being cut off.
+    int most_ties = 4;
+    /// Stretches of the record count as disturbed where their variance is more than this times the usual one,
+    double disturbed_variance = 2.0;
+    /// as improbable as this,
+    double disturbed_p = 1e-6;
+    /// with so many rows that tell something at least, and the record over this.
+    std::size_t disturbed_rows = 50;
+    std::size_t disturbed_parts = 500;
+    /// Price of a rate of two states: its step and two probabilities [nats].
+    double price_of_states = 3.0;
+    /// Price of the exact place of each jump, which does not wait for the end of a stretch [nats].
+    double price_of_jump = 2.0;
+    /// Stretches of the record that may have one of two levels.
+    std::size_t level_stretches = 120;
+    /// Polynomials of time up to this degree.
+    std::size_t polynomial_degrees = 6;
+    /// Places of a step of the rate.
+    std::size_t step_places = 40;
+    /// Slow swings: so many, each a quarter of a period over the record more than the one before.
+    std::size_t slow_swings = 32;
+    /// Time constants of a rate that settles: so many, from the length of the record down, each shorter by this factor.
+    std::size_t settling_constants = 14;
+    double settling_factor = 1.4;
+    /// Lags by which a rate may follow the temperature, reaches over which the input's slope and noise are taken, and
+    /// lags by which a rate may follow an acceleration.
+    std::size_t temperature_lags = 7;
+    std::size_t input_reaches = 5;
+    std::size_t acceleration_lags = 4;
+};
+
+/// Readings in coarse steps (samples/rounded).
+struct SampleRoundedOptions {
+    /// Rounding shows the angle where its first harmonic keeps more than this (Widrow and Kollar, "Quantization Noise",
+    /// 2008, chapter 5).
+    double rounding_shows = 0.01;
+    /// Means of stretches move more than white noise lets them where their variance is larger by this factor: with 15
+    /// degrees of freedom one time in a thousand.
+    double wanders = 2.5;
+    /// Increments are drawn beside a random walk that the model lacks where that is likelier by more [nats].
+    double drawn_beside_walk = 12.0;
+    /// Beside very large steps few of the filters hit the moments at which the angle crosses one: the variance that
+    /// they predict may be off by this share of it.
+    double filters_off = 0.1;
+};
+
+/// The loop (samples/loop).
+struct SampleLoopOptions {
+    /// Where a larger share of the record is disturbed, that is what the record is like, and nothing is left out.
+    double most_disturbed = 0.6;
+    /// How often the loop begins again, as an effect that has come in explains what seemed disturbed.
+    int most_looks = 3;
+    /// It begins again where at least this share of the disturbed rows is explained.
+    double restored = 0.05;
+    /// A narrow motion remembers for so many times the witness's lags what the witness left untold at the start: these
+    /// rows count for nothing, up to one part in `edge_parts` of the record at either end.
+    std::size_t remembered_lags = 4;
+    std::size_t edge_parts = 20;
+    /// Steps of values that add less than this share to the variance change nothing, and are not named.
+    double negligible_steps = 1e-3;
+    /// A lattice is coarser than the printed digits where its step is larger by this factor.
+    double coarser_than_printed = 1.5;
+    /// How often a motion is fitted again after each effect that is added.
+    int most_motions = 6;
+    /// Draws of rounded increments after each effect that is added.
+    int draws = 2;
+    /// Residual tests that are fitted to say what the record has beyond the model.
+    std::size_t most_views = 4;
+    /// Placeholders that are added for structure which the library does not have, so that other effects can be found
+    /// beside it.
+    int most_placeholders = 3;
+    /// A line is not reported where its changes, or another line beside it, have more than this share of its power.
+    double unsteady_line = 0.02;
+};
 
 /// Numbers that decide what is named on a record of samples.
 struct SampleOptions {
@@ -10,6 +261,15 @@ struct SampleOptions {
     /// Largest drift of a dither, relative to its frequency [1/s]: springs of steel soften by 2.5e-4 a kelvin, the
     /// resonance by half of that, while a gyro warms up by a kelvin a minute.
     double dither_drift_per_s = 2e-6;
+
+    SampleRecordOptions record = {};
+    SampleFitOptions fit = {};
+    SampleLineOptions lines = {};
+    SampleScreenOptions screen = {};
+    SampleContestOptions contest = {};
+    SampleResidualOptions residual = {};
+    SampleRoundedOptions rounded = {};
+    SampleLoopOptions loop = {};
 };
 
 }  // namespace ringlock::closure

@@ -17,6 +17,7 @@ class BiasRamp final : public Effect {
     std::string_view equation() const override {
         return "rate = R t; Allan deviation R tau / sqrt(2) (IEEE Std 952-1997, annex C, rate ramp).";
     }
+    Follows follows() const override { return Follows::time; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("deg_h_per_h") != 0.0; }
     Changes changes() const override { return {.angle = true}; }

@@ -17,6 +17,7 @@ class BiasStep final : public Effect {
     std::string_view name() const override { return "bias_step"; }
     std::string_view summary() const override { return "A step of the bias at a known time."; }
     std::string_view equation() const override { return "rate = step for t >= time, else 0."; }
+    Follows follows() const override { return Follows::time; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("step_deg_h") != 0.0; }
     Changes changes() const override { return {.angle = true}; }

@@ -20,6 +20,7 @@ class BiasTemperature final : public Effect {
         return "rate = deg_h_per_k dT, dT the temperature less that at the start; the temperature is linear over each "
                "half cycle.";
     }
+    Follows follows() const override { return Follows::temperature; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("deg_h_per_k") != 0.0; }
     Changes changes() const override { return {.angle = true}; }

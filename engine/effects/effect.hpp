@@ -2,6 +2,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -160,6 +161,15 @@ class SampleStage {
     virtual void apply(Sampled& samples) const = 0;
 };
 
+/// The quantity that drives an effect which is not random: whoever wants to tell such effects apart must change these
+/// quantities independently of each other.
+enum class Follows {
+    nothing,      ///< none of these: constants of the gyro, lines, random rates
+    time,         ///< the time since the start
+    temperature,  ///< the temperature less that at the start
+    input_rate,   ///< the rotation that the gyro is to measure
+};
+
 /// An effect: what it is called, what it needs, what it does to a gyro.
 class Effect {
    public:
@@ -191,7 +201,11 @@ class Effect {
     /// effect has something faster.
     virtual std::unique_ptr<LaneRateProcess> lane_rate_process(const Values& values, const random::LaneIdentities& who,
                                                                std::size_t lanes) const;
-    /// What the effect does to uniform samples beside all that, or null.
+    /// The quantity that drives the effect.
+    virtual Follows follows() const { return Follows::nothing; }
+    /// Where sample_stage() acts; none where the effect has no such stage.
+    virtual std::optional<SampleStage::Place> sample_place() const { return std::nullopt; }
+    /// What the effect does to uniform samples in addition to all that, or null.
     virtual std::unique_ptr<SampleStage> sample_stage(const Values& /*values*/, const random::Identity& /*who*/) const {
         return nullptr;
     }

@@ -21,6 +21,7 @@ class LockinTemperature final : public Effect {
                "each "
                "half cycle.";
     }
+    Follows follows() const override { return Follows::temperature; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("relative_per_k") != 0.0; }
     Changes changes() const override { return {.threshold = true}; }

@@ -64,6 +64,7 @@ class Resampling final : public Effect {
     }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("from_hz") != 0.0; }
+    std::optional<SampleStage::Place> sample_place() const override { return SampleStage::Place::transport; }
     std::unique_ptr<SampleStage> sample_stage(const Values& values, const random::Identity& /*who*/) const override {
         return std::make_unique<Stage>(values.at("from_hz"));
     }

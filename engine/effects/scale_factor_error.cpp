@@ -22,6 +22,7 @@ class ScaleFactorError final : public Effect {
                "cycle: "
                "that is a larger dither.peak_rate_deg_s, and left to it (docs/effects.md).";
     }
+    Follows follows() const override { return Follows::input_rate; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("relative") != 0.0; }
     Changes changes() const override { return {.angle = true}; }

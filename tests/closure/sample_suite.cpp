@@ -10,9 +10,9 @@
 #include <random>
 
 #include "analysis/closure/closure.hpp"
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/closure/samples/fit/motion.hpp"
-#include "analysis/closure/samples/loop/contest.hpp"
 #include "analysis/closure/samples/loop/loop.hpp"
 #include "analysis/closure/samples/screen/screen.hpp"
 #include "engine/core/units.hpp"
@@ -368,7 +368,7 @@ Outcome judge(const SampleCase& of, const record::Record& record) {
     const Closure oracle = ringlock::closure::fit_samples(record, known(of.truth));
     outcome.oracle = oracle.heldout_after;
     outcome.truth_gain = oracle.log_likelihood_gain;
-    outcome.asked_gain = gain_asked(outcome.missing, ringlock::closure::effects_on_samples);
+    outcome.asked_gain = gain_asked(outcome.missing, ringlock::closure::effects_on_samples());
     // Estimates of what has been named: a tie names it first.
     if (outcome.judged != Judged::right && outcome.judged != Judged::tie) return outcome;
     const SampleTruth truth = truth_of(of);

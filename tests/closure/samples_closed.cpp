@@ -264,8 +264,7 @@ TEST(SampleMotion, WhatIsLeftOfItIsNoSlowDrift) {
         closure::SampleModel model = base.model();
         model.motion.assign(series.size(), 0.0);
         model.motion_from_hz = motion_from_hz;
-        model.resonances = {"case_motion"};
-        model.resonance_steps = {0};
+        model.resonances = {{effects::find("case_motion"), 0}};
         model.noise.resonances = {{100.0, 0.002, 0.01}};
         return closure::SampleFit(series, std::move(model), rows, closure::SampleFit::Noise::near).gain_over(base);
     };

@@ -72,5 +72,16 @@ TEST(SampleStages, AWitnessSeesTheMotionAsFarAsItIsCoherent) {
     }
 }
 
+// What is asked of an effect before its stage is made is what the stage does.
+TEST(SampleStages, ActWhereTheirEffectSays) {
+    for (const Effect* effect : registry()) {
+        const auto stage = effect->sample_stage(values_of(*effect, {}), {.seed = 1, .gyro = 0});
+        ASSERT_EQ(stage != nullptr, effect->sample_place().has_value()) << effect->name();
+        if (stage) {
+            EXPECT_EQ(stage->place(), *effect->sample_place()) << effect->name();
+        }
+    }
+}
+
 }  // namespace
 }  // namespace ringlock::effects

@@ -9,8 +9,10 @@
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <string_view>
 #include <utility>
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/fit/motion.hpp"
@@ -19,6 +21,8 @@
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
+
+using effects::Role;
 
 namespace {
 
@@ -54,7 +58,8 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     const SampleSeries& series = fit.series();
     const auto& columns = fit.model().columns;
     const SampleColumn& column = columns[cosine];
-    const std::string& effect = column.effect;
+    const effects::Effect& effect = *column.effect;
+    const auto courses = parameters_of(effect, Role::frequency);
     const LineCourse& course = column.course;
     const double a = column.value;
     const double b = columns[cosine + 1].value;
@@ -68,28 +73,32 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     const double amplitude_sd = std::sqrt(std::max(0.0, along.dot(joint.block<2, 2>(of_a, of_a) * along)));
     const Unaliased real = unaliased(course.hz, fit, declared);
     const double hz_sd = std::sqrt(std::max(0.0, joint(of_hz, of_hz)));
-    if (effect == "dither_residue") {
-        all.push_back({effect, "frequency_hz", real.hz, std::hypot(hz_sd, real.from_hz_times * from_hz_sd)});
-        if (course.free == 1) {
+    if (on_samples(effect) == OnSamples::angle_line) {
+        all.push_back(
+            estimate_of(effect, courses[0]->name, real.hz, std::hypot(hz_sd, real.from_hz_times * from_hz_sd)));
+        if (course.free == 1 && courses.size() > 1) {
             // It is held at zero; the error says what of it would not show.
             LineCourse drifting = course;
             drifting.free = 2;
             const auto more = fit.joint_covariance(line_slopes(fit, drifting, a, b));
-            all.push_back({effect, drift_names[0], 0.0, std::sqrt(std::max(0.0, more(of_hz + 1, of_hz + 1)))});
+            const double sd = std::sqrt(std::max(0.0, more(of_hz + 1, of_hz + 1)));
+            all.push_back(estimate_of(effect, courses[1]->name, 0.0, sd));
         }
-        for (std::size_t k = 1; k < course.free; ++k) {
+        for (std::size_t k = 1; k < std::min(course.free, courses.size()); ++k) {
             const auto at = of_hz + static_cast<Eigen::Index>(k);
-            all.push_back({effect, drift_names[k - 1], real.drift_sign * course.coefficient(k),
-                           std::sqrt(std::max(0.0, joint(at, at)))});
+            all.push_back(estimate_of(effect, courses[k]->name, real.drift_sign * course.coefficient(k),
+                                      std::sqrt(std::max(0.0, joint(at, at)))));
         }
         const double gain = std::max(1e-9, 2.0 * std::abs(std::sin(units::pi * course.hz * series.interval_s)));
-        all.push_back({effect, "amplitude_arcsec", amplitude / gain, amplitude_sd / gain});
+        all.push_back(
+            estimate_of(effect, parameter_of(effect, Role::sampled).name, amplitude / gain, amplitude_sd / gain));
         return;
     }
-    all.push_back({effect, "frequency_hz", course.hz, hz_sd});
+    all.push_back(estimate_of(effect, courses[0]->name, course.hz, hz_sd));
     // Increments are those of a rate integrated over each interval.
     const double gain = std::sin(units::pi * course.hz * series.interval_s) / (units::pi * course.hz);
-    all.push_back({effect, "rate_deg_h", amplitude / std::abs(gain), amplitude_sd / std::abs(gain)});
+    all.push_back(estimate_of(effect, parameter_of(effect, Role::size).name, amplitude / std::abs(gain),
+                              amplitude_sd / std::abs(gain)));
     // a cos + b sin = A sin(phase + 2 pi f (t + middle)), t from the middle
     const double middle_s = middle_of(series);
     const double turns = course.hz * middle_s;
@@ -99,8 +108,8 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     by(of_a) = b / (amplitude * amplitude);
     by(of_a + 1) = -a / (amplitude * amplitude);
     by(of_hz) = -units::two_pi * middle_s;
-    all.push_back(
-        {effect, "phase_rad", std::remainder(phase, units::two_pi), std::sqrt(std::max(0.0, by.dot(joint * by)))});
+    all.push_back(estimate_of(effect, parameter_of(effect, Role::phase).name, std::remainder(phase, units::two_pi),
+                              std::sqrt(std::max(0.0, by.dot(joint * by)))));
 }
 
 /// Mean and standard deviation of the time of a step under its likelihood, which is no parabola.
@@ -136,8 +145,8 @@ Estimate time_of_step(const SampleFit& fit, std::size_t at) {
     const double mean = first / sum;
     // Within a row nothing tells.
     const double within = series.interval_s * static_cast<double>(step);
-    return {"bias_step", "time_s", series.time_s[row] + mean,
-            std::sqrt(std::max(0.0, second / sum - mean * mean) + within * within / 12.0)};
+    return estimate_of(*column.effect, parameter_of(*column.effect, Role::time).name, series.time_s[row] + mean,
+                       std::sqrt(std::max(0.0, second / sum - mean * mean) + within * within / 12.0));
 }
 
 double of_readings_hz(const SampleFit& fit) {
@@ -172,7 +181,7 @@ Untold untold_in(const SampleFit& fit, int step) {
     const SampleModel errors = fit.noise_errors();
     Untold untold;
     for (std::size_t k = 0; k < fit.model().resonances.size(); ++k) {
-        if (fit.model().resonance_steps[k] != step) continue;
+        if (fit.model().resonances[k].step != step) continue;
         const SampleNoise::Resonance& resonance = fit.model().noise.resonances[k];
         untold.resonances.push_back(resonance);
         untold.relative.push_back(errors.noise.resonances[k].arcsec / std::max(resonance.arcsec, 1e-12));
@@ -186,7 +195,7 @@ Untold untold_beside(const SampleFit& fit, const SampleFit& whole) {
     SampleModel beside = whole.model();
     beside.motion.assign(fit.series().size(), 0.0);
     for (const SampleColumn& column : fit.model().columns) {
-        if (column.effect != "case_motion") continue;
+        if (!is_motion(column.effect)) continue;
         for (std::size_t i = 0; i < beside.motion.size(); ++i) beside.motion[i] += column.value * (*column.series)[i];
     }
     const SampleFit left(fit.series(), std::move(beside), fit.rows(), SampleFit::Noise::near);
@@ -197,16 +206,16 @@ Untold untold_beside(const SampleFit& fit, const SampleFit& whole) {
 
 /// The motion's angle as a resonance of its own, whatever the witness tells of it. Noises that stood in for it where it
 /// was taken out may go on to: those that were told beside it are tried as well.
-SampleFit motion_as_resonance(const SampleFit& fit, const SampleFit& bare, const WitnessMotion& told, int step) {
+SampleFit motion_as_resonance(const SampleFit& fit, const SampleFit& bare, const WitnessMotion& told,
+                              const ResonanceOwner& owner) {
     const double centre_hz = std::max(told.centre_hz, 0.01);
     std::optional<SampleFit> best;
     for (const SampleModel& from : {bare.model(), without_motion(fit.model())}) {
         SampleModel with = bare.model();
         with.noise = from.noise;
         with.flicker_deg_h = from.flicker_deg_h;
-        with.motion_from_hz = slowest_of_motion * centre_hz;
-        with.resonances.insert(with.resonances.begin(), "case_motion");
-        with.resonance_steps.insert(with.resonance_steps.begin(), step);
+        with.motion_from_hz = options.samples.fit.slowest_of_motion * centre_hz;
+        with.resonances.insert(with.resonances.begin(), owner);
         with.noise.resonances.insert(with.noise.resonances.begin(),
                                      {std::max(told.rms_arcsec, 1e-6), centre_hz, 0.5 * centre_hz});
         SampleFit whole(fit.series(), std::move(with), fit.rows(), SampleFit::Noise::free);
@@ -222,22 +231,26 @@ std::vector<Estimate> whites_of(const SampleNoise& noise, const SampleNoise& err
 }
 
 /// What the motion is, and what its witness leaves of it.
-void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estimate>& all,
+void take_motion(const SampleFit& fit, const AddedEffect& added, std::vector<Estimate>& all,
                  std::vector<Estimate>& whites, std::vector<std::string>& notes) {
     const SampleSeries& series = fit.series();
-    const auto& [name, witness] = series.witnesses[step.witness];
-    all.push_back({"case_motion", "witness", static_cast<double>(name.back() - 'x'), 0.0, name});
+    const auto& [name, witness] = series.witnesses[added.witness];
+    const auto take = [&](std::string_view parameter, double value, double sd) -> Estimate& {
+        const effects::Effect& effect = added.effect();
+        return all.emplace_back(estimate_of(effect, parameter_of(effect, parameter).name, value, sd));
+    };
+    take("witness", static_cast<double>(name.back() - 'x'), 0.0).text = name;
     const SampleFit bare(series, without_motion(fit.model()), fit.rows(), SampleFit::Noise::near);
     const WitnessMotion told = fit_witness(bare, witness);
     const double centre = std::max(told.centre_hz, 0.01);
-    const SampleFit whole = motion_as_resonance(fit, bare, told, step.step);
+    const SampleFit whole = motion_as_resonance(fit, bare, told, {&added.effect(), added.id});
     const auto& motion = whole.model().noise.resonances.front();
     const SampleNoise errors = whole.noise_errors().noise;
     const SampleNoise::Resonance& error = errors.resonances.front();
-    const bool seen = whole.log_likelihood() - bare.log_likelihood() > 20.0;
+    const bool seen = whole.log_likelihood() - bare.log_likelihood() > options.samples.fit.motion_stands_out;
     // The witness's own noise comes in with what it tells of a strong motion, and is none of the gyro's. A motion that
     // is no resonance leaves more beside it than there is.
-    if (seen && step.strong && whole.model().noise.angle_arcsec < fit.model().noise.angle_arcsec) {
+    if (seen && added.strong && whole.model().noise.angle_arcsec < fit.model().noise.angle_arcsec) {
         whites = whites_of(whole.model().noise, errors);
     }
     double coherence = unknown;
@@ -245,7 +258,7 @@ void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estim
     if (seen) {
         // What is still needed beside what the witness tells, of the power where the motion is: elsewhere it is what
         // the witness cannot tell.
-        const Untold untold = step.strong ? untold_in(fit, step.step) : untold_beside(fit, whole);
+        const Untold untold = added.strong ? untold_in(fit, added.id) : untold_beside(fit, whole);
         const auto power = [&](const SampleNoise::Resonance& of) {
             return power_between(of, motion.hz - motion.width_hz, motion.hz + motion.width_hz, of_readings_hz(fit));
         };
@@ -269,71 +282,96 @@ void take_motion(const SampleFit& fit, const SampleStep& step, std::vector<Estim
             "the motion is known by its witness alone: its own spectrum does not stand out from the noise, "
             "so that coherence, rms, centre and width have no standard error");
     }
-    all.push_back({"case_motion", "coherence", seen ? coherence : told.coherence, coherence_sd});
-    all.push_back({"case_motion", "rms_arcsec", seen ? motion.arcsec : told.rms_arcsec, seen ? error.arcsec : unknown});
-    all.push_back({"case_motion", "centre_hz", seen ? motion.hz : centre, seen ? error.hz : unknown});
-    all.push_back({"case_motion", "width_hz", seen ? motion.width_hz : 0.5 * centre, seen ? error.width_hz : unknown});
+    take("coherence", seen ? coherence : told.coherence, coherence_sd);
+    take("rms_arcsec", seen ? motion.arcsec : told.rms_arcsec, seen ? error.arcsec : unknown);
+    take("centre_hz", seen ? motion.hz : centre, seen ? error.hz : unknown);
+    take("width_hz", seen ? motion.width_hz : 0.5 * centre, seen ? error.width_hz : unknown);
+}
+
+/// Growth of the variance of the rate [(arcsec/s)^2/s] at unit deviation; 1 deg/h is 1 arcsec/s.
+double walk_of_unit(const effects::Effect& effect) { return effect.rate_noise(unit_values(effect)).walk_deg2_h2_per_s; }
+
+void take_walk(const effects::Effect& effect, const SampleNoise& noise, const SampleNoise& errors,
+               std::vector<Estimate>& all) {
+    // The walk goes by its variance; of a root the relative error is half.
+    const double deviation = deviation_of_walk(effect, noise);
+    const double sd = 0.5 * errors.walk_arcsec2_s3 / walk_of_unit(effect) / std::max(deviation, 1e-300);
+    all.push_back(estimate_of(effect, parameter_of(effect, Role::deviation).name, deviation, sd));
+}
+
+void take_resampling(const SampleFit& fit, const AddedEffect& added, double from_hz_sd, std::vector<Estimate>& all,
+                     std::vector<std::string>& notes) {
+    const std::string_view parameter = parameter_of(added.effect(), Role::sampled).name;
+    const double from_hz = fit.model().noise.from_hz;
+    all.push_back(estimate_of(added.effect(), parameter, from_hz, added.other_hz.empty() ? from_hz_sd : unknown));
+    for (const double hz : added.other_hz) {
+        notes.push_back(
+            fmt::format("a source of {:.6g} Hz explains the record as well as {:.6g} Hz: {} has no standard error", hz,
+                        from_hz, parameter));
+    }
+}
+
+/// A line that wanders, as a narrow resonance.
+void take_wandering(const SampleFit& fit, std::size_t resonance, const SampleNoise& errors,
+                    const record::Declared& declared, std::vector<Estimate>& all) {
+    const effects::Effect& effect = *fit.model().resonances[resonance].effect;
+    const auto& line = fit.model().noise.resonances[resonance];
+    const auto& sd = errors.resonances[resonance];
+    const Unaliased real = unaliased(line.hz, fit, declared);
+    all.push_back(estimate_of(effect, parameter_of(effect, Role::frequency).name, real.hz,
+                              std::hypot(sd.hz, real.from_hz_times * errors.from_hz)));
+    all.push_back(estimate_of(effect, parameter_of(effect, Role::sampled).name, std::numbers::sqrt2 * line.arcsec,
+                              std::numbers::sqrt2 * sd.arcsec));
+    all.push_back(estimate_of(effect, "wander_hz", line.width_hz, sd.width_hz));
 }
 
 }  // namespace
 
-SampleFigures figures_of(const SampleFit& fit, const std::vector<SampleStep>& steps, const record::Declared& declared) {
+double deviation_of_walk(const effects::Effect& effect, const SampleNoise& noise) {
+    return std::sqrt(noise.walk_arcsec2_s3 / walk_of_unit(effect));
+}
+
+SampleFigures figures_of(const SampleFit& fit, const std::vector<AddedEffect>& added,
+                         const record::Declared& declared) {
     const SampleModel& model = fit.model();
     const SampleModel errors = fit.noise_errors();
     SampleFigures figures;
-    // It is that at the temperature of the start.
+    // The mean rate is that at the temperature of the start.
     double of_start = 0.0;
     for (const SampleColumn& column : model.columns) {
-        if (column.effect == "bias_temperature") of_start = column.value * fit.series().temperature_start_sd_k;
+        if (column.effect == nullptr || on_samples(*column.effect) != OnSamples::rate) continue;
+        of_start += column.value * rate_per_kelvin(*column.effect) * fit.series().temperature_start_sd_k;
     }
     figures.base.push_back({"", "mean_rate_deg_h", model.columns[0].value, std::hypot(model.columns[0].sd, of_start)});
     std::vector<Estimate> whites = whites_of(model.noise, errors.noise);
-    for (const SampleStep& step : steps) {
+    for (const AddedEffect& one : added) {
         auto& all = figures.steps.emplace_back();
-        const std::string& effect = step.effect;
-        if (effect == "case_motion") {
-            take_motion(fit, step, all, whites, figures.notes);
+        const effects::Effect& effect = one.effect();
+        const OnSamples as = on_samples(effect);
+        if (as == OnSamples::motion) {
+            take_motion(fit, one, all, whites, figures.notes);
             continue;
         }
         for (std::size_t k = 0; k < model.columns.size(); ++k) {
             const SampleColumn& column = model.columns[k];
-            if (column.step != step.step || column.effect != effect || column.name == "sine") continue;
+            if (column.step != one.id || column.effect != &effect || column.name == "sine") continue;
             if (column.name == "cosine") {
                 take_line(fit, k, declared, errors.noise.from_hz, all);
                 continue;
             }
-            all.push_back({effect, column.name, column.value, column.sd});
-            if (effect == "bias_step") all.push_back(time_of_step(fit, k));
+            all.push_back(estimate_of(effect, column.name, column.value, column.sd));
+            if (as == OnSamples::step) all.push_back(time_of_step(fit, k));
         }
-        if (effect == "rate_random_walk") {
-            // The walk goes by its variance; of a root the relative error is half.
-            const double root = std::sqrt(model.noise.walk_arcsec2_s3);
-            const double sd = errors.noise.walk_arcsec2_s3;
-            all.push_back({effect, "deg_h_rt_h", 60.0 * root, 60.0 * 0.5 * sd / std::max(root, 1e-300)});
+        if (as == OnSamples::walk) take_walk(effect, model.noise, errors.noise, all);
+        if (as == OnSamples::flicker) {
+            all.push_back(estimate_of(effect, parameter_of(effect, Role::deviation).name, model.flicker_deg_h,
+                                      errors.flicker_deg_h));
         }
-        if (effect == "bias_instability") all.push_back({effect, "deg_h", model.flicker_deg_h, errors.flicker_deg_h});
-        if (effect == "resampling") {
-            all.push_back(
-                {effect, "from_hz", model.noise.from_hz, step.other_hz.empty() ? errors.noise.from_hz : unknown});
-            for (const double hz : step.other_hz) {
-                figures.notes.push_back(fmt::format(
-                    "a source of {:.6g} Hz explains the record as well as {:.6g} Hz: from_hz has no standard error", hz,
-                    model.noise.from_hz));
-            }
-        }
-        for (std::size_t k = 0; k < model.resonances.size(); ++k) {
-            if (model.resonance_steps[k] != step.step) continue;
-            // A line that wanders
-            const auto& line = model.noise.resonances[k];
-            const auto& sd = errors.noise.resonances[k];
-            const Unaliased real = unaliased(line.hz, fit, declared);
-            all.push_back(
-                {effect, "frequency_hz", real.hz, std::hypot(sd.hz, real.from_hz_times * errors.noise.from_hz)});
-            all.push_back(
-                {effect, "amplitude_arcsec", std::numbers::sqrt2 * line.arcsec, std::numbers::sqrt2 * sd.arcsec});
-            all.push_back({effect, "wander_hz", line.width_hz, sd.width_hz});
-            break;
-        }
+        if (as == OnSamples::transport) take_resampling(fit, one, errors.noise.from_hz, all, figures.notes);
+        const auto own = std::find_if(model.resonances.begin(), model.resonances.end(),
+                                      [&](const ResonanceOwner& owner) { return owner.step == one.id; });
+        if (own == model.resonances.end()) continue;
+        take_wandering(fit, static_cast<std::size_t>(own - model.resonances.begin()), errors.noise, declared, all);
     }
     figures.base.insert(figures.base.end(), whites.begin(), whites.end());
     return figures;

@@ -3,29 +3,35 @@
 #include <string>
 #include <vector>
 
+#include "analysis/closure/closure.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/record/record.hpp"
 
 /// What a fit to samples says of the parameters of the effects in it, with standard errors.
 namespace ringlock::closure {
 
-/// An effect in a model.
-struct SampleStep {
-    std::string effect;
-    int step = 0;                       ///< as in its columns and resonances
+/// An effect that is in a model: its part of the model, and what is reported of it.
+struct AddedEffect {
+    Step step = {};                     ///< its parameters, unless they are known already, come from a last fit
+    int id = 0;                         ///< the step of its columns and resonances
     std::size_t witness = 0;            ///< of a motion, in the series
-    bool strong = false;                ///< motion that is told at many lags
-    double hz = 0.0;                    ///< of a line, where the record has it
+    bool strong = false;                ///< a motion that is fitted at many lags of its witness
+    double hz = 0.0;                    ///< of a line, where the record shows it
     std::vector<double> other_hz = {};  ///< rates that explain a resampled record as well
+
+    const effects::Effect& effect() const { return *step.effect; }
 };
 
 struct SampleFigures {
     std::vector<Estimate> base;
-    std::vector<std::vector<Estimate>> steps;
-    std::vector<std::string> notes;  ///< why some have no standard error
+    std::vector<std::vector<Estimate>> steps;  ///< of each effect that was added
+    std::vector<std::string> notes;            ///< why some have no standard error
 };
 
 /// \param fit  to all rows that are to count
-SampleFigures figures_of(const SampleFit& fit, const std::vector<SampleStep>& steps, const record::Declared& declared);
+SampleFigures figures_of(const SampleFit& fit, const std::vector<AddedEffect>& added, const record::Declared& declared);
+
+/// The deviation of a random-walk effect that makes the walk of the noise.
+double deviation_of_walk(const effects::Effect& effect, const SampleNoise& noise);
 
 }  // namespace ringlock::closure

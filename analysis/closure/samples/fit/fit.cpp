@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/column_regression.hpp"
 
 namespace ringlock::closure {
@@ -19,7 +20,7 @@ SampleFit::SampleFit(const SampleSeries& series, SampleModel model, const Rows& 
     : series_(&series), rows_(&rows), model_(std::move(model)), searched_(noise == Noise::near) {
     if (model_.columns.empty()) {
         model_.columns.push_back(
-            {"", "mean_rate_deg_h", std::make_shared<std::vector<double>>(series.size(), series.interval_s)});
+            {nullptr, "mean_rate_deg_h", std::make_shared<std::vector<double>>(series.size(), series.interval_s)});
         take_off();
         double mean = 0.0;
         for (const double x : rest_) mean += x / static_cast<double>(series.size());
@@ -107,19 +108,17 @@ void SampleFit::filter_by(const SampleNoise& noise) {
 
 /// What the digits are, nobody knows: rows tell of the rest that would be as uncertain with others.
 void SampleFit::find_settled(SampleNoise noise) {
-    constexpr double small = 0.03;
-    constexpr double coarser = 1.5;
-    constexpr double more = 1.01;
+    const SampleFitOptions& by = options.samples.fit;
     const std::size_t n = series_->size();
     settled_.assign(n, 0);
     telling_ = *rows_;
     if (!(noise.from_hz > 0.0)) return;
-    noise.digits_arcsec *= coarser;
+    noise.digits_arcsec *= by.coarser_digits;
     const SampleFilter beside(noise, n, series_->interval_s);
     double largest = 0.0;
     for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, sd(i));
     for (std::size_t i = 0; i < n; ++i) {
-        if (sd(i) > small * largest && beside.sd(i) < more * sd(i)) continue;
+        if (sd(i) > by.settled_sd * largest && beside.sd(i) < by.settled_growth * sd(i)) continue;
         settled_[i] = 1;
         telling_[i] = 0;
     }

@@ -9,13 +9,15 @@
 #include "analysis/closure/samples/model/series.hpp"
 #include "analysis/closure/samples/model/source.hpp"
 #include "analysis/closure/types.hpp"
+#include "engine/effects/effect.hpp"
 
 namespace ringlock::closure {
 
 /// Increments in proportion to one parameter.
 struct SampleColumn {
-    std::string effect, name;
-    std::shared_ptr<const std::vector<double>> series;
+    const effects::Effect* effect = nullptr;  ///< null: of the base model
+    std::string name;
+    std::shared_ptr<const std::vector<double>> series = nullptr;
     double value = 0.0;
     double sd = 0.0;
     int step = -1;             ///< of the loop that added it
@@ -25,17 +27,21 @@ struct SampleColumn {
     LineCourse course = {};
 };
 
+/// The effect, and the step of the loop that added it, which a resonance of the noise belongs to.
+struct ResonanceOwner {
+    const effects::Effect* effect = nullptr;
+    int step = -1;
+};
+
 /// What a model of the samples consists of.
 struct SampleModel {
     SampleNoise noise;
-    double flicker_deg_h = 0.0;         ///< B of the bias instability; makes the noise's terms
-    std::vector<SampleColumn> columns;  ///< the mean rate first
-    std::vector<double> motion;         ///< of the case, by its witness: taken off the increments; empty: none
-    double motion_from_hz = 0.0;        ///< what the witness does not tell of it is no slower: that is a slow rate
-    double from_shift = 0.0;            ///< of from_hz, in tenths of a cycle over the record, while it is fitted
-    /// Whose resonances the noise has, in their order.
-    std::vector<std::string> resonances;
-    std::vector<int> resonance_steps;  ///< of the loop that added each
+    double flicker_deg_h = 0.0;              ///< B of the bias instability; makes the noise's terms
+    std::vector<SampleColumn> columns;       ///< the mean rate first
+    std::vector<double> motion;              ///< of the case, by its witness: taken off the increments; empty: none
+    double motion_from_hz = 0.0;             ///< what the witness does not tell of it is no slower: that is a slow rate
+    double from_shift = 0.0;                 ///< of from_hz, in tenths of a cycle over the record, while it is fitted
+    std::vector<ResonanceOwner> resonances;  ///< of each resonance of the noise, in their order
     bool walk = false;
     bool flicker = false;
 };

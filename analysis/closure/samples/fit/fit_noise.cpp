@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <utility>
 
 #include "analysis/closure/samples/fit/fit.hpp"
+#include "analysis/closure/samples/fit/motion.hpp"
+#include "analysis/closure/samples/fit/simplex.hpp"
 #include "analysis/closure/samples/model/lanes.hpp"
 #include "analysis/closure/stats/column_regression.hpp"
 #include "engine/core/interrupt.hpp"
@@ -17,60 +18,6 @@
 namespace ringlock::closure {
 
 namespace {
-
-using Point = std::vector<double>;
-/// Of several points at once, in much less time than one after the other.
-using Values = std::function<std::vector<double>(const std::vector<Point>&)>;
-
-/// Nelder and Mead (Computer Journal 7, 308, 1965): smallest value of a function of a few numbers. All places that a
-/// step may go to are looked at together.
-Point smallest(const Values& f, const Point& start, double size, int steps) {
-    const std::size_t n = start.size();
-    std::vector<Point> places(n + 1, start);
-    for (std::size_t i = 0; i < n; ++i) places[i + 1][i] += size;
-    std::vector<double> values = f(places);
-    std::vector<std::pair<double, Point>> corners;
-    for (std::size_t c = 0; c <= n; ++c) corners.emplace_back(values[c], places[c]);
-    const auto lower = [](const auto& a, const auto& b) { return a.first < b.first; };
-    for (; steps > 0; --steps) {
-        std::sort(corners.begin(), corners.end(), lower);
-        const double best = corners.front().first;
-        auto& worst = corners.back();
-        if (worst.first - best < 0.01) break;
-        Point centre(n, 0.0);
-        for (std::size_t c = 0; c < n; ++c) {
-            for (std::size_t i = 0; i < n; ++i) centre[i] += corners[c].second[i] / static_cast<double>(n);
-        }
-        places.assign(4, centre);
-        constexpr double reflected = -1.0;
-        constexpr double expanded = -2.0;
-        constexpr double outside = -0.5;
-        constexpr double inside = 0.5;
-        const double along[] = {reflected, expanded, outside, inside};
-        for (std::size_t k = 0; k < places.size(); ++k) {
-            for (std::size_t i = 0; i < n; ++i) places[k][i] += along[k] * (worst.second[i] - centre[i]);
-        }
-        values = f(places);
-        std::size_t taken = 0;
-        if (values[0] < best) {
-            taken = values[1] < values[0] ? 1 : 0;
-        } else if (!(values[0] < corners[n - 1].first)) {
-            taken = values[0] < worst.first ? 2 : 3;
-            if (!(values[taken] < std::min(values[0], worst.first))) {
-                places.clear();
-                for (std::size_t c = 1; c <= n; ++c) {
-                    Point& place = places.emplace_back(corners[c].second);
-                    for (std::size_t i = 0; i < n; ++i) place[i] = 0.5 * (place[i] + corners.front().second[i]);
-                }
-                values = f(places);
-                for (std::size_t c = 1; c <= n; ++c) corners[c] = {values[c - 1], places[c - 1]};
-                continue;
-            }
-        }
-        worst = {values[taken], places[taken]};
-    }
-    return std::min_element(corners.begin(), corners.end(), lower)->second;
-}
 
 struct Free {
     double* value;
@@ -185,7 +132,7 @@ SampleModel SampleFit::at(const std::vector<double>& x) const {
         const double rate_hz = model.noise.from_hz > 0.0 ? model.noise.from_hz : series_->rate_hz;
         if (resonance.hz > 0.5 * rate_hz || resonance.width_hz > 3.0 * rate_hz) resonance.arcsec = 0.0;
         const bool slow = std::hypot(resonance.hz, 0.5 * resonance.width_hz) < model.motion_from_hz;
-        if (slow && model.resonances[k] == "case_motion") resonance.arcsec = 0.0;
+        if (slow && is_motion(model.resonances[k].effect)) resonance.arcsec = 0.0;
     }
     if (model.noise.from_hz > 0.0) {
         // About the middle of the record, so that rate and place are told apart.
@@ -411,7 +358,7 @@ void SampleFit::fit_noise() {
     // So does a part of what a witness leaves of a motion: a line beside it may have had no use for it.
     auto& resonances = model_.noise.resonances;
     for (std::size_t k = 1; k < resonances.size(); ++k) {
-        const bool of_one_motion = model_.resonances[k] == "case_motion" && model_.resonances[k - 1] == "case_motion";
+        const bool of_one_motion = is_motion(model_.resonances[k].effect) && is_motion(model_.resonances[k - 1].effect);
         if (of_one_motion && resonances[k].arcsec < 1e-2 * resonances[k - 1].arcsec) {
             resonances[k] = resonances[k - 1];
             resonances[k].arcsec *= 0.3;

@@ -5,6 +5,7 @@
 #include <complex>
 #include <vector>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/line_search.hpp"
 #include "engine/core/units.hpp"
 
@@ -164,7 +165,6 @@ double places_of_bends(double chi2, double cycles, std::size_t coefficients) {
 }
 
 FoundCourse follow_bends(const std::vector<double>& values, double rate_hz, const FoundLines& found) {
-    constexpr double of_a_coefficient = 12.0;  // of the chi-squared
     const double duration_s = static_cast<double>(values.size()) / rate_hz;
     const LineCourse start = LineCourse::even(found.scattered_hz, found.scattered_drift_hz_per_s);
     const auto cells = cells_about(values, rate_hz, start, most_pieces / duration_s);
@@ -178,7 +178,7 @@ FoundCourse follow_bends(const std::vector<double>& values, double rate_hz, cons
         Bending bending(cells, degree);
         bending.run(most_pieces);
         const double chi2 = 2.0 * bending.power() * weight / square;
-        const double worth = chi2 - of_a_coefficient * static_cast<double>(degree);
+        const double worth = chi2 - options.samples.lines.bend * static_cast<double>(degree);
         if (!(worth > most)) continue;
         most = worth;
         best = {bent(start, bending.by(), duration_s), chi2};

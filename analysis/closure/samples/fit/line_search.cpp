@@ -5,6 +5,7 @@
 #include <numeric>
 #include <unsupported/Eigen/FFT>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/units.hpp"
 
@@ -100,7 +101,7 @@ struct Spectrum {
           width_hz(width) {
         const double per_bin = rows / static_cast<double>(padded);  // Fourier frequencies a bin
         level = level_about(power, static_cast<std::size_t>(std::min(300.0, std::max(40.0, rows / 100.0)) / per_bin));
-        first = static_cast<std::size_t>(fewest_cycles / per_bin);
+        first = static_cast<std::size_t>(options.samples.lines.fewest_cycles / per_bin);
     }
     double level_at(double hz) const {
         return level[std::min(level.size() - 1, static_cast<std::size_t>(std::max(0.0, hz) / bin_hz))];
@@ -116,8 +117,7 @@ struct Spectrum {
 /// Over the level about it; where that leaves nothing to chance, by its own power: a strong line raises the level about
 /// itself, and what is elsewhere may be what it does there.
 bool stands_out(double chi2, double squares, const FoundLine& from) {
-    constexpr double certain = 1000.0;
-    return std::min(chi2, from.chi2) > certain ? squares > from.squares : chi2 > from.chi2;
+    return std::min(chi2, from.chi2) > options.samples.lines.certain ? squares > from.squares : chi2 > from.chi2;
 }
 
 void count_places(FoundLine& line, double places) {
@@ -141,7 +141,7 @@ FoundLine still_line(const Spectrum& spectrum) {
 /// All frequencies, drifts of so many cycles of either sign, the phase followed over the whole record.
 FoundLine slow_line(const std::vector<double>& values, const Spectrum& spectrum) {
     // A drift that is off by half a cycle at most leaves 98 % of a line's power.
-    constexpr int most = 16;
+    const int most = options.samples.lines.slow_drift_cycles;
     FoundLine found;
     const std::size_t n = values.size();
     std::vector<Complex> turned(spectrum.padded, 0.0);
@@ -199,7 +199,8 @@ FoundLine follow(const std::vector<double>& values, const Spectrum& spectrum, do
         const auto out = transform(turned);
         for (std::ptrdiff_t k = -reach; k <= reach; ++k) {
             const double hz = centre_hz + bin_hz * static_cast<double>(k);
-            if (hz * spectrum.duration_s < fewest_cycles || hz > 0.5 * spectrum.rate_hz - 4.0 * spectrum.bin_hz)
+            if (hz * spectrum.duration_s < options.samples.lines.fewest_cycles ||
+                hz > 0.5 * spectrum.rate_hz - 4.0 * spectrum.bin_hz)
                 continue;
             const double power = std::norm(out[static_cast<std::size_t>((k + all) % all)]);
             const double chi2 = 2.0 * power / spectrum.level_at(hz);
@@ -277,7 +278,7 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
         // Sums of many pieces keep to a bin each: not far from independent.
         const double count = lengths * 1.5 * 0.5 * static_cast<double>(length) * (2.0 * most + 1.0);
         const double p = of_several(chi2_tail(best, static_cast<int>(2.0 * used)), count);
-        if (best - 2.0 * used > lines.scattered && p < 1e-6) {
+        if (best - 2.0 * used > lines.scattered && p < options.samples.lines.scattered_p) {
             lines.scattered = best - 2.0 * used;
             lines.scattered_hz = hz * static_cast<double>(best_bin);
             lines.scattered_drift_hz_per_s = best_slope * bins * hz / spectrum.duration_s;
@@ -290,7 +291,7 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
         drift_cycles = 2.0 * most * static_cast<double>(pieces);
     }
     if (least == 1.0) return;
-    constexpr double near_cycles = 64.0;
+    const double near_cycles = options.samples.lines.near_cycles;
     lines.tracked = follow(values, spectrum, tracked_hz, near_cycles / spectrum.duration_s, tracked_drift,
                            static_cast<int>(near_cycles));
     count_places(lines.tracked, places_of_drift(lines.tracked.chi2, spectrum.cycles(), drift_cycles));
@@ -313,7 +314,7 @@ FoundLine FoundLines::likeliest() const {
         const bool as_rare = other.p_value == best.p_value && stands_out(other.chi2, other.squares, best);
         if (other.p_value < best.p_value || as_rare) best = other;
     }
-    constexpr double kinds = 3.0;
+    const double kinds = options.samples.lines.kinds;
     best.searched *= kinds;
     best.p_value = of_several(best.p_value, kinds);
     return best;
@@ -337,7 +338,7 @@ FoundLines find_lines(const std::vector<double>& values, double rate_hz, const s
 NarrowLines find_lines_in(const std::vector<double>& values, double rate_hz, const LineBand& band,
                           const std::vector<double>& known_hz, double width_hz) {
     // More drifts than these are left to the search over all frequencies.
-    constexpr double most_cycles = 128.0;
+    const double most_cycles = options.samples.lines.declared_drift_cycles;
     const Spectrum spectrum(values, rate_hz, known_hz, width_hz);
     const double cycles = 2.0 * band.half_width_hz * spectrum.duration_s;
     const double drift_cycles =

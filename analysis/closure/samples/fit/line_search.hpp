@@ -8,9 +8,6 @@
 /// Lines in a series of white innovations: where one stands out, and how probable that is by chance.
 namespace ringlock::closure {
 
-/// Below so many cycles a record a line is a rate that changes.
-inline constexpr double fewest_cycles = 8.0;
-
 /// A line whose frequency keeps or drifts evenly.
 struct FoundLine {
     double frequency_hz = 0.0;  ///< in the middle of the rows

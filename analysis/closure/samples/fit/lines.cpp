@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "analysis/closure/options.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -58,8 +59,6 @@ SampleLine refined_from(const SampleFit& fit, SampleLine line) {
 
 }  // namespace
 
-bool is_line(const std::string& effect) { return effect == "dither_residue" || effect == "base_vibration"; }
-
 std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const LineCourse& course, double a, double b) {
     const double duration_s = static_cast<double>(fit.series().size()) * fit.series().interval_s;
     // So small a part of a cycle at either end of the record that the next term does not matter.
@@ -98,8 +97,8 @@ SampleLine refine_line(const SampleFit& fit, const LineCourse& shown) {
 }
 
 bool scatters(const SampleFit& fit, std::vector<double> innovations, const FoundLines& found, const SampleLine& line) {
-    constexpr double near_hz = 1.0;
-    if (!(found.scattered > line.chi2 + much_scattered)) return false;
+    const SampleLineOptions& lines = options.samples.lines;
+    if (!(found.scattered > line.chi2 + lines.much_scattered)) return false;
     // A strong line raises the level about it, which powers are over, and hides others near it: what is left of it is a
     // good part of its own power, over the level as well.
     const auto columns = fit.line(line.course);
@@ -111,13 +110,13 @@ bool scatters(const SampleFit& fit, std::vector<double> innovations, const Found
         }
     }
     const FoundLines left = find_lines(innovations, fit.series().rate_hz);
-    const bool same = std::abs(left.scattered_hz - found.scattered_hz) < near_hz;
-    return same && left.scattered > found.scattered / 3.0 + much_scattered &&
-           left.scattered_squares > found.scattered_squares / 3.0;
+    const bool same = std::abs(left.scattered_hz - found.scattered_hz) < lines.beside_hz;
+    return same && left.scattered > found.scattered / lines.left_parts + lines.much_scattered &&
+           left.scattered_squares > found.scattered_squares / lines.left_parts;
 }
 
 SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, const Rows& rows,
-                                const std::string& effect, int step) {
+                                const effects::Effect* effect, int step) {
     const SampleSeries& series = fit.series();
     double squares = 0.0;
     double count = 0.0;
@@ -132,9 +131,8 @@ SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, c
     const double rms = sd * std::sqrt(found.scattered / count) / std::max(gain, 1e-6);
     const double duration_s = static_cast<double>(series.size()) * series.interval_s;
     SampleModel model = fit.model();
-    model.noise.resonances.push_back({rms, found.scattered_hz, 64.0 / duration_s});
-    model.resonances.push_back(effect);
-    model.resonance_steps.push_back(step);
+    model.noise.resonances.push_back({rms, found.scattered_hz, options.samples.screen.known_line_cycles / duration_s});
+    model.resonances.push_back({effect, step});
     return model;
 }
 

@@ -1,6 +1,4 @@
 #pragma once
-#include <array>
-#include <string>
 #include <vector>
 
 #include "analysis/closure/samples/fit/fit.hpp"
@@ -9,17 +7,11 @@
 /// Lines in samples, their frequency and drift fitted as closely as their amplitudes are.
 namespace ringlock::closure {
 
-/// Parameters of dither_residue that are the drifts of a course.
-inline constexpr std::array<const char*, LineCourse::most - 1> drift_names{
-    "drift_hz_per_s", "drift_2_hz_per_s2", "drift_3_hz_per_s3", "drift_4_hz_per_s4", "drift_5_hz_per_s5"};
-
 /// a cos + b sin of 2 pi times the turns of the course.
 struct SampleLine {
     LineCourse course;
     double chi2 = 0.0;  ///< that its two amplitudes explain
 };
-
-bool is_line(const std::string& effect);
 
 /// What a change of the frequency, and of each drift that is free, adds to a line of those amplitudes, as the record
 /// has it.
@@ -32,20 +24,15 @@ void set_line(SampleModel& model, std::size_t cosine, const SampleSeries& series
 /// have the line. Of a resampled record, what its source has there.
 SampleLine refine_line(const SampleFit& fit, const LineCourse& shown);
 
-/// What is left of a line, or made of one, is nearer to it than that.
-inline constexpr double beside_hz = 1.0;
-
-/// More in pieces than a line has may be chance [chi-squared].
-inline constexpr double much_scattered = 60.0;
-
 /// Whether the power that stands out in pieces of the innovations is that of a line which does not keep its phase: it
 /// is still there when the line that explains most has been taken off. The innovations are zero where they do not
 /// count.
 bool scatters(const SampleFit& fit, std::vector<double> innovations, const FoundLines& found, const SampleLine& line);
 
 /// The model with such power as a narrow resonance, which keeps neither amplitude nor phase.
+/// \param effect  that the resonance belongs to; null for a model that only tests the residual
 SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, const Rows& rows,
-                                const std::string& effect, int step);
+                                const effects::Effect* effect, int step);
 
 /// What refine_line() does for all lines of a model, which is fitted anew with them.
 SampleFit refine_lines(SampleFit fit, const Rows& rows);

@@ -6,6 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "analysis/closure/decide/effect_queries.hpp"
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/repeats_and_witness.hpp"
 
 namespace ringlock::closure {
@@ -20,24 +22,26 @@ std::vector<std::vector<double>> motion_columns(const std::vector<double>& witne
     return columns;
 }
 
-void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witness, int step) {
+bool is_motion(const effects::Effect* effect) { return effect != nullptr && on_samples(*effect) == OnSamples::motion; }
+
+void add_motion(SampleModel& model, const SampleSeries& series, const effects::Effect& effect, std::size_t witness,
+                int step) {
     auto columns = motion_columns(series.witnesses[witness].second);
     for (std::size_t c = 0; c < 2; ++c) {
-        model.columns.push_back({"case_motion", c == 0 ? "in_phase" : "quadrature",
+        model.columns.push_back({&effect, c == 0 ? "in_phase" : "quadrature",
                                  std::make_shared<const std::vector<double>>(std::move(columns[c]))});
         model.columns.back().step = step;
     }
 }
 
 SampleModel without_motion(SampleModel model) {
-    std::erase_if(model.columns, [](const SampleColumn& c) { return c.effect == "case_motion"; });
+    std::erase_if(model.columns, [](const SampleColumn& c) { return is_motion(c.effect); });
     model.motion.clear();
     model.motion_from_hz = 0.0;
     for (std::size_t k = model.resonances.size(); k-- > 0;) {
-        if (model.resonances[k] != "case_motion") continue;
+        if (!is_motion(model.resonances[k].effect)) continue;
         const auto at = static_cast<std::ptrdiff_t>(k);
         model.resonances.erase(model.resonances.begin() + at);
-        model.resonance_steps.erase(model.resonance_steps.begin() + at);
         model.noise.resonances.erase(model.noise.resonances.begin() + at);
     }
     return model;
@@ -88,25 +92,25 @@ SampleNoise begun_with(const SampleFit& now, const std::vector<double>& told, do
 
 }  // namespace
 
-SampleModel moved_as(const SampleFit& now, std::size_t witness, int step) {
+SampleModel moved_as(const SampleFit& now, const effects::Effect& effect, std::size_t witness, int step) {
     const auto& watched = now.series().witnesses[witness].second;
     const WitnessMotion motion = fit_witness(now, watched);
     SampleModel model = now.model();
     model.motion = motion.increments;
-    model.motion_from_hz = slowest_of_motion * motion.centre_hz;
+    model.motion_from_hz = options.samples.fit.slowest_of_motion * motion.centre_hz;
     // What the witness does not tell moves like what it tells; its own noise hides the edges of that, which are wider.
     const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
     const double centre_hz = std::max(motion.centre_hz, 0.01);
-    model.resonances.insert(model.resonances.end(), 2, "case_motion");
-    model.resonance_steps.insert(model.resonance_steps.end(), 2, step);
+    model.resonances.insert(model.resonances.end(), 2, {&effect, step});
     std::optional<SampleFit> first;
     for (const Untold where : {Untold::about_the_motion, Untold::at_half_the_rate}) {
         SampleModel trial = model;
         trial.noise = begun_with(now, motion.increments, untold, centre_hz, where);
         SampleFit fit(now.series(), std::move(trial), now.rows());
         // What is narrow and elsewhere is a line, and none of the motion.
-        const bool line = where == Untold::at_half_the_rate &&
-                          fit.model().noise.resonances.back().width_hz < 0.1 * now.series().rate_hz;
+        const bool line =
+            where == Untold::at_half_the_rate && fit.model().noise.resonances.back().width_hz <
+                                                     options.samples.fit.narrowest_at_half_rate * now.series().rate_hz;
         if (!first || (!line && fit.log_likelihood() > first->log_likelihood())) first.emplace(std::move(fit));
     }
     // Once more with what is left as the noise.

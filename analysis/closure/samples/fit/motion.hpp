@@ -5,14 +5,15 @@
 
 namespace ringlock::closure {
 
-/// What is left of a motion is no slower than that share of its centre: it would be a rate that drifts.
-inline constexpr double slowest_of_motion = 0.2;
-
 /// What a motion in proportion to a witness adds to the increments, and the same a quarter of a cycle later.
 std::vector<std::vector<double>> motion_columns(const std::vector<double>& witness);
-void add_motion(SampleModel& model, const SampleSeries& series, std::size_t witness, int step);
+void add_motion(SampleModel& model, const SampleSeries& series, const effects::Effect& effect, std::size_t witness,
+                int step);
 SampleModel without_motion(SampleModel model);
 /// The model with all that a witness tells of a motion, lag by lag, and what it does not tell as two resonances.
-SampleModel moved_as(const SampleFit& now, std::size_t witness, int step);
+SampleModel moved_as(const SampleFit& now, const effects::Effect& effect, std::size_t witness, int step);
+
+/// Whether the effect, null for the base model, is a motion of the case.
+bool is_motion(const effects::Effect* effect);
 
 }  // namespace ringlock::closure

@@ -6,6 +6,7 @@
 #include <complex>
 #include <numeric>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/line_search.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/units.hpp"
@@ -86,7 +87,11 @@ FoundCycle find_cycle(const std::vector<double>& innovations, const Rows& rows, 
     return found;
 }
 
-int witness_lags(double rate_hz) { return std::clamp(static_cast<int>(std::lround(0.25 * rate_hz)), 2, 40); }
+int witness_lags(double rate_hz) {
+    const SampleFitOptions& fit = options.samples.fit;
+    return std::clamp(static_cast<int>(std::lround(fit.witness_lag_s * rate_hz)), fit.fewest_witness_lags,
+                      fit.most_witness_lags);
+}
 
 FoundWitness find_witness(const std::vector<double>& innovations, const Rows& rows, const SampleSeries& series) {
     const std::size_t n = innovations.size();

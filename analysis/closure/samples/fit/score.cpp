@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/closure/options.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -17,7 +18,7 @@ SampleScore score_of(const SampleFit& fit, const Rows& reported, double lattice_
         double e = fit.innovations()[i] * sd;
         score.log_score -= 0.5 * e * e / (sd * sd) + std::log(sd) + 0.5 * std::log(units::two_pi);
         score.floor += sd * sd;
-        if (lattice_arcsec > 0.02 * sd) {
+        if (lattice_arcsec > options.samples.fit.fine_lattice * sd) {
             const double x = fit.series().increment[i];
             const double predicted = x - e;
             const auto reach = static_cast<int>(std::ceil(6.0 * sd / lattice_arcsec)) + 1;

@@ -3,30 +3,48 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string>
 #include <utility>
+
+#include "analysis/closure/decide/effect_queries.hpp"
+#include "analysis/closure/options.hpp"
 
 namespace ringlock::closure {
 
-SampleColumn step_column(const SampleSeries& series, std::size_t row) {
-    auto values = std::make_shared<std::vector<double>>(series.size(), 0.0);
-    std::fill(values->begin() + static_cast<std::ptrdiff_t>(row), values->end(), series.interval_s);
-    return {.effect = "bias_step", .name = "step_deg_h", .series = std::move(values)};
+namespace {
+
+std::vector<double> step_at(const SampleSeries& series, std::size_t row) {
+    std::vector<double> values(series.size(), 0.0);
+    std::fill(values.begin() + static_cast<std::ptrdiff_t>(row), values.end(), series.interval_s);
+    return values;
+}
+
+}  // namespace
+
+SampleColumn step_column(const effects::Effect& effect, const SampleSeries& series, std::size_t row) {
+    return {.effect = &effect,
+            .name = std::string(parameter_of(effect, effects::Role::size).name),
+            .series = std::make_shared<const std::vector<double>>(step_at(series, row))};
+}
+
+bool is_step(const SampleColumn& column) {
+    return column.effect != nullptr && on_samples(*column.effect) == OnSamples::step;
 }
 
 double root_of_step(const SampleFit& fit, std::size_t row) {
-    const auto score = fit.score({fit.taken(step_column(fit.series(), row))});
+    const auto score = fit.score({fit.as_taken(step_at(fit.series(), row))});
     return score.rank == 0 ? 0.0 : std::copysign(std::sqrt(score.chi2), score.value[0]);
 }
 
 std::optional<Jump> jump_beside_random(const SampleFit& fit) {
     if (!fit.model().walk && !fit.model().flicker) return std::nullopt;
-    const SampleColumn step = step_column(fit.series(), fit.series().size() / 2);
-    return largest_jump(fit.innovations(), fit.rows(), fit.filter().apply(*step.series));
+    const std::vector<double> step = step_at(fit.series(), fit.series().size() / 2);
+    return largest_jump(fit.innovations(), fit.rows(), fit.filter().apply(step));
 }
 
 std::size_t refine_place(const SampleFit& without, std::size_t row, std::size_t reach) {
     // Nearer to an end a step can hardly be told from how the record begins, or ends.
-    const std::size_t first = std::max<std::size_t>(1, without.series().size() / places_of_a_step);
+    const std::size_t first = std::max<std::size_t>(1, without.series().size() / options.samples.fit.places_of_a_step);
     const std::size_t last = without.series().size() - 1 - first;
     double best = std::abs(root_of_step(without, row));
     for (std::size_t d = reach; d > 0; d /= 2) {
@@ -50,7 +68,7 @@ SampleFit without_column(const SampleFit& fit, std::size_t column, const Rows& r
 
 SampleFit with_place(const SampleFit& fit, std::size_t column, std::size_t row, const Rows& rows) {
     SampleModel model = fit.model();
-    model.columns[column].series = step_column(fit.series(), row).series;
+    model.columns[column].series = std::make_shared<const std::vector<double>>(step_at(fit.series(), row));
     return {fit.series(), std::move(model), rows, SampleFit::Noise::near};
 }
 
@@ -67,10 +85,10 @@ SampleFit refine_steps(SampleFit fit, const Rows& rows) {
     for (int round = 0; round < rounds; ++round) {
         bool moved = false;
         for (std::size_t k = 0; k < fit.model().columns.size(); ++k) {
-            if (fit.model().columns[k].effect != "bias_step") continue;
+            if (!is_step(fit.model().columns[k])) continue;
             const std::size_t row = row_of_step(fit.model().columns[k]);
-            const std::size_t at =
-                refine_place(without_column(fit, k, rows), row, fit.series().size() / (2 * places_of_a_step));
+            const std::size_t at = refine_place(without_column(fit, k, rows), row,
+                                                fit.series().size() / (2 * options.samples.fit.places_of_a_step));
             if (at == row) continue;
             moved = true;
             fit = with_place(fit, k, at, rows);
@@ -81,9 +99,9 @@ SampleFit refine_steps(SampleFit fit, const Rows& rows) {
 }
 
 SampleFit place_in_gaps(SampleFit fit, const Rows& rows, const Rows& known) {
-    constexpr std::size_t places = 32;
+    const std::size_t places = options.samples.fit.places_in_a_gap;
     for (std::size_t k = 0; k < fit.model().columns.size(); ++k) {
-        if (fit.model().columns[k].effect != "bias_step") continue;
+        if (!is_step(fit.model().columns[k])) continue;
         const std::size_t row = row_of_step(fit.model().columns[k]);
         std::size_t from = row;
         std::size_t to = row;

@@ -7,15 +7,14 @@
 /// Steps of the rate, and where in the record they are.
 namespace ringlock::closure {
 
-/// A rate of one from that row on.
-SampleColumn step_column(const SampleSeries& series, std::size_t row);
+/// The column of an effect that steps: a rate of one from that row on. Steps are searched at whole rows, so that this
+/// is not the closed form of the effect, which rounding lets begin a row early.
+SampleColumn step_column(const effects::Effect& effect, const SampleSeries& series, std::size_t row);
+bool is_step(const SampleColumn& column);
 std::size_t row_of_step(const SampleColumn& step);
 
 /// What a step at that row explains, its sign that of the step.
 double root_of_step(const SampleFit& fit, std::size_t row);
-
-/// Of which a record is searched for a step before the likeliest is refined.
-inline constexpr std::size_t places_of_a_step = 80;
 
 /// The largest of the innovations' own, where the model has a random rate, beside which a step is forgotten soon.
 std::optional<Jump> jump_beside_random(const SampleFit& fit);

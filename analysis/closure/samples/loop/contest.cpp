@@ -6,34 +6,28 @@
 #include <cmath>
 #include <iterator>
 #include <optional>
-#include <string_view>
 #include <utility>
 
+#include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/fit/steps.hpp"
-#include "analysis/closure/samples/residual/tests.hpp"
+#include "analysis/closure/samples/loop/rivals.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 
 namespace ringlock::closure {
 
-bool passes_on_samples(double p_value) { return p_value * effects_on_samples < options.level_of_effects; }
-
-bool is_random_rate(const std::string& effect) { return effect == "rate_random_walk" || effect == "bias_instability"; }
-
-bool is_slow_rate(const std::string& effect) {
-    return is_random_rate(effect) || effect == "scale_factor_error" || effect.starts_with("bias_");
-}
+bool passes_on_samples(double p_value) { return p_value * effects_on_samples() < options.level_of_effects; }
 
 namespace {
 
-constexpr double worth_looking = 0.01;
+bool shows(const SampleCandidate& candidate, OnSamples as) { return on_samples(*candidate.effect) == as; }
 
 double p_of_gain(double gain, const SampleCandidate& candidate) {
     return of_several(chi2_tail(2.0 * gain, candidate.freedom), candidate.searched);
 }
 
-/// The contest on one state of the model.
+/// Compares all effects that may be added to one state of the model.
 class Contest {
    public:
     Contest(const record::Declared& declared, const SampleState& now, const Rows& known, double lattice_arcsec)
@@ -47,28 +41,17 @@ class Contest {
     SampleChoice choose();
 
    private:
-    using Shared = std::shared_ptr<SampleContender>;
+    using Shared = std::shared_ptr<SampleCandidate>;
     enum class Wanted { all, slow };
-    /// What may explain a record: an effect, or several, each added beside those before it.
-    struct Account {
+    /// An explanation of the record: one effect, or several, each fitted with those before it.
+    struct CandidateSet {
         std::vector<Shared> members;
         double merit = 0.0;
-        double p_value = 1.0;  ///< of the first, beside the second
+        double p_value = 1.0;  ///< of the first, given the second
 
-        bool has(const std::string& effect) const;
+        bool has(const effects::Effect* effect) const;
+        bool has(OnSamples as) const;
         bool random() const;
-    };
-    /// What a view of the residual explains, the noise fitted anew beside it.
-    struct Rival {
-        double merit = 0.0;
-        double courses = 0.0;  ///< in time, that it has coefficients of
-        Where where = Where::time;
-        bool jumps = false;
-        bool repeats = false;                    ///< a variance that does
-        std::optional<double> hz = {};           ///< of a line
-        std::optional<double> by_variance = {};  ///< of one whose power is scattered
-        double of_a_motion = 0.0;                ///< merit beside what has resonances of its own
-        std::optional<double> of_states = {};    ///< merit of jumps, their course integrated out
     };
 
     std::vector<SampleCandidate> screened(const SampleState& state, Wanted wanted) const;
@@ -76,18 +59,18 @@ class Contest {
     Shared judged(const SampleState& state, SampleCandidate candidate, SampleFit fit) const;
     Shared placed(Shared first, const SampleModel& all) const;
     std::vector<Shared> contenders(const SampleState& state, std::vector<SampleCandidate> candidates) const;
-    SampleState beside(const SampleState& state, const SampleContender& contender) const;
-    std::vector<Account> sets(const std::vector<Shared>& all, const std::vector<SampleCandidate>& candidates) const;
-    std::vector<Account> sets_from(const Shared& first, const std::vector<Shared>& firsts,
+    SampleState beside(const SampleState& state, const SampleCandidate& contender) const;
+    std::vector<CandidateSet> sets(const std::vector<Shared>& all,
                                    const std::vector<SampleCandidate>& candidates) const;
-    double p_beside(const SampleContender& first, const SampleContender& second, const std::vector<Shared>& firsts,
+    std::vector<CandidateSet> sets_from(const Shared& first, const std::vector<Shared>& firsts,
+                                        const std::vector<SampleCandidate>& candidates) const;
+    double p_beside(const SampleCandidate& first, const SampleCandidate& second, const std::vector<Shared>& firsts,
                     const std::vector<SampleCandidate>& candidates) const;
-    std::vector<Rival> rivals(bool resampled, bool moved) const;
-    static double bar(const Account& account, const std::vector<Rival>& rivals, std::size_t rows);
-    bool beside_each_other(const SampleContender& a, const SampleContender& b) const;
+    static double bar(const CandidateSet& set, const std::vector<Rival>& rivals, std::size_t rows);
+    bool beside_each_other(const SampleCandidate& a, const SampleCandidate& b) const;
     Shared set_aside(std::vector<Shared>& all, const std::vector<Rival>& against) const;
     static Shared nearest(const std::vector<Shared>& all, const Shared& unnamed);
-    static void tie(const Account& best, const std::vector<Account>& as_likely, SampleChoice& choice);
+    static void tie(const CandidateSet& best, const std::vector<CandidateSet>& as_likely, SampleChoice& choice);
 
     const record::Declared& declared_;
     const SampleSeries& series_;
@@ -97,20 +80,23 @@ class Contest {
     double lattice_arcsec_;
 };
 
-bool Contest::Account::has(const std::string& effect) const {
-    return std::any_of(members.begin(), members.end(), [&](const Shared& m) { return m->candidate.effect == effect; });
+bool Contest::CandidateSet::has(const effects::Effect* effect) const {
+    return std::any_of(members.begin(), members.end(), [&](const Shared& m) { return m->effect == effect; });
 }
 
-bool Contest::Account::random() const {
-    return std::any_of(members.begin(), members.end(),
-                       [](const Shared& m) { return is_random_rate(m->candidate.effect); });
+bool Contest::CandidateSet::has(OnSamples as) const {
+    return std::any_of(members.begin(), members.end(), [&](const Shared& m) { return shows(*m, as); });
+}
+
+bool Contest::CandidateSet::random() const {
+    return std::any_of(members.begin(), members.end(), [](const Shared& m) { return is_random_rate(*m->effect); });
 }
 
 std::vector<SampleCandidate> Contest::screened(const SampleState& state, Wanted wanted) const {
     auto candidates =
         screen_samples(*state.fit, {declared_, series_, rows_, state.lines_hz, state.step, wanted == Wanted::slow});
     if (!state.random_rates) {
-        std::erase_if(candidates, [](const SampleCandidate& c) { return is_random_rate(c.effect); });
+        std::erase_if(candidates, [](const SampleCandidate& c) { return is_random_rate(*c.effect); });
     }
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const auto& a, const auto& b) { return a.p_value < b.p_value; });
@@ -120,58 +106,53 @@ std::vector<SampleCandidate> Contest::screened(const SampleState& state, Wanted 
 Contest::Shared Contest::fitted(const SampleState& state, SampleCandidate candidate) const {
     SampleFit fit(series_, candidate.model, rows_, candidate.noise);
     // Places were found by the noise as it was, which a large effect was a part of, and without that effect.
-    constexpr double large = 50.0;
     const auto& columns = fit.model().columns;
     const bool steps = std::any_of(columns.begin(), columns.end(), [&](const SampleColumn& column) {
-        return column.effect == "bias_step" && column.step >= now_.step;
+        return is_step(column) && column.step >= now_.step;
     });
-    if (steps && fit.gain_over(*state.fit) > large) {
+    if (steps && fit.gain_over(*state.fit) > options.samples.contest.placed_again) {
         fit = refine_steps(place_in_gaps(std::move(fit), rows_, known_), rows_);
     }
     return judged(state, std::move(candidate), std::move(fit));
 }
 
 Contest::Shared Contest::judged(const SampleState& state, SampleCandidate candidate, SampleFit fit) const {
-    auto contender = std::make_shared<SampleContender>();
-    contender->fit = std::make_shared<SampleFit>(std::move(fit));
-    const double gain = contender->fit->gain_over(*state.fit);
-    contender->merit = gain - std::log(candidate.places.value_or(candidate.searched)) - candidate.parameters;
+    candidate.fit = std::make_shared<SampleFit>(std::move(fit));
+    const double gain = candidate.fit->gain_over(*state.fit);
+    candidate.merit = gain - std::log(candidate.places.value_or(candidate.searched)) - candidate.parameters;
     // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
-    contender->passes = contender->merit > 0.0 && passes_on_samples(p_of_gain(gain, candidate));
-    contender->candidate = std::move(candidate);
-    return contender;
+    candidate.passes = candidate.merit > 0.0 && passes_on_samples(p_of_gain(gain, candidate));
+    return std::make_shared<SampleCandidate>(std::move(candidate));
 }
 
-/// A step alone is elsewhere than beside what is added next: it is taken where it will be.
+/// A step that was chosen in a set is placed where the whole set has it, which is elsewhere than for the step alone.
 Contest::Shared Contest::placed(Shared first, const SampleModel& all) const {
-    if (first->candidate.effect != "bias_step") return first;
-    const auto own = [&](const SampleColumn& column) { return column.effect == "bias_step"; };
+    if (!shows(*first, OnSamples::step)) return first;
     SampleModel model = first->fit->model();
-    const auto step = std::find_if(model.columns.begin(), model.columns.end(), own);
-    const auto there = std::find_if(all.columns.begin(), all.columns.end(), own);
+    const auto step = std::find_if(model.columns.begin(), model.columns.end(), is_step);
+    const auto there = std::find_if(all.columns.begin(), all.columns.end(), is_step);
     if (step == model.columns.end() || there == all.columns.end()) return first;
     step->series = there->series;
-    return judged(now_, first->candidate, SampleFit(series_, std::move(model), rows_, SampleFit::Noise::near));
+    return judged(now_, *first, SampleFit(series_, std::move(model), rows_, SampleFit::Noise::near));
 }
 
-/// What the screening lets pass, each fitted in full, and still passes; the likeliest first. Scores are of the noise as
-/// it is, which may have swallowed a slow rate: of these more are looked at.
+/// Candidates of the screening that pass when they are fitted in full, the likeliest first. Slow rates and lines are
+/// fitted at weaker scores as well: the noise that scores go by may have absorbed them.
 std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
                                                  std::vector<SampleCandidate> candidates) const {
     std::erase_if(candidates, [](const SampleCandidate& candidate) {
-        const bool worth =
-            (is_slow_rate(candidate.effect) || is_line(candidate.effect)) && candidate.p_value < worth_looking;
+        const bool worth = (is_slow_rate(*candidate.effect) || is_line(*candidate.effect)) &&
+                           candidate.p_value < options.samples.contest.worth_looking;
         return !passes_on_samples(candidate.p_value) && !worth;
     });
     // Rates that a record may be resampled from take long to fit, and explain much the same: where the likeliest by
     // either kind of errors are far from the leader, the others are as well.
-    constexpr std::size_t kinds = 2;
-    constexpr double far = 0.5;
-    const auto resampled = [](const SampleCandidate& c) { return c.effect == "resampling"; };
+    const SampleContestOptions& by = options.samples.contest;
+    const auto resampled = [](const SampleCandidate& c) { return shows(c, OnSamples::transport); };
     std::vector<SampleCandidate> later;
     std::size_t rates = 0;
     std::erase_if(candidates, [&](SampleCandidate& candidate) {
-        if (!resampled(candidate) || rates++ < kinds) return false;
+        if (!resampled(candidate) || rates++ < by.first_sources) return false;
         later.push_back(std::move(candidate));
         return true;
     });
@@ -186,72 +167,72 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
     double most = 0.0;
     double most_resampled = 0.0;
     for (const Shared& contender : all) {
-        if (is_slow_rate(contender->candidate.effect)) continue;
-        double& of_these = resampled(contender->candidate) ? most_resampled : most;
+        if (is_slow_rate(*contender->effect)) continue;
+        double& of_these = resampled(*contender) ? most_resampled : most;
         of_these = std::max(of_these, contender->merit);
     }
-    if (!(most_resampled > 0.0 && most_resampled < far * most)) fit_all(std::move(later));
+    if (!(most_resampled > 0.0 && most_resampled < by.far * most)) fit_all(std::move(later));
     std::erase_if(all, [](const Shared& contender) { return !contender->passes; });
     std::sort(all.begin(), all.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
     // Those rates crowd nobody out.
     std::size_t count = 0;
     std::size_t count_resampled = 0;
     std::erase_if(all, [&](const Shared& contender) {
-        std::size_t& of_these = resampled(contender->candidate) ? count_resampled : count;
-        return of_these++ >= options.most_contenders + 2;
+        std::size_t& of_these = resampled(*contender) ? count_resampled : count;
+        return of_these++ >= options.most_contenders + by.more_contenders;
     });
     return all;
 }
 
-SampleState Contest::beside(const SampleState& state, const SampleContender& contender) const {
+SampleState Contest::beside(const SampleState& state, const SampleCandidate& contender) const {
     return {contender.fit, state.lines_hz, state.step + 1, state.random_rates};
 }
 
-/// Probability of what the first gains over the second alone; of both, where only the two of them show anything.
-double Contest::p_beside(const SampleContender& first, const SampleContender& second, const std::vector<Shared>& firsts,
+/// Probability of the gain by the first over the second alone; of the gain by both, if the first does not pass alone.
+double Contest::p_beside(const SampleCandidate& first, const SampleCandidate& second, const std::vector<Shared>& firsts,
                          const std::vector<SampleCandidate>& candidates) const {
-    constexpr double others = 0.5 * (effects_on_samples - 1.0);  // of all pairs, for each effect
-    const std::string& name = second.candidate.effect;
+    const double others = 0.5 * (effects_on_samples() - 1.0);  // of all pairs, for each effect
+    const effects::Effect* effect = second.effect;
     const auto fitted_already =
-        std::find_if(firsts.begin(), firsts.end(), [&](const Shared& c) { return c->candidate.effect == name; });
+        std::find_if(firsts.begin(), firsts.end(), [&](const Shared& c) { return c->effect == effect; });
     std::shared_ptr<SampleFit> alone;
     if (fitted_already != firsts.end()) {
         alone = (*fitted_already)->fit;
     } else {
         const auto same = std::find_if(candidates.begin(), candidates.end(),
-                                       [&](const SampleCandidate& c) { return c.effect == name; });
-        if (same == candidates.end()) return first.passes ? first.candidate.p_value : 1.0;
+                                       [&](const SampleCandidate& c) { return c.effect == effect; });
+        if (same == candidates.end()) return first.passes ? first.p_value : 1.0;
         alone = fitted(now_, *same)->fit;
     }
-    const double p = p_of_gain(second.fit->gain_over(*alone), first.candidate);
+    const double p = p_of_gain(second.fit->gain_over(*alone), first);
     if (first.passes) return p;
     const double both = second.fit->gain_over(*now_.fit);
-    return std::max(p, of_several(chi2_tail(2.0 * both, first.candidate.freedom + second.candidate.freedom),
-                                  others * first.candidate.searched * second.candidate.searched));
+    return std::max(p, of_several(chi2_tail(2.0 * both, first.freedom + second.freedom),
+                                  others * first.searched * second.searched));
 }
 
-/// One effect and what explains most beside it: the likeliest random rate, and the likeliest of the others with the
-/// likeliest beside both.
-std::vector<Contest::Account> Contest::sets_from(const Shared& first, const std::vector<Shared>& firsts,
-                                                 const std::vector<SampleCandidate>& candidates) const {
+/// Sets that begin with one effect: with the likeliest random rate; with the likeliest other rate; and with that and
+/// the likeliest third.
+std::vector<Contest::CandidateSet> Contest::sets_from(const Shared& first, const std::vector<Shared>& firsts,
+                                                      const std::vector<SampleCandidate>& candidates) const {
     // That there are so many others to choose from.
-    const double choice = std::log(effects_on_samples);
-    std::vector<Account> found;
+    const double choice = std::log(effects_on_samples());
+    std::vector<CandidateSet> found;
     const SampleState with_first = beside(now_, *first);
     const auto seconds = contenders(with_first, screened(with_first, Wanted::slow));
     for (const bool random : {false, true}) {
         const auto second = std::find_if(seconds.begin(), seconds.end(), [&](const Shared& c) {
-            return is_slow_rate(c->candidate.effect) && is_random_rate(c->candidate.effect) == random;
+            return is_slow_rate(*c->effect) && is_random_rate(*c->effect) == random;
         });
         if (second == seconds.end()) continue;
         const double p = p_beside(*first, **second, firsts, candidates);
         if (!passes_on_samples(p)) continue;
         const double merit = first->merit + (*second)->merit - choice;
         found.push_back({{first, *second}, merit, p});
-        if (random || is_random_rate(first->candidate.effect)) continue;
+        if (random || is_random_rate(*first->effect)) continue;
         const SampleState with_both = beside(with_first, **second);
         for (const Shared& third : contenders(with_both, screened(with_both, Wanted::slow))) {
-            if (!is_slow_rate(third->candidate.effect) || is_random_rate(third->candidate.effect)) continue;
+            if (!is_slow_rate(*third->effect) || is_random_rate(*third->effect)) continue;
             found.push_back({{first, *second, third}, merit + third->merit - choice, p});
             break;
         }
@@ -259,118 +240,78 @@ std::vector<Contest::Account> Contest::sets_from(const Shared& first, const std:
     return found;
 }
 
-/// One effect at a time may explain less than a random rate, or a view, where several of the library together explain
-/// more; and one may hide another. The first need not pass alone, if it does beside the second.
-std::vector<Contest::Account> Contest::sets(const std::vector<Shared>& all,
-                                            const std::vector<SampleCandidate>& candidates) const {
-    constexpr std::size_t starts = 4;
+/// Sets of slow rates. Several effects together may explain more than a random rate or a residual test where each alone
+/// explains less, and one may hide another: the first need not pass alone if it does with the second.
+std::vector<Contest::CandidateSet> Contest::sets(const std::vector<Shared>& all,
+                                                 const std::vector<SampleCandidate>& candidates) const {
+    const std::size_t starts = options.samples.contest.set_starts;
     std::vector<Shared> firsts;
     bool random = false;
     for (const Shared& contender : all) {
-        if (!is_slow_rate(contender->candidate.effect)) continue;
+        if (!is_slow_rate(*contender->effect)) continue;
         // One random rate can stand for another.
-        if (is_random_rate(contender->candidate.effect) && std::exchange(random, true)) continue;
+        if (is_random_rate(*contender->effect) && std::exchange(random, true)) continue;
         firsts.push_back(contender);
     }
     for (const SampleCandidate& candidate : candidates) {
-        const bool known = std::any_of(all.begin(), all.end(),
-                                       [&](const Shared& c) { return c->candidate.effect == candidate.effect; });
-        if (known || !is_slow_rate(candidate.effect) || is_random_rate(candidate.effect)) continue;
-        if (candidate.p_value < worth_looking) firsts.push_back(fitted(now_, candidate));
+        const bool known =
+            std::any_of(all.begin(), all.end(), [&](const Shared& c) { return c->effect == candidate.effect; });
+        if (known || !is_slow_rate(*candidate.effect) || is_random_rate(*candidate.effect)) continue;
+        if (candidate.p_value < options.samples.contest.worth_looking) firsts.push_back(fitted(now_, candidate));
     }
     std::sort(firsts.begin(), firsts.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
     if (firsts.size() > starts + (random ? 1 : 0)) firsts.resize(starts + (random ? 1 : 0));
-    std::vector<std::vector<Account>> found(firsts.size());
+    std::vector<std::vector<CandidateSet>> found(firsts.size());
     oneapi::tbb::parallel_for(std::size_t{0}, firsts.size(),
                               [&](std::size_t k) { found[k] = sets_from(firsts[k], firsts, candidates); });
-    std::vector<Account> accounts;
-    for (auto& some : found) std::move(some.begin(), some.end(), std::back_inserter(accounts));
-    return accounts;
+    std::vector<CandidateSet> candidate_sets;
+    for (auto& some : found) std::move(some.begin(), some.end(), std::back_inserter(candidate_sets));
+    return candidate_sets;
 }
 
-/// The views of the residual that explain most, each fitted with the noise anew; where the record may be resampled, a
-/// variance that repeats as well; where the case may have moved, power that scatters about a line.
-std::vector<Contest::Rival> Contest::rivals(bool resampled, bool moved) const {
-    constexpr std::size_t looked_at = 4;
-    auto views = view_samples(*now_.fit, lattice_arcsec_);
-    std::erase_if(views, [](const SampleView& view) { return view.test.merit < options.tie; });
-    std::sort(views.begin(), views.end(),
-              [](const SampleView& a, const SampleView& b) { return a.test.merit > b.test.merit; });
-    std::vector<Where> columns;
-    std::size_t place = 0;
-    std::erase_if(views, [&](const SampleView& view) {
-        // Jumps are looked at in any case, which a random rate can follow and no other view tells, and what follows
-        // another column of the record most: courses in time come near to that.
-        const bool follows = view.columns && view.test.where != Where::time && !view.hz;
-        const bool first = follows && std::find(columns.begin(), columns.end(), view.test.where) == columns.end();
-        if (first) columns.push_back(view.test.where);
-        return place++ >= looked_at && !view.jumps && !first;
-    });
-    std::vector<Rival> found;
-    for (const SampleView& view : views) {
-        const bool repeats = view.test.view == repeating_variance;
-        Rival rival{.merit = view.test.merit,
-                    .where = view.test.where,
-                    .jumps = view.jumps,
-                    .repeats = repeats,
-                    .hz = view.hz,
-                    .by_variance = view.by_variance};
-        if (view.columns) {
-            rival.merit = refitted_merit(*now_.fit, view);
-            const bool courses = view.test.where == Where::time && !view.jumps;
-            rival.courses = courses ? static_cast<double>(view.columns().size()) : view.courses;
-        }
-        if (repeats && resampled) rival.merit = std::max(rival.merit, view.refitted(0.0));
-        const bool levels = view.test.view == jumping_rate;
-        if (levels && view.refitted) rival.of_states = view.refitted(0.0);
-        rival.of_a_motion = !repeats && !levels && view.refitted && moved ? view.refitted(0.0) : rival.merit;
-        found.push_back(rival);
-    }
-    return found;
-}
-
-/// What an account must explain: where a view does more, the account is only what comes nearest to something that the
-/// library does not have. What a view must have more than an effect to be taken for the truth is off it.
-double Contest::bar(const Account& account, const std::vector<Rival>& rivals, std::size_t rows) {
-    const bool random = account.random();
-    const bool moves = std::all_of(account.members.begin(), account.members.end(), [](const Shared& member) {
-        return is_slow_rate(member->candidate.effect) || is_line(member->candidate.effect);
+/// Merit that a set must exceed: where a residual test explains more, the set is only a proxy for something that the
+/// library does not have. A residual test must explain more than an effect, by the margins below, to be taken for the
+/// truth.
+double Contest::bar(const CandidateSet& set, const std::vector<Rival>& rivals, std::size_t rows) {
+    const bool random = set.random();
+    const bool moves = std::all_of(set.members.begin(), set.members.end(), [](const Shared& member) {
+        return is_slow_rate(*member->effect) || is_line(*member->effect);
     });
     double most = 0.0;
     for (const Rival& rival : rivals) {
         // Noise whose size changes looks like no rate and no line, nor do these like it.
         if (rival.repeats && moves) continue;
         // A line is nothing of another that is far from it.
-        const SampleCandidate& first = account.members.front()->candidate;
-        if (rival.hz && account.members.size() == 1 && is_line(first.effect) &&
-            std::abs(*rival.hz - first.hz) > beside_hz) {
+        const SampleCandidate& first = *set.members.front();
+        if (rival.hz && set.members.size() == 1 && is_line(*first.effect) &&
+            std::abs(*rival.hz - first.hz) > options.samples.lines.beside_hz) {
             continue;
         }
-        double merit = account.has("case_motion") ? rival.of_a_motion : rival.merit;
+        double merit = set.has(OnSamples::motion) ? rival.of_a_motion : rival.merit;
         // What keeps its phase, and readings that were interpolated, leave no power of a strong line; a resonance
         // follows any line.
-        const bool keeps = is_line(first.effect) ? !first.wanders : first.effect == "resampling";
+        const bool keeps = is_line(*first.effect) ? !first.wanders : shows(first, OnSamples::transport);
         if (keeps && rival.by_variance) merit = *rival.by_variance;
-        if (rival.repeats && account.has("resampling")) {
+        if (rival.repeats && set.has(OnSamples::transport)) {
             // On straight lines the variance swings by half, no more and no less. What they are blurred by makes that
             // less, as any other swing may be.
-            constexpr double little = 0.3;
-            const SampleNoise& noise = account.members.front()->fit->model().noise;
-            merit += noise.blur_arcsec < little * noise.angle_arcsec ? -options.tie : options.tie;
+            const SampleNoise& noise = set.members.front()->fit->model().noise;
+            merit +=
+                noise.blur_arcsec < options.samples.contest.blurred * noise.angle_arcsec ? -options.tie : options.tie;
             most = std::max(most, merit);
             continue;
         }
         // Several effects are chosen from many: against what follows another column of the record they get nothing for
         // being of the library. A course in time follows all of them.
-        double more = account.members.size() > 1 && rival.where != Where::time ? 0.0 : -options.tie;
+        double more = set.members.size() > 1 && rival.where != Where::time ? 0.0 : -options.tie;
         // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
         // course in time (Schwarz 1978).
         if (random) merit -= rival.courses * (0.5 * std::log(static_cast<double>(rows)) - 1.0);
         if (random && (rival.where != Where::time || rival.jumps)) {
             // What follows jumps, or another column of the record, a random rate can follow nearly as well. The course
             // of jumps is searched stretch by stretch and loses a part of what they explain.
-            more = rival.jumps ? std::max(options.tie, 0.1 * account.merit) : options.tie;
-        } else if (!random && rival.jumps && account.members.size() > 1) {
+            more = rival.jumps ? std::max(options.tie, options.samples.contest.lost_of_jumps * set.merit) : options.tie;
+        } else if (!random && rival.jumps && set.members.size() > 1) {
             more = options.tie;
         }
         most = std::max(most, merit + more);
@@ -380,11 +321,14 @@ double Contest::bar(const Account& account, const std::vector<Rival>& rivals, st
     return most;
 }
 
-/// Whether two effects of different kinds explain different things: one is needed beside the other as well. Such may
-/// have the same merit, and are no answer in each other's place.
-bool Contest::beside_each_other(const SampleContender& a, const SampleContender& b) const {
-    const auto kind = [](const std::string& effect) { return is_slow_rate(effect) ? 0 : is_line(effect) ? 1 : 2; };
-    if (kind(a.candidate.effect) == kind(b.candidate.effect)) return false;
+/// True if one of two effects of different kinds still improves the fit when the other is present. Two such effects are
+/// not alternatives, even if their merit is equal.
+bool Contest::beside_each_other(const SampleCandidate& a, const SampleCandidate& b) const {
+    const auto kind = [](const SampleCandidate& contender) {
+        const effects::Effect& effect = *contender.effect;
+        return is_slow_rate(effect) ? 0 : is_line(effect) ? 1 : 2;
+    };
+    if (kind(a) == kind(b)) return false;
     for (const auto& [with, without] : {std::pair{&a, &b}, std::pair{&b, &a}}) {
         std::vector<std::vector<double>> added;
         for (const SampleColumn& column : with->fit->model().columns) {
@@ -393,9 +337,9 @@ bool Contest::beside_each_other(const SampleContender& a, const SampleContender&
         }
         if (!added.empty()) return 0.5 * without->fit->score(added).chi2 > options.tie;
     }
-    const SampleContender& random = is_random_rate(a.candidate.effect) ? a : b;
-    const SampleContender& other = is_random_rate(a.candidate.effect) ? b : a;
-    if (!is_random_rate(random.candidate.effect)) return false;
+    const SampleCandidate& random = is_random_rate(*a.effect) ? a : b;
+    const SampleCandidate& other = is_random_rate(*a.effect) ? b : a;
+    if (!is_random_rate(*random.effect)) return false;
     SampleModel model = other.fit->model();
     const SampleModel& rates = random.fit->model();
     model.walk = rates.walk;
@@ -407,64 +351,65 @@ bool Contest::beside_each_other(const SampleContender& a, const SampleContender&
     return both.gain_over(*other.fit) > options.tie;
 }
 
-/// All that explains as much without the first is tied to it. Where others are added next, one of these is tied to each
-/// of them instead.
-void Contest::tie(const Account& best, const std::vector<Account>& as_likely, SampleChoice& choice) {
-    const std::string& effect = choice.chosen->candidate.effect;
-    const auto add = [](std::vector<std::string>& names, const std::string& name) {
-        if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+/// Ties to the chosen effect every effect that explains as much in its place. If a set was chosen, the alternatives are
+/// distributed over its members.
+void Contest::tie(const CandidateSet& best, const std::vector<CandidateSet>& as_likely, SampleChoice& choice) {
+    const effects::Effect* effect = choice.chosen->effect;
+    const auto add = [](Effects& all, const effects::Effect* one) {
+        if (std::find(all.begin(), all.end(), one) == all.end()) all.push_back(one);
     };
-    choice.confounded_with = choice.chosen->candidate.confounded;
+    choice.confounded_with = choice.chosen->confounded;
     for (const Shared& member : best.members) {
-        if (member->candidate.effect != effect) choice.of_partners.push_back({member->candidate.effect, {}});
+        if (member->effect != effect) choice.of_partners.push_back({member->effect, {}});
     }
-    for (const Account& other : as_likely) {
+    for (const CandidateSet& other : as_likely) {
         if (other.has(effect)) {
             // The same with another drift, which may go by other names.
             if (other.members.size() > 1) continue;
-            for (const std::string& name : other.members.front()->candidate.confounded) {
-                add(choice.confounded_with, name);
+            for (const effects::Effect* same : other.members.front()->confounded) {
+                add(choice.confounded_with, same);
             }
             continue;
         }
-        std::vector<std::string> instead;
+        Effects instead;
         for (const Shared& member : other.members) {
-            if (!best.has(member->candidate.effect)) instead.push_back(member->candidate.effect);
+            if (!best.has(member->effect)) instead.push_back(member->effect);
         }
-        for (auto& [partner, names] : choice.of_partners) {
+        for (auto& [partner, alternatives] : choice.of_partners) {
             if (other.has(partner) || instead.size() < 2) continue;
-            add(names, instead.back());
+            add(alternatives, instead.back());
             instead.pop_back();
         }
-        for (const std::string& name : instead) add(choice.confounded_with, name);
+        for (const effects::Effect* one : instead) add(choice.confounded_with, one);
     }
 }
 
-/// Contenders that are no answer go.
-/// \return what has no name, if there is such
+/// Removes contenders that cannot be the answer: those without a name, and resampling where a repeating variance
+/// explains more.
+/// \return the likeliest contender without a name, or null
 Contest::Shared Contest::set_aside(std::vector<Shared>& all, const std::vector<Rival>& against) const {
     Shared unnamed;
     std::erase_if(all, [&](const Shared& contender) {
-        if (contender->candidate.nameless && !unnamed) unnamed = contender;
-        return contender->candidate.nameless;
+        if (contender->nameless && !unnamed) unnamed = contender;
+        return contender->nameless;
     });
     // What repeats otherwise than on straight lines is not resampled.
-    if (all.empty() || all.front()->candidate.effect != "resampling") return unnamed;
+    if (all.empty() || !shows(*all.front(), OnSamples::transport)) return unnamed;
     std::vector<Rival> repeats = against;
     std::erase_if(repeats, [](const Rival& rival) { return !rival.repeats; });
     if (all.front()->merit > bar({{all.front()}, all.front()->merit, 0.0}, repeats, series_.size())) return unnamed;
-    std::erase_if(all, [](const Shared& contender) { return contender->candidate.effect == "resampling"; });
+    std::erase_if(all, [](const Shared& contender) { return shows(*contender, OnSamples::transport); });
     return unnamed;
 }
 
-/// Where nothing holds: what comes nearest to a rate or to a line that the library does not have.
+/// The effect to be used as a placeholder where nothing can be chosen: the closest to an unknown rate or line, or null.
 Contest::Shared Contest::nearest(const std::vector<Shared>& all, const Shared& unnamed) {
     if (all.empty() || (unnamed && unnamed->merit > all.front()->merit)) return unnamed;
-    const std::string& leader = all.front()->candidate.effect;
+    const effects::Effect& leader = *all.front()->effect;
     if (is_line(leader)) return all.front();
     if (!is_slow_rate(leader)) return unnamed;
     const auto random =
-        std::find_if(all.begin(), all.end(), [](const Shared& c) { return is_random_rate(c->candidate.effect); });
+        std::find_if(all.begin(), all.end(), [](const Shared& c) { return is_random_rate(*c->effect); });
     return random == all.end() ? unnamed : *random;
 }
 
@@ -472,89 +417,92 @@ SampleChoice Contest::choose() {
     const auto candidates = screened(now_, Wanted::all);
     auto all = contenders(now_, candidates);
     std::vector<Rival> against;
-    const auto may_be_of = [&](std::string_view effect) {
-        return std::any_of(all.begin(), all.end(), [&](const Shared& c) { return c->candidate.effect == effect; });
+    const auto may_be_of = [&](OnSamples as) {
+        return std::any_of(all.begin(), all.end(), [as](const Shared& c) { return shows(*c, as); });
     };
-    if (!all.empty()) against = rivals(may_be_of("resampling"), may_be_of("case_motion"));
-    const auto holds = [&](const Account& account) { return account.merit > bar(account, against, series_.size()); };
+    if (!all.empty()) {
+        against = rivals_of(*now_.fit, lattice_arcsec_, may_be_of(OnSamples::transport), may_be_of(OnSamples::motion));
+    }
+    const auto holds = [&](const CandidateSet& set) { return set.merit > bar(set, against, series_.size()); };
     const Shared unnamed = set_aside(all, against);
-    std::vector<Account> accounts;
+    std::vector<CandidateSet> candidate_sets;
     for (const Shared& contender : all) {
-        accounts.push_back({{contender}, contender->merit, contender->candidate.p_value});
+        candidate_sets.push_back({{contender}, contender->merit, contender->p_value});
     }
-    const bool led = !all.empty() && holds(accounts.front());
-    const double leader = all.empty() ? 0.0 : accounts.front().merit;
-    const bool random_leads = !all.empty() && accounts.front().random();
-    if (!led || is_slow_rate(all.front()->candidate.effect)) {
-        for (Account& account : sets(all, candidates)) accounts.push_back(std::move(account));
-        if (all.empty() && !accounts.empty()) against = rivals(false, false);
+    const bool led = !all.empty() && holds(candidate_sets.front());
+    const double leader = all.empty() ? 0.0 : candidate_sets.front().merit;
+    const bool random_leads = !all.empty() && candidate_sets.front().random();
+    if (!led || is_slow_rate(*all.front()->effect)) {
+        for (CandidateSet& set : sets(all, candidates)) candidate_sets.push_back(std::move(set));
+        if (all.empty() && !candidate_sets.empty()) against = rivals_of(*now_.fit, lattice_arcsec_, false, false);
     }
-    std::stable_sort(accounts.begin(), accounts.end(),
-                     [](const Account& a, const Account& b) { return a.merit > b.merit; });
+    std::stable_sort(candidate_sets.begin(), candidate_sets.end(),
+                     [](const CandidateSet& a, const CandidateSet& b) { return a.merit > b.merit; });
     // Where a view explains more than the likeliest effect, another must be as likely and explain more than any view by
     // far, and several must be far better than it.
-    const auto may_be = [&](const Account& account) {
-        if (led || all.empty()) return holds(account);
-        if (account.members.size() > 1) {
+    const auto may_be = [&](const CandidateSet& set) {
+        if (led || all.empty()) return holds(set);
+        if (set.members.size() > 1) {
             // A random rate that does not hold comes near to whatever there is.
-            const double more = random_leads && !account.random() ? 0.0 : options.tie;
-            return account.merit > leader + more && holds(account);
+            const double more = random_leads && !set.random() ? 0.0 : options.tie;
+            return set.merit > leader + more && holds(set);
         }
-        return account.merit > std::max(leader - options.tie, bar(account, against, series_.size()) + options.tie);
+        return set.merit > std::max(leader - options.tie, bar(set, against, series_.size()) + options.tie);
     };
     // The fewest effects of those that explain as much as any.
-    const Account* best = nullptr;
+    const CandidateSet* best = nullptr;
     double least = 0.0;
-    for (const Account& account : accounts) {
-        if (!(account.merit > least) || !may_be(account)) continue;
-        if (best == nullptr) least = std::max(least, account.merit - options.tie);
-        if (best == nullptr || account.members.size() < best->members.size()) best = &account;
+    for (const CandidateSet& set : candidate_sets) {
+        if (!(set.merit > least) || !may_be(set)) continue;
+        if (best == nullptr) least = std::max(least, set.merit - options.tie);
+        if (best == nullptr || set.members.size() < best->members.size()) best = &set;
     }
     if (best == nullptr) {
         SampleChoice none;
         none.nearest = nearest(all, unnamed);
         return none;
     }
-    const bool slow =
-        best->members.size() == 1 && !best->random() && is_slow_rate(best->members.front()->candidate.effect);
+    const bool slow = best->members.size() == 1 && !best->random() && is_slow_rate(*best->members.front()->effect);
     const double least_random = slow ? std::max(0.0, best->merit - options.tie_with_random) : least;
-    std::vector<Account> as_likely;
-    for (const Account& account : accounts) {
-        const bool tied_random = account.members.size() == 1 && account.random() && account.merit > least_random;
-        if (account.merit > least || tied_random) as_likely.push_back(account);
+    std::vector<CandidateSet> as_likely;
+    for (const CandidateSet& set : candidate_sets) {
+        const bool tied_random = set.members.size() == 1 && set.random() && set.merit > least_random;
+        if (set.merit > least || tied_random) as_likely.push_back(set);
     }
     SampleChoice choice;
     // Of several, what most of those as likely have in them.
     std::ptrdiff_t most = -1;
     for (const Shared& member : best->members) {
-        const std::string& effect = member->candidate.effect;
+        const effects::Effect* effect = member->effect;
         const auto same = std::find_if(candidates.begin(), candidates.end(),
                                        [&](const SampleCandidate& c) { return c.effect == effect; });
         if (member != best->members.front() && same == candidates.end()) continue;
-        const auto in = std::count_if(as_likely.begin(), as_likely.end(),
-                                      [&](const Account& account) { return account.has(effect); });
+        const auto in =
+            std::count_if(as_likely.begin(), as_likely.end(), [&](const CandidateSet& set) { return set.has(effect); });
         if (in <= most) continue;
         most = in;
         const bool first = member == best->members.front();
         choice.chosen = first ? member : fitted(now_, *same);
-        choice.p_value = first ? best->p_value : member->candidate.p_value;
+        choice.p_value = first ? best->p_value : member->p_value;
     }
     if (best->members.size() > 1) choice.chosen = placed(choice.chosen, best->members.back()->fit->model());
-    std::erase_if(as_likely, [&](const Account& account) {
-        return account.members.size() == 1 && beside_each_other(*choice.chosen, *account.members.front());
+    std::erase_if(as_likely, [&](const CandidateSet& set) {
+        return set.members.size() == 1 && beside_each_other(*choice.chosen, *set.members.front());
     });
     tie(*best, as_likely, choice);
-    if (is_random_rate(choice.chosen->candidate.effect)) {
+    if (is_random_rate(*choice.chosen->effect)) {
         const auto other = std::find_if(all.begin(), all.end(), [&](const Shared& c) {
-            return is_random_rate(c->candidate.effect) && c->candidate.effect != choice.chosen->candidate.effect;
+            return is_random_rate(*c->effect) && c->effect != choice.chosen->effect;
         });
         if (other != all.end()) choice.other_random = *other;
     }
     const double from_hz = choice.chosen->fit->model().noise.from_hz;
-    for (const Account& account : as_likely) {
-        const double hz = account.members.front()->fit->model().noise.from_hz;
-        if (choice.chosen->candidate.effect != "resampling" || !account.has("resampling")) continue;
-        const auto near = [&](double other_hz) { return std::abs(hz - other_hz) < 1e-3 * series_.rate_hz; };
+    for (const CandidateSet& set : as_likely) {
+        const double hz = set.members.front()->fit->model().noise.from_hz;
+        if (!shows(*choice.chosen, OnSamples::transport) || !set.has(OnSamples::transport)) continue;
+        const auto near = [&](double other_hz) {
+            return std::abs(hz - other_hz) < options.samples.contest.same_source * series_.rate_hz;
+        };
         if (!near(from_hz) && std::none_of(choice.other_hz.begin(), choice.other_hz.end(), near)) {
             choice.other_hz.push_back(hz);
         }

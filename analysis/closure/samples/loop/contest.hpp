@@ -1,27 +1,21 @@
 #pragma once
 #include <memory>
-#include <string>
 #include <utility>
 #include <vector>
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/closure/samples/model/series.hpp"
 #include "analysis/closure/samples/screen/screen.hpp"
 #include "analysis/record/record.hpp"
 
-/// Which effect of the library a record of samples supports most: the second half of what screening begins.
+/// Which effect of the library a record of samples supports most, after the screening.
 namespace ringlock::closure {
 
-/// What samples can tell of; the rest of the library needs turns.
-inline constexpr double effects_on_samples = 12.0;
+/// Whether so small a p-value is rare enough for one of all effects that show on samples.
 bool passes_on_samples(double p_value);
 
-/// A random rate can follow whatever the library does not have, more or less.
-bool is_random_rate(const std::string& effect);
-/// Rates that change slowly: each can be taken for another, or for two others together.
-bool is_slow_rate(const std::string& effect);
-
-/// A model of the samples, with what is looked for next.
+/// A model of the samples, and what may be added to it.
 struct SampleState {
     std::shared_ptr<SampleFit> fit;
     std::vector<double> lines_hz = {};  ///< that are in the model
@@ -29,32 +23,26 @@ struct SampleState {
     bool random_rates = true;           ///< may be added
 };
 
-/// An effect fitted in full.
-struct SampleContender {
-    SampleCandidate candidate;
-    std::shared_ptr<SampleFit> fit;
-    double merit = 0.0;   ///< gain of the log-likelihood less its search and its parameters
-    bool passes = false;  ///< by that
-};
+/// Effects that were chosen with another and are added after it, each with the effects that would explain the record as
+/// well in its place.
+using Partners = std::vector<std::pair<const effects::Effect*, Effects>>;
 
 /// What to add, if anything.
 struct SampleChoice {
-    std::shared_ptr<SampleContender> chosen;
-    double p_value = 1.0;  ///< beside what explains the record with it
-    std::vector<std::string> confounded_with;
-    /// Where it was chosen with others that are added next: what else explains the record as well, by their names.
-    std::vector<std::pair<std::string, std::vector<std::string>>> of_partners;
+    std::shared_ptr<SampleCandidate> chosen;
+    double p_value = 1.0;  ///< given the effects that are chosen with it
+    Effects confounded_with;
+    Partners of_partners;                                ///< where it was chosen with others that are added next
     std::vector<double> other_hz;                        ///< rates that explain a resampled record as well
-    std::shared_ptr<SampleContender> other_random = {};  ///< the likeliest other random rate, where one is chosen
-    /// Where a rate or a line leads, but a view explains more, and nothing is chosen: the likeliest random rate, or
-    /// that line. It comes nearest to what is there, and what is something else can be told beside it.
-    std::shared_ptr<SampleContender> nearest = {};
+    std::shared_ptr<SampleCandidate> other_random = {};  ///< the likeliest other random rate, where one is chosen
+    /// Where a rate or a line leads but a residual test explains more, so that nothing is chosen: the likeliest random
+    /// rate, or that line, as a placeholder with which other effects can be found.
+    std::shared_ptr<SampleCandidate> nearest = {};
 };
 
-/// The likeliest effect, or the first of the likeliest two or three, with all that are as likely tied to it. None where
-/// nothing of the library passes, or where a view of the residual explains more.
-/// \param known           rows that are no part of the choice, but say where between those that are a step is
-/// \param lattice_arcsec  steps of the values
+/// The likeliest effect, or the first of the likeliest set of two or three, tied to all that are as likely. None where
+/// no effect of the library passes, or where a residual test explains more. \param known           rows that, in
+/// addition to the training rows, place a step in a gap between these \param lattice_arcsec  steps of the values
 SampleChoice choose_on_samples(const record::Declared& declared, const SampleState& now, const Rows& known,
                                double lattice_arcsec);
 

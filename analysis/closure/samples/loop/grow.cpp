@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/decide/verdict.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
@@ -23,10 +24,11 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Frequency of the line that a step added, as it is read. Others may have come behind it: a motion that is told anew.
+/// Frequency, as the record shows it, of the line that was added with that number. It need not be the last component of
+/// the model, since a motion that is fitted again moves to the end.
 double line_hz(const SampleModel& model, int step) {
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
-        if (model.resonance_steps[k] == step) return model.noise.resonances[k].hz;
+        if (model.resonances[k].step == step) return model.noise.resonances[k].hz;
     }
     const auto of_step = [step](const SampleColumn& c) { return c.step == step && c.name == "cosine"; };
     const auto found = std::find_if(model.columns.begin(), model.columns.end(), of_step);
@@ -34,12 +36,9 @@ double line_hz(const SampleModel& model, int step) {
     return found->course.hz;
 }
 
-/// As a motion is told anew by what has come in, or has been drawn, beside it.
-constexpr int most_motions = 6;
-
 }  // namespace
 
-/// Values that nothing is held out of: steps are chosen like any other effect.
+/// Increments of the training rows: the step of a lattice is chosen by them like any other effect.
 std::vector<double> SampleLoop::chosen_increments() const {
     std::vector<double> values;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -50,48 +49,50 @@ std::vector<double> SampleLoop::chosen_increments() const {
 
 void SampleLoop::take_lattice(Closure& closure) {
     if (series_.counted) {
-        closure.notes.push_back(fmt::format(
-            "counts are whole by their kind: steps of {:.6g} arcsec are no missing effect", counted_step()));
+        closure.notes.push_back(
+            fmt::format("the data are integer counts: their steps of {:.6g} arcsec are expected and no missing effect",
+                        counted_step()));
         find_coarse_steps(closure);
         if (rounded_.drawn()) closure.heldout_before = score(*now_.fit).error;
         return;
     }
     lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
-    if (lattice_.step_arcsec == 0.0) return;
+    const effects::Effect* effect = first_that_shows(OnSamples::resolution);
+    if (lattice_.step_arcsec == 0.0 || effect == nullptr) return;
     const double step = lattice_.step_arcsec;
     const double sd = now_.fit->sd(series_.size() / 2);
-    // Steps add step^2/12 to the variance: less than a thousandth of it changes nothing that is told here.
-    if (step * step / 12.0 < 1e-3 * sd * sd) {
+    // Steps add step^2/12 to the variance.
+    if (step * step / 12.0 < options.samples.loop.negligible_steps * sd * sd) {
         closure.notes.push_back(fmt::format(
-            "values come in steps of {:.6g} arcsec, too fine to matter beside {:.3g} arcsec of noise", step, sd));
+            "values come in steps of {:.6g} arcsec, which are negligible against {:.3g} arcsec of noise", step, sd));
         return;
     }
-    const bool blurred = lattice_.step_arcsec > 1.5 * lattice_.printed_arcsec;
+    const bool blurred = lattice_.step_arcsec > options.samples.loop.coarser_than_printed * lattice_.printed_arcsec;
     if (blurred) {
         closure.notes.push_back(fmt::format(
             "values are written in steps of {:.6g} arcsec; beneath them is a coarser one, of which {:.0f} % "
             "of the characteristic function is left",
             lattice_.printed_arcsec, 100.0 * lattice_.strength));
     }
-    Step taken;
-    taken.effect = effects::find("count_quantization");
+    AddedEffect added{.step = {.effect = effect}, .id = next_id_++};
+    Step& taken = added.step;
     taken.p_value = lattice_.p_value;
     const SampleScore before = score_of(*now_.fit, reported_, 0.0);
-    // Blurred steps are not where the values are: the digits are.
+    // Values do not lie on a blurred lattice, but on that of the printed digits.
     used_step_ = blurred ? lattice_.printed_arcsec : step;
     find_coarse_steps(closure);
     const SampleScore after = score(*now_.fit);
     taken.heldout_error_before = before.error;
     taken.heldout_error_after = after.error;
     taken.heldout_log_score_gain = after.log_score - before.log_score;
-    taken.parameters.push_back({"count_quantization", "step_arcsec", step, lattice_.step_sd_arcsec});
-    now_.steps.push_back(std::move(taken));
-    now_.told.push_back({"count_quantization", next_step_++});
+    taken.parameters.push_back(step_of_lattice(*effect));
+    now_.added.push_back(std::move(added));
 }
 
-/// Steps whose rounding follows the angle.
+/// Replaces increments in coarse steps, whose rounding follows the angle, by increments that are drawn within the
+/// steps.
 void SampleLoop::find_coarse_steps(Closure& closure) {
-    const bool blurred = lattice_.step_arcsec > 1.5 * lattice_.printed_arcsec;
+    const bool blurred = lattice_.step_arcsec > options.samples.loop.coarser_than_printed * lattice_.printed_arcsec;
     const double step = series_.counted ? counted_step() : blurred ? 0.0 : lattice_.step_arcsec;
     if (!RoundedSamples::show(*now_.fit, step)) return;
     now_.fit = rounded_.begin(*now_.fit, step);
@@ -101,39 +102,37 @@ void SampleLoop::find_coarse_steps(Closure& closure) {
                     step));
 }
 
-/// Adds what earns its place, until nothing does.
+/// Adds effects until none improves the model by enough.
 void SampleLoop::add_all(Closure& closure, bool random_rates) {
-    while (now_.steps.size() < options.most_steps) {
+    while (now_.added.size() < options.most_steps) {
         check_interrupt();
         monitor_.tell("searching the library");
         const SampleChoice choice = choose_on_samples(
-            record_.declared, {now_.fit, now_.lines_hz, next_step_, random_rates}, whole_, lattice_step());
+            record_.declared, {now_.fit, now_.lines_hz, next_id_, random_rates}, whole_, lattice_step());
         nearest_ = choice.nearest;
         if (!choice.chosen) break;
-        if (!earlier_ && is_random_rate(choice.chosen->candidate.effect)) earlier_ = now_;
+        if (!earlier_ && is_random_rate(*choice.chosen->effect)) earlier_ = now_;
         take(choice, closure);
     }
 }
 
-/// What was rounded was drawn by the model without a random rate, and says little of which one it is: the rounded
-/// values say that. The likelier is taken, with the fit to what was drawn by it.
-const SampleContender& SampleLoop::take_likelier(const SampleChoice& choice, Step& step) {
+/// Takes the likelier of two random rates. Increments that were drawn by a model without a random rate say little about
+/// which one it is; the likelihood of the rounded increments decides.
+const SampleCandidate& SampleLoop::take_likelier(const SampleChoice& choice, Step& step) {
     now_.fit = choice.chosen->fit;
     if (!rounded_.drawn() || !choice.other_random) return *choice.chosen;
-    const auto drawn = rounded_.draw(choice.chosen->fit, draws_of_step);
+    const auto drawn = rounded_.draw(choice.chosen->fit, options.samples.loop.draws);
     const double without = score(*drawn).log_likelihood;
-    now_.fit = rounded_.draw(choice.other_random->fit, draws_of_step);
+    now_.fit = rounded_.draw(choice.other_random->fit, options.samples.loop.draws);
     const double gain = score(*now_.fit).log_likelihood - without;
     const bool other = gain > 0.0;
     if (!other) now_.fit = rounded_.draw(drawn, 1);
-    const SampleContender& taken = other ? *choice.other_random : *choice.chosen;
-    const SampleContender& left = other ? *choice.chosen : *choice.other_random;
+    const SampleCandidate& taken = other ? *choice.other_random : *choice.chosen;
+    const SampleCandidate& left = other ? *choice.chosen : *choice.other_random;
     auto& tied = step.confounded_with;
-    std::erase_if(tied, [&](const effects::Effect* other) {
-        return other->name() == left.candidate.effect || other->name() == taken.candidate.effect;
-    });
-    if (std::abs(gain) < options.tie) tied.push_back(effects::find(left.candidate.effect));
-    if (other) step.p_value = taken.candidate.p_value;
+    std::erase_if(tied, [&](const effects::Effect* one) { return one == left.effect || one == taken.effect; });
+    if (std::abs(gain) < options.tie) tied.push_back(left.effect);
+    if (other) step.p_value = taken.p_value;
     return taken;
 }
 
@@ -141,72 +140,73 @@ const SampleContender& SampleLoop::take_likelier(const SampleChoice& choice, Ste
 void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     Step step;
     step.p_value = choice.p_value;
-    for (const std::string& name : choice.confounded_with) step.confounded_with.push_back(effects::find(name));
+    step.confounded_with = choice.confounded_with;
     const SampleScore before = score(*now_.fit);
-    const SampleContender& best = take_likelier(choice, step);
-    const std::string effect = best.candidate.effect;
-    step.effect = effects::find(effect);
-    for (const auto& [partner, names] : now_.of_partners) {
-        if (partner != effect) continue;
-        for (const std::string& name : names) {
-            const auto& named = step.confounded_with;
-            const effects::Effect* other = effects::find(name);
-            if (std::find(named.begin(), named.end(), other) == named.end()) step.confounded_with.push_back(other);
+    const SampleCandidate& best = take_likelier(choice, step);
+    const effects::Effect& effect = *best.effect;
+    step.effect = &effect;
+    auto& tied = step.confounded_with;
+    for (const auto& [partner, alternatives] : now_.of_partners) {
+        if (partner != &effect) continue;
+        for (const effects::Effect* one : alternatives) {
+            if (std::find(tied.begin(), tied.end(), one) == tied.end()) tied.push_back(one);
         }
     }
     now_.of_partners.insert(now_.of_partners.end(), choice.of_partners.begin(), choice.of_partners.end());
-    if (!step.confounded_with.empty()) step.experiment = experiment_for(*step.effect, step.confounded_with);
+    if (!tied.empty()) step.experiment = experiment_for(effect, tied);
     drop_needless(effect);
-    for (int k = 0; k < most_motions && move_anew();) ++k;
+    for (int k = 0; k < options.samples.loop.most_motions && move_anew();) ++k;
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
-    now_.told.push_back({.effect = effect,
-                         .step = next_step_++,
-                         .witness = best.candidate.witness,
-                         .strong = best.candidate.strong,
-                         .other_hz = choice.other_hz});
+    now_.added.push_back({.step = std::move(step),
+                          .id = next_id_++,
+                          .witness = best.witness,
+                          .strong = best.strong,
+                          .other_hz = choice.other_hz});
     if (rounded_.drawn()) {
-        now_.fit = rounded_.draw(now_.fit, draws_of_step);
-        // What was drawn without a motion tells little of it.
-        for (int k = 0; k < most_motions && move_anew(); ++k) now_.fit = rounded_.draw(now_.fit, 1);
+        now_.fit = rounded_.draw(now_.fit, options.samples.loop.draws);
+        // Increments that were drawn without a motion say little about it.
+        for (int k = 0; k < options.samples.loop.most_motions && move_anew(); ++k)
+            now_.fit = rounded_.draw(now_.fit, 1);
     } else if (series_.counted || used_step_ > 0.0) {
-        // What has been taken off may have been what the rounding was small beside.
+        // The rounding may have been small only against the effect that is now in the model.
         find_coarse_steps(closure);
     }
     const SampleScore after = score(*now_.fit);
-    step.heldout_error_before = before.error;
-    step.heldout_error_after = after.error;
-    step.heldout_log_score_gain = after.log_score - before.log_score;
+    AddedEffect& added = now_.added.back();
+    added.step.heldout_error_before = before.error;
+    added.step.heldout_error_after = after.error;
+    added.step.heldout_log_score_gain = after.log_score - before.log_score;
     if (is_line(effect)) {
-        const double hz = line_hz(now_.fit->model(), now_.told.back().step);
+        const double hz = line_hz(now_.fit->model(), added.id);
         now_.lines_hz.push_back(alias(hz, series_.rate_hz).hz);
-        now_.told.back().hz = now_.lines_hz.back();
-        if (best.candidate.wanders) {
+        added.hz = now_.lines_hz.back();
+        if (best.wanders) {
             now_.notes.push_back(
-                fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is foretold from the "
-                            "samples before as a narrow resonance",
+                fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is "
+                            "modelled as a narrow resonance and predicted from the samples before",
                             now_.lines_hz.back()));
         }
     }
-    monitor_.tell(fmt::format("added {}", step.effect->name()));
-    now_.steps.push_back(std::move(step));
+    monitor_.tell(fmt::format("added {}", effect.name()));
 }
 
-/// The model without what that step added, if it may only have stood in for the effect that was added last.
-std::optional<SampleLoop::Stripped> SampleLoop::stripped(const SampleStep& told, const std::string& added) const {
+/// The model without that effect, if it may only have stood in for the effect that was added last.
+std::optional<SampleLoop::Stripped> SampleLoop::stripped(const AddedEffect& of, const effects::Effect& last) const {
     Stripped without{now_.fit->model()};
     SampleModel& model = without.model;
-    if (told.effect == "rate_random_walk") {
+    const OnSamples as = on_samples(of.effect());
+    if (as == OnSamples::walk) {
         model.walk = false;
         model.noise.walk_arcsec2_s3 = 0.0;
-    } else if (told.effect == "bias_instability") {
+    } else if (as == OnSamples::flicker) {
         model.flicker = false;
         model.noise.terms.clear();
-    } else if (told.effect.starts_with("bias_") || told.effect == "scale_factor_error") {
-        std::erase_if(model.columns, [&](const SampleColumn& c) { return c.effect == told.effect; });
-        if (told.effect == "bias_step") without.parameters = 2;
-    } else if (is_line(told.effect) && added == "resampling") {
-        // Of a line that was resampled there are images, each a line to who does not know that.
-        const auto of_step = [&](const SampleColumn& c) { return c.step == told.step; };
+    } else if (as == OnSamples::rate || as == OnSamples::step) {
+        std::erase_if(model.columns, [&](const SampleColumn& c) { return c.effect == of.step.effect; });
+        if (as == OnSamples::step) without.parameters = 2;
+    } else if (is_line(of.effect()) && on_samples(last) == OnSamples::transport) {
+        // A line that was resampled has images, each of which looks like a line until the resampling is known.
+        const auto of_step = [&](const SampleColumn& c) { return c.step == of.id; };
         const auto cosine = std::find_if(model.columns.begin(), model.columns.end(), of_step);
         if (cosine == model.columns.end()) return std::nullopt;
         without.parameters = 2 + static_cast<int>(cosine->course.free);
@@ -217,54 +217,55 @@ std::optional<SampleLoop::Stripped> SampleLoop::stripped(const SampleStep& told,
     return without;
 }
 
-/// Effects that stood in for the one added last are no longer needed beside it.
-void SampleLoop::drop_needless(const std::string& added) {
-    for (std::size_t k = now_.told.size(); k-- > 0;) {
-        auto without = stripped(now_.told[k], added);
+/// Removes effects that only stood in for the one that was added last.
+void SampleLoop::drop_needless(const effects::Effect& last) {
+    for (std::size_t k = now_.added.size(); k-- > 0;) {
+        const AddedEffect& one = now_.added[k];
+        auto without = stripped(one, last);
         if (!without) continue;
         auto fitted = std::make_shared<SampleFit>(series_, std::move(without->model), rows_, SampleFit::Noise::near);
         const double chi2 = 2.0 * (now_.fit->gain_over(*fitted));
         if (passes_on_samples(chi2_tail(chi2, without->parameters))) continue;
         now_.fit = std::move(fitted);
-        if (is_line(now_.told[k].effect)) {
-            std::erase(now_.lines_hz, now_.told[k].hz);
+        if (is_line(one.effect())) {
+            std::erase(now_.lines_hz, one.hz);
             now_.notes.push_back(
-                fmt::format("a line at {:.6g} Hz was in the model until {} came in, beside which it is nothing",
-                            now_.told[k].hz, added));
+                fmt::format("a line at {:.6g} Hz was removed from the model: with {} the record does not need it",
+                            one.hz, last.name()));
         }
-        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
-        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+        now_.added.erase(now_.added.begin() + static_cast<std::ptrdiff_t>(k));
     }
 }
 
-/// What a witness told of a motion, and what it left, was told beside the noise as it was, which what has been added
-/// was a part of.
+/// Fits motions of the case again: their response to the witness was estimated with noise that included the effect
+/// which has been added since. \return whether any fit improved
 bool SampleLoop::move_anew() {
     bool any = false;
-    for (SampleStep& told : now_.told) {
-        if (told.effect != "case_motion") continue;
+    for (AddedEffect& added : now_.added) {
+        if (!is_motion(added.step.effect)) continue;
         const SampleFit still(series_, without_motion(now_.fit->model()), rows_, SampleFit::Noise::held);
-        auto moved = std::make_shared<SampleFit>(series_, moved_as(still, told.witness, told.step), rows_,
-                                                 SampleFit::Noise::near);
-        const double more = told.strong ? 1.0 : 2.0 * witness_lags(series_.rate_hz) - 1.0;
+        auto moved = std::make_shared<SampleFit>(series_, moved_as(still, added.effect(), added.witness, added.id),
+                                                 rows_, SampleFit::Noise::near);
+        const double more =
+            added.strong ? options.samples.fit.motion_refitted : 2.0 * witness_lags(series_.rate_hz) - 1.0;
         if (!(moved->gain_over(*now_.fit) > more)) continue;
         now_.fit = std::move(moved);
-        told.strong = true;
+        added.strong = true;
         any = true;
     }
     return any;
 }
 
-/// A motion of the case that is known to be there, by two numbers or lag by lag.
-void SampleLoop::move_case(SampleStep& told, SampleFit::Noise noise) {
+/// Fits a motion of the case that is known to be there: by two numbers, or lag by lag where that explains more.
+void SampleLoop::move_case(AddedEffect& motion, SampleFit::Noise noise) {
     SampleModel model = now_.fit->model();
-    add_motion(model, series_, told.witness, told.step);
+    add_motion(model, series_, motion.effect(), motion.witness, motion.id);
     auto weak = std::make_shared<SampleFit>(series_, std::move(model), rows_, noise);
-    auto strong = std::make_shared<SampleFit>(series_, moved_as(*now_.fit, told.witness, told.step), rows_,
-                                              SampleFit::Noise::near);
+    auto strong = std::make_shared<SampleFit>(series_, moved_as(*now_.fit, motion.effect(), motion.witness, motion.id),
+                                              rows_, SampleFit::Noise::near);
     const double more = 2.0 * witness_lags(series_.rate_hz) - 1.0;
-    told.strong = strong->gain_over(*weak) > more;
-    now_.fit = told.strong ? std::move(strong) : std::move(weak);
+    motion.strong = strong->gain_over(*weak) > more;
+    now_.fit = motion.strong ? std::move(strong) : std::move(weak);
 }
 
 }  // namespace ringlock::closure

@@ -7,8 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
+#include "analysis/closure/samples/fit/motion.hpp"
 #include "analysis/closure/samples/loop/loop.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
 #include "analysis/closure/stats/p_values.hpp"
@@ -28,10 +30,10 @@ ResidualTest test_of(const Disturbed& disturbed) {
 
 }  // namespace
 
-/// Tests of what the model has left; where structure lies, if any passes the level: by the regression that explains
-/// most, the noise fitted anew beside it; where none does, by the test that is least probable by chance.
+/// Tests the residual. If any test passes the level, the unexplained structure is named by the regression that explains
+/// most with the noise fitted again; if no regression explains anything, by the test that is least probable by chance.
 void SampleLoop::test_what_is_left(Closure& closure) const {
-    constexpr std::size_t looked_at = 4;
+    const std::size_t looked_at = options.samples.loop.most_views;
     auto views = view_samples(*now_.fit, lattice_step());
     views.push_back({test_of(find_disturbed(*now_.fit, whole_))});
     if (rounded_.drawn()) views.push_back({rounded_.test(*now_.fit)});
@@ -59,7 +61,7 @@ void SampleLoop::test_what_is_left(Closure& closure) const {
         regression = &view;
         closure.unexplained = view.test;
     }
-    // A strong rate looks like lines: such as are none beside it.
+    // A strong rate looks like lines: those count only if they remain when the rate is fitted.
     std::vector<SampleView> beside;
     if (regression != nullptr) beside = view_samples(fit_beside(*now_.fit, *regression), lattice_step());
     for (const SampleView& view : views) {
@@ -74,8 +76,8 @@ void SampleLoop::test_what_is_left(Closure& closure) const {
     }
 }
 
-/// Stretches that nothing was fitted to, as they are far larger than the others, are structure as well. They are no
-/// rate and no line, so that what has been named stays.
+/// Stretches that were left out of all fits because they are far larger than the others are structure as well. They are
+/// no rate and no line, so that effects which have been named stay.
 void SampleLoop::test_left_out(Closure& closure) const {
     if (std::find(disturbed_.rows.begin(), disturbed_.rows.end(), 1) == disturbed_.rows.end()) return;
     const ResidualTest test = test_of(still_disturbed());
@@ -93,12 +95,14 @@ void SampleLoop::test_left_out(Closure& closure) const {
 
 void SampleLoop::begin_again(const State& at) {
     now_ = at;
-    // It was fitted to what was drawn then.
-    if (rounded_.drawn()) now_.fit = rounded_.draw(now_.fit, draws_of_step);
+    // The fit of that state was to increments that have been drawn again since.
+    if (rounded_.drawn()) now_.fit = rounded_.draw(now_.fit, options.samples.loop.draws);
 }
 
-/// A rate is left that the random one has only come nearest to: several of the library together, if they leave nothing
-/// and are likelier; else no rate is named, and what was found beside it that is none stays.
+/// A random rate was added but left structure, so that it may only be a proxy for another rate. The loop goes on
+/// without random rates from before it: if several effects of the library together leave no structure and are likelier,
+/// they are the answer. Otherwise no rate is reported, and effects that were found after the random rate stay unless
+/// they are rates.
 void SampleLoop::go_without_random(Closure& closure) {
     const State followed = now_;
     const std::optional<ResidualTest> left = closure.unexplained;
@@ -110,82 +114,80 @@ void SampleLoop::go_without_random(Closure& closure) {
     begin_again(followed);
     closure.unexplained = left;
     closure.tests = tests;
-    const auto keeps = [](const SampleStep& told) { return !is_slow_rate(told.effect); };
-    if (keep_names(earlier_->told.empty() ? 0 : earlier_->told.back().step + 1, keeps, closure)) return;
+    const auto keeps = [](const AddedEffect& added) { return !is_slow_rate(added.effect()); };
+    if (keep_names(earlier_->added.empty() ? 0 : earlier_->added.back().id + 1, keeps, closure)) return;
     begin_again(*earlier_);
     test_what_is_left(closure);
 }
 
-/// A rate or a line is left that the library does not have, and in the way of what else there is: that is looked for
-/// beside what comes nearest to it.
+/// The residual contains a rate or a line that no effect of the library explains. The closest effect is added as a
+/// placeholder, so that other effects can still be found.
 void SampleLoop::look_beside_nearest(Closure& closure) {
-    constexpr int most = 3;
+    const int most = options.samples.loop.most_placeholders;
     const State without = now_;
-    const int first = next_step_;
+    const int first = next_id_;
     const std::optional<ResidualTest> left = closure.unexplained;
     const std::vector<ResidualTest> tests = closure.tests;
-    const bool line = is_line(nearest_->candidate.effect);
+    const bool line = is_line(*nearest_->effect);
     std::vector<double> around_hz;
-    for (int k = 0; k < most && nearest_ && is_line(nearest_->candidate.effect) == line; ++k) {
+    for (int k = 0; k < most && nearest_ && is_line(*nearest_->effect) == line; ++k) {
         SampleChoice choice;
         choice.chosen = std::exchange(nearest_, {});
         take(choice, closure);
-        around_hz.push_back(now_.told.back().hz);
+        around_hz.push_back(now_.added.back().hz);
         add_all(closure, line);
     }
     const bool of_witness = left && left->view == followed_witnesses;
-    // What is left of a line lies about it, a rate that is left takes another's shape, and one that goes with an
-    // acceleration that of a motion.
-    const auto keeps = [&](const SampleStep& told) {
-        if (!line) return !is_slow_rate(told.effect) && !(of_witness && told.effect == "case_motion");
-        if (!is_line(told.effect)) return !is_random_rate(told.effect);
+    // Lines near a placeholder are what it leaves of the unknown line; a rate may be part of the unknown rate; and a
+    // motion may be part of a rate that follows an acceleration.
+    const auto keeps = [&](const AddedEffect& added) {
+        if (!line) return !is_slow_rate(added.effect()) && !(of_witness && is_motion(added.step.effect));
+        if (!is_line(added.effect())) return !is_random_rate(added.effect());
         return std::none_of(around_hz.begin(), around_hz.end(),
-                            [&](double hz) { return std::abs(hz - told.hz) < beside_hz; });
+                            [&](double hz) { return std::abs(hz - added.hz) < options.samples.lines.beside_hz; });
     };
     if (!keep_names(first, keeps, closure)) begin_again(without);
     closure.unexplained = left;
     closure.tests = tests;
 }
 
-/// Of what was added from that step on, some loses its name.
-/// \return whether anything keeps it
-bool SampleLoop::keep_names(int first_step, const std::function<bool(const SampleStep&)>& keeps, Closure& closure) {
-    const auto since = [&](const SampleStep& told) { return told.step >= first_step; };
-    const auto stays = [&](const SampleStep& told) { return since(told) && keeps(told); };
-    if (std::none_of(now_.told.begin(), now_.told.end(), stays)) return false;
-    for (std::size_t k = now_.told.size(); k-- > 0;) {
-        if (!since(now_.told[k]) || stays(now_.told[k])) continue;
-        closure.notes.push_back(fmt::format(
-            "{} follows what may be nothing that the library has: it is in the model, so that the rest can be "
-            "told, and is not named",
-            now_.steps[k].effect->name()));
-        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
-        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+/// Effects that were added from that one on stay in the model, but those that `keeps` refuses are not reported.
+/// \return whether any is reported
+bool SampleLoop::keep_names(int first_id, const std::function<bool(const AddedEffect&)>& keeps, Closure& closure) {
+    const auto since = [&](const AddedEffect& added) { return added.id >= first_id; };
+    const auto stays = [&](const AddedEffect& added) { return since(added) && keeps(added); };
+    if (std::none_of(now_.added.begin(), now_.added.end(), stays)) return false;
+    for (std::size_t k = now_.added.size(); k-- > 0;) {
+        if (!since(now_.added[k]) || stays(now_.added[k])) continue;
+        closure.notes.push_back(
+            fmt::format("{} was fitted only as a placeholder for structure that no effect of the library explains, and "
+                        "is not reported",
+                        now_.added[k].effect().name()));
+        now_.added.erase(now_.added.begin() + static_cast<std::ptrdiff_t>(k));
     }
     return true;
 }
 
-/// A line of the library keeps its amplitude, and its frequency but for a drift. One that does not, as its own
-/// amplitudes in time or lines beside it show, is none and is not named. What a strong one does beside, by a hundredth
-/// of its power, is left, but takes the name from none.
+/// Lines of the library keep their amplitude and, but for a drift, their frequency. A line that does not, as its
+/// amplitude over time or another line next to it shows, is not reported. Changes of a strong line by a small share of
+/// its power stay in the residual, and the line is reported.
 void SampleLoop::take_back_lines(Closure& closure) {
     if (!closure.unexplained) return;
     const UnsteadyLine line = unsteady_line(*now_.fit);
-    constexpr double little = 0.02;
+    const double little = options.samples.loop.unsteady_line;
     const bool fails = line.off > little &&
                        of_several(line.p_value, static_cast<double>(closure.tests.size())) < options.level_of_residual;
     const bool beside = line.beside > little;
     if (!fails && !beside) return;
-    for (std::size_t k = 0; k < now_.told.size(); ++k) {
-        if (now_.told[k].step != line.step) continue;
+    for (std::size_t k = 0; k < now_.added.size(); ++k) {
+        if (now_.added[k].id != line.step) continue;
         const std::string at = fmt::format("at {:.6g} Hz", line.hz);
         closure.unexplained = ResidualTest{beside ? Where::frequency : Where::amplitude,
                                            "a line that does not keep its amplitude or its frequency",
                                            fails ? line.p_value : closure.unexplained->p_value, at};
-        closure.notes.push_back(
-            fmt::format("the line {} is in the model, so that the rest can be told, and is not named", at));
-        now_.steps.erase(now_.steps.begin() + static_cast<std::ptrdiff_t>(k));
-        now_.told.erase(now_.told.begin() + static_cast<std::ptrdiff_t>(k));
+        closure.notes.push_back(fmt::format(
+            "the line {} was fitted only so that other effects can be identified, and is not reported", at));
+        now_.added.erase(now_.added.begin() + static_cast<std::ptrdiff_t>(k));
         return;
     }
 }

@@ -35,24 +35,25 @@ class SampleLoop {
     Closure fit(const std::vector<ActiveEffect>& effects);
 
    private:
-    /// Of increments that were rounded, after every step.
-    static constexpr int draws_of_step = 2;
     /// The model as it has grown, with what was added.
     struct State {
         std::shared_ptr<SampleFit> fit;
-        std::vector<Step> steps;
-        std::vector<SampleStep> told;  ///< as many
+        std::vector<AddedEffect> added;
         std::vector<double> lines_hz;
         std::vector<std::string> notes;  ///< on these steps
-        /// What is added after another that was chosen with it is as confounded.
-        std::vector<std::pair<std::string, std::vector<std::string>>> of_partners;
+        Partners of_partners;            ///< of all choices
     };
-    /// Of values as they are looked at: those that were drawn are in none that could be seen.
+    /// Step of the values that fits and tests see; drawn increments have none that could be seen.
     double lattice_step() const {
         if (rounded_.drawn()) return 1e-9 * rounded_.step_arcsec();
         return counted_step() > 0.0 ? counted_step() : lattice_.step_arcsec;
     }
     double counted_step() const { return series_.counted ? 0.25 * series_.scale_factor_arcsec : 0.0; }
+    /// The step of the lattice as the parameter of an effect.
+    Estimate step_of_lattice(const effects::Effect& effect) const {
+        const auto& step = parameter_of(effect, effects::Role::sampled);
+        return estimate_of(effect, step.name, lattice_.step_arcsec, lattice_.step_sd_arcsec);
+    }
     std::vector<double> chosen_increments() const;
     Rows all_rows() const;
     void begin(Closure& closure);
@@ -62,21 +63,21 @@ class SampleLoop {
     void begin_again(const State& at);
     void go_without_random(Closure& closure);
     void look_beside_nearest(Closure& closure);
-    bool keep_names(int first_step, const std::function<bool(const SampleStep&)>& keeps, Closure& closure);
+    bool keep_names(int first_id, const std::function<bool(const AddedEffect&)>& keeps, Closure& closure);
     Disturbed still_disturbed() const;
     bool restore();
     void take_lattice(Closure& closure);
-    const SampleContender& take_likelier(const SampleChoice& choice, Step& step);
+    const SampleCandidate& take_likelier(const SampleChoice& choice, Step& step);
     void take(const SampleChoice& choice, Closure& closure);
     void take_back_lines(Closure& closure);
-    void move_case(SampleStep& told, SampleFit::Noise noise);
+    void move_case(AddedEffect& motion, SampleFit::Noise noise);
     bool move_anew();
     struct Stripped {
         SampleModel model;
         int parameters = 1;  ///< that it has less
     };
-    std::optional<Stripped> stripped(const SampleStep& told, const std::string& added) const;
-    void drop_needless(const std::string& added);
+    std::optional<Stripped> stripped(const AddedEffect& of, const effects::Effect& last) const;
+    void drop_needless(const effects::Effect& last);
     void test_what_is_left(Closure& closure) const;
     void test_left_out(Closure& closure) const;
     void finish(Closure& closure);
@@ -99,8 +100,8 @@ class SampleLoop {
     std::shared_ptr<SampleFit> base_;
     State now_;
     std::optional<State> earlier_;              ///< before the first random rate
-    std::shared_ptr<SampleContender> nearest_;  ///< of SampleChoice, where nothing was chosen any more
-    int next_step_ = 0;
+    std::shared_ptr<SampleCandidate> nearest_;  ///< of the last choice, which had nothing to add
+    int next_id_ = 0;                           ///< of the next effect that is added
 };
 
 /// Runs the loop on a record of samples. Throws InputError where the record does not suffice.

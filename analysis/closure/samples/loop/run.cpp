@@ -11,31 +11,21 @@
 #include "analysis/closure/decide/verdict.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
+#include "analysis/closure/samples/fit/motion.hpp"
 #include "analysis/closure/samples/fit/steps.hpp"
 #include "analysis/closure/samples/loop/loop.hpp"
 #include "analysis/closure/samples/screen/known.hpp"
 
 namespace ringlock::closure {
 
-namespace {
-
-/// Of a record; where it is more, that is what the record is like.
-constexpr double most_disturbed = 0.6;
-
-/// What an effect that has been added explains is not disturbed: so often it is looked at again.
-constexpr int most_looks = 3;
-
-}  // namespace
-
-/// What a witness tells at lags, it does not tell at the ends of the record; what it left untold at the start, a narrow
-/// motion remembers for longer.
+/// All rows but those at the ends of the record for which a witness has no values at all lags. At the start more rows
+/// are left out, since a narrow motion remembers what the witness does not explain there.
 Rows SampleLoop::all_rows() const {
-    constexpr std::size_t remembered = 4;
     Rows all(series_.size(), 1);
     if (series_.witnesses.empty()) return all;
     const auto lags = static_cast<std::size_t>(witness_lags(series_.rate_hz));
-    const std::size_t most = all.size() / 20;
-    std::fill_n(all.begin(), std::min(remembered * lags, most), 0);
+    const std::size_t most = all.size() / options.samples.loop.edge_parts;
+    std::fill_n(all.begin(), std::min(options.samples.loop.remembered_lags * lags, most), 0);
     std::fill_n(all.rbegin(), std::min(lags, most), 0);
     return all;
 }
@@ -63,12 +53,12 @@ void SampleLoop::begin(Closure& closure) {
                         series_.input_late_s));
     }
     now_ = {};
-    next_step_ = 0;
+    next_id_ = 0;
     now_.fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
     closure.heldout_before = score_of(*now_.fit, reported_, 0.0).error;
     if (disturbed_.rows.empty()) disturbed_ = find_disturbed(*now_.fit, whole_);
-    if (disturbed_.share >= most_disturbed) disturbed_.rows.assign(disturbed_.rows.size(), 0);
-    if (disturbed_.share > 0.0 && disturbed_.share < most_disturbed) {
+    if (disturbed_.share >= options.samples.loop.most_disturbed) disturbed_.rows.assign(disturbed_.rows.size(), 0);
+    if (disturbed_.share > 0.0 && disturbed_.share < options.samples.loop.most_disturbed) {
         const double with = closure.heldout_before;
         for (std::size_t i = 0; i < rows_.size(); ++i) {
             if (!disturbed_.rows[i]) continue;
@@ -88,7 +78,7 @@ SampleScore SampleLoop::score(const SampleFit& fit) const {
     return rounded_.drawn() ? rounded_.score_of(fit, reported_) : score_of(fit, reported_, used_step_);
 }
 
-/// What is reported: errors of the blocks held out, parameters of a last fit to the whole record.
+/// Fills in what is reported: errors on the held-out blocks, and parameters of a last fit to the whole record.
 void SampleLoop::finish(Closure& closure) {
     const SampleScore last = score(*now_.fit);
     closure.heldout_after = last.error;
@@ -110,9 +100,9 @@ void SampleLoop::finish(Closure& closure) {
     SampleFigures figures = this->figures();
     closure.rounding_in_noise = !rounded_.drawn();
     closure.base = std::move(figures.base);
-    closure.steps = std::move(now_.steps);
-    for (std::size_t k = 0; k < closure.steps.size(); ++k) {
-        if (closure.steps[k].parameters.empty()) closure.steps[k].parameters = std::move(figures.steps[k]);
+    for (std::size_t k = 0; k < now_.added.size(); ++k) {
+        Step& step = closure.steps.emplace_back(std::move(now_.added[k].step));
+        if (step.parameters.empty()) step.parameters = std::move(figures.steps[k]);
     }
     for (auto* notes : {&now_.notes, &figures.notes}) {
         for (std::string& note : *notes) closure.notes.push_back(std::move(note));
@@ -120,7 +110,7 @@ void SampleLoop::finish(Closure& closure) {
     closure.verdict = verdict_of(closure);
 }
 
-/// What is disturbed beside the model as it has grown, of all rows that can be told.
+/// Rows that are still disturbed when the present model is taken off, among all rows.
 Disturbed SampleLoop::still_disturbed() const {
     // With all that is there, as a place in it may be known by nothing else.
     const Rows all = all_rows();
@@ -129,10 +119,9 @@ Disturbed SampleLoop::still_disturbed() const {
     return find_disturbed(whole, all);
 }
 
-/// An effect that has come into the model may be what seemed to disturb a part of the record: whether any of that part
-/// is to be looked at again.
+/// Takes back rows that seemed disturbed and that an effect which was added since explains.
+/// \return whether there are enough of them for the loop to begin again
 bool SampleLoop::restore() {
-    constexpr double little = 0.05;
     if (disturbed_.share == 0.0) return false;
     const Disturbed still = still_disturbed();
     double before = 0.0;
@@ -143,16 +132,16 @@ bool SampleLoop::restore() {
         before += disturbed_.rows[i];
         left += less.rows[i];
     }
-    if (!(left < (1.0 - little) * before)) return false;
+    if (!(left < (1.0 - options.samples.loop.restored) * before)) return false;
     less.share = left / static_cast<double>(less.rows.size());
     disturbed_ = std::move(less);
     return true;
 }
 
-/// Of a fit to the whole record.
+/// Parameters and their errors, from a fit to the whole record.
 SampleFigures SampleLoop::figures() {
     const auto of = [&](const SampleFit& fit) {
-        return figures_of(refine_steps(refine_lines(fit, whole_), whole_), now_.told, record_.declared);
+        return figures_of(refine_steps(refine_lines(fit, whole_), whole_), now_.added, record_.declared);
     };
     const SampleFit whole(series_, now_.fit->model(), whole_, SampleFit::Noise::near);
     return rounded_.drawn() ? rounded_.figures_of(whole, of) : of(whole);
@@ -160,7 +149,7 @@ SampleFigures SampleLoop::figures() {
 
 Closure SampleLoop::run() {
     Closure closure;
-    for (int look = 0; look < most_looks; ++look) {
+    for (int look = 0; look < options.samples.loop.most_looks; ++look) {
         closure = {};
         monitor_.tell("fitting the base model");
         close(closure);
@@ -189,26 +178,24 @@ void SampleLoop::close(Closure& closure) {
 void SampleLoop::take_known(const std::vector<ActiveEffect>& effects, Closure& closure) {
     begin(closure);
     KnownEffects known = known_effects(*now_.fit, effects);
-    for (const SampleStep& told : known.told) {
-        Step& step = now_.steps.emplace_back();
-        step.effect = effects::find(told.effect);
-        if (told.effect != "count_quantization") continue;
+    now_.added = std::move(known.added);
+    for (AddedEffect& added : now_.added) {
+        if (on_samples(added.effect()) != OnSamples::resolution) continue;
         lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
         used_step_ = lattice_.printed_arcsec;
-        step.parameters.push_back({told.effect, "step_arcsec", lattice_.step_arcsec, lattice_.step_sd_arcsec});
+        added.step.parameters.push_back(step_of_lattice(added.effect()));
     }
-    now_.told = std::move(known.told);
     now_.fit = std::make_shared<SampleFit>(series_, std::move(known.model), rows_, known.noise);
-    for (SampleStep& told : now_.told) {
-        if (told.effect == "case_motion" && !series_.witnesses.empty()) move_case(told, known.noise);
+    for (AddedEffect& added : now_.added) {
+        if (is_motion(added.step.effect) && !series_.witnesses.empty()) move_case(added, known.noise);
     }
     if (series_.counted || used_step_ > 0.0) find_coarse_steps(closure);
 }
 
-/// Whatever is known to be there, at the values given or near them; what is left is not looked at.
+/// Fits the known effects at the values given or near them, and does not test the residual.
 Closure SampleLoop::fit(const std::vector<ActiveEffect>& effects) {
     Closure closure;
-    for (int look = 0; look < most_looks; ++look) {
+    for (int look = 0; look < options.samples.loop.most_looks; ++look) {
         closure = {};
         take_known(effects, closure);
         if (!restore()) break;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <complex>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
@@ -32,7 +33,6 @@ double common_divisor(double a, double b, double tolerance) {
 /// The known input in the middle of each interval. A sample belongs to its end; where the increments say by far that
 /// the other instrument's clock means the start, or the middle, they are believed.
 void take_input(const record::Record& record, SampleSeries& series) {
-    constexpr double by_far = 30.0;  // of chi-squared
     const std::size_t n = series.size();
     double least = 0.0;
     for (const double late : {-0.5, 0.0, 0.5}) {
@@ -47,7 +47,8 @@ void take_input(const record::Record& record, SampleSeries& series) {
         }
         squares -= sum * sum / static_cast<double>(n);
         const bool first = series.input_rate_deg_h.empty();
-        if (!first && !(squares < least * (1.0 - by_far / static_cast<double>(n)))) continue;
+        if (!first && !(squares < least * (1.0 - options.samples.record.other_clock / static_cast<double>(n))))
+            continue;
         least = squares;
         series.input_rate_deg_h = std::move(input);
         series.input_late_s = (late + 0.5) * series.interval_s;
@@ -63,7 +64,7 @@ struct Smoothed {
 /// at the ends those through the first of them and the last.
 Smoothed smooth(const std::vector<double>& values) {
     const std::size_t n = values.size();
-    const std::size_t half = std::min(std::max<std::size_t>(1, n / 1000), (n - 1) / 2);
+    const std::size_t half = std::min(std::max<std::size_t>(1, n / options.samples.record.smoothed_parts), (n - 1) / 2);
     std::vector<double> sums(n + 1, 0.0);
     for (std::size_t i = 0; i < n; ++i) sums[i + 1] = sums[i] + values[i];
     const auto mean_about = [&](std::size_t middle) {
@@ -167,7 +168,7 @@ Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
         if (x - levels.back() > tolerance) levels.push_back(x);
     }
     // Without a lattice no two values of so many digits are the same.
-    if (levels.size() > n / 4 || levels.size() < 2) return lattice;
+    if (levels.size() > n / options.samples.record.values_per_level || levels.size() < 2) return lattice;
     double step = std::max(std::abs(levels.front()), range);
     for (const double x : levels) {
         if (std::abs(x) > tolerance)
@@ -184,7 +185,7 @@ Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
     }
     step = xy / yy;
     for (const double x : levels) {
-        if (std::abs(x / step - std::round(x / step)) > 0.02) return lattice;
+        if (std::abs(x / step - std::round(x / step)) > options.samples.record.off_lattice) return lattice;
     }
     lattice.printed_arcsec = lattice.step_arcsec = step;
     lattice.strength = 1.0;
@@ -238,7 +239,8 @@ Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
         }
     }
     const double p = of_several(std::exp(-count * best * best), static_cast<double>(places));
-    if (best > 0.3 && p < 1e-6 && at < highest) {
+    const auto& record = options.samples.record;
+    if (best > record.coarser_lattice_strength && p < record.coarser_lattice_p && at < highest) {
         lattice.step_arcsec = 1.0 / at;
         lattice.strength = best;
         lattice.p_value = p;

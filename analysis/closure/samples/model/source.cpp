@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/closure/options.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -44,7 +45,7 @@ struct Clock {
 
 /// Of a clock that ticks at all these times, and at others, with about that period; none where there is none.
 std::optional<Clock> clock_of(const std::vector<double>& times, double period) {
-    constexpr double exact = 1e-3;  // rms
+    const double exact = options.samples.record.off_clock;
     double start = times.front();
     double number = 0.0;
     double count = 0.0, sum_k = 0.0, sum_t = 0.0, sum_kk = 0.0, sum_kt = 0.0;
@@ -70,11 +71,9 @@ std::optional<Clock> clock_of(const std::vector<double>& times, double period) {
 }  // namespace
 
 std::optional<SampleSource> find_straight_lines(const std::vector<double>& increments, double rate_hz) {
-    constexpr double same = 1e-7;          // of what increments differ by
-    constexpr std::size_t few = 20;        // readings
-    constexpr double shortest_period = 2;  // so that lines have whole intervals
+    const SampleRecordOptions& record = options.samples.record;
     const auto [low, high] = std::minmax_element(increments.begin(), increments.end());
-    const double tolerance = same * (*high - *low);
+    const double tolerance = record.same_line * (*high - *low);
     const auto line_goes_on = [&](std::size_t i) { return std::abs(increments[i] - increments[i - 1]) <= tolerance; };
     // Times of readings, in intervals of the record, where one turn lies between two lines.
     std::vector<double> turns;
@@ -85,13 +84,13 @@ std::optional<SampleSource> find_straight_lines(const std::vector<double>& incre
         const double share = (increments[i] - after) / (before - after);
         if (share > 0.0 && share < 1.0) turns.push_back(static_cast<double>(i) + share);
     }
-    if (turns.size() < few) return std::nullopt;
+    if (turns.size() < record.fewest_readings) return std::nullopt;
     std::vector<double> apart;
     for (std::size_t k = 1; k < turns.size(); ++k) apart.push_back(turns[k] - turns[k - 1]);
     // The shortest, but for a few by chance, is one interval of the source or, where few turns can be told, some.
     const auto shortest = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 20);
     std::nth_element(apart.begin(), shortest, apart.end());
-    for (double some = 1.0; *shortest / some >= shortest_period; some += 1.0) {
+    for (double some = 1.0; *shortest / some >= record.shortest_source_interval; some += 1.0) {
         if (const auto clock = clock_of(turns, *shortest / some)) {
             const double phase = -clock->start / clock->period;
             return SampleSource{rate_hz / clock->period, phase - std::floor(phase)};

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
 #include "analysis/closure/samples/residual/views.hpp"
 #include "analysis/closure/stats/p_values.hpp"
@@ -94,7 +95,8 @@ void test_temperature(const SampleFit& fit, Views& views) {
         return {now, lagged(now, series.interval_s, lag_s(place)), std::move(start)};
     };
     const auto said = [lag_s](std::size_t place) { return fmt::format("by {:.2g} s", lag_s(place)); };
-    test_places(fit, Where::temperature, "rates that follow the temperature late", {7, columns, said, 1}, views);
+    test_places(fit, Where::temperature, "rates that follow the temperature late",
+                {options.samples.residual.temperature_lags, columns, said, 1}, views);
 }
 
 void test_input(const SampleFit& fit, Views& views) {
@@ -127,7 +129,8 @@ void test_input(const SampleFit& fit, Views& views) {
     const auto said = [&series, half](std::size_t place) {
         return fmt::format("within {:.2g} s", static_cast<double>(half(place)) * series.interval_s);
     };
-    test_places(fit, Where::rate, "rates that follow the input rate's slope and its noise", {5, columns, said}, views);
+    test_places(fit, Where::rate, "rates that follow the input rate's slope and its noise",
+                {options.samples.residual.input_reaches, columns, said}, views);
 }
 
 /// A bias that goes with the acceleration. What is late smooths the witness as well, whose noise is fast.
@@ -149,7 +152,8 @@ void test_accelerations(const SampleFit& fit, Views& views) {
     const auto said = [lag_s](std::size_t place) {
         return place == 0 ? std::string() : fmt::format("{:.2g} s late", lag_s(place));
     };
-    test_places(fit, Where::frequency, std::string(followed_witnesses), {4, columns, said}, views);
+    test_places(fit, Where::frequency, std::string(followed_witnesses),
+                {options.samples.residual.acceleration_lags, columns, said}, views);
 }
 
 }  // namespace

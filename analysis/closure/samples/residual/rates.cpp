@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/fit/repeats_and_witness.hpp"
 #include "analysis/closure/samples/fit/steps.hpp"
@@ -25,7 +26,7 @@ namespace {
 /// Rates that go with a power of time, as few of them as the record asks for (Schwarz, Annals of Statistics 6, 1978,
 /// 461).
 void test_powers_of_time(const SampleFit& fit, Views& views) {
-    constexpr std::size_t degrees = 6;
+    const std::size_t degrees = options.samples.residual.polynomial_degrees;
     const std::size_t n = fit.series().size();
     Columns powers;
     Columns taken;
@@ -70,7 +71,8 @@ void test_slow_swings(const SampleFit& fit, Views& views) {
     const auto said = [periods](std::size_t place) {
         return fmt::format("{:g} periods over the record", periods(place));
     };
-    test_places(fit, Where::time, "a rate that swings slowly", {32, swing, said}, views);
+    test_places(fit, Where::time, "a rate that swings slowly", {options.samples.residual.slow_swings, swing, said},
+                views);
 }
 
 /// A rate that settles after the start.
@@ -79,7 +81,7 @@ void test_settling(const SampleFit& fit, Views& views) {
     const double duration_s = time_s.back() - time_s.front();
     // A constant between two of them loses little by either.
     const auto constant_s = [duration_s](std::size_t place) {
-        return duration_s * std::pow(1.4, -static_cast<double>(place));
+        return duration_s * std::pow(options.samples.residual.settling_factor, -static_cast<double>(place));
     };
     const auto settles = [&time_s, constant_s](std::size_t place) {
         Columns columns(1, std::vector<double>(time_s.size()));
@@ -91,7 +93,8 @@ void test_settling(const SampleFit& fit, Views& views) {
     const auto said = [constant_s](std::size_t place) {
         return fmt::format("with a time constant of {:.2g} s", constant_s(place));
     };
-    test_places(fit, Where::time, "a rate that settles", {14, settles, said}, views);
+    test_places(fit, Where::time, "a rate that settles", {options.samples.residual.settling_constants, settles, said},
+                views);
 }
 
 void test_steps(const SampleFit& fit, Views& views) {
@@ -100,7 +103,7 @@ void test_steps(const SampleFit& fit, Views& views) {
     std::vector<double> roots;
     double best = 0.0;
     std::size_t at = 0;
-    constexpr std::size_t places = 40;
+    const std::size_t places = options.samples.residual.step_places;
     const auto step_at = [n](std::size_t row) {
         std::vector<double> step(n, 0.0);
         std::fill(step.begin() + static_cast<std::ptrdiff_t>(row), step.end(), 1.0);
@@ -223,7 +226,6 @@ Stretches regress_on_stretches(const SampleFit& fit, std::size_t stretches) {
 
 /// Gain of the log-likelihood by a rate of two states, the noise fitted anew beside it, less its numbers.
 double merit_of_states(const SampleFit& fit, const TwoStates& first) {
-    constexpr double numbers = 3.0;  // the step and two probabilities
     const std::size_t n = fit.series().size();
     const auto stretches = static_cast<std::size_t>(first.expected.size());
     std::vector<double> rate(n);
@@ -231,7 +233,7 @@ double merit_of_states(const SampleFit& fit, const TwoStates& first) {
         rate[i] = fit.series().interval_s * first.expected(static_cast<Eigen::Index>(i * stretches / n));
     }
     SampleModel with = fit.model();
-    with.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(std::move(rate))});
+    with.columns.push_back({nullptr, "view", std::make_shared<const std::vector<double>>(std::move(rate))});
     SampleModel without = fit.model();
     without.noise = SampleFit(fit.series(), std::move(with), fit.rows(), SampleFit::Noise::near).model().noise;
     const SampleFit beside(fit.series(), std::move(without), fit.rows(), SampleFit::Noise::held);
@@ -247,17 +249,17 @@ double merit_of_states(const SampleFit& fit, const TwoStates& first) {
     for (Eigen::Index k = 0; k < shape.size(); ++k) {
         shape(k) = (first.expected(k / static_cast<Eigen::Index>(finer)) - first.rate) / first.step;
     }
-    return beside.gain_over(fit) + two_states(all.normal, all.right, shape).gain - numbers;
+    return beside.gain_over(fit) + two_states(all.normal, all.right, shape).gain -
+           options.samples.residual.price_of_states;
 }
 
 /// Rates of stretches of the record, for a rate that jumps to and fro.
 void test_levels(const SampleFit& fit, Views& views) {
-    constexpr std::size_t stretches = 120;
+    const std::size_t stretches = options.samples.residual.level_stretches;
     const Stretches all = regress_on_stretches(fit, stretches);
     const TwoLevels found = two_levels(all.normal - all.of_columns, all.right);
     // Jumps do not wait for the end of a stretch.
-    constexpr double of_places = 2.0;
-    const double cost = found.cost + of_places * found.changes;
+    const double cost = found.cost + options.samples.residual.price_of_jump * found.changes;
     SampleView view{
         {Where::time, std::string(jumping_rate), found.p_value, fmt::format("{} jumps", found.changes), found.merit},
         cost,

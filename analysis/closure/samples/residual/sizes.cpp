@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/line_search.hpp"
 #include "analysis/closure/samples/fit/repeats_and_witness.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
@@ -72,7 +73,8 @@ void test_size(const SampleFit& fit, Views& views) {
     // Patterns of the place in the record: mean and size for each remainder.
     double least = 1.0;
     std::size_t at = 0;
-    for (std::size_t m = 2; m <= 16; ++m) {
+    const std::size_t most_modulo = options.samples.residual.most_modulo;
+    for (std::size_t m = 2; m <= most_modulo; ++m) {
         double means = 0.0;
         double sizes = 0.0;
         std::vector<double> sum(m, 0.0);
@@ -95,8 +97,8 @@ void test_size(const SampleFit& fit, Views& views) {
             at = m;
         }
     }
-    views.push_back(
-        {{Where::time, "place in the record modulo 2 to 16", of_several(least, 30.0), fmt::format("modulo {}", at)}});
+    views.push_back({{Where::time, fmt::format("place in the record modulo 2 to {}", most_modulo),
+                      of_several(least, 2.0 * static_cast<double>(most_modulo - 1)), fmt::format("modulo {}", at)}});
     const FoundCycle cycle = find_cycle(e, rows, fit.series().rate_hz);
     const double cost = 2.0 + std::log(cycle.searched);
     const Swing swing = swing_of_variance(fit, cycle.frequency_hz);
@@ -112,7 +114,7 @@ void test_distribution(const SampleFit& fit, double lattice_arcsec, Views& views
     const auto& e = fit.innovations();
     const std::size_t n = e.size();
     // Steps that are not small are no normal noise; sums of them are.
-    const bool steps = lattice_arcsec > 0.2 * fit.sd(n / 2);
+    const bool steps = lattice_arcsec > options.samples.residual.coarse_lattice * fit.sd(n / 2);
     if (const auto test = fourth_moments(e, fit.telling(), steps ? 16 : 1)) views.push_back({*test});
     if (lattice_arcsec == 0.0) {
         // No two values of so many digits are the same by chance, the largest least of all.
@@ -127,7 +129,7 @@ void test_distribution(const SampleFit& fit, double lattice_arcsec, Views& views
             if (on_lines && i > 0 && std::abs(x[i] - x[i - 1]) <= tolerance) continue;
             ties += x[i] > high - tolerance || x[i] < low + tolerance ? 1 : 0;
         }
-        if (ties > 4) {
+        if (ties > options.samples.residual.most_ties) {
             views.push_back(
                 {{Where::amplitude, "values at the end of their range", 0.0, fmt::format("{} of them", ties)}});
         }
@@ -147,8 +149,9 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
     // Of rows that tell something: of a record with many to every reading of its source these are few.
     std::size_t telling = 0;
     for (std::size_t i = 0; i < n; ++i) telling += rows[i] && !fit.settled(i) ? 1 : 0;
-    constexpr std::size_t fewest = 50;
-    const std::size_t length = std::min(n, std::max(fewest * n / std::max<std::size_t>(telling, 1), n / 500));
+    const SampleResidualOptions& by = options.samples.residual;
+    const std::size_t length =
+        std::min(n, std::max(by.disturbed_rows * n / std::max<std::size_t>(telling, 1), n / by.disturbed_parts));
     const std::size_t windows = n / length;
     std::vector<double> power(windows, 0.0);
     std::vector<double> freedom(windows, 0.0);
@@ -190,7 +193,7 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
             disturbed.at_s = fit.series().time_s[w * length];
             disturbed.p_value = p;
         }
-        if (ratio < 2.0 || p > 1e-6) continue;
+        if (ratio < by.disturbed_variance || p > by.disturbed_p) continue;
         // What comes up and goes down reaches into its neighbours.
         const std::size_t a = w > 0 ? (w - 1) * length : 0;
         const std::size_t b = w + 2 < windows ? (w + 2) * length : n;

@@ -81,7 +81,7 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     const double gain = 0.5 * std::max(line.chi2, lines.scattered);
     double p = line.p_value;
     bool coherent = line.chi2 >= lines.scattered;
-    if (p < 0.01) {
+    if (p < options.samples.residual.line_p) {
         const LineCourse shown = line.drift_hz_per_s != 0.0 ? LineCourse::even(line.frequency_hz, line.drift_hz_per_s)
                                                             : LineCourse::still(line.frequency_hz);
         const SampleLine refined = refine_line(fit, shown);
@@ -107,7 +107,7 @@ void test_spectrum(const SampleFit& fit, Views& views) {
         const double share = std::min(lines.scattered_squares / std::max(squares, 1e-300), 1.0 - 1e-9);
         view.by_variance = std::min(gain, -0.5 * rows * std::log1p(-share)) - cost;
         view.refitted = [&fit, lines, cost](double) {
-            const SampleFit with(fit.series(), with_wandering_line(fit, lines, fit.rows(), "", -1), fit.rows());
+            const SampleFit with(fit.series(), with_wandering_line(fit, lines, fit.rows(), nullptr, -1), fit.rows());
             return with.gain_over(fit) - cost;
         };
     }
@@ -121,7 +121,7 @@ struct OverTime {
     double off = 0.0;      ///< chi-squared of what the stretches have beside it, less what chance leaves
 };
 OverTime line_over_time(const SampleFit& fit, std::size_t cosine) {
-    constexpr std::size_t stretches = 20;
+    const std::size_t stretches = options.samples.residual.line_stretches;
     const std::size_t n = fit.innovations().size();
     const auto& x = fit.whitened()[cosine];
     const auto& y = fit.whitened()[cosine + 1];
@@ -186,7 +186,7 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
     const FoundLine line = left.likeliest();
     const double hz = line.chi2 >= left.scattered ? line.frequency_hz : left.scattered_hz;
     if (line.p_value < options.level_of_residual &&
-        std::abs(hz - alias(least.hz, fit.series().rate_hz).hz) < beside_hz) {
+        std::abs(hz - alias(least.hz, fit.series().rate_hz).hz) < options.samples.lines.beside_hz) {
         least.beside = std::max(line.chi2, left.scattered) / std::max(power, 1e-300);
     }
     return least;
@@ -195,7 +195,7 @@ UnsteadyLine unsteady_line(const SampleFit& fit) {
 SampleFit fit_beside(const SampleFit& fit, const SampleView& view) {
     SampleModel model = fit.model();
     for (auto& column : view.columns()) {
-        model.columns.push_back({"", "view", std::make_shared<const std::vector<double>>(std::move(column))});
+        model.columns.push_back({nullptr, "view", std::make_shared<const std::vector<double>>(std::move(column))});
         model.columns.back().as_recorded = view.hz.has_value();
     }
     return {fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near};

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/closure/decide/effect_queries.hpp"
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/units.hpp"
 
@@ -71,7 +73,6 @@ std::shared_ptr<SampleFit> RoundedSamples::draw(std::shared_ptr<SampleFit> fit, 
 /// white noise alone may do that.
 double RoundedSamples::wander(const SampleFit& fit) const {
     constexpr std::size_t stretches = 16;
-    constexpr double by_chance = 2.5;  // 15 degrees of freedom, one in a thousand
     const std::vector<double> known = fit.determined();
     const std::size_t length = measured_.size() / stretches;
     const double length_s = series_.interval_s * static_cast<double>(length);
@@ -87,7 +88,7 @@ double RoundedSamples::wander(const SampleFit& fit) const {
     const double of_readings = noise.angle_arcsec * noise.angle_arcsec + variance_of_steps(step_);
     const double white =
         2.0 * noise.rate_arcsec_rt_s * noise.rate_arcsec_rt_s / length_s + 6.0 * of_readings / (length_s * length_s);
-    return squares > by_chance * white ? 1.5 * squares / length_s : 0.0;
+    return squares > options.samples.rounded.wanders * white ? 1.5 * squares / length_s : 0.0;
 }
 
 /// What the model lacks is drawn as its noise makes it. A slow rate that it lacks is drawn beside a walk, which follows
@@ -95,7 +96,6 @@ double RoundedSamples::wander(const SampleFit& fit) const {
 SampleModel RoundedSamples::likeliest(const SampleFit& fit) {
     constexpr int climbs = 2;
     constexpr int climbs_from_afar = 6;
-    constexpr double by_far = 12.0;
     summit_ = find_summit(fit, rounded(), climbs, near(fit.model()));
     const double walk = fit.model().walk || fit.model().flicker ? 0.0 : wander(fit);
     if (walk == 0.0) return summit_->model;
@@ -105,7 +105,9 @@ SampleModel RoundedSamples::likeliest(const SampleFit& fit) {
     const SampleFit start(series_, std::move(beside), fit.rows(), SampleFit::Noise::all_held);
     wandering_ =
         towards_summit(start, rounded(), measured_.size(), climbs_from_afar, wandering_ ? &*wandering_ : nullptr);
-    return wandering_->log_likelihood > summit_->log_likelihood + by_far ? wandering_->model : summit_->model;
+    return wandering_->log_likelihood > summit_->log_likelihood + options.samples.rounded.drawn_beside_walk
+               ? wandering_->model
+               : summit_->model;
 }
 
 const RoundedSummit* RoundedSamples::near(const SampleModel& model) const {
@@ -114,8 +116,6 @@ const RoundedSummit* RoundedSamples::near(const SampleModel& model) const {
 }
 
 ResidualTest RoundedSamples::test(const SampleFit& fit) const {
-    // Beside steps that are very large few of the filters hit the moments at which the angle crosses them.
-    constexpr double of_filters = 0.1;
     const Foretold foretold = foretell_rounded(fit, rounded());
     double off = 0.0;
     double said = 0.0;
@@ -127,7 +127,8 @@ ResidualTest RoundedSamples::test(const SampleFit& fit) const {
         said += variance;
         of_squares += foretold.fourth_moment[i] - variance * variance;
     }
-    const double z = (std::abs(off - said) - of_filters * said) / std::sqrt(std::max(of_squares, 1e-300));
+    const double z =
+        (std::abs(off - said) - options.samples.rounded.filters_off * said) / std::sqrt(std::max(of_squares, 1e-300));
     return {Where::amplitude, "rounded increments beside what is foretold of them", z > 0.0 ? chi2_tail(z * z, 1) : 1.0,
             fmt::format("off by {:.3g} of what is said", std::sqrt(off / std::max(said, 1e-300)))};
 }
@@ -196,11 +197,15 @@ SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
         for (Estimate& estimate : mean.steps[s]) {
             double times = 1.0;
             for (std::size_t k = 0; k < summit.column_times.size(); ++k) {
-                if (summit.model.columns[k].effect == estimate.effect) times = std::max(times, summit.column_times[k]);
+                const effects::Effect* effect = summit.model.columns[k].effect;
+                const bool same = effect != nullptr && effect->name() == estimate.effect;
+                if (same) times = std::max(times, summit.column_times[k]);
             }
             estimate.sd *= times;
-            if (estimate.effect == "bias_instability") known_to(estimate, summit.model.flicker_deg_h, 2);
-            if (estimate.effect == "rate_random_walk") known_to(estimate, 60.0 * std::sqrt(noise.walk_arcsec2_s3), 2);
+            const effects::Effect* effect = effects::find(estimate.effect);
+            if (effect == nullptr) continue;
+            if (on_samples(*effect) == OnSamples::flicker) known_to(estimate, summit.model.flicker_deg_h, 2);
+            if (on_samples(*effect) == OnSamples::walk) known_to(estimate, deviation_of_walk(*effect, noise), 2);
         }
     }
     return mean;

@@ -94,7 +94,9 @@ void Climb::begin_near(const RoundedSummit& summit) {
     const SampleModel& other = summit.model;
     if (other.walk != model_.walk || other.flicker != model_.flicker) return;
     if (other.noise.terms.size() != model_.noise.terms.size()) return;
-    if (other.resonances != model_.resonances || other.motion.size() != model_.motion.size()) return;
+    const bool same_resonances =
+        std::ranges::equal(other.resonances, model_.resonances, {}, &ResonanceOwner::effect, &ResonanceOwner::effect);
+    if (!same_resonances || other.motion.size() != model_.motion.size()) return;
     SampleModel model = model_;
     model.noise.angle_arcsec = other.noise.angle_arcsec;
     model.noise.rate_arcsec_rt_s = other.noise.rate_arcsec_rt_s;

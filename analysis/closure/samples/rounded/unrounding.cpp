@@ -10,6 +10,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/normals_between.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
@@ -29,9 +30,8 @@ std::size_t filters_for(double step_arcsec, double sd_arcsec) {
 }
 
 bool rounding_shows(double step_arcsec, double sd_arcsec) {
-    constexpr double shows = 0.01;
     const double turns = sd_arcsec / step_arcsec;
-    return std::exp(-2.0 * units::pi * units::pi * turns * turns) > shows;
+    return std::exp(-2.0 * units::pi * units::pi * turns * turns) > options.samples.rounded.rounding_shows;
 }
 
 namespace {

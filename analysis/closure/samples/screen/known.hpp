@@ -6,11 +6,11 @@
 
 namespace ringlock::closure {
 
-/// A model that has effects whose values are known, or nearly so: a fit to start from.
+/// A model with effects whose values are known at least roughly, for a fit to start from.
 struct KnownEffects {
     SampleModel model;
-    std::vector<SampleStep> told;  ///< as many as effects; of a motion its witness, which is not in the model yet
-    SampleFit::Noise noise;        ///< how its noise is to be fitted
+    std::vector<AddedEffect> added;  ///< all of them; a motion is not in the model yet, but its witness is known
+    SampleFit::Noise noise;          ///< how its noise is to be fitted
 };
 
 /// \param base  the model that they are added to, fitted

@@ -1,8 +1,9 @@
 #pragma once
+#include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/model/series.hpp"
@@ -10,26 +11,32 @@
 
 namespace ringlock::closure {
 
-/// A model of samples that the loop may go on with.
+/// One effect that may be added to a model of samples: as the screening found it, and as it turned out when it was
+/// fitted in full.
 struct SampleCandidate {
-    std::string effect = {};
-    SampleModel model = {};
+    const effects::Effect* effect = nullptr;
+    SampleModel model = {};  ///< to be fitted
     double p_value = 1.0;
     double searched = 1.0;
-    /// All over those that explain as much, which the likelihood integrated over them costs: as searched, else.
+    /// Places that were searched over those that explain as much: the cost of the search where the likelihood is
+    /// integrated over places. As `searched` if not given.
     std::optional<double> places = {};
     int parameters = 1;
-    int freedom = 1;          ///< of its chi-squared, beside what the search counts
+    int freedom = 1;          ///< degrees of freedom of its chi-squared, the search apart
     double hz = 0.0;          ///< of a line, where the record has it
     bool wanders = false;     ///< a line as a narrow resonance
-    bool strong = false;      ///< motion that is told at many lags
-    bool nameless = false;    ///< nothing of the library, and only to be in nobody's way
+    bool strong = false;      ///< a motion that is fitted at many lags of its witness
+    bool nameless = false;    ///< not a library effect; fitted so that it does not mask others
     std::size_t witness = 0;  ///< in the series, of a motion
     SampleFit::Noise noise = SampleFit::Noise::near;
-    std::vector<std::string> confounded = {};  ///< the same model by other names
+    Effects confounded = {};  ///< that make the same model
+
+    std::shared_ptr<SampleFit> fit = {};  ///< in full; null while the candidate is only screened
+    double merit = 0.0;                   ///< gain of the log-likelihood less its search and its parameters
+    bool passes = false;                  ///< the level of one effect, by that gain
 };
 
-/// What the screening of samples goes by.
+/// What the screening of samples needs to know of the loop.
 struct SampleContext {
     const record::Declared& declared;
     const SampleSeries& series;
@@ -39,15 +46,18 @@ struct SampleContext {
     bool slow = false;                    ///< slow rates only
 };
 
-/// Rates in proportion to one number that the record can tell of: time, temperature, input rate.
-std::vector<SampleColumn> rate_columns(const SampleSeries& series);
-void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const std::string& effect,
+/// A column of each effect of the library that is a rate of known shape over this record: in proportion to time, to the
+/// temperature or how it changes, to the input rate. Effects whose rate does not change in it have none.
+std::vector<SampleColumn> rate_columns(const SampleSeries& series,
+                                       std::span<const effects::Effect* const> library = effects::registry());
+void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const effects::Effect& effect,
               int step);
-/// The model as of samples taken at another rate and interpolated, from where in the source's interval the likelihood
-/// likes best.
+/// The model of readings that were taken at that rate and interpolated, with the likeliest place of the record's start
+/// within the source's interval.
 SampleModel resampled_from(const SampleFit& now, double from_hz);
 
-/// The effects that samples can tell of and that the fit does not have yet, held against what it has left.
+/// Candidates among the effects that show on samples and that the fit does not have yet, by score tests of its
+/// residual.
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in);
 
 }  // namespace ringlock::closure

@@ -1,0 +1,65 @@
+#pragma once
+#include <functional>
+#include <string_view>
+#include <vector>
+
+#include "analysis/closure/types.hpp"
+#include "engine/effects/effect.hpp"
+
+/// Questions that both halves of the closed loop ask of an effect. The answers come from what the effect says of
+/// itself, so that no effect is known by its name.
+namespace ringlock::closure {
+
+using Effects = std::vector<const effects::Effect*>;
+
+/// How an effect shows on a record of uniform samples, which is how it is searched and fitted there.
+enum class OnSamples {
+    nothing,     ///< it acts on single turns only
+    rate,        ///< a rate that is known but for its size
+    step,        ///< a rate that begins at a time to be searched
+    walk,        ///< a rate that is a random walk
+    flicker,     ///< a rate that is a sum of Gauss-Markov processes
+    white,       ///< white rate noise: part of the base model
+    rate_line,   ///< a line in the input rate
+    angle_line,  ///< a line in the angle that is put out
+    motion,      ///< the case rotates
+    resolution,  ///< readings in steps
+    transport,   ///< readings taken at another rate than that of the record
+    other,       ///< it shows, but in a way that nothing searches for
+};
+OnSamples on_samples(const effects::Effect& effect);
+
+/// The effects of a library that show in this way, those of the fewest parameters first: the first is searched for, and
+/// the others, of which samples show no more than that, are its alternatives.
+Effects effects_that_show(OnSamples as, std::span<const effects::Effect* const> library = effects::registry());
+/// The first of them or null.
+const effects::Effect* first_that_shows(OnSamples as,
+                                        std::span<const effects::Effect* const> library = effects::registry());
+
+/// Number of effects of the library that show on samples: a search on samples chooses among so many.
+double effects_on_samples();
+
+/// A rate that changes slowly. Each of these can be taken for another, or for two others together.
+bool is_slow_rate(const effects::Effect& effect);
+bool is_line(const effects::Effect& effect);
+
+/// The effect's values with every size and deviation at one and the other parameters at their defaults.
+effects::Values unit_values(const effects::Effect& effect);
+/// Rotation [arcsec] over an interval that the effect adds at these values.
+std::function<double(const effects::Interval&)> unit_angle(const effects::Effect& effect);
+/// Rate [deg/h] that the effect adds per unit of its size where the temperature is one kelvin higher than assumed.
+double rate_per_kelvin(const effects::Effect& effect);
+
+/// The first parameter of that role; the effect must have one.
+const effects::Parameter& parameter_of(const effects::Effect& effect, effects::Role role);
+/// The parameter of that name; the effect must have one.
+const effects::Parameter& parameter_of(const effects::Effect& effect, std::string_view name);
+/// All parameters of that role, in the effect's order.
+std::vector<const effects::Parameter*> parameters_of(const effects::Effect& effect, effects::Role role);
+/// The value of a parameter.
+double value_of(const effects::Values& values, const effects::Parameter& parameter);
+
+/// A fitted parameter of an effect.
+Estimate estimate_of(const effects::Effect& effect, std::string_view parameter, double value, double sd);
+
+}  // namespace ringlock::closure

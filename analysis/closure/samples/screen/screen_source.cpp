@@ -1,0 +1,183 @@
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <utility>
+
+#include "analysis/closure/options.hpp"
+#include "analysis/closure/samples/fit/line_search.hpp"
+#include "analysis/closure/samples/fit/lines.hpp"
+#include "analysis/closure/samples/fit/repeats_and_witness.hpp"
+#include "analysis/closure/samples/screen/parts.hpp"
+
+namespace ringlock::closure {
+
+namespace {
+
+/// The model with each of its lines at that frequency of the source, of all that show at the same, which explains most.
+SampleModel with_lines_of_source(const SampleFit& now, SampleModel model) {
+    const auto fitted = [&](const SampleModel& m) {
+        return SampleFit(now.series(), m, now.rows(), SampleFit::Noise::held).log_likelihood();
+    };
+    // One line after another, each tried wherever it may be.
+    const auto choose = [&](double shown_hz, const auto& put) {
+        const auto all = of_source(shown_hz, now.series().rate_hz, model.noise.from_hz);
+        double most = -std::numeric_limits<double>::infinity();
+        SampleModel best;
+        for (const Alias& of : all) {
+            SampleModel there = model;
+            put(there, of);
+            const double value = all.size() > 1 ? fitted(there) : 0.0;
+            if (value < most) continue;
+            most = value;
+            best = std::move(there);
+        }
+        model = std::move(best);
+    };
+    for (std::size_t k = 0; k + 1 < model.columns.size(); ++k) {
+        if (model.columns[k].name != "cosine") continue;
+        const LineCourse course = model.columns[k].course;
+        choose(course.hz, [&](SampleModel& there, const Alias& of) {
+            set_line(there, k, now.series(), course.shown_at(of.hz, of.folded));
+        });
+    }
+    for (std::size_t k = 0; k < model.resonances.size(); ++k) {
+        const effects::Effect* effect = model.resonances[k].effect;
+        if (effect == nullptr || !is_line(*effect)) continue;
+        choose(model.noise.resonances[k].hz,
+               [k](SampleModel& there, const Alias& of) { there.noise.resonances[k].hz = of.hz; });
+    }
+    return model;
+}
+
+/// How a model of the source begins: interpolated errors of readings look as if they were white rates.
+enum class Errors { as_they_are, of_readings };
+
+/// The model with readings of that source.
+SampleModel as_of(const SampleFit& now, const SampleSource& source, Errors errors) {
+    SampleModel model = now.model();
+    model.noise.from_hz = source.from_hz;
+    model.noise.from_phase = source.from_phase;
+    model.noise.blur_arcsec = 0.2 * now.sd(0);
+    model.noise.digits_arcsec = 1e-6 * now.sd(0);
+    // Between two readings the errors of both average out, to two thirds of the variance of one in the mean.
+    if (errors == Errors::as_they_are) model.noise.angle_arcsec *= std::sqrt(1.5);
+    if (errors == Errors::of_readings) {
+        // On the line between two readings an increment is a part of what they differ by.
+        double squares = 0.0;
+        for (const double x : now.rest()) squares += x * x;
+        const double part = std::min(1.0, source.from_hz * now.series().interval_s);
+        model.noise.angle_arcsec = std::sqrt(0.5 * squares / static_cast<double>(now.series().size())) / part;
+        model.noise.rate_arcsec_rt_s = 0.05 * model.noise.angle_arcsec * std::sqrt(source.from_hz);
+    }
+    return model;
+}
+
+struct Resampled {
+    SampleModel model;
+    double log_likelihood = 0.0;
+};
+
+/// Log-likelihood of a part of the record, with the scale of its noises free.
+double log_likelihood_of_shape(const SampleFit& now, const SampleNoise& noise) {
+    const SampleSeries& series = now.series();
+    const std::size_t part = std::min<std::size_t>(series.size(), 20000);
+    const SampleFilter filter(noise, part, series.interval_s);
+    const auto e = filter.apply(std::span<const double>(now.rest().data(), part));
+    double squares = 0.0;
+    double logs = 0.0;
+    double count = 0.0;
+    for (std::size_t i = 0; i < part; ++i) {
+        if (!now.rows()[i]) continue;
+        squares += e[i] * e[i];
+        logs += std::log(filter.sd(i));
+        count += 1.0;
+    }
+    return -0.5 * count * std::log(squares / count) - logs;
+}
+
+/// The likeliest place of the record's start within the source's interval, and the likeliest share of errors of
+/// readings, which interpolation makes look like a white rate.
+Resampled best_placed(const SampleFit& now, double from_hz, Errors errors) {
+    constexpr int places = 8;
+    Resampled best{{}, -std::numeric_limits<double>::infinity()};
+    const auto look_at = [&](SampleModel model) {
+        const double value = log_likelihood_of_shape(now, model.noise);
+        if (value > best.log_likelihood) best = {std::move(model), value};
+    };
+    for (int place = 0; place < places; ++place) {
+        look_at(as_of(now, {from_hz, static_cast<double>(place) / places}, errors));
+    }
+    if (errors == Errors::of_readings) return best;
+    constexpr double factor = 1.5;
+    constexpr int most = 10;  // a record's own errors may hardly show beside its rates
+    for (int k = 0; k < most; ++k) {
+        const double before = best.log_likelihood;
+        SampleModel model = best.model;
+        model.noise.angle_arcsec *= factor;
+        look_at(std::move(model));
+        if (!(best.log_likelihood > before)) break;
+    }
+    return best;
+}
+
+}  // namespace
+
+void screen_source(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
+    if (now.model().noise.from_hz > 0.0) return;
+    const FoundCycle cycle = find_cycle(now.innovations(), in.rows, in.series.rate_hz);
+    if (!(cycle.p_value < options.level_of_effects)) return;
+    auto candidate = candidate_of(OnSamples::transport);
+    if (!candidate) return;
+    candidate->p_value = cycle.p_value;
+    candidate->searched = cycle.searched;
+    candidate->parameters = 2;
+    candidate->freedom = 2;
+    candidate->noise = SampleFit::Noise::free;
+    const auto offer = [&](SampleModel model) {
+        out.push_back(*candidate);
+        out.back().model = with_lines_of_source(now, std::move(model));
+    };
+    if (const auto source = find_straight_lines(in.series.increment, in.series.rate_hz)) {
+        for (const Errors errors : {Errors::as_they_are, Errors::of_readings}) {
+            SampleModel model = as_of(now, *source, errors);
+            // Where the readings lie is known exactly.
+            model.noise.blur_arcsec = 1e-3 * now.sd(0);
+            offer(std::move(model));
+        }
+        return;
+    }
+    const SampleScreenOptions& by = options.samples.screen;
+    // Rates whose distance from a multiple of the record's is that frequency
+    const double rate = in.series.rate_hz;
+    std::vector<double> rates;
+    for (int m = 0; m <= by.most_multiple; ++m) {
+        for (const int sign : {-1, 1}) {
+            const double from = m * rate + sign * cycle.frequency_hz;
+            if (from < by.slowest_source * rate || from > by.fastest_source * rate ||
+                std::abs(from - rate) < 1e-9 * rate)
+                continue;
+            rates.push_back(from);
+        }
+    }
+    std::vector<Resampled> found(rates.size());
+    oneapi::tbb::parallel_for(std::size_t{0}, rates.size(),
+                              [&](std::size_t k) { found[k] = best_placed(now, rates[k], Errors::as_they_are); });
+    // That was on a part of the record, with noises that are not fitted: it may be wrong by tens of nats.
+    std::sort(found.begin(), found.end(),
+              [](const Resampled& a, const Resampled& b) { return a.log_likelihood > b.log_likelihood; });
+    if (!found.empty()) offer(best_placed(now, found.front().model.noise.from_hz, Errors::of_readings).model);
+    const double likeliest = found.empty() ? 0.0 : found.front().log_likelihood;
+    for (std::size_t k = 0; k < std::min(by.most_sources, found.size()); ++k) {
+        if (k < by.fewest_sources || found[k].log_likelihood > likeliest - by.likely_source)
+            offer(std::move(found[k].model));
+    }
+}
+
+SampleModel resampled_from(const SampleFit& now, double from_hz) {
+    return best_placed(now, from_hz, Errors::as_they_are).model;
+}
+
+}  // namespace ringlock::closure

@@ -1,0 +1,155 @@
+// What the closed loop asks of effects, for those of the library and for effects that it does not have yet.
+#include "analysis/closure/decide/effect_queries.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <string_view>
+#include <vector>
+
+#include "analysis/closure/samples/screen/screen.hpp"
+
+namespace ringlock::test::closure {
+namespace {
+
+using namespace ringlock::closure;
+using effects::Effect;
+using effects::Interval;
+using effects::Parameter;
+using effects::Role;
+using effects::Values;
+
+/// An effect that adds the angle of one size, given by its parameters.
+class Added final : public Effect {
+   public:
+    Added(std::string_view name, std::vector<Parameter> parameters, double (*angle)(const Interval&))
+        : name_(name), parameters_(std::move(parameters)), angle_(angle) {}
+    std::string_view name() const override { return name_; }
+    std::string_view summary() const override { return ""; }
+    std::string_view equation() const override { return ""; }
+    std::span<const Parameter> parameters() const override { return parameters_; }
+    bool active(const Values& /*values*/) const override { return true; }
+    bool adds_angle() const override { return true; }
+    effects::AddedAngle added_angle(const Values& values) const override {
+        return [size = values.at(std::string(parameters_[0].name)), angle = angle_](const Interval& at) {
+            return size * angle(at);
+        };
+    }
+
+   private:
+    std::string_view name_;
+    std::vector<Parameter> parameters_;
+    double (*angle_)(const Interval&);
+};
+
+// The number sets the level of every effect on samples. It changes with the library only.
+TEST(EffectQueries, TwelveEffectsShowOnSamples) { EXPECT_EQ(effects_on_samples(), 12.0); }
+
+TEST(EffectQueries, EffectsShowOnSamplesByTheirRoles) {
+    const std::map<std::string_view, OnSamples> shown = {{"base_vibration", OnSamples::rate_line},
+                                                         {"bias_instability", OnSamples::flicker},
+                                                         {"bias_ramp", OnSamples::rate},
+                                                         {"bias_step", OnSamples::step},
+                                                         {"bias_temperature", OnSamples::rate},
+                                                         {"case_motion", OnSamples::motion},
+                                                         {"count_quantization", OnSamples::resolution},
+                                                         {"dither_residue", OnSamples::angle_line},
+                                                         {"quantum_noise", OnSamples::white},
+                                                         {"rate_random_walk", OnSamples::walk},
+                                                         {"resampling", OnSamples::transport},
+                                                         {"scale_factor_error", OnSamples::rate}};
+    for (const Effect* effect : effects::registry()) {
+        const auto found = shown.find(effect->name());
+        EXPECT_EQ(on_samples(*effect), found == shown.end() ? OnSamples::nothing : found->second) << effect->name();
+    }
+}
+
+// Samples show no more of it than its step: it is an alternative of the effect that is a step alone.
+TEST(EffectQueries, AnEffectThatStepsMoreThanTheRateIsAnAlternativeOfTheStep) {
+    const Effect* step = effects::find("bias_step");
+    const Added hop("mode_hop",
+                    {{"step_deg_h", 0.0, -1e4, 1e4, Role::size, ""},
+                     {"threshold_ratio", 1.0, 0.1, 10.0, Role::setting, ""},
+                     {"phase_rad", 0.0, -7.0, 7.0, Role::phase, ""},
+                     {"time_s", 0.0, 0.0, 1e9, Role::time, ""}},
+                    [](const Interval& at) { return at.duration_s; });
+    const std::array<const Effect*, 2> library{&hop, step};
+    EXPECT_EQ(effects_that_show(OnSamples::step, library), (Effects{step, &hop}));
+}
+
+TEST(EffectQueries, OnlyWhatFollowsTheTemperatureChangesWithIt) {
+    for (const Effect* effect : effects::registry()) {
+        if (!effect->adds_angle()) continue;
+        const auto angle = unit_angle(*effect);
+        const Interval cold{.start_s = 10.0, .duration_s = 10.0};
+        Interval warm = cold;
+        warm.temperature_change_k[0] = warm.temperature_change_k[1] = 3.0;
+        Interval turned = cold;
+        turned.input_rate_deg_h[0] = turned.input_rate_deg_h[1] = 3.0;
+        EXPECT_EQ(angle(warm) != angle(cold), effect->follows() == effects::Follows::temperature) << effect->name();
+        EXPECT_EQ(angle(turned) != angle(cold), effect->follows() == effects::Follows::input_rate) << effect->name();
+    }
+    EXPECT_EQ(rate_per_kelvin(*effects::find("bias_temperature")), 1.0);
+    EXPECT_EQ(rate_per_kelvin(*effects::find("bias_ramp")), 0.0);
+}
+
+SampleSeries warming() {
+    SampleSeries series;
+    series.rate_hz = 10.0;
+    series.interval_s = 0.1;
+    for (std::size_t i = 0; i < 200; ++i) {
+        const double t = 0.1 * static_cast<double>(i);
+        series.time_s.push_back(t + 0.1);
+        series.increment.push_back(0.0);
+        series.temperature_change_k.push_back(0.02 * t + 0.003 * t * t);
+        series.input_rate_deg_h.push_back(10.0 * std::sin(t));
+    }
+    return series;
+}
+
+// Of each row the rate of the effect at unit size times its length, in the middle of the row.
+TEST(RateColumns, AreTheClosedFormsOfTheLibrary) {
+    const SampleSeries series = warming();
+    const auto columns = rate_columns(series);
+    ASSERT_EQ(columns.size(), 3U);
+    EXPECT_EQ(columns[0].effect->name(), "bias_ramp");
+    EXPECT_EQ(columns[0].name, "deg_h_per_h");
+    EXPECT_EQ(columns[1].effect->name(), "bias_temperature");
+    EXPECT_EQ(columns[2].effect->name(), "scale_factor_error");
+    for (std::size_t i = 0; i < series.size(); ++i) {
+        EXPECT_NEAR((*columns[0].series)[i], (static_cast<double>(i) + 0.5) * 0.01 / 3600.0, 1e-15);
+        EXPECT_NEAR((*columns[1].series)[i], 0.1 * series.temperature_change_k[i], 1e-13);
+        EXPECT_NEAR((*columns[2].series)[i], 0.1 * series.input_rate_deg_h[i], 1e-13);
+    }
+}
+
+TEST(RateColumns, WhatDoesNotChangeHasNone) {
+    SampleSeries series = warming();
+    series.temperature_change_k.clear();
+    std::fill(series.input_rate_deg_h.begin(), series.input_rate_deg_h.end(), 15.0);
+    const auto columns = rate_columns(series);
+    ASSERT_EQ(columns.size(), 1U);
+    EXPECT_EQ(columns[0].effect->name(), "bias_ramp");
+}
+
+// An effect that the library does not have has a column without a line of code for it: here a bias in proportion to how
+// fast the temperature changes.
+TEST(RateColumns, ABiasThatFollowsTheSlopeOfTheTemperatureHasOne) {
+    const Added slope(
+        "null_shift_ramp", {{"deg_h_per_k_per_h", 0.0, -1e3, 1e3, Role::size, ""}},
+        [](const Interval& at) { return 3600.0 * (at.temperature_change_k[1] - at.temperature_change_k[0]); });
+    const std::array<const Effect*, 1> library{&slope};
+    const SampleSeries series = warming();
+    const auto columns = rate_columns(series, library);
+    ASSERT_EQ(columns.size(), 1U);
+    for (std::size_t i = 1; i + 1 < series.size(); ++i) {
+        const double slope_k_s = 0.02 + 0.006 * 0.1 * static_cast<double>(i);
+        EXPECT_NEAR((*columns[0].series)[i], 3600.0 * slope_k_s * 0.1, 1e-9);
+    }
+}
+
+}  // namespace
+}  // namespace ringlock::test::closure
