@@ -15,3 +15,10 @@ target_include_directories(ringlock_options INTERFACE "${PROJECT_SOURCE_DIR}")
 target_compile_options(ringlock_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -ffp-contract=off
   $<$<BOOL:${RINGLOCK_WERROR}>:-Werror>)
+
+# Headers from outside the repository that most sources include, for target_precompile_headers: half of a build's time is
+# spent on reading them. Headers of the repository are left out, for a change to one would rebuild the whole target.
+# Sources still include what they use: `-DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON`, as the preset debug has it, builds without.
+set(RINGLOCK_COMMON_HEADERS
+  <algorithm> <array> <cmath> <complex> <cstdint> <filesystem> <functional> <limits> <memory> <numeric> <optional> <span>
+  <string> <utility> <vector> <fmt/format.h>)

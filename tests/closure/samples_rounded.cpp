@@ -150,7 +150,7 @@ TEST(RoundedReadings, AreLikeliestWhereTheNoiseIs) {
     EXPECT_LT(rate, 31.8);
 }
 
-TEST(RoundedRecords, CountsBesideLittleNoiseAreNoStructure) {
+TEST(LongRoundedRecords, CountsBesideLittleNoiseAreNoStructure) {
     for (const double noise : {0.1, 0.05, 0.0}) {
         SCOPED_TRACE(noise);
         const Closure found = close_samples(generate_samples(counted(noise)));
@@ -164,7 +164,7 @@ TEST(RoundedRecords, CountsBesideLittleNoiseAreNoStructure) {
     }
 }
 
-TEST(RoundedRecords, EffectsShowThroughTheSteps) {
+TEST(LongRoundedRecords, EffectsShowThroughTheSteps) {
     SampleTruth truth = counted(0.1, 3);
     truth.rates.bias_step = {6.0, 70.0};
     const Closure found = close_samples(generate_samples(truth));
@@ -176,7 +176,7 @@ TEST(RoundedRecords, EffectsShowThroughTheSteps) {
 }
 
 // Steps that nobody declared are an effect, which takes its rounding with it.
-TEST(RoundedRecords, LargeStepsAreNamedAndLeaveNothing) {
+TEST(LongRoundedRecords, LargeStepsAreNamedAndLeaveNothing) {
     SampleTruth truth = counted(0.3);
     truth.kind = record::SampleKind::angle_increment_arcsec;
     truth.count_quantization_arcsec = 1.5;
@@ -190,7 +190,7 @@ TEST(RoundedRecords, LargeStepsAreNamedAndLeaveNothing) {
 
 // Whole counts of a quiet gyro: between two crossings of a step the rounding hides all, and the noise of the values
 // says nothing of that beneath them.
-TEST(RoundedRecords, StepsOfFortyTimesTheNoiseLeaveNothing) {
+TEST(LongRoundedRecords, StepsOfFortyTimesTheNoiseLeaveNothing) {
     SampleTruth truth = counted(0.02);
     truth.kind = record::SampleKind::angle_increment_arcsec;
     truth.count_quantization_arcsec = 1.5;
