@@ -197,7 +197,7 @@ TEST(TurnKicks, AreInterpolatedBetweenThresholds) {
     }
 }
 
-TEST(TurnModel, FollowsAnotherSimulatorsGyro) {
+TEST(LongTurnModel, FollowsAnotherSimulatorsGyro) {
     Truth truth;
     truth.turns = 1500;
     truth.input_rate_deg_h = 40.0;

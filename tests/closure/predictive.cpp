@@ -68,6 +68,7 @@ class Predictively : public testing::Test {
     void TearDown() override { std::filesystem::remove_all(folder_); }
     std::filesystem::path folder_;
 };
+using LongPredictively = Predictively;
 
 TEST_F(Predictively, ARightModelMakesSuchRecords) {
     const record::Record record = instrument::simulate_record(plain_gyro(4000, 7));
@@ -112,7 +113,7 @@ TEST_F(Predictively, ARightModelMakesSuchRecords) {
     EXPECT_EQ(scenario::parse_file(folder_ / "closed.toml"), ringlock::closure::closed_scenario(record, closure));
 }
 
-TEST_F(Predictively, WhatTheModelLacksShows) {
+TEST_F(LongPredictively, WhatTheModelLacksShows) {
     // Without lock-in nothing follows the phase; without the step long sums are steadier than they were.
     scenario::Scenario scenario = plain_gyro(4000, 8);
     scenario.effects.at("bias_step") = {{"step_deg_h", 2.0}, {"time_s", 8.0}};
@@ -133,7 +134,7 @@ TEST_F(Predictively, WhatTheModelLacksShows) {
     EXPECT_EQ(statistic(free, "folded_maxima").p_value_all, 0.025);
 }
 
-TEST_F(Predictively, InputAndTemperatureAreThoseOfTheRecord) {
+TEST_F(LongPredictively, InputAndTemperatureAreThoseOfTheRecord) {
     scenario::Scenario scenario = plain_gyro(6000, 10);
     scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
     scenario.input.profile_time_s = {0.0, 8.0, 8.5, 15.0, 15.5, 1000.0};
@@ -177,7 +178,7 @@ TEST_F(Predictively, SamplesBeginAtATimeOfTheirOwn) {
     EXPECT_TRUE(scenario::check(closed).empty());
 }
 
-TEST_F(Predictively, SamplesTooAndTheirWhiteNoises) {
+TEST_F(LongPredictively, SamplesTooAndTheirWhiteNoises) {
     scenario::Scenario scenario = plain_gyro(250, 9);
     scenario.gyro.lockin_threshold_deg_h = 0.0;
     scenario.gyro.scale_factor_arcsec = 20.0;
@@ -204,7 +205,7 @@ TEST_F(Predictively, SamplesTooAndTheirWhiteNoises) {
 }
 
 // Readings at another rate than the record's, each with an error of its own, and a line on a curve.
-TEST_F(Predictively, ResampledRecordsToo) {
+TEST_F(LongPredictively, ResampledRecordsToo) {
     test::closure::SampleTruth truth;
     truth.size = 20000;
     truth.white_angle_arcsec = 0.3;
@@ -222,7 +223,7 @@ TEST_F(Predictively, ResampledRecordsToo) {
 
 // The ends of a line two hundred times the noise are at other phases in every simulation: not tapered, they showed in
 // all bands of the spectrum, in a way that no simulation did.
-TEST_F(Predictively, OfAStrongLineOnlyItsOwnBandsTell) {
+TEST_F(LongPredictively, OfAStrongLineOnlyItsOwnBandsTell) {
     test::closure::SampleTruth truth;
     truth.size = 20000;
     truth.white_angle_arcsec = 0.05;
@@ -250,7 +251,7 @@ TEST_F(Predictively, WhatCannotBeSimulatedIsANote) {
 
 // Of 60 records 6 have a p of 0.1 or less by chance, 13 or more in one case of 250; more where two statistics go
 // together does not happen, each is counted by itself. Parameters that were fitted to the record make p larger.
-TEST(LongPredictively, PIsAsRareAsItSays) {
+TEST_F(LongPredictively, PIsAsRareAsItSays) {
     for (const bool injected : {true, false}) {
         std::map<std::string, int> rare;
         for (std::uint64_t seed = 200; seed < 260; ++seed) {

@@ -39,7 +39,7 @@ TEST(ClosureSampleSuite, NamesNothingInRecordsWithoutAnything) {
     }
 }
 
-TEST(ClosureSampleSuite, NamesWhatIsFourTimesItsLimit) {
+TEST(LongClosureSampleSuite, NamesWhatIsFourTimesItsLimit) {
     std::uint64_t seed = 420;
     const auto named = [&](const char* effect, std::size_t condition) {
         SampleCase of{.kind = Kind::single, .truth = {}, .multiple = 4.0, .condition = &sample_conditions[condition]};
@@ -58,7 +58,7 @@ TEST(ClosureSampleSuite, NamesWhatIsFourTimesItsLimit) {
     named("scale_factor_error", 4);
 }
 
-TEST(ClosureSampleSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
+TEST(LongClosureSampleSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
     for (SampleCase& of : foreign_sample_cases(1)) {
         of.size = 10000;
         const Outcome outcome = judged(of);
@@ -167,7 +167,7 @@ TEST(ClosureSampleSuite, ABiasOfTwoStatesIsNoRandomRate) {
 }
 
 // A gyro that settles after it was switched on, and a sway of three and a half periods, were called a random walk.
-TEST(ClosureSampleSuite, ACourseInTimeIsNoRandomRate) {
+TEST(LongClosureSampleSuite, ACourseInTimeIsNoRandomRate) {
     SampleTruth settles = short_record(7);
     settles.rates.settling = {8.0, 40.0};
     SampleTruth sways = short_record(8);
@@ -183,7 +183,7 @@ TEST(ClosureSampleSuite, ACourseInTimeIsNoRandomRate) {
 
 // Biases that go with an acceleration, slow or fast, were called a random walk and a motion of the case, the latter
 // also beside a random rate of no name.
-TEST(ClosureSampleSuite, ARateThatFollowsAWitnessIsNeitherRandomNorAMotion) {
+TEST(LongClosureSampleSuite, ARateThatFollowsAWitnessIsNeitherRandomNorAMotion) {
     for (const double time_s : {3.0, 40.0}) {
         SampleTruth truth = short_record(6);
         truth.slow_acceleration = {0.01, time_s, 500.0};
@@ -193,7 +193,7 @@ TEST(ClosureSampleSuite, ARateThatFollowsAWitnessIsNeitherRandomNorAMotion) {
 
 // A bias that follows the temperature through a thermal mass was called a random walk, and so was one whose mass was
 // warmer than the thermometer at the start.
-TEST(ClosureSampleSuite, ARateThatFollowsTheTemperatureLateIsNoRandomRate) {
+TEST(LongClosureSampleSuite, ARateThatFollowsTheTemperatureLateIsNoRandomRate) {
     SampleTruth truth = short_record(10);
     truth.temperature.swing_k = 2.0;
     truth.temperature.period_s = 70.0;
@@ -213,7 +213,7 @@ TEST(ClosureSampleSuite, ARateThatFollowsTheTemperatureLateIsNoRandomRate) {
 }
 
 // The instrument that tells the input is late, or noisy, which was called a bias instability.
-TEST(ClosureSampleSuite, AnInputThatIsToldLateOrWithNoiseHasItsPlace) {
+TEST(LongClosureSampleSuite, AnInputThatIsToldLateOrWithNoiseHasItsPlace) {
     SampleTruth truth = short_record(11);
     std::mt19937_64 random(3);
     std::normal_distribution<double> normal;
@@ -232,7 +232,7 @@ TEST(ClosureSampleSuite, AnInputThatIsToldLateOrWithNoiseHasItsPlace) {
 }
 
 // What is left out of the fits as it is far larger than the rest is structure, and takes no name.
-TEST(ClosureSampleSuite, AJumpOfTheAngleIsStructure) {
+TEST(LongClosureSampleSuite, AJumpOfTheAngleIsStructure) {
     SampleTruth truth = short_record(12);
     record::Record jumps = generate_samples(truth);
     jumps.samples->values[9000] += 4.0;
@@ -248,7 +248,7 @@ TEST(ClosureSampleSuite, AJumpOfTheAngleIsStructure) {
 
 // Jumps between two levels explain more than any random rate, and more than the line: it is looked for beside the
 // random rate that comes nearest.
-TEST(ClosureSampleSuite, ALineBesideARateOfNoNameIsNamed) {
+TEST(LongClosureSampleSuite, ALineBesideARateOfNoNameIsNamed) {
     SampleTruth truth = short_record(5);
     truth.rates.telegraph_bias = {3.0, 20.0};
     truth.dither_residue = {37.3, 0.0, 0.04, 1.0};
@@ -262,7 +262,7 @@ TEST(ClosureSampleSuite, ALineBesideARateOfNoNameIsNamed) {
 }
 
 // A line that swings is no line of the library, and is beside nothing else.
-TEST(ClosureSampleSuite, WhatIsBesideALineOfNoNameIsNamed) {
+TEST(LongClosureSampleSuite, WhatIsBesideALineOfNoNameIsNamed) {
     SampleTruth truth = short_record(6);
     truth.swinging_line = {8.0, 30.0, 0.2, 60.0};
     const auto alone = ringlock::closure::close_samples(generate_samples(truth));
@@ -280,7 +280,7 @@ TEST(ClosureSampleSuite, WhatIsBesideALineOfNoNameIsNamed) {
 }
 
 // A gyro that moves by rates that are known has nothing missing, and a scale factor's error is one of them alone.
-TEST(ClosureSampleSuite, KnownInputIsNoStructure) {
+TEST(LongClosureSampleSuite, KnownInputIsNoStructure) {
     SampleTruth truth;
     truth.size = 20000;
     truth.white_angle_arcsec = 0.2;
@@ -297,7 +297,7 @@ TEST(ClosureSampleSuite, KnownInputIsNoStructure) {
 }
 
 // A declared dither is looked for where it shows: what all frequencies and drifts would drown is named.
-TEST(ClosureSampleSuite, ADeclaredDitherNeedsLess) {
+TEST(LongClosureSampleSuite, ADeclaredDitherNeedsLess) {
     SampleTruth truth;
     truth.size = 20000;
     truth.seed = 11;
@@ -315,7 +315,7 @@ TEST(ClosureSampleSuite, ADeclaredDitherNeedsLess) {
 }
 
 // A random rate explains more than a ramp or a scale factor's error alone, but less than both.
-TEST(ClosureSampleSuite, TwoEffectsThatHideEachOtherAreNamed) {
+TEST(LongClosureSampleSuite, TwoEffectsThatHideEachOtherAreNamed) {
     SampleTruth truth;
     truth.size = 20000;
     truth.white_angle_arcsec = 0.2;

@@ -76,12 +76,12 @@ int false_alarms(std::uint64_t first, int records) {
     return alarms;
 }
 
-TEST(SampleClosure, NothingIsMissingWhereNothingIs) { EXPECT_EQ(false_alarms(100, 20), 0); }
+TEST(LongSampleClosure, NothingIsMissingWhereNothingIs) { EXPECT_EQ(false_alarms(100, 20), 0); }
 
 // Of 300 at 0.3 % one is expected; more than five have a probability of 3e-4.
 TEST(LongSampleClosure, FalseAlarmsAreAsRareAsSaid) { EXPECT_LE(false_alarms(1000, 300), 5); }
 
-TEST(SampleClosure, NamesWhatTheDataChainDid) {
+TEST(LongSampleClosure, NamesWhatTheDataChainDid) {
     SampleTruth truth = usual();
     truth.count_quantization_arcsec = 0.5;
     EXPECT_NEAR(value_of(only_step(closed(truth), "count_quantization"), "step_arcsec"), 0.5, 1e-6);
@@ -100,7 +100,7 @@ TEST(SampleClosure, RatesThatARecordDwellsAtAreNoSteps) {
     EXPECT_NEAR(value_of(only_step(closed(truth), "count_quantization"), "step_arcsec"), 0.25, 1e-6);
 }
 
-TEST(SampleClosure, NamesADitherThatDrifts) {
+TEST(LongSampleClosure, NamesADitherThatDrifts) {
     SampleTruth truth = usual();
     truth.dither_residue = {437.3, 1e-4, 0.05, 0.0};
     const auto step = only_step(closed(truth), "dither_residue");
@@ -113,7 +113,7 @@ TEST(SampleClosure, NamesADitherThatDrifts) {
 
 // A dither whose springs take on another temperature: its frequency goes on a curve that no even drift follows. The
 // truth is no polynomial.
-TEST(SampleClosure, NamesADitherThatSettles) {
+TEST(LongSampleClosure, NamesADitherThatSettles) {
     SampleTruth truth = usual();
     truth.dither_residue = {437.3, 0.0, 0.1, 0.5, -0.5, 250.0};
     const auto step = only_step(closed(truth), "dither_residue");
@@ -127,7 +127,7 @@ TEST(SampleClosure, NamesADitherThatSettles) {
 
 // A line whose phase walks is foretold as a resonance, and is not taken for the motion beside it, which has resonances
 // too.
-TEST(SampleClosure, AWanderingLineIsNotTheMotionBesideIt) {
+TEST(LongSampleClosure, AWanderingLineIsNotTheMotionBesideIt) {
     SampleTruth truth = usual();
     truth.accelerometers = true;
     truth.case_motion.rms_arcsec = 2.0;
@@ -152,7 +152,7 @@ TEST(SampleClosure, AWanderingLineIsNotTheMotionBesideIt) {
     EXPECT_EQ(of_line->find("the line at 37."), 0U) << *of_line;
 }
 
-TEST(SampleClosure, ALineThatStandsStillMayBeEither) {
+TEST(LongSampleClosure, ALineThatStandsStillMayBeEither) {
     SampleTruth truth = usual();
     truth.dither_residue = {137.3, 0.0, 0.05, 0.0};
     EXPECT_EQ(only_step(closed(truth), "dither_residue").confounded_with, std::vector<std::string>{"base_vibration"});
@@ -165,7 +165,7 @@ TEST(SampleClosure, ALineThatStandsStillMayBeEither) {
     EXPECT_NEAR(value_of(step, "rate_deg_h"), 3.0, 0.5);
 }
 
-TEST(SampleClosure, NamesTheWitnessOfTheCasesMotion) {
+TEST(LongSampleClosure, NamesTheWitnessOfTheCasesMotion) {
     SampleTruth truth = usual();
     truth.case_motion.rms_arcsec = 1.0;
     truth.case_motion.witness = "accel_y";
@@ -175,7 +175,7 @@ TEST(SampleClosure, NamesTheWitnessOfTheCasesMotion) {
     EXPECT_LT(found.heldout_after, 0.8 * found.heldout_before);
 }
 
-TEST(SampleClosure, NamesSlowRates) {
+TEST(LongSampleClosure, NamesSlowRates) {
     SampleTruth truth = usual();
     truth.rates.bias_step = {3.0, 250.0};
     const auto step = only_step(closed(truth), "bias_step");
@@ -196,7 +196,7 @@ TEST(SampleClosure, NamesSlowRates) {
 
 // What is evident is named as surely as what hardly shows, though the noise that the base model takes it for is far
 // from the one that is left.
-TEST(SampleClosure, NamesWhatIsStrong) {
+TEST(LongSampleClosure, NamesWhatIsStrong) {
     const auto short_record = [] {
         SampleTruth truth = usual();
         truth.size = 20000;
@@ -273,7 +273,7 @@ TEST(SampleMotion, WhatIsLeftOfItIsNoSlowDrift) {
 }
 
 // What a witness tells of a strong motion has the witness's own noise in it.
-TEST(SampleMotion, TheNoiseOfItsWitnessIsNoneOfTheGyros) {
+TEST(LongSampleMotion, TheNoiseOfItsWitnessIsNoneOfTheGyros) {
     SampleTruth truth = usual();
     truth.size = 30000;
     truth.case_motion.rms_arcsec = 5.0;
@@ -336,7 +336,7 @@ TEST(LongSampleClosure, AMotionBesideAStrongWalkIsToldAsItIs) {
     }
 }
 
-TEST(SampleClosure, DoesNotNameWhatTheLibraryDoesNotHave) {
+TEST(LongSampleClosure, DoesNotNameWhatTheLibraryDoesNotHave) {
     SampleTruth truth = usual();
     truth.jumping_line = {12.0, 2.0, 6.0, 300.0};
     EXPECT_EQ(closed(truth).verdict, closure::Verdict::unexplained);

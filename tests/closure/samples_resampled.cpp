@@ -52,7 +52,7 @@ TEST(ResampledRecords, ClosesWhatWasTakenAtALowerRate) {
 
 // From less than two fifths of the record's rate neighbours lie on one straight line and are the same, which tells
 // the source's clock exactly; largest values come several times, and a stretch has few readings.
-TEST(ResampledRecords, OfSlowSourcesHaveStraightLines) {
+TEST(LongResampledRecords, OfSlowSourcesHaveStraightLines) {
     for (const double from_hz : {5.1, 12.3, 23.7, 31.9, 39.1}) {
         const SampleTruth truth = taken_at(from_hz, 4, 6000);
         const record::Record record = generate_samples(truth);
@@ -71,7 +71,7 @@ TEST(ResampledRecords, OfSlowSourcesHaveStraightLines) {
 
 // Just below the record's rate a small error of one reading grows from interval to interval, and what digits would do
 // grows with it. The rows that they reach are no structure.
-TEST(ResampledRecords, DigitsThatGrowAreNoStructure) {
+TEST(LongResampledRecords, DigitsThatGrowAreNoStructure) {
     const Closure found = close_samples(generate_samples(taken_at(95.81, 7)));
     expect_only_resampling(found);
     EXPECT_NEAR(found.steps[0].parameters[0].value, 95.81, 1e-6);
@@ -88,7 +88,7 @@ bool tells(const Closure& found, double from_hz) {
 
 // Errors of readings average out where they are interpolated, and what is left of them looks like a rate: with the
 // noises of a record as it is, images of the rate were likelier than the rate, or none explained enough.
-TEST(ResampledRecords, ImagesOfTheRateAreNotTheRate) {
+TEST(LongResampledRecords, ImagesOfTheRateAreNotTheRate) {
     struct Source {
         double hz, rate_noise_deg_rt_h;
         std::uint64_t seed;
@@ -105,7 +105,7 @@ TEST(ResampledRecords, ImagesOfTheRateAreNotTheRate) {
 
 // Near twice the record's rate readings share nothing: the variance alone says that they are interpolated, and how far
 // the rate is from a multiple of the record's.
-TEST(ResampledRecords, AreToldByTheirVarianceAlone) {
+TEST(LongResampledRecords, AreToldByTheirVarianceAlone) {
     const Closure found = close_samples(generate_samples(taken_at(186.87, 8)));
     expect_only_resampling(found);
     const double from_hz = found.steps[0].parameters[0].value;
@@ -113,7 +113,7 @@ TEST(ResampledRecords, AreToldByTheirVarianceAlone) {
 }
 
 // By how much a variance swings tells whether interpolation may do that.
-TEST(ResampledRecords, OtherVariancesThatRepeatAreNoResampling) {
+TEST(LongResampledRecords, OtherVariancesThatRepeatAreNoResampling) {
     for (const double depth : {0.2, 0.4}) {
         SampleTruth truth = taken_at(0.0, 9);
         truth.noise_modulation = {depth, 0.0763};
@@ -127,7 +127,7 @@ TEST(ResampledRecords, OtherVariancesThatRepeatAreNoResampling) {
 
 // A motion of the case is on the source's straight lines like all else: taken off as the witness has it, at the
 // record's own times, it would break them.
-TEST(ResampledRecords, MotionIsResampledToo) {
+TEST(LongResampledRecords, MotionIsResampledToo) {
     SampleTruth truth = taken_at(59.44, 3);
     truth.accelerometers = true;
     truth.case_motion.witness = "accel_x";
@@ -143,7 +143,7 @@ TEST(ResampledRecords, MotionIsResampledToo) {
 }
 
 // What a resampled record's source was given, it has on the straight lines between the source's times.
-TEST(ResampledRecords, KnownInputIsResampledToo) {
+TEST(LongResampledRecords, KnownInputIsResampledToo) {
     SampleTruth truth = taken_at(77.3, 5, 10000);
     truth.white_angle_arcsec = 0.2;
     truth.input_profile_deg_h = {{0.0, 30.0, 31.0, 65.0, 66.0, 100.0}, {200.0, 200.0, -300.0, -300.0, 50.0, 50.0}};
@@ -169,7 +169,7 @@ const Estimate& named(const Closure& found, const std::string& effect, const std
 
 // A line a hundred times the noise has images far above it, which look like lines of their own and go when their source
 // is known; whose clock the line tells, if all that the clock moves is fitted with it, better than anything else.
-TEST(ResampledRecords, StrongLinesHaveImagesAndTellTheClock) {
+TEST(LongResampledRecords, StrongLinesHaveImagesAndTellTheClock) {
     struct Case {
         double from_hz, shown_hz, amplitude_arcsec;
         std::uint64_t seed;
@@ -196,7 +196,7 @@ TEST(ResampledRecords, StrongLinesHaveImagesAndTellTheClock) {
 }
 
 // A line on a curve that was resampled: its phase is lost from one part of the record to the next, its power is not.
-TEST(ResampledRecords, ALineOnACurveToo) {
+TEST(LongResampledRecords, ALineOnACurveToo) {
     SampleTruth truth = taken_at(157.2, 4);
     truth.white_angle_arcsec = 0.05;
     truth.dither_residue = {437.3, 0.0, 0.3, 0.0, -0.5, 250.0};
@@ -211,7 +211,7 @@ TEST(ResampledRecords, ALineOnACurveToo) {
 
 // Of a line the record has the straight lines between the source's readings: it is weaker there, and has others beside
 // it. Where the source is faster it may be above half the record's rate, and shows below; found first or last.
-TEST(ResampledRecords, LinesAreThoseOfTheSource) {
+TEST(LongResampledRecords, LinesAreThoseOfTheSource) {
     constexpr double dither_hz = 430.0;
     struct Case {
         double from_hz, amplitude_arcsec;

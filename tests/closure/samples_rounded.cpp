@@ -124,7 +124,7 @@ TEST(RoundedReadings, NearlyTheSameModelsAreNearlyAsLikely) {
 }
 
 // Where the measured increments are likeliest, and how sharp that is: the truth, within its errors.
-TEST(RoundedReadings, AreLikeliestWhereTheNoiseIs) {
+TEST(LongRoundedReadings, AreLikeliestWhereTheNoiseIs) {
     constexpr int records = 8;
     double angle = 0.0;
     double rate = 0.0;
@@ -149,7 +149,7 @@ TEST(RoundedReadings, AreLikeliestWhereTheNoiseIs) {
     EXPECT_LT(rate, 31.8);
 }
 
-TEST(RoundedRecords, CountsBesideLittleNoiseAreNoStructure) {
+TEST(LongRoundedRecords, CountsBesideLittleNoiseAreNoStructure) {
     for (const double noise : {0.1, 0.05, 0.0}) {
         SCOPED_TRACE(noise);
         const Closure found = close_samples(generate_samples(counted(noise)));
@@ -163,7 +163,7 @@ TEST(RoundedRecords, CountsBesideLittleNoiseAreNoStructure) {
     }
 }
 
-TEST(RoundedRecords, EffectsShowThroughTheSteps) {
+TEST(LongRoundedRecords, EffectsShowThroughTheSteps) {
     SampleTruth truth = counted(0.1, 3);
     truth.rates.bias_step = {6.0, 70.0};
     const Closure found = close_samples(generate_samples(truth));
@@ -175,7 +175,7 @@ TEST(RoundedRecords, EffectsShowThroughTheSteps) {
 }
 
 // Steps that nobody declared are an effect, which takes its rounding with it.
-TEST(RoundedRecords, LargeStepsAreNamedAndLeaveNothing) {
+TEST(LongRoundedRecords, LargeStepsAreNamedAndLeaveNothing) {
     SampleTruth truth = counted(0.3);
     truth.kind = record::SampleKind::angle_increment_arcsec;
     truth.count_quantization_arcsec = 1.5;
@@ -189,7 +189,7 @@ TEST(RoundedRecords, LargeStepsAreNamedAndLeaveNothing) {
 
 // Whole counts of a quiet gyro: between two crossings of a step the rounding hides all, and the noise of the values
 // says nothing of that beneath them.
-TEST(RoundedRecords, StepsOfFortyTimesTheNoiseLeaveNothing) {
+TEST(LongRoundedRecords, StepsOfFortyTimesTheNoiseLeaveNothing) {
     SampleTruth truth = counted(0.02);
     truth.kind = record::SampleKind::angle_increment_arcsec;
     truth.count_quantization_arcsec = 1.5;

@@ -32,7 +32,7 @@ std::vector<Outcome> judged(const std::vector<Case>& cases) {
     return outcomes;
 }
 
-TEST(ClosureSuite, NamesNothingInRecordsWithoutAnything) {
+TEST(LongClosureSuite, NamesNothingInRecordsWithoutAnything) {
     std::vector<Case> cases;
     for (const Condition& condition : conditions) {
         cases.push_back({.truth = {}, .condition = &condition, .seed = 300 + cases.size(), .turns = turns});
@@ -46,7 +46,7 @@ TEST(ClosureSuite, NamesNothingInRecordsWithoutAnything) {
     }
 }
 
-TEST(ClosureSuite, NamesWhatIsFourTimesItsLimit) {
+TEST(LongClosureSuite, NamesWhatIsFourTimesItsLimit) {
     std::vector<Case> cases;
     const auto add = [&](const char* effect, double size, std::size_t condition) {
         Case of{.kind = Kind::single, .truth = {}, .multiple = 4.0, .condition = &conditions[condition]};
@@ -109,7 +109,7 @@ TEST(ClosureSuite, SizesComeFromTheRecordsInformation) {
     EXPECT_NEAR(limit(4000) / limit(16000), 2.0, 0.4);
 }
 
-TEST(ClosureSuite, SizesFollowPhasesThatAreForetoldAlike) {
+TEST(LongClosureSuite, SizesFollowPhasesThatAreForetoldAlike) {
     // This gyro's phases are foretold alike turn after turn, so that the noise of 3 rad decides both how large an
     // innovation is and at which phase it ends; without that in the test four of these draws are below 1e-3.
     double product = 1.0;
@@ -130,7 +130,7 @@ TEST(ClosureSuite, SizesFollowPhasesThatAreForetoldAlike) {
 }
 
 // In a locked gyro bias, threshold and the coupling's phase move together, as do the amplitudes of its harmonics.
-TEST(ClosureSuite, ADetectorsPhaseIsFoundAlongWithTheThreshold) {
+TEST(LongClosureSuite, ADetectorsPhaseIsFoundAlongWithTheThreshold) {
     Case of{.kind = Kind::single, .truth = {}, .multiple = 2.0, .condition = &conditions[0], .seed = 1037};
     of.truth = {{"detector_phase_offset", {{"phase_rad", 0.25677}}}};
     const Outcome outcome = judged({of}).front();
@@ -236,7 +236,7 @@ TEST(LongClosureSuite, AStrongSecondHarmonicIsFoundBehindAStep) {
 }
 
 // The phase turns faster than a sine of the counted swing: a rotation moves zero-rate points by less.
-TEST(ClosureSuite, AThirdHarmonicOfTheDitherIsNoOtherShape) {
+TEST(LongClosureSuite, AThirdHarmonicOfTheDitherIsNoOtherShape) {
     Truth truth;
     truth.scale_factor_arcsec = 0.55;
     truth.dither_frequency_hz = 310.0;
@@ -257,7 +257,7 @@ TEST(ClosureSuite, AThirdHarmonicOfTheDitherIsNoOtherShape) {
 }
 
 // A lock-in of which much is at minima makes their accelerations smaller, of second order.
-TEST(ClosureSuite, AStrongLockInIsNoShapeOfTheDither) {
+TEST(LongClosureSuite, AStrongLockInIsNoShapeOfTheDither) {
     Case of{.kind = Kind::several, .truth = {}, .multiple = 5.0, .condition = &other_gyro, .seed = 2092};
     of.truth = {{"missed_counts", {{"probability_per_turn", 0.0053584}}},
                 {"bias_temperature", {{"deg_h_per_k", 0.062808}}},
@@ -311,7 +311,7 @@ TEST(LongClosureSuite, ALineAndASecondHarmonicAreNotSomethingElse) {
         << outcome.verdict << " " << outcome.named;
 }
 
-TEST(ClosureSuite, NothingOutsideTheLibraryHasItsName) {
+TEST(LongClosureSuite, NothingOutsideTheLibraryHasItsName) {
     std::vector<Case> all = foreign_cases(1);
     ASSERT_EQ(all.size(), 6U);
     for (Case& of : all) of.turns = turns;
@@ -334,7 +334,7 @@ TEST(LongClosureSuite, WhatFollowsThePhaseIsNoVibration) {
     EXPECT_FALSE(outcome.false_name) << outcome.named;
 }
 
-TEST(ClosureSuite, ALockInThatDriftsIsNoRandomRate) {
+TEST(LongClosureSuite, ALockInThatDriftsIsNoRandomRate) {
     // Kicks of a threshold that is not the mean one add up to a walk beside injected noise.
     Case of{.kind = Kind::foreign, .truth = {}, .condition = &conditions[1], .direct = true, .seed = 7};
     of.foreign = {{"lockin_swing", {{"ratio", 0.3}, {"period_s", 120.0}}}};
@@ -353,7 +353,7 @@ TEST(LongClosureSuite, AnEffectOfTheCouplingIsNamedBesideItsLine) {
     EXPECT_EQ(outcome.judged, Judged::right) << outcome.verdict << " " << outcome.named;
 }
 
-TEST(ClosureSuite, TwoRatesAreNotOneRandomRate) {
+TEST(LongClosureSuite, TwoRatesAreNotOneRandomRate) {
     // A random rate follows a ramp and a temperature at once, better than either of them does.
     Case of{.kind = Kind::pair, .truth = {}, .multiple = 4.0, .condition = &conditions[2], .seed = 350, .turns = turns};
     of.truth = {draw("bias_ramp", 4.0 * start_size("bias_ramp"), of.seed, duration_s),

@@ -41,7 +41,7 @@ std::vector<Closure> close_noisy(const Truth& locked, const std::vector<double>&
 }
 
 // What the lock-in adds on the way to a turn goes with the noise there: sizes follow phases by more than they do.
-TEST(TurnLoop, InjectedNoiseInALockedGyroIsNoStructure) {
+TEST(LongTurnLoop, InjectedNoiseInALockedGyroIsNoStructure) {
     Truth truth;
     truth.scale_factor_arcsec = 1.6;
     truth.dither_frequency_hz = 233.7;
@@ -58,7 +58,7 @@ TEST(TurnLoop, InjectedNoiseInALockedGyroIsNoStructure) {
 }
 
 // Noise between bounds goes with the lock-in before the turn otherwise than a normal one does.
-TEST(TurnLoop, NoiseOfEvenDensityInALockedGyroIsNoStructure) {
+TEST(LongTurnLoop, NoiseOfEvenDensityInALockedGyroIsNoStructure) {
     Truth truth;
     truth.scale_factor_arcsec = 1.6;
     truth.dither_frequency_hz = 105.497;
@@ -110,7 +110,7 @@ TEST(TurnLoop, AThresholdThatSwingsByASixthIsFollowed) {
 }
 
 // Before the swing is in the model what it leaves is flatter than normal noise: no shape of the noise beside it.
-TEST(TurnLoop, TheShapeOfTheNoiseIsReadAnewBesideAnEffect) {
+TEST(LongTurnLoop, TheShapeOfTheNoiseIsReadAnewBesideAnEffect) {
     Truth truth = swinging_threshold();
     truth.readout_noise = 0.02;
     truth.input_rate_deg_h = 40.0;
@@ -134,7 +134,7 @@ Truth coarsely_read(std::uint64_t seed) {
 
 // What a kick makes of the reading's error is not linear in it, and adds up: about the phases that were read each of
 // these had a step of the bias as well.
-TEST(TurnLoop, CoarseReadingsAreNoStep) {
+TEST(LongTurnLoop, CoarseReadingsAreNoStep) {
     Truth plain = coarsely_read(104);
     plain.input_rate_deg_h = 71.3;
     const Closure closure = close_loop(generate({&plain, 1}).front());
@@ -194,7 +194,7 @@ TEST(LongTurnLoop, ARateThatWalksIsNoShapeOfTheDither) {
     EXPECT_EQ(closure.verdict, Verdict::closed);
 }
 
-TEST(TurnLoop, ASteepRampLeadsTheFitBack) {
+TEST(LongTurnLoop, ASteepRampLeadsTheFitBack) {
     Truth truth;
     truth.scale_factor_arcsec = 1.6;
     truth.dither_frequency_hz = 497.9;
@@ -215,7 +215,7 @@ TEST(TurnLoop, ASteepRampLeadsTheFitBack) {
 }
 
 // Its offsets are in units of the fringe, not of the mean radius, and the noise that is left is no longer round.
-TEST(TurnLoop, AnEllipseOfASixthIsMadeRound) {
+TEST(LongTurnLoop, AnEllipseOfASixthIsMadeRound) {
     Truth truth;
     truth.scale_factor_arcsec = 1.2;
     truth.dither_frequency_hz = 168.3;
@@ -263,7 +263,7 @@ double squares_of_locked_gyros(int gyros, std::uint64_t seed, int by_chance) {
     return squares;
 }
 
-TEST(TurnLoop, ALockedGyroTellsItsThresholdWithAnHonestError) {
+TEST(LongTurnLoop, ALockedGyroTellsItsThresholdWithAnHonestError) {
     // Chi-squared of twelve: one in 2000 is above 34.
     EXPECT_LT(squares_of_locked_gyros(12, 300, 0), 34.0);
 }
