@@ -125,7 +125,7 @@ TEST(RoundedReadings, NearlyTheSameModelsAreNearlyAsLikely) {
 }
 
 // Where the measured increments are likeliest, and how sharp that is: the truth, within its errors.
-TEST(RoundedReadings, AreLikeliestWhereTheNoiseIs) {
+TEST(LongRoundedReadings, AreLikeliestWhereTheNoiseIs) {
     constexpr int records = 8;
     double angle = 0.0;
     double rate = 0.0;
