@@ -1,8 +1,10 @@
 #include "analysis/closure/closure.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -32,6 +34,31 @@ void declare(record::Declared& declared, const scenario::Scenario& model) {
     fill(declared.dither_peak_rate_deg_s, model.dither.peak_rate_deg_s);
 }
 
+/// Shows the stage of the loop and the time since it began: one line that is replaced on a terminal, a line for each
+/// stage elsewhere.
+class StageProgress {
+   public:
+    explicit StageProgress(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
+    ~StageProgress() {
+        if (shown_ && terminal_) tell("\r\033[K");
+    }
+    StageProgress(const StageProgress&) = delete;
+    StageProgress& operator=(const StageProgress&) = delete;
+
+    void show(const std::string& stage) {
+        if (quiet_) return;
+        const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start_;
+        tell(fmt::format(terminal_ ? "\r\033[K{:4.0f} s  {} ..." : "{:4.0f} s  {}\n", since.count(), stage));
+        shown_ = true;
+    }
+
+   private:
+    bool quiet_;
+    bool terminal_;
+    bool shown_ = false;
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
 }  // namespace
 
 void add_closure(CLI::App& root) {
@@ -40,23 +67,28 @@ void add_closure(CLI::App& root) {
         std::string model;
         std::string out;
         bool json = false;
+        bool quiet = false;
     };
     CLI::App* command =
-        root.add_subcommand("closure", "Fit a measured record, trace what is left, add what is missing");
+        root.add_subcommand("closure", "Identify the error sources in a measured record");
     auto arguments = std::make_shared<Arguments>();
     command->add_option("RECORD", arguments->record, "rlg-record (.h5), or samples as text")->required();
     command->add_option("--model", arguments->model,
-                        "scenario (.toml) of the instrument, for what the record leaves open");
+                        "scenario (.toml) that supplies scale factor, threshold and dither where the record does not "
+                        "declare them");
     command->add_option("-o,--output", arguments->out,
                         "folder for report.md with its figures, closed.toml, closure.h5 and closure.json");
     command->add_flag("--json", arguments->json, "one JSON object on standard output");
+    command->add_flag("-q,--quiet", arguments->quiet, "no progress on standard error");
     command->callback([arguments] {
         record::Record record = record::read_record(arguments->record);
         tell_warnings(arguments->record, record);
         if (!arguments->model.empty()) declare(record.declared, scenario::parse_file(arguments->model));
+        StageProgress progress(arguments->quiet);
+        const closure::Monitor monitor{[&](const std::string& stage) { progress.show(stage); }};
         closure::Closure closure;
         try {
-            closure = closure::close_loop(record);
+            closure = closure::close_loop(record, monitor);
         } catch (const InputError& error) {
             throw InputError(fmt::format("{}: {}", arguments->record, error.what()));
         }
@@ -64,6 +96,7 @@ void add_closure(CLI::App& root) {
         std::string text = closure::to_text(closure);
         if (!arguments->out.empty()) {
             const std::string name = std::filesystem::path(arguments->record).filename().string();
+            monitor.tell("simulating the closed model");
             const closure::Predictive predictive = closure::check_predictive(record, closure);
             closure::write_closure(arguments->out, name, record, closure, predictive);
             report::write_closure_page(arguments->out, name, closure, predictive);

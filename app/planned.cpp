@@ -2,7 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
-#include <utility>
+#include <string>
 
 #include "app/command.hpp"
 #include "engine/core/error.hpp"
@@ -10,13 +10,10 @@
 namespace ringlock::app {
 
 void add_planned(CLI::App& root) {
-    constexpr std::array<std::pair<const char*, const char*>, 3> planned = {{
-        {"merge", "Join the shards of one run (not there yet)"},
-        {"replay", "Simulate one gyro of a result again, at full detail (not there yet)"},
-        {"report", "Write a report of a result (not there yet)"},
-    }};
-    for (const auto& [name, what] : planned) {
-        CLI::App* command = root.add_subcommand(name, what);
+    // Their names are reserved, but the help shows what can be used.
+    constexpr std::array planned = {"merge", "replay", "report"};
+    for (const char* const name : planned) {
+        CLI::App* command = root.add_subcommand(name)->group("");
         command->allow_extras();
         const std::string text = name;
         command->callback([text] {

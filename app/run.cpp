@@ -122,8 +122,9 @@ void add_run(CLI::App& root, std::span<const char* const> command_line) {
         ->type_name("N");
     command->add_option("--seed", arguments->seed, "replaces ensemble.seed")->type_name("S");
     command->add_option("--plot", arguments->plot, "also draw the figure into this SVG file");
-    command->add_option("--shard", arguments->shard, "I/N: part I of N (not there yet)");
-    command->add_flag("--resume", arguments->resume, "go on with an interrupted run (not there yet)");
+    // Reserved, but not there yet: the help shows what can be used.
+    command->add_option("--shard", arguments->shard)->group("");
+    command->add_flag("--resume", arguments->resume)->group("");
     command->add_flag("--json", arguments->json, "print one JSON object instead of a table");
     command->add_flag("-q,--quiet", arguments->quiet, "no progress on standard error");
     // A flag, so that it does not take the word after it for its value.

@@ -1,9 +1,11 @@
 #include "analysis/closure/decide/effect_queries.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "engine/core/error.hpp"
+#include "engine/core/units.hpp"
 
 namespace ringlock::closure {
 
@@ -89,7 +91,8 @@ effects::Values unit_values(const effects::Effect& effect) {
 }
 
 std::function<double(const effects::Interval&)> unit_angle(const effects::Effect& effect) {
-    return effect.added_angle(unit_values(effect));
+    return
+        [change = effect.change(unit_values(effect))](const effects::Interval& at) { return change(at).angle_arcsec; };
 }
 
 double rate_per_kelvin(const effects::Effect& effect) {
@@ -124,6 +127,40 @@ std::vector<const effects::Parameter*> parameters_of(const effects::Effect& effe
 
 double value_of(const effects::Values& values, const effects::Parameter& parameter) {
     return values.at(std::string(parameter.name));
+}
+
+Configures configured_by(const effects::Effect& effect) {
+    // Any value that shows in the constants and is allowed.
+    constexpr double probe = 1e-3;
+    const gyro::Setup plain;
+    gyro::Setup setup;
+    effects::Values values;
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        const bool acts =
+            parameter.role == Role::size || parameter.role == Role::probability || parameter.role == Role::phase;
+        values.emplace(parameter.name, acts ? probe : parameter.default_value);
+    }
+    effect.configure(values, setup);
+    return {
+        .dither_shape = setup.dither_asymmetry_ratio != plain.dither_asymmetry_ratio ||
+                        setup.dither_harmonic_ratio != plain.dither_harmonic_ratio,
+        .reading = setup.ellipse != plain.ellipse || setup.missed_count_probability != plain.missed_count_probability,
+        .coupling = setup.coupling_phase_rad != plain.coupling_phase_rad ||
+                    setup.lockin_second_ratio != plain.lockin_second_ratio ||
+                    setup.lockin_turn_asymmetry != plain.lockin_turn_asymmetry};
+}
+
+void set_back_clock(const effects::Effect& effect, effects::Values& values, double start_s) {
+    if (!effect.adds_angle()) return;
+    const auto of = [&](Role role) -> double* {
+        const effects::Parameter* found = effects::first_of(effect, role);
+        return found == nullptr ? nullptr : &values.at(std::string(found->name));
+    };
+    if (double* time_s = of(Role::time)) *time_s = std::max(0.0, *time_s - start_s);
+    double* phase_rad = of(Role::phase);
+    const double* frequency_hz = of(Role::frequency);
+    if (phase_rad == nullptr || frequency_hz == nullptr) return;
+    *phase_rad = std::remainder(*phase_rad + units::two_pi * *frequency_hz * start_s, units::two_pi);
 }
 
 Estimate estimate_of(const effects::Effect& effect, std::string_view parameter, double value, double sd) {

@@ -59,6 +59,18 @@ std::vector<const effects::Parameter*> parameters_of(const effects::Effect& effe
 /// The value of a parameter.
 double value_of(const effects::Values& values, const effects::Parameter& parameter);
 
+/// Constants of a gyro that an effect changes, of which kind.
+struct Configures {
+    bool dither_shape = false;  ///< the dither's asymmetry or its second harmonic
+    bool reading = false;       ///< the detectors or the counter
+    bool coupling = false;      ///< the lock-in: its phase, its second harmonic, its threshold at either kind of turn
+};
+Configures configured_by(const effects::Effect& effect);
+
+/// Values for a clock that begins `start_s` later: times and phases of what the effect changes over time. Times before
+/// that become zero.
+void set_back_clock(const effects::Effect& effect, effects::Values& values, double start_s);
+
 /// A fitted parameter of an effect.
 Estimate estimate_of(const effects::Effect& effect, std::string_view parameter, double value, double sd);
 

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <string_view>
 
+#include "analysis/closure/decide/effect_queries.hpp"
+#include "analysis/closure/decide/evidence.hpp"
+
 namespace ringlock::closure {
 
 std::string_view name_of(Verdict verdict) {
@@ -18,28 +21,28 @@ std::string_view name_of(Verdict verdict) {
 }
 
 std::string experiment_for(const effects::Effect& effect, const std::vector<const effects::Effect*>& others) {
-    const auto has = [&](std::string_view name) {
-        return effect.name() == name || std::any_of(others.begin(), others.end(), [&](const effects::Effect* other) {
-                   return other->name() == name;
-               });
+    std::vector<const effects::Effect*> all = others;
+    all.push_back(&effect);
+    const auto count = [&](auto&& is_such) { return std::count_if(all.begin(), all.end(), is_such); };
+    const auto follow = [&](effects::Follows quantity) {
+        return count([quantity](const effects::Effect* e) { return e->follows() == quantity; }) > 0;
     };
-    if (has("dither_residue")) {
+    if (count([](const effects::Effect* e) { return on_samples(*e) == OnSamples::angle_line; }) > 0) {
         return "declare the dither's frequency if the record does not, or record with another dither frequency or "
                "sampling rate";
     }
-    if (has("bias_temperature") || has("lockin_temperature")) {
+    if (follow(effects::Follows::temperature)) {
         return "record with the temperature changed against time: held, then stepped up and down";
     }
-    if (has("scale_factor_error")) return "record at three input rates or more, of both signs";
-    if (has("dither_asymmetry") && has("dither_second_harmonic")) {
+    if (follow(effects::Follows::input_rate)) return "record at three input rates or more, of both signs";
+    if (count([](const effects::Effect* e) { return configured_by(*e).dither_shape; }) > 1) {
         return "record the accelerations on both sides of the turns";
     }
-    if (has("detector_phase_offset") || has("lockin_second_harmonic") || has("lockin_turn_asymmetry")) {
+    if (count([](const effects::Effect* e) { return configured_by(*e).coupling; }) > 0) {
         return "record with more injected noise, so that all phases come at all turns, or for longer";
     }
-    if (has("bias_step") || has("bias_ramp") || has("rate_random_walk") || has("bias_instability") ||
-        has("quantum_noise")) {
-        return "record for longer: their Allan deviations and their courses in time part with the averaging time";
+    if (follow(effects::Follows::time) || count([](const effects::Effect* e) { return is_random_rate(*e); }) > 0) {
+        return "record for longer: their Allan deviations and their trends separate with the averaging time";
     }
     return "record for longer";
 }

@@ -4,10 +4,10 @@
 
 #include "analysis/closure/closure.hpp"
 
-/// What is said of a closed model: the verdict, and what would resolve a tie.
+/// The verdict on a closed model, and the record that would resolve a tie.
 namespace ringlock::closure {
 
-/// What would tell two effects apart that this record cannot.
+/// A record that would tell apart effects that this one cannot.
 std::string experiment_for(const effects::Effect& effect, const std::vector<const effects::Effect*>& others);
 
 Verdict verdict_of(const Closure& closure);

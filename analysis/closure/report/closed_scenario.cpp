@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "analysis/closure/decide/effect_queries.hpp"
+#include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
 
@@ -20,6 +22,13 @@ double value_of(const std::vector<Estimate>& estimates, std::string_view name, d
         if (estimate.name == name && std::isfinite(estimate.value)) return estimate.value;
     }
     return otherwise;
+}
+
+/// A parameter of the library's effect that shows on samples in this way, in the scenario's table of effects.
+double* value_in(Scenario& scenario, OnSamples as, effects::Role role) {
+    const effects::Effect* effect = first_that_shows(as);
+    if (effect == nullptr) throw RunError("the library has no effect of the kind that the closed model needs");
+    return &scenario.effects.at(std::string(effect->name())).at(std::string(parameter_of(*effect, role).name));
 }
 
 void take_device_of_turns(const record::Record& record, const Closure& closure, Scenario& scenario) {
@@ -59,17 +68,20 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
     const record::Samples& samples = *record.samples;
     scenario.gyro.lockin_threshold_deg_h = 0.0;
     scenario.input.rate_deg_h = value_of(closure.base, "mean_rate_deg_h", 0.0);
-    scenario.effects.at("quantum_noise").at("deg_rt_h") =
+    *value_in(scenario, OnSamples::white, effects::Role::deviation) =
         std::max(0.0, value_of(closure.base, "white_rate_deg_rt_h", 0.0));
     const double scale_factor_arcsec = record.declared.scale_factor_arcsec.value_or(scenario.gyro.scale_factor_arcsec);
     if (samples.kind == record::SampleKind::quarter_count) {
-        scenario.effects.at("count_quantization").at("step_arcsec") = 0.25 * scale_factor_arcsec;
+        *value_in(scenario, OnSamples::resolution, effects::Role::sampled) = 0.25 * scale_factor_arcsec;
     }
-    double step_arcsec = scenario.effects.at("count_quantization").at("step_arcsec");
+    double step_arcsec = *value_in(scenario, OnSamples::resolution, effects::Role::sampled);
     double readings_hz = samples.rate_hz;
     for (const Step& step : closure.steps) {
-        if (step.effect->name() == "count_quantization") step_arcsec = value_of(step.parameters, "step_arcsec", 0.0);
-        if (step.effect->name() == "resampling") readings_hz = value_of(step.parameters, "from_hz", readings_hz);
+        const OnSamples as = on_samples(*step.effect);
+        if (as != OnSamples::resolution && as != OnSamples::transport) continue;
+        const std::string_view parameter = parameter_of(*step.effect, effects::Role::sampled).name;
+        if (as == OnSamples::resolution) step_arcsec = value_of(step.parameters, parameter, 0.0);
+        if (as == OnSamples::transport) readings_hz = value_of(step.parameters, parameter, readings_hz);
     }
     // What is fitted as white noise of the angle has that of the steps in it.
     const double white = value_of(closure.base, "white_angle_arcsec", 0.0);
@@ -136,21 +148,17 @@ Scenario closed_scenario(const record::Record& record, const Closure& closure) {
         scenario.environment.temperature_ramp_k_per_h = (t.value.back() - t.value.front()) / span_h;
     }
     for (const Step& step : closure.steps) {
-        const auto found = scenario.effects.find(std::string(step.effect->name()));
+        const auto found = scenario.effects.find(step.name());
         if (found == scenario.effects.end()) continue;
         for (const Estimate& estimate : step.parameters) {
             const auto value = found->second.find(estimate.name);
             if (value != found->second.end()) value->second = estimate.value;
         }
     }
-    // The step's time and the line's phase are those of the record's own clock.
-    const double start_s = start_of(record);
-    auto& when_s = scenario.effects.at("bias_step").at("time_s");
-    when_s = std::max(0.0, when_s - start_s);
-    auto& line = scenario.effects.at("base_vibration");
-    if (line.at("rate_deg_h") != 0.0) {
-        line.at("phase_rad") =
-            std::remainder(line.at("phase_rad") + units::two_pi * line.at("frequency_hz") * start_s, units::two_pi);
+    // Times and phases were those of the record's own clock.
+    for (const Step& step : closure.steps) {
+        const auto found = scenario.effects.find(step.name());
+        if (found != scenario.effects.end()) set_back_clock(*step.effect, found->second, start_of(record));
     }
     return scenario;
 }

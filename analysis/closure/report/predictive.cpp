@@ -289,6 +289,14 @@ record::Track temperature_change(const record::Record& record, const SampleSight
     return track;
 }
 
+/// Rate [deg/h] of an effect that follows the temperature, at that time.
+double rate_at(const effects::ChangeOver& change, const record::Track& temperature, double time_s) {
+    constexpr double moment_s = 1e-3;
+    const double before_s = time_s - 0.5 * moment_s;
+    const double after_s = time_s + 0.5 * moment_s;
+    return change({before_s, moment_s, {temperature.at(before_s), temperature.at(after_s)}}).angle_arcsec / moment_s;
+}
+
 /// The closed scenario over the record's own length, input and temperature.
 scenario::Scenario replica(const record::Record& record, const Closure& closure, const SampleSight* samples) {
     scenario::Scenario s = closed_scenario(record, closure);
@@ -299,10 +307,21 @@ scenario::Scenario replica(const record::Record& record, const Closure& closure,
     const double start_s = start_of(record);
     const double rest_deg_h = s.input.rate_deg_h - closure.mean_input_rate_deg_h;
     const record::Track& input = record.input_rate_deg_h;
-    // A scenario's temperature is a ramp and a sine; what a rate makes of any other is part of the profile.
-    double& of_temperature = s.effects.at("bias_temperature").at("deg_h_per_k");
+    // A scenario's temperature is a ramp and a sine; rates that follow any other temperature are part of the profile.
     const record::Track temperature = temperature_change(record, samples);
-    const bool by_temperature = of_temperature != 0.0 && !temperature.empty();
+    std::vector<effects::ChangeOver> rates;
+    for (auto& [name, values] : s.effects) {
+        const effects::Effect& effect = *effects::find(name);
+        if (temperature.empty() || effect.follows() != effects::Follows::temperature || !effect.adds_angle() ||
+            !effect.active(values)) {
+            continue;
+        }
+        rates.push_back(effect.change(values));
+        for (const effects::Parameter& parameter : effect.parameters()) {
+            values.at(std::string(parameter.name)) = parameter.default_value;
+        }
+    }
+    const bool by_temperature = !rates.empty();
     if (changes(input) || by_temperature) {
         std::vector<double> times = input.time_s;
         if (by_temperature) times.insert(times.end(), temperature.time_s.begin(), temperature.time_s.end());
@@ -310,11 +329,10 @@ scenario::Scenario replica(const record::Record& record, const Closure& closure,
         times.erase(std::unique(times.begin(), times.end()), times.end());
         for (const double time_s : times) {
             double rate = rest_deg_h + (input.empty() ? closure.mean_input_rate_deg_h : input.at(time_s));
-            if (by_temperature) rate += of_temperature * temperature.at(time_s);
+            for (const effects::ChangeOver& change : rates) rate += rate_at(change, temperature, time_s);
             s.input.profile_time_s.push_back(time_s - start_s);
             s.input.profile_rate_deg_h.push_back(rate);
         }
-        if (by_temperature) of_temperature = 0.0;
     }
     return s;
 }
@@ -324,13 +342,13 @@ std::vector<std::string> left_out(const Closure& closure) {
     std::vector<std::string> notes;
     const scenario::EffectSettings known = scenario::default_effect_settings();
     for (const Step& step : closure.steps) {
-        const auto effect = known.find(std::string(step.effect->name()));
+        const auto effect = known.find(step.name());
         for (const Estimate& estimate : step.parameters) {
             if (effect != known.end() && effect->second.contains(estimate.name)) continue;
             notes.push_back(fmt::format("{} of {} is no parameter of a scenario: it is not simulated", estimate.name,
                                         step.effect->name()));
         }
-        if (step.effect->name() == "lockin_temperature") {
+        if (step.effect->changes().threshold && step.effect->follows() == effects::Follows::temperature) {
             notes.emplace_back("the threshold follows a steady ramp of the temperature in the simulations");
         }
     }

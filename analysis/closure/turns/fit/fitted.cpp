@@ -8,6 +8,7 @@
 
 #include "analysis/closure/turns/model/effect_roles.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/interrupt.hpp"
 
 namespace ringlock::closure {
 
@@ -78,6 +79,7 @@ TurnProblem::TurnProblem(const record::Record& record, Rows rows, std::shared_pt
 TurnProblem TurnProblem::whole() const { return {*record_, Rows(rows_.size(), 1), readings_}; }
 
 std::shared_ptr<Fitted> TurnProblem::fit(const TurnParameters& start, TurnFit::Effects effects, double needed) const {
+    check_interrupt();
     auto fitted = std::make_shared<Fitted>();
     gyro::Setup setup;
     bool count_again = false;

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 #include <utility>
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/decide/rows.hpp"
 #include "analysis/closure/decide/verdict.hpp"
@@ -20,7 +20,6 @@
 #include "analysis/closure/turns/screen/side_channels.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
-#include "engine/core/units.hpp"
 
 namespace ringlock::closure {
 
@@ -37,18 +36,8 @@ void add_once(std::vector<const effects::Effect*>& effects, const effects::Effec
 /// Effects with times and phases by a clock that begins with the first turn, as the fit's does (TurnFit::estimates has
 /// the way back).
 std::vector<ActiveEffect> since_first_turn(std::vector<ActiveEffect> effects, const record::Record& record) {
-    const double start_s = record.turns->time_s.front();
     for (ActiveEffect& active : effects) {
-        if (!active.effect->adds_angle()) continue;
-        const auto of = [&](effects::Role role) -> double* {
-            const effects::Parameter* found = effects::first_of(*active.effect, role);
-            return found == nullptr ? nullptr : &active.values.at(std::string(found->name));
-        };
-        if (double* time = of(effects::Role::time)) *time = std::max(0.0, *time - start_s);
-        double* phase = of(effects::Role::phase);
-        const double* frequency = of(effects::Role::frequency);
-        if (phase == nullptr || frequency == nullptr) continue;
-        *phase = std::remainder(*phase + units::two_pi * *frequency * start_s, units::two_pi);
+        set_back_clock(*active.effect, active.values, record.turns->time_s.front());
     }
     return effects;
 }

@@ -1,5 +1,6 @@
 #include "analysis/closure/turns/model/effect_roles.hpp"
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/decide/evidence.hpp"
 
 namespace ringlock::closure {
@@ -16,27 +17,6 @@ gyro::Setup configured(const Effect& effect, const effects::Values& values) {
     gyro::Setup setup;
     effect.configure(values, setup);
     return setup;
-}
-
-bool is_shown_by_reading(const gyro::Setup& setup) {
-    const gyro::Setup plain;
-    return setup.ellipse != plain.ellipse || setup.missed_count_probability != plain.missed_count_probability;
-}
-
-bool is_shown_elsewhere(const gyro::Setup& setup) {
-    const gyro::Setup plain;
-    return setup.dither_asymmetry_ratio != plain.dither_asymmetry_ratio ||
-           setup.dither_harmonic_ratio != plain.dither_harmonic_ratio || is_shown_by_reading(setup);
-}
-
-/// A gyro's constants with the sizes and probabilities of the effect at small values.
-gyro::Setup probed(const Effect& effect) {
-    effects::Values values = values_at_rest(effect);
-    for (const effects::Parameter& parameter : effect.parameters()) {
-        if (parameter.role != Role::size && parameter.role != Role::probability) continue;
-        values.at(std::string(parameter.name)) = probe;
-    }
-    return configured(effect, values);
 }
 
 /// The parameter that, by itself, changes this constant; empty where none does.
@@ -97,9 +77,12 @@ effects::Values values_at_rest(const Effect& effect) {
     return values;
 }
 
-bool told_by_other_columns(const Effect& effect) { return is_shown_elsewhere(probed(effect)); }
+bool told_by_other_columns(const Effect& effect) {
+    const Configures configures = configured_by(effect);
+    return configures.dither_shape || configures.reading;
+}
 
-bool changes_reading(const Effect& effect) { return is_shown_by_reading(probed(effect)); }
+bool changes_reading(const Effect& effect) { return configured_by(effect).reading; }
 
 bool is_of_coupling(const Effect& effect) {
     return !effect.adds_angle() && !is_random_rate(effect) && !told_by_other_columns(effect);
