@@ -314,14 +314,14 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
     };
     Objective::Point x = Objective::Point::Zero(size);
     ceres::GradientProblem problem(new Objective(size, values));
-    ceres::GradientProblemSolver::Options options;
-    options.logging_type = ceres::SILENT;
-    options.max_num_iterations = 60;
-    options.function_tolerance = 1e-9;
-    options.gradient_tolerance = 1e-4;
+    ceres::GradientProblemSolver::Options solver;
+    solver.logging_type = ceres::SILENT;
+    solver.max_num_iterations = 60;
+    solver.function_tolerance = 1e-9;
+    solver.gradient_tolerance = 1e-4;
     ceres::GradientProblemSolver::Summary summary;
     quiet_solver();
-    ceres::Solve(options, problem, x.data(), &summary);
+    ceres::Solve(solver, problem, x.data(), &summary);
     return with(logarithms(x));
 }
 
