@@ -48,7 +48,8 @@ class StageProgress {
     void show(const std::string& stage) {
         if (quiet_) return;
         const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start_;
-        tell(fmt::format(terminal_ ? "\r\033[K{:4.0f} s  {} ..." : "{:4.0f} s  {}\n", since.count(), stage));
+        const std::string line = fmt::format("{:4.0f} s  {}", since.count(), stage);
+        tell(terminal_ ? "\r\033[K" + line + " ..." : line + "\n");
         shown_ = true;
     }
 

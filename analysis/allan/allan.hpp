@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "analysis/allan/estimator.hpp"
-#include "analysis/allan/phase.hpp"
+#include "analysis/allan/sums/phase.hpp"
 
 /// Allan family of frequency-stability estimators.
 namespace ringlock::allan {

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/allan/degrees_of_freedom.hpp"
+#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "analysis/allan/interval.hpp"
-#include "analysis/allan/noise_identification.hpp"
+#include "analysis/allan/statistics/noise_identification.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::allan {

@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "analysis/allan/interval.hpp"
-#include "analysis/allan/power_law.hpp"
+#include "analysis/allan/statistics/power_law.hpp"
 
 namespace ringlock::allan {
 namespace {

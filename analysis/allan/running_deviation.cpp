@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "analysis/allan/exact_sum.hpp"
+#include "analysis/allan/sums/exact_sum.hpp"
 #include "analysis/allan/interval.hpp"
 #include "analysis/allan/octave_deviation.hpp"
 #include "engine/core/error.hpp"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "analysis/allan/allan.hpp"
-#include "analysis/allan/difference_sums.hpp"
+#include "analysis/allan/sums/difference_sums.hpp"
 
 namespace ringlock::allan {
 

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <tuple>
 
-#include "analysis/allan/degrees_of_freedom.hpp"
+#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "analysis/allan/interval.hpp"
 #include "analysis/allan/quadratic_form.hpp"
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "analysis/allan/allan.hpp"
-#include "analysis/allan/phase.hpp"
+#include "analysis/allan/sums/phase.hpp"
 #include "engine/core/error.hpp"
 #include "engine/store/hdf5.hpp"
 

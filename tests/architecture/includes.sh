@@ -20,11 +20,13 @@ declare -A may=(
     [engine/store]="engine/core engine/scenario"
     [engine/ensemble]="engine/core engine/simd engine/gyro engine/random engine/dither engine/effects engine/propagate
         engine/readout engine/compensate engine/scenario"
-    [analysis/allan]="engine/core engine/simd"
-    [analysis/noise]="analysis/allan engine/core engine/random"
-    [analysis/record]="analysis/allan analysis/noise engine/core engine/store"
+    [analysis/allan]="analysis/allan/sums analysis/allan/statistics engine/core engine/simd"
+    [analysis/allan/sums]="engine/core engine/simd"
+    [analysis/allan/statistics]="engine/core"
+    [analysis/noise]="analysis/allan analysis/allan/sums engine/core engine/random"
+    [analysis/record]="analysis/allan analysis/allan/sums analysis/noise engine/core engine/store"
     [analysis/instrument]="analysis/record engine/*"
-    [analysis/study]="analysis/allan analysis/noise engine/*"
+    [analysis/study]="analysis/allan analysis/allan/sums analysis/noise engine/*"
     # The closed loop has rooms of its own: its halves, turns and samples, never include each other.
     [analysis/closure]="engine/core engine/effects analysis/record"
     [analysis/closure/stats]="analysis/closure engine/core engine/simd"
@@ -67,10 +69,11 @@ complain() {
     bad=$((bad + 1))
 }
 
-# The room of a path: its folder in the closed loop, two folders deep elsewhere in engine and analysis, one in the rest.
+# The room of a path: its folder in the closed loop and in the Allan family, two folders deep elsewhere in engine and
+# analysis, one in the rest.
 room_of() {
     case "$1" in
-        analysis/closure/*)
+        analysis/closure/* | analysis/allan/*)
             room="${1%/*}"
             ;;
         engine/*/* | analysis/*/*)

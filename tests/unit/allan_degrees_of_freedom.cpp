@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "analysis/allan/degrees_of_freedom.hpp"
+#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 
 namespace {
 

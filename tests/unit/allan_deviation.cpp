@@ -7,7 +7,7 @@
 
 #include "analysis/allan/allan.hpp"
 #include "analysis/allan/interval.hpp"
-#include "analysis/allan/noise_identification.hpp"
+#include "analysis/allan/statistics/noise_identification.hpp"
 #include "engine/core/error.hpp"
 #include "tests/unit/allan_support.hpp"
 

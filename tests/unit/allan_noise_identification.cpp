@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "analysis/allan/allan.hpp"
-#include "analysis/allan/noise_identification.hpp"
+#include "analysis/allan/statistics/noise_identification.hpp"
 #include "tests/unit/allan_support.hpp"
 
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/allan/degrees_of_freedom.hpp"
+#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "analysis/allan/octave_deviation.hpp"
 #include "analysis/allan/octave_stream.hpp"
 #include "tests/unit/allan_support.hpp"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/allan/piece_sums.hpp"
+#include "analysis/allan/sums/piece_sums.hpp"
 #include "tests/support/allan_oracle.hpp"
 
 /// The sums of the modified and the Hadamard total deviation: all pieces together, against each on its own.

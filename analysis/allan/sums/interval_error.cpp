@@ -1,4 +1,4 @@
-#include "analysis/allan/interval_error.hpp"
+#include "analysis/allan/sums/interval_error.hpp"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>

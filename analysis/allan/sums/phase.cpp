@@ -1,10 +1,10 @@
-#include "analysis/allan/phase.hpp"
+#include "analysis/allan/sums/phase.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "analysis/allan/exact_sum.hpp"
+#include "analysis/allan/sums/exact_sum.hpp"
 
 namespace ringlock::allan {
 namespace {

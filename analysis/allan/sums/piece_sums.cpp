@@ -1,13 +1,13 @@
-#include "analysis/allan/piece_sums.hpp"
+#include "analysis/allan/sums/piece_sums.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "analysis/allan/piece_sums.cpp"
+#define HWY_TARGET_INCLUDE "analysis/allan/sums/piece_sums.cpp"
 #include "engine/simd/targets.hpp"
 // The above must come first.
 #include <algorithm>
 #include <vector>
 
-#include "analysis/allan/exact_sum.hpp"
+#include "analysis/allan/sums/exact_sum.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ringlock::allan::HWY_NAMESPACE {

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "analysis/allan/pieces.hpp"
+#include "analysis/allan/sums/pieces.hpp"
 
 namespace ringlock::allan {
 

@@ -1,4 +1,4 @@
-#include "analysis/allan/total_sums.hpp"
+#include "analysis/allan/sums/total_sums.hpp"
 
 #include <algorithm>
 

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "analysis/allan/phase.hpp"
+#include "analysis/allan/sums/phase.hpp"
 
 namespace ringlock::allan {
 

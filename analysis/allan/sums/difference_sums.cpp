@@ -1,7 +1,7 @@
-#include "analysis/allan/difference_sums.hpp"
+#include "analysis/allan/sums/difference_sums.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "analysis/allan/difference_sums.cpp"
+#define HWY_TARGET_INCLUDE "analysis/allan/sums/difference_sums.cpp"
 #include "engine/simd/targets.hpp"
 // The above must come first.
 #include <tbb/cache_aligned_allocator.h>

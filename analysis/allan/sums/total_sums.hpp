@@ -3,9 +3,9 @@
 #include <span>
 #include <vector>
 
-#include "analysis/allan/difference_sums.hpp"
-#include "analysis/allan/phase.hpp"
-#include "analysis/allan/pieces.hpp"
+#include "analysis/allan/sums/difference_sums.hpp"
+#include "analysis/allan/sums/phase.hpp"
+#include "analysis/allan/sums/pieces.hpp"
 
 namespace ringlock::allan {
 

@@ -1,4 +1,4 @@
-#include "analysis/allan/noise_identification.hpp"
+#include "analysis/allan/statistics/noise_identification.hpp"
 
 #include <algorithm>
 #include <cmath>

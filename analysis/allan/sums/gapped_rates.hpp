@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "analysis/allan/phase.hpp"
-#include "analysis/allan/pieces.hpp"
+#include "analysis/allan/sums/phase.hpp"
+#include "analysis/allan/sums/pieces.hpp"
 
 namespace ringlock::allan {
 

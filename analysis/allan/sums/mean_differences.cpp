@@ -1,7 +1,7 @@
-#include "analysis/allan/mean_differences.hpp"
+#include "analysis/allan/sums/mean_differences.hpp"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "analysis/allan/mean_differences.cpp"
+#define HWY_TARGET_INCLUDE "analysis/allan/sums/mean_differences.cpp"
 #include "engine/simd/targets.hpp"
 // The above must come first.
 #include <algorithm>
@@ -9,7 +9,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "analysis/allan/exact_sum.hpp"
+#include "analysis/allan/sums/exact_sum.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace ringlock::allan::HWY_NAMESPACE {

@@ -1,10 +1,10 @@
-#include "analysis/allan/degrees_of_freedom.hpp"
+#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "analysis/allan/power_law.hpp"
+#include "analysis/allan/statistics/power_law.hpp"
 
 namespace ringlock::allan {
 namespace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "analysis/allan/pieces.hpp"
+#include "analysis/allan/sums/pieces.hpp"
 
 /// Sums of squares that the estimators are made of. They do not depend on the number of threads nor on the instruction
 /// set: what is added to what is fixed by the data's positions alone.

@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <span>
 
-#include "analysis/allan/pieces.hpp"
+#include "analysis/allan/sums/pieces.hpp"
 
 namespace ringlock::allan {
 

@@ -1,4 +1,4 @@
-#include "analysis/allan/power_law.hpp"
+#include "analysis/allan/statistics/power_law.hpp"
 
 #include <cmath>
 #include <stdexcept>

@@ -1,4 +1,4 @@
-#include "analysis/allan/gapped_rates.hpp"
+#include "analysis/allan/sums/gapped_rates.hpp"
 
 #include <algorithm>
 #include <cmath>
