@@ -196,7 +196,7 @@ TEST(TurnModel, FollowsACouplingThatHops) {
     EXPECT_GT(without, 20.0 * with_it);
 }
 
-class AHop : public testing::Test {
+class LongHop : public testing::Test {
    protected:
     static Truth truth() {
         Truth truth = hopping(4000);
@@ -223,7 +223,7 @@ class AHop : public testing::Test {
     }
 };
 
-TEST_F(AHop, IsFoundAndFittedInAllThatItChanges) {
+TEST_F(LongHop, IsFoundAndFittedInAllThatItChanges) {
     const TurnFit base(model_, start(), rows_);
     const TurnModel::Prediction without = model_.predict(base.parameters());
     const auto candidate = score_test(base, without, hop);
