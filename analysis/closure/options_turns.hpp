@@ -93,6 +93,11 @@ struct TurnOptions {
         /// Passes in which the density of bounded noise is found: the lock-in is not right before the last of them.
         int passes_of_shape = 3;
 
+        /// Effort: turns to either side of a time at which the coupling changes that are tried in its place, more than
+        /// the score test's times are apart, and how often.
+        int turns_about_time = 64;
+        int most_time_rounds = 4;
+
         /// Values of one standard deviation from which a fit starts; the likeliest is taken.
         struct Grid {
             double first, end, factor;

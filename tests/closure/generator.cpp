@@ -80,7 +80,7 @@ struct Drive {
     static double direction(std::size_t turn) { return turn % 2 == 0 ? -1.0 : 1.0; }
 
     std::vector<double> turn_s;
-    std::vector<double> amplitude_rad, duration_s, rate_rad_s, b_rad_s;
+    std::vector<double> amplitude_rad, duration_s, rate_rad_s, b_rad_s, coupling_phase_rad;
     std::vector<double> line_phase_rad;  ///< where the half cycle begins
     std::vector<double> line_rad;        ///< what it adds over it
 };
@@ -154,6 +154,13 @@ Drive::Drive(const Truth& truth) {
         const SwingOfCoupling& swing = truth.lockin_swing;
         b_rad_s[j] = phase_per_arcsec * truth.lockin_threshold_deg_h * (1.0 + truth.lockin_temperature_per_k * warmer) *
                      (1.0 + swing.ratio * std::sin(two_pi * middle_s / swing.period_s));
+        const ModeHop& hop = truth.mode_hop;
+        if (hop.step_deg_h != 0.0) {
+            const double after = std::clamp(turn_s[j + 1] - hop.time_s, 0.0, turn_s[j + 1] - turn_s[j]);
+            rate_rad_s[j] += phase_per_arcsec * hop.step_deg_h * after / (turn_s[j + 1] - turn_s[j]);
+        }
+        if (middle_s >= hop.time_s) b_rad_s[j] *= 1.0 + hop.threshold_ratio;
+        coupling_phase_rad.push_back(truth.detector_phase_offset_rad + (middle_s >= hop.time_s ? hop.phase_rad : 0.0));
     }
 }
 
@@ -303,7 +310,6 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
     };
     for (std::size_t lane = 0; lane < lanes; ++lane) {
         const Truth& truth = truth_of(lane);
-        device.coupling_phase_rad[lane] = truth.detector_phase_offset_rad;
         device.second_ratio[lane] = truth.lockin_second_harmonic.ratio;
         device.second_phase_rad[lane] = truth.lockin_second_harmonic.phase_rad;
         device.third_ratio[lane] = truth.lockin_third_harmonic.ratio;
@@ -345,7 +351,16 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
             start[lane] = phases[lane < which.size() ? lane : 0].rest_rad();
     };
 
+    const auto set_coupling_phase = [&](std::size_t j) {
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            const Drive& drive = drives[lane < which.size() ? lane : 0];
+            device.coupling_phase_rad[lane] =
+                drive.coupling_phase_rad[std::min(j, drive.coupling_phase_rad.size() - 1)];
+        }
+    };
+
     fill(0, before);
+    set_coupling_phase(0);
     for (std::size_t turn = 1; turn <= longest; ++turn) {
         phases_now();
         integrate_half(device, before, Drive::direction(turn - 1), start, accuracy, delta);
@@ -379,6 +394,7 @@ void run_group(std::span<const Truth> truths, std::span<const std::size_t> which
             trajectory.b_rad_s.push_back(before.b_rad_s[lane]);
         }
         std::swap(before, after);
+        set_coupling_phase(turn);
     }
     for (std::size_t lane = 0; lane < which.size(); ++lane) {
         record::Record& record = results[which[lane]].record;

@@ -47,6 +47,14 @@ struct SwingOfCoupling {
     double ratio = 0.0;
     double period_s = 60.0;
 };
+/// From a time on, in the half cycles whose middle is later: the bias is larger by a step, the threshold 1 + ratio
+/// times as large, and the coupling acts on the phase plus another.
+struct ModeHop {
+    double step_deg_h = 0.0;
+    double threshold_ratio = 0.0;
+    double phase_rad = 0.0;
+    double time_s = 0.0;
+};
 struct ReadoutEllipse {
     double gain = 0.0;
     double offset_sin = 0.0;
@@ -104,6 +112,7 @@ struct Truth {
     double dither_third_harmonic = 0.0;  ///< of the dither rate, in phase with the first, the swing kept
     HarmonicOfCoupling lockin_third_harmonic;
     SwingOfCoupling lockin_swing;
+    ModeHop mode_hop;
     double bias_per_rate_squared_h_deg = 0.0;        ///< bias = this times the square of the input rate [1/(deg/h)]
     double bias_per_relative_amplitude_deg_h = 0.0;  ///< bias = this times the half cycle's relative amplitude change
 

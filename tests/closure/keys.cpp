@@ -60,6 +60,10 @@ constexpr Key<Truth> turn_numbers[] = {
     RINGLOCK_KEY(Truth, "lockin_third_harmonic.phase_rad", lockin_third_harmonic.phase_rad),
     RINGLOCK_KEY(Truth, "lockin_swing.ratio", lockin_swing.ratio),
     RINGLOCK_KEY(Truth, "lockin_swing.period_s", lockin_swing.period_s),
+    RINGLOCK_KEY(Truth, "mode_hop.step_deg_h", mode_hop.step_deg_h),
+    RINGLOCK_KEY(Truth, "mode_hop.threshold_ratio", mode_hop.threshold_ratio),
+    RINGLOCK_KEY(Truth, "mode_hop.phase_rad", mode_hop.phase_rad),
+    RINGLOCK_KEY(Truth, "mode_hop.time_s", mode_hop.time_s),
     RINGLOCK_KEY(Truth, "bias_per_rate_squared_h_deg", bias_per_rate_squared_h_deg),
     RINGLOCK_KEY(Truth, "bias_per_relative_amplitude_deg_h", bias_per_relative_amplitude_deg_h),
 };

@@ -24,7 +24,7 @@ double cost_of_amplitudes(double gain, int amplitudes) {
 double davies_places(double chi2, const std::vector<double>& roots) {
     double variation = 0.0;
     for (std::size_t i = 1; i < roots.size(); ++i) variation += std::abs(roots[i] - roots[i - 1]);
-    // V exp(-u/2)/sqrt(2 pi) over sqrt(2/(pi u)) exp(-u/2), the tail of one degree of freedom.
+    // V u^((s-1)/2) exp(-u/2) 2^(-s/2)/Gamma(s/2) over (u/2)^(s/2-1) exp(-u/2)/Gamma(s/2), the tail of s degrees.
     return 1.0 + 0.5 * variation * std::sqrt(std::max(chi2, 0.0));
 }
 
@@ -40,8 +40,8 @@ double places_of_frequency(double chi2, double cycles) {
     return std::max(1.0, std::sqrt(units::pi / 3.0) * cycles * std::sqrt(0.5 * std::max(chi2, 0.0)));
 }
 
-double davies_bound(double chi2, const std::vector<double>& roots) {
-    return std::min(1.0, chi2_tail(chi2, 1) * davies_places(chi2, roots));
+double davies_bound(double chi2, const std::vector<double>& roots, int freedom) {
+    return std::min(1.0, chi2_tail(chi2, freedom) * davies_places(chi2, roots));
 }
 
 }  // namespace ringlock::closure

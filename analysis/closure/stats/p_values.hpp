@@ -10,9 +10,9 @@ double chi2_tail(double x, int freedom);
 /// P(the least of `count` independent p-values <= p).
 double of_several(double p, double count);
 
-/// Davies (Biometrika 74, 1987, 33): a bound for the largest chi-squared of one degree over a nuisance, from how much
-/// its root varies over the search.
-double davies_bound(double chi2, const std::vector<double>& roots);
+/// Davies (Biometrika 74, 1987, 33): a bound for the p-value of the largest chi-squared over a nuisance parameter, from
+/// how much its root varies over the search. Of one degree of freedom the root has a sign.
+double davies_bound(double chi2, const std::vector<double>& roots, int freedom = 1);
 
 /// What of a gain of the log-likelihood goes when the amplitudes that make it are integrated out, as the course of a
 /// random process is in its own likelihood: normal about zero with their own covariance times a factor, the factor
@@ -29,7 +29,8 @@ double places_of_step(double chi2, double share_at_ends);
 /// 1279), over the probability at one place.
 double places_of_frequency(double chi2, double cycles);
 
-/// The bound over the probability of one place: how many independent ones the search is worth.
+/// That bound over the p-value at one place: the number of independent places that the search is worth, for any degrees
+/// of freedom.
 double davies_places(double chi2, const std::vector<double>& roots);
 
 }  // namespace ringlock::closure

@@ -40,7 +40,12 @@ bool fitted_in_phase(const effects::Effect& effect, effects::Role role) {
            !told_by_other_columns(effect);
 }
 
-bool has_phase(const effects::Effect& effect) { return effects::first_of(effect, effects::Role::phase) != nullptr; }
+/// Whether a phase turns the size, so that it may have either sign on its way.
+bool is_turned(const effects::Effect& effect, const effects::Parameter& size) {
+    const std::vector<Amplitude> amplitudes = amplitudes_of(effect);
+    return std::any_of(amplitudes.begin(), amplitudes.end(),
+                       [&](const Amplitude& a) { return a.value == &size && a.turned_by != nullptr; });
+}
 
 }  // namespace
 
@@ -92,6 +97,7 @@ TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows,
     fit_deterministic(options.turns.fit.passes);
     fit_noise();
     climb();
+    for (int round = 0; round < options.turns.fit.most_time_rounds && place_times(); ++round) climb();
     if (-objective(parameters_, rest_) > needed_) {
         try_other_noise();
         shape_noise();
@@ -127,6 +133,45 @@ void TurnFit::climb() {
         if (before - now < (round < of.soon ? of.gained : of.gained_late)) break;
         if (-now + of.rounds_ahead * (before - now) < needed_) break;
     }
+}
+
+/// Where the coupling changes at once, each turn by which the time is off leaves a kick in all later phases: the
+/// likelihood has a summit at nearly every turn, and steps of Gauss and Newton end on the nearest. All turns nearby are
+/// tried; tells whether another time is more likely.
+bool TurnFit::place_times() {
+    if (effects_ == Effects::held) return false;
+    bool moved = false;
+    for (ActiveEffect& active : parameters_.effects) {
+        const effects::Parameter* time = effects::first_of(*active.effect, effects::Role::time);
+        if (time == nullptr || changes_angle_only(*active.effect)) continue;
+        double& time_s = active.values.at(std::string(time->name));
+        const double from_s = time_s;
+        double best_s = from_s;
+        double best = objective_at(prediction_);
+        TurnModel::Prediction prediction = prediction_;
+        const int turns = options.turns.fit.turns_about_time;
+        for (int k = -turns; k <= turns; ++k) {
+            time_s = std::clamp(from_s + k * model_->series().interval_s, time->min, time->max);
+            try {
+                TurnModel::Prediction there = model_->predict(parameters_);
+                set_rest(there);
+                const double now = objective_at(there);
+                if (!(now < best)) continue;
+                best = now;
+                best_s = time_s;
+                prediction = std::move(there);
+            } catch (const RunError&) {
+                // no motion of a gyro with such parameters can be followed
+            }
+        }
+        time_s = best_s;
+        prediction_ = std::move(prediction);
+        set_rest(prediction_);
+        if (best_s == from_s) continue;
+        moved = true;
+        moved_ = true;
+    }
+    return moved;
 }
 
 std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& prediction) const {
@@ -176,8 +221,11 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
             double step = 1e-4 * std::max(std::abs(value), 1e-2);
             // Over the whole record it is a phase that a frequency moves.
             if (parameter.role == effects::Role::frequency) step = 1e-4 / model_->series().time_s.back();
+            const bool angle_only = changes_angle_only(*active.effect);
+            // A coupling that changes at once shows a time in the turns that this passes over.
+            if (parameter.role == effects::Role::time && !angle_only) step = 2.0 * model_->series().interval_s;
             if (value + step > parameter.max) step = -step;
-            if (active.effect->adds_angle()) {
+            if (angle_only) {
                 const auto here = model_->added_rad(prediction, *active.effect, active.values);
                 value += step;
                 auto series = model_->added_rad(prediction, *active.effect, active.values);
@@ -352,12 +400,12 @@ void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) c
     auto k = static_cast<Eigen::Index>(nuisances() + base_columns);
     for (const ActiveEffect& active : parameters_.effects) {
         const auto all = active.effect->parameters();
-        const bool has_size = effects::first_of(*active.effect, effects::Role::size) != nullptr;
         for (const effects::Parameter& parameter : all) {
             if (!fitted_in_phase(*active.effect, parameter.role)) continue;
             const double limit = parameter.role == effects::Role::time        ? part * duration_s
                                  : parameter.role == effects::Role::frequency ? part / duration_s
-                                 : parameter.role == effects::Role::phase     ? (has_size ? far : part * units::two_pi)
+                                 : is_own_phase(*active.effect, parameter)    ? part * units::two_pi
+                                 : parameter.role == effects::Role::phase     ? far
                                                                               : 0.0;
             if (limit > 0.0) bound(k, limit);
             ++k;
@@ -376,7 +424,9 @@ void TurnFit::take(const Eigen::VectorXd& step) {
     parameters_.threshold_deg_h = std::max(0.0, parameters_.threshold_deg_h + step(k++));
     if (effects_ == Effects::held) return;
     for (ActiveEffect& active : parameters_.effects) {
-        // The one that a phase turns; what is a phase and no more turns the coupling, whose size is the threshold.
+        // The size that a phase turns. A phase of the gyro's coupling turns the coupling, whose size is the threshold;
+        // one that comes in time leaves the threshold alone.
+        const bool moves_in_time = active.effect->changes().coupling_phase;
         double* size = nullptr;
         double size_from = 0.0;
         double most = 0.0;
@@ -384,6 +434,10 @@ void TurnFit::take(const Eigen::VectorXd& step) {
             if (!fitted_in_phase(*active.effect, parameter.role)) continue;
             double& value = active.values.at(std::string(parameter.name));
             const double by = step(k++);
+            if (moves_in_time && is_own_phase(*active.effect, parameter)) {
+                value = std::remainder(value + by, units::two_pi);
+                continue;
+            }
             if (parameter.role == effects::Role::phase) {
                 double& along = size != nullptr ? *size : parameters_.threshold_deg_h;
                 // Straight on in the plane of both: of what is next to nothing the phase may turn far.
@@ -398,7 +452,7 @@ void TurnFit::take(const Eigen::VectorXd& step) {
                 size_from = value;
                 most = parameter.max;
             }
-            const bool turned = parameter.role == effects::Role::size && has_phase(*active.effect);
+            const bool turned = is_turned(*active.effect, parameter);
             value = turned ? value + by : std::clamp(value + by, parameter.min, parameter.max);
         }
     }

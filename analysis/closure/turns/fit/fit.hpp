@@ -131,6 +131,7 @@ class TurnFit {
     /// Tells whether another may gain something.
     bool go_down(const Equations& equations, const Whitening* guessed);
     void climb();
+    bool place_times();
     void fit_noise();
     void try_other_noise();
     void try_wander();

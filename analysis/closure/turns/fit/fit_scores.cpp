@@ -73,7 +73,6 @@ std::vector<Estimate> TurnFit::estimates() const {
     // Times and phases by the record's clock, which need not begin with the first turn.
     const double start_s = model_->series().start_s;
     for (const ActiveEffect& active : parameters_.effects) {
-        if (!active.effect->adds_angle()) continue;
         std::optional<std::size_t> frequency;
         std::optional<std::size_t> phase;
         for (const effects::Parameter& parameter : active.effect->parameters()) {

@@ -77,6 +77,33 @@ effects::Values values_at_rest(const Effect& effect) {
     return values;
 }
 
+bool is_own_phase(const Effect& effect, const effects::Parameter& parameter) {
+    if (parameter.role != Role::phase) return false;
+    effects::Values values = values_at_rest(effect);
+    values.at(std::string(parameter.name)) = probe;
+    return effect.active(values);
+}
+
+std::vector<Amplitude> amplitudes_of(const Effect& effect) {
+    std::vector<Amplitude> all;
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        if (parameter.role == Role::size || is_own_phase(effect, parameter)) {
+            all.push_back({&parameter, nullptr});
+        } else if (parameter.role == Role::phase && !all.empty()) {
+            all.back().turned_by = &parameter;
+        }
+    }
+    return all;
+}
+
+bool changes_angle_only(const Effect& effect) {
+    const effects::Changes changes = effect.changes();
+    if (!changes.angle || changes.threshold || changes.coupling_phase) return false;
+    effects::Values values = values_at_rest(effect);
+    for (const Amplitude& amplitude : amplitudes_of(effect)) values.at(std::string(amplitude.value->name)) = probe;
+    return configured(effect, values) == gyro::Setup{};
+}
+
 bool told_by_other_columns(const Effect& effect) {
     const Configures configures = configured_by(effect);
     return configures.dither_shape || configures.reading;

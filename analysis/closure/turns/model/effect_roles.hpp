@@ -1,5 +1,6 @@
 #pragma once
 #include <string>
+#include <vector>
 
 #include "engine/effects/effect.hpp"
 
@@ -20,6 +21,21 @@ bool changes_reading(const effects::Effect& effect);
 
 /// Whether the effect changes the kicks of the lock-in and is seen in the phases alone.
 bool is_of_coupling(const effects::Effect& effect);
+
+/// Whether a parameter is a phase that does something while all sizes are zero, such as one of the coupling. Any other
+/// phase turns the size before it.
+bool is_own_phase(const effects::Effect& effect, const effects::Parameter& parameter);
+
+/// A parameter that enters in proportion, about zero.
+struct Amplitude {
+    const effects::Parameter* value;      ///< a size, or a phase of its own
+    const effects::Parameter* turned_by;  ///< phase with which the size makes two amplitudes; null where there is none
+};
+/// The amplitudes of the effect, in the order of its parameters.
+std::vector<Amplitude> amplitudes_of(const effects::Effect& effect);
+
+/// Whether the phases are proportional to the effect's sizes: it adds an angle, and changes nothing of the gyro.
+bool changes_angle_only(const effects::Effect& effect);
 
 /// The first effect of the library that changes each of these constants of the gyro, with the names of the parameters
 /// that do; null where the library has none.

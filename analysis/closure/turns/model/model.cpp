@@ -91,6 +91,12 @@ double TurnModel::temperature_change_k(std::size_t turn) const {
     return series_.temperature_change_k.empty() ? 0.0 : series_.temperature_change_k[turn];
 }
 
+effects::Interval TurnModel::exposure(std::size_t turn, double start_s, double duration_s) const {
+    const double change_k = temperature_change_k(turn);
+    const double input_deg_h = series_.input_rate_deg_h[turn];
+    return {start_s, duration_s, {change_k, change_k}, {input_deg_h, input_deg_h}};
+}
+
 std::vector<double> TurnModel::smooth(const std::vector<double>& turn_s) const {
     // A resonator keeps its time far better than a zero-rate point can be told from pulses that the lock-in moves.
     constexpr std::ptrdiff_t reach = options.turns.model.smoothing_turns;  // of one parity each
@@ -131,27 +137,80 @@ std::shared_ptr<const TurnModel::Kicks> TurnModel::kicks(gyro::Setup setup, cons
                                         [&](const Met& met) { return met.setup == setup && met.shape == shape; });
         if (found != met_.end()) return found->kicks;
     }
-    const auto shared = std::make_shared<const Kicks>(
-        kicks_at(setup, series_.input_rate_deg_h, std::vector<double>(series_.size(), 1.0), shape));
+    const std::vector<Coupling> stays(series_.size());
+    const auto shared = std::make_shared<const Kicks>(kicks_at(setup, series_.input_rate_deg_h, {stays, stays}, shape));
     const std::lock_guard lock(meeting_);
     met_.push_front({setup, shape, shared});
     if (met_.size() > kept) met_.pop_back();
     return shared;
 }
 
+bool TurnModel::Couplings::stay() const {
+    const auto plain = [](const Coupling& of) { return of == Coupling{}; };
+    return std::all_of(before.begin(), before.end(), plain) && std::all_of(after.begin(), after.end(), plain);
+}
+
+TurnModel::Couplings TurnModel::couplings(const TurnParameters& parameters) const {
+    Couplings couplings{std::vector<Coupling>(series_.size()), std::vector<Coupling>(series_.size())};
+    for (const ActiveEffect& active : parameters.effects) {
+        const effects::Changes changes = active.effect->changes();
+        if (!changes.threshold && !changes.coupling_phase) continue;
+        const effects::ChangeOver change = active.effect->change(active.values);
+        // Constant over each half cycle, as it is in its middle, but for a temperature and an input rate, which hardly
+        // change from there to the turn.
+        const double to_middle_s = 0.5 * series_.interval_s;
+        for (std::size_t i = 0; i < series_.size(); ++i) {
+            const auto add = [&](Coupling& to, double time_s) {
+                const effects::Change at = change(exposure(i, time_s, 0.0));
+                to.threshold *= at.threshold_factor;
+                if (at.coupling_phase_rad != 0.0) to.turn *= std::polar(1.0, at.coupling_phase_rad);
+            };
+            add(couplings.before[i], series_.time_s[i] - to_middle_s);
+            add(couplings.after[i], series_.time_s[i] + to_middle_s);
+        }
+    }
+    return couplings;
+}
+
 TurnModel::Kicks TurnModel::kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h,
-                                     const std::vector<double>& threshold_factors, const Shape& shape) const {
+                                     const Couplings& couplings, const Shape& shape) const {
     const auto [slowest, fastest] = std::minmax_element(rate_deg_h.begin(), rate_deg_h.end());
-    const auto [least, most] = std::minmax_element(threshold_factors.begin(), threshold_factors.end());
-    const KicksOverRange of(setup, {setup.input_rate_deg_h + *slowest, setup.input_rate_deg_h + *fastest},
-                            {*least, *most});
+    KicksOverRange::Range threshold{couplings.before.front().threshold, couplings.before.front().threshold};
+    for (const auto* side : {&couplings.before, &couplings.after}) {
+        for (const Coupling& coupling : *side) {
+            threshold.lowest = std::min(threshold.lowest, coupling.threshold);
+            threshold.highest = std::max(threshold.highest, coupling.threshold);
+        }
+    }
+    const KicksOverRange of(setup, {setup.input_rate_deg_h + *slowest, setup.input_rate_deg_h + *fastest}, threshold);
+    const auto kick_at = [&](std::size_t i, const Coupling& coupling) {
+        const TurnKicks::Weights* weights = shape ? &shape->at(i) : nullptr;
+        TurnKicks::Weights moved{};
+        std::complex<double> turned = turned_[i];
+        if (coupling.turn != 1.0) {
+            turned *= coupling.turn;
+            // The weights stand in for harmonics of the phase that was read, not of the one that the coupling sees.
+            std::complex<double> by = 1.0;
+            for (std::size_t k = 0; weights != nullptr && k < moved.size(); ++k) {
+                by *= coupling.turn;
+                moved[k] = (*weights)[k] * by;
+            }
+            if (weights != nullptr) weights = &moved;
+        }
+        return of.at(series_.direction[i], turned, setup.input_rate_deg_h + rate_deg_h[i], coupling.threshold, weights);
+    };
     Kicks kicks(series_.size());
     constexpr std::size_t worth_a_task = 2048;
     const oneapi::tbb::blocked_range<std::size_t> turns(0, kicks.size(), worth_a_task);
     oneapi::tbb::parallel_for(turns, [&](const auto& some) {
         for (std::size_t i = some.begin(); i < some.end(); ++i) {
-            kicks[i] = of.at(series_.direction[i], turned_[i], setup.input_rate_deg_h + rate_deg_h[i],
-                             threshold_factors[i], shape ? &shape->at(i) : nullptr);
+            kicks[i] = kick_at(i, couplings.after[i]);
+            if (couplings.before[i] == couplings.after[i]) continue;
+            const TurnKicks::Kick before = kick_at(i, couplings.before[i]);
+            kicks[i].before_rad = before.before_rad;
+            kicks[i].before_slope = before.before_slope;
+            kicks[i].before_curvature = before.before_curvature;
+            kicks[i].before_weighted = before.before_weighted;
         }
     });
     return kicks;
@@ -171,8 +230,8 @@ std::vector<double> TurnModel::added_rad(const Prediction& prediction, const eff
 }
 
 std::vector<double> TurnModel::dither_turns(const std::vector<double>& rate_deg_h,
-                                            const std::vector<double>& threshold_factors,
-                                            const std::vector<double>& swing, const gyro::Device& device) const {
+                                            const std::vector<Coupling>& coupling, const std::vector<double>& swing,
+                                            const gyro::Device& device) const {
     const double c = units::two_pi / series_.setup.scale_factor_arcsec;
     const double w = units::pi / series_.interval_s;
     const double peak_rad_s = series_.amplitude_rad * w;
@@ -187,8 +246,9 @@ std::vector<double> TurnModel::dither_turns(const std::vector<double>& rate_deg_
     }
     std::vector<double> turn_s(series_.size());
     for (std::size_t i = 0; i < turn_s.size(); ++i) {
-        const double sine = turned_[i].real() * coupling_turn.imag() + turned_[i].imag() * coupling_turn.real();
-        const double rate_rad_s = c * rate_deg_h[i] + threshold_factors[i] * sine;
+        const std::complex<double> psi = coupling[i].turn == 1.0 ? turned_[i] : turned_[i] * coupling[i].turn;
+        const double sine = psi.real() * coupling_turn.imag() + psi.imag() * coupling_turn.real();
+        const double rate_rad_s = c * rate_deg_h[i] + coupling[i].threshold * sine;
         const bool before = series_.direction[i] * rate_rad_s > 0.0;
         const double share = rate_rad_s / (peak_rad_s * swing[before && i > 0 ? i - 1 : i] *
                                            relative[series_.direction[i] > 0][before ? 0 : 1]);
@@ -218,11 +278,7 @@ std::vector<double> TurnModel::added_rates_deg_h(const TurnParameters& parameter
         added_deg_h.resize(turn_s.size());
         const effects::ChangeOver change = active.effect->change(active.values);
         for (std::size_t i = 0; i < turn_s.size(); ++i) {
-            const double change_k = temperature_change_k(i);
-            const double input_deg_h = series_.input_rate_deg_h[i];
-            const effects::Interval about{
-                turn_s[i] - 0.5 * moment_s, moment_s, {change_k, change_k}, {input_deg_h, input_deg_h}};
-            added_deg_h[i] += change(about).angle_arcsec / moment_s;
+            added_deg_h[i] += change(exposure(i, turn_s[i] - 0.5 * moment_s, moment_s)).angle_arcsec / moment_s;
         }
     }
     return added_deg_h;
@@ -242,26 +298,15 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     frame.readout = series_.readout;
     prediction.phase_rad.resize(n);
     const double c = device.phase_per_arcsec;
-    std::vector<double> factors(n, 1.0);
-    for (const ActiveEffect& active : parameters.effects) {
-        if (!active.effect->changes().threshold) continue;
-        const effects::ChangeOver change = active.effect->change(active.values);
-        for (std::size_t i = 0; i < n; ++i) {
-            const double change_k = temperature_change_k(i);
-            const double input_deg_h = series_.input_rate_deg_h[i];
-            const effects::Interval at{series_.time_s[i], 0.0, {change_k, change_k}, {input_deg_h, input_deg_h}};
-            factors[i] *= change(at).threshold_factor;
-        }
-    }
-    const bool one_threshold = std::all_of(factors.begin(), factors.end(), [](double factor) { return factor == 1.0; });
+    const Couplings coupling = couplings(parameters);
     std::shared_ptr<const Kicks> kick_of =
-        one_threshold ? kicks(device_setup, parameters.shape)
-                      : std::make_shared<const Kicks>(
-                            kicks_at(device_setup, series_.input_rate_deg_h, factors, parameters.shape));
+        coupling.stay() ? kicks(device_setup, parameters.shape)
+                        : std::make_shared<const Kicks>(
+                              kicks_at(device_setup, series_.input_rate_deg_h, coupling, parameters.shape));
     std::vector<double> swing = dither_swings(*kick_of, series_.input_rate_deg_h);
     std::vector<double> rate_deg_h(n);
     for (std::size_t i = 0; i < n; ++i) rate_deg_h[i] = parameters.bias_deg_h + series_.input_rate_deg_h[i];
-    prediction.turn_s = dither_turns(rate_deg_h, factors, swing, device);
+    prediction.turn_s = dither_turns(rate_deg_h, coupling.after, swing, device);
     std::vector<double> turn_s = smooth(prediction.turn_s);
     prediction.intervals = intervals(turn_s);
     if (const auto added_deg_h = added_rates_deg_h(parameters, turn_s); !added_deg_h.empty()) {
@@ -276,10 +321,10 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         const double acceleration_rad_s2 = device.half_cycle(1, series_.amplitude_rad).end_acceleration_rad_s2();
         if (c * most_deg_h > options.turns.model.rate_felt_by_kicks * std::sqrt(acceleration_rad_s2)) {
             kick_of =
-                std::make_shared<const Kicks>(kicks_at(device_setup, beside_bias_deg_h, factors, parameters.shape));
+                std::make_shared<const Kicks>(kicks_at(device_setup, beside_bias_deg_h, coupling, parameters.shape));
             swing = dither_swings(*kick_of, beside_bias_deg_h);
         }
-        prediction.turn_s = dither_turns(rate_deg_h, factors, swing, device);
+        prediction.turn_s = dither_turns(rate_deg_h, coupling.after, swing, device);
         turn_s = smooth(prediction.turn_s);
         prediction.intervals = intervals(turn_s);
     }

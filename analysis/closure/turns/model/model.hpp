@@ -79,16 +79,31 @@ class TurnModel {
     using Shape = std::shared_ptr<const NoiseShape>;
     /// Kicks at the turns of a gyro of that setup, whose rate is that and the input's.
     std::shared_ptr<const Kicks> kicks(gyro::Setup setup, const Shape& shape) const;
-    /// The same with such a rate at each turn, and the threshold by such factors.
-    Kicks kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h,
-                   const std::vector<double>& threshold_factors, const Shape& shape) const;
+    /// What effects make of the coupling in a half cycle.
+    struct Coupling {
+        double threshold = 1.0;           ///< factor of the setup's threshold
+        std::complex<double> turn = 1.0;  ///< exp(i phase) by which its phase moves
+
+        bool operator==(const Coupling&) const = default;
+    };
+    /// The half cycles before and after each turn.
+    struct Couplings {
+        std::vector<Coupling> before, after;
+
+        bool stay() const;
+    };
+    Couplings couplings(const TurnParameters& parameters) const;
+    /// Kicks with such a rate at each turn, and such a coupling.
+    Kicks kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h, const Couplings& couplings,
+                   const Shape& shape) const;
 
     double temperature_change_k(std::size_t turn) const;
+    /// What a gyro is exposed to at the turn, from a time on and for so long.
+    effects::Interval exposure(std::size_t turn, double start_s, double duration_s) const;
     /// When the dither turned, from when the phase did, at these rates: the phase stands still where the dither's own
     /// rate and they, the lock-in's among them, add up to nothing.
-    std::vector<double> dither_turns(const std::vector<double>& rate_deg_h,
-                                     const std::vector<double>& threshold_factors, const std::vector<double>& swing,
-                                     const gyro::Device& device) const;
+    std::vector<double> dither_turns(const std::vector<double>& rate_deg_h, const std::vector<Coupling>& coupling,
+                                     const std::vector<double>& swing, const gyro::Device& device) const;
     /// Half cycles that end at the turns.
     std::vector<effects::Interval> intervals(const std::vector<double>& turn_s) const;
     /// Those that effects add while the dither turns; none where no effect does.

@@ -74,7 +74,7 @@ Jumping placed(const TurnFit& fit, const TwoLevels& levels) {
     return found;
 }
 
-/// The merit of jumps, and the noise fitted anew beside them, from one that is near.
+/// The merit of jumps with the noise fitted again, which starts from parameters nearby.
 void judge(const TurnFit& fit, Jumping& jumping, const TurnParameters& near) {
     const double of_levels = options.stats.two_levels.cost_of_levels;
     const double place =
@@ -101,7 +101,7 @@ void move_jumps(const TurnFit& fit, Jumping& found) {
         }
         const Eigen::VectorXd value = fit.with_noise(found.noise)->score(columns).value;
         const double before = found.merit;
-        // Too far, where jumps are near each other.
+        // A whole step goes too far where jumps are near each other.
         for (double share = 1.0; share > of.least_share_of_move && !(found.merit > before); share *= 0.5) {
             Jumping moved{.jumps = found.jumps, .on = found.on};
             for (std::size_t k = 0; k < moved.jumps.size(); ++k) {
@@ -123,7 +123,7 @@ Jumping without_stay(const Jumping& all, std::size_t k) {
     return without;
 }
 
-/// Those that explain least under the noise as it is, first.
+/// Stays in the order of what they explain under the present noise, the least first.
 std::vector<std::size_t> stays_by_use(const TurnFit& fit, const Jumping& all) {
     const auto beside = fit.with_noise(all.noise);
     std::vector<double> left(all.jumps.size() - 1);

@@ -25,10 +25,10 @@ using effects::Values;
 
 std::string name_of(const Parameter& parameter) { return std::string(parameter.name); }
 
-/// What the effect with these values adds to the phases, over `per`.
+/// The phases that the effect adds with these values, over `per`.
 Regressor added(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect, const Values& values,
                 double per = 1.0) {
-    if (effect.adds_angle()) {
+    if (changes_angle_only(effect)) {
         std::vector<double> series = fit.model().added_rad(without, effect, values);
         for (double& value : series) value /= per;
         return series;
@@ -38,35 +38,50 @@ Regressor added(const TurnFit& fit, const TurnModel::Prediction& without, const 
     return difference(fit.model().predict(p), without, per);
 }
 
-/// Step of a size by which the phases' change is taken: small against the bounds, large against rounding.
+/// Step of a size for the derivative of the phases: small against the bounds, large against rounding.
 double step_of(const Parameter& size) { return 1e-3 * std::min(1.0, size.max); }
 
-/// Sizes, each by itself or with the phase after it as two amplitudes.
-std::optional<Candidate> sizes(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
-                               Values values) {
+/// One column for each amplitude of the effect, two where a phase turns it, all else at these values; `unit_steps`: for
+/// an effect whose phases are proportional to its sizes.
+std::vector<Regressor> columns_of(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
+                                  const std::vector<Amplitude>& amplitudes, const Values& values, bool unit_steps) {
     std::vector<Regressor> columns;
-    struct Entry {
-        const Parameter* size;
-        const Parameter* phase;
-    };
-    std::vector<Entry> entries;
-    const auto parameters = effect.parameters();
-    for (std::size_t k = 0; k < parameters.size(); ++k) {
-        if (parameters[k].role != Role::size) continue;
-        const Parameter& size = parameters[k];
-        const bool turned = k + 1 < parameters.size() && parameters[k + 1].role == Role::phase;
-        entries.push_back({&size, turned ? &parameters[k + 1] : nullptr});
-        const double step = step_of(size);
-        for (int part = 0; part < (turned ? 2 : 1); ++part) {
+    for (const Amplitude& amplitude : amplitudes) {
+        const double step = unit_steps ? 1.0 : step_of(*amplitude.value);
+        for (int part = 0; part < (amplitude.turned_by != nullptr ? 2 : 1); ++part) {
             Values at = values;
-            at.at(name_of(size)) = step;
-            if (turned) at.at(name_of(parameters[k + 1])) = part == 0 ? 0.0 : 0.5 * units::pi;
+            at.at(name_of(*amplitude.value)) = step;
+            if (amplitude.turned_by != nullptr) {
+                at.at(name_of(*amplitude.turned_by)) = part == 0 ? 0.0 : 0.5 * units::pi;
+            }
             columns.push_back(added(fit, without, effect, at, step));
         }
     }
-    if (entries.empty()) return std::nullopt;
+    return columns;
+}
+
+/// What a regression on these columns says of the amplitudes, kept within their bounds.
+void set_amplitudes(const std::vector<Amplitude>& amplitudes, const Eigen::VectorXd& found, Values& values) {
+    Eigen::Index k = 0;
+    for (const Amplitude& amplitude : amplitudes) {
+        double value = found(k++);
+        if (amplitude.turned_by != nullptr) {
+            const double other = found(k++);
+            values.at(name_of(*amplitude.turned_by)) = std::atan2(other, value);
+            value = std::hypot(value, other);
+        }
+        const Parameter& of = *amplitude.value;
+        values.at(name_of(of)) = std::clamp(value, 0.98 * of.min, 0.98 * of.max);
+    }
+}
+
+/// All amplitudes of an effect that is there all the time.
+std::optional<Candidate> sizes(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
+                               Values values) {
+    const std::vector<Amplitude> amplitudes = amplitudes_of(effect);
+    const std::vector<Regressor> columns = columns_of(fit, without, effect, amplitudes, values, false);
     for (const auto& column : columns) {
-        // Nothing of it is left beside what the model has: this record cannot tell.
+        // The effect adds nothing to what the model has: this record cannot tell.
         const double all =
             Eigen::Map<const Eigen::VectorXd>(column.series.data(), static_cast<Eigen::Index>(column.series.size()))
                 .norm();
@@ -75,22 +90,14 @@ std::optional<Candidate> sizes(const TurnFit& fit, const TurnModel::Prediction& 
     const TurnFit::Score score = fit.score(columns);
     if (score.rank < static_cast<int>(columns.size())) return std::nullopt;
     Candidate candidate{&effect, std::move(values), score.chi2, chi2_tail(score.chi2, score.rank), 1.0};
-    Eigen::Index k = 0;
-    for (const Entry& entry : entries) {
-        double size = score.value(k++);
-        if (entry.phase != nullptr) {
-            const double other = score.value(k++);
-            candidate.values.at(name_of(*entry.phase)) = std::atan2(other, size);
-            size = std::hypot(size, other);
-        }
-        candidate.values.at(name_of(*entry.size)) = std::clamp(size, 0.98 * entry.size->min, 0.98 * entry.size->max);
-    }
+    set_amplitudes(amplitudes, score.value, candidate.values);
     return candidate;
 }
 
 /// The phase of the base coupling itself.
 std::optional<Candidate> coupling_phase(const TurnFit& fit, const Effect& effect, Values values) {
-    // A quarter turn on from a coupling that can be seen, whatever the fit has found without it.
+    // The change from no coupling to one that is a quarter turn on and can be seen, whatever threshold the fit has
+    // found.
     const std::string name = name_of(effect.parameters().front());
     TurnParameters p = fit.parameters();
     const double found = p.threshold_deg_h;
@@ -106,48 +113,60 @@ std::optional<Candidate> coupling_phase(const TurnFit& fit, const Effect& effect
     return candidate;
 }
 
+/// All amplitudes of an effect that begins at a time, which is searched.
 std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
                                       Values values) {
-    const Parameter& size = *first_of(effect, Role::size);
-    const Parameter& time = *first_of(effect, Role::time);
+    const std::vector<Amplitude> amplitudes = amplitudes_of(effect);
+    if (amplitudes.empty()) return std::nullopt;
+    const std::string time = name_of(*first_of(effect, Role::time));
     const double end = fit.model().series().time_s.back();
     constexpr int places = options.turns.score_tests.times;
     constexpr int finer = options.turns.score_tests.refined_times;
-    const auto score_at = [&](double t, double& value) {
+    /// Root of the chi-squared of all amplitudes together, with the sign of a single one; zero where the record cannot
+    /// tell them apart from each other or from the model.
+    struct Place {
+        double root = 0.0;
+        Eigen::VectorXd value = {};
+        int rank = 0;
+    };
+    const auto place_at = [&](double t) {
         Values at = values;
-        at.at(name_of(size)) = 1.0;
-        at.at(name_of(time)) = t;
-        const auto score = fit.score({added(fit, without, effect, at)});
-        if (score.rank < 1) return 0.0;
-        value = score.value(0);
-        return value / std::sqrt(score.covariance(0, 0));
+        at.at(time) = t;
+        const auto columns = columns_of(fit, without, effect, amplitudes, at, changes_angle_only(effect));
+        const auto score = fit.score(columns);
+        if (score.rank < static_cast<int>(columns.size())) return Place{};
+        const double root =
+            score.rank == 1 ? score.value(0) / std::sqrt(score.covariance(0, 0)) : std::sqrt(std::max(score.chi2, 0.0));
+        return Place{root, score.value, score.rank};
     };
     double best = 0.0;
+    int freedom = 1;
     Candidate candidate{&effect, values};
     const auto consider = [&](const std::vector<double>& times) {
-        std::vector<double> roots(times.size());
-        std::vector<double> sizes(times.size());
-        oneapi::tbb::parallel_for(std::size_t{0}, times.size(),
-                                  [&](std::size_t k) { roots[k] = score_at(times[k], sizes[k]); });
+        std::vector<Place> found(times.size());
+        oneapi::tbb::parallel_for(std::size_t{0}, times.size(), [&](std::size_t k) { found[k] = place_at(times[k]); });
+        std::vector<double> roots;
         for (std::size_t k = 0; k < times.size(); ++k) {
-            if (std::abs(roots[k]) <= best) continue;
-            best = std::abs(roots[k]);
-            candidate.values.at(name_of(time)) = times[k];
-            candidate.values.at(name_of(size)) = sizes[k];
+            roots.push_back(found[k].root);
+            if (std::abs(found[k].root) <= best) continue;
+            best = std::abs(found[k].root);
+            freedom = found[k].rank;
+            candidate.values.at(time) = times[k];
+            set_amplitudes(amplitudes, found[k].value, candidate.values);
         }
         return roots;
     };
     std::vector<double> times;
     for (int k = 1; k < places; ++k) times.push_back(end * k / places);
     const std::vector<double> roots = consider(times);
-    const double centre = candidate.values.at(name_of(time));
+    const double centre = candidate.values.at(time);
     times.clear();
     for (int k = 1 - finer; k < finer; ++k) {
         if (k != 0) times.push_back(centre + end / places * k / finer);
     }
     consider(times);
     candidate.chi2 = best * best;
-    candidate.p_value = davies_bound(candidate.chi2, roots);
+    candidate.p_value = davies_bound(candidate.chi2, roots, freedom);
     candidate.searched = davies_places(candidate.chi2, roots);
     return candidate;
 }
@@ -162,7 +181,7 @@ std::array<double, 4> seen_by_beat(const TurnModel& model, double hz) {
             folded(hz + dither_hz - beat_hz)};
 }
 
-/// Of that frequency, size and phase free. None where the record cannot tell both amplitudes.
+/// A line of that frequency with size and phase free; none where the record cannot tell both amplitudes.
 std::optional<Candidate> at_frequency(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
                                       double hz) {
     const std::string size = name_of(*first_of(effect, Role::size));
@@ -192,7 +211,7 @@ struct Band {
     bool has(double hz) const { return hz >= lowest_hz && hz < highest_hz; }
 };
 
-/// Slower than three periods in the record is drift; next to half the turns' rate it is the dither's amplitude.
+/// A line with fewer periods in the record is drift, and one next to half the rate of turns is the dither's amplitude.
 Band band_of(const TurnSeries& series) {
     return {options.turns.reading.fewest_periods / (static_cast<double>(series.size()) * series.interval_s),
             0.5 / series.interval_s - series.amplitude_band_hz()};
@@ -213,7 +232,8 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
     fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
     fft.fwd(out, in);
     const double bin_hz = 1.0 / (static_cast<double>(padded) * series.interval_s);
-    // What else the model could do of a line the spectrum does not know: the highest peaks are looked at closely.
+    // The spectrum does not account for what the model's own parameters can follow of a line, so that the highest peaks
+    // are each tested.
     const TurnOptions::ScoreTests& of = options.turns.score_tests;
     std::vector<std::size_t> peaks;
     for (std::size_t k = 1; k < padded / 2; ++k) {
@@ -274,27 +294,31 @@ std::vector<double> frequencies_as_likely(const TurnFit& fit, const Effect& effe
     return found;
 }
 
+std::optional<Candidate> score_test(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect) {
+    const effects::Changes changes = effect.changes();
+    const Values rest = values_at_rest(effect);
+    if (first_of(effect, Role::frequency) != nullptr) {
+        return changes.angle ? at_some_frequency(fit, without, effect) : std::nullopt;
+    }
+    if (first_of(effect, Role::time) != nullptr) {
+        const bool shows = changes.angle || changes.threshold || changes.coupling_phase;
+        return shows ? at_some_time(fit, without, effect, rest) : std::nullopt;
+    }
+    if (first_of(effect, Role::deviation) != nullptr) return spread(fit, effect, rest);
+    if (first_of(effect, Role::size) != nullptr) return sizes(fit, without, effect, rest);
+    if (first_of(effect, Role::phase) != nullptr) return coupling_phase(fit, effect, rest);
+    return std::nullopt;
+}
+
 std::vector<Candidate> screen(const TurnFit& fit) {
     const TurnModel::Prediction without = fit.model().predict(fit.parameters());
     const auto registry = effects::registry();
     std::vector<std::optional<Candidate>> found(registry.size());
     oneapi::tbb::parallel_for(std::size_t{0}, registry.size(), [&](std::size_t k) {
         const Effect* effect = registry[k];
-        TurnParameters p = fit.parameters();
-        if (p.find(effect->name()) != nullptr || told_by_other_columns(*effect)) return;
-        const Values rest = values_at_rest(*effect);
+        if (fit.parameters().find(effect) != nullptr || told_by_other_columns(*effect)) return;
         try {
-            if (first_of(*effect, Role::frequency) != nullptr) {
-                if (effect->adds_angle()) found[k] = at_some_frequency(fit, without, *effect);
-            } else if (first_of(*effect, Role::time) != nullptr) {
-                if (effect->adds_angle()) found[k] = at_some_time(fit, without, *effect, rest);
-            } else if (first_of(*effect, Role::deviation) != nullptr) {
-                found[k] = spread(fit, *effect, rest);
-            } else if (first_of(*effect, Role::size) != nullptr) {
-                found[k] = sizes(fit, without, *effect, rest);
-            } else if (first_of(*effect, Role::phase) != nullptr) {
-                found[k] = coupling_phase(fit, *effect, rest);
-            }
+            found[k] = score_test(fit, without, *effect);
         } catch (const RunError&) {
             // no motion of a gyro with a little of it can be followed
         }

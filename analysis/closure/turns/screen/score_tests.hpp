@@ -18,6 +18,12 @@ struct Candidate {
     double merit = 0.0;  ///< of the full fit: gain of the log-likelihood, amplitudes integrated out, less its search
 };
 
+/// The score test of one effect that is not in the fit, which predicts `without`; none where the effect does not act on
+/// phases at the turns or cannot be told on this record. Throws RunError where no motion of a gyro with a little of it
+/// can be followed.
+std::optional<Candidate> score_test(const TurnFit& fit, const TurnModel::Prediction& without,
+                                    const effects::Effect& effect);
+
 /// The effects of the library that act on phases at the turns, can be told on this record and are not in the fit yet,
 /// by score tests (Rao 1948; Engle 1984, "Wald, likelihood ratio and Lagrange multiplier tests").
 std::vector<Candidate> screen(const TurnFit& fit);

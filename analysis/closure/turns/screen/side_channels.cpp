@@ -14,7 +14,7 @@ namespace {
 
 using effects::Effect;
 
-/// Chi-squared of a mean, with the doubt of its standard error in it: what a normal deviate of the same rarity has.
+/// Chi-squared of a mean whose standard error is estimated: the square of the normal deviate that is as rare as its t.
 double chi2_of(const BlockMean& mean, double expected) {
     if (!std::isfinite(mean.sd) || mean.sd == 0.0) return 0.0;
     const double t = std::abs(mean.value - expected) / mean.sd;
@@ -25,15 +25,15 @@ double chi2_of(const BlockMean& mean, double expected) {
            (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
 }
 
-/// Asymmetry r and second harmonic (sine s, cosine c of its phase times its ratio) by what the columns tell, with
-/// l = w late:
+/// Asymmetry r and second harmonic (s and c: its ratio times the sine and cosine of its phase), fitted to the columns,
+/// with l = w late:
 ///
 ///     l = (pi/2) r - s,     sides = j r - k s,     turns = c,     j = sides_by_ratio, k = sides_by_sine.
 struct ShapeFit {
     double ratio = 0.0, ratio_sd = 0.0;
     double sine = 0.0, sine_sd = 0.0;
     double cosine = 0.0, cosine_sd = 0.0;
-    double left = 0.0;  ///< chi-squared of what they do not account for
+    double left = 0.0;  ///< chi-squared of the columns about the fit
 
     ShapeFit(const DitherShape& shape, double w, bool asymmetry, bool harmonic) {
         const Eigen::Vector2d of_ratio{0.5 * units::pi, shape.sides_by_ratio};
@@ -115,7 +115,7 @@ std::optional<TurnParameters> shape_read_again(const record::Turns& turns, const
 
 RadiusFold radius_fold(const record::Turns& turns, const Rows& rows) {
     RadiusFold fold;
-    double amplitude = 0.0;  // of the cosine, in which offsets are told
+    double amplitude = 0.0;  // of the cosine; offsets are relative to it
     for (std::size_t i = 0; i < turns.size(); ++i) amplitude += std::hypot(turns.sine[i], turns.cosine[i]);
     amplitude /= static_cast<double>(turns.size());
     // Gauss and Newton: radius - 1 = gain sin^2 + offset_sin sin + offset_cos cos - orthogonality sin cos + (scale).
