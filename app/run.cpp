@@ -78,7 +78,7 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
 
     store::Provenance provenance = store::collect_provenance(command_line, threads, arguments.scenario);
     const auto start = std::chrono::steady_clock::now();
-    const study::Study plan(scenario);
+    study::Study plan(scenario);
     study::ResultWriter writer(out, plan);
     const std::int64_t gyros = ensemble::total_gyros(scenario);
     if (!arguments.quiet) {
@@ -87,17 +87,15 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
                          arguments.scenario, gyros, duration_s, scenario.arms.size(), threads,
                          static_cast<double>(study::expected_size_bytes(plan)) * 1e-6));
     }
-    std::vector<scenario::Arm> arms;
-    for (const study::ArmStatistics& arm : plan.arms) arms.push_back(arm.arm);
-    ensemble::Progress progress(gyros,
-                                {.quiet = arguments.quiet, .total_turns = ensemble::expected_turns(scenario, arms)});
+    ensemble::Progress progress(
+        gyros, {.quiet = arguments.quiet, .total_turns = ensemble::expected_turns(scenario, scenario.arms)});
     study::OnSamples on_samples;
     if (scenario.output.angle_record) {
         on_samples = [&](const study::SampledAngles& samples) { writer.write_samples(samples); };
     }
     const ensemble::Monitor monitor{interrupted,
                                     [&](std::int64_t done, std::int64_t turns) { progress.advance(done, turns); }};
-    const study::Study study = study::run(scenario, threads, on_samples, monitor);
+    const study::Study study = study::run(std::move(plan), threads, on_samples, monitor);
     progress.finish();
     check_interrupt();
 

@@ -11,10 +11,10 @@
 #include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
 #include "engine/core/version.hpp"
-#include "engine/effects/effect.hpp"
 #include "engine/ensemble/block.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/schedule.hpp"
+#include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/check.hpp"
 
@@ -29,7 +29,7 @@ constexpr std::int64_t most_rows = 200'000'000;
 /// The scenario with the one arm that is recorded, its rules checked.
 Scenario with_trajectory(Scenario scenario) {
     const bool noisy = scenario.record.trajectory == scenario::RecordTrajectory::noise_injected;
-    scenario.arms = {noisy ? "noise_injected" : "uncompensated"};
+    scenario.arms = scenario::parse_arms({noisy ? "noise_injected" : "uncompensated"});
     const auto complaints = scenario::check(scenario);
     if (!complaints.empty()) {
         throw InputError(
@@ -131,19 +131,22 @@ class Sampler {
     double last_ = 0.0;                  // angle at the boundary before
 };
 
-using Stages = std::vector<std::unique_ptr<effects::SampleStage>>;
+/// What an effect does to the samples.
+struct Stage {
+    const effects::Effect* effect;
+    std::unique_ptr<effects::SampleStage> does;
+};
+using Stages = std::vector<Stage>;
 
 /// What effects do to the samples, in the order in which it happens.
 Stages sample_stages(const Scenario& s, std::int64_t gyro) {
     Stages stages;
     const random::Identity who{s.ensemble.seed, static_cast<std::uint64_t>(gyro)};
-    for (const auto& [name, values] : s.effects) {
-        const effects::Effect* effect = effects::find(name);
-        if (!effect->active(values)) continue;
-        if (auto stage = effect->sample_stage(values, who)) stages.push_back(std::move(stage));
+    for (const auto& [effect, values] : scenario::active_effects(s)) {
+        if (auto stage = effect->sample_stage(*values, who)) stages.push_back({effect, std::move(stage)});
     }
     std::stable_sort(stages.begin(), stages.end(),
-                     [](const auto& a, const auto& b) { return a->place() < b->place(); });
+                     [](const Stage& a, const Stage& b) { return a.does->place() < b.does->place(); });
     return stages;
 }
 
@@ -154,7 +157,7 @@ void apply(const Stages& stages, double record_hz, double start_s, std::size_t w
     sampled.record_hz = record_hz;
     sampled.start_s = start_s;
     sampled.increment_arcsec = std::move(samples.values);
-    for (const auto& stage : stages) stage->apply(sampled);
+    for (const Stage& stage : stages) stage.does->apply(sampled);
     samples.rate_hz = record_hz;
     samples.t0_s = start_s + 1.0 / record_hz;
     samples.values = std::move(sampled.increment_arcsec);
@@ -203,8 +206,7 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
         throw InputError(fmt::format("key \"record.rate_hz\" = {:g}: a record of {:g} s holds no sample",
                                      s.record.rate_hz, s.ensemble.duration_s));
     }
-    const std::vector<scenario::Arm> arms = {scenario::parse_arm(s.arms.front())};
-    ensemble::GyroBlock block(s, arms, gyro, 1, ensemble::Detail::hardware);
+    ensemble::GyroBlock block(s, s.arms, gyro, 1, ensemble::Detail::hardware);
     const ensemble::Schedule schedule(s);
 
     std::int64_t turn = 0;
@@ -221,7 +223,7 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
     advance(settle_turns, [](std::int64_t, std::size_t) {});
 
     record::Record out;
-    out.title = fmt::format("gyro {} of seed {}, {}", gyro, s.ensemble.seed, s.arms.front());
+    out.title = fmt::format("gyro {} of seed {}, {}", gyro, s.ensemble.seed, s.arms.front().name);
     out.instrument = "simulated ring laser gyro";
     out.source = fmt::format("ringlock {} record", version());
     const double start_s = block.turn_time_s(settle_turns, 0);
@@ -231,12 +233,19 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
     if (samples) {
         const Stages stages = sample_stages(s, gyro);
         double source_hz = s.record.rate_hz;
-        for (const auto& stage : stages) source_hz = stage->source_hz(source_hz);
+        std::string key = "record.rate_hz";
+        for (const Stage& stage : stages) {
+            const double needed_hz = stage.does->source_hz(source_hz);
+            if (needed_hz != source_hz) {
+                const effects::Parameter* rate = effects::first_of(*stage.effect, effects::Role::sampled);
+                key = fmt::format("effects.{}.{}", stage.effect->name(), rate->name);
+            }
+            source_hz = needed_hz;
+        }
         const double source_rows = std::ceil(s.ensemble.duration_s * source_hz - 1e-9) + (stages.empty() ? 0.0 : 1.0);
         if (!(source_rows <= static_cast<double>(most_rows))) {
-            throw InputError(
-                fmt::format("key \"effects.resampling.from_hz\" = {:g}: {:.3g} samples; at most {} are allowed",
-                            source_hz, source_rows, most_rows));
+            throw InputError(fmt::format("key \"{}\" = {:g}: {:.3g} samples; at most {} are allowed", key, source_hz,
+                                         source_rows, most_rows));
         }
         Sampler sampler(source_hz, start_s);
         const auto wanted = static_cast<std::size_t>(std::floor(rows + 1e-9));

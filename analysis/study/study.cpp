@@ -20,9 +20,7 @@ Study::Study(const scenario::Scenario& what)
       factors(allan::octave_factors(allan::largest_factor(allan::Estimator::oadev, schedule.cycles()))) {
     const auto total = static_cast<std::size_t>(ensemble::total_gyros(scenario));
     gyros.resize(total);
-    for (const std::string& name : scenario.arms) {
-        arms.push_back({scenario::parse_arm(name), std::vector<GyroStatistics>(total)});
-    }
+    for (const scenario::Arm& arm : scenario.arms) arms.push_back({arm, std::vector<GyroStatistics>(total)});
 }
 
 bool has_closed_form(const scenario::Scenario& scenario, const scenario::Arm& arm) {
@@ -171,16 +169,13 @@ class BlockStatistics final : public ensemble::BlockSink {
 
 }  // namespace
 
-Study run(const scenario::Scenario& scenario, int threads, const OnSamples& on_samples,
-          const ensemble::Monitor& monitor) {
-    Study study(scenario);
-    std::vector<scenario::Arm> arms;
-    for (const ArmStatistics& arm : study.arms) arms.push_back(arm.arm);
+Study run(Study study, int threads, const OnSamples& on_samples, const ensemble::Monitor& monitor) {
+    const scenario::Scenario& scenario = study.scenario;
     std::mutex mutex;
     const auto make_sink = [&](std::int64_t first_gyro, std::size_t gyros) {
         return std::make_unique<BlockStatistics>(study, mutex, first_gyro, gyros, on_samples);
     };
-    ensemble::run(scenario, arms, 0, ensemble::total_gyros(scenario), threads, make_sink, monitor);
+    ensemble::run(scenario, scenario.arms, 0, ensemble::total_gyros(scenario), threads, make_sink, monitor);
     return study;
 }
 

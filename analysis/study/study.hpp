@@ -61,11 +61,10 @@ struct SampledAngles {
 };
 using OnSamples = std::function<void(const SampledAngles& samples)>;
 
-/// Runs the whole study. Statistics are taken while it runs: Allan deviations from every cycle of the dither, noise
-/// coefficients from at most `fit_samples` of the samples; nothing grows with the simulated time but the number of
-/// octaves. Throws RunError, Interrupted.
-Study run(const scenario::Scenario& scenario, int threads, const OnSamples& on_samples = nullptr,
-          const ensemble::Monitor& monitor = {});
+/// Runs a study that is planned only, and returns it with its results. Statistics are taken while it runs: Allan
+/// deviations from every cycle of the dither, noise coefficients from at most `fit_samples` of the samples; nothing
+/// grows with the simulated time but the number of octaves. Throws RunError, Interrupted.
+Study run(Study study, int threads, const OnSamples& on_samples = nullptr, const ensemble::Monitor& monitor = {});
 
 /// Most samples of a gyro that noise coefficients are fitted to: N is known to 1 % from as many.
 inline constexpr std::int64_t fit_samples = 8192;

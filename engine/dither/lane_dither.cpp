@@ -19,8 +19,9 @@ using V = hn::Vec<D>;
 
 /// `deviates`: of the turns after each turn of the piece; null: no noise.
 void fill(const LaneDither::Constants& constants, double noise_rms_rad, const simd::Lanes* deviates,
-          std::span<const simd::Lanes> angle_arcsec, std::span<const simd::Lanes> threshold_factor, std::size_t lanes,
-          LaneDither::State& state, gyro::LaneDrive& drive) {
+          std::span<const simd::Lanes> angle_arcsec, std::span<const simd::Lanes> threshold_factor,
+          std::span<const simd::Lanes> coupling_phase_rad, std::size_t lanes, LaneDither::State& state,
+          gyro::LaneDrive& drive) {
     const D d;
     const V rms = hn::Set(d, noise_rms_rad);
     const V per_rad = hn::Set(d, 0.15915494309189535);
@@ -73,6 +74,14 @@ void fill(const LaneDither::Constants& constants, double noise_rms_rad, const si
         store(swing, state.amplitude_rad);
         store(rate, state.rate_rad_s);
         store(b, state.b_rad_s);
+        if (!drive.phases_vary) continue;
+        V phase = load(state.coupling_phase_fringes);
+        store(phase, drive.coupling_phase_fringes[0]);
+        for (std::size_t i = 0; i < drive.turns; ++i) {
+            phase = sm::fma(d, load(coupling_phase_rad[i]), per_rad, load(constants.coupling_phase_fringes));
+            store(phase, drive.coupling_phase_fringes[i + 1]);
+        }
+        store(phase, state.coupling_phase_fringes);
     }
 }
 
@@ -93,6 +102,7 @@ LaneDither::LaneDither(std::span<const gyro::Device> devices, double noise_rms_r
         constants_.amplitude_rad[lane] = device.dither_amplitude_rad;
         constants_.input_rate_rad_s[lane] = device.input_rate_rad_s;
         constants_.b_rad_s[lane] = device.coupling.b_rad_s;
+        constants_.coupling_phase_fringes[lane] = device.coupling.phase_rad / units::two_pi;
         constants_.fringes_per_arcsec[lane] = device.phase_per_arcsec / units::two_pi;
         const double start = device.initial_phase_rad / units::two_pi;
         const double peak = 2.0 * device.dither_amplitude_rad / units::two_pi;
@@ -115,10 +125,13 @@ LaneDither::LaneDither(std::span<const gyro::Device> devices, double noise_rms_r
     }
     state_.rate_rad_s = constants_.input_rate_rad_s;
     state_.b_rad_s = constants_.b_rad_s;
+    state_.coupling_phase_fringes = constants_.coupling_phase_fringes;
 }
 
 void LaneDither::next(std::size_t turns, std::span<const simd::Lanes> extra_angle_arcsec,
-                      std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive) {
+                      std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive,
+                      std::span<const simd::Lanes> coupling_phase_rad) {
+    drive.phases_vary = !coupling_phase_rad.empty();
     drive.resize(turns);
     drive.first_turn = turn_;
     const bool vary = !extra_angle_arcsec.empty() || !threshold_factor.empty();
@@ -138,7 +151,7 @@ void LaneDither::next(std::size_t turns, std::span<const simd::Lanes> extra_angl
     const bool moved = noise_rms_rad_ > 0.0 || wander_.active();
     HWY_DYNAMIC_DISPATCH(fill)
     (constants_, wander_.active() ? 1.0 : noise_rms_rad_, moved ? deviates_.data() : nullptr, extra_angle_arcsec,
-     threshold_factor, lanes_, state_, drive);
+     threshold_factor, coupling_phase_rad, lanes_, state_, drive);
     drive.constants_filled = !vary;
     turn_ += static_cast<std::int64_t>(turns);
 }

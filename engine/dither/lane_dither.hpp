@@ -32,9 +32,11 @@ class LaneDither {
 
     /// Fills in the next `turns` turns. `extra_angle_arcsec`: what varying rates add over the half cycle that begins at
     /// each of them, [turn][gyro], or none; the half cycle's mean rate grows by it. `threshold_factor`: b of these half
-    /// cycles over the device's, or none.
+    /// cycles over the device's, or none. `coupling_phase_rad`: by which the coupling moves over them from the device's
+    /// phase, or none.
     void next(std::size_t turns, std::span<const simd::Lanes> extra_angle_arcsec,
-              std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive);
+              std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive,
+              std::span<const simd::Lanes> coupling_phase_rad = {});
 
     /// Rms of half cycles' amplitudes about the device's with noise of this rms: half the difference of two turns'.
     static double amplitude_rms_rad(double noise_rms_rad);
@@ -43,7 +45,7 @@ class LaneDither {
 
     /// What the kernel needs, one value for each gyro; index 0 of a pair: half cycles of positive sign.
     struct Constants {
-        simd::Lanes amplitude_rad, input_rate_rad_s, b_rad_s;
+        simd::Lanes amplitude_rad, input_rate_rad_s, b_rad_s, coupling_phase_fringes;
         simd::Lanes start_fringes[2];  ///< phase at minima and maxima without noise and rotation
         simd::Lanes turn_fringes[2];   ///< rotation of the input over a half cycle, less ...
         simd::Lanes turn_whole[2];     ///< ... these whole fringes
@@ -53,8 +55,9 @@ class LaneDither {
     };
     struct State {
         simd::Lanes rotation_fringes, rotation_whole;
-        simd::Lanes noise_rad;                           ///< at the next turn
-        simd::Lanes amplitude_rad, rate_rad_s, b_rad_s;  ///< of the half cycle that ends there
+        simd::Lanes noise_rad;  ///< at the next turn
+        // Of the half cycle that ends there:
+        simd::Lanes amplitude_rad, rate_rad_s, b_rad_s, coupling_phase_fringes;
     };
 
    private:

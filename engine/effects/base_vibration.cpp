@@ -22,17 +22,20 @@ class BaseVibration final : public Effect {
     }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("rate_deg_h") != 0.0; }
-    bool adds_angle() const override { return true; }
+    Changes changes() const override { return {.angle = true}; }
     /// A difference of cosines would lose digits late in a long run; the product over the middle of the interval does
     /// not.
-    AddedAngle added_angle(const Values& values) const override {
+    ChangeOver change(const Values& values) const override {
         return [frequency_hz = values.at("frequency_hz"), rate_deg_h = values.at("rate_deg_h"),
                 phase_rad = values.at("phase_rad")](const Interval& at) {
             const double turns = frequency_hz * (at.start_s + 0.5 * at.duration_s);
             const double half_angle = units::pi * frequency_hz * at.duration_s;
-            return rate_deg_h / (units::pi * frequency_hz) * std::sin(half_angle) *
-                   std::sin(units::two_pi * (turns - std::floor(turns)) + phase_rad);
+            return Change{.angle_arcsec = rate_deg_h / (units::pi * frequency_hz) * std::sin(half_angle) *
+                                          std::sin(units::two_pi * (turns - std::floor(turns)) + phase_rad)};
         };
+    }
+    Bounds bounds(const Values& values, const Exposure& /*exposure*/) const override {
+        return {.rate_deg_h = std::abs(values.at("rate_deg_h"))};
     }
 };
 

@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 
 #include "engine/effects/effect.hpp"
 
@@ -19,11 +20,14 @@ class BiasRamp final : public Effect {
     Follows follows() const override { return Follows::time; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("deg_h_per_h") != 0.0; }
-    bool adds_angle() const override { return true; }
-    AddedAngle added_angle(const Values& values) const override {
+    Changes changes() const override { return {.angle = true}; }
+    ChangeOver change(const Values& values) const override {
         return [slope_arcsec_s2 = values.at("deg_h_per_h") / 3600.0](const Interval& at) {
-            return slope_arcsec_s2 * (at.start_s + 0.5 * at.duration_s) * at.duration_s;
+            return Change{.angle_arcsec = slope_arcsec_s2 * (at.start_s + 0.5 * at.duration_s) * at.duration_s};
         };
+    }
+    Bounds bounds(const Values& values, const Exposure& exposure) const override {
+        return {.rate_deg_h = std::abs(values.at("deg_h_per_h")) * exposure.duration_h};
     }
 };
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "engine/effects/effect.hpp"
 
@@ -19,11 +20,15 @@ class BiasStep final : public Effect {
     Follows follows() const override { return Follows::time; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("step_deg_h") != 0.0; }
-    bool adds_angle() const override { return true; }
-    AddedAngle added_angle(const Values& values) const override {
+    Changes changes() const override { return {.angle = true}; }
+    ChangeOver change(const Values& values) const override {
         return [step_deg_h = values.at("step_deg_h"), time_s = values.at("time_s")](const Interval& at) {
-            return step_deg_h * std::clamp(at.start_s + at.duration_s - time_s, 0.0, at.duration_s);
+            return Change{.angle_arcsec =
+                              step_deg_h * std::clamp(at.start_s + at.duration_s - time_s, 0.0, at.duration_s)};
         };
+    }
+    Bounds bounds(const Values& values, const Exposure& /*exposure*/) const override {
+        return {.rate_deg_h = std::abs(values.at("step_deg_h"))};
     }
 };
 

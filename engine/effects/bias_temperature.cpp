@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 
 #include "engine/effects/effect.hpp"
 
@@ -22,12 +23,15 @@ class BiasTemperature final : public Effect {
     Follows follows() const override { return Follows::temperature; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("deg_h_per_k") != 0.0; }
-    bool adds_angle() const override { return true; }
-    AddedAngle added_angle(const Values& values) const override {
+    Changes changes() const override { return {.angle = true}; }
+    ChangeOver change(const Values& values) const override {
         return [deg_h_per_k = values.at("deg_h_per_k")](const Interval& at) {
             const double mean_change_k = 0.5 * (at.temperature_change_k[0] + at.temperature_change_k[1]);
-            return deg_h_per_k * mean_change_k * at.duration_s;
+            return Change{.angle_arcsec = deg_h_per_k * mean_change_k * at.duration_s};
         };
+    }
+    Bounds bounds(const Values& values, const Exposure& exposure) const override {
+        return {.rate_deg_h = std::abs(values.at("deg_h_per_k")) * exposure.temperature_change_k};
     }
 };
 

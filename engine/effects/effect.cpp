@@ -39,6 +39,12 @@ double angle_variance_arcsec2(const RateNoise& noise, double duration_s) {
     return variance;
 }
 
+double rate_sd_deg_h(const RateNoise& noise, double average_s, double duration_h) {
+    double variance = noise.white_deg2_h2_s / average_s + noise.walk_deg2_h2_per_s * duration_h * 3600.0;
+    for (const GaussMarkov& term : noise.terms) variance += term.variance_deg2_h2;
+    return std::sqrt(variance);
+}
+
 std::unique_ptr<LaneRateProcess> Effect::lane_rate_process(const Values& values, const random::LaneIdentities& who,
                                                            std::size_t lanes) const {
     std::vector<std::unique_ptr<RateProcess>> processes;

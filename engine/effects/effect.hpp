@@ -50,8 +50,25 @@ struct Interval {
     double input_rate_deg_h[2] = {0.0, 0.0};      ///< of the case, the dither apart
 };
 
-/// Rotation [arcsec] over an interval.
-using AddedAngle = std::function<double(const Interval&)>;
+/// What an effect does to a gyro over an interval, chance apart. Angles of intervals that follow each other add up.
+/// Threshold and phase of the coupling are those in the middle of the interval. The engine keeps both constant over
+/// each half cycle of the dither and asks for them at the instant in its middle: an interval without duration, both
+/// ends of which are alike.
+struct Change {
+    double angle_arcsec = 0.0;        ///< rotation that the output gains
+    double threshold_factor = 1.0;    ///< of the lock-in threshold
+    double coupling_phase_rad = 0.0;  ///< by which the whole coupling moves: F(psi) becomes F(psi + phase)
+};
+
+/// The change over an interval: a pure function of it.
+using ChangeOver = std::function<Change(const Interval&)>;
+
+/// What of Change an effect can set; the rest stays as it is by default.
+struct Changes {
+    bool angle = false;
+    bool threshold = false;
+    bool coupling_phase = false;
+};
 
 /// A stationary random rate of exponential autocorrelation, variance exp(-|t|/time).
 struct GaussMarkov {
@@ -72,6 +89,25 @@ struct RateNoise {
 
 /// Variance of the angle [arcsec^2] that the rate adds in the first `duration_s` after the start.
 double angle_variance_arcsec2(const RateNoise& noise, double duration_s);
+
+/// Standard deviation [deg/h] of the rate's mean over `average_s` at the end of a run of `duration_h`, or a little
+/// more: for rates that remember longer than that mean lasts, the standard deviation of the rate itself is taken.
+double rate_sd_deg_h(const RateNoise& noise, double average_s, double duration_h);
+
+/// The most that a gyro is exposed to over a run.
+struct Exposure {
+    double duration_h = 0.0;
+    double temperature_change_k = 0.0;       ///< largest magnitude of the temperature less that at the start
+    double temperature_slope_k_per_h = 0.0;  ///< largest magnitude
+    double input_rate_deg_h = 0.0;           ///< largest magnitude, the dither apart
+};
+
+/// How far an effect can take a gyro, chance apart: magnitudes that Change does not exceed at any time of a run.
+struct Bounds {
+    double rate_deg_h = 0.0;          ///< of the angle over the duration
+    double threshold_relative = 0.0;  ///< of the threshold's factor less one
+    double coupling_phase_rad = 0.0;
+};
 
 /// A random rate, given as the angle it adds.
 class RateProcess {
@@ -146,14 +182,15 @@ class Effect {
     virtual bool active(const Values& values) const = 0;
     /// Changes constants of the gyro. The default does nothing.
     virtual void configure(const Values& /*values*/, gyro::Setup& /*setup*/) const {}
-    /// What the lock-in threshold is multiplied by when the temperature has changed by so much since the start.
-    virtual double threshold_factor(const Values& /*values*/, double /*temperature_change_k*/) const { return 1.0; }
-    /// True where added_angle() is not always zero.
-    virtual bool adds_angle() const { return false; }
-    /// Rotation that the effect adds to the output, chance apart; angles of intervals that follow each other add up.
-    virtual AddedAngle added_angle(const Values& /*values*/) const {
-        return [](const Interval&) { return 0.0; };
+    /// What change() sets.
+    virtual Changes changes() const { return {}; }
+    bool adds_angle() const { return changes().angle; }
+    /// What the effect does in time, chance apart.
+    virtual ChangeOver change(const Values& /*values*/) const {
+        return [](const Interval&) { return Change{}; };
     }
+    /// How far change() can go under that exposure.
+    virtual Bounds bounds(const Values& /*values*/, const Exposure& /*exposure*/) const { return {}; }
     /// The random rate that rate_process() draws from.
     virtual RateNoise rate_noise(const Values& /*values*/) const { return {}; }
     /// A random rate for one gyro, or null where the effect has none.

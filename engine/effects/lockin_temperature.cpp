@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 
 #include "engine/effects/effect.hpp"
 
@@ -23,8 +24,15 @@ class LockinTemperature final : public Effect {
     Follows follows() const override { return Follows::temperature; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("relative_per_k") != 0.0; }
-    double threshold_factor(const Values& values, double temperature_change_k) const override {
-        return 1.0 + values.at("relative_per_k") * temperature_change_k;
+    Changes changes() const override { return {.threshold = true}; }
+    ChangeOver change(const Values& values) const override {
+        return [relative_per_k = values.at("relative_per_k")](const Interval& at) {
+            const double mean_change_k = 0.5 * (at.temperature_change_k[0] + at.temperature_change_k[1]);
+            return Change{.threshold_factor = 1.0 + relative_per_k * mean_change_k};
+        };
+    }
+    Bounds bounds(const Values& values, const Exposure& exposure) const override {
+        return {.threshold_relative = std::abs(values.at("relative_per_k")) * exposure.temperature_change_k};
     }
 };
 

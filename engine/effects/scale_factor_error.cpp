@@ -1,4 +1,5 @@
 #include <array>
+#include <cmath>
 
 #include "engine/effects/effect.hpp"
 
@@ -24,12 +25,15 @@ class ScaleFactorError final : public Effect {
     Follows follows() const override { return Follows::input_rate; }
     std::span<const Parameter> parameters() const override { return parameters_of; }
     bool active(const Values& values) const override { return values.at("relative") != 0.0; }
-    bool adds_angle() const override { return true; }
-    AddedAngle added_angle(const Values& values) const override {
+    Changes changes() const override { return {.angle = true}; }
+    ChangeOver change(const Values& values) const override {
         return [relative = values.at("relative")](const Interval& at) {
             const double mean_rate_arcsec_s = 0.5 * (at.input_rate_deg_h[0] + at.input_rate_deg_h[1]);
-            return relative * mean_rate_arcsec_s * at.duration_s;
+            return Change{.angle_arcsec = relative * mean_rate_arcsec_s * at.duration_s};
         };
+    }
+    Bounds bounds(const Values& values, const Exposure& exposure) const override {
+        return {.rate_deg_h = std::abs(values.at("relative")) * exposure.input_rate_deg_h};
     }
 };
 

@@ -14,10 +14,10 @@
 #include "engine/compensate/two_train.hpp"
 #include "engine/dither/lane_dither.hpp"
 #include "engine/effects/effect.hpp"
-#include "engine/ensemble/added_angles.hpp"
+#include "engine/ensemble/changes.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/output_counts.hpp"
-#include "engine/ensemble/told.hpp"
+#include "engine/ensemble/calibration.hpp"
 #include "engine/ensemble/trajectory_kind.hpp"
 #include "engine/propagate/lane_propagator.hpp"
 #include "engine/readout/ellipse_correction.hpp"
@@ -126,7 +126,7 @@ class Branch {
    public:
     Branch(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms,
            const std::vector<gyro::Setup>& setups, const random::LaneIdentities& who, TrajectoryKind kind,
-           Detail detail)
+           bool phases_vary, Detail detail)
         : kind_(kind),
           devices_(make_devices(setups, kind)),
           dither_(devices_, injected_rms_rad(scenario, kind), who, wander_of(scenario)),
@@ -146,23 +146,24 @@ class Branch {
         readout_.emplace(devices_, ellipses_of(setups), electronics,
                          instrument || samples_wanted_ ? readout::Wanted::pulses
                          : compensated_ || detailed_   ? readout::Wanted::accelerations
-                                                       : readout::Wanted::phase);
+                                                       : readout::Wanted::phase,
+                         phases_vary);
         if (detailed_) readout_->keep_times();
         interpolated_ = electronics.interpolate;
         if (scenario.readout.ellipse_correction) ellipse_.emplace(devices_.size());
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
-            std::vector<gyro::Device> told = devices_;
-            for (gyro::Device& device : told) device.coupling.b_rad_s = told_b_rad_s(scenario, device);
-            recovery_.emplace(told, electronics, amplitude_rms_rad(scenario, devices_, kind));
+            std::vector<gyro::Device> calibrated = devices_;
+            for (gyro::Device& device : calibrated) device.coupling.b_rad_s = calibrated_b_rad_s(scenario, device);
+            recovery_.emplace(calibrated, electronics, amplitude_rms_rad(scenario, devices_, kind));
         }
     }
 
     bool empty() const { return listeners_.empty(); }
     bool every_turn() const { return every_turn_; }
 
-    void advance(std::size_t turns, std::span<const simd::Lanes> angle_arcsec,
-                 std::span<const simd::Lanes> threshold_factor, const readout::ElectronicNoise& noise) {
-        dither_.next(turns, angle_arcsec, threshold_factor, drive_);
+    void advance(std::size_t turns, std::span<const simd::Lanes> angle_arcsec, const CouplingChanges& coupling,
+                 const readout::ElectronicNoise& noise) {
+        dither_.next(turns, angle_arcsec, coupling.threshold_factors(), drive_, coupling.phases_rad());
         propagator_->step(drive_, turns_);
         readout_->read(drive_, turns_, noise, every_turn_ ? 1 : 2, readings_, angles_);
         if (detailed_) hardware_ = readings_;
@@ -253,10 +254,13 @@ random::LaneIdentities identities(const scenario::Scenario& scenario, std::int64
 struct GyroBlock::State {
     State(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
           std::vector<gyro::Setup> drawn, Detail detail)
-        : setups(std::move(drawn)), who(identities(scenario, first_gyro, setups.size())), missed_counts(setups, who) {
+        : setups(std::move(drawn)),
+          who(identities(scenario, first_gyro, setups.size())),
+          missed_counts(setups, who),
+          coupling(scenario, setups) {
         for (const TrajectoryKind kind :
              {TrajectoryKind::ideal, TrajectoryKind::plain, TrajectoryKind::noise_injected}) {
-            Branch branch(scenario, arms, setups, who, kind, detail);
+            Branch branch(scenario, arms, setups, who, kind, coupling.phases_vary(), detail);
             if (branch.empty()) continue;
             every_turn = every_turn || branch.every_turn();
             branches.push_back(std::move(branch));
@@ -265,18 +269,9 @@ struct GyroBlock::State {
             scenario.readout.model != scenario::ReadoutModel::ideal && scenario.readout.detector_noise_relative > 0.0;
         noisy_comparators = scenario.readout.model == scenario::ReadoutModel::instrument &&
                             scenario.readout.comparator_noise_relative > 0.0;
-        environment = scenario.environment;
-        const bool follows_temperature = scenario::temperature_varies(environment);
-        for (const effects::Effect* effect : effects::registry()) {
-            const auto values = scenario.effects.find(std::string(effect->name()));
-            if (values == scenario.effects.end() || !effect->active(values->second)) continue;
-            if (follows_temperature && effect->threshold_factor(values->second, 1.0) != 1.0) {
-                threshold_effects.emplace_back(effect, values->second);
-            }
-            if (effect->adds_angle()) {
-                processes.push_back(added_angles(*effect, values->second, scenario, setups));
-            }
-            if (auto process = effect->lane_rate_process(values->second, who, setups.size())) {
+        for (const scenario::ActiveEffect& active : scenario::active_effects(scenario)) {
+            if (active.effect->adds_angle()) processes.push_back(added_angles(active, scenario, setups));
+            if (auto process = active.effect->lane_rate_process(*active.values, who, setups.size())) {
                 processes.push_back(std::move(process));
             }
         }
@@ -315,26 +310,6 @@ struct GyroBlock::State {
         return angle_arcsec;
     }
 
-    /// What the threshold is multiplied by over the half cycles that begin in the piece; none where it stays.
-    std::span<const simd::Lanes> threshold_factors(std::size_t turns) {
-        if (threshold_effects.empty()) return {};
-        factors.resize(turns);
-        for (std::size_t i = 0; i < turns; ++i) {
-            const std::int64_t number = turn + static_cast<std::int64_t>(i);
-            for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
-                const double period_s = duration_s[0][lane] + duration_s[1][lane];
-                const double middle_s = (0.5 * static_cast<double>(number) + 0.25) * period_s;
-                const double change_k = scenario::temperature_change_k(environment, middle_s);
-                double factor = 1.0;
-                for (const auto& [effect, values] : threshold_effects) {
-                    factor *= effect->threshold_factor(values, change_k);
-                }
-                factors[i][lane] = factor;
-            }
-        }
-        return factors;
-    }
-
     readout::ElectronicNoise electronic_noise(std::size_t turns) {
         readout::ElectronicNoise noise;
         if (noisy_detectors) {
@@ -362,12 +337,10 @@ struct GyroBlock::State {
     std::vector<gyro::Setup> setups;
     random::LaneIdentities who;
     readout::MissedCounts missed_counts;
+    CouplingChanges coupling;
     std::span<const simd::Lanes> count_errors;
     std::vector<Branch> branches;
     std::vector<std::unique_ptr<effects::LaneRateProcess>> processes;
-    scenario::Environment environment;
-    std::vector<std::pair<const effects::Effect*, effects::Values>> threshold_effects;
-    std::vector<simd::Lanes> factors;
     bool every_turn = false;  // some compensator wants the maxima, too
     bool noisy_detectors = false;
     bool noisy_comparators = false;
@@ -405,9 +378,9 @@ GyroBlock::~GyroBlock() = default;
 void GyroBlock::advance(std::size_t turns) {
     State& s = *state_;
     const auto angles = s.varying_angles(turns);
-    const auto factors = s.threshold_factors(turns);
+    s.coupling.evaluate(s.turn, turns);
     const auto noise = s.electronic_noise(turns);
-    for (Branch& branch : s.branches) branch.advance(turns, angles, factors, noise);
+    for (Branch& branch : s.branches) branch.advance(turns, angles, s.coupling, noise);
     s.turn += static_cast<std::int64_t>(turns);
 }
 

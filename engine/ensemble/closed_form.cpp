@@ -1,11 +1,10 @@
 #include "engine/ensemble/closed_form.hpp"
 
 #include <algorithm>
-#include <string>
 
-#include "engine/effects/effect.hpp"
 #include "engine/gyro/device.hpp"
 #include "engine/propagate/rotation.hpp"
+#include "engine/scenario/active_effects.hpp"
 
 namespace ringlock::ensemble {
 
@@ -14,14 +13,13 @@ bool drive_repeats(const scenario::Scenario& scenario) {
         scenario.dither.amplitude_drift_relative_per_h != 0.0) {
         return false;
     }
-    const auto all = effects::registry();
-    return std::none_of(all.begin(), all.end(), [&](const effects::Effect* effect) {
-        const auto values = scenario.effects.find(std::string(effect->name()));
-        // The effect itself is asked, so that a new one cannot be forgotten here.
-        return values != scenario.effects.end() && effect->active(values->second) &&
-               (effect->adds_angle() || effect->rate_process(values->second, {scenario.ensemble.seed, 0}) != nullptr ||
-                (scenario::temperature_varies(scenario.environment) &&
-                 effect->threshold_factor(values->second, 1.0) != 1.0));
+    const auto active = scenario::active_effects(scenario);
+    const effects::Exposure exposed = scenario::exposure(scenario);
+    return std::none_of(active.begin(), active.end(), [&](const scenario::ActiveEffect& one) {
+        const auto& [effect, values] = one;
+        const effects::Bounds bounds = effect->bounds(*values, exposed);
+        return effect->adds_angle() || bounds.threshold_relative != 0.0 || bounds.coupling_phase_rad != 0.0 ||
+               effect->rate_process(*values, {scenario.ensemble.seed, 0}) != nullptr;
     });
 }
 

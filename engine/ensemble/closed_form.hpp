@@ -7,7 +7,7 @@
 namespace ringlock::ensemble {
 
 /// Whether a gyro of the scenario without injected noise sees the same drive in every cycle: no active effect adds a
-/// rate that varies in time, noise included, and none changes the threshold in time; amplitude and input rate stay,
+/// rate that varies in time, noise included, and none changes the coupling in time; amplitude and input rate stay,
 /// too.
 bool drive_repeats(const scenario::Scenario& scenario);
 

@@ -2,8 +2,8 @@
 
 #include <boost/random/uniform_real_distribution.hpp>
 
-#include "engine/effects/effect.hpp"
 #include "engine/ensemble/schedule.hpp"
+#include "engine/scenario/active_effects.hpp"
 
 namespace ringlock::ensemble {
 
@@ -31,17 +31,8 @@ random::Identity identity(const scenario::Scenario& scenario, std::int64_t gyro)
 }
 
 gyro::Setup nominal_setup(const scenario::Scenario& scenario) {
-    gyro::Setup setup;
-    setup.scale_factor_arcsec = scenario.gyro.scale_factor_arcsec;
-    setup.lockin_threshold_deg_h = scenario.gyro.lockin_threshold_deg_h;
-    setup.dither_frequency_hz = scenario.dither.frequency_hz;
-    setup.dither_peak_rate_deg_s = scenario.dither.peak_rate_deg_s;
+    gyro::Setup setup = scenario::configured_setup(scenario);
     setup.input_rate_deg_h = input_rate_deg_h(scenario, 0);
-    for (const effects::Effect* effect : effects::registry()) {
-        const auto values = scenario.effects.find(std::string(effect->name()));
-        if (values != scenario.effects.end() && effect->active(values->second))
-            effect->configure(values->second, setup);
-    }
     return setup;
 }
 

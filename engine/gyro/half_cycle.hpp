@@ -68,6 +68,13 @@ struct Coupling {
     /// Phase of the second harmonic in the angle theta = psi + phase: sin(2 psi + second_phase) =
     /// sin(2 theta + this).
     double second_from_first_rad() const { return second_phase_rad - 2.0 * phase_rad; }
+    /// The whole coupling at another phase of it: both harmonics move.
+    Coupling moved_to(double wanted_phase_rad) const {
+        Coupling moved = *this;
+        moved.phase_rad = wanted_phase_rad;
+        moved.second_phase_rad += 2.0 * (wanted_phase_rad - phase_rad);
+        return moved;
+    }
 };
 
 }  // namespace ringlock::gyro

@@ -15,11 +15,14 @@ struct LaneDrive {
     std::size_t turns = 0;
     bool rates_vary = false;  ///< from half cycle to half cycle
     bool thresholds_vary = false;
+    bool phases_vary = false;                ///< of the coupling
     bool constants_filled = false;           ///< rows of rates and couplings that do not vary stand from a piece before
     std::vector<simd::Lanes> plain_fringes;  ///< [turns] phase of drive and input at the turn, less whole fringes
     std::vector<simd::Lanes> amplitude_rad;  ///< [turns + 1] amplitude of the half cycle: half its swing
     std::vector<simd::Lanes> rate_rad_s;     ///< [turns + 1] phase rate of the input over the half cycle
     std::vector<simd::Lanes> b_rad_s;        ///< [turns + 1] coupling over the half cycle
+    /// [turns + 1] phase of the coupling over the half cycle; empty where it is always the gyro's own.
+    std::vector<simd::Lanes> coupling_phase_fringes;
     std::vector<simd::Lanes> rotation_fringes;  ///< [turns] rotation of the case since turn 0 of the run, less ...
     std::vector<simd::Lanes> rotation_whole;    ///< [turns] ... these whole fringes
 
@@ -30,6 +33,7 @@ struct LaneDrive {
         amplitude_rad.resize(wanted + 1);
         rate_rad_s.resize(wanted + 1);
         b_rad_s.resize(wanted + 1);
+        coupling_phase_fringes.resize(phases_vary ? wanted + 1 : 0);
         rotation_fringes.resize(wanted);
         rotation_whole.resize(wanted);
     }
@@ -39,7 +43,8 @@ struct LaneDrive {
 
 /// What the phase does at these turns of the dither.
 struct LaneTurns {
-    std::vector<simd::Lanes> cosine;  ///< [turns] of psi + coupling phase
+    /// [turns] of psi + coupling phase, that of the half cycle that ends at the turn.
+    std::vector<simd::Lanes> cosine;
     std::vector<simd::Lanes> sine;
     std::vector<simd::Lanes> lockin_fringes;  ///< [turns] phase that the lock-in has added, beyond `lockin_whole`
     simd::Lanes lockin_whole;                 ///< whole fringes that the lock-in had added when the piece began

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/propagate/direct_lanes.cpp"
@@ -314,6 +315,10 @@ void DirectLanes::step(const gyro::LaneDrive& drive, gyro::LaneTurns* turns) {
             stretch.half = devices_[lane].half_cycle(drive.direction(i), drive.amplitude_rad[i + 1][lane]);
             stretch.half.rate_rad_s = drive.rate_rad_s[i + 1][lane];
             stretch.coupling = devices_[lane].coupling;
+            if (drive.phases_vary) {
+                const double phase_rad = units::two_pi * drive.coupling_phase_fringes[i + 1][lane];
+                stretch.coupling = stretch.coupling.moved_to(phase_rad);
+            }
             stretch.coupling.b_rad_s = drive.b_rad_s[i + 1][lane];
             stretch.start_fringes = drive.plain_fringes[i][lane] + lockin_fringes_[lane];
             stretch.end_s = stretch.half.duration_s;
@@ -321,8 +326,13 @@ void DirectLanes::step(const gyro::LaneDrive& drive, gyro::LaneTurns* turns) {
         integrate(stretches_, tolerance_rad_, results_);
         for (std::size_t lane = 0; lane < devices_.size(); ++lane) {
             if (turns != nullptr) {
-                turns->cosine[i][lane] = results_[lane].cosine;
-                turns->sine[i][lane] = results_[lane].sine;
+                std::complex<double> turn{results_[lane].cosine, results_[lane].sine};
+                if (drive.phases_vary) {
+                    const auto& phase_fringes = drive.coupling_phase_fringes;
+                    turn *= std::polar(1.0, units::two_pi * (phase_fringes[i][lane] - phase_fringes[i + 1][lane]));
+                }
+                turns->cosine[i][lane] = turn.real();
+                turns->sine[i][lane] = turn.imag();
                 turns->lockin_fringes[i][lane] = lockin_fringes_[lane];
             }
             lockin_fringes_[lane] += results_[lane].lockin_rad / units::two_pi;

@@ -87,6 +87,7 @@ void step(const PhaseTables& tables, const gyro::LaneDrive& drive, std::size_t f
         const bool arriving = i > 0 || state.under_way;
         for (std::size_t g = 0; g < group; ++g) {
             const std::size_t lane = first_lane + g * width;
+            if (drive.phases_vary) phase[g] = hn::Load(d, drive.coupling_phase_fringes[i].data() + lane);
             const V plain = hn::Load(d, drive.plain_fringes[i].data() + lane) + phase[g];
             V sine, cosine;
             if (arriving) {
@@ -100,6 +101,11 @@ void step(const PhaseTables& tables, const gyro::LaneDrive& drive, std::size_t f
                 hn::Store(cosine, d, turns->cosine[i].data() + lane);
                 hn::Store(sine, d, turns->sine[i].data() + lane);
                 hn::Store(lockin[g], d, turns->lockin_fringes[i].data() + lane);
+            }
+            if (drive.phases_vary) {
+                // psi goes on as it is, and psi + coupling phase jumps with the phase.
+                const V next = hn::Load(d, drive.coupling_phase_fringes[i + 1].data() + lane);
+                sm::sincos(d, plain + (next - phase[g]) + lockin[g], sine, cosine);
             }
             before[g] = scaled(d, tables, drive, i + 1, lane);
             const V constant = coefficient(d, begin[0], lane, before[g]).re;

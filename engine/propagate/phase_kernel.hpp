@@ -9,7 +9,7 @@ struct PhaseState {
     /// Phase that the lock-in has added up to the middle, in the frame in which fast motion is rotation; less `whole`.
     simd::Lanes lockin_fringes;
     simd::Lanes whole;
-    simd::Lanes coupling_phase_fringes;
+    simd::Lanes coupling_phase_fringes;  ///< where the drive has none
     /// Some turn was gone through: the half cycle that ends at the next one has a second half.
     bool under_way = false;
 };

@@ -26,8 +26,9 @@ HWY_INLINE V bend(D d, sm::Complex<V> a) {
     }
 }
 
-/// `group` vectors side by side: the turns of one hide the latency of the other's.
-template <std::size_t group, bool turns_wanted, bool strong>
+/// `group` vectors side by side: the turns of one hide the latency of the other's. `jumping`: the coupling's phase
+/// varies.
+template <std::size_t group, bool turns_wanted, bool strong, bool jumping>
 void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t first_lane, TurnState& state,
           gyro::LaneTurns* turns) {
     const D d;
@@ -68,6 +69,7 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
 
             // u is the phase at the turn but for the second half's own bend; p = exp(-i sign u).
             const V before_turn = sm::fnma(d, sign, shift_before[g], lockin[g]);
+            if constexpr (jumping) phase[g] = hn::Load(d, drive.coupling_phase_fringes[i].data() + lane);
             const V u = hn::Load(d, drive.plain_fringes[i].data() + lane) + phase[g] + before_turn;
             V sine, cosine;
             sm::sincos(d, u, sine, cosine);
@@ -75,7 +77,7 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
             const sm::Complex<V> z_before{re_before[g], im_before[g]};
             const sm::Complex<V> z_after{after.z_re, after.z_im};
             const sm::Complex<V> v = sm::mul_add(d, z_before, p, sm::Complex<V>{one, hn::Zero(d)});
-            const sm::Complex<V> w = sm::mul(d, p, sm::Complex<V>{v.re, hn::Neg(v.im)});
+            sm::Complex<V> w = sm::mul(d, p, sm::Complex<V>{v.re, hn::Neg(v.im)});
             if constexpr (turns_wanted) {
                 // exp(-i sign psi) = p conj(v)/v
                 const V inverse = one / sm::norm(d, v);
@@ -85,6 +87,13 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
                 const V second_half = bend<strong>(d, v) * per_half_pi;
                 const V at_turn = sm::fma(d, sign, second_half, before_turn);
                 hn::Store(whole[g] + at_turn, d, turns->lockin_fringes[i].data() + lane);
+            }
+            if constexpr (jumping) {
+                // psi goes on as it is, and psi + coupling phase jumps with the phase.
+                V jump_sine, jump_cosine;
+                sm::sincos(d, hn::Load(d, drive.coupling_phase_fringes[i + 1].data() + lane) - phase[g], jump_sine,
+                           jump_cosine);
+                w = sm::mul(d, w, sm::Complex<V>{jump_cosine, hn::Neg(sign * jump_sine)});
             }
             const sm::Complex<V> q = sm::mul_add(d, z_after, w, v);
             const V gain = sm::fma(d, bend<strong>(d, q), per_half_pi, after.shift);
@@ -108,25 +117,33 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
     }
 }
 
-template <bool turns_wanted, bool strong>
+template <bool turns_wanted, bool strong, bool jumping>
 void step_all(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t lanes, TurnState& state,
               gyro::LaneTurns* turns) {
     const std::size_t width = hn::Lanes(D());
     std::size_t lane = 0;
-    for (; lane + width < lanes; lane += 2 * width) step<2, turns_wanted, strong>(tables, drive, lane, state, turns);
-    for (; lane < lanes; lane += width) step<1, turns_wanted, strong>(tables, drive, lane, state, turns);
+    for (; lane + width < lanes; lane += 2 * width)
+        step<2, turns_wanted, strong, jumping>(tables, drive, lane, state, turns);
+    for (; lane < lanes; lane += width) step<1, turns_wanted, strong, jumping>(tables, drive, lane, state, turns);
+}
+
+template <bool jumping>
+void step_any(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t lanes, TurnState& state,
+              gyro::LaneTurns* turns) {
+    const bool strong = tables.strong();
+    if (turns != nullptr) {
+        strong ? step_all<true, true, jumping>(tables, drive, lanes, state, turns)
+               : step_all<true, false, jumping>(tables, drive, lanes, state, turns);
+    } else {
+        strong ? step_all<false, true, jumping>(tables, drive, lanes, state, turns)
+               : step_all<false, false, jumping>(tables, drive, lanes, state, turns);
+    }
 }
 
 void step_lanes(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t lanes, TurnState& state,
                 gyro::LaneTurns* turns) {
-    const bool strong = tables.strong();
-    if (turns != nullptr) {
-        strong ? step_all<true, true>(tables, drive, lanes, state, turns)
-               : step_all<true, false>(tables, drive, lanes, state, turns);
-    } else {
-        strong ? step_all<false, true>(tables, drive, lanes, state, turns)
-               : step_all<false, false>(tables, drive, lanes, state, turns);
-    }
+    drive.phases_vary ? step_any<true>(tables, drive, lanes, state, turns)
+                      : step_any<false>(tables, drive, lanes, state, turns);
 }
 
 void find_extremes(const std::vector<simd::Lanes>& rows, simd::Lanes& lowest, simd::Lanes& highest) {

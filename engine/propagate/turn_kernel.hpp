@@ -9,7 +9,7 @@ struct TurnState {
     /// Phase that the lock-in has added up to the middle, in the frame in which fast motion is rotation; less `whole`.
     simd::Lanes lockin_fringes;
     simd::Lanes whole;
-    simd::Lanes coupling_phase_fringes;
+    simd::Lanes coupling_phase_fringes;  ///< where the drive has none
     // Second half of the half cycle under way.
     simd::Lanes shift_fringes, z_re, z_im;
 };

@@ -41,7 +41,7 @@ struct Found {
 constexpr std::size_t turns_together = 16;
 
 template <bool extras>
-bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, const Electronics& electronics,
+bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> pulses, const Electronics& electronics,
               bool accelerations, std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
               const ElectronicNoise& noise, std::size_t stride, LaneReadings& readings, LaneAngles& angles) {
     const D d;
@@ -51,8 +51,7 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
     for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
         const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
         const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
-        const V coupling_cosine = load(constants.coupling_cosine);
-        const V coupling_sine = load(constants.coupling_sine);
+        const CouplingPhase own{load(constants.coupling_sine), load(constants.coupling_cosine)};
         const V lockin_whole = load(turns.lockin_whole);
         store(lockin_whole, angles.lockin_whole);
         const auto sides_of = [&](std::size_t i) HWY_ATTR { return sides_at<extras>(d, constants, drive, i, lane); };
@@ -66,7 +65,8 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
                 const Sides sides = sides_of(i);
                 Walk& walk = found[(i - first) / stride].walk;
                 walk = {zero, sides.sign * load(turns.sine[i]), load(turns.cosine[i]), zero, zero};
-                if (!walk_to_zero_rate<extras>(d, sides.before, sides.after, sides.extra, walk)) return false;
+                const Jump jump = jump_at(d, drive, i, lane);
+                if (!walk_to_zero_rate<extras>(d, sides.before, sides.after, sides.extra, jump, walk)) return false;
             }
             for (std::size_t i = first; i < end; i += stride) {
                 const int direction = drive.direction(i);
@@ -77,8 +77,9 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
                 // psi at the zero-rate point, in fringes less whole ones that are added where the phase is reported.
                 const V phase = sm::fma(d, sign * walk.phase_rad, per_rad,
                                         load(drive.plain_fringes[i]) + load(turns.lockin_fringes[i]));
-                const V true_sine = sm::fnma(d, walk.cosine, coupling_sine, sign * walk.sine * coupling_cosine);
-                const V true_cosine = sm::fma(d, sign * walk.sine, coupling_sine, walk.cosine * coupling_cosine);
+                const CouplingPhase coupling = coupling_phase_at(d, own, drive, i, lane, walk.time_s);
+                const V true_sine = sm::fnma(d, walk.cosine, coupling.sine, sign * walk.sine * coupling.cosine);
+                const V true_cosine = sm::fma(d, sign * walk.sine, coupling.sine, walk.cosine * coupling.cosine);
 
                 V sine = true_sine;
                 V cosine = true_cosine;
@@ -159,8 +160,8 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
                     const V ticks = time * clock;
                     tick_fraction = ticks - hn::Floor(ticks);
                 }
-                const auto factors =
-                    pulse_factors<2>(d, pulses.times[after_side], pulses.used, lane, quarter_of(d, floor), x);
+                const PhaseWeights<V> weights = phase_weights(d, constants, drive, i, lane);
+                const auto factors = pulse_factors<2>(d, pulses, after_side, lane, quarter_of(d, floor), x, weights);
                 const V turned_s = walk.time_s;
                 V nearest_s[2];
                 const auto side_acceleration = [&](std::size_t which, V scale) HWY_ATTR {
@@ -199,7 +200,7 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& pulses, cons
     return true;
 }
 
-bool read_lanes(const ReadoutConstants& constants, const PulseTables& pulses, const Electronics& electronics,
+bool read_lanes(const ReadoutConstants& constants, std::span<const PulseTables> pulses, const Electronics& electronics,
                 bool accelerations, std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
                 const ElectronicNoise& noise, std::size_t stride, LaneReadings& readings, LaneAngles& angles) {
     const auto read = constants.extras ? read_all<true> : read_all<false>;
@@ -215,14 +216,21 @@ namespace ringlock::readout {
 HWY_EXPORT(read_lanes);
 
 LaneReadout::LaneReadout(std::span<const gyro::Device> devices, std::span<const gyro::Ellipse> ellipses,
-                         const Electronics& electronics, Wanted wanted)
+                         const Electronics& electronics, Wanted wanted, bool phases_vary)
     : lanes_(devices.size()),
       electronics_(electronics),
       wanted_(wanted),
       constants_(make_readout_constants(devices, ellipses)) {
     if (wanted == Wanted::phase || (wanted == Wanted::accelerations && electronics.ideal)) return;
+    pulses_.resize(phases_vary ? PulseTables::phases : 1);
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
-        pulses_.make(lane, devices[std::min(lane, devices.size() - 1)], wanted == Wanted::pulses ? kept_pulses : 2);
+        gyro::Device device = devices[std::min(lane, devices.size() - 1)];
+        const double own_rad = device.coupling.phase_rad;
+        for (std::size_t phase = 0; phase < pulses_.size(); ++phase) {
+            const double beyond_rad = units::two_pi * static_cast<double>(phase) / PulseTables::phases;
+            device.coupling = device.coupling.moved_to(own_rad + beyond_rad);
+            pulses_[phase].make(lane, device, wanted == Wanted::pulses ? kept_pulses : 2);
+        }
     }
 }
 

@@ -30,8 +30,9 @@ class LaneReadout {
     /// \param devices     of each gyro, at most simd::lanes; with b = 0 where there is no lock-in
     /// \param ellipses    errors of each gyro's detectors; not used by ideal electronics
     /// \param wanted      what the readings must hold
+    /// \param phases_vary whether drives say that the coupling's phase varies
     LaneReadout(std::span<const gyro::Device> devices, std::span<const gyro::Ellipse> ellipses,
-                const Electronics& electronics, Wanted wanted);
+                const Electronics& electronics, Wanted wanted, bool phases_vary = false);
 
     /// From now on readings hold the times of the zero-rate points and the counter, too. Not where only the phase is
     /// wanted.
@@ -48,7 +49,7 @@ class LaneReadout {
     Wanted wanted_;
     bool times_ = false;
     ReadoutConstants constants_;
-    PulseTables pulses_;
+    std::vector<PulseTables> pulses_;  // at one phase of the coupling, or where that varies at PulseTables::phases
 };
 
 }  // namespace ringlock::readout

@@ -27,7 +27,7 @@ HWY_INLINE V acceleration_of(D d, V near_root, V far_root, V interval_s) {
 }
 
 template <bool extras>
-bool read_all(const ReadoutConstants& constants, const PulseTables& tables, const Electronics& electronics,
+bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> tables, const Electronics& electronics,
               std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
               const ElectronicNoise& noise, LaneReadings& readings, LaneAngles& angles) {
     const D d;
@@ -52,21 +52,21 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& tables, cons
     for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
         const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
         const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
-        const V coupling_cosine = load(constants.coupling_cosine);
-        const V coupling_sine = load(constants.coupling_sine);
+        const CouplingPhase own{load(constants.coupling_sine), load(constants.coupling_cosine)};
         const V lockin_whole = load(turns.lockin_whole);
         store(lockin_whole, angles.lockin_whole);
         for (std::size_t i = 0; i < drive.turns; ++i) {
             const auto [sign, before, after, extra, after_side] = sides_at<extras>(d, constants, drive, i, lane);
             Walk walk{zero, sign * load(turns.sine[i]), load(turns.cosine[i]), zero, zero};
-            if (!walk_to_zero_rate<extras>(d, before, after, extra, walk)) return false;
+            if (!walk_to_zero_rate<extras>(d, before, after, extra, jump_at(d, drive, i, lane), walk)) return false;
             const V lockin = sm::fma(d, sign * walk.lockin_rad, per_rad, load(turns.lockin_fringes[i]));
             store(lockin, angles.lockin_fringes[i]);
             // psi at the zero-rate point, in fringes less whole ones that are added where the phase is reported.
             const V phase = sm::fma(d, sign * walk.phase_rad, per_rad,
                                     load(drive.plain_fringes[i]) + load(turns.lockin_fringes[i]));
-            const V true_sine = sm::fnma(d, walk.cosine, coupling_sine, sign * walk.sine * coupling_cosine);
-            const V true_cosine = sm::fma(d, sign * walk.sine, coupling_sine, walk.cosine * coupling_cosine);
+            const CouplingPhase coupling = coupling_phase_at(d, own, drive, i, lane, walk.time_s);
+            const V true_sine = sm::fnma(d, walk.cosine, coupling.sine, sign * walk.sine * coupling.cosine);
+            const V true_cosine = sm::fma(d, sign * walk.sine, coupling.sine, walk.cosine * coupling.cosine);
 
             // The path: distances of quarter fringes from the extremum and the times at which they are passed.
             const V upright = sign * phase * hn::Set(d, 4.0);
@@ -74,12 +74,13 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& tables, cons
             const V near = (floor + one - upright) * quarter_rad;
             const V near_root = hn::Sqrt(near + near);
             const V x = sm::fma(d, near_root, hn::Set(d, 1.1283791670955126), hn::Neg(one));  // 2/sqrt(pi)
+            const PhaseWeights<V> weights = phase_weights(d, constants, drive, i, lane);
             const auto factors =
-                pulse_factors<kept_pulses>(d, tables.times[after_side], tables.used, lane, quarter_of(d, floor), x);
+                pulse_factors<kept_pulses>(d, tables, after_side, lane, quarter_of(d, floor), x, weights);
             const V scale[2] = {inverse_root_acceleration<extras>(d, before, extra),
                                 inverse_root_acceleration<extras>(d, after, extra)};
-            const V bend[2] = {before.b * scale[0] * load(tables.inverse_bend[1 - after_side]),
-                               after.b * scale[1] * load(tables.inverse_bend[after_side])};
+            const V bend[2] = {before.b * scale[0] * load(tables[0].inverse_bend[1 - after_side]),
+                               after.b * scale[1] * load(tables[0].inverse_bend[after_side])};
             const V curve[2] = {before.w * before.w * scale[0] * scale[0] * hn::Set(d, 1.0 / 12.0),
                                 after.w * after.w * scale[1] * scale[1] * hn::Set(d, 1.0 / 12.0)};
             // The parabola of the half cycle in which the extremum does not lie would have it elsewhere: at the time
@@ -237,7 +238,7 @@ bool read_all(const ReadoutConstants& constants, const PulseTables& tables, cons
     return true;
 }
 
-bool read_lanes(const ReadoutConstants& constants, const PulseTables& tables, const Electronics& electronics,
+bool read_lanes(const ReadoutConstants& constants, std::span<const PulseTables> tables, const Electronics& electronics,
                 std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
                 const ElectronicNoise& noise, LaneReadings& readings, LaneAngles& angles) {
     const auto read = constants.extras ? read_all<true> : read_all<false>;
@@ -262,9 +263,10 @@ double least_distance_rad(const Electronics& electronics) {
     return 6.0 * electronics.comparator_noise_relative;
 }
 
-bool read_pulse_by_pulse(const ReadoutConstants& constants, const PulseTables& tables, const Electronics& electronics,
-                         std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
-                         const ElectronicNoise& noise, LaneReadings& readings, LaneAngles& angles) {
+bool read_pulse_by_pulse(const ReadoutConstants& constants, std::span<const PulseTables> tables,
+                         const Electronics& electronics, std::size_t lanes, const gyro::LaneDrive& drive,
+                         const gyro::LaneTurns& turns, const ElectronicNoise& noise, LaneReadings& readings,
+                         LaneAngles& angles) {
     readings.pulses.resize(drive.turns);
     return HWY_DYNAMIC_DISPATCH(read_lanes)(constants, tables, electronics, lanes, drive, turns, noise, readings,
                                             angles);

@@ -16,10 +16,12 @@ namespace ringlock::readout {
 /// extremum is blunted by psi'' T^2/2, which is taken into account (terms in T^3 are not). Noise acts at each crossing
 /// by itself: pulses are tens of correlation times apart.
 ///
-/// False where the phase does not reverse near a turn of the dither in some lane.
-bool read_pulse_by_pulse(const ReadoutConstants& constants, const PulseTables& tables, const Electronics& electronics,
-                         std::size_t lanes, const gyro::LaneDrive& drive, const gyro::LaneTurns& turns,
-                         const ElectronicNoise& noise, LaneReadings& readings, LaneAngles& angles);
+/// `tables`: one, or PulseTables::phases of them where the coupling's phase varies. False where the phase does not
+/// reverse near a turn of the dither in some lane.
+bool read_pulse_by_pulse(const ReadoutConstants& constants, std::span<const PulseTables> tables,
+                         const Electronics& electronics, std::size_t lanes, const gyro::LaneDrive& drive,
+                         const gyro::LaneTurns& turns, const ElectronicNoise& noise, LaneReadings& readings,
+                         LaneAngles& angles);
 
 /// Time constant of the low-pass [s].
 double low_pass_s(const Electronics& electronics);

@@ -6,7 +6,12 @@
 #define RINGLOCK_PULSE_TABLES
 #endif
 
+#include <array>
+#include <span>
+
+#include "engine/gyro/lane_drive.hpp"
 #include "engine/readout/pulse_tables.hpp"
+#include "engine/readout/readout_constants.hpp"
 #include "engine/simd/math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -68,6 +73,53 @@ HWY_INLINE PulseFactors<V, pulses> pulse_factors(D d, const Sides& sides, std::s
         }
     }
     return sums;
+}
+
+/// Shares of the tables at PulseTables::phases, for the half cycles before and after a turn; not set where the
+/// coupling's phase does not vary.
+template <class V>
+struct PhaseWeights {
+    V values[2][PulseTables::phases];
+};
+
+/// Trigonometric interpolation (A. Zygmund, "Trigonometric Series", 1959, chapter X): (1 + 2 cos x_j + 2 cos 2 x_j)/5,
+/// x_j the phase less that of table j.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE PhaseWeights<V> phase_weights(D d, const ReadoutConstants& constants, const gyro::LaneDrive& drive,
+                                         std::size_t i, std::size_t lane) {
+    PhaseWeights<V> weights;
+    if (!drive.phases_vary) return weights;
+    const V own = hn::Load(d, constants.coupling_phase_fringes.data() + lane);
+    for (std::size_t side = 0; side < 2; ++side) {
+        const V beyond = hn::Load(d, drive.coupling_phase_fringes[i + side].data() + lane) - own;
+        for (std::size_t j = 0; j < PulseTables::phases; ++j) {
+            V sine, cosine;
+            sm::sincos(d, beyond - hn::Set(d, static_cast<double>(j) / PulseTables::phases), sine, cosine);
+            // 1 + 2 cos x + 2 cos 2 x = 4 cos^2 x + 2 cos x - 1
+            const V two = cosine + cosine;
+            weights.values[side][j] =
+                sm::fma(d, two, two, two - hn::Set(d, 1.0)) * hn::Set(d, 1.0 / PulseTables::phases);
+        }
+    }
+    return weights;
+}
+
+/// The same by the tables of `tables`: one, or as many as there are weights.
+template <std::size_t pulses, class D, class V = hn::Vec<D>>
+HWY_INLINE PulseFactors<V, pulses> pulse_factors(D d, std::span<const PulseTables> tables, std::size_t after_side,
+                                                 std::size_t lane, const QuarterOf<D>& quarter, V x,
+                                                 const PhaseWeights<V>& weights) {
+    auto factors = pulse_factors<pulses>(d, tables[0].times[after_side], tables[0].used, lane, quarter, x);
+    for (std::size_t j = 0; tables.size() > 1 && j < tables.size(); ++j) {
+        const auto at = pulse_factors<pulses>(d, tables[j].times[after_side], tables[j].used, lane, quarter, x);
+        for (std::size_t side = 0; side < 2; ++side) {
+            for (std::size_t pulse = 0; pulse < pulses; ++pulse) {
+                V& sum = factors.values[side][pulse];
+                sum = sm::fma(d, at.values[side][pulse], weights.values[side][j], j == 0 ? hn::Zero(d) : sum);
+            }
+        }
+    }
+    return factors;
 }
 
 }  // namespace ringlock::readout::HWY_NAMESPACE

@@ -23,6 +23,9 @@ namespace ringlock::readout {
 struct PulseTables {
     static constexpr std::size_t terms = 10;
     static constexpr std::size_t quarters = 4;
+    /// Phases of the coupling at which tables stand where it varies: evenly round the circle, from the gyro's own on. R
+    /// is interpolated between them by the first two harmonics of the phase; first order in b/sqrt(a) has no others.
+    static constexpr std::size_t phases = 5;
 
     /// Polynomial in 2 sqrt(d1/(pi/2)) - 1, d1 the distance of the first pulse: [quarter][power].
     using Times = std::array<std::array<simd::Lanes, terms>, quarters>;

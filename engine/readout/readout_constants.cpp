@@ -35,6 +35,7 @@ ReadoutConstants make_readout_constants(std::span<const gyro::Device> devices,
         c.turn_asymmetry[lane] = device.coupling.turn_asymmetry;
         c.coupling_cosine[lane] = std::cos(device.coupling.phase_rad);
         c.coupling_sine[lane] = std::sin(device.coupling.phase_rad);
+        c.coupling_phase_fringes[lane] = device.coupling.phase_rad / units::two_pi;
         c.gain[lane] = 1.0 + ellipse.gain;
         c.offset_sin[lane] = ellipse.offset_sin;
         c.offset_cos[lane] = ellipse.offset_cos;

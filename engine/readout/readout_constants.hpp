@@ -25,6 +25,7 @@ struct ReadoutConstants {
     simd::Lanes turn_asymmetry;
     simd::Lanes second_ratio, second_sine, second_cosine;  ///< second harmonic of the coupling, in psi + its phase
     simd::Lanes coupling_cosine, coupling_sine;            ///< of the coupling phase
+    simd::Lanes coupling_phase_fringes;
     simd::Lanes gain, offset_sin, offset_cos, orthogonality_cosine, orthogonality_sine;
     simd::Lanes swing_whole;  ///< whole fringes between minima and maxima that the drive's phases leave out
     simd::Lanes comparator_shift_rad[4];

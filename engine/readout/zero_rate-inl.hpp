@@ -32,23 +32,66 @@ struct Walk {
     V phase_rad;   ///< gained since the dither's turn
 };
 
-/// Goes to where the rate of x vanishes; false where some lane does not get there.
+/// Jump of x at the dither's turn, where the coupling's phase varies: x is psi + that phase, turned upright.
+struct Jump {
+    bool any;
+    V sine, cosine;
+};
+
+HWY_INLINE Jump jump_at(D d, const gyro::LaneDrive& drive, std::size_t i, std::size_t lane) {
+    Jump jump{drive.phases_vary, hn::Zero(d), hn::Set(d, 1.0)};
+    if (!jump.any) return jump;
+    const auto phase = [&](std::size_t half)
+                           HWY_ATTR { return hn::Load(d, drive.coupling_phase_fringes[half].data() + lane); };
+    sm::sincos(d, hn::Set(d, drive.direction(i)) * (phase(i + 1) - phase(i)), jump.sine, jump.cosine);
+    return jump;
+}
+
+/// Sine and cosine of the coupling's phase in the half cycle in which a zero-rate point lies.
+struct CouplingPhase {
+    V sine, cosine;
+};
+
+/// `own`: the gyro's, where the phase does not vary.
+HWY_INLINE CouplingPhase coupling_phase_at(D d, const CouplingPhase& own, const gyro::LaneDrive& drive, std::size_t i,
+                                           std::size_t lane, V zero_rate_s) {
+    if (!drive.phases_vary) return own;
+    const V before = hn::Load(d, drive.coupling_phase_fringes[i].data() + lane);
+    const V after = hn::Load(d, drive.coupling_phase_fringes[i + 1].data() + lane);
+    CouplingPhase phase = own;
+    sm::sincos(d, hn::IfThenElse(zero_rate_s > hn::Zero(d), after, before), phase.sine, phase.cosine);
+    return phase;
+}
+
+/// Goes to where the rate of x vanishes; false where some lane does not get there. x begins as that of the half cycle
+/// before the dither's turn.
 template <bool extras>
-HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, const Extras& extra, Walk& walk) {
+HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, const Extras& extra, const Jump& jump,
+                                  Walk& walk) {
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
+    V sine_after = walk.sine;
+    V cosine_after = walk.cosine;
+    if (jump.any) {
+        sine_after = sm::fma(d, walk.cosine, jump.sine, walk.sine * jump.cosine);
+        cosine_after = sm::fnma(d, walk.sine, jump.sine, walk.cosine * jump.cosine);
+    }
     // A minimum whose phase still falls at the dither's turn lies after it.
-    V first_rate = sm::fma(d, after.b, walk.sine, after.rate);
+    V first_rate = sm::fma(d, after.b, sine_after, after.rate);
     if constexpr (extras) {
-        const V doubled_sine = (walk.sine + walk.sine) * walk.cosine;
-        const V doubled_cosine = sm::fnma(d, walk.sine + walk.sine, walk.sine, one);
+        const V doubled_sine = (sine_after + sine_after) * cosine_after;
+        const V doubled_cosine = sm::fnma(d, sine_after + sine_after, sine_after, one);
         const V pull =
             sm::fma(d, extra.second, sm::fma(d, doubled_sine, extra.second_cosine, doubled_cosine * extra.second_sine),
-                    walk.sine);
+                    sine_after);
         first_rate = sm::fma(d, after.amplitude * after.w * extra.ratio, extra.harmonic_sine,
                              sm::fma(d, after.b * (one + extra.asymmetry), pull, after.rate));
     }
     const auto ahead = first_rate < zero;
+    if (jump.any) {
+        walk.sine = hn::IfThenElse(ahead, sine_after, walk.sine);
+        walk.cosine = hn::IfThenElse(ahead, cosine_after, walk.cosine);
+    }
     const Side side{
         hn::IfThenElse(ahead, after.amplitude, before.amplitude), hn::IfThenElse(ahead, after.w, before.w),
         hn::IfThenElse(ahead, after.rate, before.rate),           hn::IfThenElse(ahead, after.b, before.b),

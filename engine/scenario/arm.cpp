@@ -61,4 +61,10 @@ Arm parse_arm(std::string_view name) {
                                  fmt::join(known, ", ")));
 }
 
+std::vector<Arm> parse_arms(const std::vector<std::string>& names) {
+    std::vector<Arm> arms;
+    for (const std::string& name : names) arms.push_back(parse_arm(name));
+    return arms;
+}
+
 }  // namespace ringlock::scenario

@@ -28,6 +28,9 @@ struct Arm {
 /// @throws InputError that says which arms there are, without a place in a file.
 Arm parse_arm(std::string_view name);
 
+/// The same of several names, in their order.
+std::vector<Arm> parse_arms(const std::vector<std::string>& names);
+
 /// Every name that parse_arm() understands.
 std::vector<std::string> arm_names();
 

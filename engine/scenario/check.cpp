@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "engine/core/units.hpp"
-#include "engine/scenario/arm.hpp"
+#include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/fast_motion.hpp"
 
 namespace ringlock::scenario {
@@ -35,9 +35,24 @@ double kick_rad(const Scenario& s) {
            std::sqrt(s.gyro.scale_factor_arcsec * peak_rate_deg_h(s) * dither_rad_s(s));
 }
 
+double largest_asymmetry(const Scenario& s) {
+    return std::abs(configured_setup(s).dither_asymmetry_ratio) + sigmas * s.ensemble.dither_asymmetry_sd_ratio;
+}
+
+/// Keys, then those of the active effects that change the gyro's constants so that `differ(gyro, plain gyro)`.
+template <class Differ>
+std::vector<std::string> with_keys_of_effects(const Scenario& s, std::vector<std::string> keys, Differ&& differ) {
+    for (const auto& [effect, values] : active_effects(s)) {
+        gyro::Setup setup;
+        effect->configure(*values, setup);
+        if (!differ(setup, gyro::Setup{})) continue;
+        for (std::string& key : keys_of(*effect)) keys.push_back(std::move(key));
+    }
+    return keys;
+}
+
 Finding dither_reverses_the_rate(const Scenario& s) {
-    const double asymmetry =
-        std::abs(s.effects.at("dither_asymmetry").at("ratio")) + sigmas * s.ensemble.dither_asymmetry_sd_ratio;
+    const double asymmetry = largest_asymmetry(s);
     const double smallest =
         peak_rate_deg_h(s) * (1.0 - sigmas * s.ensemble.dither_amplitude_sd_relative) * (1.0 - asymmetry);
     const double swing = 1.0 - amplitude_change_relative(s.dither, s.ensemble.settle_s + s.ensemble.duration_s);
@@ -52,9 +67,13 @@ Finding dither_reverses_the_rate(const Scenario& s) {
     const bool stop_is_larger = sweep && std::abs(s.input.sweep_stop_deg_h) > std::abs(s.input.rate_deg_h);
     const double rate = stop_is_larger ? s.input.sweep_stop_deg_h : s.input.rate_deg_h;
     if (std::abs(rate) < 0.5 * smallest) return {};
-    return Complaint{{stop_is_larger ? "input.sweep_stop_deg_h" : "input.rate_deg_h", "dither.peak_rate_deg_s",
-                      "effects.dither_asymmetry.ratio", "ensemble.dither_asymmetry_sd_ratio",
-                      "ensemble.dither_amplitude_sd_relative"},
+    std::vector<std::string> keys = with_keys_of_effects(
+        s, {stop_is_larger ? "input.sweep_stop_deg_h" : "input.rate_deg_h", "dither.peak_rate_deg_s"},
+        [](const gyro::Setup& a, const gyro::Setup& b) {
+            return a.dither_asymmetry_ratio != b.dither_asymmetry_ratio;
+        });
+    keys.insert(keys.end(), {"ensemble.dither_asymmetry_sd_ratio", "ensemble.dither_amplitude_sd_relative"});
+    return Complaint{std::move(keys),
                      fmt::format("the input rate of {:g} deg/h must stay below {:g} deg/h, half of the smallest peak "
                                  "rate of the dither (the rate must reverse in every half cycle)",
                                  rate, 0.5 * smallest)};
@@ -142,13 +161,34 @@ Finding turn_map_has_small_kicks(const Scenario& s) {
                     kick, largest)};
 }
 
+/// Keys of the rates that matter in comparison with the dither's, that of the largest first.
+std::vector<std::string> keys_of_rates(const Scenario& s) {
+    std::vector<std::pair<double, std::vector<std::string>>> rates;
+    rates.push_back({exposure(s).input_rate_deg_h,
+                     has_profile(s.input) ? std::vector<std::string>{"input.profile_rate_deg_h"}
+                                          : std::vector<std::string>{"input.rate_deg_h", "input.sweep_stop_deg_h"}});
+    for (const EffectBounds& bounds : bounds_of_effects(s)) {
+        const double rate = bounds.certain.rate_deg_h + sigmas * bounds.rate_sd_deg_h;
+        if (rate > 0.01 * peak_rate_deg_h(s)) rates.emplace_back(rate, keys_of(*bounds.effect));
+    }
+    std::stable_sort(rates.begin(), rates.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    std::vector<std::string> keys;
+    for (const auto& [rate, names] : rates) keys.insert(keys.end(), names.begin(), names.end());
+    return keys;
+}
+
 Finding turn_map_has_fast_middles(const Scenario& s) {
     if (s.propagation.method != PropagationMethod::turn_map || fast_middles(s)) return {};
+    std::vector<std::string> keys = keys_of_rates(s);
+    for (const char* key :
+         {"noise_injection.turn_phase_rms_rad", "dither.peak_rate_deg_s", "dither.frequency_hz",
+          "gyro.scale_factor_arcsec", "gyro.lockin_threshold_deg_h", "calibration.threshold_error_relative",
+          "ensemble.dither_amplitude_sd_relative", "ensemble.dither_asymmetry_sd_ratio",
+          "ensemble.lockin_threshold_sd_relative", "propagation.method"}) {
+        keys.emplace_back(key);
+    }
     return Complaint{
-        {"input.rate_deg_h", "input.sweep_stop_deg_h", "noise_injection.turn_phase_rms_rad", "dither.peak_rate_deg_s",
-         "dither.frequency_hz", "gyro.scale_factor_arcsec", "gyro.lockin_threshold_deg_h",
-         "calibration.threshold_error_relative", "ensemble.dither_amplitude_sd_relative",
-         "ensemble.dither_asymmetry_sd_ratio", "ensemble.lockin_threshold_sd_relative", "propagation.method"},
+        std::move(keys),
         "with what rates, noise, effects and spread may take from it, the dither is too slow in the middle of some "
         "half "
         "cycle for the turn map (which needs a phase that runs fast there); set propagation.method = \"direct\" or a "
@@ -157,8 +197,7 @@ Finding turn_map_has_fast_middles(const Scenario& s) {
 }
 
 Finding noise_leaves_the_dither(const Scenario& s) {
-    const bool injected = std::any_of(s.arms.begin(), s.arms.end(),
-                                      [](const std::string& name) { return parse_arm(name).noise_injected; });
+    const bool injected = std::any_of(s.arms.begin(), s.arms.end(), [](const Arm& arm) { return arm.noise_injected; });
     const double most = phase_amplitude_rad(s) / (sigmas * std::numbers::sqrt2);
     if (!injected || s.noise_injection.turn_phase_rms_rad <= most) return {};
     return Complaint{
@@ -169,19 +208,21 @@ Finding noise_leaves_the_dither(const Scenario& s) {
                     s.noise_injection.turn_phase_rms_rad, most, sigmas)};
 }
 
-Finding temperature_leaves_a_threshold(const Scenario& s) {
+Finding effects_leave_a_threshold(const Scenario& s) {
     constexpr double most = 0.9;
-    const double simulated_s = s.ensemble.settle_s + s.ensemble.duration_s;
-    const double change_k =
-        std::abs(s.environment.temperature_ramp_k_per_h) * simulated_s / 3600.0 + s.environment.temperature_swing_k;
-    const double relative = s.effects.at("lockin_temperature").at("relative_per_k");
-    if (std::abs(relative) * change_k <= most) return {};
-    return Complaint{
-        {"effects.lockin_temperature.relative_per_k", "environment.temperature_ramp_k_per_h",
-         "environment.temperature_swing_k", "ensemble.duration_s", "ensemble.settle_s"},
-        fmt::format("the temperature changes by up to {:g} K, the threshold by {:g} of itself; it must not "
-                    "change by more than {:g}",
-                    change_k, std::abs(relative) * change_k, most)};
+    const double change = threshold_change_relative(s);
+    if (change <= most) return {};
+    std::vector<std::string> keys;
+    for (const EffectBounds& bounds : bounds_of_effects(s)) {
+        if (bounds.certain.threshold_relative == 0.0) continue;
+        for (std::string& key : keys_of(*bounds.effect)) keys.push_back(std::move(key));
+    }
+    keys.insert(keys.end(), {"environment.temperature_ramp_k_per_h", "environment.temperature_swing_k",
+                             "ensemble.duration_s", "ensemble.settle_s"});
+    return Complaint{std::move(keys),
+                     fmt::format("the temperature changes by up to {:g} K, the threshold by {:g} of itself; it must "
+                                 "not change by more than {:g}",
+                                 exposure(s).temperature_change_k, change, most)};
 }
 
 Finding ideal_detectors_need_no_correction(const Scenario& s) {
@@ -203,7 +244,7 @@ Finding keys_are_the_instruments(const Scenario& s) {
     if (r.detector_bandwidth_hz != standard.detector_bandwidth_hz) key = "readout.detector_bandwidth_hz";
     if (r.adc_bits != standard.adc_bits) key = "readout.adc_bits";
     if (key.empty()) return {};
-    return Complaint{{key, "readout.model"},
+    return Complaint{{std::string(key), "readout.model"},
                      fmt::format("{} is a property of the instrument, which this readout model leaves out; set "
                                  "readout.model = \"instrument\"",
                                  key)};
@@ -211,11 +252,11 @@ Finding keys_are_the_instruments(const Scenario& s) {
 
 Finding pulses_are_there(const Scenario& s) {
     if (s.readout.model != ReadoutModel::latched) return {};
-    for (const std::string& name : s.arms) {
-        const Compensator compensator = parse_arm(name).compensator;
-        if (compensator != Compensator::extrapolated && compensator != Compensator::adaptive) continue;
-        return Complaint{{"arms.names", "readout.model"},
-                         fmt::format("arm \"{}\" needs the pulses' times; set readout.model = \"instrument\"", name)};
+    for (const Arm& arm : s.arms) {
+        if (arm.compensator != Compensator::extrapolated && arm.compensator != Compensator::adaptive) continue;
+        return Complaint{
+            {"arms.names", "readout.model"},
+            fmt::format("arm \"{}\" needs the pulses' times; set readout.model = \"instrument\"", arm.name)};
     }
     return {};
 }
@@ -223,10 +264,8 @@ Finding pulses_are_there(const Scenario& s) {
 /// Largest rate of the phase in fringes a second: the dither's, with its spread, and the input.
 double peak_beat_hz(const Scenario& s) {
     const double spread = 1.0 + sigmas * s.ensemble.dither_amplitude_sd_relative;
-    const double asymmetry =
-        1.0 + std::abs(s.effects.at("dither_asymmetry").at("ratio")) + sigmas * s.ensemble.dither_asymmetry_sd_ratio;
-    const double input = std::max(std::abs(s.input.rate_deg_h), std::abs(s.input.sweep_stop_deg_h));
-    return (peak_rate_deg_h(s) * spread * asymmetry + input) / s.gyro.scale_factor_arcsec;
+    return (peak_rate_deg_h(s) * spread * (1.0 + largest_asymmetry(s)) + exposure(s).input_rate_deg_h) /
+           s.gyro.scale_factor_arcsec;
 }
 
 Finding comparators_follow_the_fringes(const Scenario& s) {
@@ -260,14 +299,14 @@ Finding comparators_do_not_chatter(const Scenario& s) {
 
 Finding converter_holds_the_detectors(const Scenario& s) {
     constexpr double range = 1.25;
-    const auto& ellipse = s.effects.at("readout_ellipse");
-    const double largest = std::max(1.0 + ellipse.at("gain") + std::abs(ellipse.at("offset_sin")),
-                                    1.0 + std::abs(ellipse.at("offset_cos"))) +
-                           sigmas * s.readout.detector_noise_relative;
+    const gyro::Ellipse ellipse = configured_setup(s).ellipse;
+    const double largest =
+        std::max(1.0 + ellipse.gain + std::abs(ellipse.offset_sin), 1.0 + std::abs(ellipse.offset_cos)) +
+        sigmas * s.readout.detector_noise_relative;
     if (s.readout.model != ReadoutModel::instrument || s.readout.adc_bits == 0 || largest <= range) return {};
     return Complaint{
-        {"readout.adc_bits", "readout.detector_noise_relative", "effects.readout_ellipse.gain",
-         "effects.readout_ellipse.offset_sin", "effects.readout_ellipse.offset_cos"},
+        with_keys_of_effects(s, {"readout.adc_bits", "readout.detector_noise_relative"},
+                             [](const gyro::Setup& a, const gyro::Setup& b) { return !(a.ellipse == b.ellipse); }),
         fmt::format("the detectors reach {:.3g} fringe amplitudes, the converter holds {:g}", largest, range)};
 }
 
@@ -317,8 +356,7 @@ constexpr std::array all_rules = {
     Rule{"Injected noise leaves at least half of each half cycle's swing within six standard deviations (checked where "
          "an arm injects noise).",
          noise_leaves_the_dither},
-    Rule{"The temperature changes the lock-in threshold by no more than 0.9 of itself over the run.",
-         temperature_leaves_a_threshold},
+    Rule{"Effects change the lock-in threshold by no more than 0.9 of itself over the run.", effects_leave_a_threshold},
     Rule{"An ideal readout has no ellipse to correct.", ideal_detectors_need_no_correction},
     Rule{"Keys that only the instrument has stay at their defaults with other readout models.",
          keys_are_the_instruments},

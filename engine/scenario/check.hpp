@@ -11,8 +11,8 @@ namespace ringlock::scenario {
 
 /// A rule that a scenario breaks.
 struct Complaint {
-    std::vector<std::string_view> keys;  ///< paths of the keys involved, the likeliest culprit first
-    std::string problem;                 ///< what is found and what is allowed
+    std::vector<std::string> keys;  ///< paths of the keys involved, the likeliest culprit first
+    std::string problem;            ///< what is found and what is allowed
 };
 
 /// Every rule that the scenario breaks.

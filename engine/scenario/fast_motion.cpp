@@ -7,7 +7,7 @@
 #include "engine/core/units.hpp"
 #include "engine/gyro/device.hpp"
 #include "engine/gyro/fast_motion.hpp"
-#include "engine/scenario/arm.hpp"
+#include "engine/scenario/active_effects.hpp"
 
 namespace ringlock::scenario {
 
@@ -15,40 +15,42 @@ namespace {
 
 constexpr double sigmas = 6.0;  // draws further out are treated as impossible, as by the other rules
 
-/// A value of an effect that is always there, at its default where it was not asked for.
-double parameter(const Scenario& s, const char* effect, const char* name) { return s.effects.at(effect).at(name); }
-
-double simulated_h(const Scenario& s) { return (s.ensemble.settle_s + s.ensemble.duration_s) / 3600.0; }
-
-double largest_asymmetry(const Scenario& s) {
-    return std::abs(parameter(s, "dither_asymmetry", "ratio")) + sigmas * s.ensemble.dither_asymmetry_sd_ratio;
-}
-
 /// How far the rate of a half cycle may be from the input rate [deg/h].
 double varying_rate_deg_h(const Scenario& s) {
-    // Ten terms of variance B^2 ln(10)/pi each, see bias_instability.cpp.
-    const double instability =
-        parameter(s, "bias_instability", "deg_h") * std::sqrt(10.0 * std::numbers::ln10 / std::numbers::pi);
-    const double walk = parameter(s, "rate_random_walk", "deg_h_rt_h") * std::sqrt(simulated_h(s));
-    const double quantum = parameter(s, "quantum_noise", "deg_rt_h") / units::deg_rt_h_per_arcsec_rt_s *
-                           std::sqrt(2.0 * s.dither.frequency_hz / (1.0 - largest_asymmetry(s)));
-    return std::abs(parameter(s, "base_vibration", "rate_deg_h")) + std::abs(parameter(s, "bias_step", "step_deg_h")) +
-           std::abs(parameter(s, "bias_ramp", "deg_h_per_h")) * simulated_h(s) +
-           sigmas * std::hypot(instability, walk, quantum);
+    double certain = 0.0;
+    double random = 0.0;
+    for (const EffectBounds& bounds : bounds_of_effects(s)) {
+        certain += bounds.certain.rate_deg_h;
+        random = std::hypot(random, bounds.rate_sd_deg_h);
+    }
+    return certain + sigmas * random;
 }
 
-/// The same with the room that tables leave on either side, see lane_propagator.cpp: up to twice what varies or
+/// Half of what the input's profile can span within the turns that a run makes its tables for at one time [deg/h].
+double profile_half_span_deg_h(const Scenario& s) {
+    constexpr double turns = 128.0;
+    if (!has_profile(s.input)) return 0.0;
+    const auto& times = s.input.profile_time_s;
+    const auto& rates = s.input.profile_rate_deg_h;
+    double steepest = 0.0;
+    for (std::size_t i = 1; i < std::min(times.size(), rates.size()); ++i) {
+        steepest = std::max(steepest, std::abs(rates[i] - rates[i - 1]) / (times[i] - times[i - 1]));
+    }
+    const auto [lowest, highest] = input_range(s.input);
+    return 0.5 * std::min(highest - lowest, steepest * turns / (2.0 * s.dither.frequency_hz));
+}
+
+/// The varying rate with the room that tables leave on either side, see lane_propagator.cpp: up to twice what varies or
 /// 5000 deg/h, and 200 deg/h in any case.
 double tabulated_rate_deg_h(const Scenario& s) {
     const double varies = varying_rate_deg_h(s);
-    return varies > 0.0 ? varies + std::max(200.0, std::min(2.0 * varies, 5000.0)) : 0.0;
+    const double spans = varies + profile_half_span_deg_h(s);
+    return spans > 0.0 ? varies + std::max(200.0, std::min(2.0 * spans, 5000.0)) : 0.0;
 }
 
-/// Largest coupling over that of the gyro, of the run's tables: the temperature's part with as much room, at most half.
+/// Largest coupling over that of the gyro, of the run's tables: what varies with as much room, at most half.
 double tabulated_coupling(const Scenario& s) {
-    const double change_k =
-        std::abs(s.environment.temperature_ramp_k_per_h) * simulated_h(s) + s.environment.temperature_swing_k;
-    const double varies = std::abs(parameter(s, "lockin_temperature", "relative_per_k")) * change_k;
+    const double varies = threshold_change_relative(s);
     return varies > 0.0 ? 1.0 + varies + std::max(0.05, std::min(2.0 * varies, 0.5)) : 1.0;
 }
 
@@ -61,21 +63,18 @@ struct Room {
 };
 
 bool fast(const Scenario& s, const Room& room) {
-    gyro::Setup setup;
-    setup.scale_factor_arcsec = s.gyro.scale_factor_arcsec;
-    setup.lockin_threshold_deg_h =
-        s.gyro.lockin_threshold_deg_h * (1.0 + sigmas * s.ensemble.lockin_threshold_sd_relative) * room.coupling;
-    setup.dither_frequency_hz = s.dither.frequency_hz;
-    setup.dither_peak_rate_deg_s = s.dither.peak_rate_deg_s * (1.0 - sigmas * s.ensemble.dither_amplitude_sd_relative);
-    if (room.with_harmonics) {
-        setup.dither_harmonic_ratio = parameter(s, "dither_second_harmonic", "ratio");
-        setup.dither_harmonic_phase_rad = parameter(s, "dither_second_harmonic", "phase_rad");
-        setup.lockin_second_ratio = parameter(s, "lockin_second_harmonic", "ratio");
-        setup.lockin_turn_asymmetry = parameter(s, "lockin_turn_asymmetry", "ratio");
+    gyro::Setup setup = configured_setup(s);
+    setup.lockin_threshold_deg_h *= (1.0 + sigmas * s.ensemble.lockin_threshold_sd_relative) * room.coupling;
+    setup.dither_peak_rate_deg_s *= 1.0 - sigmas * s.ensemble.dither_amplitude_sd_relative;
+    if (!room.with_harmonics) {
+        setup.dither_harmonic_ratio = 0.0;
+        setup.lockin_second_ratio = 0.0;
+        setup.lockin_turn_asymmetry = 0.0;
     }
     const double spread = sigmas * s.ensemble.dither_asymmetry_sd_ratio;
+    const double asymmetry = setup.dither_asymmetry_ratio;
     for (const double off : {-spread, spread}) {
-        setup.dither_asymmetry_ratio = parameter(s, "dither_asymmetry", "ratio") + off;
+        setup.dither_asymmetry_ratio = asymmetry + off;
         gyro::Device device(setup);
         // Amplitudes, rates and couplings inside are faster: the worst are at the corners.
         const double amplitude = device.dither_amplitude_rad - room.margin_rad;
@@ -97,15 +96,12 @@ bool fast(const Scenario& s, const Room& room) {
 }  // namespace
 
 bool fast_middles(const Scenario& s) {
-    const double last = s.input.sweep_points > 1 ? s.input.sweep_stop_deg_h : s.input.rate_deg_h;
-    const double lowest = std::min(s.input.rate_deg_h, last);
-    const double highest = std::max(s.input.rate_deg_h, last);
+    const auto [lowest, highest] = input_range(s.input);
     // Eight standard deviations of half the difference of two turns, see LaneDither::amplitude_margin_rad().
     const double noise_rad = 8.0 / std::numbers::sqrt2 * s.noise_injection.turn_phase_rms_rad;
     bool driven[2] = {};    // without and with noise injected
     bool inverted[2] = {};  // by a compensator with tables of its own
-    for (const std::string& name : s.arms) {
-        const Arm arm = parse_arm(name);
+    for (const Arm& arm : s.arms) {
         driven[arm.noise_injected] = true;
         inverted[arm.noise_injected] |=
             arm.compensator == Compensator::exact || arm.compensator == Compensator::adaptive;

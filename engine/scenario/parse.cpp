@@ -197,25 +197,23 @@ class Reader {
             return wrong(key, node, fmt::format("must be {}, not {}", allowed_text(key), type_text(node)));
         }
         if (list->empty()) return wrong(key, node, fmt::format("is empty; must be {}", allowed_text(key)));
-        std::vector<std::string> names;
+        std::vector<Arm> arms;
         for (const toml::node& element : *list) {
             if (!element.is_string()) {
                 wrong(key, element, fmt::format("must be the name of an arm, not {}", type_text(element)));
                 continue;
             }
-            const std::string& name = element.as_string()->get();
             try {
-                parse_arm(name);
+                Arm arm = parse_arm(element.as_string()->get());
+                if (std::find(arms.begin(), arms.end(), arm) != arms.end()) {
+                    wrong(key, element, "stands twice; an arm is run once");
+                }
+                arms.push_back(std::move(arm));
             } catch (const InputError& error) {
                 wrong(key, element, error.what());
-                continue;
             }
-            if (std::find(names.begin(), names.end(), name) != names.end()) {
-                wrong(key, element, "stands twice; an arm is run once");
-            }
-            names.push_back(name);
         }
-        key.set(scenario_, names);
+        key.set(scenario_, arms);
     }
 
     void wrong(const Key& key, const toml::node& node, std::string_view problem) {
@@ -281,10 +279,9 @@ class Reader {
     /// Each broken rule is reported at the first of its keys that the file names.
     void apply_rules() {
         for (const Complaint& complaint : check(scenario_)) {
-            const auto named = std::find_if(complaint.keys.begin(), complaint.keys.end(), [this](std::string_view key) {
-                return places_.contains(std::string(key));
-            });
-            const std::string key(named == complaint.keys.end() ? complaint.keys.front() : *named);
+            const auto named = std::find_if(complaint.keys.begin(), complaint.keys.end(),
+                                            [this](const std::string& key) { return places_.contains(key); });
+            const std::string& key = named == complaint.keys.end() ? complaint.keys.front() : *named;
             const auto place = places_.find(key);
             note(place == places_.end() ? toml::source_position{} : place->second,
                  fmt::format("key \"{}\" = {}: {}", key, current_value(key), complaint.problem));

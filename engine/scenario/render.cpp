@@ -65,9 +65,16 @@ std::string_view type_name(Type type) {
     return "list of strings";
 }
 
-nlohmann::ordered_json json_of(const Value& value) {
-    return std::visit([](const auto& v) { return nlohmann::ordered_json(v); }, value);
-}
+struct JsonWriter {
+    nlohmann::ordered_json operator()(const std::vector<Arm>& arms) const {
+        auto names = nlohmann::ordered_json::array();
+        for (const Arm& arm : arms) names.push_back(arm.name);
+        return names;
+    }
+    nlohmann::ordered_json operator()(const auto& value) const { return value; }
+};
+
+nlohmann::ordered_json json_of(const Value& value) { return std::visit(JsonWriter{}, value); }
 
 }  // namespace
 

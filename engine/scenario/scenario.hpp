@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "engine/scenario/arm.hpp"
+
 /// Plain, validated description of a study. Units are in the names; K is arcsec per fringe (2 pi of optical phase).
 namespace ringlock::scenario {
 
@@ -153,9 +155,8 @@ struct Scenario {
     Environment environment;
     EffectSettings effects = default_effect_settings();
     Ensemble ensemble;
-    /// Names that parse_arm() of arm.hpp understands.
-    std::vector<std::string> arms = {"ideal", "uncompensated", "noise_injected", "noise_injected+compensated_published",
-                                     "noise_injected+compensated"};
+    std::vector<Arm> arms = parse_arms({"ideal", "uncompensated", "noise_injected",
+                                        "noise_injected+compensated_published", "noise_injected+compensated"});
     Propagation propagation;
     Output output;
     RecordSettings record;

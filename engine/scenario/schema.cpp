@@ -60,7 +60,7 @@ Key key(std::string section, std::string name, Access access, Bounds bounds, std
                 if (words[i] == std::get<std::string>(v)) access(s) = static_cast<Field>(i);
             }
         };
-    } else if constexpr (std::is_same_v<Field, std::vector<std::string>>) {
+    } else if constexpr (std::is_same_v<Field, std::vector<Arm>>) {
         k.type = Type::arms;
         k.get = [access](const Scenario& s) -> Value { return access(s); };
         k.set = [access](Scenario& s, const Value& v) { access(s) = std::get<Field>(v); };
@@ -347,7 +347,11 @@ std::string to_toml(const Value& value) {
         std::string operator()(std::int64_t v) const { return fmt::format("{}", v); }
         std::string operator()(double v) const { return format_real(v); }
         std::string operator()(const std::string& v) const { return in_quotes(v); }
-        std::string operator()(const std::vector<std::string>& v) const { return fmt::format("[{}]", list_text(v)); }
+        std::string operator()(const std::vector<Arm>& arms) const {
+            std::vector<std::string> names;
+            for (const Arm& arm : arms) names.push_back(arm.name);
+            return fmt::format("[{}]", list_text(names));
+        }
         std::string operator()(const std::vector<double>& v) const {
             std::vector<std::string> items;
             for (const double value : v) items.push_back(format_real(value));

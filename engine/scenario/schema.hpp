@@ -12,7 +12,7 @@
 /// The parser, the printed schema, the page docs/scenario.md and the resolved scenario all come from it.
 namespace ringlock::scenario {
 
-using Value = std::variant<bool, std::int64_t, double, std::string, std::vector<std::string>, std::vector<double>>;
+using Value = std::variant<bool, std::int64_t, double, std::string, std::vector<Arm>, std::vector<double>>;
 
 enum class Type { boolean, integer, real, word, arms, reals };
 
@@ -26,7 +26,7 @@ struct Bounds {
 };
 
 struct Key {
-    std::string section;  ///< "ensemble", "effects.quantum_noise"
+    std::string section;  ///< "ensemble", "effects.NAME"
     std::string name;     ///< with its unit
     Type type;
     Bounds bounds;                   ///< of integers, reals and each of a list of reals

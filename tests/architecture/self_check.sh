@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Shows that the other two can fail: `self_check.sh FOLDER` makes trees in FOLDER/made_up, a clean one that must pass
+# Shows that the others can fail: `self_check.sh FOLDER` makes trees in FOLDER/made_up, a clean one that must pass
 # and, one at a time, faults that must each be found and named.
 set -euo pipefail
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd -P)"
@@ -24,10 +24,10 @@ clean_tree() {
     printf '#include "app/command.hpp"\n' | tee tests/unit/command.cpp >app/main.cpp
 }
 
-# expect STATUS WORDS SCRIPT: SCRIPT on the tree ends with STATUS and its output has WORDS.
+# expect STATUS WORDS SCRIPT ARGUMENT...: SCRIPT on the tree ends with STATUS and its output has WORDS.
 expect() {
     local status=0 output
-    output="$("$here/$3" "$folder" 2>&1)" || status=$?
+    output="$("$here/$3" "$folder" "${@:4}" 2>&1)" || status=$?
     checks=$((checks + 1))
     if [[ $status -ne $1 || $output != *"$2"* ]]; then
         echo "$3: expected status $1 and '$2', got status $status and: $output"
@@ -67,6 +67,23 @@ include_fault "sources are called" engine/gyro/device.h '#pragma once'
 include_fault "room 'engine/attic' has no line" engine/attic/old.cpp '// nothing'
 include_fault "room 'engine' has no line" engine/loose.cpp '// nothing'
 include_fault "is not beside it" engine/ensemble/device.cpp '#include "engine/gyro/device.hpp"'
+
+# name_fault STATUS WORDS LINE: a tree with two effects whose engine/gyro/device.cpp has LINE.
+name_fault() {
+    clean_tree
+    mkdir -p engine/effects
+    printf '#define RINGLOCK_EFFECTS(X) \\\n    X(bias_step) \\\n    X(quantum_noise)\n' >engine/effects/registry.cpp
+    echo 'return "bias_step";' >engine/effects/bias_step.cpp
+    echo "$3" >>engine/gyro/device.cpp
+    expect "$1" "$2" effect_names.sh engine app
+}
+name_fault 0 "call none of 2 effects" '// bias_step, "bias_steps", "a bias_step" and effects::bias_steps are no effects'
+name_fault 1 "engine/gyro/device.cpp:4:" 'if (effect.name() == "bias_step") return;'
+name_fault 1 "engine/gyro/device.cpp:4:" 'return effects::quantum_noise();'
+name_fault 1 "engine/gyro/device.cpp:4:" 'complain("effects.bias_step.time_s");'
+expect 2 "no sources" effect_names.sh engine/attic
+rm engine/effects/registry.cpp
+expect 2 "no effects" effect_names.sh engine
 
 # text_fault STATUS WORDS LINE: a fresh repository whose one file has LINE. Slashes and words are put together here, for
 # this file is read by the same check.

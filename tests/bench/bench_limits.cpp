@@ -27,8 +27,8 @@
 #include "engine/core/units.hpp"
 #include "engine/dither/lane_dither.hpp"
 #include "engine/ensemble/block.hpp"
+#include "engine/ensemble/calibration.hpp"
 #include "engine/ensemble/draw.hpp"
-#include "engine/ensemble/told.hpp"
 #include "engine/gyro/theory.hpp"
 #include "engine/readout/fraction_recovery.hpp"
 #include "engine/scenario/arm.hpp"
@@ -63,7 +63,7 @@ std::string short_name(const std::string& arm) { return arm.substr(arm.find('+')
 /// The study of scenarios/what-limits.toml, with every compensator that there is.
 scenario::Scenario base() {
     scenario::Scenario scenario = scenario::parse_file(RINGLOCK_SOURCE_DIR "/scenarios/what-limits.toml");
-    scenario.arms = li::compensated_arms();
+    scenario.arms = scenario::parse_arms(li::compensated_arms());
     return scenario;
 }
 
@@ -246,7 +246,7 @@ void averaging_times() {
     averaging_time(base());
     fmt::print("\nA record of 8000 s that begins after 4000 s:\n\n");
     scenario::Scenario scenario = base();
-    scenario.arms = {li::exact_arm, li::adaptive_arm};
+    scenario.arms = scenario::parse_arms({li::exact_arm, li::adaptive_arm});
     scenario.ensemble.settle_s = 4000.0;
     scenario.ensemble.duration_s = 8000.0;
     averaging_time(scenario);

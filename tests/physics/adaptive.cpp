@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/ensemble/block.hpp"
-#include "engine/ensemble/told.hpp"
+#include "engine/ensemble/calibration.hpp"
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {

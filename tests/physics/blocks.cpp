@@ -166,7 +166,7 @@ TEST(Ensemble, NamesAGyroThatFailsAndSimulatesTheOthers) {
     auto scenario = quiet();
     scenario.ensemble.gyros = 1;
     scenario.ensemble.duration_s = 1.0;
-    scenario.arms = {"noise_injected+compensated"};
+    scenario.arms = scenario::parse_arms({"noise_injected+compensated"});
     // The last of three rates is more than the dither's peak rate, 392 760 deg/h: its phase does not reverse.
     scenario.input.rate_deg_h = 0.0;
     scenario.input.sweep_stop_deg_h = 400000.0;

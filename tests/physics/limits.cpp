@@ -15,10 +15,10 @@
 namespace ringlock::test {
 namespace {
 
-scenario::Scenario what_limits(std::vector<std::string> arms) {
+scenario::Scenario what_limits(const std::vector<std::string>& arms) {
     scenario::Scenario scenario =
         scenario::parse_file(std::filesystem::path(RINGLOCK_SOURCE_DIR) / "scenarios/what-limits.toml");
-    scenario.arms = std::move(arms);
+    scenario.arms = scenario::parse_arms(arms);
     return scenario;
 }
 
@@ -88,7 +88,7 @@ TEST(Limits, TheAdaptiveCompensatorIsWithinATenthOfTheExactOne) {
     scenario.ensemble.gyros = 32;
     scenario.ensemble.duration_s = 1000.0;
     const limits::Walks exact = limits::walks(scenario);
-    scenario.arms = {limits::adaptive_arm};
+    scenario.arms = scenario::parse_arms({limits::adaptive_arm});
     scenario.calibration.threshold_error_relative = 0.3;
     const limits::Walks adaptive = limits::walks(scenario);
     EXPECT_LE(shown("adaptive, told 30 % too much, over exact",

@@ -25,7 +25,7 @@ Outcome injected(double rms_rad, double rate_deg_h, std::int64_t gyros, double d
     scenario.ensemble.duration_s = duration_s;
     scenario.ensemble.dither_amplitude_sd_relative = 0.0;
     scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
-    scenario.arms = {"noise_injected"};
+    scenario.arms = scenario::parse_arms({"noise_injected"});
     const ensemble::Schedule schedule(scenario);
     std::vector<double> rate(static_cast<std::size_t>(gyros));
     std::vector<double> variance(rate.size());
@@ -38,7 +38,7 @@ Outcome injected(double rms_rad, double rate_deg_h, std::int64_t gyros, double d
                        block.angle_arcsec.begin() + static_cast<std::ptrdiff_t>((g + 1) * samples));
         }
     };
-    study::run(scenario, 2, on_samples);
+    study::run(study::Study(scenario), 2, on_samples);
     for (std::size_t g = 0; g < angle.size(); ++g) {
         const auto& x = angle[g];
         const auto n = static_cast<double>(x.size() - 1);

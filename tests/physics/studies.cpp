@@ -21,7 +21,9 @@ scenario::Scenario from_file(const std::string& name) {
     return scenario::parse_file(std::filesystem::path(RINGLOCK_SOURCE_DIR) / "scenarios" / name);
 }
 
-study::Summary run(const scenario::Scenario& scenario) { return study::summarise(study::run(scenario, 2)); }
+study::Summary run(const scenario::Scenario& scenario) {
+    return study::summarise(study::run(study::Study(scenario), 2));
+}
 
 const study::ArmSummary& arm(const study::Summary& summary, const std::string& name) {
     for (const study::ArmSummary& each : summary.arms) {
@@ -75,8 +77,8 @@ TEST(Scenarios, GaoDengTable1TurnsItsErrorsRound) {
     double worst = 0.0;
     std::int64_t moved = 0;
     std::mutex mutex;
-    const study::Study study = study::run(scenario, 2, [&](const study::SampledAngles& samples) {
-        if (scenario.arms[samples.arm].starts_with("compensated")) return;  // less a correction that is no count
+    const study::Study study = study::run(study::Study(scenario), 2, [&](const study::SampledAngles& samples) {
+        if (scenario.arms[samples.arm].name.starts_with("compensated")) return;  // less a correction that is no count
         const std::lock_guard lock(mutex);
         const std::size_t length = samples.angle_arcsec.size() / samples.gyros;
         for (std::size_t gyro = 0; gyro < samples.gyros; ++gyro) {
@@ -110,7 +112,7 @@ TEST(Scenarios, GaoDengCoefficientsAreAlikeAtAllRates) {
     scenario.input.sweep_points = 3;
     scenario.ensemble.gyros = 16;
     scenario.ensemble.duration_s = 120.0;
-    const study::Study study = study::run(scenario, 2);
+    const study::Study study = study::run(study::Study(scenario), 2);
     const study::Summary summary = study::summarise(study);
     const study::Figure& injected = arm(summary, "noise_injected").arw_deg_rt_h;
     const study::Figure& published = arm(summary, "noise_injected+compensated_published").arw_deg_rt_h;
@@ -158,7 +160,7 @@ TEST(Scenarios, TheStaircaseIsTheOneOfTheClosedForm) {
     EXPECT_EQ(scenario.input.sweep_points, 1351);
     // Each tenth rate: the same range, 1 deg/h apart, gives the figures of its answer to 1 deg/h.
     scenario.input.sweep_points = 136;
-    const study::Study study = study::run(scenario, 2);
+    const study::Study study = study::run(study::Study(scenario), 2);
     const study::Summary summary = study::summarise(study);
     const study::ArmSummary& plain = arm(summary, "uncompensated");
     // N cycles gain N rotation numbers within a fringe; the readings are 1e-3 fringes off the turns.
@@ -185,7 +187,7 @@ TEST(Scenarios, TheRateSweepShortensToItsAnswer) {
     EXPECT_EQ(scenario.input.sweep_stop_deg_h, 500.0);
     scenario.input.sweep_points = 18;
     scenario.ensemble.duration_s = 30.0;
-    const study::Study study = study::run(scenario, 2);
+    const study::Study study = study::run(study::Study(scenario), 2);
     const study::Summary summary = study::summarise(study);
     const double duration_s = study.schedule.sample_interval_s * static_cast<double>(study.schedule.samples - 1);
     double squares = 0.0;
@@ -256,8 +258,8 @@ TEST(LongScenarios, WhatIdealReadoutLeavesIsOfTheInjectedNoiseNotOfTables) {
         scenario.ensemble.duration_s = 7200.0;
         scenario.noise_injection.turn_phase_rms_rad = turn_phase_rms_rad;
         scenario.propagation.turn_map_tolerance_rad = tolerance_rad;
-        scenario.arms = {"noise_injected+compensated_exact"};
-        const study::Study study = study::run(scenario, 2);
+        scenario.arms = scenario::parse_arms({"noise_injected+compensated_exact"});
+        const study::Study study = study::run(study::Study(scenario), 2);
         for (const study::EnsemblePoint& point : study::summarise(study).arms[0].allan) {
             if (point.tau_s < 250.0) continue;
             std::printf(
@@ -309,7 +311,7 @@ TEST(Scenarios, TheDirectIntegratorGivesTheSameStudyAsTheTurnMap) {
             ASSERT_EQ((*map)[g].counts[a].size(), (*direct)[g].counts[a].size());
             for (std::size_t i = 0; i < (*map)[g].counts[a].size(); ++i) {
                 EXPECT_NEAR((*map)[g].angle_arcsec(a, i), (*direct)[g].angle_arcsec(a, i), 1e-8)
-                    << scenario.arms[a] << " cycle " << i;
+                    << scenario.arms[a].name << " cycle " << i;
             }
         }
     }
@@ -319,7 +321,7 @@ TEST(Scenarios, ADriftingThresholdShowsInTheRandomWalk) {
     // The random walk goes with the threshold: 20 % more after 10 K, so that its square over the run has the mean of
     // (1 + 0.2 x)^2 over x from 0 to 1. 16 gyros of 600 samples each: 0.7 % of the random walk.
     scenario::Scenario scenario;
-    scenario.arms = {"noise_injected"};
+    scenario.arms = scenario::parse_arms({"noise_injected"});
     scenario.noise_injection.turn_phase_rms_rad = 4.0;
     scenario.ensemble.gyros = 16;
     const double still = *run(scenario).arms[0].arw_deg_rt_h.median;
@@ -341,9 +343,9 @@ TEST(Studies, AnglesBetweenTwoSamplesMayBeMoreThanCountsHold) {
     scenario.ensemble.duration_s = 7200.0;
     scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
     scenario.output.sample_interval_s = 2400.0;
-    scenario.arms = {"ideal"};
+    scenario.arms = scenario::parse_arms({"ideal"});
     std::vector<double> angle_arcsec;
-    const study::Study study = study::run(scenario, 1, [&](const study::SampledAngles& samples) {
+    const study::Study study = study::run(study::Study(scenario), 1, [&](const study::SampledAngles& samples) {
         angle_arcsec.insert(angle_arcsec.end(), samples.angle_arcsec.begin(), samples.angle_arcsec.end());
     });
     // A fringe is 1e-3 arcsec.
@@ -360,14 +362,14 @@ TEST(Studies, TheSizeOfTheResultIsKnownBeforehand) {
     scenario.ensemble.duration_s = 3.1;
     scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
     scenario.readout.model = scenario::ReadoutModel::ideal;
-    scenario.arms = {"ideal", "uncompensated"};
+    scenario.arms = scenario::parse_arms({"ideal", "uncompensated"});
     const TemporaryDirectory directory;
     for (const bool record : {false, true}) {
         scenario.output.angle_record = record;
         const auto path = directory / (record ? "with.h5" : "without.h5");
         study::ResultWriter writer(path, study::Study(scenario));
-        const study::Study study =
-            study::run(scenario, 2, [&](const study::SampledAngles& samples) { writer.write_samples(samples); });
+        const study::Study study = study::run(
+            study::Study(scenario), 2, [&](const study::SampledAngles& samples) { writer.write_samples(samples); });
         store::Provenance provenance;
         writer.finish(study, study::summarise(study), provenance);
         // Names, units and descriptions of some hundred objects come on top.
@@ -408,7 +410,7 @@ TEST(Claims, NoBiasInstabilityWithoutFlickerHoweverWellTheTurnsAreRandomised) {
 TEST(Claims, BiasInstabilityIsFoundWhereThereIsFlicker) {
     scenario::Scenario scenario;
     scenario.effects["bias_instability"]["deg_h"] = 0.05;
-    scenario.arms = {"ideal", "noise_injected+compensated"};
+    scenario.arms = scenario::parse_arms({"ideal", "noise_injected+compensated"});
     scenario.ensemble.gyros = 16;
     scenario.ensemble.duration_s = 400.0;
     const study::Summary summary = run(scenario);
@@ -422,7 +424,7 @@ TEST(Claims, TheQuantumNoiseFloorIsWhatACorrectedGyroIsLeftWith) {
     scenario::Scenario scenario;
     scenario.effects["quantum_noise"]["deg_rt_h"] = 3e-4;
     scenario.readout.model = scenario::ReadoutModel::ideal;
-    scenario.arms = {"noise_injected+compensated"};
+    scenario.arms = scenario::parse_arms({"noise_injected+compensated"});
     scenario.ensemble.gyros = 16;
     scenario.ensemble.duration_s = 200.0;
     const study::Figure arw = run(scenario).arms.at(0).arw_deg_rt_h;
@@ -434,7 +436,7 @@ TEST(Claims, ALimitOfARecordTooShortIsAboveTheRandomWalkThatIsThere) {
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
         scenario::Scenario scenario;
         scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
-        scenario.arms = {"noise_injected"};
+        scenario.arms = scenario::parse_arms({"noise_injected"});
         scenario.ensemble.gyros = 16;
         scenario.ensemble.duration_s = 15.0;
         scenario.ensemble.seed = seed;
@@ -452,7 +454,7 @@ TEST(Claims, AGyroWithoutLockInHasNoRandomWalkOnlyALimit) {
     scenario.gyro.lockin_threshold_deg_h = 0.0;
     scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
     scenario.readout.model = scenario::ReadoutModel::ideal;
-    scenario.arms = {"noise_injected"};
+    scenario.arms = scenario::parse_arms({"noise_injected"});
     scenario.ensemble.gyros = 4;
     scenario.ensemble.duration_s = 60.0;
     const study::Figure arw = run(scenario).arms.at(0).arw_deg_rt_h;
@@ -465,10 +467,10 @@ TEST(Claims, ALimitCountsTheKicksThatSingleCyclesDoNotSee) {
     scenario::Scenario scenario;
     scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
     scenario.readout.model = scenario::ReadoutModel::ideal;
-    scenario.arms = {"noise_injected"};
+    scenario.arms = scenario::parse_arms({"noise_injected"});
     scenario.ensemble.gyros = 64;
     scenario.ensemble.duration_s = 30.0;
-    study::Study study = study::run(scenario, 2);
+    study::Study study = study::run(study::Study(scenario), 2);
     // Single cycles show 5/8 of the variance.
     double variance = 0.0;
     for (const study::GyroStatistics& gyro : study.arms[0].gyros) {

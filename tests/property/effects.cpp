@@ -59,7 +59,7 @@ Scenario plain(RandomScenarios& random) {
     scenario.readout.model = scenario::ReadoutModel::ideal;
     scenario.readout.angle_output = scenario::AngleOutput::interpolated;
     scenario.environment.temperature_ramp_k_per_h = random.uniform(-1000.0, 1000.0);
-    scenario.arms = {"ideal"};
+    scenario.arms = scenario::parse_arms({"ideal"});
     return scenario;
 }
 
@@ -85,7 +85,7 @@ TEST(EffectProperty, OutputsMoveByTheAngleThatAnEffectSaysItAdds) {
             const double change_k = scenario::temperature_change_k(without.environment, time_s);
             const double rate = base.setup.input_rate_deg_h;
             const double expected =
-                effect->added_angle(with.effects[name])({0.0, time_s, {0.0, change_k}, {rate, rate}});
+                effect->change(with.effects[name])({0.0, time_s, {0.0, change_k}, {rate, rate}}).angle_arcsec;
             // Rounding of some hundred half cycles.
             ASSERT_NEAR(moved.angle_arcsec(0, k) - base.angle_arcsec(0, k), expected, 1e-9 + 1e-12 * std::abs(expected))
                 << name << " minimum " << k << "\n"
@@ -101,7 +101,7 @@ TEST(EffectProperty, AScaleFactorErrorIsAnotherScaleFactorButForTheSwingOfTheDit
     for (int i = 0; i < 4; ++i) {
         constexpr double relative = 1e-3;
         Scenario erring = plain(random);
-        erring.arms = {"uncompensated"};
+        erring.arms = scenario::parse_arms({"uncompensated"});
         Scenario other = erring;
         erring.effects["scale_factor_error"]["relative"] = relative;
         other.gyro.scale_factor_arcsec /= 1.0 + relative;
@@ -123,7 +123,7 @@ struct Counted {
 };
 
 Counted count(const Scenario& scenario) {
-    const auto arms = test::parsed({"uncompensated"});
+    const auto arms = scenario::parse_arms({"uncompensated"});
     ensemble::GyroBlock block(scenario, arms, 1, 1);
     Counted out;
     for (int piece = 0; piece < 8; ++piece) {
@@ -197,7 +197,7 @@ TEST(EffectProperty, MissedCountsAreTheSameOnAllInstructionSets) {
     RandomScenarios random(26);
     for (int i = 0; i < 3; ++i) {
         Scenario scenario = random.next();
-        scenario.arms = test::served_arms(scenario);
+        scenario.arms = scenario::parse_arms(test::served_arms(scenario));
         scenario.noise_injection.turn_phase_rms_rad = 1.0;
         scenario.effects["missed_counts"]["probability_per_turn"] = 0.05;
         const GyroRecord best = simulate(scenario, 1);

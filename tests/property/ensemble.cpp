@@ -17,7 +17,6 @@ namespace {
 
 using scenario::Scenario;
 using test::GyroRecord;
-using test::parsed;
 using test::RandomScenarios;
 using test::served_arms;
 using test::simulate;
@@ -49,18 +48,18 @@ TEST(EnsembleProperty, AnArmDoesNotKnowWhichOthersAreRun) {
     RandomScenarios random(2);
     for (int i = 0; i < scenarios; ++i) {
         Scenario scenario = random.next();
-        scenario.arms = served_arms(scenario);
+        scenario.arms = scenario::parse_arms(served_arms(scenario));
         scenario.noise_injection.turn_phase_rms_rad = 1.0;
         const GyroRecord all = simulate(scenario, 1);
         Scenario part = scenario;
-        part.arms = random.arms(scenario);
+        part.arms = scenario::parse_arms(random.arms(scenario));
         const GyroRecord some = simulate(part, 1);
         EXPECT_TRUE(same(all.setup, some.setup)) << "arms share what was drawn";
         for (std::size_t arm = 0; arm < part.arms.size(); ++arm) {
             const auto at = std::find(scenario.arms.begin(), scenario.arms.end(), part.arms[arm]);
             ASSERT_NE(at, scenario.arms.end());
             EXPECT_EQ(some.counts[arm], all.counts[static_cast<std::size_t>(at - scenario.arms.begin())])
-                << part.arms[arm] << "\n"
+                << part.arms[arm].name << "\n"
                 << to_toml(part);
         }
     }
@@ -86,7 +85,7 @@ TEST(EnsembleProperty, InstructionSetsGiveTheSameBits) {
     RandomScenarios random(8);
     for (int i = 0; i < 4; ++i) {
         Scenario scenario = random.next();
-        scenario.arms = served_arms(scenario);
+        scenario.arms = scenario::parse_arms(served_arms(scenario));
         scenario.noise_injection.turn_phase_rms_rad = 3.0;
         const GyroRecord best = simulate(scenario, 1);
         for (const std::string& target : simd::available_targets()) {
@@ -136,15 +135,14 @@ TEST(EnsembleProperty, WithoutLockInAllArmsAreTheIdealOne) {
         scenario.readout.model = scenario::ReadoutModel::ideal;
         scenario.readout.angle_output = scenario::AngleOutput::interpolated;
         scenario.noise_injection.turn_phase_rms_rad = 1.0;
-        scenario.arms = served_arms(scenario);
-        std::erase_if(scenario.arms, [](const std::string& name) {
-            return scenario::parse_arm(name).compensator == scenario::Compensator::extrapolated;
-        });
+        scenario.arms = scenario::parse_arms(served_arms(scenario));
+        std::erase_if(scenario.arms,
+                      [](const scenario::Arm& arm) { return arm.compensator == scenario::Compensator::extrapolated; });
         const GyroRecord record = simulate(scenario, 0);
         for (std::size_t arm = 1; arm < scenario.arms.size(); ++arm) {
             for (std::size_t k = 0; k < record.counts[0].size(); ++k) {
                 ASSERT_NEAR(record.angle_arcsec(arm, k), record.angle_arcsec(0, k), 1e-9)
-                    << scenario.arms[arm] << " sample " << k << "\n"
+                    << scenario.arms[arm].name << " sample " << k << "\n"
                     << to_toml(scenario);
             }
         }

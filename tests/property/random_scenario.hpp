@@ -69,7 +69,7 @@ class RandomScenarios {
             s.ensemble.seed = static_cast<std::uint64_t>(whole(0, 1'000'000));
             s.ensemble.lockin_threshold_sd_relative = uniform(0.0, 0.1);
             s.output.sample_interval_s = uniform(0.05, 0.3);
-            s.arms = arms(s);
+            s.arms = scenario::parse_arms(arms(s));
             if (scenario::check(s).empty()) return s;
         }
     }
@@ -77,11 +77,5 @@ class RandomScenarios {
    private:
     std::mt19937_64 engine_;
 };
-
-inline std::vector<scenario::Arm> parsed(const std::vector<std::string>& names) {
-    std::vector<scenario::Arm> arms;
-    for (const std::string& name : names) arms.push_back(scenario::parse_arm(name));
-    return arms;
-}
 
 }  // namespace ringlock::test

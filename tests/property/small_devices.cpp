@@ -44,7 +44,7 @@ Scenario small_device(RandomScenarios& random, double fringes, double kick_rad) 
     }
     if (random.coin()) s.effects["base_vibration"]["rate_deg_h"] = random.uniform(0.0, 1e4);
     if (random.coin()) s.effects["quantum_noise"]["deg_rt_h"] = random.uniform(0.0, 0.1);
-    s.arms = {"uncompensated", "noise_injected+compensated_exact"};
+    s.arms = scenario::parse_arms({"uncompensated", "noise_injected+compensated_exact"});
     // Wide tables need many nodes to a fine tolerance, and are refused for that; here it is the map that is asked
     // after.
     s.propagation.turn_map_tolerance_rad = 1e-4;
@@ -89,7 +89,7 @@ TEST(SmallDevices, AreRefusedJustWhereTheTurnMapEnds) {
         s.effects = scenario::default_effect_settings();
         s.effects["quantum_noise"]["deg_rt_h"] = 0.0;
         s.effects["dither_second_harmonic"] = {{"ratio", random.uniform(-0.1, 0.1)}, {"phase_rad", 0.4}};
-        s.arms = {"uncompensated"};
+        s.arms = scenario::parse_arms({"uncompensated"});
         double runs = 0.0;
         double fails = 0.499 * s.dither.peak_rate_deg_s * units::deg_h_per_deg_s;
         const auto refused = [&](double rate) {

@@ -25,13 +25,12 @@ struct GyroRecord {
 class GyroRecords {
    public:
     GyroRecords(scenario::Scenario scenario, std::size_t gyros) : scenario_(std::move(scenario)), records_(gyros) {
-        for (const std::string& name : scenario_.arms) arms_.push_back(scenario::parse_arm(name));
-        for (GyroRecord& record : records_) record.counts.resize(arms_.size());
+        for (GyroRecord& record : records_) record.counts.resize(scenario_.arms.size());
     }
 
     void run(std::int64_t first, std::int64_t last, int threads) {
         ensemble::run(
-            scenario_, arms_, first, last, threads,
+            scenario_, scenario_.arms, first, last, threads,
             [this](std::int64_t gyro, std::size_t gyros) { return std::make_unique<Sink>(*this, gyro, gyros); }, {});
     }
     const GyroRecord& operator[](std::int64_t gyro) const { return records_[static_cast<std::size_t>(gyro)]; }
@@ -60,7 +59,6 @@ class GyroRecords {
     };
 
     scenario::Scenario scenario_;
-    std::vector<scenario::Arm> arms_;
     std::vector<GyroRecord> records_;
     std::mutex mutex_;
 };

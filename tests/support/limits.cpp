@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "engine/core/units.hpp"
+#include "engine/ensemble/calibration.hpp"
 #include "engine/ensemble/draw.hpp"
-#include "engine/ensemble/told.hpp"
 #include "engine/gyro/device.hpp"
 #include "engine/scenario/arm.hpp"
 
@@ -47,7 +47,7 @@ std::size_t Walks::index(const std::string& arm) const {
 }
 
 Walks walks(const scenario::Scenario& scenario) {
-    const study::Study study = study::run(scenario, 2);
+    const study::Study study = study::run(study::Study(scenario), 2);
     Walks walks;
     for (const study::ArmStatistics& arm : study.arms) {
         walks.arms.push_back(arm.arm.name);

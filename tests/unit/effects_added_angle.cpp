@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -61,9 +62,27 @@ TEST(AddedAngles, AreTheIntegralsOfTheStatedRates) {
                 const double t = from + (i + 0.5) * (to - from) / steps;
                 expected += s.rate_deg_h(t, 3.0 - 0.25 * t, -40.0 + 6.0 * t) * (to - from) / steps;
             }
-            EXPECT_NEAR(find(s.name)->added_angle(s.values)(between(from, to)), expected, 1e-6)
+            EXPECT_NEAR(find(s.name)->change(s.values)(between(from, to)).angle_arcsec, expected, 1e-6)
                 << s.name << " from " << from << " to " << to;
         }
+    }
+}
+
+// 20 s under a temperature of 3 K to -2 K and a rate of -40 to 80 deg/h: no rate is faster than its bound, and some
+// are as fast, which an effect that leaves its bound at zero is not.
+TEST(AddedAngles, StayWithinTheirBounds) {
+    const Exposure exposure{20.0 / 3600.0, 3.0, 0.25 * 3600.0, 80.0};
+    for (const Stated& s : stated()) {
+        const Effect& effect = *find(s.name);
+        const double bound = effect.bounds(s.values, exposure).rate_deg_h;
+        double fastest = 0.0;
+        for (int i = 0; i < 20000; ++i) {
+            const Interval at = between(1e-3 * i, 1e-3 * (i + 1));
+            fastest = std::max(fastest, std::abs(effect.change(s.values)(at).angle_arcsec) / at.duration_s);
+        }
+        EXPECT_LE(fastest, bound * (1.0 + 1e-12)) << s.name;
+        EXPECT_GE(fastest, 0.99 * bound) << s.name;
+        EXPECT_GT(bound, 0.0) << s.name;
     }
 }
 
@@ -76,10 +95,10 @@ TEST(AddedAngles, OfIntervalsThatFollowEachOtherAddUp) {
         double t = 0.0;
         for (int i = 0; i < 200; ++i) {
             const double next = t + length(engine);
-            sum += effect.added_angle(s.values)(between(t, next));
+            sum += effect.change(s.values)(between(t, next)).angle_arcsec;
             t = next;
         }
-        const double whole = effect.added_angle(s.values)(between(0.0, t));
+        const double whole = effect.change(s.values)(between(0.0, t)).angle_arcsec;
         EXPECT_NEAR(sum, whole, 1e-12 * (1.0 + std::abs(whole))) << s.name;  // rounding
     }
 }
@@ -92,9 +111,9 @@ TEST(AddedAngles, AreProportionalToTheSize) {
             Values twice = s.values;
             twice.at(std::string(p.name)) *= 2.0;
             const Interval at = between(10.0, 10.5);
-            EXPECT_EQ(effect.added_angle(twice)(at), 2.0 * effect.added_angle(s.values)(at)) << s.name;
+            EXPECT_EQ(effect.change(twice)(at).angle_arcsec, 2.0 * effect.change(s.values)(at).angle_arcsec) << s.name;
             twice.at(std::string(p.name)) = 0.0;
-            EXPECT_EQ(effect.added_angle(twice)(at), 0.0) << s.name;
+            EXPECT_EQ(effect.change(twice)(at).angle_arcsec, 0.0) << s.name;
         }
     }
 }
@@ -102,16 +121,16 @@ TEST(AddedAngles, AreProportionalToTheSize) {
 TEST(BiasStep, ActsFromItsTimeOnAndInPartOfTheIntervalItFallsInto) {
     const Values values = {{"step_deg_h", 2.0}, {"time_s", 10.0}};
     const Effect& effect = *find("bias_step");
-    EXPECT_EQ(effect.added_angle(values)({.start_s = 0.0, .duration_s = 9.0}), 0.0);
-    EXPECT_DOUBLE_EQ(effect.added_angle(values)({.start_s = 9.0, .duration_s = 4.0}), 6.0);
-    EXPECT_DOUBLE_EQ(effect.added_angle(values)({.start_s = 13.0, .duration_s = 1.0}), 2.0);
+    EXPECT_EQ(effect.change(values)({.start_s = 0.0, .duration_s = 9.0}).angle_arcsec, 0.0);
+    EXPECT_DOUBLE_EQ(effect.change(values)({.start_s = 9.0, .duration_s = 4.0}).angle_arcsec, 6.0);
+    EXPECT_DOUBLE_EQ(effect.change(values)({.start_s = 13.0, .duration_s = 1.0}).angle_arcsec, 2.0);
 }
 
 TEST(BiasRamp, GrowsWithTheSquareOfTime) {
     const Values values = {{"deg_h_per_h", 3600.0}};  // 1 arcsec/s^2
     const Effect& effect = *find("bias_ramp");
-    EXPECT_DOUBLE_EQ(effect.added_angle(values)({.start_s = 0.0, .duration_s = 2.0}), 2.0);
-    EXPECT_DOUBLE_EQ(effect.added_angle(values)({.start_s = 2.0, .duration_s = 2.0}), 6.0);
+    EXPECT_DOUBLE_EQ(effect.change(values)({.start_s = 0.0, .duration_s = 2.0}).angle_arcsec, 2.0);
+    EXPECT_DOUBLE_EQ(effect.change(values)({.start_s = 2.0, .duration_s = 2.0}).angle_arcsec, 6.0);
 }
 
 TEST(BaseVibration, IsTheIntegralOfTheLine) {
@@ -121,15 +140,15 @@ TEST(BaseVibration, IsTheIntegralOfTheLine) {
     const double w = 2.0 * std::numbers::pi * f;
     for (const auto& [start, duration] : {std::pair{0.0, 0.004}, {0.004, 0.011}, {0.015, 1.0}}) {
         const double expected = 5.0 / w * (std::cos(w * start + phase) - std::cos(w * (start + duration) + phase));
-        EXPECT_NEAR(find("base_vibration")->added_angle(values)({.start_s = start, .duration_s = duration}), expected,
-                    1e-14);
+        EXPECT_NEAR(find("base_vibration")->change(values)({.start_s = start, .duration_s = duration}).angle_arcsec,
+                    expected, 1e-14);
     }
 }
 
 TEST(BaseVibration, AddsUpToTheSameAngleLateInALongRun) {
     const Values values = {{"frequency_hz", 10.0}, {"rate_deg_h", 1.0}, {"phase_rad", 0.0}};
     // A quarter of a period: the integral is A/(2 pi f).
-    EXPECT_NEAR(find("base_vibration")->added_angle(values)({.start_s = 1e7, .duration_s = 0.025}),
+    EXPECT_NEAR(find("base_vibration")->change(values)({.start_s = 1e7, .duration_s = 0.025}).angle_arcsec,
                 1.0 / (20.0 * std::numbers::pi), 1e-9);
 }
 

@@ -55,7 +55,14 @@ TEST(EffectRegistry, AnEffectAtItsDefaultsAddsNoAngle) {
             EXPECT_EQ(process->angle_arcsec(0.0, 10.0), 0.0) << effect->name();
         }
         const Interval warm{0.0, 10.0, {1.0, 2.0}, {15.0, 30.0}};
-        EXPECT_EQ(effect->added_angle(defaults_of(*effect))(warm), 0.0) << effect->name();
+        const Change change = effect->change(defaults_of(*effect))(warm);
+        EXPECT_EQ(change.angle_arcsec, 0.0) << effect->name();
+        EXPECT_EQ(change.threshold_factor, 1.0) << effect->name();
+        EXPECT_EQ(change.coupling_phase_rad, 0.0) << effect->name();
+        const Bounds bounds = effect->bounds(defaults_of(*effect), {10.0, 100.0, 100.0, 1e4});
+        EXPECT_EQ(bounds.rate_deg_h, 0.0) << effect->name();
+        EXPECT_EQ(bounds.threshold_relative, 0.0) << effect->name();
+        EXPECT_EQ(bounds.coupling_phase_rad, 0.0) << effect->name();
         EXPECT_EQ(angle_variance_arcsec2(effect->rate_noise(defaults_of(*effect)), 10.0), 0.0) << effect->name();
     }
 }
@@ -111,14 +118,15 @@ TEST(SecondHarmonics, APhaseAloneDoesNothing) {
 
 TEST(Effects, TheThresholdFollowsTheTemperature) {
     const Effect& effect = *find("lockin_temperature");
-    EXPECT_DOUBLE_EQ(effect.threshold_factor({{"relative_per_k", 0.02}}, 10.0), 1.2);
-    EXPECT_DOUBLE_EQ(effect.threshold_factor({{"relative_per_k", -0.02}}, 10.0), 0.8);
-    EXPECT_EQ(effect.threshold_factor({{"relative_per_k", 0.02}}, 0.0), 1.0);
-    for (const Effect* other : registry()) {
-        if (other != &effect) {
-            EXPECT_EQ(other->threshold_factor(defaults_of(*other), 10.0), 1.0) << other->name();
-        }
-    }
+    const auto factor = [&](double relative_per_k, double change_k) {
+        return effect.change({{"relative_per_k", relative_per_k}})({9.0, 0.0, {change_k, change_k}, {}})
+            .threshold_factor;
+    };
+    EXPECT_DOUBLE_EQ(factor(0.02, 10.0), 1.2);
+    EXPECT_DOUBLE_EQ(factor(-0.02, 10.0), 0.8);
+    EXPECT_EQ(factor(0.02, 0.0), 1.0);
+    EXPECT_DOUBLE_EQ(effect.bounds({{"relative_per_k", -0.02}}, {.temperature_change_k = 10.0}).threshold_relative,
+                     0.2);
 }
 
 TEST(MissedCounts, SetTheProbability) {

@@ -223,8 +223,8 @@ TEST(SimulatedRecord, AStudySeesTheSameProfileAndAmplitudes) {
     s.input.profile_rate_deg_h = {-1000.0, 3600.0, 50.0};
     s.dither.amplitude_wander_relative_rt_s = 1e-3;
     s.readout.model = scenario::ReadoutModel::ideal;
-    s.arms = {"ideal", "noise_injected+compensated_exact"};
-    const study::Study study = study::run(s, 1);
+    s.arms = scenario::parse_arms({"ideal", "noise_injected+compensated_exact"});
+    const study::Study study = study::run(study::Study(s), 1);
     for (const study::ArmStatistics& arm : study.arms) {
         for (const study::GyroStatistics& gyro : arm.gyros) {
             // Half a cycle's change of rate over the run; what the compensator leaves is far less.
@@ -278,7 +278,7 @@ TEST(SimulatedRecord, RefusesWhatCannotBe) {
     Scenario s = short_run();
     EXPECT_THAT(test::message_of<InputError>([&] { simulate_record(s, 3); }), HasSubstr("0 to 2"));
     s.noise_injection.turn_phase_rms_rad = 2000.0;
-    s.arms = {"uncompensated"};
+    s.arms = scenario::parse_arms({"uncompensated"});
     EXPECT_THAT(test::message_of<InputError>([&] { simulate_record(s); }), HasSubstr("record.trajectory"));
     s = short_run();
     s.ensemble.duration_s = 1e9;

@@ -51,7 +51,7 @@ bool same(const gyro::Setup& a, const gyro::Setup& b) {
 
 TEST_F(ResultFile, GivesTheStudyBack) {
     scenario::Scenario scenario = small(true);
-    scenario.arms = {"ideal", "noise_injected", "noise_injected+compensated"};
+    scenario.arms = scenario::parse_arms({"ideal", "noise_injected", "noise_injected+compensated"});
     scenario.input = {.rate_deg_h = 1.0, .sweep_stop_deg_h = 2.0, .sweep_points = 2};
     ResultWriter writer(path_, Study(scenario));
     std::vector<double> record;                                       // of gyro 4 in the first arm
@@ -63,7 +63,7 @@ TEST_F(ResultFile, GivesTheStudyBack) {
         record.insert(record.end(), samples.angle_arcsec.begin() + row * count,
                       samples.angle_arcsec.begin() + (row + 1) * count);
     };
-    const Study study = run(scenario, 1, on_samples);
+    const Study study = run(Study(scenario), 1, on_samples);
     store::Provenance provenance = store::collect_provenance({}, 1, "small.toml");
     provenance.wall_s = 1.5;
     writer.finish(study, summarise(study), provenance);
@@ -115,7 +115,7 @@ TEST_F(ResultFile, GivesTheStudyBack) {
 
 TEST_F(ResultFile, GivesClosedFormsBackWhereTheDriveRepeatsItself) {
     scenario::Scenario scenario = small(false);
-    scenario.arms = {"ideal", "uncompensated", "compensated", "noise_injected"};
+    scenario.arms = scenario::parse_arms({"ideal", "uncompensated", "compensated", "noise_injected"});
     scenario.input = {.rate_deg_h = 1.0, .sweep_stop_deg_h = 15.0, .sweep_points = 2};
     const auto read = [&] {
         fs::remove(path_);

@@ -22,15 +22,15 @@ inline scenario::Scenario small(bool angle_record, std::uint64_t seed = 5) {
     scenario.ensemble.seed = seed;
     scenario.ensemble.lockin_threshold_sd_relative = 0.01;
     scenario.output.angle_record = angle_record;
-    scenario.arms = {"uncompensated", "noise_injected+compensated"};
+    scenario.arms = scenario::parse_arms({"uncompensated", "noise_injected+compensated"});
     scenario.effects["quantum_noise"]["deg_rt_h"] = 0.001;
     return scenario;
 }
 
 inline void write(const std::filesystem::path& path, const scenario::Scenario& scenario) {
     study::ResultWriter writer(path, study::Study(scenario));
-    const study::Study study =
-        study::run(scenario, 2, [&](const study::SampledAngles& samples) { writer.write_samples(samples); });
+    const study::Study study = study::run(study::Study(scenario), 2,
+                                          [&](const study::SampledAngles& samples) { writer.write_samples(samples); });
     writer.finish(study, study::summarise(study), store::collect_provenance({}, 2, "small.toml"));
 }
 

@@ -59,7 +59,7 @@ TEST(ScenarioText, SetsWhatItNames) {
     EXPECT_EQ(s.ensemble.seed, 9223372036854775807U);
     EXPECT_EQ(s.effects.at("bias_step").at("step_deg_h"), -0.5);
     EXPECT_EQ(s.effects.at("bias_step").at("time_s"), 0.0);
-    EXPECT_EQ(s.arms, (std::vector<std::string>{"ideal", "compensated"}));
+    EXPECT_EQ(s.arms, parse_arms({"ideal", "compensated"}));
     EXPECT_FALSE(s.output.angle_record);
     EXPECT_EQ(s.propagation.method, PropagationMethod::direct);
 }

@@ -57,7 +57,7 @@ Value random_value(const Key& key, Random& random) {
     std::vector<std::string> names = arm_names();
     std::shuffle(names.begin(), names.end(), random);
     names.resize(1 + below(random, names.size()));
-    return names;
+    return parse_arms(names);
 }
 
 TEST(ScenarioProperty, ResolvedTextParsesBackToAnEqualScenario) {

@@ -160,6 +160,33 @@ TEST(ScenarioRules, TheTurnMapNeedsFastMiddles) {
     EXPECT_THAT(complaint(weak + "[effects.base_vibration]\nrate_deg_h = 5000"), HasSubstr("runs fast"));
 }
 
+// Every effect that adds a rate takes from the dither, and so does the input's profile; a run would fail.
+TEST(ScenarioRules, AllRatesTakeFromTheFastMiddles) {
+    const std::string slow = "[dither]\npeak_rate_deg_s = 20\n[ensemble]\nduration_s = 3000\n";
+    EXPECT_EQ(complaint(slow), "");
+    EXPECT_THAT(complaint(slow + "[effects.bias_ramp]\ndeg_h_per_h = 1e5"),
+                AllOf(HasSubstr("s.toml:6:15: key \"effects.bias_ramp.deg_h_per_h\""), HasSubstr("runs fast")));
+    EXPECT_THAT(complaint(slow + "[effects.bias_temperature]\ndeg_h_per_k = 100\n"
+                                 "[environment]\ntemperature_ramp_k_per_h = 1000"),
+                AllOf(HasSubstr("s.toml:6:15: key \"effects.bias_temperature.deg_h_per_k\""), HasSubstr("runs fast")));
+    // Of a rate of 0.4 of the dither's peak a tenth is added; tables leave twice that for it.
+    const std::string fast = "[dither]\npeak_rate_deg_s = 10\n[input]\nrate_deg_h = 14500\n";
+    EXPECT_EQ(complaint(fast), "");
+    EXPECT_THAT(complaint(fast + "[effects.scale_factor_error]\nrelative = 0.1"), HasSubstr("runs fast"));
+}
+
+TEST(ScenarioRules, AProfileTakesFromTheFastMiddlesLikeAConstantRate) {
+    const std::string slow = "[dither]\npeak_rate_deg_s = 10\n[input]\n";
+    EXPECT_THAT(complaint(slow + "rate_deg_h = 17280"),
+                AllOf(HasSubstr("s.toml:4:14: key \"input.rate_deg_h\""), HasSubstr("runs fast")));
+    EXPECT_THAT(
+        complaint(slow + "profile_time_s = [0, 600]\nprofile_rate_deg_h = [0, 17280]"),
+        AllOf(HasSubstr("s.toml:5:22: key \"input.profile_rate_deg_h\" = [0.0, 17280.0]"), HasSubstr("runs fast")));
+    EXPECT_THAT(complaint(slow + "profile_time_s = [0, 600]\nprofile_rate_deg_h = [-17280, 0]"),
+                HasSubstr("runs fast"));
+    EXPECT_EQ(complaint(slow + "profile_time_s = [0, 600]\nprofile_rate_deg_h = [0, 5000]"), "");
+}
+
 TEST(ScenarioRules, InjectedNoiseLeavesTheDither) {
     const std::string noisy = "[noise_injection]\nturn_phase_rms_rad = 800\n";
     EXPECT_THAT(complaint(noisy), HasSubstr("s.toml:2:22: key \"noise_injection.turn_phase_rms_rad\" = 800.0: "));
@@ -182,6 +209,11 @@ TEST(ScenarioRules, TheInstrumentFollowsTheFringes) {
     EXPECT_THAT(complaint(instrument + "detector_bandwidth_hz = 5e5"),
                 AllOf(HasSubstr("s.toml:3:"), HasSubstr("the counter loses fringes")));
     EXPECT_EQ(complaint(instrument + "detector_bandwidth_hz = 0"), "");
+    // 796000 fringes a second by the dither, 380000 more by the fastest rate of the profile.
+    const std::string narrow = instrument + "detector_bandwidth_hz = 9e5\n[input]\n";
+    EXPECT_EQ(complaint(narrow), "");
+    EXPECT_THAT(complaint(narrow + "profile_time_s = [0, 9]\nprofile_rate_deg_h = [0, -190000]"),
+                HasSubstr("the counter loses fringes"));
     EXPECT_THAT(complaint(instrument + "comparator_hysteresis_relative = 0.01"),
                 AllOf(HasSubstr("s.toml:3:"), HasSubstr("at least 4 times the noise")));
     EXPECT_THAT(complaint(instrument + "[effects.readout_ellipse]\noffset_sin = 0.3"),

@@ -89,7 +89,8 @@ effects::Values unit_values(const effects::Effect& effect) {
 }
 
 std::function<double(const effects::Interval&)> unit_angle(const effects::Effect& effect) {
-    return effect.added_angle(unit_values(effect));
+    return
+        [change = effect.change(unit_values(effect))](const effects::Interval& at) { return change(at).angle_arcsec; };
 }
 
 double rate_per_kelvin(const effects::Effect& effect) {

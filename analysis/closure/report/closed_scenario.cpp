@@ -50,9 +50,9 @@ void take_device_of_turns(const record::Record& record, const Closure& closure, 
     scenario.record.kind = scenario::RecordKind::turns;
     scenario.record.trajectory =
         noisy ? scenario::RecordTrajectory::noise_injected : scenario::RecordTrajectory::uncompensated;
-    scenario.arms = noisy ? std::vector<std::string>{"ideal", "noise_injected", "noise_injected+compensated",
-                                                     "noise_injected+compensated_exact"}
-                          : std::vector<std::string>{"ideal", "uncompensated", "compensated", "compensated_exact"};
+    scenario.arms = noisy ? scenario::parse_arms({"ideal", "noise_injected", "noise_injected+compensated",
+                                                  "noise_injected+compensated_exact"})
+                          : scenario::parse_arms({"ideal", "uncompensated", "compensated", "compensated_exact"});
 }
 
 void take_device_of_samples(const record::Record& record, const Closure& closure, Scenario& scenario) {
@@ -97,7 +97,7 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
     scenario.record.kind = scenario::RecordKind::samples;
     scenario.record.rate_hz = samples.rate_hz;
     scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
-    scenario.arms = {"ideal", "uncompensated"};
+    scenario.arms = scenario::parse_arms({"ideal", "uncompensated"});
 }
 
 }  // namespace

@@ -186,9 +186,9 @@ std::vector<double> TurnModel::added_rad(const Prediction& prediction, const eff
     const double c = units::two_pi / series_.setup.scale_factor_arcsec;
     std::vector<double> phase(series_.size());
     double angle_arcsec = 0.0;
-    const effects::AddedAngle added_arcsec = effect.added_angle(values);
+    const effects::ChangeOver change = effect.change(values);
     for (std::size_t i = 0; i < phase.size(); ++i) {
-        angle_arcsec += added_arcsec(prediction.intervals[i]);
+        angle_arcsec += change(prediction.intervals[i]).angle_arcsec;
         phase[i] = c * angle_arcsec;
     }
     return phase;
@@ -240,13 +240,13 @@ std::vector<double> TurnModel::added_rates_deg_h(const TurnParameters& parameter
     for (const ActiveEffect& active : parameters.effects) {
         if (!active.effect->adds_angle()) continue;
         added_deg_h.resize(turn_s.size());
-        const effects::AddedAngle added_arcsec = active.effect->added_angle(active.values);
+        const effects::ChangeOver change = active.effect->change(active.values);
         for (std::size_t i = 0; i < turn_s.size(); ++i) {
             const double change_k = temperature_change_k(i);
             const double input_deg_h = series_.input_rate_deg_h[i];
             const effects::Interval about{
                 turn_s[i] - 0.5 * moment_s, moment_s, {change_k, change_k}, {input_deg_h, input_deg_h}};
-            added_deg_h[i] += added_arcsec(about) / moment_s;
+            added_deg_h[i] += change(about).angle_arcsec / moment_s;
         }
     }
     return added_deg_h;
@@ -267,9 +267,14 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     prediction.phase_rad.resize(n);
     const double c = device.phase_per_arcsec;
     std::vector<double> factors(n, 1.0);
-    for (std::size_t i = 0; i < n; ++i) {
-        for (const ActiveEffect& active : parameters.effects) {
-            factors[i] *= active.effect->threshold_factor(active.values, temperature_change_k(i));
+    for (const ActiveEffect& active : parameters.effects) {
+        if (!active.effect->changes().threshold) continue;
+        const effects::ChangeOver change = active.effect->change(active.values);
+        for (std::size_t i = 0; i < n; ++i) {
+            const double change_k = temperature_change_k(i);
+            const double input_deg_h = series_.input_rate_deg_h[i];
+            const effects::Interval at{series_.time_s[i], 0.0, {change_k, change_k}, {input_deg_h, input_deg_h}};
+            factors[i] *= change(at).threshold_factor;
         }
     }
     const bool one_threshold = std::all_of(factors.begin(), factors.end(), [](double factor) { return factor == 1.0; });
@@ -304,9 +309,9 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         prediction.intervals = intervals(turn_s);
     }
     const std::vector<double> input_arcsec = series_.input_angles_arcsec(turn_s);
-    std::vector<effects::AddedAngle> added_arcsec;
+    std::vector<effects::ChangeOver> changes;
     for (const ActiveEffect& active : parameters.effects) {
-        if (active.effect->adds_angle()) added_arcsec.push_back(active.effect->added_angle(active.values));
+        if (active.effect->adds_angle()) changes.push_back(active.effect->change(active.values));
     }
     double lockin = 0.0;
     double angle_arcsec = 0.0;
@@ -325,7 +330,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         const std::size_t last = i > 0 ? i - 1 : 0;
         const effects::Interval& interval = prediction.intervals[i];
         angle_arcsec += interval.duration_s * parameters.bias_deg_h + (input_arcsec[i] - input_arcsec[last]);
-        for (const effects::AddedAngle& added : added_arcsec) angle_arcsec += added(interval);
+        for (const effects::ChangeOver& change : changes) angle_arcsec += change(interval).angle_arcsec;
 
         prediction.phase_rad[i] = lockin + before_rad + c * angle_arcsec;
         lockin += before_rad + after_rad;

@@ -6,13 +6,13 @@
 #include "engine/readout/electronics.hpp"
 #include "engine/scenario/scenario.hpp"
 
-/// What electronics and compensators of a scenario are, and are told about its gyros.
+/// The electronics of a scenario and what compensators are calibrated to.
 namespace ringlock::ensemble {
 
 readout::Electronics electronics_of(const scenario::Scenario& scenario);
 
-/// The threshold as measured.
-double told_b_rad_s(const scenario::Scenario& scenario, const gyro::Device& device);
+/// The coupling of the threshold that calibration gives for the device.
+double calibrated_b_rad_s(const scenario::Scenario& scenario, const gyro::Device& device);
 
 /// Of a block of gyros, under injected noise of that rms.
 compensate::Calibration calibration_of(const scenario::Scenario& scenario, std::span<const gyro::Device> devices,

@@ -1,4 +1,4 @@
-#include "engine/ensemble/told.hpp"
+#include "engine/ensemble/calibration.hpp"
 
 #include "engine/dither/lane_dither.hpp"
 
@@ -18,7 +18,7 @@ readout::Electronics electronics_of(const scenario::Scenario& scenario) {
     return electronics;
 }
 
-double told_b_rad_s(const scenario::Scenario& scenario, const gyro::Device& device) {
+double calibrated_b_rad_s(const scenario::Scenario& scenario, const gyro::Device& device) {
     return device.coupling.b_rad_s * (1.0 + scenario.calibration.threshold_error_relative);
 }
 
@@ -29,7 +29,7 @@ compensate::Calibration calibration_of(const scenario::Scenario& scenario, std::
     calibration.amplitude_margin_rad = dither::LaneDither::amplitude_margin_rad(noise_rms_rad);
     calibration.amplitude_rms_rad = dither::LaneDither::amplitude_rms_rad(noise_rms_rad);
     for (std::size_t lane = 0; lane < devices.size(); ++lane) {
-        calibration.b_rad_s[lane] = told_b_rad_s(scenario, devices[lane]);
+        calibration.b_rad_s[lane] = calibrated_b_rad_s(scenario, devices[lane]);
         calibration.dither_amplitude_rad[lane] = devices[lane].dither_amplitude_rad;
         calibration.positive_duration_s[lane] = devices[lane].positive_duration_s;
         calibration.negative_duration_s[lane] = devices[lane].negative_duration_s;

@@ -1,0 +1,48 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "engine/effects/effect.hpp"
+#include "engine/gyro/setup.hpp"
+#include "engine/scenario/active_effects.hpp"
+#include "engine/scenario/scenario.hpp"
+
+/// What effects do to a block of gyros without chance, under the scenario's temperature and input rate.
+namespace ringlock::ensemble {
+
+/// The angle that an effect adds. The effect must outlive it.
+std::unique_ptr<effects::LaneRateProcess> added_angles(const scenario::ActiveEffect& active,
+                                                       const scenario::Scenario& scenario,
+                                                       const std::vector<gyro::Setup>& setups);
+
+/// What all active effects do to the coupling, half cycle by half cycle. Effects whose bounds say that nothing of it
+/// changes over the run are left out.
+class CouplingChanges {
+   public:
+    /// The effects must outlive it.
+    CouplingChanges(const scenario::Scenario& scenario, const std::vector<gyro::Setup>& setups);
+
+    bool phases_vary() const { return phases_vary_; }
+
+    /// Evaluates the half cycles that begin at `turns` turns, from turn `first_turn` of the run on.
+    void evaluate(std::int64_t first_turn, std::size_t turns);
+    /// By what the threshold is multiplied, [turn][gyro]; none where it stays.
+    std::span<const simd::Lanes> threshold_factors() const { return factors_; }
+    /// By what the coupling's phase moves, [turn][gyro]; none where it stays.
+    std::span<const simd::Lanes> phases_rad() const { return phases_rad_; }
+
+   private:
+    scenario::Scenario scenario_;
+    std::vector<gyro::Setup> setups_;
+    std::vector<double> period_s_;
+    std::vector<effects::ChangeOver> changes_;
+    bool thresholds_vary_ = false;
+    bool phases_vary_ = false;
+    std::vector<simd::Lanes> factors_;
+    std::vector<simd::Lanes> phases_rad_;
+};
+
+}  // namespace ringlock::ensemble
