@@ -32,10 +32,10 @@ class Added final : public Effect {
     std::string_view equation() const override { return ""; }
     std::span<const Parameter> parameters() const override { return parameters_; }
     bool active(const Values& /*values*/) const override { return true; }
-    bool adds_angle() const override { return true; }
-    effects::AddedAngle added_angle(const Values& values) const override {
+    effects::Changes changes() const override { return {.angle = true}; }
+    effects::ChangeOver change(const Values& values) const override {
         return [size = values.at(std::string(parameters_[0].name)), angle = angle_](const Interval& at) {
-            return size * angle(at);
+            return effects::Change{.angle_arcsec = size * angle(at)};
         };
     }
 
@@ -72,8 +72,8 @@ TEST(EffectQueries, AnEffectThatStepsMoreThanTheRateIsAnAlternativeOfTheStep) {
     const Effect* step = effects::find("bias_step");
     const Added hop("mode_hop",
                     {{"step_deg_h", 0.0, -1e4, 1e4, Role::size, ""},
-                     {"threshold_ratio", 1.0, 0.1, 10.0, Role::setting, ""},
-                     {"phase_rad", 0.0, -7.0, 7.0, Role::phase, ""},
+                     {"threshold_ratio", 0.0, -0.9, 0.9, Role::size, ""},
+                     {"phase_rad", 0.0, -4.0, 4.0, Role::size, ""},
                      {"time_s", 0.0, 0.0, 1e9, Role::time, ""}},
                     [](const Interval& at) { return at.duration_s; });
     const std::array<const Effect*, 2> library{&hop, step};

@@ -19,6 +19,7 @@ struct AddedEffect {
     double hz = 0.0;                    ///< of a line, where the record shows it
     std::vector<double> other_hz = {};  ///< rates that explain a resampled record as well
 
+    AddedEffect(const effects::Effect& added, int number) : id(number) { step.effect = &added; }
     const effects::Effect& effect() const { return *step.effect; }
 };
 

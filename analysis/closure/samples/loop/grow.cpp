@@ -74,7 +74,7 @@ void SampleLoop::take_lattice(Closure& closure) {
             "of the characteristic function is left",
             lattice_.printed_arcsec, 100.0 * lattice_.strength));
     }
-    AddedEffect added{.step = {.effect = effect}, .id = next_id_++};
+    AddedEffect added(*effect, next_id_++);
     Step& taken = added.step;
     taken.p_value = lattice_.p_value;
     const SampleScore before = score_of(*now_.fit, reported_, 0.0);
@@ -157,11 +157,11 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     drop_needless(effect);
     for (int k = 0; k < options.samples.loop.most_motions && move_anew();) ++k;
     now_.fit = std::make_shared<SampleFit>(place_in_gaps(*now_.fit, rows_, whole_));
-    now_.added.push_back({.step = std::move(step),
-                          .id = next_id_++,
-                          .witness = best.witness,
-                          .strong = best.strong,
-                          .other_hz = choice.other_hz});
+    AddedEffect& added = now_.added.emplace_back(effect, next_id_++);
+    added.step = std::move(step);
+    added.witness = best.witness;
+    added.strong = best.strong;
+    added.other_hz = choice.other_hz;
     if (rounded_.drawn()) {
         now_.fit = rounded_.draw(now_.fit, options.samples.loop.draws);
         // Increments that were drawn without a motion say little about it.
@@ -172,7 +172,6 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
         find_coarse_steps(closure);
     }
     const SampleScore after = score(*now_.fit);
-    AddedEffect& added = now_.added.back();
     added.step.heldout_error_before = before.error;
     added.step.heldout_error_after = after.error;
     added.step.heldout_log_score_gain = after.log_score - before.log_score;

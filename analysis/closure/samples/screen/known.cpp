@@ -41,7 +41,7 @@ KnownEffects known_effects(const SampleFit& base, const std::vector<ActiveEffect
     if (from_hz > 0.0) model = resampled_from(base, from_hz);
     for (const ActiveEffect& active : effects) {
         const effects::Effect& effect = *active.effect;
-        AddedEffect added{.step = {.effect = &effect}, .id = static_cast<int>(known.added.size())};
+        AddedEffect added(effect, static_cast<int>(known.added.size()));
         switch (on_samples(effect)) {
             case OnSamples::rate_line:
             case OnSamples::angle_line: {
