@@ -70,8 +70,7 @@ void add_closure(CLI::App& root) {
         bool json = false;
         bool quiet = false;
     };
-    CLI::App* command =
-        root.add_subcommand("closure", "Identify the error sources in a measured record");
+    CLI::App* command = root.add_subcommand("closure", "Identify the error sources in a measured record");
     auto arguments = std::make_shared<Arguments>();
     command->add_option("RECORD", arguments->record, "rlg-record (.h5), or samples as text")->required();
     command->add_option("--model", arguments->model,

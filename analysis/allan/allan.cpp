@@ -6,12 +6,12 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/allan/interval.hpp"
+#include "analysis/allan/statistics/noise_identification.hpp"
 #include "analysis/allan/sums/difference_sums.hpp"
 #include "analysis/allan/sums/gapped_rates.hpp"
-#include "analysis/allan/interval.hpp"
 #include "analysis/allan/sums/interval_error.hpp"
 #include "analysis/allan/sums/mean_differences.hpp"
-#include "analysis/allan/statistics/noise_identification.hpp"
 #include "analysis/allan/sums/piece_sums.hpp"
 #include "analysis/allan/sums/total_sums.hpp"
 #include "analysis/allan/uncertainty.hpp"

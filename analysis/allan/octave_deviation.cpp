@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "analysis/allan/interval.hpp"
+#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "analysis/allan/statistics/noise_identification.hpp"
 #include "engine/core/error.hpp"
 

@@ -7,9 +7,9 @@
 #include <limits>
 #include <utility>
 
-#include "analysis/allan/sums/exact_sum.hpp"
 #include "analysis/allan/interval.hpp"
 #include "analysis/allan/octave_deviation.hpp"
+#include "analysis/allan/sums/exact_sum.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::allan {

@@ -8,9 +8,9 @@
 #include <numbers>
 #include <tuple>
 
-#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "analysis/allan/interval.hpp"
 #include "analysis/allan/quadratic_form.hpp"
+#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 
 namespace ringlock::allan {
 namespace {

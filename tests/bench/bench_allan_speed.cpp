@@ -17,9 +17,9 @@
 #include <vector>
 
 #include "analysis/allan/allan.hpp"
+#include "analysis/allan/running_deviation.hpp"
 #include "analysis/allan/sums/difference_sums.hpp"
 #include "analysis/allan/sums/piece_sums.hpp"
-#include "analysis/allan/running_deviation.hpp"
 #include "engine/random/stream.hpp"
 #include "tests/bench/page.hpp"
 #include "tests/bench/plain_allan.hpp"

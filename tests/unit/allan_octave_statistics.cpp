@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "analysis/allan/octave_deviation.hpp"
 #include "analysis/allan/octave_stream.hpp"
+#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "tests/unit/allan_support.hpp"
 
 namespace {

@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "analysis/allan/quadratic_form.hpp"
+#include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "analysis/allan/uncertainty.hpp"
 
 namespace {

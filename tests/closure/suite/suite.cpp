@@ -1,0 +1,515 @@
+#include "tests/closure/suite/suite.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <chrono>
+#include <cmath>
+#include <initializer_list>
+#include <limits>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "analysis/closure/options.hpp"
+#include "analysis/closure/turns/loop/loop.hpp"
+#include "analysis/closure/turns/model/model.hpp"
+#include "analysis/instrument/simulate.hpp"
+#include "engine/core/units.hpp"
+#include "engine/effects/effect.hpp"
+#include "engine/gyro/theory.hpp"
+#include "tests/closure/generator/generator.hpp"
+#include "tests/closure/generator/keys.hpp"
+#include "tests/closure/generator/plain_gyro.hpp"
+
+namespace ringlock::test::closure {
+
+using ringlock::closure::ActiveEffect;
+using ringlock::closure::Closure;
+using ringlock::closure::Estimate;
+using ringlock::closure::fit_turns;
+using ringlock::closure::Verdict;
+using ringlock::closure::Where;
+
+const std::vector<Condition> conditions = {
+    {"quiet", 0.0, false}, {"injected", 3.0, false}, {"moving", 0.0, true}, {"moving, injected", 3.0, true}};
+
+const Condition other_gyro = {"another gyro", 0.0, false, true};
+
+const char* name_of(Kind kind) {
+    constexpr const char* names[] = {"null", "single", "pair", "foreign", "other", "several", "mixed"};
+    return names[static_cast<std::size_t>(kind)];
+}
+
+const char* name_of(Judged judged) {
+    constexpr const char* names[] = {"right", "tie", "missed", "unexplained", "wrong"};
+    return names[static_cast<std::size_t>(judged)];
+}
+
+std::string text_of(const std::vector<Added>& added) {
+    std::string text;
+    for (const Added& one : added) text += (text.empty() ? "" : "+") + one.effect;
+    return text.empty() ? "nothing" : text;
+}
+
+std::vector<Added> Case::added() const {
+    std::vector<Added> all = truth;
+    all.insert(all.end(), foreign.begin(), foreign.end());
+    return all;
+}
+
+std::string Case::truth_text() const { return text_of(added()); }
+
+namespace {
+
+constexpr double nominal_threshold_deg_h = 300.0;
+constexpr double temperature_swing_k = 1.0;
+constexpr double temperature_interval_s = 0.1;  // between rows the temperature is taken for linear
+constexpr double walk_relative_rt_s = 1e-5;
+constexpr double drift_relative_per_h = 0.01;
+
+/// Truths of the gyro itself, by the seed.
+struct Device {
+    double threshold_deg_h, peak_rate_deg_s, rate_deg_h;
+    double declared_threshold_deg_h = nominal_threshold_deg_h;
+    double injected_rad = 0.0;
+    double readout_noise = 0.005;
+    double scale_factor_arcsec = Truth{}.scale_factor_arcsec;
+    double dither_frequency_hz = Truth{}.dither_frequency_hz;
+    double duration_s = 0.0;
+    std::vector<double> profile_time_s = {};
+    std::vector<double> profile_rate_deg_h = {};
+};
+
+/// Kicks up to this are those of gyros that are built.
+void draw_other(Device& d, std::mt19937_64& random) {
+    constexpr double largest_kick_rad = 0.4;
+    constexpr double least_fringes = 110.0;  // in a half cycle, for the turn map
+    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
+    const auto one_of = [&](std::initializer_list<double> all) {
+        return all.begin()[std::uniform_int_distribution<std::size_t>(0, all.size() - 1)(random)];
+    };
+    gyro::Setup setup;
+    do {
+        setup.scale_factor_arcsec = one_of({0.3, 0.5, 0.8, 1.2, 2.0, 3.0});
+        setup.dither_frequency_hz = even(110.0, 600.0);
+        setup.dither_peak_rate_deg_s = even(40.0, 300.0);
+        setup.lockin_threshold_deg_h = even(40.0, 1500.0);
+    } while (gyro::turn_kick_rad(setup) > largest_kick_rad ||
+             units::arcsec_per_deg * setup.dither_peak_rate_deg_s <
+                 least_fringes * units::pi * setup.scale_factor_arcsec * setup.dither_frequency_hz);
+    d.scale_factor_arcsec = setup.scale_factor_arcsec;
+    d.dither_frequency_hz = setup.dither_frequency_hz;
+    d.peak_rate_deg_s = setup.dither_peak_rate_deg_s;
+    d.threshold_deg_h = setup.lockin_threshold_deg_h;
+    d.declared_threshold_deg_h = d.threshold_deg_h * between(0.7, 1.3);
+    d.readout_noise = one_of({0.001, 0.005, 0.02});
+    d.injected_rad = one_of({0.0, 0.0, 0.5, 1.5, 3.0});
+    if (between(0.0, 1.0) < 1.0 / 3.0) d.rate_deg_h = between(-1.0, 1.0);  // at rest, its bias alone
+}
+
+Device device_of(const Case& of) {
+    std::mt19937_64 random(of.seed);
+    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    Device d{nominal_threshold_deg_h * between(0.8, 1.2), 109.1 * between(0.9, 1.1), between(-100.0, 100.0)};
+    d.injected_rad = of.condition->injected_rad;
+    if (of.condition->other_gyro) draw_other(d, random);
+    d.duration_s = 0.5 * static_cast<double>(of.turns) / d.dither_frequency_hz;
+    if (of.condition->moving) {
+        d.rate_deg_h = 0.0;
+        double time_s = 0.0;
+        double rate = between(-300.0, 300.0);
+        while (time_s < d.duration_s) {
+            const double next = between(-300.0, 300.0);
+            const double hold_s = between(0.1, 0.3) * d.duration_s;
+            for (const double t : {time_s, time_s + hold_s}) {
+                d.profile_time_s.push_back(t);
+                d.profile_rate_deg_h.push_back(rate);
+            }
+            time_s += hold_s + 1.0;
+            rate = next;
+        }
+    }
+    return d;
+}
+
+record::Record by_map(const Case& of, const Device& device) {
+    scenario::Scenario scenario = plain_gyro(static_cast<double>(of.turns), of.seed + (of.noise << 32));
+    inject(scenario, device.injected_rad);
+    scenario.gyro.scale_factor_arcsec = device.scale_factor_arcsec;
+    scenario.dither.frequency_hz = device.dither_frequency_hz;
+    scenario.ensemble.duration_s = device.duration_s;
+    scenario.gyro.lockin_threshold_deg_h = device.threshold_deg_h;
+    scenario.dither.peak_rate_deg_s = device.peak_rate_deg_s;
+    scenario.readout.detector_noise_relative = device.readout_noise;
+    scenario.input.rate_deg_h = scenario.input.sweep_stop_deg_h = device.rate_deg_h;
+    if (of.condition->moving) {
+        scenario.dither.amplitude_wander_relative_rt_s = walk_relative_rt_s;
+        scenario.dither.amplitude_drift_relative_per_h = drift_relative_per_h;
+        scenario.input.profile_time_s = device.profile_time_s;
+        scenario.input.profile_rate_deg_h = device.profile_rate_deg_h;
+    }
+    scenario.environment.temperature_swing_k = temperature_swing_k;
+    scenario.environment.temperature_period_s = 0.4 * device.duration_s;
+    scenario.record.temperature_interval_s = temperature_interval_s;
+    for (const Added& added : of.added()) {
+        for (const auto& [name, value] : added.values) scenario.effects.at(added.effect).at(name) = value;
+    }
+    record::Record record = instrument::simulate_record(scenario);
+    record.declared.lockin_threshold_deg_h = device.declared_threshold_deg_h;
+    return record;
+}
+
+Truth truth_of(const Case& of, const Device& device) {
+    Truth truth;
+    truth.turns = of.turns;
+    truth.seed = of.seed;
+    truth.lockin_threshold_deg_h = device.threshold_deg_h;
+    truth.dither_peak_rate_deg_s = device.peak_rate_deg_s;
+    truth.readout_noise = device.readout_noise;
+    truth.injected_noise_rad = device.injected_rad;
+    truth.scale_factor_arcsec = device.scale_factor_arcsec;
+    truth.dither_frequency_hz = device.dither_frequency_hz;
+    std::mt19937_64 random(of.seed + 1);
+    truth.initial_phase_rad = std::uniform_real_distribution<double>(0.0, units::two_pi)(random);
+    truth.input_rate_deg_h = device.rate_deg_h;
+    if (of.condition->moving) {
+        truth.wander.walk_per_turn = walk_relative_rt_s / std::sqrt(2.0 * truth.dither_frequency_hz);
+        truth.wander.drift_per_s = drift_relative_per_h / 3600.0;
+        truth.input_profile_deg_h = {device.profile_time_s, device.profile_rate_deg_h};
+    }
+    truth.temperature.swing_k = temperature_swing_k;
+    truth.temperature.period_s = 0.4 * device.duration_s;
+    truth.temperature.interval_s = temperature_interval_s;
+    for (const Added& added : of.added()) {
+        for (const auto& [name, value] : added.values) {
+            const std::string key = name.empty() ? added.effect : added.effect + "." + name;
+            set(truth, key, fmt::format("{:.17g}", value));
+        }
+    }
+    return truth;
+}
+
+/// The parameter that says how much there is of an effect.
+const effects::Parameter& size_of(const effects::Effect& effect) {
+    using effects::Role;
+    const effects::Parameter* phase = nullptr;
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        if (parameter.role == Role::size || parameter.role == Role::deviation || parameter.role == Role::probability) {
+            return parameter;
+        }
+        if (parameter.role == Role::phase) phase = &parameter;
+    }
+    return *phase;
+}
+
+double deviation_of(const Estimate& estimate, double truth) {
+    double off = estimate.value - truth;
+    if (estimate.name == "phase_rad") off = std::remainder(off, units::two_pi);
+    return off / estimate.sd;
+}
+
+}  // namespace
+
+std::vector<record::Record> make(std::span<const Case> cases) {
+    std::vector<record::Record> records(cases.size());
+    std::vector<Truth> truths;
+    std::vector<std::size_t> direct;
+    for (std::size_t k = 0; k < cases.size(); ++k) {
+        if (cases[k].direct) {
+            truths.push_back(truth_of(cases[k], device_of(cases[k])));
+            direct.push_back(k);
+        } else {
+            records[k] = by_map(cases[k], device_of(cases[k]));
+        }
+    }
+    auto generated = generate(truths);
+    for (std::size_t k = 0; k < direct.size(); ++k) {
+        records[direct[k]] = std::move(generated[k]);
+        records[direct[k]].declared.lockin_threshold_deg_h = device_of(cases[direct[k]]).declared_threshold_deg_h;
+    }
+    return records;
+}
+
+double duration_s(const Case& of) { return device_of(of).duration_s; }
+
+std::vector<std::string> effects_on_turns() {
+    std::vector<std::string> names;
+    for (const effects::Effect* effect : effects::registry()) {
+        const auto parameters = effect->parameters();
+        if (std::none_of(parameters.begin(), parameters.end(),
+                         [](const auto& p) { return p.role == effects::Role::sampled; })) {
+            names.emplace_back(effect->name());
+        }
+    }
+    return names;
+}
+
+Added draw(const std::string& name, double size, std::uint64_t seed, double duration_s) {
+    std::mt19937_64 random(seed ^ 0x5eed);
+    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    const effects::Effect& effect = *effects::find(name);
+    const effects::Parameter& main = size_of(effect);
+    Added added{name, {}};
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        using effects::Role;
+        double& value = added.values[std::string(parameter.name)];
+        value = parameter.default_value;
+        if (&parameter == &main) {
+            // A size with a phase has its sign in that.
+            const auto all = effect.parameters();
+            const bool turned =
+                std::any_of(all.begin(), all.end(), [](const auto& p) { return p.role == Role::phase; });
+            const bool either_sign = parameter.min < 0.0 && parameter.role == Role::size && !turned;
+            value = size * (either_sign && between(0.0, 1.0) < 0.5 ? -1.0 : 1.0);
+        } else if (parameter.role == Role::size) {
+            value = 0.0;
+        } else if (parameter.role == Role::phase) {
+            value = between(-units::pi, units::pi);
+        } else if (parameter.role == Role::time) {
+            value = between(0.2, 0.8) * duration_s;
+        } else if (parameter.role == Role::frequency) {
+            value = std::exp(between(std::log(0.5), std::log(100.0)));
+        }
+    }
+    return added;
+}
+
+double start_size(const std::string& name) {
+    using effects::Role;
+    const effects::Parameter& main = size_of(*effects::find(name));
+    if (main.role == Role::deviation) return name == "quantum_noise" ? 1e-4 : 1e-2;
+    return main.role == Role::probability ? 1e-3 : 0.02 * std::min(1.0, main.max);
+}
+
+bool settle(Case& of) {
+    constexpr int most_rounds = 8;
+    // What one record tells of a random process is random itself.
+    const bool random_process = std::any_of(of.truth.begin(), of.truth.end(), [](const Added& added) {
+        return size_of(*effects::find(added.effect)).role == effects::Role::deviation;
+    });
+    const std::uint64_t records = random_process ? 4 : 2;
+    bool within = true;
+    for (int round = 0; round < most_rounds; ++round) {
+        Case at_limit = of;
+        at_limit.direct = false;
+        at_limit.foreign.clear();
+        std::vector<ActiveEffect> known;
+        for (Added& added : at_limit.truth) {
+            const effects::Effect* effect = effects::find(added.effect);
+            added.values.at(std::string(size_of(*effect).name)) /= of.multiple;
+            known.push_back({effect, added.values});
+        }
+        std::vector<double> information(known.size(), 0.0);
+        for (std::uint64_t k = 0; k < records; ++k) {
+            Case another = at_limit;
+            another.noise = k;
+            for (const Estimate& estimate :
+                 ringlock::closure::information_on_turns(make({&another, 1}).front(), known)) {
+                for (std::size_t e = 0; e < known.size(); ++e) {
+                    if (known[e].effect->name() != estimate.effect) continue;
+                    if (size_of(*known[e].effect).name != estimate.name || !(estimate.sd > 0.0)) continue;
+                    information[e] += 1.0 / (estimate.sd * estimate.sd) / static_cast<double>(records);
+                }
+            }
+        }
+        double most = 1.0;
+        within = true;
+        for (std::size_t e = 0; e < known.size(); ++e) {
+            const effects::Parameter& main = size_of(*known[e].effect);
+            const std::string parameter(main.name);
+            const double size = known[e].values.at(parameter);
+            const double sd = 1.0 / std::sqrt(information[e]);
+            // Of a random process the variance is told, of which the information hardly depends: its deviation times
+            // the error of that stays.
+            const bool random = main.role == effects::Role::deviation;
+            const double limit = random ? std::sqrt(std::abs(size) * 4.0 * sd) : 4.0 * sd;
+            const double factor = std::clamp(limit / std::abs(size), 1e-3, 1e3);
+            most = std::max({most, factor, 1.0 / factor});
+            double& settled = of.truth[e].values.at(parameter);
+            const double least = 0.5 * main.min;
+            const double largest = 0.5 * main.max;
+            within = within && of.multiple * factor * size > least && of.multiple * factor * size < largest;
+            settled = std::clamp(of.multiple * factor * size, least, largest);
+        }
+        if (most < 1.05) break;
+    }
+    return within;
+}
+
+std::vector<Case> foreign_cases(std::size_t each, std::uint64_t series) {
+    std::vector<Case> cases;
+    std::mt19937_64 random(77 + series);
+    const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
+    const auto add = [&](std::size_t condition, Where where, Added added) {
+        Case of;
+        of.kind = Kind::foreign;
+        of.condition = &conditions[condition];
+        of.direct = true;
+        of.seed = seeds_of_series * series + 50000 + cases.size();
+        of.where = where;
+        of.foreign = {std::move(added)};
+        cases.push_back(std::move(of));
+    };
+    // From what shows itself well to what is evident: sizes are even in their logarithms.
+    const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
+    for (std::size_t k = 0; k < each; ++k) {
+        const bool injected = k % 2 == 1;
+        add(k % 2, Where::phase,
+            {"lockin_third_harmonic",
+             {{"ratio", injected ? even(0.1, 0.4) : even(0.02, 0.4)}, {"phase_rad", between(-3.0, 3.0)}}});
+        add(0, Where::time, {"telegraph_bias", {{"step_deg_h", even(1e-3, 1e-1)}, {"dwell_s", between(4.0, 10.0)}}});
+        add(2, Where::rate, {"bias_per_rate_squared_h_deg", {{"", even(1e-7, 1e-5)}}});
+        add(2, Where::amplitude, {"bias_per_relative_amplitude_deg_h", {{"", even(100.0, 10000.0)}}});
+        add(k % 2, Where::frequency,
+            {"chirped_line",
+             {{"frequency_hz", between(2.0, 30.0)},
+              {"chirp_hz_per_s", even(1e-3, 2e-2) * (k % 3 == 0 ? -1.0 : 1.0)},
+              {"rate_deg_h", injected ? even(3.0, 30.0) : even(0.02, 1.0)},
+              {"phase_rad", between(-3.0, 3.0)}}});
+    }
+    // Off the period of the temperature, 0.4 of the record: a threshold of that period follows the temperature.
+    for (std::size_t k = 0; k < each; ++k) {
+        const bool injected = k % 2 == 1;
+        add(k % 2, Where::time,
+            {"lockin_swing",
+             {{"ratio", injected ? even(0.1, 0.5) : even(2e-3, 0.2)},
+              {"period_s", k % 3 == 0 ? even(6.0, 18.0) : even(35.0, 130.0)}}});
+    }
+    return cases;
+}
+
+double gain_asked(const std::vector<std::string>& missing, double library) {
+    constexpr double none = std::numeric_limits<double>::quiet_NaN();
+    double least = std::numeric_limits<double>::infinity();
+    for (const std::string& effect : missing) {
+        const effects::Effect& of = *effects::find(effect);
+        if (ringlock::closure::told_by_other_columns(of)) return none;
+        const auto parameters = of.parameters();
+        const auto freedom = std::count_if(parameters.begin(), parameters.end(), [](const effects::Parameter& p) {
+            return p.role != effects::Role::time && p.role != effects::Role::frequency;
+        });
+        const boost::math::chi_squared chi2(static_cast<double>(freedom));
+        const double level = ringlock::closure::options.level_of_effects / library;
+        least = std::min(least, 0.5 * boost::math::quantile(boost::math::complement(chi2, level)));
+    }
+    return std::isfinite(least) ? least : none;
+}
+
+namespace {
+
+/// True effects that no step holds. One that names a true effect holds that or one that it is tied to; where it names
+/// another, all that is tied to that may stand in its place together.
+std::vector<std::string> not_held(const std::set<std::string>& true_effects,
+                                  const std::vector<ringlock::closure::Step>& steps) {
+    const std::vector<std::string> wanted(true_effects.begin(), true_effects.end());
+    std::vector<std::string> least = wanted;
+    std::vector<std::string> lacking;
+    std::vector<bool> taken(steps.size());
+    const auto hold = [&](const auto& self, std::size_t k) -> void {
+        if (k == wanted.size()) {
+            if (lacking.size() < least.size()) least = lacking;
+            return;
+        }
+        for (std::size_t s = 0; s < steps.size(); ++s) {
+            const auto& others = steps[s].confounded_with;
+            const bool among = std::any_of(others.begin(), others.end(),
+                                           [&](const auto* other) { return other->name() == wanted[k]; });
+            if (taken[s] || (steps[s].name() != wanted[k] && !among)) continue;
+            taken[s] = true_effects.contains(steps[s].name());
+            self(self, k + 1);
+            taken[s] = false;
+        }
+        lacking.push_back(wanted[k]);
+        self(self, k + 1);
+        lacking.pop_back();
+    };
+    hold(hold, 0);
+    return least;
+}
+
+}  // namespace
+
+void compare(const Closure& closure, std::optional<Where> where, const std::vector<Added>& truth, Outcome& outcome) {
+    outcome.verdict = std::string(name_of(closure.verdict));
+    outcome.before = closure.heldout_before;
+    outcome.after = closure.heldout_after;
+    outcome.floor = closure.noise_floor;
+    outcome.answer_gain = closure.log_likelihood_gain;
+    outcome.oracle = std::numeric_limits<double>::quiet_NaN();
+    if (closure.unexplained) outcome.where = std::string(name_of(closure.unexplained->where));
+    std::set<std::string> true_effects;
+    for (const Added& added : truth) true_effects.insert(added.effect);
+    bool ties = false;
+    for (const auto& step : closure.steps) {
+        outcome.named += (outcome.named.empty() ? "" : "+") + step.name();
+        for (const auto* other : step.confounded_with) outcome.named += "~" + std::string(other->name());
+        const bool named = true_effects.contains(step.name());
+        const bool tied_to_truth =
+            std::any_of(step.confounded_with.begin(), step.confounded_with.end(),
+                        [&](const auto* other) { return true_effects.contains(std::string(other->name())); });
+        ties = ties || (named ? !step.confounded_with.empty() : tied_to_truth);
+        if (!named && !tied_to_truth) outcome.false_name = true;
+    }
+    outcome.missing = not_held(true_effects, closure.steps);
+    const bool unexplained = closure.verdict == Verdict::unexplained;
+    const bool as_it_is = unexplained ? where && closure.unexplained->where == *where : !where;
+    if (outcome.false_name && !unexplained) {
+        outcome.judged = Judged::wrong;
+    } else if (unexplained && (!as_it_is || outcome.false_name)) {
+        outcome.judged = Judged::unexplained;
+    } else if (!as_it_is || !outcome.missing.empty()) {
+        outcome.judged = Judged::missed;
+    } else {
+        outcome.judged = ties ? Judged::tie : Judged::right;
+    }
+}
+
+Outcome judge(const Case& of, const record::Record& record) {
+    Outcome outcome;
+    const auto start = std::chrono::steady_clock::now();
+    const Closure closure = ringlock::closure::close_turns(record);
+    outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const bool foreign = !of.foreign.empty();
+    compare(closure, foreign ? std::optional(of.where) : std::nullopt, of.truth, outcome);
+    if (foreign) return outcome;
+
+    std::vector<ActiveEffect> known;
+    for (const Added& added : of.truth) {
+        known.push_back({effects::find(added.effect), {added.values.begin(), added.values.end()}});
+    }
+    const Closure oracle = fit_turns(record, known);
+    outcome.oracle = oracle.heldout_after;
+    outcome.truth_gain = oracle.log_likelihood_gain;
+    outcome.asked_gain = gain_asked(outcome.missing, static_cast<double>(effects::registry().size()));
+    if (outcome.judged != Judged::right) return outcome;
+    const Device device = device_of(of);
+    const std::map<std::string, double> base_truth = {
+        {"bias_deg_h", 0.0},
+        {"lockin_threshold_deg_h", device.threshold_deg_h},
+        {"injected_noise_rad", device.injected_rad},
+        {"readout_noise_rad", device.readout_noise},
+        {"dither_frequency_hz", device.dither_frequency_hz},
+    };
+    for (const Estimate& estimate : closure.base) {
+        const auto truth = base_truth.find(estimate.name);
+        if (truth == base_truth.end() || (truth->second == 0.0 && estimate.name != "bias_deg_h")) continue;
+        outcome.deviations.push_back(
+            {estimate.name, estimate.value, estimate.sd, deviation_of(estimate, truth->second)});
+    }
+    for (const auto& step : closure.steps) {
+        for (const Added& added : of.truth) {
+            if (added.effect != step.name()) continue;
+            for (const Estimate& estimate : step.parameters) {
+                outcome.deviations.push_back({step.name() + "." + estimate.name, estimate.value, estimate.sd,
+                                              deviation_of(estimate, added.values.at(estimate.name))});
+            }
+        }
+    }
+    return outcome;
+}
+
+}  // namespace ringlock::test::closure
