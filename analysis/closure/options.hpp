@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 
+#include "analysis/closure/options_report.hpp"
 #include "analysis/closure/options_samples.hpp"
 #include "analysis/closure/options_stats.hpp"
 #include "analysis/closure/options_turns.hpp"
@@ -40,6 +41,7 @@ struct Options {
     StatsOptions stats = {};
     TurnOptions turns = {};
     SampleOptions samples = {};
+    ReportOptions report = {};
 };
 
 /// The options that the loop runs with.

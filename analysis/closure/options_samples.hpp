@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 /// Numbers that decide what is named on a record of samples, room by room. "p" is a probability by chance.
 namespace ringlock::closure {
@@ -28,6 +29,9 @@ struct SampleRecordOptions {
     /// (the length of the mean of exp(2 pi i value/step)), and be as improbable by chance.
     double coarser_lattice_strength = 0.3;
     double coarser_lattice_p = 1e-6;
+    /// Effort: a coarser lattice is not looked for where values reach further from zero than this [printed steps], for
+    /// every step is counted.
+    std::int64_t most_levels = 200000;
     /// Half of the length over which temperatures are smoothed is the record over this: a thermometer's noise is faster
     /// than any temperature.
     std::size_t smoothed_parts = 1000;
@@ -42,11 +46,34 @@ struct SampleFitOptions {
     double coarser_digits = 1.5;
     /// make its standard deviation larger by this factor.
     double settled_growth = 1.01;
+    /// A column of whose squares no more than this share is left when the model's own columns have been taken out is
+    /// one of them but for rounding [1]: the record cannot tell it from the model's parameters. Several columns are
+    /// independent of each other where the ratio of their pivots is larger than this.
+    double told_apart = 1e-8;
+    /// A resonance that is wider than this has no shape within the record's frequencies, and is tried as none [rates of
+    /// the record or of its source].
+    double widest_resonance = 3.0;
+    /// Effort: rounds of Fisher's scoring of the noise.
+    int most_scorings = 25;
+    /// Effort: searches by a simplex on a part of the record, each from the end of the one before; there are no more
+    /// after one that gains less than this [nats].
+    int most_searches = 3;
+    double searched_again = 0.5;
+    /// A noise of a resampled record whose logarithm has a larger standard error than this stands at zero, its lower
+    /// bound: it does not count in the standard errors of others.
+    double log_sd_at_zero = 1.5;
+    /// The frequency of a cycle in products of innovations is refined between those of the spectrum below this p.
+    double refined_cycle_p = 1e-3;
     /// Innovations are held against a witness at lags up to this on either side [s], but at no fewer and no more lags
     /// than these.
     double witness_lag_s = 0.25;
     int fewest_witness_lags = 2;
     int most_witness_lags = 40;
+    /// Order of the autoregression that makes a witness white, so that its lags are independent.
+    int witness_order = 24;
+    /// Fewest windows of lags far from zero, where innovations and witness have nothing in common, that tell how the
+    /// sum of squares over the lags is spread by chance.
+    double fewest_far_windows = 20.0;
     /// What a witness leaves of a motion is no slower than this share of the motion's centre frequency: at next to
     /// nothing hertz it would be a random walk of the rate, which would then not be looked for.
     double slowest_of_motion = 0.2;
@@ -56,12 +83,17 @@ struct SampleFitOptions {
     /// A motion whose resonance gains less than this without its witness does not stand out from the noise [nats]:
     /// coherence, rms, centre and width have no standard error then.
     double motion_stands_out = 20.0;
+    /// The standard error of a coherence is that of Bendat and Piersol for independent spectra where the amplitude that
+    /// the witness leaves has a relative standard error below this; it is in proportion to the power left elsewhere.
+    double small_relative_sd = 0.25;
     /// A motion is fitted again, beside an effect that was added, while that gains more [nats].
     double motion_refitted = 1.0;
     /// Places at which a record is searched for a step before the likeliest is refined, and places in a gap between
     /// rows that count.
     std::size_t places_of_a_step = 80;
     std::size_t places_in_a_gap = 32;
+    /// Effort: rounds in which each step is placed again with the others in the model.
+    int most_step_rounds = 3;
     /// Steps of values that are smaller than this share of the standard deviation do not show in held-out errors.
     double fine_lattice = 0.02;
 };
@@ -76,6 +108,16 @@ struct SampleLineOptions {
     /// Lines that keep their frequency, that drift slowly and that drift by anything are searched: the likeliest is one
     /// of so many.
     double kinds = 3.0;
+    /// Pieces of the record over which lines that drift are tracked, few and many: a line must stay in its bin for the
+    /// length of a piece. Lines on a curve are followed by the many.
+    std::array<std::size_t, 2> pieces = {8, 64};
+    /// Shortest piece whose spectrum tells a line from the level about it [rows], and fewest pieces with rows that
+    /// count.
+    std::size_t shortest_piece = 256;
+    double fewest_pieces = 3.0;
+    /// Coefficients of the course of a line's frequency, a polynomial of time: the frequency and its derivatives up to
+    /// the fifth. A dither follows the temperature of its springs, evenly over minutes, on a curve over an hour.
+    std::size_t most_coefficients = 6;
     /// Power along tracks over pieces must be as improbable to be a line that does not keep its phase.
     double scattered_p = 1e-6;
     /// Power in pieces that a line does not have may be chance up to this [chi-squared].
@@ -137,6 +179,12 @@ struct SampleScreenOptions {
     std::size_t fewest_sources = 3;
     std::size_t most_sources = 7;
     double likely_source = 40.0;
+    /// Effort: places of the record's start within the interval of a source from which fits start. A record's own white
+    /// errors, which may be small against those of its rates, are then raised by `error_step` while that is likelier,
+    /// `most_error_steps` times at most.
+    int places_of_source = 8;
+    double error_step = 1.5;
+    int most_error_steps = 10;
 };
 
 /// Candidates compared with each other and with residual tests (samples/loop/contest).
@@ -175,6 +223,8 @@ struct SampleResidualOptions {
     std::size_t line_stretches = 20;
     /// Patterns of the place in the record are looked for modulo 2 up to this.
     std::size_t most_modulo = 16;
+    /// Fewest rows with one remainder for their mean and size to be compared.
+    double fewest_in_pattern = 20.0;
     /// Values in steps that are larger than this share of the standard deviation are not normal, and sums of them are
     /// tested in their place.
     double coarse_lattice = 0.2;
@@ -193,6 +243,8 @@ struct SampleResidualOptions {
     double price_of_jump = 2.0;
     /// Stretches of the record that may have one of two levels.
     std::size_t level_stretches = 120;
+    /// Jumps are placed to one part in so many of a stretch.
+    std::size_t jump_places = 50;
     /// Polynomials of time up to this degree.
     std::size_t polynomial_degrees = 6;
     /// Places of a step of the rate.
@@ -214,6 +266,30 @@ struct SampleRoundedOptions {
     /// Rounding shows the angle where its first harmonic keeps more than this (Widrow and Kollar, "Quantization Noise",
     /// 2008, chapter 5).
     double rounding_shows = 0.01;
+    /// Effort: filters whose mixture gives the likelihood of rounded increments: this many for each standard deviation
+    /// in a step, doubled up from the fewest to the most. A filter's number has one byte: 256 are the most possible.
+    double filters_per_step = 8.0;
+    std::size_t fewest_filters = 64;
+    std::size_t most_filters = 256;
+    /// Least white noise of the angle that the model begins with, when the variance of steps has been taken off
+    /// [steps].
+    double least_angle_noise = 0.02;
+    /// Effort at the start: the likeliest noises are found on the first part of the record [rows] by at most
+    /// `climbs_at_start` steps; then the model is fitted again in rounds, each after some draws of the increments.
+    std::size_t first_look = 6000;
+    int climbs_at_start = 12;
+    int rounds_at_start = 2;
+    int draws_a_round = 2;
+    /// Effort: steps towards the likeliest model before increments are drawn by it, from a model without the random
+    /// walk that is added, and before figures are reported.
+    int climbs = 2;
+    int climbs_with_walk = 6;
+    int climbs_of_figures = 4;
+    /// Draws that reported figures and their standard errors are the mean of: what rounding hides is the scatter
+    /// between draws, which eight give to a quarter.
+    int draws_of_figures = 8;
+    /// Stretches of the record whose means are compared.
+    std::size_t stretches = 16;
     /// Means of stretches move more than white noise lets them where their variance is larger by this factor: with 15
     /// degrees of freedom one time in a thousand.
     double wanders = 2.5;

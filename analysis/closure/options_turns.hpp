@@ -335,6 +335,12 @@ struct TurnOptions {
         int shape_readings = 3;
         /// Rounds of the loop for each step that it may end with.
         std::size_t rounds_per_step = 3;
+
+        /// Stretches of the record by whose mean times the dither's frequency is reported, and the lag [stretches] at
+        /// which the weights of their correlation in its standard error have fallen to zero: a quarter of the record,
+        /// as a varying input is correlated for long.
+        std::size_t frequency_stretches = 40;
+        std::size_t frequency_memory = 10;
     };
     Loop loop;
 };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analysis/closure/decide/effect_queries.hpp"
+#include "analysis/closure/options.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
@@ -42,12 +43,10 @@ void take_device_of_turns(const record::Record& record, const Closure& closure, 
     const double readout = value_of(closure.base, "readout_noise_rad", standard.readout.detector_noise_relative);
     scenario.readout.detector_noise_relative = std::clamp(readout, 0.0, 0.1);
     const double injected = value_of(closure.base, "injected_noise_rad", 0.0);
-    // Below a hundredth of a radian nothing is randomised: a dither without noise.
-    const bool noisy = injected > 0.01;
+    const bool noisy = injected > options.report.least_injected_rad;
     if (noisy) scenario.noise_injection.turn_phase_rms_rad = injected;
     const double wander = value_of(closure.base, "amplitude_wander_rad", 0.0);
-    // Below a twentieth of the readout's noise it is not seen from one turn to the next.
-    if (wander > 0.05 * readout) {
+    if (wander > options.report.least_wander * readout) {
         const double w = units::two_pi * scenario.dither.frequency_hz;
         const double amplitude_rad = units::two_pi * scenario.dither.peak_rate_deg_s * units::deg_h_per_deg_s /
                                      (scenario.gyro.scale_factor_arcsec * w);
@@ -87,22 +86,19 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
     const double white = value_of(closure.base, "white_angle_arcsec", 0.0);
     const double rounding = closure.rounding_in_noise ? step_arcsec * step_arcsec / 12.0 : 0.0;
     const double angle_arcsec = std::sqrt(std::max(0.0, white * white - rounding));
-    // A phase whose noise is a twentieth of a radian is normal to a thousandth.
-    constexpr double noise_rad = 0.05;
-    if (angle_arcsec > 1e-6) {
+    constexpr double noise_rad = options.report.phase_noise_rad;
+    if (angle_arcsec > options.report.least_angle_noise_arcsec) {
         scenario.gyro.scale_factor_arcsec = std::clamp(units::two_pi * angle_arcsec / noise_rad, 1e-3, 1e3);
         scenario.readout.detector_noise_relative = units::two_pi * angle_arcsec / scenario.gyro.scale_factor_arcsec;
     } else {
         scenario.readout.model = scenario::ReadoutModel::ideal;
         scenario.gyro.scale_factor_arcsec = scale_factor_arcsec;
     }
-    // A turn at every reading, so that none is interpolated and each has an error of its own, and fringes enough
-    // between turns.
+    // A turn at every reading, so that none is interpolated and each has an error of its own.
     const double halves = std::max(1.0, std::ceil(2.0 / readings_hz));
     scenario.dither.frequency_hz = 0.5 * halves * readings_hz;
-    constexpr double fringes = 200.0;
-    scenario.dither.peak_rate_deg_s = 0.5 * fringes * scenario.gyro.scale_factor_arcsec * units::two_pi *
-                                      scenario.dither.frequency_hz / units::deg_h_per_deg_s;
+    scenario.dither.peak_rate_deg_s = 0.5 * options.report.fringes_between_turns * scenario.gyro.scale_factor_arcsec *
+                                      units::two_pi * scenario.dither.frequency_hz / units::deg_h_per_deg_s;
     const std::size_t increments =
         samples.size() - (samples.kind == record::SampleKind::angle_increment_arcsec ? 0 : 1);
     scenario.ensemble.duration_s = static_cast<double>(increments) / samples.rate_hz;

@@ -13,6 +13,7 @@
 #include <span>
 
 #include "analysis/allan/allan.hpp"
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/report/closed_scenario.hpp"
 #include "analysis/closure/samples/model/series.hpp"
 #include "analysis/closure/turns/model/effect_roles.hpp"
@@ -30,13 +31,10 @@ namespace ringlock::closure {
 
 namespace {
 
-constexpr std::int64_t most_turns = 4'000'000;
-constexpr int fewest_simulations = 9;
 // Seeds of nobody's study: the record itself may be of a simulation, whose chance must not come again.
 constexpr std::uint64_t first_seed = 0x7072656469637400;
-constexpr std::size_t fold_points = 12;
-constexpr Eigen::Index harmonics = 3;
-constexpr int bands = 30;
+constexpr std::size_t fold_points = options.report.phase_points;
+constexpr Eigen::Index harmonics = options.report.kick_harmonics;
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 /// One statistic of one record.
@@ -96,15 +94,15 @@ void add_rate_curves(const std::vector<double>& increment_arcsec, double interva
         rate_deg_h[i] = unit * bell * bell * (rate_deg_h[i] - mean);
     }
     const noise::Spectrum spectrum = noise::cosine_spectrum(rate_deg_h);
-    // Bands of equal ratio, but of four coefficients at least.
+    // Bands of equal ratio, where these have coefficients enough.
     Curve& density = curves.emplace_back();
     const std::size_t last = spectrum.z.size();
-    const double ratio = std::pow(static_cast<double>(last), 1.0 / bands);
+    const double ratio = std::pow(static_cast<double>(last), 1.0 / options.report.spectrum_bands);
     double edge = 1.0;
     for (std::size_t j = 0; j < last;) {
-        edge = std::max(edge * ratio, static_cast<double>(j + 4));
+        edge = std::max(edge * ratio, static_cast<double>(j + options.report.fewest_in_band));
         std::size_t end = std::min(last, static_cast<std::size_t>(std::llround(edge)));
-        if (last - end < 4) end = last;
+        if (last - end < options.report.fewest_in_band) end = last;
         double power = 0.0;
         double log_x = 0.0;
         for (std::size_t k = j; k < end; ++k) {
@@ -179,7 +177,7 @@ class TurnSight {
                      const std::vector<double>& steady_rad, Curves& curves) {
         constexpr Eigen::Index each = 2 * harmonics;
         constexpr Eigen::Index columns = 2 * each;
-        constexpr std::size_t stretch = 256;
+        constexpr std::size_t stretch = options.report.turns_in_stretch;
         using Row = Eigen::Matrix<double, columns, 1>;
         const std::size_t n = steady_rad.size();
         std::array<std::array<double, fold_points>, 2> seen{};
@@ -235,8 +233,7 @@ class TurnSight {
                             size(first + 2 * h + 1) * std::sin(static_cast<double>(h + 1) * phase);
                 }
                 curve.x.push_back(phase);
-                // Phases that hardly come tell nothing.
-                curve.y.push_back(seen[direction][point] < 4.0 ? nothing : kick);
+                curve.y.push_back(seen[direction][point] < options.report.fewest_at_phase ? nothing : kick);
             }
         }
     }
@@ -449,7 +446,7 @@ double swinging_deg_s(const record::Record& record, Closure closure, const TurnS
         scenario::Scenario mine = replica(record, closure, nullptr);
         tbb::parallel_for(std::size_t{0}, swung.size(), [&](std::size_t k) {
             scenario::Scenario one = mine;
-            one.ensemble.seed = first_seed + most_simulations + k;
+            one.ensemble.seed = first_seed + options.report.most_simulations + k;
             swung[k] = sight.peak_rate_deg_s(instrument::simulate_record(one));
         });
         double mean = 0.0;
@@ -492,8 +489,9 @@ Predictive check_predictive(const record::Record& record, const Closure& closure
         const scenario::Scenario closed = replica(record, closure, sample_sight);
         out.notes = left_out(closure);
         const double each = std::max(1.0, 2.0 * closed.ensemble.duration_s * closed.dither.frequency_hz);
-        const int affordable = static_cast<int>(std::min(1e6, static_cast<double>(most_turns) / each));
-        const int wanted = std::clamp(affordable, std::min(fewest_simulations, simulations), simulations);
+        const int affordable = static_cast<int>(std::min(1e6, static_cast<double>(options.report.most_turns) / each));
+        const int wanted =
+            std::clamp(affordable, std::min(options.report.fewest_simulations, simulations), simulations);
         Closure swinging = closure;
         if (turns && closed.record.trajectory == scenario::RecordTrajectory::uncompensated) {
             const double peak_deg_s = swinging_deg_s(record, closure, *turns, std::clamp(affordable / 20, 1, 4));

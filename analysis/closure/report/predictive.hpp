@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "analysis/closure/closure.hpp"
+#include "analysis/closure/options.hpp"
 
 /// Whether the closed model, simulated, makes records like the one that was measured.
 namespace ringlock::closure {
@@ -31,11 +32,10 @@ struct Predictive {
     std::vector<std::string> notes = {};  ///< what was left out, and why
 };
 
-/// Simulations at most; the lowest and the highest of 39 hold 95 % of what one more would show.
-inline constexpr int most_simulations = 39;
-
-/// Simulates the closed model as often as about four million turns last, 9 to `simulations` times, with the record's
-/// own input and length, and compares. What cannot be simulated is a note, and no error. Throws Interrupted.
-Predictive check_predictive(const record::Record& record, const Closure& closure, int simulations = most_simulations);
+/// Simulates the closed model as often as `options.report.most_turns` last, `options.report.fewest_simulations` to
+/// `simulations` times, with the record's own input and length, and compares. What cannot be simulated is a note, and
+/// no error. Throws Interrupted.
+Predictive check_predictive(const record::Record& record, const Closure& closure,
+                            int simulations = options.report.most_simulations);
 
 }  // namespace ringlock::closure

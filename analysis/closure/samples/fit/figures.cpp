@@ -43,7 +43,8 @@ struct Unaliased {
 Unaliased unaliased(double hz, const SampleFit& fit, const record::Declared& declared) {
     if (!declared.dither_frequency_hz) return {hz};
     const double from_hz = fit.model().noise.from_hz;
-    for (int h = 1; h <= 3; ++h) {
+    constexpr auto harmonics = static_cast<int>(options.samples.screen.harmonic_shares.size());
+    for (int h = 1; h <= harmonics; ++h) {
         const double of_dither = h * *declared.dither_frequency_hz;
         const Alias shown = alias(of_dither, from_hz > 0.0 ? from_hz : fit.series().rate_hz);
         if (std::abs(shown.hz - hz) >= options.samples.declared_dither_error * of_dither) continue;
@@ -276,7 +277,8 @@ void take_motion(const SampleFit& fit, const AddedEffect& added, std::vector<Est
         const double relative = 0.5 * squares_sd / std::max(squares, 1e-300);
         // Of n independent spectra: (1 - c) sqrt(2 c/n) (Bendat and Piersol 2010, table 9.6); of their power's
         // logarithm the standard error is 1/sqrt(n).
-        coherence_sd = relative < 0.25 ? left * std::sqrt(8.0 * coherence) * relative : squares_sd / all_of_it;
+        coherence_sd = relative < options.samples.fit.small_relative_sd ? left * std::sqrt(8.0 * coherence) * relative
+                                                                        : squares_sd / all_of_it;
     } else {
         notes.push_back(
             "the motion is known by its witness alone: its own spectrum does not stand out from the noise, "

@@ -194,13 +194,13 @@ SampleFit::Score SampleFit::score(const std::vector<std::vector<double>>& series
     const Eigen::VectorXd s = scale.tail(m - k);
     freed = s.cwiseInverse().asDiagonal() * freed * s.cwiseInverse().asDiagonal();
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> rest;
-    rest.setThreshold(1e-8);
+    rest.setThreshold(options.samples.fit.told_apart);
     rest.compute(freed);
     const Eigen::VectorXd scaled = s.cwiseInverse().asDiagonal() * target;
     const Eigen::VectorXd solution = rest.solve(scaled);
     Score score;
     score.chi2 = std::max(0.0, scaled.dot(solution));
-    score.rank = freed.diagonal().maxCoeff() > 1e-8 ? static_cast<int>(rest.rank()) : 0;
+    score.rank = freed.diagonal().maxCoeff() > options.samples.fit.told_apart ? static_cast<int>(rest.rank()) : 0;
     for (Eigen::Index i = 0; i < m - k; ++i) score.value.push_back(solution(i) / s(i));
     score.covariance = s.cwiseInverse().asDiagonal() * rest.pseudoInverse() * s.cwiseInverse().asDiagonal();
     return score;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/closure/samples/fit/motion.hpp"
 #include "analysis/closure/samples/fit/simplex.hpp"
@@ -130,7 +131,9 @@ SampleModel SampleFit::at(const std::vector<double>& x) const {
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
         auto& resonance = model.noise.resonances[k];
         const double rate_hz = model.noise.from_hz > 0.0 ? model.noise.from_hz : series_->rate_hz;
-        if (resonance.hz > 0.5 * rate_hz || resonance.width_hz > 3.0 * rate_hz) resonance.arcsec = 0.0;
+        if (resonance.hz > 0.5 * rate_hz || resonance.width_hz > options.samples.fit.widest_resonance * rate_hz) {
+            resonance.arcsec = 0.0;
+        }
         const bool slow = std::hypot(resonance.hz, 0.5 * resonance.width_hz) < model.motion_from_hz;
         if (slow && is_motion(model.resonances[k].effect)) resonance.arcsec = 0.0;
     }
@@ -270,12 +273,11 @@ SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows
 
 /// Fisher's scoring, damped (Levenberg and Marquardt): steps by the information where the likelihood rises.
 void SampleFit::score_noise(std::vector<double>& x, const Rows& rows, const std::vector<bool>& held) const {
-    constexpr int most_rounds = 25;
     constexpr double longest = 1.5;
     constexpr double enough = 2e-3;  // of the log-likelihood
     double damping = 1e-3;
     Slope now = slope(x, rows, held);
-    for (int round = 0; round < most_rounds && damping < 1e7; ++round) {
+    for (int round = 0; round < options.samples.fit.most_scorings && damping < 1e7; ++round) {
         bool better = false;
         double gained = 0.0;
         while (!better && damping < 1e7) {
@@ -414,10 +416,10 @@ void SampleFit::fit_noise() {
         for (const std::size_t i : turned) some.push_back(start[i]);
         const int steps = 18 * static_cast<int>(some.size());
         double value = on_part({some}).front();
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < options.samples.fit.most_searches; ++i) {
             some = smallest(on_part, some, 0.3, steps);
             const double now = on_part({some}).front();
-            if (value - now < 0.5) break;
+            if (value - now < options.samples.fit.searched_again) break;
             value = now;
         }
         start = with(some);
@@ -479,9 +481,9 @@ SampleModel SampleFit::noise_errors() const {
     Eigen::MatrixXd covariance = inverse_of_information(information);
     for (std::size_t a = 0; a < x.size(); ++a) {
         // What stands at zero, its lower bound, moves no other.
-        constexpr double at_zero = 1.5;  // standard error of the logarithm
         const auto i = static_cast<Eigen::Index>(a);
-        if (own[a].of_clock || !own[a].of_source || !(std::sqrt(covariance(i, i)) > at_zero)) continue;
+        if (own[a].of_clock || !own[a].of_source || !(std::sqrt(covariance(i, i)) > options.samples.fit.log_sd_at_zero))
+            continue;
         const double own_information = information(i, i);
         information.row(i).setZero();
         information.col(i).setZero();

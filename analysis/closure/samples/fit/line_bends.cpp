@@ -15,7 +15,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr std::size_t most_pieces = 64;
+constexpr std::size_t most_pieces = options.samples.lines.pieces.back();
 using Polynomials = std::array<double, LineCourse::most + 1>;
 
 /// Those of Legendre, which do not make up for each other: a start that is only near is improved in few steps.

@@ -216,14 +216,14 @@ FoundLine follow(const std::vector<double>& values, const Spectrum& spectrum, do
 /// its bin.
 void track_lines(const std::vector<double>& values, const Spectrum& spectrum, FoundLines& lines) {
     const std::size_t n = values.size();
-    constexpr double lengths = 2.0;  // of pieces that are tried
+    constexpr auto lengths = static_cast<double>(options.samples.lines.pieces.size());
     double least = 1.0;
     double tracked_hz = 0.0;
     double tracked_drift = 0.0;
     double drift_cycles = 0.0;
-    for (const std::size_t pieces : {8U, 64U}) {
+    for (const std::size_t pieces : options.samples.lines.pieces) {
         const std::size_t length = n / pieces;
-        if (length < 256) continue;
+        if (length < options.samples.lines.shortest_piece) continue;
         const std::size_t wide = power_of_two(2 * length);
         const double hz = spectrum.rate_hz / static_cast<double>(wide);
         // A piece in which a part does not count is as much the less: each by its own level.
@@ -244,7 +244,7 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
             }
             relative.push_back(std::move(s));
         }
-        if (used < 3.0) continue;
+        if (used < options.samples.lines.fewest_pieces) continue;
         const auto most = static_cast<int>(pieces);
         double best = 0.0;
         int best_slope = 0;

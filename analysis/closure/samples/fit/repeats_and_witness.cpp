@@ -53,7 +53,7 @@ FoundCycle find_cycle(const std::vector<double>& innovations, const Rows& rows, 
             }
             return std::norm(total);
         };
-        if (p < 1e-3) {
+        if (p < options.samples.fit.refined_cycle_p) {
             double top = power_at(hz);
             for (double d = 0.25 * rate_hz / static_cast<double>(n); d > 0.004 * rate_hz / static_cast<double>(n);
                  d *= 0.5) {
@@ -102,7 +102,7 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
     for (std::size_t w = 0; w < series.witnesses.size(); ++w) {
         const auto& raw = series.witnesses[w].second;
         // The witness made white by an autoregression (Levinson and Durbin), so that lags tell one thing each.
-        constexpr int order = 24;
+        constexpr int order = options.samples.fit.witness_order;
         const double mean = std::accumulate(raw.begin(), raw.end(), 0.0) / static_cast<double>(n);
         std::vector<double> r(order + 1, 0.0);
         for (int k = 0; k <= order; ++k) {
@@ -168,7 +168,7 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
                 count += 1.0;
             }
         }
-        if (count < 20.0) continue;
+        if (count < options.samples.fit.fewest_far_windows) continue;
         const double m = sum / count;
         const double v = std::max(square / count - m * m, 2.0 * m * m / (2.0 * lags + 1.0));
         // Gamma of that mean and variance: v/(2 m) times chi-squared of 2 m^2/v

@@ -81,8 +81,7 @@ std::size_t row_of_step(const SampleColumn& step) {
 }
 
 SampleFit refine_steps(SampleFit fit, const Rows& rows) {
-    constexpr int rounds = 3;
-    for (int round = 0; round < rounds; ++round) {
+    for (int round = 0; round < options.samples.fit.most_step_rounds; ++round) {
         bool moved = false;
         for (std::size_t k = 0; k < fit.model().columns.size(); ++k) {
             if (!is_step(fit.model().columns[k])) continue;

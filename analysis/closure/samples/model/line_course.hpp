@@ -3,12 +3,14 @@
 #include <cstddef>
 #include <vector>
 
+#include "analysis/closure/options.hpp"
+
 namespace ringlock::closure {
 
 /// How the frequency of a line goes through a record: a polynomial of the time from the middle. A dither follows the
 /// temperature of its springs, evenly over minutes, on a curve over an hour.
 struct LineCourse {
-    static constexpr std::size_t most = 6;
+    static constexpr std::size_t most = options.samples.lines.most_coefficients;
     double hz = 0.0;  ///< in the middle
     /// Derivatives of the frequency there, from the first on [Hz/s, Hz/s^2, ...].
     std::array<double, most - 1> drifts{};

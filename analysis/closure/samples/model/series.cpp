@@ -197,7 +197,7 @@ Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
     double count = 0.0;
     double second = 0.0;
     const auto most = static_cast<std::int64_t>(std::llround(std::max(-sorted.front(), sorted.back()) / step));
-    if (most > 200000) return lattice;
+    if (most > options.samples.record.most_levels) return lattice;
     std::vector<double> often(static_cast<std::size_t>(2 * most + 1), 0.0);
     for (const double x : sorted) often[static_cast<std::size_t>(std::llround(x / step) + most)] += 1.0;
     for (std::int64_t m = -most; m <= most; ++m) {

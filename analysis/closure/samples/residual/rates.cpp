@@ -145,7 +145,7 @@ std::vector<double> two_level_rate(const SampleFit& fit, const Eigen::VectorXd& 
     };
     double best = fit.score({fit.as_taken(rate())}).chi2;
     const std::size_t length = std::max<std::size_t>(1, n / stretches);
-    for (std::size_t step = length / 2; step > length / 50; step /= 2) {
+    for (std::size_t step = length / 2; step > length / options.samples.residual.jump_places; step /= 2) {
         for (std::size_t& jump : jumps) {
             for (const bool later : {false, true}) {
                 const std::size_t from = jump;

@@ -87,7 +87,7 @@ void test_size(const SampleFit& fit, Views& views) {
             k[i % m] += 1.0;
         }
         for (std::size_t j = 0; j < m; ++j) {
-            if (k[j] < 20.0) continue;
+            if (k[j] < options.samples.residual.fewest_in_pattern) continue;
             means += sum[j] * sum[j] / (k[j] * mean);
             sizes += squares[j] * squares[j] / (k[j] * variance);
         }

@@ -34,11 +34,8 @@ bool RoundedSamples::show(const SampleFit& fit, double step_arcsec) {
 }
 
 std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double step_arcsec) {
-    constexpr int rounds = 2;
-    constexpr int draws = 2;
-    constexpr double least = 0.02;
-    constexpr std::size_t first_look = 6000;
-    constexpr int most_looks = 12;
+    const SampleRoundedOptions& of = options.samples.rounded;
+    const double least = of.least_angle_noise;
     step_ = step_arcsec;
     SampleModel model = fit.model();
     double& angle = model.noise.angle_arcsec;
@@ -46,12 +43,12 @@ std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double st
     SampleFit now(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
     // The rate's noise may have grown by what the rounding is on the way from one step to the next.
     filters_ = filters_for(step_, now.sd(measured_.size() / 2));
-    summit_ = towards_summit(now, rounded(), first_look, most_looks);
+    summit_ = towards_summit(now, rounded(), of.first_look, of.climbs_at_start);
     wandering_.reset();
     const SampleFit there(series_, summit_->model, fit.rows(), SampleFit::Noise::all_held);
     filters_ = filters_for(step_, there.sd(measured_.size() / 2));
     auto drawn = draw_by(summit_->model, summit_->model, fit.rows());
-    for (int round = 0; round < rounds; ++round) drawn = draw(std::move(drawn), draws);
+    for (int round = 0; round < of.rounds_at_start; ++round) drawn = draw(std::move(drawn), of.draws_a_round);
     return drawn;
 }
 
@@ -72,7 +69,7 @@ std::shared_ptr<SampleFit> RoundedSamples::draw(std::shared_ptr<SampleFit> fit, 
 /// By how much the variance of a rate that walks grows, as means of stretches differ from one to the next; zero where
 /// white noise alone may do that.
 double RoundedSamples::wander(const SampleFit& fit) const {
-    constexpr std::size_t stretches = 16;
+    constexpr std::size_t stretches = options.samples.rounded.stretches;
     const std::vector<double> known = fit.determined();
     const std::size_t length = measured_.size() / stretches;
     const double length_s = series_.interval_s * static_cast<double>(length);
@@ -94,17 +91,15 @@ double RoundedSamples::wander(const SampleFit& fit) const {
 /// What the model lacks is drawn as its noise makes it. A slow rate that it lacks is drawn beside a walk, which follows
 /// it, where that is likelier by far.
 SampleModel RoundedSamples::likeliest(const SampleFit& fit) {
-    constexpr int climbs = 2;
-    constexpr int climbs_from_afar = 6;
-    summit_ = find_summit(fit, rounded(), climbs, near(fit.model()));
+    summit_ = find_summit(fit, rounded(), options.samples.rounded.climbs, near(fit.model()));
     const double walk = fit.model().walk || fit.model().flicker ? 0.0 : wander(fit);
     if (walk == 0.0) return summit_->model;
     SampleModel beside = summit_->model;
     beside.walk = true;
     beside.noise.walk_arcsec2_s3 = walk;
     const SampleFit start(series_, std::move(beside), fit.rows(), SampleFit::Noise::all_held);
-    wandering_ =
-        towards_summit(start, rounded(), measured_.size(), climbs_from_afar, wandering_ ? &*wandering_ : nullptr);
+    wandering_ = towards_summit(start, rounded(), measured_.size(), options.samples.rounded.climbs_with_walk,
+                                wandering_ ? &*wandering_ : nullptr);
     return wandering_->log_likelihood > summit_->log_likelihood + options.samples.rounded.drawn_beside_walk
                ? wandering_->model
                : summit_->model;
@@ -152,9 +147,8 @@ SampleScore RoundedSamples::score_of(const SampleFit& fit, const Rows& reported)
 
 SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
                                          const std::function<SampleFigures(const SampleFit&)>& figures) {
-    constexpr int several = 8;
-    constexpr int climbs = 4;
-    summit_ = find_summit(fit, rounded(), climbs, near(fit.model()));
+    constexpr int several = options.samples.rounded.draws_of_figures;
+    summit_ = find_summit(fit, rounded(), options.samples.rounded.climbs_of_figures, near(fit.model()));
     const RoundedSummit& summit = *summit_;
     std::vector<SampleFigures> all;
     for (int k = 0; k < several; ++k) all.push_back(figures(*draw_by(summit.model, summit.model, fit.rows())));

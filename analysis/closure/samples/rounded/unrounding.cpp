@@ -24,8 +24,10 @@ double upper_tail(double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); }
 }  // namespace
 
 std::size_t filters_for(double step_arcsec, double sd_arcsec) {
-    std::size_t count = 64;
-    while (count < 256 && static_cast<double>(count) < 8.0 * step_arcsec / sd_arcsec) count *= 2;
+    const SampleRoundedOptions& by = options.samples.rounded;
+    const double wanted = by.filters_per_step * step_arcsec / sd_arcsec;
+    std::size_t count = by.fewest_filters;
+    while (count < by.most_filters && static_cast<double>(count) < wanted) count *= 2;
     return count;
 }
 

@@ -101,7 +101,7 @@ double log_likelihood_of_shape(const SampleFit& now, const SampleNoise& noise) {
 /// The likeliest place of the record's start within the source's interval, and the likeliest share of errors of
 /// readings, which interpolation makes look like a white rate.
 Resampled best_placed(const SampleFit& now, double from_hz, Errors errors) {
-    constexpr int places = 8;
+    constexpr int places = options.samples.screen.places_of_source;
     Resampled best{{}, -std::numeric_limits<double>::infinity()};
     const auto look_at = [&](SampleModel model) {
         const double value = log_likelihood_of_shape(now, model.noise);
@@ -111,12 +111,10 @@ Resampled best_placed(const SampleFit& now, double from_hz, Errors errors) {
         look_at(as_of(now, {from_hz, static_cast<double>(place) / places}, errors));
     }
     if (errors == Errors::of_readings) return best;
-    constexpr double factor = 1.5;
-    constexpr int most = 10;  // a record's own errors may hardly show beside its rates
-    for (int k = 0; k < most; ++k) {
+    for (int k = 0; k < options.samples.screen.most_error_steps; ++k) {
         const double before = best.log_likelihood;
         SampleModel model = best.model;
-        model.noise.angle_arcsec *= factor;
+        model.noise.angle_arcsec *= options.samples.screen.error_step;
         look_at(std::move(model));
         if (!(best.log_likelihood > before)) break;
     }

@@ -18,7 +18,7 @@ namespace {
 /// Frequency of the dither by its own turns: the slope of their times. Its error comes from the scatter of means over
 /// stretches with their correlation (Newey and West, Econometrica 55, 1987, 703), which a varying input causes.
 Estimate dither_frequency(const TurnFit& fit) {
-    constexpr std::size_t stretches = 40;
+    constexpr std::size_t stretches = options.turns.loop.frequency_stretches;
     const auto& turn_s = fit.prediction().turn_s;
     const double interval_s = fit.model().series().interval_s;
     std::vector<double> at;
@@ -41,7 +41,7 @@ Estimate dither_frequency(const TurnFit& fit) {
         slope_s += (at[s] - mean) * late_s[s];
     }
     slope_s /= squares;
-    constexpr std::size_t memory = 10;
+    constexpr std::size_t memory = options.turns.loop.frequency_memory;
     double scatter = 0.0;
     std::vector<double> pull;
     for (std::size_t s = 0; s < stretches; ++s) {

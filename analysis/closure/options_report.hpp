@@ -1,0 +1,43 @@
+#pragma once
+#include <cstddef>
+#include <cstdint>
+
+namespace ringlock::closure {
+
+/// Numbers that decide what is reported of the closed model: its scenario and its simulations (report).
+struct ReportOptions {
+    /// Injected noise at the turns below this randomises nothing, and the scenario has a dither without noise [rad].
+    double least_injected_rad = 0.01;
+    /// A wander of the dither's amplitude from one turn to the next that is smaller than this share of the readout's
+    /// noise is not seen there, and the scenario has none [1].
+    double least_wander = 0.05;
+    /// White noise of the angle of samples below this is none, and the readout of the scenario is ideal [arcsec].
+    double least_angle_noise_arcsec = 1e-6;
+    /// Samples have no fringes of their own: those of the scenario are of a size that makes the white noise of the
+    /// angle this noise of the phase, which is normal to a thousandth [rad].
+    double phase_noise_rad = 0.05;
+    /// Fringes between two turns of a scenario of samples, enough for the phase to run free between them.
+    double fringes_between_turns = 200.0;
+
+    /// Effort: turns that are simulated in all.
+    std::int64_t most_turns = 4'000'000;
+    /// Simulations, however long they last, unless fewer are asked for; and most of them: the lowest and the highest of
+    /// 39 hold 95 % of what one more would show.
+    int fewest_simulations = 9;
+    int most_simulations = 39;
+
+    /// Bands of the spectrum that are compared, of equal ratio, and fewest coefficients of each: a mean of four
+    /// periodogram ordinates has a relative standard deviation of a half.
+    int spectrum_bands = 30;
+    std::size_t fewest_in_band = 4;
+
+    /// Phases at which kicks are compared, harmonics of the phase that are fitted to the angle for them, and turns that
+    /// have a line of their own in that fit, so that slow rates do not matter.
+    std::size_t phase_points = 12;
+    int kick_harmonics = 3;
+    std::size_t turns_in_stretch = 256;
+    /// Phases with fewer turns than this are not compared: their kicks are not determined.
+    double fewest_at_phase = 4.0;
+};
+
+}  // namespace ringlock::closure
