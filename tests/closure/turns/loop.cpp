@@ -296,7 +296,7 @@ TEST(TurnLoop, RecordsThatCannotBeFollowedAreRefused) {
     truth.scale_factor_arcsec = 2.0;
     truth.dither_frequency_hz = 600.3;
     truth.dither_peak_rate_deg_s = 20.0;
-    expect_refused("half cycles of so few fringes");
+    expect_refused("the lock-in threshold is too high for the number of fringes in a half cycle");
 }
 
 TEST(LongTurnLoop, WhatIsReadAgainIsFittedAnew) {
