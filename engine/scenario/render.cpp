@@ -13,18 +13,29 @@
 namespace ringlock::scenario {
 namespace {
 
-/// Comment lines of at most 120 columns.
-std::string comment(std::string_view text) {
-    constexpr std::size_t columns = 118;
+/// Lines of at most 120 columns, the first after `first` and the others after `next`. None of the others begins like
+/// an item of a Markdown list.
+std::string wrapped(std::string_view text, std::string_view first, std::string_view next) {
+    const std::size_t columns = 120 - next.size();
+    const auto splits = [&text](std::size_t at) {
+        const std::string_view rest = text.substr(at + 1);
+        return !(rest.size() > 1 && rest[1] == ' ' &&
+                 std::string_view("-+*#>|=").find(rest[0]) != std::string_view::npos);
+    };
     std::string out;
+    std::string_view lead = first;
     while (text.size() > columns) {
         std::size_t end = text.rfind(' ', columns);
-        if (end == std::string_view::npos) end = columns;
-        out += fmt::format("# {}\n", text.substr(0, end));
+        while (end != std::string_view::npos && end > 0 && !splits(end)) end = text.rfind(' ', end - 1);
+        if (end == std::string_view::npos || end == 0) end = columns;
+        out += fmt::format("{}{}\n", lead, text.substr(0, end));
         text.remove_prefix(std::min(text.size(), end + 1));
+        lead = next;
     }
-    return out + fmt::format("# {}\n", text);
+    return out + fmt::format("{}{}\n", lead, text);
 }
+
+std::string comment(std::string_view text) { return wrapped(text, "# ", "# "); }
 
 /// "A number between 1 and 100000: mechanical dither runs at some hundred Hz."
 std::string allowed_sentence(const Key& key) {
@@ -88,17 +99,16 @@ std::string schema_text() {
 std::string schema_markdown() {
     std::string out =
         "# Scenario keys\n\n"
-        "<!-- Made by `ringlock run --print-schema=markdown`; a test compares the two. -->\n\n"
+        "<!-- Made by `ringlock run --print-schema=markdown`; a test compares the two. -->\n\n";
+    out += wrapped(
         "A scenario is a TOML file. A key that is not named has its default, so an empty file is valid: it is the "
-        "device "
-        "of\nGao and Deng (2007) with the default ensemble. Every key carries its unit in its name. An unknown key, a "
-        "wrong "
-        "type or a\nvalue out of bounds is an error that names file, line, column, key and value; all of a file's "
-        "errors "
-        "are reported at\nonce. Integers are accepted where a float is wanted. `ringlock run --print-schema` prints a "
-        "commented file with every\ndefault.\n";
+        "device of Gao and Deng (2007) with the default ensemble. Every key carries its unit in its name. An "
+        "unknown key, a wrong type or a value out of bounds is an error that names file, line, column, key and "
+        "value; all of a file's errors are reported at once. Integers are accepted where a float is wanted. "
+        "`ringlock run --print-schema` prints a commented file with every default.",
+        "", "");
     for (const Section& section : schema()) {
-        out += fmt::format("\n## `[{}]`\n\n{}\n\n", section.name, section.doc);
+        out += fmt::format("\n## `[{}]`\n\n{}\n", section.name, wrapped(section.doc, "", ""));
         out += "| key | type | default | allowed | meaning |\n|---|---|---|---|---|\n";
         for (const Key& key : section.keys) {
             out += fmt::format("| `{}` | {} | `{}` | {} | {} |\n", key.name, type_name(key.type),
@@ -106,7 +116,7 @@ std::string schema_markdown() {
         }
     }
     out += "\n## Rules between keys\n\n";
-    for (const std::string_view rule : rules()) out += fmt::format("- {}\n", rule);
+    for (const std::string_view rule : rules()) out += wrapped(rule, "- ", "  ");
     return out;
 }
 

@@ -92,6 +92,19 @@ TEST(Schema, PrintedTextCommentsEveryKeyWithin120Columns) {
     }
 }
 
+// Rows of a table cannot be broken in Markdown; everything else can, but not into what looks like a list.
+TEST(Schema, PageBreaksItsLinesAt120Columns) {
+    std::istringstream lines(schema_markdown());
+    bool any_continued = false;
+    for (std::string line; std::getline(lines, line);) {
+        if (line.starts_with('|')) continue;
+        EXPECT_LE(line.size(), 120U) << line;
+        any_continued |= line.starts_with("  ");
+        EXPECT_FALSE(line.starts_with("+ ") || line.starts_with("= ") || line.starts_with("* ")) << line;
+    }
+    EXPECT_TRUE(any_continued);
+}
+
 TEST(Schema, JsonIsValidAndHoldsEverySection) {
     const nlohmann::json json = nlohmann::json::parse(schema_json());
     ASSERT_EQ(json.at("sections").size(), schema().size());
