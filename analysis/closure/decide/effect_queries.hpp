@@ -67,8 +67,7 @@ struct Configures {
 };
 Configures configured_by(const effects::Effect& effect);
 
-/// Values for a clock that begins `start_s` later: times and phases of what the effect changes over time. Times before
-/// that become zero.
+/// Converts the times and phases of an effect to a clock that begins `start_s` later. Earlier times become zero.
 void set_back_clock(const effects::Effect& effect, effects::Values& values, double start_s);
 
 /// A fitted parameter of an effect.

@@ -4,7 +4,7 @@
 
 #include "engine/effects/effect.hpp"
 
-/// Sets of effects that explain a record about equally well: which effect is named, and what it is confounded with.
+/// Sets of effects that explain a record about equally well: the choice of the effect to name and of its alternatives.
 namespace ringlock::closure {
 
 /// Effects that explain the record together.

@@ -8,7 +8,7 @@
 
 namespace ringlock::closure {
 
-/// A test of the innovations and what it regresses them on.
+/// A residual test with the columns on which it regresses the innovations.
 template <class Column>
 struct View {
     ResidualTest test;
