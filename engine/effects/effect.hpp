@@ -37,6 +37,9 @@ struct Parameter {
     double max;
     Role role;
     std::string_view doc;  ///< one line
+    /// Size that comes with the typical sizes of the effect's other parameters, to an order of magnitude: a record that
+    /// could not show it does not tell whether it is there. Zero where sizes have no such proportion.
+    double typical = 0.0;
 };
 
 /// The value of every parameter of one effect.
@@ -58,6 +61,8 @@ struct Change {
     double angle_arcsec = 0.0;        ///< rotation that the output gains
     double threshold_factor = 1.0;    ///< of the lock-in threshold
     double coupling_phase_rad = 0.0;  ///< by which the whole coupling moves: F(psi) becomes F(psi + phase)
+
+    bool operator==(const Change&) const = default;
 };
 
 /// The change over an interval: a pure function of it.

@@ -29,6 +29,41 @@ OnSamples of_place(const effects::Effect& effect, effects::SampleStage::Place pl
     return OnSamples::transport;
 }
 
+/// The values at which this amplitude alone acts, from the middle of the intervals on that are looked at.
+effects::Values values_of_one(const effects::Effect& effect, const Amplitude& amplitude) {
+    effects::Values values = values_at_rest(effect);
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        if (parameter.role == Role::time) values.at(std::string(parameter.name)) = 1.0;
+    }
+    values.at(std::string(amplitude.value->name)) = probe;
+    return values;
+}
+
+/// Whether an amplitude of one effect does the same as one of another, each by itself.
+bool act_alike(const effects::Effect& a, const Amplitude& of_a, const effects::Effect& b, const Amplitude& of_b) {
+    if ((of_a.turned_by == nullptr) != (of_b.turned_by == nullptr)) return false;
+    const auto random = [](const effects::Effect& effect) {
+        return has(effect, Role::deviation) || has(effect, Role::probability) || has(effect, Role::sampled);
+    };
+    if (random(a) || random(b)) return false;
+    const effects::Values at_a = values_of_one(a, of_a);
+    const effects::Values at_b = values_of_one(b, of_b);
+    const gyro::Setup setup = configured(a, at_a);
+    if (setup != configured(b, at_b)) return false;
+    bool acts = setup != gyro::Setup{};
+    const effects::ChangeOver change_a = a.change(at_a);
+    const effects::ChangeOver change_b = b.change(at_b);
+    for (const double start_s : {0.0, 0.75, 2.0}) {
+        for (const double temperature_k : {0.0, 1.0}) {
+            const effects::Interval at{start_s, 0.5, {temperature_k, 2.0 * temperature_k}, {temperature_k, 3.0}};
+            const effects::Change change = change_a(at);
+            if (change != change_b(at)) return false;
+            acts = acts || change != effects::Change{};
+        }
+    }
+    return acts;
+}
+
 OnSamples of_angle(const effects::Effect& effect) {
     if (has(effect, Role::frequency)) return OnSamples::rate_line;
     if (!has(effect, Role::size)) return OnSamples::other;
@@ -38,6 +73,12 @@ OnSamples of_angle(const effects::Effect& effect) {
 }
 
 }  // namespace
+
+gyro::Setup configured(const effects::Effect& effect, const effects::Values& values) {
+    gyro::Setup setup;
+    effect.configure(values, setup);
+    return setup;
+}
 
 OnSamples on_samples(const effects::Effect& effect) {
     if (const auto place = effect.sample_place()) return of_place(effect, *place);
@@ -95,6 +136,82 @@ std::function<double(const effects::Interval&)> unit_angle(const effects::Effect
         [change = effect.change(unit_values(effect))](const effects::Interval& at) { return change(at).angle_arcsec; };
 }
 
+effects::Values values_at_rest(const effects::Effect& effect) {
+    effects::Values values;
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        const bool active = parameter.role == Role::size || parameter.role == Role::deviation ||
+                            parameter.role == Role::probability || parameter.role == Role::phase;
+        values[std::string(parameter.name)] = active ? 0.0 : parameter.default_value;
+    }
+    return values;
+}
+
+bool is_own_phase(const effects::Effect& effect, const effects::Parameter& parameter) {
+    if (parameter.role != Role::phase) return false;
+    effects::Values values = values_at_rest(effect);
+    values.at(std::string(parameter.name)) = probe;
+    return effect.active(values);
+}
+
+std::vector<Amplitude> amplitudes_of(const effects::Effect& effect) {
+    std::vector<Amplitude> all;
+    for (const effects::Parameter& parameter : effect.parameters()) {
+        if (parameter.role == Role::size || is_own_phase(effect, parameter)) {
+            all.push_back({&parameter, nullptr});
+        } else if (parameter.role == Role::phase && !all.empty()) {
+            all.back().turned_by = &parameter;
+        }
+    }
+    return all;
+}
+
+bool changes_angle_only(const effects::Effect& effect) {
+    const effects::Changes changes = effect.changes();
+    if (!changes.angle || changes.threshold || changes.coupling_phase) return false;
+    effects::Values values = values_at_rest(effect);
+    for (const Amplitude& amplitude : amplitudes_of(effect)) values.at(std::string(amplitude.value->name)) = probe;
+    return configured(effect, values) == gyro::Setup{};
+}
+
+bool contains(const effects::Effect& larger, const effects::Effect& smaller) {
+    const std::vector<Amplitude> of_larger = amplitudes_of(larger);
+    const std::vector<Amplitude> of_smaller = amplitudes_of(smaller);
+    if (of_smaller.empty() || of_larger.size() <= of_smaller.size()) return false;
+    return std::all_of(of_smaller.begin(), of_smaller.end(), [&](const Amplitude& wanted) {
+        return std::any_of(of_larger.begin(), of_larger.end(),
+                           [&](const Amplitude& amplitude) { return act_alike(larger, amplitude, smaller, wanted); });
+    });
+}
+
+effects::Values values_as_larger(const effects::Effect& larger, const effects::Effect& smaller,
+                                 const effects::Values& values) {
+    effects::Values all = values_at_rest(larger);
+    const auto set = [&](const effects::Parameter* to, const effects::Parameter* from) {
+        if (to != nullptr && from != nullptr) all.at(std::string(to->name)) = value_of(values, *from);
+    };
+    for (const Role role : {Role::time, Role::frequency}) {
+        set(effects::first_of(larger, role), effects::first_of(smaller, role));
+    }
+    for (const Amplitude& to : amplitudes_of(larger)) {
+        for (const Amplitude& from : amplitudes_of(smaller)) {
+            if (!act_alike(larger, to, smaller, from)) continue;
+            set(to.value, from.value);
+            set(to.turned_by, from.turned_by);
+        }
+    }
+    return all;
+}
+
+std::vector<Amplitude> in_addition(const effects::Effect& larger, const effects::Effect& smaller) {
+    const std::vector<Amplitude> of_smaller = amplitudes_of(smaller);
+    std::vector<Amplitude> all = amplitudes_of(larger);
+    std::erase_if(all, [&](const Amplitude& amplitude) {
+        return std::any_of(of_smaller.begin(), of_smaller.end(),
+                           [&](const Amplitude& other) { return act_alike(larger, amplitude, smaller, other); });
+    });
+    return all;
+}
+
 double rate_per_kelvin(const effects::Effect& effect) {
     const auto angle = unit_angle(effect);
     return angle({.duration_s = 1.0, .temperature_change_k = {1.0, 1.0}}) - angle({.duration_s = 1.0});
@@ -130,8 +247,6 @@ double value_of(const effects::Values& values, const effects::Parameter& paramet
 }
 
 Configures configured_by(const effects::Effect& effect) {
-    // Any value that shows in the constants and is allowed.
-    constexpr double probe = 1e-3;
     const gyro::Setup plain;
     gyro::Setup setup;
     effects::Values values;

@@ -43,6 +43,42 @@ double effects_on_samples();
 bool is_slow_rate(const effects::Effect& effect);
 bool is_line(const effects::Effect& effect);
 
+/// A value of any parameter that shows in what an effect changes and is allowed.
+inline constexpr double probe = 1e-3;
+
+/// The standard gyro as an effect of these values changes it.
+gyro::Setup configured(const effects::Effect& effect, const effects::Values& values);
+
+/// Parameters of an effect at which it does nothing: sizes, deviations, probabilities and phases zero, the others at
+/// their defaults.
+effects::Values values_at_rest(const effects::Effect& effect);
+
+/// Whether a parameter is a phase that does something while all sizes are zero, such as one of the coupling. Any other
+/// phase turns the size before it.
+bool is_own_phase(const effects::Effect& effect, const effects::Parameter& parameter);
+
+/// A parameter that enters in proportion, about zero.
+struct Amplitude {
+    const effects::Parameter* value;      ///< a size, or a phase of its own
+    const effects::Parameter* turned_by;  ///< phase with which the size makes two amplitudes; null where there is none
+};
+/// The amplitudes of the effect, in the order of its parameters.
+std::vector<Amplitude> amplitudes_of(const effects::Effect& effect);
+
+/// Whether the phases are proportional to the effect's sizes: it adds an angle, and changes nothing of the gyro.
+bool changes_angle_only(const effects::Effect& effect);
+
+/// Whether an effect can do all that another one does, and more: with some of its amplitudes at zero it is the other
+/// one. Compared are effects that are not random, by what they change over intervals of all kinds and in a setup.
+bool contains(const effects::Effect& larger, const effects::Effect& smaller);
+
+/// The values of the larger effect at which it is the smaller one at these, which it contains.
+effects::Values values_as_larger(const effects::Effect& larger, const effects::Effect& smaller,
+                                 const effects::Values& values);
+
+/// The amplitudes of an effect for which one that it contains has no counterpart.
+std::vector<Amplitude> in_addition(const effects::Effect& larger, const effects::Effect& smaller);
+
 /// The effect's values with every size and deviation at one and the other parameters at their defaults.
 effects::Values unit_values(const effects::Effect& effect);
 /// Rotation [arcsec] over an interval that the effect adds at these values.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 
@@ -30,6 +31,37 @@ double p_of_gain(double gain, const effects::Effect& effect) {
     const int free =
         count_of(effect, {Role::size, Role::phase, Role::time, Role::frequency, Role::deviation, Role::probability});
     return chi2_tail(2.0 * gain, free);
+}
+
+std::optional<double> evidence_for_addition(const effects::Effect& larger, const effects::Effect& smaller,
+                                            const std::vector<Estimate>& fitted) {
+    const auto estimate = [&](const effects::Parameter& parameter) {
+        const auto found = std::find_if(fitted.begin(), fitted.end(), [&](const Estimate& e) {
+            return e.effect == larger.name() && e.name == parameter.name;
+        });
+        return found == fitted.end() ? nullptr : &*found;
+    };
+    const std::vector<Amplitude> additional = in_addition(larger, smaller);
+    // How much there is of the effect, in typical sizes, by what both have.
+    double squares = 0.0;
+    for (const Amplitude& amplitude : amplitudes_of(larger)) {
+        const effects::Parameter& parameter = *amplitude.value;
+        const bool common = std::none_of(additional.begin(), additional.end(),
+                                         [&](const Amplitude& a) { return a.value == amplitude.value; });
+        const Estimate* found = estimate(parameter);
+        if (parameter.typical == 0.0 || found == nullptr) return std::nullopt;
+        if (common) squares += std::pow(found->value / parameter.typical, 2);
+    }
+    double evidence = 0.0;
+    for (const Amplitude& amplitude : additional) {
+        const Estimate& found = *estimate(*amplitude.value);
+        // Of a size that the fit could not tell the record says nothing.
+        if (!(found.sd > 0.0) || !std::isfinite(found.sd)) continue;
+        const double expected = squares * std::pow(amplitude.value->typical / found.sd, 2);
+        const double shown = std::pow(found.value / found.sd, 2);
+        evidence += 0.5 * (shown * expected / (1.0 + expected) - std::log1p(expected));
+    }
+    return evidence;
 }
 
 }  // namespace ringlock::closure

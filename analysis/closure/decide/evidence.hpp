@@ -1,6 +1,9 @@
 #pragma once
 #include <initializer_list>
+#include <optional>
+#include <vector>
 
+#include "analysis/closure/types.hpp"
 #include "engine/effects/effect.hpp"
 
 /// How much evidence an effect of the library needs: its free parameters and the choice among all effects, by the roles
@@ -24,5 +27,14 @@ bool passes(double p_value);
 
 /// Probability of so large a gain of the log-likelihood by chance, with all free parameters of the effect.
 double p_of_gain(double gain, const effects::Effect& effect);
+
+/// Evidence that an effect does what it has in addition to a smaller one that it contains: the logarithm of the Bayes
+/// factor [nats], each additional size normal about zero with its typical proportion to the sizes in common as its
+/// standard deviation. Near zero where the record could not show sizes in that proportion, so that the two are tied;
+/// negative where it could and does not show them. Correlations between the sizes are neglected. None where a size has
+/// no typical proportion.
+/// \param fitted  estimates of the larger effect's parameters, with standard errors
+std::optional<double> evidence_for_addition(const effects::Effect& larger, const effects::Effect& smaller,
+                                            const std::vector<Estimate>& fitted);
 
 }  // namespace ringlock::closure

@@ -41,6 +41,13 @@ std::string experiment_for(const effects::Effect& effect, const std::vector<cons
     if (count([](const effects::Effect* e) { return configured_by(*e).coupling; }) > 0) {
         return "record with more injected noise, so that all phases come at all turns, or for longer";
     }
+    const auto changes_kicks = [](const effects::Effect* e) {
+        return e->changes().threshold || e->changes().coupling_phase;
+    };
+    if (count(changes_kicks) > 0) {
+        return "record the turns of the dither, with less noise or for longer on both sides of the change: the kicks "
+               "of the lock-in show whether the coupling changed";
+    }
     if (follow(effects::Follows::time) || count([](const effects::Effect* e) { return is_random_rate(*e); }) > 0) {
         return "record for longer: their Allan deviations and their trends separate with the averaging time";
     }

@@ -1,11 +1,14 @@
 // Hundreds of records with known truth, which the closed loop reads blind.
 //
-//   bench_closure FOLDER [--share S] [--only KIND] [--seed N] [--series N]
+//   bench_closure FOLDER [--share S] [--only KIND] [--multiple M] [--effect E,F] [--without E,F] [--direct] [--seed N]
+//                 [--series N]
 //
 // FOLDER gets records.csv (a row a record), deviations.csv (estimates less truth, in standard errors), confusion.csv
 // and the tables of the page: figures.md, misses.md, confusion.md, calibration.md. A share S of 0.1 makes a tenth of
 // the records; with a seed only that record is made, and kept as record.h5. Another series has records of the same
-// kinds that no other has. tools/closure puts the tables into the page.
+// kinds that no other has. --effect and --without say which effects of the library are drawn, --multiple at which
+// multiple of their detection limits, --direct that all records are by the integration of the equation of motion. A
+// share above 1 makes more records of a kind. tools/closure puts the tables into the page.
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
@@ -45,14 +48,14 @@ bool shows(const std::string& effect, const Condition& condition) {
 
 int main(int argc, char** argv) {
     const Command command = command_of(argc, argv, "bench_closure");
-    const std::vector<std::string> effects = effects_on_turns();
+    const std::vector<std::string> effects = command.kept(effects_on_turns());
 
     std::vector<Case> cases;
     const std::uint64_t first_seed = seeds_of_series * command.series + 1000;
     const std::uint64_t first_draw = seeds_of_series * command.series;
     const auto add = [&](Case of) {
         of.seed = first_seed + cases.size();
-        of.direct = of.direct || cases.size() % 8 == 0;
+        of.direct = of.direct || command.direct || cases.size() % 8 == 0;
         cases.push_back(std::move(of));
     };
     if (command.wants(Kind::null)) {
@@ -80,7 +83,7 @@ int main(int argc, char** argv) {
         for (const double multiple : near_the_limit) singles(multiple, 6);
         for (std::size_t a = 0, k = 0; command.wants(Kind::pair) && a < effects.size(); ++a) {
             for (std::size_t b = a + 1; b < effects.size(); ++b, ++k) {
-                if (k % static_cast<std::size_t>(std::round(2.0 / command.share)) != 0) continue;
+                if (k % command.every(2.0) != 0) continue;
                 const Condition& condition = conditions[k % conditions.size()];
                 if (!shows(effects[a], condition) || !shows(effects[b], condition)) continue;
                 Case of{.kind = Kind::pair, .truth = {}, .multiple = 2.0, .condition = &condition};
@@ -141,8 +144,9 @@ int main(int argc, char** argv) {
         }
     }
 
-    std::erase_if(cases,
-                  [&](const Case& of) { return !command.seed.empty() && std::to_string(of.seed) != command.seed; });
+    std::erase_if(cases, [&](const Case& of) {
+        return (!command.seed.empty() && std::to_string(of.seed) != command.seed) || !command.wants(of.multiple);
+    });
     // Neighbours by the same way of making: the generator takes several records at a time.
     std::stable_sort(cases.begin(), cases.end(), [](const Case& a, const Case& b) { return a.direct > b.direct; });
     Tables tables(command.folder, cases.size(), "rad", "16 000 turns");

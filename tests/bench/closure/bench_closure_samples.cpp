@@ -27,7 +27,7 @@ constexpr double of_several[] = {5.0, 10.0, 30.0};
 constexpr double of_mixed = 6.0;
 
 std::vector<SampleCase> all_cases(const Command& command) {
-    const std::vector<std::string> effects = effects_on_samples();
+    const std::vector<std::string> effects = command.kept(effects_on_samples());
     std::vector<SampleCase> cases;
     std::size_t turn = 0;
     std::uint64_t seed = seeds_of_series * command.series + 20000;
@@ -54,8 +54,7 @@ std::vector<SampleCase> all_cases(const Command& command) {
     std::size_t pair = 0;
     for (std::size_t a = 0; a < effects.size(); ++a) {
         for (std::size_t b = a + 1; b < effects.size(); ++b, ++pair) {
-            if (pair % static_cast<std::size_t>(std::round(1.0 / command.share)) == 0)
-                add(Kind::pair, 2.0, {effects[a], effects[b]});
+            if (pair % command.every(1.0) == 0) add(Kind::pair, 2.0, {effects[a], effects[b]});
         }
     }
     // What is evident must be named as surely: a loop made for what hardly shows may break there.
@@ -79,7 +78,7 @@ std::vector<SampleCase> all_cases(const Command& command) {
     std::size_t next = 0;
     for (SampleCase& of : foreign_sample_cases(command.scaled(5), command.series)) {
         while (!shows(effects[next % effects.size()], *of.condition)) ++next;
-        of.kind = Kind::mixed;
+        of.kind = of.foreign.empty() ? Kind::several : Kind::mixed;
         of.multiple = of_mixed;
         of.seed = mixed_seed++;
         of.truth.push_back(draw_on_samples(effects[next++ % effects.size()], of));
@@ -94,8 +93,9 @@ std::vector<SampleCase> all_cases(const Command& command) {
 int main(int argc, char** argv) {
     const Command command = command_of(argc, argv, "bench_closure_samples");
     std::vector<SampleCase> cases = all_cases(command);
-    std::erase_if(
-        cases, [&](const SampleCase& of) { return !command.seed.empty() && std::to_string(of.seed) != command.seed; });
+    std::erase_if(cases, [&](const SampleCase& of) {
+        return (!command.seed.empty() && std::to_string(of.seed) != command.seed) || !command.wants(of.multiple);
+    });
     Tables tables(command.folder, cases.size(), "arcsec", "30 000 samples");
     oneapi::tbb::parallel_for(std::size_t{0}, cases.size(), [&](std::size_t k) {
         try {

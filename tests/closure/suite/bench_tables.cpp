@@ -271,6 +271,39 @@ std::string limit_of(std::size_t count, std::size_t of) {
 
 std::size_t Command::scaled(double count) const { return static_cast<std::size_t>(std::ceil(share * count)); }
 
+std::size_t Command::every(double of) const {
+    return std::max(std::size_t{1}, static_cast<std::size_t>(std::round(of / share)));
+}
+
+namespace {
+
+constexpr double most_share = 10.0;
+
+/// Names of effects of the library, separated by commas. Ends the program where one is none.
+std::vector<std::string> names_in(const std::string& text) {
+    std::vector<std::string> names;
+    std::istringstream in(text);
+    for (std::string name; std::getline(in, name, ',');) {
+        if (effects::find(name) == nullptr) {
+            fmt::print(stderr, "{}: no effect of the library\n", name);
+            std::exit(2);
+        }
+        names.push_back(name);
+    }
+    return names;
+}
+
+}  // namespace
+
+std::vector<std::string> Command::kept(std::vector<std::string> names) const {
+    const auto in = [](const std::vector<std::string>& all, const std::string& name) {
+        return std::find(all.begin(), all.end(), name) != all.end();
+    };
+    std::erase_if(
+        names, [&](const std::string& name) { return (!effects.empty() && !in(effects, name)) || in(without, name); });
+    return names;
+}
+
 Command command_of(int argc, char** argv, const char* program) {
     Command command;
     bool wrong = false;
@@ -281,6 +314,14 @@ Command command_of(int argc, char** argv, const char* program) {
             command.share = std::strtod(argv[++k], nullptr);
         } else if (argument == "--only" && followed) {
             command.only = argv[++k];
+        } else if (argument == "--effect" && followed) {
+            command.effects = names_in(argv[++k]);
+        } else if (argument == "--without" && followed) {
+            command.without = names_in(argv[++k]);
+        } else if (argument == "--multiple" && followed) {
+            command.multiple = std::strtod(argv[++k], nullptr);
+        } else if (argument == "--direct") {
+            command.direct = true;
         } else if (argument == "--seed" && followed) {
             command.seed = argv[++k];
         } else if (argument == "--series" && followed) {
@@ -295,10 +336,10 @@ Command command_of(int argc, char** argv, const char* program) {
     const bool known = command.wants(Kind::null) || command.wants(Kind::single) || command.wants(Kind::pair) ||
                        command.wants(Kind::foreign) || command.wants(Kind::other) || command.wants(Kind::several) ||
                        command.wants(Kind::mixed);
-    if (wrong || command.folder.empty() || !known || !(command.share > 0.0 && command.share <= 1.0)) {
+    if (wrong || command.folder.empty() || !known || !(command.share > 0.0 && command.share <= most_share)) {
         fmt::print(stderr,
-                   "usage: {} FOLDER [--share S] [--only null|single|pair|foreign|other|several|mixed] [--seed N] "
-                   "[--series N]\n",
+                   "usage: {} FOLDER [--share S] [--only null|single|pair|foreign|other|several|mixed] "
+                   "[--multiple M] [--effect E,F] [--without E,F] [--direct] [--seed N] [--series N]\n",
                    program);
         std::exit(2);
     }

@@ -13,13 +13,22 @@ namespace ringlock::test::closure {
 /// What the command line of a bench says.
 struct Command {
     std::string folder;
-    double share = 1.0;        ///< of the records
-    std::string only;          ///< one kind of them, by name
-    std::string seed;          ///< the one record of that seed
-    std::uint64_t series = 0;  ///< each has records of its own
+    double share = 1.0;                ///< of the records
+    std::string only;                  ///< one kind of them, by name
+    std::string seed;                  ///< the one record of that seed
+    std::uint64_t series = 0;          ///< each has records of its own
+    std::vector<std::string> effects;  ///< of the library that are drawn; none: all
+    std::vector<std::string> without;  ///< of the library that are not drawn
+    double multiple = 0.0;             ///< of the detection limit; 0: all
+    bool direct = false;               ///< all records by the integration of the equation of motion
 
     bool wants(Kind kind) const { return only.empty() || only == name_of(kind); }
+    bool wants(double of_limit) const { return multiple == 0.0 || multiple == of_limit; }
+    /// The effects that are drawn.
+    std::vector<std::string> kept(std::vector<std::string> names) const;
     std::size_t scaled(double count) const;
+    /// One of so many is made, where it is one of `of` in the whole bench.
+    std::size_t every(double of) const;
 };
 /// Makes the folder. Ends the program with status 2 where the command line is wrong.
 Command command_of(int argc, char** argv, const char* program);

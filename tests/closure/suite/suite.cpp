@@ -206,6 +206,35 @@ const effects::Parameter& size_of(const effects::Effect& effect) {
     return *phase;
 }
 
+/// Sizes of an effect that come together, for each unit of the main one.
+std::map<std::string, double> proportions_of(const std::string& effect) {
+    std::map<std::string, double> proportions;
+    const effects::Effect& of = *effects::find(effect);
+    const effects::Parameter& main = size_of(of);
+    for (const effects::Parameter& parameter : of.parameters()) {
+        if (&parameter == &main || parameter.typical == 0.0) continue;
+        proportions[std::string(parameter.name)] = parameter.typical / main.typical;
+    }
+    return proportions;
+}
+
+/// Sets the main size of an effect, and with it those in proportion to it.
+void set_size(Added& added, double size) {
+    added.values.at(std::string(size_of(*effects::find(added.effect)).name)) = size;
+    for (const auto& [name, per] : proportions_of(added.effect)) added.values.at(name) = per * size;
+}
+
+/// Whether all sizes are well within their bounds.
+bool is_within_bounds(const Added& added) {
+    for (const effects::Parameter& parameter : effects::find(added.effect)->parameters()) {
+        const double value = added.values.at(std::string(parameter.name));
+        if (parameter.role == effects::Role::size && !(value > 0.5 * parameter.min && value < 0.5 * parameter.max)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 double deviation_of(const Estimate& estimate, double truth) {
     double off = estimate.value - truth;
     if (estimate.name == "phase_rad") off = std::remainder(off, units::two_pi);
@@ -275,6 +304,7 @@ Added draw(const std::string& name, double size, std::uint64_t seed, double dura
             value = std::exp(between(std::log(0.5), std::log(100.0)));
         }
     }
+    set_size(added, added.values.at(std::string(main.name)));
     return added;
 }
 
@@ -285,7 +315,37 @@ double start_size(const std::string& name) {
     return main.role == Role::probability ? 1e-3 : 0.02 * std::min(1.0, main.max);
 }
 
+namespace {
+
+/// Scales an effect whose sizes come together to `multiple` times the size at which the gain of the log-likelihood that
+/// is expected of it equals what the level of an effect asks for. The gain goes with the square of the size.
+bool settle_by_gain(Case& of) {
+    constexpr double looked_at = 3.0;  // times the limit: large beside what noise gains
+    constexpr int rounds = 4;
+    Added& added = of.truth.front();
+    const effects::Effect& effect = *effects::find(added.effect);
+    const double asked = gain_asked({added.effect}, static_cast<double>(effects::registry().size()));
+    const auto sizes = static_cast<double>(1 + proportions_of(added.effect).size());
+    double limit = added.values.at(std::string(size_of(effect).name)) / of.multiple;
+    Case at = of;
+    at.direct = false;
+    for (int round = 0; round < rounds; ++round) {
+        set_size(at.truth.front(), looked_at * limit);
+        if (!is_within_bounds(at.truth.front())) return false;
+        at.noise = static_cast<std::uint64_t>(round);
+        const ActiveEffect known{&effect, {at.truth.front().values.begin(), at.truth.front().values.end()}};
+        const double gain = fit_turns(make({&at, 1}).front(), {known}).log_likelihood_gain - 0.5 * sizes;
+        const double factor = std::sqrt(asked / std::max(gain, asked)) * looked_at;
+        limit *= std::clamp(gain < asked ? looked_at : factor, 0.2, looked_at);
+    }
+    set_size(added, of.multiple * limit);
+    return is_within_bounds(added);
+}
+
+}  // namespace
+
 bool settle(Case& of) {
+    if (of.truth.size() == 1 && !proportions_of(of.truth.front().effect).empty()) return settle_by_gain(of);
     constexpr int most_rounds = 8;
     // What one record tells of a random process is random itself.
     const bool random_process = std::any_of(of.truth.begin(), of.truth.end(), [](const Added& added) {
@@ -300,7 +360,7 @@ bool settle(Case& of) {
         std::vector<ActiveEffect> known;
         for (Added& added : at_limit.truth) {
             const effects::Effect* effect = effects::find(added.effect);
-            added.values.at(std::string(size_of(*effect).name)) /= of.multiple;
+            set_size(added, added.values.at(std::string(size_of(*effect).name)) / of.multiple);
             known.push_back({effect, added.values});
         }
         std::vector<double> information(known.size(), 0.0);
@@ -329,11 +389,10 @@ bool settle(Case& of) {
             const double limit = random ? std::sqrt(std::abs(size) * 4.0 * sd) : 4.0 * sd;
             const double factor = std::clamp(limit / std::abs(size), 1e-3, 1e3);
             most = std::max({most, factor, 1.0 / factor});
-            double& settled = of.truth[e].values.at(parameter);
             const double least = 0.5 * main.min;
             const double largest = 0.5 * main.max;
             within = within && of.multiple * factor * size > least && of.multiple * factor * size < largest;
-            settled = std::clamp(of.multiple * factor * size, least, largest);
+            set_size(of.truth[e], std::clamp(of.multiple * factor * size, least, largest));
         }
         if (most < 1.05) break;
     }

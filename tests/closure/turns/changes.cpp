@@ -232,7 +232,7 @@ TEST_F(LongHop, IsFoundAndFittedInAllThatItChanges) {
     // A step of the bias alone, which the library has, explains less than that by more than two degrees of freedom do
     // by chance.
     for (const effects::Effect* effect : effects::registry()) {
-        if (effects::first_of(*effect, Role::time) == nullptr || !effect->changes().angle) continue;
+        if (effects::first_of(*effect, Role::time) == nullptr || !changes_angle_only(*effect)) continue;
         const auto alone = score_test(base, without, *effect);
         ASSERT_TRUE(alone.has_value()) << effect->name();
         EXPECT_LT(chi2_tail(candidate->chi2 - alone->chi2, 2), 1e-6) << effect->name();

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
@@ -67,7 +68,7 @@ void CandidateFit::begin(const Fitted* alike, double needed) {
     const effects::Effect& effect = *candidate_.effect;
     // Coupling, threshold and bias move together: from a small share the first step takes all of them along.
     if (is_of_coupling(effect)) from(with_share(limits.small_share));
-    if (!is_of_coupling(effect) || !gained(limits.nearly_all_of_chi2 * candidate_.chi2)) from(start_);
+    if (!is_of_coupling(effect) || !gained_most()) from(start_);
     // The fit without the effect may have led the other parameters far astray.
     if (is_random_rate(effect) || changes_reading(effect) ||
         (strong_rate_ && !gained(limits.little_of_chi2 * candidate_.chi2))) {
@@ -77,6 +78,21 @@ void CandidateFit::begin(const Fitted* alike, double needed) {
     const int shorter = told_by_other_columns(effect) ? 0 : limits.shorter_starts;
     double share = 1.0;
     for (int k = 0; k < shorter && !gained(0.0); ++k) from(with_share(share *= 0.1));
+}
+
+bool CandidateFit::gained_most() const { return gained(options.turns.loop.nearly_all_of_chi2 * candidate_.chi2); }
+
+void CandidateFit::begin_as(const effects::Effect& smaller, const Fitted& fitted, double needed) {
+    needed_ = now_.log_likelihood() + needed;
+    TurnParameters start = fitted.parameters();
+    ActiveEffect& active = *start.find(&smaller);
+    active = {candidate_.effect, values_as_larger(*candidate_.effect, smaller, active.values)};
+    from(start);
+    if (gained_most()) {
+        anew_ = true;
+    } else {
+        begin(nullptr, needed);
+    }
 }
 
 void CandidateFit::again_if_strong() {

@@ -31,6 +31,10 @@ class CandidateFit {
     /// \param needed  gain of the log-likelihood below which the fit need not be exact [nats]
     void begin(const Fitted* alike, double needed);
 
+    /// Starts from the fit of a smaller effect that the candidate contains, in its place, and from the score test's
+    /// estimate only where that gains much less than the score promises.
+    void begin_as(const effects::Effect& smaller, const Fitted& fitted, double needed);
+
     /// Starts from scratch where a strong rate may have led the other parameters astray although it gained most of what
     /// its score promised.
     void again_if_strong();
@@ -39,6 +43,7 @@ class CandidateFit {
     const std::shared_ptr<Fitted>& best() const { return best_; }
 
    private:
+    bool gained_most() const;
     void from(const TurnParameters& start);
     void anew(const Fitted* alike);
     TurnParameters with_share(double share) const;

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <utility>
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/loop/candidate_fit.hpp"
@@ -35,13 +37,23 @@ std::vector<Candidate> screen_by_any_noise(const TurnFit& fit) {
     return candidates;
 }
 
-/// The candidates worth a full fit, the most promising first; random rates in addition to `most` others.
+/// The candidates worth a full fit, the most promising first; random rates in addition to `most` others, and effects
+/// that contain one of these.
 std::vector<Candidate> worth_a_fit(std::vector<Candidate> candidates, double largest_p, std::size_t most) {
     std::erase_if(candidates, [&](const Candidate& c) { return !(c.p_value < largest_p); });
     std::sort(candidates.begin(), candidates.end(),
               [](const Candidate& a, const Candidate& b) { return promised_merit(a) > promised_merit(b); });
+    const std::vector<Candidate> all = candidates;
+    const auto contains_one_of = [](const Candidate& c, const std::vector<Candidate>& others) {
+        return std::any_of(others.begin(), others.end(),
+                           [&](const Candidate& other) { return contains(*c.effect, *other.effect); });
+    };
     std::size_t taken = 0;
-    std::erase_if(candidates, [&](const Candidate& c) { return !is_random_rate(*c.effect) && ++taken > most; });
+    std::erase_if(candidates, [&](const Candidate& c) {
+        return !is_random_rate(*c.effect) && !contains_one_of(c, all) && ++taken > most;
+    });
+    const std::vector<Candidate> kept = candidates;
+    std::erase_if(candidates, [&](const Candidate& c) { return contains_one_of(c, all) && !contains_one_of(c, kept); });
     return candidates;
 }
 
@@ -69,6 +81,7 @@ class RankingFits {
         // The most promising candidate and the most promising random rate go first: they set the scale for the others.
         std::vector<std::size_t> first;
         std::vector<std::size_t> others;
+        std::vector<std::size_t> larger;  // than another candidate, whose fit they start from
         const Candidate* random = nullptr;
         std::size_t first_random = 0;
         for (std::size_t k = 0; k < candidates_.size(); ++k) {
@@ -77,10 +90,11 @@ class RankingFits {
                 random = &candidates_[k];
                 first_random = k;
             }
-            (k == 0 || leads_random ? first : others).push_back(k);
+            (contained_in(k) ? larger : k == 0 || leads_random ? first : others).push_back(k);
         }
         fit(first, nullptr);
         fit(others, random == nullptr ? nullptr : fits_[first_random].best().get());
+        fit(larger, nullptr);
         oneapi::tbb::parallel_for(std::size_t{0}, fits_.size(), [&](std::size_t k) {
             if (!fits_[k].best() || merits_[k] < options.turns.loop.nearly_best * matters_) return;
             fits_[k].again_if_strong();
@@ -102,12 +116,24 @@ class RankingFits {
             matters_ > limits.much_merit ? limits.far_below * matters_ : -std::numeric_limits<double>::infinity();
         oneapi::tbb::parallel_for(std::size_t{0}, some.size(), [&](std::size_t i) {
             const std::size_t k = some[i];
-            fits_[k].begin(is_random_rate(*candidates_[k].effect) ? alike : nullptr, needed);
+            const std::optional<std::size_t> smaller = contained_in(k);
+            if (smaller && fits_[*smaller].best()) {
+                fits_[k].begin_as(*candidates_[*smaller].effect, *fits_[*smaller].best(), needed);
+            } else {
+                fits_[k].begin(is_random_rate(*candidates_[k].effect) ? alike : nullptr, needed);
+            }
             judge(k);
         });
         for (const std::size_t k : some) {
             if (fits_[k].best()) matters_ = std::max(matters_, merits_[k]);
         }
+    }
+    /// Another candidate that this one contains.
+    std::optional<std::size_t> contained_in(std::size_t k) const {
+        for (std::size_t other = 0; other < candidates_.size(); ++other) {
+            if (contains(*candidates_[k].effect, *candidates_[other].effect)) return other;
+        }
+        return std::nullopt;
     }
     void judge(std::size_t k) {
         const auto& best = fits_[k].best();
@@ -124,6 +150,18 @@ class RankingFits {
     std::vector<CandidateFit> fits_;
     std::vector<double> merits_;
 };
+
+/// An effect that contains another one is as likely as that, but for what the record says of the rest of it.
+void compare_with_contained(std::vector<Candidate>& candidates) {
+    for (Candidate& larger : candidates) {
+        for (const Candidate& smaller : candidates) {
+            if (!contains(*larger.effect, *smaller.effect)) continue;
+            const auto evidence =
+                evidence_for_addition(*larger.effect, *smaller.effect, larger.fitted->fit->estimates());
+            if (evidence) larger.merit = smaller.merit + *evidence;
+        }
+    }
+}
 
 }  // namespace
 
@@ -144,6 +182,7 @@ Ranking rank_candidates(const TurnProblem& problem, const Fitted& now, std::size
     }
     RankingFits(problem, now, candidates, ranking.seen_in_other_columns, matters).fit_all();
     std::erase_if(candidates, [](const Candidate& candidate) { return !candidate.fitted; });
+    if (!ranking.seen_in_other_columns) compare_with_contained(candidates);
     std::sort(candidates.begin(), candidates.end(),
               [](const Candidate& a, const Candidate& b) { return a.merit > b.merit; });
     return ranking;

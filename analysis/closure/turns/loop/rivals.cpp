@@ -68,7 +68,7 @@ std::optional<double> better_than_library(const TurnFit& fit, const Choice& choi
         const double merit = counts * refitted_merit(fit, view, rival);
         const auto beats = [&](const Naming::Alternative& alternative) {
             const double tied = alternative.merit - options.tie;
-            const bool in_step = of_phase && alternative.effect->adds_angle() && phases_in_step(fit);
+            const bool in_step = of_phase && changes_angle_only(*alternative.effect) && phases_in_step(fit);
             if (in_step) return merit > std::min(tied, (1.0 - limits.first_order_error) * alternative.merit);
             if (!is_random_rate(*alternative.effect)) return merit > alternative.merit + options.tie;
             // A random rate can follow jumps nearly as well as the jumps themselves, and anything that follows a noisy

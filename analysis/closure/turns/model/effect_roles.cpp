@@ -1,23 +1,11 @@
 #include "analysis/closure/turns/model/effect_roles.hpp"
 
-#include "analysis/closure/decide/effect_queries.hpp"
-#include "analysis/closure/decide/evidence.hpp"
-
 namespace ringlock::closure {
 
 namespace {
 
 using effects::Effect;
 using effects::Role;
-
-/// A value of any parameter that shows in a setup and is allowed.
-constexpr double probe = 1e-3;
-
-gyro::Setup configured(const Effect& effect, const effects::Values& values) {
-    gyro::Setup setup;
-    effect.configure(values, setup);
-    return setup;
-}
 
 /// The parameter that, by itself, changes this constant; empty where none does.
 template <class Constant>
@@ -67,43 +55,6 @@ EffectRoles find_roles() {
 
 }  // namespace
 
-effects::Values values_at_rest(const Effect& effect) {
-    effects::Values values;
-    for (const effects::Parameter& parameter : effect.parameters()) {
-        const bool active = parameter.role == Role::size || parameter.role == Role::deviation ||
-                            parameter.role == Role::probability || parameter.role == Role::phase;
-        values[std::string(parameter.name)] = active ? 0.0 : parameter.default_value;
-    }
-    return values;
-}
-
-bool is_own_phase(const Effect& effect, const effects::Parameter& parameter) {
-    if (parameter.role != Role::phase) return false;
-    effects::Values values = values_at_rest(effect);
-    values.at(std::string(parameter.name)) = probe;
-    return effect.active(values);
-}
-
-std::vector<Amplitude> amplitudes_of(const Effect& effect) {
-    std::vector<Amplitude> all;
-    for (const effects::Parameter& parameter : effect.parameters()) {
-        if (parameter.role == Role::size || is_own_phase(effect, parameter)) {
-            all.push_back({&parameter, nullptr});
-        } else if (parameter.role == Role::phase && !all.empty()) {
-            all.back().turned_by = &parameter;
-        }
-    }
-    return all;
-}
-
-bool changes_angle_only(const Effect& effect) {
-    const effects::Changes changes = effect.changes();
-    if (!changes.angle || changes.threshold || changes.coupling_phase) return false;
-    effects::Values values = values_at_rest(effect);
-    for (const Amplitude& amplitude : amplitudes_of(effect)) values.at(std::string(amplitude.value->name)) = probe;
-    return configured(effect, values) == gyro::Setup{};
-}
-
 bool told_by_other_columns(const Effect& effect) {
     const Configures configures = configured_by(effect);
     return configures.dither_shape || configures.reading;
@@ -112,7 +63,8 @@ bool told_by_other_columns(const Effect& effect) {
 bool changes_reading(const Effect& effect) { return configured_by(effect).reading; }
 
 bool is_of_coupling(const Effect& effect) {
-    return !effect.adds_angle() && !is_random_rate(effect) && !told_by_other_columns(effect);
+    const effects::Changes changes = effect.changes();
+    return changes.threshold || changes.coupling_phase || configured_by(effect).coupling;
 }
 
 const EffectRoles& effect_roles() {
