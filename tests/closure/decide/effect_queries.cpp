@@ -46,7 +46,7 @@ class Added final : public Effect {
 };
 
 // The number sets the level of every effect on samples. It changes with the library only.
-TEST(EffectQueries, TwelveEffectsShowOnSamples) { EXPECT_EQ(effects_on_samples(), 12.0); }
+TEST(EffectQueries, ThirteenEffectsShowOnSamples) { EXPECT_EQ(effects_on_samples(), 13.0); }
 
 TEST(EffectQueries, EffectsShowOnSamplesByTheirRoles) {
     const std::map<std::string_view, OnSamples> shown = {{"base_vibration", OnSamples::rate_line},
@@ -57,6 +57,7 @@ TEST(EffectQueries, EffectsShowOnSamplesByTheirRoles) {
                                                          {"case_motion", OnSamples::motion},
                                                          {"count_quantization", OnSamples::resolution},
                                                          {"dither_residue", OnSamples::angle_line},
+                                                         {"null_shift_ramp", OnSamples::rate},
                                                          {"quantum_noise", OnSamples::white},
                                                          {"rate_random_walk", OnSamples::walk},
                                                          {"resampling", OnSamples::transport},
@@ -70,14 +71,14 @@ TEST(EffectQueries, EffectsShowOnSamplesByTheirRoles) {
 // Samples show no more of it than its step: it is an alternative of the effect that is a step alone.
 TEST(EffectQueries, AnEffectThatStepsMoreThanTheRateIsAnAlternativeOfTheStep) {
     const Effect* step = effects::find("bias_step");
-    const Added hop("mode_hop",
-                    {{"step_deg_h", 0.0, -1e4, 1e4, Role::size, ""},
-                     {"threshold_ratio", 0.0, -0.9, 0.9, Role::size, ""},
-                     {"phase_rad", 0.0, -4.0, 4.0, Role::size, ""},
-                     {"time_s", 0.0, 0.0, 1e9, Role::time, ""}},
-                    [](const Interval& at) { return at.duration_s; });
-    const std::array<const Effect*, 2> library{&hop, step};
-    EXPECT_EQ(effects_that_show(OnSamples::step, library), (Effects{step, &hop}));
+    const Added of_hop("mode_hop",
+                       {{"step_deg_h", 0.0, -1e4, 1e4, Role::size, ""},
+                        {"threshold_ratio", 0.0, -0.9, 0.9, Role::size, ""},
+                        {"time_s", 0.0, 0.0, 1e9, Role::time, ""}},
+                       [](const Interval& at) { return at.duration_s; });
+    const Effect* hop = &of_hop;
+    const std::array<const Effect*, 2> library{hop, step};
+    EXPECT_EQ(effects_that_show(OnSamples::step, library), (Effects{step, hop}));
 }
 
 TEST(EffectQueries, OnlyWhatFollowsTheTemperatureChangesWithIt) {
@@ -86,7 +87,8 @@ TEST(EffectQueries, OnlyWhatFollowsTheTemperatureChangesWithIt) {
         const auto angle = unit_angle(*effect);
         const Interval cold{.start_s = 10.0, .duration_s = 10.0};
         Interval warm = cold;
-        warm.temperature_change_k[0] = warm.temperature_change_k[1] = 3.0;
+        warm.temperature_change_k[0] = 3.0;
+        warm.temperature_change_k[1] = 4.0;
         Interval turned = cold;
         turned.input_rate_deg_h[0] = turned.input_rate_deg_h[1] = 3.0;
         EXPECT_EQ(angle(warm) != angle(cold), effect->follows() == effects::Follows::temperature) << effect->name();
@@ -114,15 +116,20 @@ SampleSeries warming() {
 TEST(RateColumns, AreTheClosedFormsOfTheLibrary) {
     const SampleSeries series = warming();
     const auto columns = rate_columns(series);
-    ASSERT_EQ(columns.size(), 3U);
+    ASSERT_EQ(columns.size(), 4U);
     EXPECT_EQ(columns[0].effect->name(), "bias_ramp");
     EXPECT_EQ(columns[0].name, "deg_h_per_h");
     EXPECT_EQ(columns[1].effect->name(), "bias_temperature");
-    EXPECT_EQ(columns[2].effect->name(), "scale_factor_error");
+    EXPECT_EQ(columns[2].effect->name(), "null_shift_ramp");
+    EXPECT_EQ(columns[3].effect->name(), "scale_factor_error");
     for (std::size_t i = 0; i < series.size(); ++i) {
         EXPECT_NEAR((*columns[0].series)[i], (static_cast<double>(i) + 0.5) * 0.01 / 3600.0, 1e-15);
         EXPECT_NEAR((*columns[1].series)[i], 0.1 * series.temperature_change_k[i], 1e-13);
-        EXPECT_NEAR((*columns[2].series)[i], 0.1 * series.input_rate_deg_h[i], 1e-13);
+        EXPECT_NEAR((*columns[3].series)[i], 0.1 * series.input_rate_deg_h[i], 1e-13);
+        // At the ends the temperature is taken to go on as steeply as between the two outermost rows.
+        if (i == 0 || i + 1 == series.size()) continue;
+        const double slope_k_s = 0.02 + 0.006 * 0.1 * static_cast<double>(i);
+        EXPECT_NEAR((*columns[2].series)[i], 3600.0 * slope_k_s * 0.1, 1e-9);
     }
 }
 
@@ -135,19 +142,18 @@ TEST(RateColumns, WhatDoesNotChangeHasNone) {
     EXPECT_EQ(columns[0].effect->name(), "bias_ramp");
 }
 
-// An effect that the library does not have has a column without a line of code for it: here a bias in proportion to how
-// fast the temperature changes.
-TEST(RateColumns, ABiasThatFollowsTheSlopeOfTheTemperatureHasOne) {
-    const Added slope(
-        "null_shift_ramp", {{"deg_h_per_k_per_h", 0.0, -1e3, 1e3, Role::size, ""}},
-        [](const Interval& at) { return 3600.0 * (at.temperature_change_k[1] - at.temperature_change_k[0]); });
-    const std::array<const Effect*, 1> library{&slope};
+// An effect that the library does not have has a column without a line of code for it: here a bias in proportion to the
+// square of the input rate.
+TEST(RateColumns, AnEffectThatIsNotInTheLibraryHasOne) {
+    const Added square("rate_squared", {{"h_deg", 0.0, -1e3, 1e3, Role::size, ""}}, [](const Interval& at) {
+        return at.duration_s * std::pow(0.5 * (at.input_rate_deg_h[0] + at.input_rate_deg_h[1]), 2);
+    });
+    const std::array<const Effect*, 1> library{&square};
     const SampleSeries series = warming();
     const auto columns = rate_columns(series, library);
     ASSERT_EQ(columns.size(), 1U);
-    for (std::size_t i = 1; i + 1 < series.size(); ++i) {
-        const double slope_k_s = 0.02 + 0.006 * 0.1 * static_cast<double>(i);
-        EXPECT_NEAR((*columns[0].series)[i], 3600.0 * slope_k_s * 0.1, 1e-9);
+    for (std::size_t i = 0; i < series.size(); ++i) {
+        EXPECT_NEAR((*columns[0].series)[i], 0.1 * std::pow(series.input_rate_deg_h[i], 2), 1e-9);
     }
 }
 

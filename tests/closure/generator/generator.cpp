@@ -145,8 +145,12 @@ Drive::Drive(const Truth& truth) {
         if (!truth.input_profile_deg_h.empty())
             input += track_mean(truth.input_profile_deg_h, turn_s[j], turn_s[j + 1]);
         const double warmer = truth.temperature.mean_change_k(turn_s[j], turn_s[j + 1]);
+        const double slope_k_per_h =
+            3600.0 * (truth.temperature.change_k(turn_s[j + 1]) - truth.temperature.change_k(turn_s[j])) /
+            (turn_s[j + 1] - turn_s[j]);
         const double rate = rate_rad_s[j] + input * (1.0 + truth.scale_factor_error) + truth.bias_deg_h +
                             truth.bias_temperature_deg_h_per_k * warmer +
+                            truth.null_shift_deg_h_per_k_h * slope_k_per_h +
                             truth.bias_per_rate_squared_h_deg * input * input +
                             truth.bias_per_relative_amplitude_deg_h * (amplitude_rad[j] / nominal - 1.0);
         rate_rad_s[j] = phase_per_arcsec * rate;  // 1 deg/h is 1 arcsec/s

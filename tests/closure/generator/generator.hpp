@@ -106,13 +106,14 @@ struct Truth {
     DitherHarmonic dither_second_harmonic;
     double scale_factor_error = 0.0;  ///< input rates (not the dither, whose amplitude is unknown) count 1 + this
     double bias_temperature_deg_h_per_k = 0.0;
+    double null_shift_deg_h_per_k_h = 0.0;  ///< bias for each kelvin an hour of the temperature's slope
+    ModeHop mode_hop;
     RateTruth rates;  ///< those of the library and others that are rates of their own
 
     // Effects that the library does not have
     double dither_third_harmonic = 0.0;  ///< of the dither rate, in phase with the first, the swing kept
     HarmonicOfCoupling lockin_third_harmonic;
     SwingOfCoupling lockin_swing;
-    ModeHop mode_hop;
     double bias_per_rate_squared_h_deg = 0.0;        ///< bias = this times the square of the input rate [1/(deg/h)]
     double bias_per_relative_amplitude_deg_h = 0.0;  ///< bias = this times the half cycle's relative amplitude change
 

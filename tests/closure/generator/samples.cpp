@@ -144,8 +144,8 @@ record::Record generate_samples(const SampleTruth& truth) {
             rate[i] += (1.0 + truth.scale_factor_error) * mean([](double x) { return x; });
             rate[i] += truth.bias_per_rate_squared_h_deg * mean([](double x) { return x * x; });
         }
-        if (truth.bias_per_temperature_slope_deg_h_s_per_k != 0.0) {
-            rate[i] += truth.bias_per_temperature_slope_deg_h_s_per_k *
+        if (truth.null_shift_deg_h_per_k_h != 0.0) {
+            rate[i] += 3600.0 * truth.null_shift_deg_h_per_k_h *
                        (truth.temperature.change_k(to) - truth.temperature.change_k(from)) / (to - from);
         }
         if (truth.swinging_line.rate_deg_h != 0.0) {

@@ -104,7 +104,8 @@ struct SampleTruth {
     RateTruth rates;                    ///< the white rate noise is `quantum_noise_deg_rt_h`
     Temperature temperature;            ///< not constant: a witness
     double bias_temperature_deg_h_per_k = 0.0;
-    std::vector<RateLine> lines;  ///< beside rates.base_vibration
+    double null_shift_deg_h_per_k_h = 0.0;  ///< bias for each kelvin an hour of the temperature's slope
+    std::vector<RateLine> lines;            ///< beside rates.base_vibration
 
     double count_quantization_arcsec = 0.0;  ///< the angle in whole steps, floor(angle/step) step
     DitherResidue dither_residue;
@@ -120,7 +121,6 @@ struct SampleTruth {
     SwingingLine swinging_line;
     NoiseModulation noise_modulation;
     double bias_per_rate_squared_h_deg = 0.0;  ///< of the profile: deg/h per (deg/h)^2
-    double bias_per_temperature_slope_deg_h_s_per_k = 0.0;
     LateTemperature late_temperature;
     SlowAcceleration slow_acceleration;
     double saturation_arcsec = 0.0;  ///< increments of the source are clipped here; 0: never

@@ -57,6 +57,7 @@ TEST(LongClosureSampleSuite, NamesWhatIsFourTimesItsLimit) {
     named("case_motion", 2);
     named("bias_temperature", 3);
     named("scale_factor_error", 4);
+    named("null_shift_ramp", 3);
 }
 
 TEST(LongClosureSampleSuite, HasNoNameForWhatTheLibraryDoesNotHave) {

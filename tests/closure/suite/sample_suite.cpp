@@ -104,6 +104,8 @@ SampleTruth truth_of(const SampleCase& of) {
     return truth;
 }
 
+constexpr double evident = 6.0;  // of the detection limit
+
 /// The parameter that says how much there is of an effect.
 const char* size_of(const std::string& effect) {
     static const std::map<std::string, const char*> sizes = {{"count_quantization", "step_arcsec"},
@@ -113,6 +115,7 @@ const char* size_of(const std::string& effect) {
                                                              {"bias_step", "step_deg_h"},
                                                              {"bias_ramp", "deg_h_per_h"},
                                                              {"bias_temperature", "deg_h_per_k"},
+                                                             {"null_shift_ramp", "deg_h_per_k_h"},
                                                              {"bias_instability", "deg_h"},
                                                              {"rate_random_walk", "deg_h_rt_h"},
                                                              {"base_vibration", "rate_deg_h"},
@@ -156,16 +159,16 @@ double limit_of_motion(const SampleCase& of, std::size_t effect) {
 record::Record make(const SampleCase& of) { return generate_samples(truth_of(of)); }
 
 std::vector<std::string> effects_on_samples() {
-    return {"count_quantization", "dither_residue", "resampling",        "case_motion",
-            "bias_step",          "bias_ramp",      "bias_temperature",  "bias_instability",
-            "rate_random_walk",   "base_vibration", "scale_factor_error"};
+    return {"count_quantization", "dither_residue", "resampling",         "case_motion",
+            "bias_step",          "bias_ramp",      "bias_temperature",   "bias_instability",
+            "rate_random_walk",   "base_vibration", "scale_factor_error", "null_shift_ramp"};
 }
 
 bool has_size(const std::string& effect) { return effect != "resampling"; }
 
 bool shows(const std::string& effect, const SampleCondition& condition) {
     if (effect == "case_motion") return condition.accelerometers;
-    if (effect == "bias_temperature") return condition.warm;
+    if (effect == "bias_temperature" || effect == "null_shift_ramp") return condition.warm;
     if (effect == "scale_factor_error") return condition.moving;
     if (effect == "count_quantization") return condition.digits_arcsec == 0.0;
     return true;
@@ -212,6 +215,7 @@ Added draw_on_samples(const std::string& effect, const SampleCase& of) {
     }
     if (effect == "bias_ramp") return {effect, {{"deg_h_per_h", 10.0 * sign}}};
     if (effect == "bias_temperature") return {effect, {{"deg_h_per_k", 0.3 * sign}}};
+    if (effect == "null_shift_ramp") return {effect, {{"deg_h_per_k_h", 0.01 * sign}}};
     if (effect == "bias_instability") return {effect, {{"deg_h", 1.0}}};
     if (effect == "rate_random_walk") return {effect, {{"deg_h_rt_h", 5.0}}};
     if (effect == "base_vibration") {
@@ -347,13 +351,20 @@ std::vector<SampleCase> foreign_sample_cases(std::size_t each, std::uint64_t ser
                       {"period_s", foreign.between(30.0, 100.0)}}});
         foreign.add(4, Where::rate, {"bias_per_rate_squared_h_deg", {{"", sign * foreign.even(2e-5, 4e-4)}}});
         foreign.add(3 + k % 2, Where::temperature,
-                    {"bias_per_temperature_slope_deg_h_s_per_k", {{"", sign * foreign.even(50.0, 500.0)}}});
+                    {"null_shift_ramp", {{"deg_h_per_k_h", sign * foreign.even(50.0, 500.0) / 3600.0}}});
         foreign.add(
             k % 3, Where::time,
             {"noise_modulation", {{"depth", foreign.even(0.15, 0.7)}, {"period_s", foreign.between(25.0, 120.0)}}});
         foreign.add(0, Where::amplitude, {"saturation_arcsec", {{"", 0.3 * foreign.between(2.5, 4.0)}}});
     }
     for (SampleCase& of : foreign_rates(each, series)) foreign.cases.push_back(std::move(of));
+    // The library has learned some of these effects since; their records keep their seeds.
+    for (SampleCase& of : foreign.cases) {
+        if (effects::find(of.foreign.front().effect) == nullptr) continue;
+        of.kind = Kind::single;
+        of.multiple = evident;
+        of.truth = std::exchange(of.foreign, {});
+    }
     return foreign.cases;
 }
 

@@ -1,0 +1,45 @@
+// Effects that were added to the library after the loop was built, named in records of the independent generator. The
+// loop has no line of code for any of them.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/closure/suite/suite.hpp"
+
+namespace ringlock::test::closure {
+namespace {
+
+/// Three records, at rest and with moving input, of an effect at six times its detection limit.
+std::vector<Outcome> judged_at_six_times_the_limit(const std::string& effect, std::uint64_t seed) {
+    std::vector<Case> cases;
+    for (const std::size_t condition : {0, 2, 0}) {
+        Case of{.kind = Kind::single, .truth = {}, .multiple = 6.0, .condition = &conditions[condition]};
+        of.direct = true;
+        of.seed = seed++;
+        of.truth = {draw(effect, of.multiple * start_size(effect), of.seed, duration_s(of))};
+        EXPECT_TRUE(settle(of));
+        cases.push_back(std::move(of));
+    }
+    const auto records = make(cases);
+    std::vector<Outcome> outcomes;
+    for (std::size_t k = 0; k < cases.size(); ++k) outcomes.push_back(judge(cases[k], records[k]));
+    return outcomes;
+}
+
+class LongNamed : public testing::TestWithParam<const char*> {};
+
+TEST_P(LongNamed, AloneOrInATieThatHoldsIt) {
+    for (const Outcome& outcome : judged_at_six_times_the_limit(GetParam(), 4100)) {
+        EXPECT_TRUE(outcome.judged == Judged::right || outcome.judged == Judged::tie)
+            << outcome.verdict << " " << outcome.named;
+        EXPECT_FALSE(outcome.false_name) << outcome.named;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Effects, LongNamed, testing::Values("null_shift_ramp"),
+                         [](const auto& info) { return std::string(info.param); });
+
+}  // namespace
+}  // namespace ringlock::test::closure
