@@ -20,6 +20,7 @@
     X(lockin_temperature)     \
     X(lockin_turn_asymmetry)  \
     X(missed_counts)          \
+    X(mode_hop)               \
     X(null_shift_ramp)        \
     X(quantum_noise)          \
     X(rate_random_walk)       \

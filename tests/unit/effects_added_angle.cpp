@@ -30,6 +30,9 @@ const std::vector<Stated>& stated() {
          {{"step_deg_h", 2.0}, {"time_s", 10.125}},
          [](double t, double, double) { return t >= 10.125 ? 2.0 : 0.0; }},
         {"bias_temperature", {{"deg_h_per_k", 0.3}}, [](double, double k, double) { return 0.3 * k; }},
+        {"mode_hop",
+         {{"step_deg_h", -2.0}, {"threshold_ratio", 0.1}, {"phase_rad", 0.2}, {"time_s", 10.125}},
+         [](double t, double, double) { return t >= 10.125 ? -2.0 : 0.0; }},
         // The temperature falls by 0.25 K a second.
         {"null_shift_ramp", {{"deg_h_per_k_h", 0.01}}, [](double, double, double) { return -0.01 * 900.0; }},
         {"scale_factor_error", {{"relative", 1e-3}}, [](double, double, double rate) { return 1e-3 * rate; }},

@@ -129,6 +129,18 @@ TEST(Effects, TheThresholdFollowsTheTemperature) {
                      0.2);
 }
 
+TEST(ModeHop, StepsThresholdAndPhaseWithTheMiddleOfAnInterval) {
+    const Values values = {{"step_deg_h", 0.0}, {"threshold_ratio", -0.2}, {"phase_rad", 0.7}, {"time_s", 10.0}};
+    const ChangeOver change = find("mode_hop")->change(values);
+    EXPECT_EQ(change({.start_s = 9.0, .duration_s = 1.9}).threshold_factor, 1.0);
+    EXPECT_EQ(change({.start_s = 9.0, .duration_s = 1.9}).coupling_phase_rad, 0.0);
+    EXPECT_EQ(change({.start_s = 9.0, .duration_s = 2.1}).threshold_factor, 0.8);
+    EXPECT_EQ(change({.start_s = 9.0, .duration_s = 2.1}).coupling_phase_rad, 0.7);
+    const Bounds bounds = find("mode_hop")->bounds(values, {});
+    EXPECT_EQ(bounds.threshold_relative, 0.2);
+    EXPECT_EQ(bounds.coupling_phase_rad, 0.7);
+}
+
 TEST(MissedCounts, SetTheProbability) {
     EXPECT_EQ(configured("missed_counts", {{"probability_per_turn", 0.1}}).missed_count_probability, 0.1);
 }

@@ -46,7 +46,7 @@ class Added final : public Effect {
 };
 
 // The number sets the level of every effect on samples. It changes with the library only.
-TEST(EffectQueries, ThirteenEffectsShowOnSamples) { EXPECT_EQ(effects_on_samples(), 13.0); }
+TEST(EffectQueries, FourteenEffectsShowOnSamples) { EXPECT_EQ(effects_on_samples(), 14.0); }
 
 TEST(EffectQueries, EffectsShowOnSamplesByTheirRoles) {
     const std::map<std::string_view, OnSamples> shown = {{"base_vibration", OnSamples::rate_line},
@@ -57,6 +57,7 @@ TEST(EffectQueries, EffectsShowOnSamplesByTheirRoles) {
                                                          {"case_motion", OnSamples::motion},
                                                          {"count_quantization", OnSamples::resolution},
                                                          {"dither_residue", OnSamples::angle_line},
+                                                         {"mode_hop", OnSamples::step},
                                                          {"null_shift_ramp", OnSamples::rate},
                                                          {"quantum_noise", OnSamples::white},
                                                          {"rate_random_walk", OnSamples::walk},
@@ -71,12 +72,7 @@ TEST(EffectQueries, EffectsShowOnSamplesByTheirRoles) {
 // Samples show no more of it than its step: it is an alternative of the effect that is a step alone.
 TEST(EffectQueries, AnEffectThatStepsMoreThanTheRateIsAnAlternativeOfTheStep) {
     const Effect* step = effects::find("bias_step");
-    const Added of_hop("mode_hop",
-                       {{"step_deg_h", 0.0, -1e4, 1e4, Role::size, ""},
-                        {"threshold_ratio", 0.0, -0.9, 0.9, Role::size, ""},
-                        {"time_s", 0.0, 0.0, 1e9, Role::time, ""}},
-                       [](const Interval& at) { return at.duration_s; });
-    const Effect* hop = &of_hop;
+    const Effect* hop = effects::find("mode_hop");
     const std::array<const Effect*, 2> library{hop, step};
     EXPECT_EQ(effects_that_show(OnSamples::step, library), (Effects{step, hop}));
 }
@@ -154,6 +150,24 @@ TEST(RateColumns, AnEffectThatIsNotInTheLibraryHasOne) {
     ASSERT_EQ(columns.size(), 1U);
     for (std::size_t i = 0; i < series.size(); ++i) {
         EXPECT_NEAR((*columns[0].series)[i], 0.1 * std::pow(series.input_rate_deg_h[i], 2), 1e-9);
+    }
+}
+
+TEST(EffectQueries, OneEffectContainsAnotherWhereItIsThatOneAtSomeSizesOfZero) {
+    const auto contained = [](std::string_view larger, std::string_view smaller) {
+        return contains(*effects::find(larger), *effects::find(smaller));
+    };
+    EXPECT_TRUE(contained("mode_hop", "bias_step"));
+    const auto in_addition_to_step = in_addition(*effects::find("mode_hop"), *effects::find("bias_step"));
+    ASSERT_EQ(in_addition_to_step.size(), 2U);
+    EXPECT_EQ(in_addition_to_step[0].value->name, "threshold_ratio");
+    EXPECT_EQ(in_addition_to_step[1].value->name, "phase_rad");
+    // There is no other such pair in the library.
+    for (const Effect* larger : effects::registry()) {
+        for (const Effect* smaller : effects::registry()) {
+            if (larger->name() == "mode_hop" && smaller->name() == "bias_step") continue;
+            EXPECT_FALSE(contains(*larger, *smaller)) << larger->name() << " and " << smaller->name();
+        }
     }
 }
 

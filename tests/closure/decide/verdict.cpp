@@ -50,6 +50,8 @@ TEST(Advice, GoesByWhatTiedEffectsFollow) {
     EXPECT_THAT(experiment_for(*effects::find("detector_phase_offset"), {effects::find("lockin_second_harmonic")}),
                 HasSubstr("more injected noise"));
     EXPECT_THAT(experiment_for(*ramp, {effects::find("rate_random_walk")}), HasSubstr("for longer"));
+    EXPECT_THAT(experiment_for(*effects::find("bias_step"), {effects::find("mode_hop")}),
+                HasSubstr("record the turns"));
 }
 
 TEST(TrainingRows, HoldOutATenthInContiguousBlocks) {
@@ -86,6 +88,30 @@ TEST(Evidence, RandomRatesAreThoseWithADeviation) {
     for (const char* name : {"bias_ramp", "bias_step", "base_vibration", "missed_counts"}) {
         EXPECT_FALSE(ringlock::closure::is_random_rate(*effects::find(name))) << name;
     }
+}
+
+// A step of the bias by 0.8 deg/h comes with changes of the threshold by 0.12 and of the phase by 0.5 rad in a typical
+// hop of modes.
+TEST(Evidence, AnAdditionIsToldByARecordThatCouldShowIt) {
+    const effects::Effect& hop = *effects::find("mode_hop");
+    const effects::Effect& step = *effects::find("bias_step");
+    const auto evidence = [&](double size, double threshold, double phase, double sd) {
+        const std::vector<ringlock::closure::Estimate> fitted = {{"mode_hop", "step_deg_h", 0.8 * size, 0.01},
+                                                                 {"mode_hop", "threshold_ratio", threshold, 0.12 * sd},
+                                                                 {"mode_hop", "phase_rad", phase, 0.5 * sd}};
+        return ringlock::closure::evidence_for_addition(hop, step, fitted).value();
+    };
+    // Where the record could show no typical change the two effects are tied.
+    EXPECT_NEAR(evidence(1.0, 0.0, 0.0, 100.0), 0.0, 1e-3);
+    EXPECT_NEAR(evidence(0.01, 0.3, 1.0, 1.0), 0.0, 1e-2);
+    // Where it could and shows none: half the logarithm of one and the square of a hundred, twice.
+    EXPECT_NEAR(evidence(1.0, 0.0, 0.0, 0.01), -std::log(1.0 + 1e4), 1e-9);
+    EXPECT_LT(evidence(1.0, 0.0, 0.0, 0.01), -options.tie);
+    // Where it shows them.
+    EXPECT_GT(evidence(1.0, 0.12, 0.5, 0.1), options.tie);
+    EXPECT_GT(evidence(-1.0, 0.0, 0.5, 0.1), options.tie);
+    // Effects without typical sizes are not compared so.
+    EXPECT_FALSE(ringlock::closure::evidence_for_addition(*effects::find("readout_ellipse"), step, {}).has_value());
 }
 
 }  // namespace

@@ -60,6 +60,20 @@ TEST(LongClosureSampleSuite, NamesWhatIsFourTimesItsLimit) {
     named("null_shift_ramp", 3);
 }
 
+// Samples show a hop of modes as the step of the bias that comes with it.
+TEST(ClosureSampleSuite, AStepOfTheBiasMayBeAHopOfModes) {
+    SampleCase of{.truth = {{"bias_step", {{"step_deg_h", 12.0}, {"time_s", 60.0}}}},
+                  .condition = &sample_conditions[0],
+                  .seed = 440};
+    of.size = 8000;
+    const auto closure = ringlock::closure::close_samples(make(of));
+    ASSERT_EQ(closure.steps.size(), 1U);
+    EXPECT_EQ(closure.steps[0].name(), "bias_step");
+    ASSERT_EQ(closure.steps[0].confounded_with.size(), 1U);
+    EXPECT_EQ(closure.steps[0].confounded_with[0]->name(), "mode_hop");
+    EXPECT_NE(closure.steps[0].experiment.find("turns"), std::string::npos) << closure.steps[0].experiment;
+}
+
 TEST(LongClosureSampleSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
     for (SampleCase& of : foreign_sample_cases(1)) {
         of.size = 10000;

@@ -38,8 +38,22 @@ TEST_P(LongNamed, AloneOrInATieThatHoldsIt) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Effects, LongNamed, testing::Values("null_shift_ramp"),
+INSTANTIATE_TEST_SUITE_P(Effects, LongNamed, testing::Values("mode_hop", "null_shift_ramp"),
                          [](const auto& info) { return std::string(info.param); });
+
+// A hop whose changes of threshold and phase show is no step of the bias, and a step of the bias that comes without
+// them is no hop.
+TEST(LongHopOrStep, AreToldApartWhereTheRecordCouldShowTheDifference) {
+    const auto named = [](const Added& added) {
+        Case of{.kind = Kind::single, .truth = {added}, .condition = &conditions[0], .direct = true, .seed = 4200};
+        return judge(of, make({&of, 1}).front());
+    };
+    const Outcome hop =
+        named({"mode_hop", {{"step_deg_h", 0.08}, {"threshold_ratio", 0.012}, {"phase_rad", 0.05}, {"time_s", 30.0}}});
+    EXPECT_EQ(hop.judged, Judged::right) << hop.named;
+    const Outcome step = named({"bias_step", {{"step_deg_h", 0.08}, {"time_s", 30.0}}});
+    EXPECT_EQ(step.judged, Judged::right) << step.named;
+}
 
 }  // namespace
 }  // namespace ringlock::test::closure
