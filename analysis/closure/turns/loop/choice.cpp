@@ -6,6 +6,7 @@
 #include <memory>
 #include <utility>
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/loop/candidate_fit.hpp"
@@ -40,6 +41,11 @@ struct CandidateSet {
     }
 };
 
+bool contains_one_of(const std::vector<Candidate>& candidates, const effects::Effect& effect) {
+    return std::any_of(candidates.begin(), candidates.end(),
+                       [&](const Candidate& other) { return contains(effect, *other.effect); });
+}
+
 /// The likeliest candidates, random or not, each with the effect that explains most of its residual, and pairs of
 /// random rates. Both members must be needed.
 std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Candidate>& candidates) {
@@ -58,6 +64,8 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
     std::vector<const Candidate*> random;
     std::size_t tried = 0;
     for (const Candidate& candidate : candidates) {
+        // Sets with an effect that contains another one explain hardly more than those with the other.
+        if (contains_one_of(candidates, *candidate.effect)) continue;
         const bool is_random = is_random_rate(*candidate.effect);
         if (is_random ? !passes(candidate.p_value) : ++tried > limits.first_of_pair) continue;
         firsts.push_back(&candidate);
@@ -97,13 +105,19 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
 /// The likeliest pairs with a third effect: a random rate can follow three other effects at once, and hide what jumps
 /// next to another random one. Only sets that do as well as the best one, with each effect needed.
 /// \param sets  by decreasing merit
-std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<CandidateSet>& sets) {
+std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<Candidate>& candidates,
+                                  const std::vector<CandidateSet>& sets) {
     const TurnOptions::Loop& limits = options.turns.loop;
     const double best = sets.front().merit;
     std::vector<const CandidateSet*> extended;
     for (const long random : {0L, 1L}) {
         const auto likeliest = std::find_if(sets.begin(), sets.end(), [&](const CandidateSet& set) {
-            return set.others.size() == 1 && set.random_rates() == random;
+            // An effect that contains another one stands in for much that a third effect would explain.
+            const EffectSet all = set.effects();
+            const bool smallest = std::none_of(all.effects.begin(), all.effects.end(), [&](const auto* effect) {
+                return contains_one_of(candidates, *effect);
+            });
+            return set.others.size() == 1 && set.random_rates() == random && smallest;
         });
         if (likeliest == sets.end()) continue;
         // The residual of a pair with one random rate is searched after it has been added, except for effects that a
@@ -157,7 +171,7 @@ std::vector<CandidateSet> sets_of(const TurnProblem& problem, const Ranking& ran
     if (!ranking.seen_in_other_columns && is_random_rate(*ranking.candidates.front().effect)) {
         for (CandidateSet& pair : pairs(problem, ranking.candidates)) sets.push_back(std::move(pair));
         sort();
-        for (CandidateSet& triple : triples(problem, sets)) sets.push_back(std::move(triple));
+        for (CandidateSet& triple : triples(problem, ranking.candidates, sets)) sets.push_back(std::move(triple));
     }
     sort();
     return sets;
