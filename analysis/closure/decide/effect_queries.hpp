@@ -68,8 +68,9 @@ std::vector<Amplitude> amplitudes_of(const effects::Effect& effect);
 /// Whether the phases are proportional to the effect's sizes: it adds an angle, and changes nothing of the gyro.
 bool changes_angle_only(const effects::Effect& effect);
 
-/// Whether an effect can do all that another one does, and more: with some of its amplitudes at zero it is the other
-/// one. Compared are effects that are not random, by what they change over intervals of all kinds and in a setup.
+/// Whether a larger effect contains a smaller one: with some of its amplitudes at zero it equals the smaller one. The
+/// comparison evaluates the changes of both over several intervals, and the setups that both configure. An effect with
+/// a random part neither contains another effect nor is contained in one.
 bool contains(const effects::Effect& larger, const effects::Effect& smaller);
 
 /// The values of the larger effect at which it is the smaller one at these, which it contains.

@@ -42,7 +42,7 @@ std::optional<double> evidence_for_addition(const effects::Effect& larger, const
         return found == fitted.end() ? nullptr : &*found;
     };
     const std::vector<Amplitude> additional = in_addition(larger, smaller);
-    // How much there is of the effect, in typical sizes, by what both have.
+    // The scale of the effect: the sum of squares of the sizes that both effects have, in units of their typical sizes.
     double squares = 0.0;
     for (const Amplitude& amplitude : amplitudes_of(larger)) {
         const effects::Parameter& parameter = *amplitude.value;

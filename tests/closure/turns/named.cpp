@@ -28,6 +28,7 @@ std::vector<Outcome> judged_at_six_times_the_limit(const std::string& effect, st
     return outcomes;
 }
 
+/// Expects the effect to be named, alone or in a tie, without any false name.
 void expect_named(const std::string& effect) {
     for (const Outcome& outcome : judged_at_six_times_the_limit(effect, 4100)) {
         EXPECT_TRUE(outcome.judged == Judged::right || outcome.judged == Judged::tie)
