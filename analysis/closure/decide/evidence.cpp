@@ -34,7 +34,7 @@ double p_of_gain(double gain, const effects::Effect& effect) {
 }
 
 std::optional<double> evidence_for_addition(const effects::Effect& larger, const effects::Effect& smaller,
-                                            const std::vector<Estimate>& fitted) {
+                                            const std::vector<Estimate>& fitted, double log_likelihood_ratio) {
     const auto estimate = [&](const effects::Parameter& parameter) {
         const auto found = std::find_if(fitted.begin(), fitted.end(), [&](const Estimate& e) {
             return e.effect == larger.name() && e.name == parameter.name;
@@ -61,7 +61,7 @@ std::optional<double> evidence_for_addition(const effects::Effect& larger, const
         const double shown = std::pow(found.value / found.sd, 2);
         evidence += 0.5 * (shown * expected / (1.0 + expected) - std::log1p(expected));
     }
-    return evidence;
+    return std::min(evidence, log_likelihood_ratio);
 }
 
 }  // namespace ringlock::closure

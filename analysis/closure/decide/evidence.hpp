@@ -34,7 +34,9 @@ double p_of_gain(double gain, const effects::Effect& effect);
 /// negative where it could and does not show them. Correlations between the sizes are neglected. None where a size has
 /// no typical proportion.
 /// \param fitted  estimates of the larger effect's parameters, with standard errors
+/// \param log_likelihood_ratio  of the two best fits [nats]: an upper bound of the logarithm of the Bayes factor, which
+///        holds where the likelihood is far from normal, as it is where neither effect made the record
 std::optional<double> evidence_for_addition(const effects::Effect& larger, const effects::Effect& smaller,
-                                            const std::vector<Estimate>& fitted);
+                                            const std::vector<Estimate>& fitted, double log_likelihood_ratio);
 
 }  // namespace ringlock::closure

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "analysis/closure/decide/evidence.hpp"
@@ -95,23 +96,28 @@ TEST(Evidence, RandomRatesAreThoseWithADeviation) {
 TEST(Evidence, AnAdditionIsToldByARecordThatCouldShowIt) {
     const effects::Effect& hop = *effects::find("mode_hop");
     const effects::Effect& step = *effects::find("bias_step");
-    const auto evidence = [&](double size, double threshold, double phase, double sd) {
+    constexpr double unlimited = std::numeric_limits<double>::infinity();
+    const auto evidence = [&](double size, double threshold, double phase, double sd, double ratio) {
         const std::vector<ringlock::closure::Estimate> fitted = {{"mode_hop", "step_deg_h", 0.8 * size, 0.01},
                                                                  {"mode_hop", "threshold_ratio", threshold, 0.12 * sd},
                                                                  {"mode_hop", "phase_rad", phase, 0.5 * sd}};
-        return ringlock::closure::evidence_for_addition(hop, step, fitted).value();
+        return ringlock::closure::evidence_for_addition(hop, step, fitted, ratio).value();
     };
     // Where the record could show no typical change the two effects are tied.
-    EXPECT_NEAR(evidence(1.0, 0.0, 0.0, 100.0), 0.0, 1e-3);
-    EXPECT_NEAR(evidence(0.01, 0.3, 1.0, 1.0), 0.0, 1e-2);
+    EXPECT_NEAR(evidence(1.0, 0.0, 0.0, 100.0, unlimited), 0.0, 1e-3);
+    EXPECT_NEAR(evidence(0.01, 0.3, 1.0, 1.0, unlimited), 0.0, 1e-2);
     // Where it could and shows none: half the logarithm of one and the square of a hundred, twice.
-    EXPECT_NEAR(evidence(1.0, 0.0, 0.0, 0.01), -std::log(1.0 + 1e4), 1e-9);
-    EXPECT_LT(evidence(1.0, 0.0, 0.0, 0.01), -options.tie);
+    EXPECT_NEAR(evidence(1.0, 0.0, 0.0, 0.01, unlimited), -std::log(1.0 + 1e4), 1e-9);
+    EXPECT_LT(evidence(1.0, 0.0, 0.0, 0.01, unlimited), -options.tie);
     // Where it shows them.
-    EXPECT_GT(evidence(1.0, 0.12, 0.5, 0.1), options.tie);
-    EXPECT_GT(evidence(-1.0, 0.0, 0.5, 0.1), options.tie);
+    EXPECT_GT(evidence(1.0, 0.12, 0.5, 0.1, unlimited), options.tie);
+    EXPECT_GT(evidence(-1.0, 0.0, 0.5, 0.1, unlimited), options.tie);
+    // No Bayes factor is larger than the likelihood ratio, whatever standard errors say of a likelihood far from
+    // normal.
+    EXPECT_EQ(evidence(1.0, 0.12, 0.5, 1e-4, 20.0), 20.0);
+    EXPECT_EQ(evidence(1.0, 0.0, 0.0, 0.01, 20.0), evidence(1.0, 0.0, 0.0, 0.01, unlimited));
     // Effects without typical sizes are not compared so.
-    EXPECT_FALSE(ringlock::closure::evidence_for_addition(*effects::find("readout_ellipse"), step, {}).has_value());
+    EXPECT_FALSE(ringlock::closure::evidence_for_addition(*effects::find("readout_ellipse"), step, {}, unlimited));
 }
 
 }  // namespace

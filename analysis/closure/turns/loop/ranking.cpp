@@ -157,7 +157,8 @@ void compare_with_contained(std::vector<Candidate>& candidates) {
         for (const Candidate& smaller : candidates) {
             if (!contains(*larger.effect, *smaller.effect)) continue;
             const auto evidence =
-                evidence_for_addition(*larger.effect, *smaller.effect, larger.fitted->fit->estimates());
+                evidence_for_addition(*larger.effect, *smaller.effect, larger.fitted->fit->estimates(),
+                                      gain_over(*larger.fitted, *smaller.fitted));
             if (evidence) larger.merit = smaller.merit + *evidence;
         }
     }
