@@ -35,6 +35,9 @@ struct SampleRecordOptions {
     /// Half of the length over which temperatures are smoothed is the record over this: a thermometer's noise is faster
     /// than any temperature.
     std::size_t smoothed_parts = 1000;
+    /// Half of the length over which a temperature's slope is taken is the record over this: the noise that smoothing
+    /// leaves counts for five times as little as over half a smoothing length.
+    std::size_t slope_parts = 200;
 };
 
 /// Fits (samples/fit).

@@ -76,10 +76,12 @@ TEST(ClosureSampleSuite, AStepOfTheBiasMayBeAHopOfModes) {
 
 TEST(LongClosureSampleSuite, HasNoNameForWhatTheLibraryDoesNotHave) {
     for (SampleCase& of : foreign_sample_cases(1)) {
-        of.size = 10000;
+        // In a short record a temperature that is late by more than its period is the slope of the temperature.
+        if (of.where != ringlock::closure::Where::temperature) of.size = 10000;
         const Outcome outcome = judged(of);
         EXPECT_FALSE(outcome.false_name) << of.truth_text() << ": " << outcome.verdict << " " << outcome.named;
-        EXPECT_TRUE(std::isnan(outcome.oracle));
+        // Effects that the library has learned since are among the cases.
+        EXPECT_EQ(std::isnan(outcome.oracle), of.truth.empty());
     }
 }
 

@@ -99,6 +99,19 @@ Smoothed smooth(const std::vector<double>& values) {
     return smoothed;
 }
 
+/// Slopes of a smoothed course [1/row], over some rows to both sides.
+std::vector<double> slopes(const std::vector<double>& values) {
+    const std::size_t last = values.size() - 1;
+    const std::size_t apart = std::max<std::size_t>(1, values.size() / options.samples.record.slope_parts);
+    std::vector<double> all(values.size());
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        const std::size_t before = i > apart ? i - apart : 0;
+        const std::size_t behind = std::min(last, i + apart);
+        all[i] = (values[behind] - values[before]) / static_cast<double>(behind - before);
+    }
+    return all;
+}
+
 }  // namespace
 
 SampleSeries prepare_samples(const record::Record& record) {
@@ -149,6 +162,8 @@ SampleSeries prepare_samples(const record::Record& record) {
         series.temperature_start_sd_k = smoothed.start_sd;
         series.temperature_change_k = smoothed.values;
         for (double& value : series.temperature_change_k) value -= smoothed.values.front();
+        series.temperature_slope_k_per_s = slopes(series.temperature_change_k);
+        for (double& value : series.temperature_slope_k_per_s) value *= series.rate_hz;
     }
     if (!record.input_rate_deg_h.empty()) take_input(record, series);
     return series;

@@ -72,16 +72,9 @@ void test_temperature(const SampleFit& fit, Views& views) {
     if (t.empty()) return;
     const std::size_t n = series.size();
     std::vector<double> square(n);
-    std::vector<double> slope(n, 0.0);
-    const std::size_t apart = std::max<std::size_t>(1, n / 200);
-    for (std::size_t i = 0; i < n; ++i) {
-        square[i] = t[i] * t[i];
-        const std::size_t a = i > apart ? i - apart : 0;
-        const std::size_t b = std::min(n - 1, i + apart);
-        slope[i] = (t[b] - t[a]) / static_cast<double>(b - a);
-    }
-    test_columns(fit, Where::temperature, "rates that follow temperature, its square and its slope", {t, square, slope},
-                 views);
+    for (std::size_t i = 0; i < n; ++i) square[i] = t[i] * t[i];
+    test_columns(fit, Where::temperature, "rates that follow temperature, its square and its slope",
+                 {t, square, series.temperature_slope_k_per_s}, views);
     // A mass between thermometer and gyro, which may be warmer or colder at the start. Short lags are the slope.
     const auto lag_s = [&series](std::size_t place) {
         return 0.5 * duration_s(series) * std::pow(1.6, -static_cast<double>(place));

@@ -221,19 +221,25 @@ std::vector<SampleColumn> rate_columns(const SampleSeries& series, std::span<con
     const bool warms = !series.temperature_change_k.empty();
     const bool turns = !series.input_rate_deg_h.empty();
     const std::size_t last = series.size() - 1;
-    // What the record was exposed to in that row. Temperatures and input rates are those of the middle of the interval,
-    // and go on from there as steeply as from the row before to the row behind.
+    // What the record was exposed to in that row. Temperatures and input rates are those of the middle of the interval;
+    // input rates go on from there as steeply as from the row before to the row behind.
     const auto exposure = [&](std::size_t row) {
         effects::Interval at{.start_s = static_cast<double>(row) * series.interval_s, .duration_s = series.interval_s};
-        const auto ends = [&](const std::vector<double>& values, double(&both)[2]) {
+        const auto ends = [](double middle, double half, double(&both)[2]) {
+            both[0] = middle - half;
+            both[1] = middle + half;
+        };
+        if (warms) {
+            const double half_k = 0.5 * series.interval_s * series.temperature_slope_k_per_s[row];
+            ends(series.temperature_change_k[row], half_k, at.temperature_change_k);
+        }
+        if (turns) {
+            const auto& rates = series.input_rate_deg_h;
             const std::size_t before = row == 0 ? 0 : row - 1;
             const std::size_t behind = std::min(row + 1, last);
-            const double half = 0.5 * (values[behind] - values[before]) / static_cast<double>(behind - before);
-            both[0] = values[row] - half;
-            both[1] = values[row] + half;
-        };
-        if (warms) ends(series.temperature_change_k, at.temperature_change_k);
-        if (turns) ends(series.input_rate_deg_h, at.input_rate_deg_h);
+            const double half = 0.5 * (rates[behind] - rates[before]) / static_cast<double>(behind - before);
+            ends(rates[row], half, at.input_rate_deg_h);
+        }
         return at;
     };
     std::vector<SampleColumn> columns;
