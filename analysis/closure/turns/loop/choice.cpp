@@ -41,11 +41,6 @@ struct CandidateSet {
     }
 };
 
-bool contains_one_of(const std::vector<Candidate>& candidates, const effects::Effect& effect) {
-    return std::any_of(candidates.begin(), candidates.end(),
-                       [&](const Candidate& other) { return contains(effect, *other.effect); });
-}
-
 /// The likeliest candidates, random or not, each with the effect that explains most of its residual, and pairs of
 /// random rates. Both members must be needed.
 std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Candidate>& candidates) {
@@ -65,7 +60,7 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
     std::size_t tried = 0;
     for (const Candidate& candidate : candidates) {
         // Sets with an effect that contains another one explain hardly more than those with the other.
-        if (contains_one_of(candidates, *candidate.effect)) continue;
+        if (contains_one_of(*candidate.effect, candidates)) continue;
         const bool is_random = is_random_rate(*candidate.effect);
         if (is_random ? !passes(candidate.p_value) : ++tried > limits.first_of_pair) continue;
         firsts.push_back(&candidate);
@@ -115,7 +110,7 @@ std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<
             // An effect that contains another one stands in for much that a third effect would explain.
             const EffectSet all = set.effects();
             const bool smallest = std::none_of(all.effects.begin(), all.effects.end(), [&](const auto* effect) {
-                return contains_one_of(candidates, *effect);
+                return contains_one_of(*effect, candidates);
             });
             return set.others.size() == 1 && set.random_rates() == random && smallest;
         });

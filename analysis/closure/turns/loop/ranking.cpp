@@ -44,16 +44,14 @@ std::vector<Candidate> worth_a_fit(std::vector<Candidate> candidates, double lar
     std::sort(candidates.begin(), candidates.end(),
               [](const Candidate& a, const Candidate& b) { return promised_merit(a) > promised_merit(b); });
     const std::vector<Candidate> all = candidates;
-    const auto contains_one_of = [](const Candidate& c, const std::vector<Candidate>& others) {
-        return std::any_of(others.begin(), others.end(),
-                           [&](const Candidate& other) { return contains(*c.effect, *other.effect); });
-    };
     std::size_t taken = 0;
     std::erase_if(candidates, [&](const Candidate& c) {
-        return !is_random_rate(*c.effect) && !contains_one_of(c, all) && ++taken > most;
+        return !is_random_rate(*c.effect) && !contains_one_of(*c.effect, all) && ++taken > most;
     });
     const std::vector<Candidate> kept = candidates;
-    std::erase_if(candidates, [&](const Candidate& c) { return contains_one_of(c, all) && !contains_one_of(c, kept); });
+    std::erase_if(candidates, [&](const Candidate& c) {
+        return contains_one_of(*c.effect, all) && !contains_one_of(*c.effect, kept);
+    });
     return candidates;
 }
 
@@ -165,6 +163,11 @@ void compare_with_contained(std::vector<Candidate>& candidates) {
 }
 
 }  // namespace
+
+bool contains_one_of(const effects::Effect& effect, const std::vector<Candidate>& candidates) {
+    return std::any_of(candidates.begin(), candidates.end(),
+                       [&](const Candidate& other) { return contains(effect, *other.effect); });
+}
 
 Ranking rank_candidates(const TurnProblem& problem, const Fitted& now, std::size_t most, Among among, double matters) {
     Ranking ranking;

@@ -21,4 +21,7 @@ enum class Among { all, not_random };
 Ranking rank_candidates(const TurnProblem& problem, const Fitted& now, std::size_t most, Among among = Among::all,
                         double matters = 0.0);
 
+/// Whether the effect does what one of the candidates does, and more (decide/effect_queries.hpp).
+bool contains_one_of(const effects::Effect& effect, const std::vector<Candidate>& candidates);
+
 }  // namespace ringlock::closure
