@@ -35,8 +35,8 @@ struct SampleRecordOptions {
     /// Half of the length over which temperatures are smoothed is the record over this: a thermometer's noise is faster
     /// than any temperature.
     std::size_t smoothed_parts = 1000;
-    /// Half of the length over which a temperature's slope is taken is the record over this: the noise that smoothing
-    /// leaves counts for five times as little as over half a smoothing length.
+    /// Half of the length over which a temperature's slope is taken is the record over this. Over single rows the noise
+    /// that smoothing leaves would be a good part of the slope.
     std::size_t slope_parts = 200;
 };
 

@@ -342,7 +342,7 @@ TEST_P(TurnLoopFinds, TheEffectThatIsMissing) {
     EXPECT_EQ(closure.verdict, Verdict::closed);
     ASSERT_EQ(closure.steps.size(), 1U);
     EXPECT_EQ(closure.steps[0].name(), single.effect);
-    // A larger effect with nothing to see of what it has in addition is a tie.
+    // The record does not exclude an effect that contains the true one and whose additional sizes are small.
     for (const effects::Effect* other : closure.steps[0].confounded_with) {
         EXPECT_TRUE(ringlock::closure::contains(*other, *closure.steps[0].effect)) << other->name();
     }

@@ -15,7 +15,7 @@ struct SampleSeries {
     std::vector<double> increment;                                       ///< [arcsec]
     std::vector<std::pair<std::string, std::vector<double>>> witnesses;  ///< accelerations that change
     std::vector<double> temperature_change_k;                            ///< since the start; empty where there is none
-    std::vector<double> temperature_slope_k_per_s;                       ///< likewise
+    std::vector<double> temperature_slope_k_per_s;                       ///< of that; empty where there is none
     double temperature_start_sd_k = 0.0;                                 ///< by the thermometer's noise
     std::vector<double> input_rate_deg_h;                                ///< empty where there is none
     double input_late_s = 0.0;         ///< by which the known input's clock was found to be early

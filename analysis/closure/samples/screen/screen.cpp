@@ -221,8 +221,9 @@ std::vector<SampleColumn> rate_columns(const SampleSeries& series, std::span<con
     const bool warms = !series.temperature_change_k.empty();
     const bool turns = !series.input_rate_deg_h.empty();
     const std::size_t last = series.size() - 1;
-    // What the record was exposed to in that row. Temperatures and input rates are those of the middle of the interval;
-    // input rates go on from there as steeply as from the row before to the row behind.
+    // What the record was exposed to in that row. Temperatures and input rates are those of the middle of the interval.
+    // Temperatures change over it by the slope of the series, input rates by that from the row before to the row
+    // behind.
     const auto exposure = [&](std::size_t row) {
         effects::Interval at{.start_s = static_cast<double>(row) * series.interval_s, .duration_s = series.interval_s};
         const auto ends = [](double middle, double half, double(&both)[2]) {
