@@ -22,3 +22,31 @@ target_compile_options(ringlock_options INTERFACE
 set(RINGLOCK_COMMON_HEADERS
   <algorithm> <array> <cmath> <complex> <cstdint> <filesystem> <functional> <limits> <memory> <numeric> <optional> <span>
   <string> <utility> <vector> <fmt/format.h>)
+
+# Several sources in one compilation (unity build), as the preset release has it: headers are read and templates compiled
+# once for all of them. Names in anonymous namespaces of one target must differ for that; the preset debug compiles each
+# source by itself. Sources that Highway compiles once for each instruction set, and those made by the build, stay alone.
+option(RINGLOCK_UNITY_BUILD "Compile several sources of the program together" OFF)
+function(ringlock_compile_together target sources_each)
+  if(NOT RINGLOCK_UNITY_BUILD)
+    return()
+  endif()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${sources_each})
+  # A class whose members have types of the source's anonymous namespace is defined in one source all the same.
+  target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+  get_target_property(sources ${target} SOURCES)
+  foreach(source IN LISTS sources)
+    set(alone OFF)
+    if(source MATCHES "^${PROJECT_BINARY_DIR}")
+      set(alone ON)
+    elseif(source MATCHES "\\.cpp$" AND EXISTS "${source}")
+      file(STRINGS "${source}" for_each_target REGEX "HWY_TARGET_INCLUDE" LIMIT_COUNT 1)
+      if(for_each_target)
+        set(alone ON)
+      endif()
+    endif()
+    if(alone)
+      set_source_files_properties("${source}" TARGET_DIRECTORY ${target} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
+  endforeach()
+endfunction()

@@ -3,12 +3,13 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "engine/core/units.hpp"
 
 namespace ringlock::noise {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using units::pi;
 constexpr double fewest_half_periods = 8.0;
 constexpr double apart = 4.0;  // coefficients between two lines
 constexpr std::ptrdiff_t reach = 8;

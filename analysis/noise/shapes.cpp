@@ -1,12 +1,13 @@
 #include "analysis/noise/shapes.hpp"
 
 #include <cmath>
-#include <numbers>
+
+#include "engine/core/units.hpp"
 
 namespace ringlock::noise {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using units::pi;
 
 /// Sum over all integers k of |x + k|^-3, for 0 < x <= 1/2.
 double alias_sum_cubes(double x) {
@@ -59,8 +60,8 @@ Shapes shapes(double x, double index) {
     return g;
 }
 
-CorrelatedShape::CorrelatedShape(double log_time, std::size_t samples)
-    : a_(std::exp(-log_time)),
+CorrelatedShape::CorrelatedShape(double log_correlation_time, std::size_t samples)
+    : a_(std::exp(-log_correlation_time)),
       sinh_half2_(std::pow(std::sinh(0.5 * a_), 2)),
       sinh_(std::sinh(a_)),
       // sinh a - a loses all digits for small a

@@ -32,8 +32,8 @@ Shapes shapes(double x, double index = 0.0);
 /// the ends of the record takes off 4 S^2 (1 - s^2)/(n a^2 (S + s^2)^2), but for exp(-n a).
 class CorrelatedShape {
    public:
-    /// \param log_time  ln(T/tau0), T/tau0 from 1/2 to n/10
-    CorrelatedShape(double log_time, std::size_t samples);
+    /// \param log_correlation_time  ln(T/tau0), T/tau0 from 1/2 to n/10
+    CorrelatedShape(double log_correlation_time, std::size_t samples);
     struct Value {
         double shape = 0.0;
         double slope = 0.0;  ///< by ln T

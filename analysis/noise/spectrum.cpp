@@ -2,13 +2,14 @@
 
 #include <cmath>
 #include <complex>
-#include <numbers>
 #include <unsupported/Eigen/FFT>
+
+#include "engine/core/units.hpp"
 
 namespace ringlock::noise {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using units::pi;
 
 bool small_factors_only(std::size_t n) {
     for (const std::size_t p : {2, 3, 5, 7, 11, 13}) {

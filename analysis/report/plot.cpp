@@ -11,6 +11,7 @@
 #include <string_view>
 #include <utility>
 
+#include "analysis/report/code_points.hpp"
 #include "analysis/report/gnuplot.hpp"
 
 namespace ringlock::report {
@@ -31,11 +32,6 @@ struct Marker {
 // colours: a pair comes back only after 42 curves.
 constexpr std::array<Marker, 7> markers = {{{6, 1.35}, {5, 0.8}, {8, 1.4}, {13, 0.8}, {4, 1.15}, {7, 0.55}, {10, 1.1}}};
 constexpr std::array<std::string_view, 3> dashes = {"(12,6)", "(4,4)", "(14,4,3,4)"};
-
-std::size_t code_points(std::string_view text) {
-    return static_cast<std::size_t>(
-        std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
-}
 
 /// A literal of gnuplot. All but letters and blanks is written as octal codes (digits too, they would prolong a code):
 /// nothing in it can end the string, be expanded or be run.

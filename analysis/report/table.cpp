@@ -7,13 +7,10 @@
 #include <string_view>
 #include <utility>
 
+#include "analysis/report/code_points.hpp"
+
 namespace ringlock::report {
 namespace {
-
-std::size_t code_points(std::string_view text) {
-    return static_cast<std::size_t>(
-        std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
-}
 
 void check_cell(const std::string& cell) {
     if (cell.find_first_of("\r\n") != std::string::npos) {

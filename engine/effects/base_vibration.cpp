@@ -7,7 +7,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array base_vibration_parameters = {
     Parameter{"frequency_hz", 10.0, 1e-6, 1e5, Role::frequency, "frequency of the line"},
     Parameter{"rate_deg_h", 0.0, 0.0, 1e4, Role::size, "amplitude of the rate"},
     Parameter{"phase_rad", 0.0, -units::two_pi, units::two_pi, Role::phase, "phase of the rate at the start"},
@@ -20,7 +20,7 @@ class BaseVibration final : public Effect {
     std::string_view equation() const override {
         return "rate = A sin(2 pi f t + phase), integrated exactly over each interval.";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return base_vibration_parameters; }
     bool active(const Values& values) const override { return values.at("rate_deg_h") != 0.0; }
     Changes changes() const override { return {.angle = true}; }
     /// A difference of cosines would lose digits late in a long run; the product over the middle of the interval does

@@ -8,14 +8,14 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array bias_instability_parameters = {
     Parameter{"deg_h", 0.0, 0.0, 1000.0, Role::deviation, "bias instability B; the Allan deviation is flat at 0.664 B"},
 };
 
 /// Correlation times: one a decade from 0.01 s to 1e7 s. The Allan deviation is then within 3 % of its flat value for
 /// averaging times of 0.1 s to 1e6 s.
-constexpr std::size_t terms = 10;
-constexpr std::array<double, terms> correlation_times_s = {1e-2, 1e-1, 1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7};
+constexpr std::size_t flicker_terms = 10;
+constexpr std::array<double, flicker_terms> correlation_times_s = {1e-2, 1e-1, 1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7};
 
 /// Standard deviation s of each term: with one a decade the sum of 2 s^2 T / (1 + (2 pi f T)^2) is s^2 / (2 ln(10) f).
 double term_sd(double deg_h) { return deg_h * std::sqrt(std::numbers::ln10 / std::numbers::pi); }
@@ -25,14 +25,14 @@ double term_sd(double deg_h) { return deg_h * std::sqrt(std::numbers::ln10 / std
 /// T^2 (2 x - 4 h). Only the sum of the integrals is asked for, so their remainders share one deviate.
 struct Transition {
     double duration_s = -1.0;
-    std::array<double, terms> decay{};
-    std::array<double, terms> kick{};
-    std::array<double, terms> mean_s{};
+    std::array<double, flicker_terms> decay{};
+    std::array<double, flicker_terms> kick{};
+    std::array<double, flicker_terms> mean_s{};
     double remainder_s = 0.0;
 
     explicit Transition(double duration) : duration_s(duration) {
         double variance = 0.0;
-        for (std::size_t i = 0; i < terms; ++i) {
+        for (std::size_t i = 0; i < flicker_terms; ++i) {
             const double time = correlation_times_s[i];
             const double x = duration / time;
             const double x2 = x * x;
@@ -49,9 +49,9 @@ struct Transition {
     }
 };
 
-class Process final : public RateProcess {
+class BiasInstabilityProcess final : public RateProcess {
    public:
-    Process(double deg_h, const random::Identity& who)
+    BiasInstabilityProcess(double deg_h, const random::Identity& who)
         : sd_arcsec_s_(term_sd(deg_h)), normal_(who, random::Purpose::bias_instability) {
         for (double& rate : rates_) rate = normal_();
     }
@@ -59,7 +59,7 @@ class Process final : public RateProcess {
     double angle_arcsec(double /*start_s*/, double duration_s) override {
         const Transition& step = transition(duration_s);
         double angle = step.remainder_s * normal_();
-        for (std::size_t i = 0; i < terms; ++i) {
+        for (std::size_t i = 0; i < flicker_terms; ++i) {
             const double next = step.decay[i] * rates_[i] + step.kick[i] * normal_();
             angle += step.mean_s[i] * (rates_[i] + next);
             rates_[i] = next;
@@ -77,7 +77,7 @@ class Process final : public RateProcess {
     }
 
     double sd_arcsec_s_;
-    std::array<double, terms> rates_{};
+    std::array<double, flicker_terms> rates_{};
     Transition recent_{0.0};
     Transition older_{0.0};
     random::NormalStream normal_;
@@ -95,7 +95,7 @@ class BiasInstability final : public Effect {
                "times "
                "of 0.01 s, 0.1 s, ... 1e7 s, each of variance B^2 ln(10)/pi.";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return bias_instability_parameters; }
     bool active(const Values& values) const override { return values.at("deg_h") != 0.0; }
     RateNoise rate_noise(const Values& values) const override {
         const double deg_h = term_sd(values.at("deg_h"));
@@ -104,7 +104,7 @@ class BiasInstability final : public Effect {
         return noise;
     }
     std::unique_ptr<RateProcess> rate_process(const Values& values, const random::Identity& who) const override {
-        return std::make_unique<Process>(values.at("deg_h"), who);
+        return std::make_unique<BiasInstabilityProcess>(values.at("deg_h"), who);
     }
 };
 

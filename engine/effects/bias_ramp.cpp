@@ -6,7 +6,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array bias_ramp_parameters = {
     Parameter{"deg_h_per_h", 0.0, -1e5, 1e5, Role::size, "slope R of the rate"},
 };
 
@@ -18,7 +18,7 @@ class BiasRamp final : public Effect {
         return "rate = R t; Allan deviation R tau / sqrt(2) (IEEE Std 952-1997, annex C, rate ramp).";
     }
     Follows follows() const override { return Follows::time; }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return bias_ramp_parameters; }
     bool active(const Values& values) const override { return values.at("deg_h_per_h") != 0.0; }
     Changes changes() const override { return {.angle = true}; }
     ChangeOver change(const Values& values) const override {

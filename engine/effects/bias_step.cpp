@@ -7,7 +7,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array bias_step_parameters = {
     Parameter{"step_deg_h", 0.0, -1e4, 1e4, Role::size, "change of the rate"},
     Parameter{"time_s", 0.0, 0.0, 1e9, Role::time, "when it happens, from the start"},
 };
@@ -18,7 +18,7 @@ class BiasStep final : public Effect {
     std::string_view summary() const override { return "A step of the bias at a known time."; }
     std::string_view equation() const override { return "rate = step for t >= time, else 0."; }
     Follows follows() const override { return Follows::time; }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return bias_step_parameters; }
     bool active(const Values& values) const override { return values.at("step_deg_h") != 0.0; }
     Changes changes() const override { return {.angle = true}; }
     ChangeOver change(const Values& values) const override {

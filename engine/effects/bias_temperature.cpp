@@ -6,7 +6,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array bias_temperature_parameters = {
     Parameter{"deg_h_per_k", 0.0, -100.0, 100.0, Role::size, "change of the bias with each kelvin"},
 };
 
@@ -21,7 +21,7 @@ class BiasTemperature final : public Effect {
                "half cycle.";
     }
     Follows follows() const override { return Follows::temperature; }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return bias_temperature_parameters; }
     bool active(const Values& values) const override { return values.at("deg_h_per_k") != 0.0; }
     Changes changes() const override { return {.angle = true}; }
     ChangeOver change(const Values& values) const override {

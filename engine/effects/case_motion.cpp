@@ -8,7 +8,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array case_motion_parameters = {
     Parameter{"witness", 0.0, 0.0, 2.0, Role::setting, "accelerometer that sees it: 0 accel_x, 1 accel_y, 2 accel_z"},
     Parameter{"coherence", 1.0, 0.0, 1.0, Role::setting, "magnitude-squared coherence of witness and rotation"},
     Parameter{"rms_arcsec", 0.0, 0.0, 1e5, Role::sampled, "rms of the angle"},
@@ -40,9 +40,9 @@ std::vector<double> resonance(std::size_t size, double rate_hz, const Values& va
     return x;
 }
 
-class Stage final : public SampleStage {
+class CaseMotionStage final : public SampleStage {
    public:
-    Stage(const Values& values, const random::Identity& who) : values_(values), who_(who) {}
+    CaseMotionStage(const Values& values, const random::Identity& who) : values_(values), who_(who) {}
     Place place() const override { return Place::motion; }
     void apply(Sampled& samples) const override {
         const std::size_t rows = samples.increment_arcsec.size();
@@ -77,11 +77,11 @@ class CaseMotion final : public Effect {
                "accelerometer, tilted, reads g (sqrt(C) angle + sqrt(1 - C) other), the other independent of the angle "
                "and like it: C is their coherence (Bendat and Piersol, \"Random Data\", 2010, section 6.1).";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return case_motion_parameters; }
     bool active(const Values& values) const override { return values.at("rms_arcsec") != 0.0; }
     std::optional<SampleStage::Place> sample_place() const override { return SampleStage::Place::motion; }
     std::unique_ptr<SampleStage> sample_stage(const Values& values, const random::Identity& who) const override {
-        return std::make_unique<Stage>(values, who);
+        return std::make_unique<CaseMotionStage>(values, who);
     }
 };
 

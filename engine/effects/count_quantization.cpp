@@ -6,14 +6,14 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array count_quantization_parameters = {
     Parameter{"step_arcsec", 0.0, 0.0, 1e4, Role::sampled, "step of the angle that is put out"},
 };
 
 /// Whole steps of the angle since the start, as differences.
-class Stage final : public SampleStage {
+class CountQuantizationStage final : public SampleStage {
    public:
-    explicit Stage(double step_arcsec) : step_(step_arcsec) {}
+    explicit CountQuantizationStage(double step_arcsec) : step_(step_arcsec) {}
     Place place() const override { return Place::resolution; }
     void apply(Sampled& samples) const override {
         double angle = 0.0;
@@ -43,11 +43,11 @@ class CountQuantization final : public Effect {
                "Noise\", "
                "2008, chapter 4).";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return count_quantization_parameters; }
     bool active(const Values& values) const override { return values.at("step_arcsec") != 0.0; }
     std::optional<SampleStage::Place> sample_place() const override { return SampleStage::Place::resolution; }
     std::unique_ptr<SampleStage> sample_stage(const Values& values, const random::Identity& /*who*/) const override {
-        return std::make_unique<Stage>(values.at("step_arcsec"));
+        return std::make_unique<CountQuantizationStage>(values.at("step_arcsec"));
     }
 };
 

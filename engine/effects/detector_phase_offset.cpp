@@ -6,7 +6,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array detector_phase_offset_parameters = {
     Parameter{"phase_rad", 0.0, -units::pi, units::pi, Role::phase, "phase of the coupling against the sine detector"},
 };
 
@@ -20,7 +20,7 @@ class DetectorPhaseOffset final : public Effect {
         return "psi' = C (rate + dither rate) + b sin(psi + phase), psi as the detectors see it (Gao and Deng 2007, "
                "equation 1, with a phase).";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return detector_phase_offset_parameters; }
     bool active(const Values& values) const override { return values.at("phase_rad") != 0.0; }
     void configure(const Values& values, gyro::Setup& setup) const override {
         setup.coupling_phase_rad = values.at("phase_rad");

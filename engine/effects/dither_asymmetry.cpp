@@ -5,7 +5,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array dither_asymmetry_parameters = {
     Parameter{"ratio", 0.0, -0.5, 0.5, Role::size, "positive half cycles stronger by it, and shorter"},
 };
 
@@ -21,7 +21,7 @@ class DitherAsymmetry final : public Effect {
                "stronger are "
                "shorter, so that the dither angle stays bounded.";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return dither_asymmetry_parameters; }
     bool active(const Values& values) const override { return values.at("ratio") != 0.0; }
     void configure(const Values& values, gyro::Setup& setup) const override {
         setup.dither_asymmetry_ratio += values.at("ratio");

@@ -7,7 +7,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array dither_residue_parameters = {
     Parameter{"frequency_hz", 50.0, 1e-6, 1e5, Role::frequency, "frequency in the middle of the record"},
     Parameter{"drift_hz_per_s", 0.0, -10.0, 10.0, Role::frequency, "change of the frequency there"},
     Parameter{"drift_2_hz_per_s2", 0.0, -1.0, 1.0, Role::frequency, "second derivative of the frequency there"},
@@ -17,9 +17,9 @@ constexpr std::array parameters_of = {
     Parameter{"amplitude_arcsec", 0.0, 0.0, 1e5, Role::sampled, "amplitude of the angle"},
 };
 
-class Stage final : public SampleStage {
+class DitherResidueStage final : public SampleStage {
    public:
-    explicit Stage(const Values& values)
+    explicit DitherResidueStage(const Values& values)
         : course_{values.at("frequency_hz"),      values.at("drift_hz_per_s"),    values.at("drift_2_hz_per_s2"),
                   values.at("drift_3_hz_per_s3"), values.at("drift_4_hz_per_s4"), values.at("drift_5_hz_per_s5")},
           amplitude_arcsec_(values.at("amplitude_arcsec")) {}
@@ -61,11 +61,11 @@ class DitherResidue final : public Effect {
                "frequency follows the temperature of the springs. In increments A becomes 2 A "
                "|sin(pi f/rate)|; above half the rate it shows at its alias.";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return dither_residue_parameters; }
     bool active(const Values& values) const override { return values.at("amplitude_arcsec") != 0.0; }
     std::optional<SampleStage::Place> sample_place() const override { return SampleStage::Place::output; }
     std::unique_ptr<SampleStage> sample_stage(const Values& values, const random::Identity& /*who*/) const override {
-        return std::make_unique<Stage>(values);
+        return std::make_unique<DitherResidueStage>(values);
     }
 };
 

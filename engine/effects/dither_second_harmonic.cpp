@@ -6,7 +6,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array dither_second_harmonic_parameters = {
     Parameter{"ratio", 0.0, -0.3, 0.3, Role::size, "second harmonic of the dither rate over the first"},
     Parameter{"phase_rad", 0.0, -units::pi, units::pi, Role::phase, "phase of the second harmonic at the turns"},
 };
@@ -21,7 +21,7 @@ class DitherSecondHarmonic final : public Effect {
                "and -1 in negative half cycles (docs/physics.md). Swings and turns of the dither angle stay where they "
                "are.";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return dither_second_harmonic_parameters; }
     bool active(const Values& values) const override { return values.at("ratio") != 0.0; }
     void configure(const Values& values, gyro::Setup& setup) const override {
         setup.dither_harmonic_ratio = values.at("ratio");

@@ -6,7 +6,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array lockin_second_harmonic_parameters = {
     Parameter{"ratio", 0.0, -0.5, 0.5, Role::size, "coupling at twice the phase over that at the phase itself"},
     Parameter{"phase_rad", 0.0, -units::pi, units::pi, Role::phase,
               "phase of the second harmonic against the sine detector"},
@@ -21,7 +21,7 @@ class LockinSecondHarmonic final : public Effect {
                "the kick "
                "of a turn at the second harmonic is ratio/sqrt(2) of that at the first (docs/turn-map.md).";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return lockin_second_harmonic_parameters; }
     bool active(const Values& values) const override { return values.at("ratio") != 0.0; }
     void configure(const Values& values, gyro::Setup& setup) const override {
         setup.lockin_second_ratio = values.at("ratio");

@@ -6,7 +6,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array lockin_temperature_parameters = {
     Parameter{"relative_per_k", 0.0, -0.5, 0.5, Role::size, "relative change of the threshold with each kelvin"},
 };
 
@@ -22,7 +22,7 @@ class LockinTemperature final : public Effect {
                "half cycle.";
     }
     Follows follows() const override { return Follows::temperature; }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return lockin_temperature_parameters; }
     bool active(const Values& values) const override { return values.at("relative_per_k") != 0.0; }
     Changes changes() const override { return {.threshold = true}; }
     ChangeOver change(const Values& values) const override {

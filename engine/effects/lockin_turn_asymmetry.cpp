@@ -5,7 +5,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array lockin_turn_asymmetry_parameters = {
     Parameter{"ratio", 0.0, -0.9, 0.9, Role::size, "threshold stronger by it at minima of the phase, weaker at maxima"},
 };
 
@@ -20,7 +20,7 @@ class LockinTurnAsymmetry final : public Effect {
                "path of the "
                "beams, the light scattered back depends on the dither angle.";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return lockin_turn_asymmetry_parameters; }
     bool active(const Values& values) const override { return values.at("ratio") != 0.0; }
     void configure(const Values& values, gyro::Setup& setup) const override {
         setup.lockin_turn_asymmetry = values.at("ratio");

@@ -5,7 +5,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array missed_counts_parameters = {
     Parameter{"probability_per_turn", 0.0, 0.0, 1.0, Role::probability,
               "that a quarter fringe was missed in the half cycle before a turn"},
 };
@@ -21,7 +21,7 @@ class MissedCounts final : public Effect {
                "branch nearest to the quarter that the counter names: it is wrong by whole fringes, and only once two "
                "counts or more are missing (docs/readout.md).";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return missed_counts_parameters; }
     bool active(const Values& values) const override { return values.at("probability_per_turn") != 0.0; }
     void configure(const Values& values, gyro::Setup& setup) const override {
         setup.missed_count_probability = values.at("probability_per_turn");

@@ -10,7 +10,7 @@ namespace {
 
 // Typical sizes are assumed orders of magnitude: the backscattered waves add up with other phases, half a radian apart,
 // to a sum that differs by a tenth, and the bias steps by a good part of a degree an hour.
-constexpr std::array parameters_of = {
+constexpr std::array mode_hop_parameters = {
     Parameter{"step_deg_h", 0.0, -1e4, 1e4, Role::size, "change of the bias", 0.8},
     Parameter{"threshold_ratio", 0.0, -0.9, 0.9, Role::size, "change of the lock-in threshold, over the threshold",
               0.12},
@@ -31,7 +31,7 @@ class ModeHop final : public Effect {
                "Optical Gyros and their Application, RTO AGARDograph 339, 1999). Threshold and phase change with the "
                "half cycle whose middle comes first after the time.";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return mode_hop_parameters; }
     bool active(const Values& values) const override {
         return values.at("step_deg_h") != 0.0 || values.at("threshold_ratio") != 0.0 || values.at("phase_rad") != 0.0;
     }

@@ -6,7 +6,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array null_shift_ramp_parameters = {
     Parameter{"deg_h_per_k_h", 0.0, -10.0, 10.0, Role::size, "bias for each kelvin an hour"},
 };
 
@@ -21,7 +21,7 @@ class NullShiftRamp final : public Effect {
                "the null by the flow of the gas (IEEE Std 647-2006, thermal sensitivities of the bias). The angle is "
                "that coefficient times the change of the temperature.";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return null_shift_ramp_parameters; }
     bool active(const Values& values) const override { return values.at("deg_h_per_k_h") != 0.0; }
     Changes changes() const override { return {.angle = true}; }
     Follows follows() const override { return Follows::temperature; }

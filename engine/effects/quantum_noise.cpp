@@ -7,13 +7,13 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array quantum_noise_parameters = {
     Parameter{"deg_rt_h", 1e-4, 0.0, 10.0, Role::deviation, "angle random walk of the quantum noise floor"},
 };
 
-class Process final : public RateProcess {
+class QuantumNoiseProcess final : public RateProcess {
    public:
-    Process(double deg_rt_h, const random::Identity& who)
+    QuantumNoiseProcess(double deg_rt_h, const random::Identity& who)
         : arcsec_rt_s_(deg_rt_h / units::deg_rt_h_per_arcsec_rt_s), who_(who) {}
 
     double angle_arcsec(double /*start_s*/, double duration_s) override {
@@ -27,9 +27,9 @@ class Process final : public RateProcess {
 };
 
 /// Every half cycle of every gyro of a study takes one: all gyros at once.
-class LaneProcess final : public LaneRateProcess {
+class QuantumNoiseLaneProcess final : public LaneRateProcess {
    public:
-    LaneProcess(double deg_rt_h, const random::LaneIdentities& who)
+    QuantumNoiseLaneProcess(double deg_rt_h, const random::LaneIdentities& who)
         : arcsec_rt_s_(deg_rt_h / units::deg_rt_h_per_arcsec_rt_s), who_(who) {}
 
     void add_angles(const LaneIntervals& intervals, std::span<simd::Lanes> angle_arcsec) override {
@@ -61,18 +61,18 @@ class QuantumNoise final : public Effect {
                "interval "
                "(IEEE Std 952-1997, annex C, angle random walk).";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return quantum_noise_parameters; }
     bool active(const Values& values) const override { return values.at("deg_rt_h") != 0.0; }
     RateNoise rate_noise(const Values& values) const override {
         const double arcsec_rt_s = values.at("deg_rt_h") / units::deg_rt_h_per_arcsec_rt_s;
         return {.white_deg2_h2_s = arcsec_rt_s * arcsec_rt_s};
     }
     std::unique_ptr<RateProcess> rate_process(const Values& values, const random::Identity& who) const override {
-        return std::make_unique<Process>(values.at("deg_rt_h"), who);
+        return std::make_unique<QuantumNoiseProcess>(values.at("deg_rt_h"), who);
     }
     std::unique_ptr<LaneRateProcess> lane_rate_process(const Values& values, const random::LaneIdentities& who,
                                                        std::size_t /*lanes*/) const override {
-        return std::make_unique<LaneProcess>(values.at("deg_rt_h"), who);
+        return std::make_unique<QuantumNoiseLaneProcess>(values.at("deg_rt_h"), who);
     }
 };
 

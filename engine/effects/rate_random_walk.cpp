@@ -7,16 +7,16 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array rate_random_walk_parameters = {
     Parameter{"deg_h_rt_h", 0.0, 0.0, 1000.0, Role::deviation,
               "rate random walk K: rms change of the rate after one hour"},
 };
 
 /// The rate r is a Wiener process. Over dt its change and the angle beyond r dt are jointly normal:
 /// var(dr) = K^2 dt, var(angle) = K^2 dt^3 / 3, cov = K^2 dt^2 / 2.
-class Process final : public RateProcess {
+class RateRandomWalkProcess final : public RateProcess {
    public:
-    Process(double deg_h_rt_h, const random::Identity& who)
+    RateRandomWalkProcess(double deg_h_rt_h, const random::Identity& who)
         // (deg/h)/sqrt(h) = (arcsec/s)/sqrt(3600 s)
         : arcsec_s_rt_s_(deg_h_rt_h / 60.0), normal_(who, random::Purpose::rate_random_walk) {}
 
@@ -42,14 +42,14 @@ class RateRandomWalk final : public Effect {
     std::string_view equation() const override {
         return "dr = K dW; Allan variance K^2 tau / 3 (IEEE Std 952-1997, annex C, rate random walk).";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return rate_random_walk_parameters; }
     bool active(const Values& values) const override { return values.at("deg_h_rt_h") != 0.0; }
     RateNoise rate_noise(const Values& values) const override {
         const double deg_h_rt_s = values.at("deg_h_rt_h") / 60.0;
         return {.walk_deg2_h2_per_s = deg_h_rt_s * deg_h_rt_s};
     }
     std::unique_ptr<RateProcess> rate_process(const Values& values, const random::Identity& who) const override {
-        return std::make_unique<Process>(values.at("deg_h_rt_h"), who);
+        return std::make_unique<RateRandomWalkProcess>(values.at("deg_h_rt_h"), who);
     }
 };
 

@@ -5,7 +5,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array readout_ellipse_parameters = {
     Parameter{"gain", 0.0, -0.5, 0.5, Role::size, "relative gain error of the sine detector"},
     Parameter{"offset_sin", 0.0, -0.5, 0.5, Role::size, "offset of the sine detector, in fringe amplitudes"},
     Parameter{"offset_cos", 0.0, -0.5, 0.5, Role::size, "offset of the cosine detector, in fringe amplitudes"},
@@ -23,7 +23,7 @@ class ReadoutEllipse final : public Effect {
                "Applied "
                "Optics 20, 3382, 1981, with the sine as the reference).";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return readout_ellipse_parameters; }
     bool active(const Values& values) const override {
         return values.at("gain") != 0.0 || values.at("offset_sin") != 0.0 || values.at("offset_cos") != 0.0 ||
                values.at("orthogonality_rad") != 0.0;

@@ -8,13 +8,13 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array resampling_parameters = {
     Parameter{"from_hz", 0.0, 0.0, 1e5, Role::sampled, "rate at which the samples were taken"},
 };
 
-class Stage final : public SampleStage {
+class ResamplingStage final : public SampleStage {
    public:
-    explicit Stage(double from_hz) : from_hz_(from_hz) {}
+    explicit ResamplingStage(double from_hz) : from_hz_(from_hz) {}
     Place place() const override { return Place::transport; }
     double source_hz(double /*record_hz*/) const override { return from_hz_; }
     void apply(Sampled& samples) const override {
@@ -62,11 +62,11 @@ class Resampling final : public Effect {
                "which "
                "beats with the distance of the rates (docs/effects.md).";
     }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return resampling_parameters; }
     bool active(const Values& values) const override { return values.at("from_hz") != 0.0; }
     std::optional<SampleStage::Place> sample_place() const override { return SampleStage::Place::transport; }
     std::unique_ptr<SampleStage> sample_stage(const Values& values, const random::Identity& /*who*/) const override {
-        return std::make_unique<Stage>(values.at("from_hz"));
+        return std::make_unique<ResamplingStage>(values.at("from_hz"));
     }
 };
 

@@ -6,7 +6,7 @@
 namespace ringlock::effects {
 namespace {
 
-constexpr std::array parameters_of = {
+constexpr std::array scale_factor_error_parameters = {
     Parameter{"relative", 0.0, -0.1, 0.1, Role::size, "output angle per input angle, less one"},
 };
 
@@ -23,7 +23,7 @@ class ScaleFactorError final : public Effect {
                "that is a larger dither.peak_rate_deg_s, and left to it (docs/effects.md).";
     }
     Follows follows() const override { return Follows::input_rate; }
-    std::span<const Parameter> parameters() const override { return parameters_of; }
+    std::span<const Parameter> parameters() const override { return scale_factor_error_parameters; }
     bool active(const Values& values) const override { return values.at("relative") != 0.0; }
     Changes changes() const override { return {.angle = true}; }
     ChangeOver change(const Values& values) const override {

@@ -7,9 +7,9 @@ namespace ringlock::propagate {
 namespace {
 
 /// Terms of the asymptotic series, and Taylor terms in w (t' - t) that its derivatives need.
-constexpr std::size_t terms = 10;
-using Series = std::array<double, terms>;
-using ComplexSeries = std::array<std::complex<double>, terms>;
+constexpr std::size_t frame_terms = 10;
+using Series = std::array<double, frame_terms>;
+using ComplexSeries = std::array<std::complex<double>, frame_terms>;
 
 }  // namespace
 
@@ -20,7 +20,7 @@ FastFrame::FastFrame(const gyro::HalfCycle& half, const gyro::Coupling& coupling
     Series b{};
     double factor = 1.0;
     double doubled = 1.0;
-    for (std::size_t n = 0; n < terms; ++n) {
+    for (std::size_t n = 0; n < frame_terms; ++n) {
         const double quarter = 0.5 * units::pi * static_cast<double>(n);  // each derivative turns by it
         g[n] = half.amplitude_rad * w *
                (half.sign * factor * std::sin(w * t_s + quarter) +
@@ -39,8 +39,8 @@ FastFrame::FastFrame(const gyro::HalfCycle& half, const gyro::Coupling& coupling
 
     // slope[k]: coefficient of d phi/d theta - 1. Each pass makes one more order right and uses up one Taylor term.
     std::array<ComplexSeries, harmonics + 1> slope{};
-    for (std::size_t pass = 0; pass < terms; ++pass) {
-        const std::size_t kept = terms - pass;
+    for (std::size_t pass = 0; pass < frame_terms; ++pass) {
+        const std::size_t kept = frame_terms - pass;
         std::array<ComplexSeries, harmonics + 1> next{};
         for (std::size_t k = 1; k <= harmonics; ++k) {
             ComplexSeries coupled{};  // coefficient of F (1 + slope)
@@ -58,7 +58,7 @@ FastFrame::FastFrame(const gyro::HalfCycle& half, const gyro::Coupling& coupling
             for (std::size_t n = 0; n < kept; ++n) {
                 Complex right{};
                 for (std::size_t j = 0; j <= n; ++j) right -= b[j] * coupled[n - j];
-                if (n + 1 < terms) right -= per_order * static_cast<double>(n + 1) * slope[k][n + 1];
+                if (n + 1 < frame_terms) right -= per_order * static_cast<double>(n + 1) * slope[k][n + 1];
                 for (std::size_t j = 1; j <= n; ++j) right -= g[j] * next[k][n - j];
                 next[k][n] = right / g[0];
             }

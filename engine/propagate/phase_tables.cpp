@@ -74,9 +74,10 @@ std::vector<Complex> coefficients_of(std::span<const double> values, std::size_t
 }
 
 /// Half turns of one end of half cycles of one sign, at points of the ranges.
-class Source {
+class PhaseSource {
    public:
-    Source(const gyro::Device& device, double sign, int end, const std::array<Range, 3>& ranges, double tolerance_rad)
+    PhaseSource(const gyro::Device& device, double sign, int end, const std::array<Range, 3>& ranges,
+                double tolerance_rad)
         : device_(device), sign_(sign), end_(end), ranges_(ranges), tolerance_rad_(tolerance_rad) {}
 
     /// Fourier coefficients [rad] at each point up to `harmonics`, [point][k], from `phases` equidistant phases each.
@@ -222,7 +223,8 @@ std::vector<Complex> evaluate(const PhaseTables::LanePart& part, const Point& po
     return sum;
 }
 
-PhaseTables::LanePart interpolate(const Source& source, const Terms& terms, std::size_t harmonics, std::size_t phases) {
+PhaseTables::LanePart interpolate(const PhaseSource& source, const Terms& terms, std::size_t harmonics,
+                                  std::size_t phases) {
     PhaseTables::LanePart part{terms, harmonics, source.at(chebyshev_nodes(terms), harmonics, phases)};
     // Complex numbers are pairs of doubles, one after the other.
     nodes_to_powers(terms, 2 * (harmonics + 1),
@@ -232,9 +234,9 @@ PhaseTables::LanePart interpolate(const Source& source, const Terms& terms, std:
 
 /// Largest error of a turn, two half turns, where the half turns were probed [rad].
 double error_rad(const PhaseTables::LanePart& part, const std::vector<Point>& points,
-                 const std::vector<Source::Probe>& probes) {
+                 const std::vector<PhaseSource::Probe>& probes) {
     double worst = 0.0;
-    for (const Source::Probe& probe : probes) {
+    for (const PhaseSource::Probe& probe : probes) {
         const auto c = evaluate(part, points[probe.point]);
         const double shift = c[0].imag();
         worst = std::max(worst, std::abs(shift + fourier(c, probe.angle_rad + shift).value - probe.value_rad));
@@ -243,7 +245,7 @@ double error_rad(const PhaseTables::LanePart& part, const std::vector<Point>& po
 }
 
 /// Harmonics of the middle of the ranges that matter at this tolerance, and some.
-std::size_t harmonics_needed(const Source& source, double tolerance_rad) {
+std::size_t harmonics_needed(const PhaseSource& source, double tolerance_rad) {
     constexpr std::size_t most = PhaseTables::most_harmonics;
     const auto c = source.at({Point{}}, most, 2 * most + 8, true);
     double rest = 0.0;
@@ -254,7 +256,7 @@ std::size_t harmonics_needed(const Source& source, double tolerance_rad) {
 
 /// Terms that one variable takes by itself, the others in the middle of their ranges: those of a Chebyshev series of
 /// more.
-std::size_t terms_needed(const Source& source, std::size_t variable, std::size_t harmonics, double tolerance_rad) {
+std::size_t terms_needed(const PhaseSource& source, std::size_t variable, std::size_t harmonics, double tolerance_rad) {
     for (const std::size_t n : {8U, 16U, 24U}) {
         Terms terms{1, 1, 1};
         terms[variable] = n;
@@ -304,7 +306,7 @@ void PhaseTables::make(std::size_t lane, const gyro::Device& device, const HalfC
     const double node_tolerance_rad = std::max(0.01 * tolerance_rad_, 1e-13);
     for (const double sign : {1.0, -1.0}) {
         for (int end = 0; end < 2; ++end) {
-            const Source source(device, sign, end, ranges, node_tolerance_rad);
+            const PhaseSource source(device, sign, end, ranges, node_tolerance_rad);
             std::size_t harmonics = harmonics_needed(source, tolerance_rad_);
             Terms terms{1, 1, 1};
             for (std::size_t v = 0; v < variables; ++v) {

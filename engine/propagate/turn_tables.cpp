@@ -18,9 +18,9 @@ constexpr std::size_t variables = TurnTables::variables;
 using Values = std::array<double, 3>;  // shift in fringes, Re z, Im z
 
 /// What exact_half_turns makes of points of the ranges.
-class Source {
+class KickSource {
    public:
-    Source(const gyro::Device& device, double sign, int end, const std::array<Range, variables>& ranges)
+    KickSource(const gyro::Device& device, double sign, int end, const std::array<Range, variables>& ranges)
         : device_(device), sign_(sign), end_(end), ranges_(ranges) {}
 
     std::vector<Values> at(const std::vector<Point>& points) const {
@@ -78,14 +78,14 @@ struct Polynomial {
     }
 };
 
-Polynomial interpolate(const Source& source, const Terms& terms) {
+Polynomial interpolate(const KickSource& source, const Terms& terms) {
     Polynomial polynomial{terms, source.at(chebyshev_nodes(terms))};
     nodes_to_powers(terms, 3, {polynomial.coefficients.data()->data(), 3 * polynomial.coefficients.size()});
     return polynomial;
 }
 
 /// Largest error of a turn, two half turns, at the points [rad].
-double error_rad(const Source& source, const Polynomial& polynomial, const std::vector<Point>& points) {
+double error_rad(const KickSource& source, const Polynomial& polynomial, const std::vector<Point>& points) {
     const std::vector<Values> exact = source.at(points);
     double worst = 0.0;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -98,7 +98,7 @@ double error_rad(const Source& source, const Polynomial& polynomial, const std::
 }
 
 /// Terms that one variable takes by itself, the others in the middle of their ranges.
-std::size_t terms_needed(const Source& source, std::size_t variable, double tolerance_rad) {
+std::size_t terms_needed(const KickSource& source, std::size_t variable, double tolerance_rad) {
     for (const std::size_t n : {2U, 3U, 4U, 5U, 6U, 8U, 10U, 12U, 16U, 20U}) {
         Terms terms{1, 1, 1};
         terms[variable] = n;
@@ -148,7 +148,7 @@ void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCy
     }
     for (const double sign : {1.0, -1.0}) {
         for (int end = 0; end < (symmetric_ ? 1 : 2); ++end) {
-            const Source source(device, sign, end, ranges);
+            const KickSource source(device, sign, end, ranges);
             Terms terms{1, 1, 1};
             for (std::size_t v = 0; v < variables; ++v) {
                 if (inverse_[v][lane] > 0.0) terms[v] = terms_needed(source, v, tolerance_rad_);

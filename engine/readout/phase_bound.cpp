@@ -8,7 +8,7 @@
 namespace ringlock::readout {
 namespace {
 
-constexpr double quarter_rad = 0.5 * std::numbers::pi;
+constexpr double quarter_fringe_rad = 0.5 * std::numbers::pi;
 
 double squared(double value) { return value * value; }
 
@@ -30,7 +30,7 @@ double phase_variance_bound_rad2(const Electronics& electronics, const BoundedTu
     for (const bool after : {false, true}) {
         const double hysteresis = electronics.comparator_hysteresis_relative;
         for (std::size_t pulse = 0; pulse < kept_pulses; ++pulse) {
-            const double nominal = first_distance_rad + static_cast<double>(pulse) * quarter_rad;
+            const double nominal = first_distance_rad + static_cast<double>(pulse) * quarter_fringe_rad;
             if (nominal <= hysteresis) continue;
             const double distance = after ? nominal + hysteresis : nominal - hysteresis;
             const double speed = std::sqrt(2.0 * distance * a);
@@ -59,7 +59,7 @@ double phase_bound_rad(const Electronics& electronics, const BoundedTurn& turn) 
     constexpr int points = 512;
     double sum = 0.0;
     for (int i = 0; i < points; ++i) {
-        sum += phase_variance_bound_rad2(electronics, turn, quarter_rad * (i + 0.5) / points);
+        sum += phase_variance_bound_rad2(electronics, turn, quarter_fringe_rad * (i + 0.5) / points);
     }
     return std::sqrt(sum / points);
 }

@@ -62,7 +62,6 @@ effects::Exposure exposure(const Scenario& scenario) {
 }
 
 std::vector<EffectBounds> bounds_of_effects(const Scenario& scenario) {
-    constexpr double sigmas = 6.0;  // draws further out are treated as impossible, as by the rules of check.cpp
     const effects::Exposure exposed = exposure(scenario);
     const double asymmetry = std::abs(configured_setup(scenario).dither_asymmetry_ratio) +
                              sigmas * scenario.ensemble.dither_asymmetry_sd_ratio;

@@ -9,6 +9,9 @@
 /// The effects that a scenario turns on. Whoever needs to know what they do asks them here, not by their names.
 namespace ringlock::scenario {
 
+/// Draws further out than this from their mean are treated as impossible by rules and bounds, in standard deviations.
+inline constexpr double sigmas = 6.0;
+
 /// An effect that does something, and its values; both belong to others, the values to the scenario.
 struct ActiveEffect {
     const effects::Effect* effect;

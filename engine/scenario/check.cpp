@@ -17,9 +17,6 @@ namespace {
 
 using Finding = std::optional<Complaint>;
 
-/// Draws further out than this from their mean are treated as impossible.
-constexpr double sigmas = 6.0;
-
 double peak_rate_deg_h(const Scenario& s) { return s.dither.peak_rate_deg_s * units::deg_h_per_deg_s; }
 
 double dither_rad_s(const Scenario& s) { return units::two_pi * s.dither.frequency_hz; }

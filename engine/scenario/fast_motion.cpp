@@ -13,8 +13,6 @@ namespace ringlock::scenario {
 
 namespace {
 
-constexpr double sigmas = 6.0;  // draws further out are treated as impossible, as by the other rules
-
 /// How far the rate of a half cycle may be from the input rate [deg/h].
 double varying_rate_deg_h(const Scenario& s) {
     double certain = 0.0;

@@ -18,7 +18,7 @@ namespace {
 
 using scenario::Scenario;
 
-double value_of(const std::vector<Estimate>& estimates, std::string_view name, double otherwise) {
+double estimated(const std::vector<Estimate>& estimates, std::string_view name, double otherwise) {
     for (const Estimate& estimate : estimates) {
         if (estimate.name == name && std::isfinite(estimate.value)) return estimate.value;
     }
@@ -36,16 +36,17 @@ void take_device_of_turns(const record::Record& record, const Closure& closure, 
     const Scenario standard;
     scenario.gyro.scale_factor_arcsec = record.declared.scale_factor_arcsec.value_or(standard.gyro.scale_factor_arcsec);
     scenario.gyro.lockin_threshold_deg_h =
-        value_of(closure.base, "lockin_threshold_deg_h", standard.gyro.lockin_threshold_deg_h);
-    scenario.dither.frequency_hz = value_of(closure.base, "dither_frequency_hz", standard.dither.frequency_hz);
-    scenario.dither.peak_rate_deg_s = value_of(closure.base, "dither_peak_rate_deg_s", standard.dither.peak_rate_deg_s);
-    scenario.input.rate_deg_h = value_of(closure.base, "bias_deg_h", 0.0) + closure.mean_input_rate_deg_h;
-    const double readout = value_of(closure.base, "readout_noise_rad", standard.readout.detector_noise_relative);
+        estimated(closure.base, "lockin_threshold_deg_h", standard.gyro.lockin_threshold_deg_h);
+    scenario.dither.frequency_hz = estimated(closure.base, "dither_frequency_hz", standard.dither.frequency_hz);
+    scenario.dither.peak_rate_deg_s =
+        estimated(closure.base, "dither_peak_rate_deg_s", standard.dither.peak_rate_deg_s);
+    scenario.input.rate_deg_h = estimated(closure.base, "bias_deg_h", 0.0) + closure.mean_input_rate_deg_h;
+    const double readout = estimated(closure.base, "readout_noise_rad", standard.readout.detector_noise_relative);
     scenario.readout.detector_noise_relative = std::clamp(readout, 0.0, 0.1);
-    const double injected = value_of(closure.base, "injected_noise_rad", 0.0);
+    const double injected = estimated(closure.base, "injected_noise_rad", 0.0);
     const bool noisy = injected > options.report.least_injected_rad;
     if (noisy) scenario.noise_injection.turn_phase_rms_rad = injected;
-    const double wander = value_of(closure.base, "amplitude_wander_rad", 0.0);
+    const double wander = estimated(closure.base, "amplitude_wander_rad", 0.0);
     if (wander > options.report.least_wander * readout) {
         const double w = units::two_pi * scenario.dither.frequency_hz;
         const double amplitude_rad = units::two_pi * scenario.dither.peak_rate_deg_s * units::deg_h_per_deg_s /
@@ -66,9 +67,9 @@ void take_device_of_turns(const record::Record& record, const Closure& closure, 
 void take_device_of_samples(const record::Record& record, const Closure& closure, Scenario& scenario) {
     const record::Samples& samples = *record.samples;
     scenario.gyro.lockin_threshold_deg_h = 0.0;
-    scenario.input.rate_deg_h = value_of(closure.base, "mean_rate_deg_h", 0.0);
+    scenario.input.rate_deg_h = estimated(closure.base, "mean_rate_deg_h", 0.0);
     *value_in(scenario, OnSamples::white, effects::Role::deviation) =
-        std::max(0.0, value_of(closure.base, "white_rate_deg_rt_h", 0.0));
+        std::max(0.0, estimated(closure.base, "white_rate_deg_rt_h", 0.0));
     const double scale_factor_arcsec = record.declared.scale_factor_arcsec.value_or(scenario.gyro.scale_factor_arcsec);
     if (samples.kind == record::SampleKind::quarter_count) {
         *value_in(scenario, OnSamples::resolution, effects::Role::sampled) = 0.25 * scale_factor_arcsec;
@@ -79,11 +80,11 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
         const OnSamples as = on_samples(*step.effect);
         if (as != OnSamples::resolution && as != OnSamples::transport) continue;
         const std::string_view parameter = parameter_of(*step.effect, effects::Role::sampled).name;
-        if (as == OnSamples::resolution) step_arcsec = value_of(step.parameters, parameter, 0.0);
-        if (as == OnSamples::transport) readings_hz = value_of(step.parameters, parameter, readings_hz);
+        if (as == OnSamples::resolution) step_arcsec = estimated(step.parameters, parameter, 0.0);
+        if (as == OnSamples::transport) readings_hz = estimated(step.parameters, parameter, readings_hz);
     }
     // What is fitted as white noise of the angle has that of the steps in it.
-    const double white = value_of(closure.base, "white_angle_arcsec", 0.0);
+    const double white = estimated(closure.base, "white_angle_arcsec", 0.0);
     const double rounding = closure.rounding_in_noise ? step_arcsec * step_arcsec / 12.0 : 0.0;
     const double angle_arcsec = std::sqrt(std::max(0.0, white * white - rounding));
     constexpr double noise_rad = options.report.phase_noise_rad;

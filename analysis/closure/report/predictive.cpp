@@ -35,7 +35,7 @@ namespace {
 constexpr std::uint64_t first_seed = 0x7072656469637400;
 constexpr std::size_t fold_points = options.report.phase_points;
 constexpr Eigen::Index harmonics = options.report.kick_harmonics;
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
 
 /// One statistic of one record.
 struct Curve {
@@ -233,7 +233,7 @@ class TurnSight {
                             size(first + 2 * h + 1) * std::sin(static_cast<double>(h + 1) * phase);
                 }
                 curve.x.push_back(phase);
-                curve.y.push_back(seen[direction][point] < options.report.fewest_at_phase ? nothing : kick);
+                curve.y.push_back(seen[direction][point] < options.report.fewest_at_phase ? undefined : kick);
             }
         }
     }
@@ -361,9 +361,9 @@ void rank(const std::vector<std::vector<double>>& curves, PredictiveStatistic& s
     const std::size_t records = curves.size();
     const std::size_t points = curves.front().size();
     std::vector<double> largest(records, 0.0);
-    statistic.p_value.assign(points, nothing);
-    statistic.lowest.assign(points, nothing);
-    statistic.highest.assign(points, nothing);
+    statistic.p_value.assign(points, undefined);
+    statistic.lowest.assign(points, undefined);
+    statistic.highest.assign(points, undefined);
     for (std::size_t j = 0; j < points; ++j) {
         std::vector<double> value;
         for (const auto& curve : curves) value.push_back(statistic.positive ? std::log(curve[j]) : curve[j]);
@@ -439,7 +439,7 @@ Closure drawn(const Closure& closure, std::uint64_t seed) {
 double swinging_deg_s(const record::Record& record, Closure closure, const TurnSight& sight, int simulations) {
     const auto peak = std::find_if(closure.base.begin(), closure.base.end(),
                                    [](const Estimate& e) { return e.name == "dither_peak_rate_deg_s"; });
-    if (peak == closure.base.end()) return nothing;
+    if (peak == closure.base.end()) return undefined;
     const double measured = sight.peak_rate_deg_s(record);
     for (int pass = 0; pass < 2; ++pass) {
         std::vector<double> swung(static_cast<std::size_t>(simulations));

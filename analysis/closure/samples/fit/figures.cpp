@@ -43,8 +43,8 @@ struct Unaliased {
 Unaliased unaliased(double hz, const SampleFit& fit, const record::Declared& declared) {
     if (!declared.dither_frequency_hz) return {hz};
     const double from_hz = fit.model().noise.from_hz;
-    constexpr auto harmonics = static_cast<int>(options.samples.screen.harmonic_shares.size());
-    for (int h = 1; h <= harmonics; ++h) {
+    constexpr auto harmonic_count = static_cast<int>(options.samples.screen.harmonic_shares.size());
+    for (int h = 1; h <= harmonic_count; ++h) {
         const double of_dither = h * *declared.dither_frequency_hz;
         const Alias shown = alias(of_dither, from_hz > 0.0 ? from_hz : fit.series().rate_hz);
         if (std::abs(shown.hz - hz) >= options.samples.declared_dither_error * of_dither) continue;

@@ -28,8 +28,8 @@ struct Free {
     bool of_clock = false;   ///< when that source takes its samples
 };
 
-constexpr std::size_t whites = 2;  // the first of the knobs
-constexpr double nothing = 1e-4;   // of white noises, beside the other
+constexpr std::size_t whites = 2;    // the first of the knobs
+constexpr double negligible = 1e-4;  // of white noises, beside the other
 
 std::vector<Free> knobs(SampleModel& model) {
     std::vector<Free> all{{&model.noise.angle_arcsec, true}, {&model.noise.rate_arcsec_rt_s, true}};
@@ -325,7 +325,7 @@ void SampleFit::share_whites(SampleNoise& noise, double share) const {
 bool SampleFit::gone(const SampleNoise& noise) const {
     const double root_s = std::sqrt(series_->interval_s);
     const double scale = std::hypot(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s);
-    return std::min(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s) < nothing * scale;
+    return std::min(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s) < negligible * scale;
 }
 
 /// White noises that stand at zero, made small: from nothing they could not grow, and it would tell nothing of them.
@@ -333,8 +333,8 @@ void SampleFit::raise_whites(SampleNoise& noise) const {
     constexpr double small = 1e-2;
     const double root_s = std::sqrt(series_->interval_s);
     const double scale = std::hypot(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s);
-    if (noise.angle_arcsec < nothing * scale) noise.angle_arcsec = small * scale;
-    if (noise.rate_arcsec_rt_s * root_s < nothing * scale) noise.rate_arcsec_rt_s = small * scale / root_s;
+    if (noise.angle_arcsec < negligible * scale) noise.angle_arcsec = small * scale;
+    if (noise.rate_arcsec_rt_s * root_s < negligible * scale) noise.rate_arcsec_rt_s = small * scale / root_s;
 }
 
 /// The knobs for the places of resonances that one point has and the other has not.

@@ -51,12 +51,12 @@ namespace {
 
 /// Where, beside most of it, something is left of a motion that the witness does not tell: its own noise hides the
 /// edges, and what is a mean over intervals has nothing at half the rate of the record.
-enum class Untold { about_the_motion, at_half_the_rate };
+enum class ResonanceStart { about_the_motion, at_half_the_rate };
 
 /// The noise with two resonances for what is left of a motion, the likeliest of many: how wide they are no mean over
 /// frequencies tells, and the likelihood has several tops.
 SampleNoise begun_with(const SampleFit& now, const std::vector<double>& told, double rms_arcsec, double hz,
-                       Untold where) {
+                       ResonanceStart where) {
     const SampleSeries& series = now.series();
     std::vector<double> rest = now.as_taken(told);
     for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = now.rest()[i] - rest[i];
@@ -75,7 +75,7 @@ SampleNoise begun_with(const SampleFit& now, const std::vector<double>& told, do
                     noise.rate_arcsec_rt_s = of_rate * noise.angle_arcsec / std::sqrt(series.interval_s);
                     const double width_hz = std::max(wide * hz, 0.01);
                     noise.resonances.push_back({rms_arcsec, hz, width_hz});
-                    if (where == Untold::at_half_the_rate) {
+                    if (where == ResonanceStart::at_half_the_rate) {
                         noise.resonances.push_back({share * rms_arcsec, 0.45 * series.rate_hz, wider * series.rate_hz});
                     } else {
                         noise.resonances.push_back({share * rms_arcsec, hz, 20.0 * wider * width_hz});
@@ -103,14 +103,14 @@ SampleModel moved_as(const SampleFit& now, const effects::Effect& effect, std::s
     const double centre_hz = std::max(motion.centre_hz, 0.01);
     model.resonances.insert(model.resonances.end(), 2, {&effect, step});
     std::optional<SampleFit> first;
-    for (const Untold where : {Untold::about_the_motion, Untold::at_half_the_rate}) {
+    for (const ResonanceStart where : {ResonanceStart::about_the_motion, ResonanceStart::at_half_the_rate}) {
         SampleModel trial = model;
         trial.noise = begun_with(now, motion.increments, untold, centre_hz, where);
         SampleFit fit(now.series(), std::move(trial), now.rows());
         // What is narrow and elsewhere is a line, and none of the motion.
-        const bool line =
-            where == Untold::at_half_the_rate && fit.model().noise.resonances.back().width_hz <
-                                                     options.samples.fit.narrowest_at_half_rate * now.series().rate_hz;
+        const bool line = where == ResonanceStart::at_half_the_rate &&
+                          fit.model().noise.resonances.back().width_hz <
+                              options.samples.fit.narrowest_at_half_rate * now.series().rate_hz;
         if (!first || (!line && fit.log_likelihood() > first->log_likelihood())) first.emplace(std::move(fit));
     }
     // Once more with what is left as the noise.

@@ -75,8 +75,8 @@ struct Innovations {
 };
 
 // Of a knob's logarithm: nothing is so small or so large.
-constexpr double smallest = -25.0;
-constexpr double largest = 12.0;
+constexpr double smallest_log = -25.0;
+constexpr double largest_log = 12.0;
 
 /// Minus the log-likelihood by the logarithms of the knobs, rising beyond their bounds. Says where it cannot be had:
 /// Ceres ends the program where a value has no finite gradient.
@@ -277,7 +277,7 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
         TurnParameters changed = start;
         Eigen::Index k = 0;
         for (const Knob& knob : knobs(changed, of_effects)) {
-            *knob.value = std::exp(std::clamp(at(k++), smallest, largest));
+            *knob.value = std::exp(std::clamp(at(k++), smallest_log, largest_log));
         }
         return changed;
     };
@@ -308,7 +308,7 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
         std::vector<double> found = objectives(frame, changed, rest);
         for (std::size_t k = 0; k < points.size(); ++k) {
             const Eigen::VectorXd logs = logarithms(points[k]);
-            found[k] += (logs.array() - logs.array().max(smallest).min(largest)).square().sum();
+            found[k] += (logs.array() - logs.array().max(smallest_log).min(largest_log)).square().sum();
         }
         return found;
     };

@@ -66,12 +66,12 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
         firsts.push_back(&candidate);
         if (is_random) random.push_back(&candidate);
     }
-    struct Pair {
+    struct RatePair {
         const Candidate* first;
         const Candidate* second;
         std::shared_ptr<Fitted> both = {};
     };
-    std::vector<Pair> of_random;
+    std::vector<RatePair> of_random;
     for (std::size_t a = 0; a < random.size(); ++a) {
         for (std::size_t b = a + 1; b < random.size(); ++b) of_random.push_back({random[a], random[b]});
     }
@@ -82,7 +82,7 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
                                          candidates.front().merit - firsts[k]->merit);
             return;
         }
-        Pair& pair = of_random[k - firsts.size()];
+        RatePair& pair = of_random[k - firsts.size()];
         TurnParameters start = pair.first->fitted->parameters();
         start.effects.push_back(*pair.second->fitted->parameters().find(pair.second->effect->name()));
         pair.both = problem.fit_or_none(start);
@@ -91,7 +91,7 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
         if (seconds[k].seen_in_other_columns) continue;
         for (const Candidate& second : seconds[k].candidates) add(*firsts[k], second.fitted, second);
     }
-    for (const Pair& pair : of_random) {
+    for (const RatePair& pair : of_random) {
         if (pair.both) add(*pair.first, pair.both, *pair.second);
     }
     return sets;
@@ -109,10 +109,10 @@ std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<
         const auto likeliest = std::find_if(sets.begin(), sets.end(), [&](const CandidateSet& set) {
             // An effect that contains another one stands in for much that a third effect would explain.
             const EffectSet all = set.effects();
-            const bool smallest = std::none_of(all.effects.begin(), all.effects.end(), [&](const auto* effect) {
+            const bool of_smallest = std::none_of(all.effects.begin(), all.effects.end(), [&](const auto* effect) {
                 return contains_one_of(*effect, candidates);
             });
-            return set.others.size() == 1 && set.random_rates() == random && smallest;
+            return set.others.size() == 1 && set.random_rates() == random && of_smallest;
         });
         if (likeliest == sets.end()) continue;
         // The residual of a pair with one random rate is searched after it has been added, except for effects that a

@@ -25,12 +25,12 @@ namespace ringlock::closure {
 
 namespace {
 
-bool contains(const std::vector<const effects::Effect*>& effects, const effects::Effect* effect) {
+bool is_among(const std::vector<const effects::Effect*>& effects, const effects::Effect* effect) {
     return std::find(effects.begin(), effects.end(), effect) != effects.end();
 }
 
 void add_once(std::vector<const effects::Effect*>& effects, const effects::Effect* effect) {
-    if (!contains(effects, effect)) effects.push_back(effect);
+    if (!is_among(effects, effect)) effects.push_back(effect);
 }
 
 /// Effects with times and phases by a clock that begins with the first turn, as the fit's does (TurnFit::estimates has

@@ -16,8 +16,6 @@ namespace ringlock::closure {
 
 namespace {
 
-constexpr double quarter_rad = 0.5 * units::pi;
-
 double median(std::vector<double> values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
@@ -140,8 +138,8 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
     CountedQuarters quarters{.off = std::vector<double>(n), .sd = std::vector<double>(n), .direction = turns.direction};
     for (std::size_t i = 0; i < n; ++i) {
         const double of_noise = joined.readout.empty() ? 1.0 : std::sqrt(joined.readout[i]);
-        quarters.sd[i] = joined.readout_sd_rad * of_noise / quarter_rad;
-        const double q = angle[i] / quarter_rad - (static_cast<double>(turns.quarter_count[i] % 4) + 0.5);
+        quarters.sd[i] = joined.readout_sd_rad * of_noise / units::quarter_fringe_rad;
+        const double q = angle[i] / units::quarter_fringe_rad - (static_cast<double>(turns.quarter_count[i] % 4) + 0.5);
         quarters.off[i] = q - 4.0 * std::round(0.25 * q);
     }
     joined.miscounts = lost_quarters(quarters);
@@ -152,7 +150,7 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
         const std::int64_t now = joined.miscounts[i];
         if (i > 0 && now != joined.miscounts[i - 1]) joined.miscounted.push_back(i);
         const std::int64_t count = turns.quarter_count[i] - whole_fringes + (count_again ? now : first);
-        const double middle = (static_cast<double>(count) + 0.5) * quarter_rad;
+        const double middle = (static_cast<double>(count) + 0.5) * units::quarter_fringe_rad;
         joined.phase_rad[i] = angle[i] + units::two_pi * std::round((middle - angle[i]) / units::two_pi);
     }
     for (std::int64_t& lost : joined.miscounts) lost -= first;

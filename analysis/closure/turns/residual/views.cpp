@@ -34,7 +34,7 @@ std::vector<double> integral(const TurnFit& fit, const std::vector<double>& rate
     return sum;
 }
 
-double largest(const std::vector<double>& values) {
+double largest_of(const std::vector<double>& values) {
     double most = 0.0;
     for (const double value : values) most = std::max(most, std::abs(value));
     return most;
@@ -203,7 +203,7 @@ void test_rates(const TurnFit& fit, std::vector<TurnView>& views) {
                          cost,
                          [columns = std::make_shared<const Columns>(std::move(columns))] { return *columns; }});
     };
-    if (!series.temperature_change_k.empty() && largest(series.temperature_change_k) > 0.0) {
+    if (!series.temperature_change_k.empty() && largest_of(series.temperature_change_k) > 0.0) {
         const auto& t = series.temperature_change_k;
         std::vector<double> square(n);
         for (std::size_t i = 0; i < n; ++i) square[i] = t[i] * t[i];
@@ -236,7 +236,7 @@ void test_rates(const TurnFit& fit, std::vector<TurnView>& views) {
         if (i > 1) mean += memory * ((*at_turn)[i - 2] - mean);
     }
     const auto angles = [&fit](std::vector<double> change) {
-        const double scale = std::max(largest(change), 1e-12);
+        const double scale = std::max(largest_of(change), 1e-12);
         std::vector<double> square(change.size());
         for (std::size_t i = 0; i < change.size(); ++i) {
             change[i] /= scale;

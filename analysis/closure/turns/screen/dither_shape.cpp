@@ -88,11 +88,9 @@ BlockMean block_mean(const std::vector<double>& series, const std::vector<std::u
     return mean;
 }
 
-constexpr double quarter_rad = 0.5 * units::pi;
-
 /// How far the pulses next to a turn are, on both sides of it, in quarters of a fringe.
 double quarters_to_pulse(int direction, double phase_rad) {
-    const double quarters = phase_rad / quarter_rad;
+    const double quarters = phase_rad / units::quarter_fringe_rad;
     return direction > 0 ? std::floor(quarters) + 1.0 - quarters : quarters - std::floor(quarters);
 }
 
@@ -111,7 +109,8 @@ class PhaseFunctions {
         root_.reserve(series.size());
         for (std::size_t i = 0; i < series.size(); ++i) {
             const double phase_rad = fit.model().phase_rad()[i];
-            const auto cell = static_cast<Eigen::Index>(std::fmod(std::floor(phase_rad / quarter_rad), 4.0) + 4.0) % 4;
+            const auto cell =
+                static_cast<Eigen::Index>(std::fmod(std::floor(phase_rad / units::quarter_fringe_rad), 4.0) + 4.0) % 4;
             cell_.push_back((series.direction[i] > 0 ? 0 : cells * powers) + cell * powers);
             root_.push_back(std::sqrt(quarters_to_pulse(series.direction[i], phase_rad)));
         }
@@ -195,9 +194,9 @@ struct PulseAngles {
     double first, second;
 
     PulseAngles(int direction, double phase_rad, double amplitude_rad) {
-        const double first_rad = quarter_rad * quarters_to_pulse(direction, phase_rad);
+        const double first_rad = units::quarter_fringe_rad * quarters_to_pulse(direction, phase_rad);
         first = std::sqrt(2.0 * first_rad / amplitude_rad);
-        second = std::sqrt(2.0 * (first_rad + quarter_rad) / amplitude_rad);
+        second = std::sqrt(2.0 * (first_rad + units::quarter_fringe_rad) / amplitude_rad);
     }
 
     /// The acceleration that they show of a sine, over that where it turns: they are 2 asin(sqrt(d/(2 A))) of it away,

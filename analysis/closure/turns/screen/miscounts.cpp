@@ -12,13 +12,12 @@ namespace ringlock::closure {
 namespace {
 
 CountedQuarters counted_quarters(const record::Turns& turns, const JoinedPhase& joined) {
-    constexpr double quarter_rad = 0.5 * units::pi;
     CountedQuarters counted{.off = {}, .sd = {}, .direction = turns.direction};
     for (std::size_t i = 0; i < turns.size(); ++i) {
         const auto middle = static_cast<double>(turns.quarter_count[i] % 4) + 0.5;
         const double of_noise = joined.readout.empty() ? 1.0 : std::sqrt(joined.readout[i]);
-        counted.off.push_back(joined.phase_rad[i] / quarter_rad - middle);
-        counted.sd.push_back(joined.readout_sd_rad * of_noise / quarter_rad);
+        counted.off.push_back(joined.phase_rad[i] / units::quarter_fringe_rad - middle);
+        counted.sd.push_back(joined.readout_sd_rad * of_noise / units::quarter_fringe_rad);
     }
     return counted;
 }
