@@ -17,6 +17,7 @@ void add_validate(CLI::App& root);
 void add_import(CLI::App& root);
 void add_closure(CLI::App& root);
 void add_record(CLI::App& root);
+void add_devices(CLI::App& root);
 /// Commands of the contract that are not built yet: they say so.
 void add_planned(CLI::App& root);
 

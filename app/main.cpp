@@ -63,6 +63,7 @@ int main(int argc, char** argv) {
     app::add_import(root);
     app::add_closure(root);
     app::add_record(root);
+    app::add_devices(root);
     app::add_planned(root);
     try {
         const ringlock::InterruptGuard guard;

@@ -19,7 +19,7 @@ void add_planned(CLI::App& root) {
         command->callback([text] {
             throw InputError(
                 fmt::format("the command \"{}\" is not there yet; there are run, analyze, allan, validate, import, "
-                            "record and closure",
+                            "record, devices and closure",
                             text));
         });
     }

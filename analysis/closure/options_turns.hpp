@@ -30,9 +30,9 @@ struct TurnOptions {
         /// Largest rotation, relative to the dither's peak rate, at which records are closed [1]. The half cycles then
         /// have two thirds of their length and more; nearer to the peak rate the phase hardly reverses.
         double most_rotation = 0.5;
-        /// Least mean swing of the phase over a half cycle [rad]. With less the phase hardly runs free between two
-        /// turns, and the expansion of the kicks in harmonics does not hold.
-        double least_swing_rad = 100.0;
+        /// Least mean swing of the phase over a half cycle [rad]: somewhat less than the 62.8 rad of ten fringes, the
+        /// fewest that the turn map is made for (docs/turn-map.md).
+        double least_swing_rad = 60.0;
 
         /// Frequencies this near the dither's belong to its amplitude: relative to its frequency [1], and at least so
         /// many periods in the record, below which they are drift.

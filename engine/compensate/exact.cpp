@@ -174,7 +174,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                                        hn::Neg(first.z_re * (last_sine - sine)));  // Im z (e_0 - e_1)
                 const V gain_rad = sm::fma(d, bend, hn::Set(d, 2.0), first.shift * (two_pi + two_pi));
                 const V amplitude = half * (sm::fma(d, moved, two_pi, hn::Neg(plain_rotation)) - gain_rad);
-                const pm::HalfMapOf<V> map = pm::evaluate(d, part, lane, scaled(amplitude), zero, zero);
+                const pm::HalfMapOf<V> map = pm::evaluate(d, part, lane, scaled(amplitude), zero, zero, zero);
                 const sm::Complex<V> z{map.z_re, map.z_im};
                 const sm::Complex<V> unit{one, zero};
                 const sm::Complex<V> e0{last_cosine, hn::Neg(last_sine)};
@@ -263,7 +263,7 @@ void Exact::make_tables(std::size_t lane) {
     const double rate = state_.rate_rad_s[lane];
     const double b = state_.b_rad_s[lane];
     const double spread = coupling_share_ * b;
-    tables_.make(lane, device, {{a - margin, a + margin}, {rate - width, rate + width}, {b - spread, b + spread}});
+    tables_.make(lane, device, {{a - margin, a + margin}, {rate - width, rate + width}, {b - spread, b + spread}, {}});
 }
 
 void Exact::see_minima(const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row,
@@ -314,9 +314,9 @@ void Exact::set_coupling(std::size_t lane, double b_rad_s, double phase_rad) {
 void Exact::take_parts() {
     for (const std::size_t which : {0U, 1U}) {
         const propagate::TurnTables::Part& whole = tables_.part(which == 0 ? -1.0 : 1.0, 0);
-        const auto [amplitudes, rates, couplings] = whole.terms;
+        const auto [amplitudes, rates, couplings, changes] = whole.terms;
         propagate::TurnTables::Part& part = parts_[which];
-        part.terms = {amplitudes, 1, 1};
+        part.terms = {amplitudes, 1, 1, 1};
         part.coefficients.assign(3 * amplitudes, simd::Lanes{});
         for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
             const auto scaled = [&](double value, std::size_t variable) {

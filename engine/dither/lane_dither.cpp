@@ -1,5 +1,6 @@
 #include "engine/dither/lane_dither.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #undef HWY_TARGET_INCLUDE
@@ -128,10 +129,65 @@ LaneDither::LaneDither(std::span<const gyro::Device> devices, double noise_rms_r
     state_.coupling_phase_fringes = constants_.coupling_phase_fringes;
 }
 
+LaneDither::LaneDither(std::span<const gyro::Device> devices, const gyro::DriveNoise& noise, double noise_rms_rad,
+                       const random::LaneIdentities& who, const Wander& wander)
+    : LaneDither(devices, 0.0, who, wander) {
+    if (noise_rms_rad <= 0.0) return;
+    resonator_ = std::make_unique<DriveNoiseLanes>(noise, devices, noise_rms_rad, who);
+    // A force that is constant over half cycles makes the amplitude grow evenly; one of many levels in each does not.
+    amplitudes_change_ = noise.form != gyro::NoiseForm::white;
+    before_rad_ = resonator_->before_rad();
+    deviation_rad_.assign(1, resonator_->deviation_rad());
+    late_s_.assign(1, resonator_->late_s());
+    for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+        state_.noise_rad[lane] = -deviation_rad_[0][lane];
+        state_.amplitude_rad[lane] += 0.5 * (before_rad_[lane] + deviation_rad_[0][lane]);
+    }
+}
+
+void LaneDither::take_drive_noise(std::size_t turns) {
+    // Rows: the turns of the piece and the one after it.
+    deviation_rad_.erase(deviation_rad_.begin(), deviation_rad_.end() - 1);
+    late_s_.erase(late_s_.begin(), late_s_.end() - 1);
+    std::vector<simd::Lanes> deviation_rad;
+    std::vector<simd::Lanes> late_s;
+    resonator_->next(turns, deviation_rad, late_s);
+    deviation_rad_.insert(deviation_rad_.end(), deviation_rad.begin(), deviation_rad.end());
+    late_s_.insert(late_s_.end(), late_s.begin(), late_s.end());
+    for (std::size_t i = 0; i < turns; ++i) {
+        const double sign = (turn_ + static_cast<std::int64_t>(i) + 1) % 2 == 0 ? -1.0 : 1.0;
+        for (std::size_t lane = 0; lane < simd::lanes; ++lane) deviates_[i][lane] = sign * deviation_rad_[i + 1][lane];
+    }
+}
+
+void LaneDither::finish_drive(gyro::LaneDrive& drive) {
+    // What the input turns while a turn is late, at the rate of the half cycle that ends. Half cycles keep their
+    // length; their swings take it up.
+    for (std::size_t i = 0; i <= drive.turns; ++i) {
+        for (std::size_t lane = 0; lane < lanes_; ++lane) {
+            const double turned_fringes = drive.rate_rad_s[i][lane] * late_s_[i][lane] / units::two_pi;
+            // Half cycle i has the sign of the turn before turn i.
+            const double half_swing_rad = -0.5 * drive.direction(i) * units::two_pi;
+            drive.amplitude_rad[i][lane] += half_swing_rad * (turned_fringes - turned_before_fringes_[lane]);
+            if (i == drive.turns) continue;
+            drive.plain_fringes[i][lane] += turned_fringes;
+            turned_before_fringes_[lane] = turned_fringes;
+        }
+    }
+    if (!amplitudes_change_) return;
+    for (std::size_t i = 0; i <= drive.turns; ++i) {
+        const simd::Lanes& from = i == 0 ? before_rad_ : deviation_rad_[i - 1];
+        for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+            drive.amplitude_change_rad[i][lane] = deviation_rad_[i][lane] - from[lane];
+        }
+    }
+}
+
 void LaneDither::next(std::size_t turns, std::span<const simd::Lanes> extra_angle_arcsec,
                       std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive,
                       std::span<const simd::Lanes> coupling_phase_rad) {
     drive.phases_vary = !coupling_phase_rad.empty();
+    drive.amplitudes_change = amplitudes_change_;
     drive.resize(turns);
     drive.first_turn = turn_;
     const bool vary = !extra_angle_arcsec.empty() || !threshold_factor.empty();
@@ -144,15 +200,23 @@ void LaneDither::next(std::size_t turns, std::span<const simd::Lanes> extra_angl
         random::normals(who_, random::Purpose::noise_injection, static_cast<std::uint64_t>(turn_) + 1, turns, lanes_,
                         deviates_.front().data());
     }
+    if (resonator_ && turns > 0) {
+        deviates_.resize(turns);
+        take_drive_noise(turns);
+    }
     if (wander_.active() && turns > 0) {
         deviates_.resize(turns);
         add_wander();
     }
-    const bool moved = noise_rms_rad_ > 0.0 || wander_.active();
+    const bool moved = noise_rms_rad_ > 0.0 || resonator_ || wander_.active();
     HWY_DYNAMIC_DISPATCH(fill)
-    (constants_, wander_.active() ? 1.0 : noise_rms_rad_, moved ? deviates_.data() : nullptr, extra_angle_arcsec,
-     threshold_factor, coupling_phase_rad, lanes_, state_, drive);
+    (constants_, wander_.active() || resonator_ ? 1.0 : noise_rms_rad_, moved ? deviates_.data() : nullptr,
+     extra_angle_arcsec, threshold_factor, coupling_phase_rad, lanes_, state_, drive);
     drive.constants_filled = !vary;
+    if (resonator_ && turns > 0) {
+        finish_drive(drive);
+        before_rad_ = deviation_rad_[turns - 1];
+    }
     turn_ += static_cast<std::int64_t>(turns);
 }
 
@@ -174,7 +238,9 @@ void LaneDither::add_wander() {
             walk_[lane] += wander_.relative_rt_s * std::sqrt(duration_s[maximum ? 0 : 1][lane]) * steps_[i][lane];
             const double farther =
                 constants_.amplitude_rad[lane] * (wander_.drift_relative_per_s * time_s + walk_[lane]);
-            const double noise = noise_rms_rad_ > 0.0 ? noise_rms_rad_ * deviates_[i][lane] : 0.0;
+            const double noise = resonator_             ? deviates_[i][lane]
+                                 : noise_rms_rad_ > 0.0 ? noise_rms_rad_ * deviates_[i][lane]
+                                                        : 0.0;
             deviates_[i][lane] = noise + (maximum ? farther : -farther);
         }
     }

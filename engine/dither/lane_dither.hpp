@@ -1,9 +1,11 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "engine/dither/drive_noise.hpp"
 #include "engine/gyro/device.hpp"
 #include "engine/gyro/lane_drive.hpp"
 #include "engine/random/normal_lanes.hpp"
@@ -21,14 +23,18 @@ struct Wander {
 /// Drive of a block of gyros, piece after piece: the dither, optionally with random noise on its angle at each turn,
 /// and the rotation of the case.
 ///
-/// Noise is on the angle, not on the rate: the case swings between noisy turns and stays where it is. Before turn 0 the
-/// drive is free of noise. The amplitude can drift and wander: turns are then farther out, or less far. Rates that vary
-/// in time are constant over each half cycle: at their mean.
+/// Noise is on the angle, not on the rate: the case swings between noisy turns and stays where it is. It is independent
+/// from turn to turn, and the drive is free of it before turn 0; or it is that of a resonator whose force is noisy
+/// (DriveNoiseLanes), which has memory and was there before. The amplitude can drift and wander: turns are then farther
+/// out, or less far. Rates that vary in time are constant over each half cycle: at their mean.
 class LaneDither {
    public:
     /// `devices`: of each gyro, at most simd::lanes. `noise_rms_rad`: of each turn's angle in optical phase; 0: none.
     LaneDither(std::span<const gyro::Device> devices, double noise_rms_rad, const random::LaneIdentities& who,
                const Wander& wander = {});
+    /// With the noise of a drive, of that stationary rms of the amplitude at the turns.
+    LaneDither(std::span<const gyro::Device> devices, const gyro::DriveNoise& noise, double noise_rms_rad,
+               const random::LaneIdentities& who, const Wander& wander = {});
 
     /// Fills in the next `turns` turns. `extra_angle_arcsec`: what varying rates add over the half cycle that begins at
     /// each of them, [turn][gyro], or none; the half cycle's mean rate grows by it. `threshold_factor`: b of these half
@@ -61,6 +67,10 @@ class LaneDither {
     };
 
    private:
+    /// Turns' offsets by a noisy drive in place of deviates.
+    void take_drive_noise(std::size_t turns);
+    /// What the kernel does not know of it: changes of the amplitude and turns that are late.
+    void finish_drive(gyro::LaneDrive& drive);
     /// Makes noise, one deviate a turn, what the turns are off by: noise and change of the amplitude [rad].
     void add_wander();
 
@@ -74,6 +84,13 @@ class LaneDither {
     Wander wander_;
     simd::Lanes walk_{};  // W at the last turn
     std::vector<simd::Lanes> steps_;
+    std::unique_ptr<DriveNoiseLanes> resonator_;
+    bool amplitudes_change_ = false;
+    std::vector<simd::Lanes>
+        deviation_rad_;  // of the amplitude at the turns from the piece's first on, and the one after
+    std::vector<simd::Lanes> late_s_;
+    simd::Lanes before_rad_{};                 // at the turn before the piece
+    simd::Lanes turned_before_fringes_{};      // by the input while that turn was late
     const gyro::LaneDrive* filled_ = nullptr;  // has this dither's rates and couplings, if they are constant
 };
 

@@ -24,6 +24,7 @@
 #include "engine/readout/fraction_recovery.hpp"
 #include "engine/readout/lane_readout.hpp"
 #include "engine/readout/missed_counts.hpp"
+#include "engine/scenario/injected_noise.hpp"
 
 namespace ringlock::ensemble {
 
@@ -37,8 +38,8 @@ struct Listener {
     std::vector<simd::LaneCounts> counts;
 };
 
-double injected_rms_rad(const scenario::Scenario& scenario, TrajectoryKind kind) {
-    return kind == TrajectoryKind::noise_injected ? scenario.noise_injection.turn_phase_rms_rad : 0.0;
+scenario::InjectedNoise noise_of(const scenario::Scenario& scenario, TrajectoryKind kind) {
+    return kind == TrajectoryKind::noise_injected ? scenario::injected_noise(scenario) : scenario::InjectedNoise{};
 }
 
 dither::Wander wander_of(const scenario::Scenario& scenario) {
@@ -56,16 +57,14 @@ double wander_margin_rad(const scenario::Scenario& scenario, const std::vector<g
 /// How far noise, drift and wander take the amplitude of a half cycle from the device's.
 double amplitude_margin_rad(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices,
                             TrajectoryKind kind) {
-    return dither::LaneDither::amplitude_margin_rad(injected_rms_rad(scenario, kind)) +
-           wander_margin_rad(scenario, devices);
+    return noise_of(scenario, kind).margin_rad + wander_margin_rad(scenario, devices);
 }
 
 /// Their spread about it.
 double amplitude_rms_rad(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices,
                          TrajectoryKind kind) {
     constexpr double sigmas = 6.0;  // that the margin of the wander stands for
-    return std::hypot(dither::LaneDither::amplitude_rms_rad(injected_rms_rad(scenario, kind)),
-                      wander_margin_rad(scenario, devices) / sigmas);
+    return std::hypot(noise_of(scenario, kind).amplitude_rms_rad, wander_margin_rad(scenario, devices) / sigmas);
 }
 
 std::vector<gyro::Device> make_devices(const std::vector<gyro::Setup>& setups, TrajectoryKind kind) {
@@ -91,14 +90,17 @@ std::unique_ptr<propagate::LanePropagator> make_propagator(const scenario::Scena
         return std::make_unique<propagate::DirectPropagator>(devices, scenario.propagation.direct_tolerance_rad);
     }
     // Without lock-in there is nothing to tabulate; the map is that of the plain phase.
-    const double margin = kind == TrajectoryKind::ideal ? 0.0 : amplitude_margin_rad(scenario, devices, kind);
-    return propagate::make_turn_map(devices, margin, scenario.propagation.turn_map_tolerance_rad);
+    propagate::AmplitudeRoom room;
+    if (kind != TrajectoryKind::ideal) {
+        room = {amplitude_margin_rad(scenario, devices, kind), noise_of(scenario, kind).change_rad};
+    }
+    return propagate::make_turn_map(devices, room, scenario.propagation.turn_map_tolerance_rad);
 }
 
 std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Scenario& scenario,
                                                               const std::vector<gyro::Device>& devices,
                                                               const scenario::Arm& arm, TrajectoryKind kind) {
-    compensate::Calibration calibration = calibration_of(scenario, devices, injected_rms_rad(scenario, kind));
+    compensate::Calibration calibration = calibration_of(scenario, devices, kind == TrajectoryKind::noise_injected);
     calibration.amplitude_margin_rad = amplitude_margin_rad(scenario, devices, kind);
     calibration.amplitude_rms_rad = amplitude_rms_rad(scenario, devices, kind);
     switch (arm.compensator) {
@@ -121,6 +123,15 @@ std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Sc
     return nullptr;
 }
 
+dither::LaneDither make_dither(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices,
+                               const random::LaneIdentities& who, TrajectoryKind kind) {
+    const double rms_rad = noise_of(scenario, kind).turn_rms_rad;
+    if (scenario.noise_injection.model == scenario::NoiseModel::turns) {
+        return {devices, rms_rad, who, wander_of(scenario)};
+    }
+    return {devices, scenario::drive_noise(scenario), rms_rad, who, wander_of(scenario)};
+}
+
 /// One physical trajectory of the block and the arms that read it.
 class Branch {
    public:
@@ -129,7 +140,7 @@ class Branch {
            bool phases_vary, Detail detail)
         : kind_(kind),
           devices_(make_devices(setups, kind)),
-          dither_(devices_, injected_rms_rad(scenario, kind), who, wander_of(scenario)),
+          dither_(make_dither(scenario, devices_, who, kind)),
           detailed_(detail == Detail::hardware) {
         for (std::size_t i = 0; i < arms.size(); ++i) {
             if (kind_of(arms[i]) != kind) continue;

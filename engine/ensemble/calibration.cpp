@@ -1,6 +1,6 @@
 #include "engine/ensemble/calibration.hpp"
 
-#include "engine/dither/lane_dither.hpp"
+#include "engine/scenario/injected_noise.hpp"
 
 namespace ringlock::ensemble {
 
@@ -23,11 +23,14 @@ double calibrated_b_rad_s(const scenario::Scenario& scenario, const gyro::Device
 }
 
 compensate::Calibration calibration_of(const scenario::Scenario& scenario, std::span<const gyro::Device> devices,
-                                       double noise_rms_rad) {
+                                       bool noise_injected) {
     compensate::Calibration calibration;
     calibration.lanes = devices.size();
-    calibration.amplitude_margin_rad = dither::LaneDither::amplitude_margin_rad(noise_rms_rad);
-    calibration.amplitude_rms_rad = dither::LaneDither::amplitude_rms_rad(noise_rms_rad);
+    if (noise_injected) {
+        const scenario::InjectedNoise noise = scenario::injected_noise(scenario);
+        calibration.amplitude_margin_rad = noise.margin_rad;
+        calibration.amplitude_rms_rad = noise.amplitude_rms_rad;
+    }
     for (std::size_t lane = 0; lane < devices.size(); ++lane) {
         calibration.b_rad_s[lane] = calibrated_b_rad_s(scenario, devices[lane]);
         calibration.dither_amplitude_rad[lane] = devices[lane].dither_amplitude_rad;

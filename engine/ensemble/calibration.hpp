@@ -14,8 +14,8 @@ readout::Electronics electronics_of(const scenario::Scenario& scenario);
 /// The coupling of the threshold that calibration gives for the device.
 double calibrated_b_rad_s(const scenario::Scenario& scenario, const gyro::Device& device);
 
-/// Of a block of gyros, under injected noise of that rms.
+/// Of a block of gyros, with injected noise or without.
 compensate::Calibration calibration_of(const scenario::Scenario& scenario, std::span<const gyro::Device> devices,
-                                       double noise_rms_rad);
+                                       bool noise_injected);
 
 }  // namespace ringlock::ensemble

@@ -12,6 +12,9 @@ constexpr double least_adiabaticity = 100.0;
 constexpr double relaxed = 0.9;      // from one that is tried to the next: 104.6 is the last
 constexpr double least_beat = 4.0;   // g over b: the slow solution is a series in b/g, too
 constexpr double latest_sine = 0.9;  // the slow solution must hold from here to the middle
+/// Phase from the zero-rate point to the middle. The slow solution's n-th term goes as n!/phase^n: below this, its ten
+/// terms are more than are of use.
+constexpr double least_phase_rad = 10.0;
 
 double needed_rate_rad_s(const HalfCycle& half, double b_rad_s, double adiabaticity) {
     return std::max(std::sqrt(adiabaticity * greatest_acceleration_rad_s2(half)), least_beat * b_rad_s);
@@ -45,24 +48,31 @@ double fast_from_s(const HalfCycle& half, double b_rad_s, double adiabaticity) {
 
 }  // namespace
 
+double zero_rate_s(const HalfCycle& half) {
+    const double w = half.angular_frequency_rad_s();
+    return -std::asin(std::clamp(half.drive_rate_rad_s(0.0) / (half.end_amplitude_rad(0) * w), -1.0, 1.0)) / w;
+}
+
 double greatest_acceleration_rad_s2(const HalfCycle& half) {
     const double w = half.angular_frequency_rad_s();
-    return half.amplitude_rad * w * w * (1.0 + 2.0 * std::abs(half.harmonic_ratio));
+    // The rate of a change has the derivative change w (w cos(w t) (t/T - 1/2) + sin(w t)/T).
+    const double changing = std::abs(half.amplitude_change_rad) * (0.5 + 1.0 / units::pi);
+    return w * w * (half.amplitude_rad * (1.0 + 2.0 * std::abs(half.harmonic_ratio)) + changing);
 }
 
 double fast_motion_from_s(const HalfCycle& half, double b_rad_s) {
+    if (!has_fast_middle(half, b_rad_s)) return std::nan("");
     for (double adiabaticity = full_adiabaticity; adiabaticity >= least_adiabaticity; adiabaticity *= relaxed) {
         const double t = fast_from_s(half, b_rad_s, adiabaticity);
         if (!std::isnan(t)) return t;
     }
-    return std::nan("");
+    return 0.5 * half.duration_s;
 }
 
 bool has_fast_middle(const HalfCycle& half, double b_rad_s) {
-    // The last one tried asks for the least.
-    double adiabaticity = full_adiabaticity;
-    while (adiabaticity * relaxed >= least_adiabaticity) adiabaticity *= relaxed;
-    return is_fast_from_there(half, needed_rate_rad_s(half, b_rad_s, adiabaticity));
+    const double middle_s = 0.5 * half.duration_s;
+    if (half.drive_rate_rad_s(middle_s) < least_beat * b_rad_s) return false;
+    return half.plain_phase_rad(middle_s) - half.plain_phase_rad(zero_rate_s(half)) >= least_phase_rad;
 }
 
 double strength_with_harmonics_rad_s(const Coupling& coupling) {

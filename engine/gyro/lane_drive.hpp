@@ -16,11 +16,15 @@ struct LaneDrive {
     bool rates_vary = false;  ///< from half cycle to half cycle
     bool thresholds_vary = false;
     bool phases_vary = false;                ///< of the coupling
+    bool amplitudes_change = false;          ///< over half cycles
     bool constants_filled = false;           ///< rows of rates and couplings that do not vary stand from a piece before
     std::vector<simd::Lanes> plain_fringes;  ///< [turns] phase of drive and input at the turn, less whole fringes
     std::vector<simd::Lanes> amplitude_rad;  ///< [turns + 1] amplitude of the half cycle: half its swing
     std::vector<simd::Lanes> rate_rad_s;     ///< [turns + 1] phase rate of the input over the half cycle
     std::vector<simd::Lanes> b_rad_s;        ///< [turns + 1] coupling over the half cycle
+    /// [turns + 1] amplitude at the end of the half cycle less that at its beginning; empty where it is constant over
+    /// each half cycle.
+    std::vector<simd::Lanes> amplitude_change_rad;
     /// [turns + 1] phase of the coupling over the half cycle; empty where it is always the gyro's own.
     std::vector<simd::Lanes> coupling_phase_fringes;
     std::vector<simd::Lanes> rotation_fringes;  ///< [turns] rotation of the case since turn 0 of the run, less ...
@@ -33,6 +37,7 @@ struct LaneDrive {
         amplitude_rad.resize(wanted + 1);
         rate_rad_s.resize(wanted + 1);
         b_rad_s.resize(wanted + 1);
+        amplitude_change_rad.resize(amplitudes_change ? wanted + 1 : 0);
         coupling_phase_fringes.resize(phases_vary ? wanted + 1 : 0);
         rotation_fringes.resize(wanted);
         rotation_whole.resize(wanted);

@@ -37,6 +37,8 @@ class PhaseSeries {
         double first = half.sign * half.amplitude_rad * x;
         double second = half.harmonic_ratio * half.amplitude_rad * x;
         const double b = coupling.b_rad_s * scale_s;
+        double grown = half.sign * half.amplitude_change_rad * (t_s / half.duration_s - 0.5) * x;
+        double growth = 0.0;  // of the term before: change w scale (x/pi) x^(n-1)/(n-1)!
         double swing = half.sign * coupling.turn_asymmetry * b;
         const bool swings = swing != 0.0;
         const bool doubles = coupling.second_ratio != 0.0;
@@ -62,9 +64,16 @@ class PhaseSeries {
                 q[n] = -sum_q / static_cast<double>(n);
                 first *= x / static_cast<double>(n);
                 second *= 2.0 * x / static_cast<double>(n);
+                growth = n == 1 ? half.sign * half.amplitude_change_rad * x * x / units::pi
+                                : growth * x / static_cast<double>(n - 1);
+                grown *= x / static_cast<double>(n);
                 swing *= x / static_cast<double>(n);
             }
             double right = first * sine[n % 4] + second * harmonic[n % 4];
+            if (half.amplitude_change_rad != 0.0) {
+                right += grown * sine[n % 4];
+                if (n > 0) right += growth * sine[(n - 1) % 4];
+            }
             if (n == 0) right += half.rate_rad_s * scale_s;
             f[n] = s[n];
             if (doubles) {

@@ -45,25 +45,29 @@ double chebyshev_node(std::size_t i, std::size_t terms) {
 
 std::vector<Point> chebyshev_nodes(const Terms& terms) {
     std::vector<Point> points;
-    for (std::size_t c = 0; c < terms[2]; ++c) {
-        for (std::size_t b = 0; b < terms[1]; ++b) {
-            for (std::size_t a = 0; a < terms[0]; ++a) {
-                points.push_back(
-                    {chebyshev_node(a, terms[0]), chebyshev_node(b, terms[1]), chebyshev_node(c, terms[2])});
-            }
+    const std::size_t count = terms[0] * terms[1] * terms[2] * terms[3];
+    for (std::size_t i = 0; i < count; ++i) {
+        Point point{};
+        std::size_t rest = i;
+        for (std::size_t v = 0; v < terms.size(); ++v) {
+            point[v] = chebyshev_node(rest % terms[v], terms[v]);
+            rest /= terms[v];
         }
+        points.push_back(point);
     }
     return points;
 }
 
 std::vector<Point> points_between_nodes(const Terms& terms) {
     std::vector<Point> points;
-    for (int i = 0; i < 8; ++i) {
+    constexpr double shares[] = {0.618034, 0.754878, 0.569840, 0.656673};
+    const int each = terms[3] == 1 ? 8 : 16;
+    for (int i = 0; i < each; ++i) {
         Point inside{};
         Point corner{};
         for (std::size_t v = 0; v < terms.size(); ++v) {
             if (terms[v] == 1) continue;
-            const double golden = (static_cast<double>(i) + 0.5) * (v == 0 ? 0.618034 : v == 1 ? 0.754878 : 0.569840);
+            const double golden = (static_cast<double>(i) + 0.5) * shares[v];
             inside[v] = 2.0 * (golden - std::floor(golden)) - 1.0;
             corner[v] = (i >> v & 1) != 0 ? 1.0 : -1.0;
         }

@@ -4,24 +4,26 @@
 #include <span>
 #include <vector>
 
-/// Interpolation in the three quantities that differ from half cycle to half cycle, each scaled to [-1, 1].
+/// Interpolation in the quantities that differ from half cycle to half cycle, each scaled to [-1, 1].
 namespace ringlock::propagate {
 
-/// Amplitude, rate and coupling.
-using Point = std::array<double, 3>;
+/// Amplitude, rate, coupling and change of the amplitude over the half cycle.
+using Point = std::array<double, 4>;
 /// Terms of a polynomial in each of them; 1: the quantity does not vary.
-using Terms = std::array<std::size_t, 3>;
+using Terms = std::array<std::size_t, 4>;
+inline constexpr Terms one_term{1, 1, 1, 1};
 
 /// Node i of `terms` Chebyshev nodes, from 1 downwards.
 double chebyshev_node(std::size_t i, std::size_t terms);
 
-/// All nodes: [coupling][rate][amplitude].
+/// All nodes: [change][coupling][rate][amplitude].
 std::vector<Point> chebyshev_nodes(const Terms& terms);
 
 /// Points between the nodes: spread over the ranges by the golden ratio, the corners among them.
 std::vector<Point> points_between_nodes(const Terms& terms);
 
-/// Turns values at the nodes, [coupling][rate][amplitude][column], into coefficients of powers in the same order.
+/// Turns values at the nodes, [change][coupling][rate][amplitude][column], into coefficients of powers in the same
+/// order.
 void nodes_to_powers(const Terms& terms, std::size_t columns, std::span<double> values);
 
 }  // namespace ringlock::propagate

@@ -23,12 +23,14 @@ namespace {
 struct Batch {
     simd::Lanes sign, amplitude_rad, duration_s, angular_frequency_rad_s, rate_rad_s;
     simd::Lanes harmonic_ratio, harmonic_cosine, harmonic_sine;
+    simd::Lanes amplitude_change_rad;
     simd::Lanes b_rad_s, turn_asymmetry;
     simd::Lanes second_sine, second_cosine;  ///< of 2 theta in the coupling, over that of sin(theta)
     simd::Lanes start_fringes;               ///< theta = psi + coupling phase
     simd::Lanes end_s, first_scale_s, shortest_s, step_tolerance_rad;
-    bool second = false;  ///< some coupling has a second harmonic
-    bool swing = false;   ///< some coupling differs from turn to turn
+    bool second = false;    ///< some coupling has a second harmonic
+    bool changing = false;  ///< some amplitude changes over its half cycle
+    bool swing = false;     ///< some coupling differs from turn to turn
     // Results
     simd::Lanes lockin_rad, cosine, sine, steps;
     simd::Lanes failed;  ///< not 0 where the steps became too short
@@ -72,6 +74,7 @@ void integrate_vectors(Batch& batch, std::size_t first_lane) {
     const auto store = [&](V value, simd::Lanes& to, std::size_t g)
                            HWY_ATTR { hn::Store(value, d, to.data() + first_lane + g * width); };
 
+    const bool changing = batch.changing;
     V t[group], scale[group], gain[group], steps[group], end[group], failed[group];
     for (std::size_t g = 0; g < group; ++g) {
         t[g] = gain[g] = steps[g] = failed[g] = zero;
@@ -90,7 +93,7 @@ void integrate_vectors(Batch& batch, std::size_t first_lane) {
         V s2[second ? order : 1][group], q2[second ? order : 1][group];  // sine and cosine of 2 theta
         V f[swing ? order : 1][group], bs[swing ? order : 1][group];
         V cycle[4][group], doubled[4][group];  // sin(w t) and sin(2 w t + f) with their derivatives
-        V x[group], first_term[group], second_term[group], swing_term[group], b[group];
+        V x[group], first_term[group], second_term[group], swing_term[group], growth_term[group], b[group];
         for (std::size_t g = 0; g < group; ++g) {
             V half_sine, half_cosine;
             sm::sincos(d, hn::Set(d, 0.25) * (t[g] / load(batch.duration_s, g)), half_sine, half_cosine);
@@ -106,7 +109,14 @@ void integrate_vectors(Batch& batch, std::size_t first_lane) {
             const V amplitude = load(batch.amplitude_rad, g);
             const V rate = load(batch.rate_rad_s, g);
             const V swings = sm::fma(d, sign, versine, ratio * shifted_sine * sine);
-            const V plain = sm::fma(d, rate, t[g], amplitude * swings);
+            V plain = sm::fma(d, rate, t[g], amplitude * swings);
+            if (changing) {
+                // (sin x - x cos x)/pi - (1 - cos x)/2, x = w t
+                const V angle = hn::Set(d, 3.141592653589793) * (t[g] / load(batch.duration_s, g));
+                const V grown = sm::fma(d, sm::fnma(d, angle, cosine, sine), hn::Set(d, 0.3183098861837907),
+                                        versine * hn::Set(d, -0.5));
+                plain = sm::fma(d, sign * load(batch.amplitude_change_rad, g), grown, plain);
+            }
             const V theta = sm::fma(d, plain + gain[g], per_two_pi, load(batch.start_fringes, g));
             sm::sincos(d, theta, s[0][g], q[0][g]);
             if constexpr (second) {
@@ -128,6 +138,14 @@ void integrate_vectors(Batch& batch, std::size_t first_lane) {
             x[g] = load(batch.angular_frequency_rad_s, g) * scale[g];
             first_term[g] = sign * amplitude * x[g];
             second_term[g] = ratio * amplitude * x[g];
+            growth_term[g] = zero;
+            if (changing) {
+                const V change = sign * load(batch.amplitude_change_rad, g);
+                const V share = t[g] / load(batch.duration_s, g);
+                const V grown = change * (share - hn::Set(d, 0.5));
+                first_term[g] = sm::fma(d, grown, x[g], first_term[g]);
+                growth_term[g] = change * hn::Set(d, 0.3183098861837907) * x[g] * x[g];
+            }
             b[g] = load(batch.b_rad_s, g) * scale[g];
             swing_term[g] = sign * load(batch.turn_asymmetry, g) * b[g];
         }
@@ -172,6 +190,10 @@ void integrate_vectors(Batch& batch, std::size_t first_lane) {
             }
             for (std::size_t g = 0; g < group; ++g) {
                 V right = sm::fma(d, first_term[g], cycle[n % 4][g], second_term[g] * doubled[n % 4][g]);
+                if (changing && n > 0) {
+                    right = sm::fma(d, growth_term[g], cycle[(n - 1) % 4][g], right);
+                    growth_term[g] = growth_term[g] * x[g] * inverse;
+                }
                 if (n == 0) right = sm::fma(d, load(batch.rate_rad_s, g), scale[g], right);
                 V coupled = s[n][g];
                 if constexpr (second) {
@@ -255,6 +277,8 @@ void prepare(Batch& batch, std::size_t lane, const Stretch& stretch, double tole
     batch.harmonic_ratio[lane] = half.harmonic_ratio;
     batch.harmonic_cosine[lane] = std::cos(half.harmonic_phase_rad);
     batch.harmonic_sine[lane] = std::sin(half.harmonic_phase_rad);
+    batch.amplitude_change_rad[lane] = half.amplitude_change_rad;
+    batch.changing = batch.changing || half.amplitude_change_rad != 0.0;
     batch.b_rad_s[lane] = coupling.b_rad_s;
     batch.turn_asymmetry[lane] = coupling.turn_asymmetry;
     batch.second_sine[lane] = coupling.second_ratio * std::cos(coupling.second_from_first_rad());
@@ -314,6 +338,9 @@ void DirectLanes::step(const gyro::LaneDrive& drive, gyro::LaneTurns* turns) {
             Stretch& stretch = stretches_[lane];
             stretch.half = devices_[lane].half_cycle(drive.direction(i), drive.amplitude_rad[i + 1][lane]);
             stretch.half.rate_rad_s = drive.rate_rad_s[i + 1][lane];
+            if (drive.amplitudes_change) {
+                stretch.half.amplitude_change_rad = drive.amplitude_change_rad[i + 1][lane];
+            }
             stretch.coupling = devices_[lane].coupling;
             if (drive.phases_vary) {
                 const double phase_rad = units::two_pi * drive.coupling_phase_fringes[i + 1][lane];

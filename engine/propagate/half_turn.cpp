@@ -26,6 +26,7 @@ constexpr std::size_t quadrature_nodes = 20;
 /// Problems side by side, one in each lane, with what is decided about each beforehand.
 struct Batch {
     simd::Lanes amplitude_rad, angular_frequency_rad_s, rate_rad_s, harmonic_ratio, harmonic_phase_fringes;
+    simd::Lanes amplitude_change_rad;
     simd::Lanes b_rad_s, turn_asymmetry;
     simd::Lanes fast_from_s;
     simd::Lanes longest_step_s;
@@ -49,19 +50,20 @@ namespace sm = simd::HWY_NAMESPACE;
 
 constexpr std::size_t slow_terms = 10;    // terms of the asymptotic series, and Taylor terms that its derivatives need
 constexpr std::size_t matrix_order = 24;  // Taylor order of the 2x2 flow
-/// Taylor terms of the drive. A step is at most 1/sqrt(a) long: with 100 fringes in a half cycle, the fewest allowed,
-/// the twelfth term of the second harmonic is (0.16)^12/12! of the first.
+/// Taylor terms of the drive. A step is at most 0.9/sqrt(a) long: with an amplitude of 10 rad, the least allowed, the
+/// twelfth term of the second harmonic is (0.57)^12/12! of the first.
 constexpr std::size_t drive_terms = 12;
 
 /// The drive and the coupling of a vector of problems.
 template <class D, class V = hn::Vec<D>>
 struct Problems {
     D d;
-    V amplitude, w, rate, ratio, harmonic_phase, b, asymmetry;
+    V amplitude, change, w, rate, ratio, harmonic_phase, b, asymmetry;
 
     Problems(D tag, const Batch& batch, std::size_t lane)
         : d(tag),
           amplitude(hn::Load(d, batch.amplitude_rad.data() + lane)),
+          change(hn::Load(d, batch.amplitude_change_rad.data() + lane)),
           w(hn::Load(d, batch.angular_frequency_rad_s.data() + lane)),
           rate(hn::Load(d, batch.rate_rad_s.data() + lane)),
           ratio(hn::Load(d, batch.harmonic_ratio.data() + lane)),
@@ -77,14 +79,21 @@ struct Problems {
         sm::sincos(d, fringes, s1, c1);
         sm::sincos(d, fringes + fringes + harmonic_phase, s2, c2);
         const V x = w * scale;
-        V first = amplitude * x;
-        V second = first * ratio;
+        const V per_pi = hn::Set(d, 0.3183098861837907);
+        V first = sm::fma(d, change, sm::fma(d, w * t, per_pi, hn::Set(d, -0.5)), amplitude) * x;
+        V second = amplitude * x * ratio;
+        V growth =
+            change * per_pi * x * x;  // of the amplitude over the unit of time, times the term before of the sine
+        V last_sine = hn::Zero(d);
         V swing = b * asymmetry * scale;
         for (std::size_t n = 0; n < N; ++n) {
             const V sine = n % 4 == 0 ? s1 : n % 4 == 1 ? c1 : n % 4 == 2 ? hn::Neg(s1) : hn::Neg(c1);
             const V cosine = n % 4 == 0 ? c1 : n % 4 == 1 ? hn::Neg(s1) : n % 4 == 2 ? hn::Neg(c1) : s1;
             const V doubled = n % 4 == 0 ? s2 : n % 4 == 1 ? c2 : n % 4 == 2 ? hn::Neg(s2) : hn::Neg(c2);
             g[n] = sm::fma(d, first, sine, second * doubled);
+            if (n > 0) g[n] = sm::fma(d, growth, last_sine, g[n]);
+            if (n > 0) growth = growth * x * hn::Set(d, 1.0 / static_cast<double>(n));
+            last_sine = sine;
             coupling[n] = swing * cosine;
             const V step = x * hn::Set(d, 1.0 / static_cast<double>(n + 1));
             first = first * step;
@@ -248,6 +257,7 @@ void prepare(Batch& batch, std::size_t lane, const HalfTurnProblem& problem, dou
     const gyro::HalfCycle& half = problem.half;
     const double w = half.angular_frequency_rad_s();
     batch.amplitude_rad[lane] = half.amplitude_rad;
+    batch.amplitude_change_rad[lane] = half.amplitude_change_rad;
     batch.angular_frequency_rad_s[lane] = w;
     batch.rate_rad_s[lane] = half.rate_rad_s;
     batch.harmonic_ratio[lane] = half.harmonic_ratio;
@@ -256,8 +266,7 @@ void prepare(Batch& batch, std::size_t lane, const HalfTurnProblem& problem, dou
     batch.turn_asymmetry[lane] = problem.turn_asymmetry;
     batch.fast_from_s[lane] = start_s;
     batch.longest_step_s[lane] = std::sqrt(0.8 / gyro::greatest_acceleration_rad_s2(half));
-    const double sine = half.drive_rate_rad_s(0.0) / (half.amplitude_rad * w);
-    const double zero = -std::asin(std::clamp(sine, -1.0, 1.0)) / w;
+    const double zero = gyro::zero_rate_s(half);
     const double stretch = std::log((0.5 * half.duration_s - zero) / (start_s - zero));
     using Gauss = boost::math::quadrature::gauss<double, quadrature_nodes>;
     for (std::size_t node = 0; node < quadrature_nodes; ++node) {

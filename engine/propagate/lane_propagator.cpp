@@ -31,9 +31,9 @@ Range around(double lowest, double highest, const Range& last, double widest, do
 }  // namespace
 
 template <class Turns>
-TurnMapLanes<Turns>::TurnMapLanes(std::span<const gyro::Device> devices, double amplitude_margin_rad,
+TurnMapLanes<Turns>::TurnMapLanes(std::span<const gyro::Device> devices, const AmplitudeRoom& room,
                                   double tolerance_rad)
-    : devices_(devices.begin(), devices.end()), amplitude_margin_rad_(amplitude_margin_rad), tables_(tolerance_rad) {
+    : devices_(devices.begin(), devices.end()), room_(room), tables_(tolerance_rad) {
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
         const gyro::Device& device = devices_[std::min(lane, devices_.size() - 1)];
         state_.coupling_phase_fringes[lane] = device.coupling.phase_rad / units::two_pi;
@@ -42,10 +42,21 @@ TurnMapLanes<Turns>::TurnMapLanes(std::span<const gyro::Device> devices, double 
 
 template <class Turns>
 void TurnMapLanes<Turns>::cover(const gyro::LaneDrive& drive) {
-    const bool noisy = amplitude_margin_rad_ > 0.0;
+    const bool noisy = room_.margin_rad > 0.0;
     if (begun_ && !noisy && !drive.rates_vary && !drive.thresholds_vary) return;
     simd::Lanes low_amplitude, high_amplitude, low_rate, high_rate, low_b, high_b;
     extremes(drive.amplitude_rad, low_amplitude, high_amplitude);
+    simd::Lanes largest_change{};
+    if (drive.amplitudes_change) {
+        simd::Lanes low_change, high_change;
+        extremes(drive.amplitude_change_rad, low_change, high_change);
+        for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+            largest_change[lane] = std::max(-low_change[lane], high_change[lane]);
+            // Tables are of the amplitude at a turn.
+            low_amplitude[lane] -= 0.5 * largest_change[lane];
+            high_amplitude[lane] += 0.5 * largest_change[lane];
+        }
+    }
     if (!begun_ || drive.rates_vary) extremes(drive.rate_rad_s, low_rate, high_rate);
     if (!begun_ || drive.thresholds_vary) extremes(drive.b_rad_s, low_b, high_b);
     if (Turns::evaluates_first_half_cycle && begun_) {
@@ -71,8 +82,14 @@ void TurnMapLanes<Turns>::cover(const gyro::LaneDrive& drive) {
             // Noise beyond eight sigma, or the first piece.
             const double a = device.dither_amplitude_rad;
             const double margin =
-                std::max({amplitude_margin_rad_, 1.1 * (high_amplitude[lane] - a), 1.1 * (a - low_amplitude[lane])});
+                std::max({room_.margin_rad, 1.1 * (high_amplitude[lane] - a), 1.1 * (a - low_amplitude[lane])});
             ranges.amplitude_rad = noisy ? Range{a - margin, a + margin} : Range{a, a};
+            changed = true;
+        }
+        if (drive.amplitudes_change &&
+            misses(ranges.amplitude_change_rad, -largest_change[lane], largest_change[lane])) {
+            const double change = std::max(room_.change_rad, 1.1 * largest_change[lane]);
+            ranges.amplitude_change_rad = {-change, change};
             changed = true;
         }
         if ((!begun_ || drive.rates_vary) && misses(ranges.rate_rad_s, low_rate[lane], high_rate[lane])) {
@@ -106,12 +123,12 @@ void TurnMapLanes<Turns>::step(const gyro::LaneDrive& drive, gyro::LaneTurns& tu
 template class TurnMapLanes<MoebiusTurns>;
 template class TurnMapLanes<TabulatedTurns>;
 
-std::unique_ptr<LanePropagator> make_turn_map(std::span<const gyro::Device> devices, double amplitude_margin_rad,
+std::unique_ptr<LanePropagator> make_turn_map(std::span<const gyro::Device> devices, const AmplitudeRoom& room,
                                               double tolerance_rad) {
     const bool moebius = std::all_of(devices.begin(), devices.end(),
                                      [](const gyro::Device& device) { return device.coupling.second_ratio == 0.0; });
-    if (moebius) return std::make_unique<TurnMapLanes<MoebiusTurns>>(devices, amplitude_margin_rad, tolerance_rad);
-    return std::make_unique<TurnMapLanes<TabulatedTurns>>(devices, amplitude_margin_rad, tolerance_rad);
+    if (moebius) return std::make_unique<TurnMapLanes<MoebiusTurns>>(devices, room, tolerance_rad);
+    return std::make_unique<TurnMapLanes<TabulatedTurns>>(devices, room, tolerance_rad);
 }
 
 }  // namespace ringlock::propagate

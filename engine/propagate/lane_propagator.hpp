@@ -42,14 +42,20 @@ struct TabulatedTurns {
     static constexpr auto step = step_phases;
 };
 
+/// How far amplitudes can go, which tables must hold [rad].
+struct AmplitudeRoom {
+    double margin_rad = 0.0;  ///< of the amplitude at a turn, from the device's
+    double change_rad = 0.0;  ///< over a half cycle
+};
+
 /// The production propagator: the turn map. Tables are made over the ranges that the first piece asks for, with room to
 /// spare, and anew where a later one leaves them.
 template <class Turns>
 class TurnMapLanes final : public LanePropagator {
    public:
-    /// `amplitude_margin_rad`: how far injected noise takes the amplitude of a half cycle from the device's.
+    /// `room`: how far injected noise takes the amplitude of a half cycle from the device's, and changes it over one.
     /// `tolerance_rad`: interpolation error of a turn.
-    TurnMapLanes(std::span<const gyro::Device> devices, double amplitude_margin_rad, double tolerance_rad);
+    TurnMapLanes(std::span<const gyro::Device> devices, const AmplitudeRoom& room, double tolerance_rad);
 
     void step(const gyro::LaneDrive& drive, gyro::LaneTurns& turns) override;
     double table_error_rad(std::size_t lane) const override { return tables_.measured_error_rad(lane); }
@@ -59,7 +65,7 @@ class TurnMapLanes final : public LanePropagator {
     void cover(const gyro::LaneDrive& drive);
 
     std::vector<gyro::Device> devices_;
-    double amplitude_margin_rad_;
+    AmplitudeRoom room_;
     typename Turns::Tables tables_;
     typename Turns::State state_;
     std::array<std::int64_t, simd::lanes> remade_{};
@@ -67,7 +73,7 @@ class TurnMapLanes final : public LanePropagator {
 };
 
 /// The exact Moebius map, or, where the coupling of one of the gyros has a second harmonic, the tabulated one.
-std::unique_ptr<LanePropagator> make_turn_map(std::span<const gyro::Device> devices, double amplitude_margin_rad,
+std::unique_ptr<LanePropagator> make_turn_map(std::span<const gyro::Device> devices, const AmplitudeRoom& room,
                                               double tolerance_rad);
 
 /// The reference: every fringe integrated.

@@ -32,7 +32,7 @@ HWY_INLINE Scaled scaled(D d, const PhaseTables& tables, const gyro::LaneDrive& 
 
 /// Coefficient of one harmonic. Terms that a gyro does not have are zeros: 0 x + c is c to the bit.
 HWY_INLINE sm::Complex<V> coefficient(D d, const PhaseTables::Harmonic& harmonic, std::size_t lane, const Scaled& at) {
-    const auto [amplitudes, rates, couplings] = harmonic.terms;
+    const auto [amplitudes, rates, couplings, changes] = harmonic.terms;
     const simd::Lanes* row = harmonic.coefficients.data() + 2 * amplitudes * rates * couplings;
     const V zero = hn::Zero(d);
     sm::Complex<V> sum{zero, zero};

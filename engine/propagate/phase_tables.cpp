@@ -258,7 +258,7 @@ std::size_t harmonics_needed(const PhaseSource& source, double tolerance_rad) {
 /// more.
 std::size_t terms_needed(const PhaseSource& source, std::size_t variable, std::size_t harmonics, double tolerance_rad) {
     for (const std::size_t n : {8U, 16U, 24U}) {
-        Terms terms{1, 1, 1};
+        Terms terms = one_term;
         terms[variable] = n;
         const auto values = source.at(chebyshev_nodes(terms), harmonics, 2 * harmonics + 4);
         double rest = 0.0;
@@ -295,6 +295,11 @@ void finish(PhaseTables::LanePart& part, double sign) {
 }  // namespace
 
 void PhaseTables::make(std::size_t lane, const gyro::Device& device, const HalfCycleRanges& wanted) {
+    if (wanted.amplitude_change_rad.highest > wanted.amplitude_change_rad.lowest) {
+        throw RunError(
+            "turn map: series in the phase, for a coupling with a second harmonic, have no amplitude that changes over "
+            "a half cycle");
+    }
     ranges_[lane] = wanted;
     const std::array<Range, variables> ranges{wanted.amplitude_rad, wanted.rate_rad_s, wanted.b_rad_s};
     for (std::size_t v = 0; v < variables; ++v) {
@@ -308,7 +313,7 @@ void PhaseTables::make(std::size_t lane, const gyro::Device& device, const HalfC
         for (int end = 0; end < 2; ++end) {
             const PhaseSource source(device, sign, end, ranges, node_tolerance_rad);
             std::size_t harmonics = harmonics_needed(source, tolerance_rad_);
-            Terms terms{1, 1, 1};
+            Terms terms = one_term;
             for (std::size_t v = 0; v < variables; ++v) {
                 if (inverse_[v][lane] > 0.0) terms[v] = terms_needed(source, v, harmonics, tolerance_rad_);
             }
@@ -358,7 +363,7 @@ void PhaseTables::lay_out(std::size_t at) {
                     for (std::size_t k = 0; k <= from.harmonics; ++k, ++i) {
                         if (std::abs(from.coefficients[i]) < least) continue;
                         Terms& terms = part[k].terms;
-                        terms = {std::max(terms[0], a + 1), std::max(terms[1], b + 1), std::max(terms[2], c + 1)};
+                        terms = {std::max(terms[0], a + 1), std::max(terms[1], b + 1), std::max(terms[2], c + 1), 1};
                     }
                 }
             }

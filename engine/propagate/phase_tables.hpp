@@ -32,7 +32,7 @@ class PhaseTables {
     /// 0, which does not count there, is the shift of an end 1.
     struct Harmonic {
         /// Terms in each variable: the largest number of any gyro, others have zeros.
-        Terms terms{1, 1, 1};
+        Terms terms = one_term;
         /// [coupling][rate][amplitude][Re, Im], powers of the variables scaled to [-1, 1].
         std::vector<simd::Lanes> coefficients;
     };
@@ -62,7 +62,7 @@ class PhaseTables {
 
     /// Series of one part of one gyro.
     struct LanePart {
-        Terms terms{1, 1, 1};
+        Terms terms = one_term;
         std::size_t harmonics = 0;
         /// [coupling][rate][amplitude][k], k from 0 to harmonics.
         std::vector<std::complex<double>> coefficients;

@@ -48,7 +48,8 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
             hn::Store(hn::Load(d, state.whole.data() + lane), d, turns->lockin_whole.data() + lane);
         }
     }
-    const bool both = !tables.symmetric();
+    const bool changing = tables.changing();
+    const bool both = changing || !tables.symmetric();
     for (std::size_t i = 0; i < drive.turns; ++i) {
         const double direction = drive.direction(i);
         const TurnTables::Part& begin = tables.part(direction, 0);
@@ -56,16 +57,27 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
         const V sign = hn::Set(d, direction);
         for (std::size_t g = 0; g < group; ++g) {
             const std::size_t lane = first_lane + g * width;
-            const auto scaled = [&](const std::vector<simd::Lanes>& rows, std::size_t variable) HWY_ATTR {
-                const V value = hn::Load(d, rows[i + 1].data() + lane);
+            const auto row = [&](const std::vector<simd::Lanes>& rows)
+                                 HWY_ATTR { return hn::Load(d, rows[i + 1].data() + lane); };
+            const auto scaled = [&](V value, std::size_t variable) HWY_ATTR {
                 const V centre = hn::Load(d, tables.centre()[variable].data() + lane);
                 return (value - centre) * hn::Load(d, tables.inverse_half_width()[variable].data() + lane);
             };
-            const V x = scaled(drive.amplitude_rad, 0);
-            const V y = scaled(drive.rate_rad_s, 1);
-            const V c = scaled(drive.b_rad_s, 2);
-            const HalfMap after = evaluate(d, begin, lane, x, y, c);
-            const HalfMap next = both ? evaluate(d, end, lane, x, y, c) : after;
+            const V y = scaled(row(drive.rate_rad_s), 1);
+            const V c = scaled(row(drive.b_rad_s), 2);
+            HalfMap after, next;
+            if (changing) {
+                // Amplitude and change as seen from either turn.
+                const V middle = row(drive.amplitude_rad);
+                const V change = row(drive.amplitude_change_rad);
+                const V half_change = change * hn::Set(d, 0.5);
+                after = evaluate(d, begin, lane, scaled(middle - half_change, 0), y, c, scaled(change, 3));
+                next = evaluate(d, end, lane, scaled(middle + half_change, 0), y, c, scaled(hn::Neg(change), 3));
+            } else {
+                const V x = scaled(row(drive.amplitude_rad), 0);
+                after = evaluate(d, begin, lane, x, y, c, hn::Zero(d));
+                next = both ? evaluate(d, end, lane, x, y, c, hn::Zero(d)) : after;
+            }
 
             // u is the phase at the turn but for the second half's own bend; p = exp(-i sign u).
             const V before_turn = sm::fnma(d, sign, shift_before[g], lockin[g]);

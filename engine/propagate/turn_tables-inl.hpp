@@ -30,27 +30,34 @@ HWY_INLINE HalfMapOf<hn::Vec<D>> middle(D d, const TurnTables::Part& part, std::
 
 /// Polynomials of one part at the scaled variables.
 template <class D, class V>
-HWY_INLINE HalfMapOf<V> evaluate(D d, const TurnTables::Part& part, std::size_t lane, V amplitude, V rate, V coupling) {
-    const auto [amplitudes, rates, couplings] = part.terms;
-    const simd::Lanes* row = part.coefficients.data() + 3 * amplitudes * rates * couplings;
+HWY_INLINE HalfMapOf<V> evaluate(D d, const TurnTables::Part& part, std::size_t lane, V amplitude, V rate, V coupling,
+                                 V change) {
+    const auto [amplitudes, rates, couplings, changes] = part.terms;
+    const simd::Lanes* row = part.coefficients.data() + 3 * amplitudes * rates * couplings * changes;
     // Terms that a gyro does not have are zeros: 0 x + c is c to the bit.
     const V zero = hn::Zero(d);
     V sum[3] = {zero, zero, zero};
-    for (std::size_t c = 0; c < couplings; ++c) {
-        V over_rate[3] = {zero, zero, zero};
-        for (std::size_t b = 0; b < rates; ++b) {
-            row -= 3;
-            V over_amplitude[3];
-            for (std::size_t k = 0; k < 3; ++k) over_amplitude[k] = hn::Load(d, row[k].data() + lane);
-            for (std::size_t a = 1; a < amplitudes; ++a) {
+    for (std::size_t e = 0; e < changes; ++e) {
+        V over_coupling[3] = {zero, zero, zero};
+        for (std::size_t c = 0; c < couplings; ++c) {
+            V over_rate[3] = {zero, zero, zero};
+            for (std::size_t b = 0; b < rates; ++b) {
                 row -= 3;
-                for (std::size_t k = 0; k < 3; ++k) {
-                    over_amplitude[k] = sm::fma(d, over_amplitude[k], amplitude, hn::Load(d, row[k].data() + lane));
+                V over_amplitude[3];
+                for (std::size_t k = 0; k < 3; ++k) over_amplitude[k] = hn::Load(d, row[k].data() + lane);
+                for (std::size_t a = 1; a < amplitudes; ++a) {
+                    row -= 3;
+                    for (std::size_t k = 0; k < 3; ++k) {
+                        over_amplitude[k] = sm::fma(d, over_amplitude[k], amplitude, hn::Load(d, row[k].data() + lane));
+                    }
                 }
+                for (std::size_t k = 0; k < 3; ++k) over_rate[k] = sm::fma(d, over_rate[k], rate, over_amplitude[k]);
             }
-            for (std::size_t k = 0; k < 3; ++k) over_rate[k] = sm::fma(d, over_rate[k], rate, over_amplitude[k]);
+            for (std::size_t k = 0; k < 3; ++k) {
+                over_coupling[k] = sm::fma(d, over_coupling[k], coupling, over_rate[k]);
+            }
         }
-        for (std::size_t k = 0; k < 3; ++k) sum[k] = sm::fma(d, sum[k], coupling, over_rate[k]);
+        for (std::size_t k = 0; k < 3; ++k) sum[k] = sm::fma(d, sum[k], change, over_coupling[k]);
     }
     return {sum[0], sum[1], sum[2]};
 }

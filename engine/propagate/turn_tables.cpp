@@ -26,7 +26,10 @@ class KickSource {
     std::vector<Values> at(const std::vector<Point>& points) const {
         std::vector<HalfTurnProblem> problems;
         for (const Point& point : points) {
-            gyro::HalfCycle half = device_.half_cycle(sign_, value(0, point));
+            // Amplitude and change as seen from the turn: the half cycle's own amplitude is that in its middle.
+            const double change_rad = value(3, point);
+            gyro::HalfCycle half = device_.half_cycle(sign_, value(0, point) + 0.5 * change_rad);
+            half.amplitude_change_rad = end_ == 0 ? change_rad : -change_rad;
             half.rate_rad_s = value(1, point);
             gyro::Coupling coupling = device_.coupling;
             coupling.b_rad_s = value(2, point);
@@ -36,9 +39,11 @@ class KickSource {
         exact_half_turns(problems, turns);
         std::vector<Values> values;
         for (std::size_t i = 0; i < turns.size(); ++i) {
-            // Half of the half cycle's plain phase is taken out by the user; a harmonic makes the two halves unequal.
+            // Half of the half cycle's plain phase is taken out by the user; a harmonic and a change of the amplitude
+            // make the two halves unequal.
             const gyro::HalfCycle& half = problems[i].half;
-            const double unequal = half.amplitude_rad * half.harmonic_ratio * std::cos(half.harmonic_phase_rad);
+            const double unequal = half.amplitude_rad * half.harmonic_ratio * std::cos(half.harmonic_phase_rad) +
+                                   half.amplitude_change_rad * (1.0 / units::pi - 0.5);
             values.push_back({(turns[i].shift_rad + unequal) / units::two_pi, turns[i].z.real(), turns[i].z.imag()});
         }
         return values;
@@ -56,21 +61,24 @@ class KickSource {
     const std::array<Range, variables>& ranges_;
 };
 
-/// Polynomial of a part for one gyro: [coupling][rate][amplitude].
+/// Polynomial of a part for one gyro: [change][coupling][rate][amplitude].
 struct Polynomial {
-    Terms terms{1, 1, 1};
+    Terms terms = one_term;
     std::vector<Values> coefficients;
 
     Values at(const Point& point) const {
         Values sum{};
         std::size_t i = 0;
-        double third = 1.0;
-        for (std::size_t c = 0; c < terms[2]; ++c, third *= point[2]) {
-            double second = third;
-            for (std::size_t b = 0; b < terms[1]; ++b, second *= point[1]) {
-                double first = second;
-                for (std::size_t a = 0; a < terms[0]; ++a, first *= point[0], ++i) {
-                    for (std::size_t k = 0; k < 3; ++k) sum[k] += first * coefficients[i][k];
+        double fourth = 1.0;
+        for (std::size_t e = 0; e < terms[3]; ++e, fourth *= point[3]) {
+            double third = fourth;
+            for (std::size_t c = 0; c < terms[2]; ++c, third *= point[2]) {
+                double second = third;
+                for (std::size_t b = 0; b < terms[1]; ++b, second *= point[1]) {
+                    double first = second;
+                    for (std::size_t a = 0; a < terms[0]; ++a, first *= point[0], ++i) {
+                        for (std::size_t k = 0; k < 3; ++k) sum[k] += first * coefficients[i][k];
+                    }
                 }
             }
         }
@@ -99,8 +107,8 @@ double error_rad(const KickSource& source, const Polynomial& polynomial, const s
 
 /// Terms that one variable takes by itself, the others in the middle of their ranges.
 std::size_t terms_needed(const KickSource& source, std::size_t variable, double tolerance_rad) {
-    for (const std::size_t n : {2U, 3U, 4U, 5U, 6U, 8U, 10U, 12U, 16U, 20U}) {
-        Terms terms{1, 1, 1};
+    for (const std::size_t n : {2U, 3U, 4U, 5U, 6U, 8U, 10U, 12U, 14U, 17U, 20U, 24U, 28U}) {
+        Terms terms = one_term;
         terms[variable] = n;
         const Polynomial polynomial = interpolate(source, terms);
         std::vector<Point> points;
@@ -135,12 +143,14 @@ void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCy
                         device.coupling.second_ratio));
     }
     ranges_[lane] = wanted;
-    const std::array<Range, variables> ranges{wanted.amplitude_rad, wanted.rate_rad_s, wanted.b_rad_s};
+    const std::array<Range, variables> ranges{wanted.amplitude_rad, wanted.rate_rad_s, wanted.b_rad_s,
+                                              wanted.amplitude_change_rad};
     for (std::size_t v = 0; v < variables; ++v) {
         const double width = ranges[v].highest - ranges[v].lowest;
         centre_[v][lane] = 0.5 * (ranges[v].highest + ranges[v].lowest);
         inverse_[v][lane] = width > 0.0 ? 2.0 / width : 0.0;
     }
+    changing_ = changing_ || inverse_[3][lane] > 0.0;
     const bool alike = device.harmonic_ratio == 0.0 && device.coupling.turn_asymmetry == 0.0;
     if (!alike && symmetric_) {  // the gyros before have only one end so far, which is both
         for (std::size_t i = 0; i < 4; i += 2) parts_[i + 1] = parts_[i];
@@ -149,7 +159,7 @@ void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCy
     for (const double sign : {1.0, -1.0}) {
         for (int end = 0; end < (symmetric_ ? 1 : 2); ++end) {
             const KickSource source(device, sign, end, ranges);
-            Terms terms{1, 1, 1};
+            Terms terms = one_term;
             for (std::size_t v = 0; v < variables; ++v) {
                 if (inverse_[v][lane] > 0.0) terms[v] = terms_needed(source, v, tolerance_rad_);
             }
@@ -177,38 +187,37 @@ void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCy
     }
 }
 
-void TurnTables::put(Part& part, std::size_t lane, const std::array<std::size_t, variables>& terms,
+void TurnTables::put(Part& part, std::size_t lane, const Terms& terms,
                      const std::vector<std::array<double, 3>>& coefficients) {
-    std::array<std::size_t, variables> grown{};
+    Terms grown{};
     for (std::size_t v = 0; v < variables; ++v) grown[v] = std::max(part.terms[v], terms[v]);
-    const auto at = [](const std::array<std::size_t, variables>& n, std::size_t a, std::size_t b, std::size_t c) {
-        return (c * n[1] + b) * n[0] + a;
-    };
-    if (grown != part.terms || part.coefficients.empty()) {
-        std::vector<simd::Lanes> moved(3 * grown[0] * grown[1] * grown[2]);
-        for (std::size_t c = 0; c < part.terms[2] && !part.coefficients.empty(); ++c) {
-            for (std::size_t b = 0; b < part.terms[1]; ++b) {
-                for (std::size_t a = 0; a < part.terms[0]; ++a) {
-                    for (std::size_t k = 0; k < 3; ++k) {
-                        moved[3 * at(grown, a, b, c) + k] = part.coefficients[3 * at(part.terms, a, b, c) + k];
+    // Calls with the number of a coefficient among `n` terms and among those that have grown, for all of the former.
+    const auto for_each_of = [&grown](const Terms& n, const auto& action) {
+        std::size_t i = 0;
+        for (std::size_t e = 0; e < n[3]; ++e) {
+            for (std::size_t c = 0; c < n[2]; ++c) {
+                for (std::size_t b = 0; b < n[1]; ++b) {
+                    for (std::size_t a = 0; a < n[0]; ++a, ++i) {
+                        action(i, ((e * grown[2] + c) * grown[1] + b) * grown[0] + a);
                     }
                 }
             }
         }
+    };
+    if (grown != part.terms || part.coefficients.empty()) {
+        std::vector<simd::Lanes> moved(3 * grown[0] * grown[1] * grown[2] * grown[3]);
+        if (!part.coefficients.empty()) {
+            for_each_of(part.terms, [&](std::size_t from, std::size_t to) {
+                for (std::size_t k = 0; k < 3; ++k) moved[3 * to + k] = part.coefficients[3 * from + k];
+            });
+        }
         part.terms = grown;
         part.coefficients = std::move(moved);
     }
-    for (std::size_t c = 0; c < grown[2]; ++c) {
-        for (std::size_t b = 0; b < grown[1]; ++b) {
-            for (std::size_t a = 0; a < grown[0]; ++a) {
-                const bool has = a < terms[0] && b < terms[1] && c < terms[2];
-                for (std::size_t k = 0; k < 3; ++k) {
-                    part.coefficients[3 * at(grown, a, b, c) + k][lane] =
-                        has ? coefficients[at(terms, a, b, c)][k] : 0.0;
-                }
-            }
-        }
-    }
+    for (simd::Lanes& row : part.coefficients) row[lane] = 0.0;
+    for_each_of(terms, [&](std::size_t from, std::size_t to) {
+        for (std::size_t k = 0; k < 3; ++k) part.coefficients[3 * to + k][lane] = coefficients[from][k];
+    });
 }
 
 std::size_t TurnTables::nodes() const {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "engine/gyro/device.hpp"
+#include "engine/propagate/chebyshev.hpp"
 #include "engine/simd/lanes.hpp"
 
 namespace ringlock::propagate {
@@ -18,26 +19,28 @@ struct Range {
 
 /// What may differ from half cycle to half cycle of one gyro.
 struct HalfCycleRanges {
-    Range amplitude_rad;
+    Range amplitude_rad;  ///< at the turn; the half cycle's own where it does not change
     Range rate_rad_s;
     Range b_rad_s;
+    Range amplitude_change_rad{};  ///< over a half cycle; symmetric about zero
 };
 
-/// The exact half turns of a block of gyros as polynomials in amplitude, rate and coupling.
+/// The exact half turns of a block of gyros as polynomials in amplitude, rate, coupling and change of the amplitude.
 ///
 /// Each gyro has its own polynomials over its own ranges, of as many terms as hold the error measured between the
 /// nodes; a quantity that does not vary takes one term. What a gyro's polynomials are depends on its device and ranges
 /// alone.
 class TurnTables {
    public:
-    static constexpr std::size_t variables = 3;
-    static constexpr std::size_t most_nodes = 24;
+    static constexpr std::size_t variables = 4;
+    static constexpr std::size_t most_nodes = 32;
 
     /// Polynomials of the half turns at one end of half cycles of one sign.
     struct Part {
         /// Terms in each variable: the largest number of any gyro, others have zeros.
-        std::array<std::size_t, variables> terms{1, 1, 1};
-        /// [coupling][rate][amplitude][shift in fringes, Re z, Im z], powers of the variables scaled to [-1, 1].
+        Terms terms = one_term;
+        /// [change][coupling][rate][amplitude][shift in fringes, Re z, Im z], powers of the variables scaled to [-1,
+        /// 1].
         std::vector<simd::Lanes> coefficients;
     };
 
@@ -52,6 +55,8 @@ class TurnTables {
     const Part& part(double sign, int end) const { return parts_[index(sign, symmetric_ ? 0 : end)]; }
     /// Both ends are alike for all gyros.
     bool symmetric() const { return symmetric_; }
+    /// Amplitudes change over half cycles of some gyro.
+    bool changing() const { return changing_; }
     /// Lock-in may turn some gyro's phase by more than a quarter fringe at a turn.
     bool strong() const { return strong_; }
     /// Middle and inverse half width of the ranges, 0 for what does not vary.
@@ -65,12 +70,12 @@ class TurnTables {
 
    private:
     static std::size_t index(double sign, int end) { return (sign > 0 ? 0U : 2U) + static_cast<std::size_t>(end); }
-    void put(Part& part, std::size_t lane, const std::array<std::size_t, variables>& terms,
-             const std::vector<std::array<double, 3>>& coefficients);
+    void put(Part& part, std::size_t lane, const Terms& terms, const std::vector<std::array<double, 3>>& coefficients);
 
     double tolerance_rad_;
     bool symmetric_ = true;
     bool strong_ = false;
+    bool changing_ = false;
     std::array<Part, 4> parts_;
     std::array<simd::Lanes, variables> centre_;
     std::array<simd::Lanes, variables> inverse_;

@@ -28,6 +28,8 @@ enum class Purpose : std::uint64_t {
     case_motion = 14,
     witness_motion = 15,
     fitted_parameters = 16,
+    drive_noise = 17,
+    drive_noise_phase = 18,
 };
 
 /// Who draws: the study's seed and the gyro's number.

@@ -11,6 +11,7 @@
 #include "engine/core/units.hpp"
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/fast_motion.hpp"
+#include "engine/scenario/injected_noise.hpp"
 
 namespace ringlock::scenario {
 namespace {
@@ -136,7 +137,7 @@ Finding turns_can_be_counted(const Scenario& s) {
 }
 
 Finding turn_map_has_fringes(const Scenario& s) {
-    constexpr double fewest = 100.0;
+    constexpr double fewest = 10.0;
     const double fringes = phase_amplitude_rad(s) / units::pi;
     if (s.propagation.method != PropagationMethod::turn_map || fringes >= fewest) return {};
     return Complaint{
@@ -174,8 +175,12 @@ std::vector<std::string> keys_of_rates(const Scenario& s) {
     return keys;
 }
 
+bool loop_is_stable(const Scenario& s) {
+    return s.noise_injection.model != NoiseModel::drive || gyro::Resonator(drive_noise(s)).decay() < 1.0;
+}
+
 Finding turn_map_has_fast_middles(const Scenario& s) {
-    if (s.propagation.method != PropagationMethod::turn_map || fast_middles(s)) return {};
+    if (s.propagation.method != PropagationMethod::turn_map || !loop_is_stable(s) || fast_middles(s)) return {};
     std::vector<std::string> keys = keys_of_rates(s);
     for (const char* key :
          {"noise_injection.turn_phase_rms_rad", "dither.peak_rate_deg_s", "dither.frequency_hz",
@@ -186,23 +191,92 @@ Finding turn_map_has_fast_middles(const Scenario& s) {
     }
     return Complaint{
         std::move(keys),
-        "with what rates, noise, effects and spread may take from it, the dither is too slow in the middle of some "
-        "half "
-        "cycle for the turn map (which needs a phase that runs fast there); set propagation.method = \"direct\" or a "
-        "stronger "
-        "dither"};
+        "the phase can go through too few fringes between a zero-rate point and the middle of a half cycle for the "
+        "turn map, which needs 10 rad there, after injected noise, effects and the spread of the gyros have taken "
+        "their "
+        "part; set propagation.method = \"direct\" or a stronger dither"};
+}
+
+Finding amplitude_loop_is_stable(const Scenario& s) {
+    if (loop_is_stable(s)) return {};
+    return Complaint{
+        {"noise_injection.amplitude_loop_hz", "noise_injection.resonator_q", "dither.frequency_hz"},
+        "the amplitude loop is not stable: it corrects the force once in a half cycle and must be slow beside "
+        "that; a hundredth of the dither's frequency is"};
+}
+
+Finding noise_has_one_strength(const Scenario& s) {
+    const NoiseInjection& noise = s.noise_injection;
+    if (noise.drive_noise_relative == 0.0) return {};
+    if (noise.turn_phase_rms_rad != 0.0) {
+        return Complaint{
+            {"noise_injection.drive_noise_relative"},
+            "the strength of the noise is given twice, here and by noise_injection.turn_phase_rms_rad; leave "
+            "one of them out"};
+    }
+    if (noise.model == NoiseModel::drive) return {};
+    return Complaint{
+        {"noise_injection.drive_noise_relative"},
+        "noise of a drive needs noise_injection.model = \"drive\"; the model \"turns\" has its strength from "
+        "noise_injection.turn_phase_rms_rad"};
+}
+
+Finding keys_of_a_drive_need_it(const Scenario& s) {
+    const NoiseInjection& noise = s.noise_injection;
+    const NoiseInjection plain;
+    if (noise.model == NoiseModel::drive) return {};
+    const auto needless = [](const char* key) {
+        return Complaint{{std::string("noise_injection.") + key},
+                         "has a meaning with noise_injection.model = \"drive\" only; set that, or leave the key out"};
+    };
+    if (noise.resonator_q != plain.resonator_q) return needless("resonator_q");
+    if (noise.form != plain.form) return needless("form");
+    if (noise.distribution != plain.distribution) return needless("distribution");
+    if (noise.hold_half_cycles != plain.hold_half_cycles) return needless("hold_half_cycles");
+    if (noise.modulation_hz != plain.modulation_hz) return needless("modulation_hz");
+    if (noise.amplitude_loop_hz != plain.amplitude_loop_hz) return needless("amplitude_loop_hz");
+    return {};
+}
+
+Finding sinusoidal_noise_is_slow(const Scenario& s) {
+    const NoiseInjection& noise = s.noise_injection;
+    if (noise.model != NoiseModel::drive || noise.form != gyro::NoiseForm::sinusoidal) return {};
+    if (noise.modulation_hz < s.dither.frequency_hz) return {};
+    return Complaint{{"noise_injection.modulation_hz", "dither.frequency_hz"},
+                     fmt::format("the modulation must be slower than the dither, {:g} Hz", s.dither.frequency_hz)};
+}
+
+Finding changing_amplitudes_need_moebius_maps(const Scenario& s) {
+    const bool injected = std::any_of(s.arms.begin(), s.arms.end(), [](const Arm& arm) { return arm.noise_injected; });
+    const NoiseInjection& noise = s.noise_injection;
+    if (!injected || noise.model != NoiseModel::drive || noise.form == gyro::NoiseForm::white) return {};
+    if (s.propagation.method != PropagationMethod::turn_map || configured_setup(s).lockin_second_ratio == 0.0)
+        return {};
+    return Complaint{
+        {"noise_injection.model", "noise_injection.form", "propagation.method"},
+        "the turn map does not have a second harmonic of the coupling together with an amplitude that changes "
+        "over half cycles; set propagation.method = \"direct\", or leave the effect out"};
 }
 
 Finding noise_leaves_the_dither(const Scenario& s) {
     const bool injected = std::any_of(s.arms.begin(), s.arms.end(), [](const Arm& arm) { return arm.noise_injected; });
-    const double most = phase_amplitude_rad(s) / (sigmas * std::numbers::sqrt2);
-    if (!injected || s.noise_injection.turn_phase_rms_rad <= most) return {};
+    if (!injected || !loop_is_stable(s)) return {};
+    // Eight standard deviations of the amplitude leave half of it.
+    const InjectedNoise noise = injected_noise(s);
+    const double half_swing_rad = 0.5 * phase_amplitude_rad(s);
+    if (noise.margin_rad <= half_swing_rad) return {};
+    const double most_rad = noise.turn_rms_rad * half_swing_rad / noise.margin_rad;
+    const bool relative = s.noise_injection.drive_noise_relative > 0.0;
+    const std::string most =
+        relative
+            ? fmt::format("{:.4g} of the force", s.noise_injection.drive_noise_relative * most_rad / noise.turn_rms_rad)
+            : fmt::format("{:.4g} rad", most_rad);
     return Complaint{
-        {"noise_injection.turn_phase_rms_rad", "dither.peak_rate_deg_s", "dither.frequency_hz",
-         "gyro.scale_factor_arcsec"},
-        fmt::format("noise of {:g} rad at the turns must not exceed {:.4g} rad (or it halves the swing of a "
-                    "half cycle within {:g} sigma)",
-                    s.noise_injection.turn_phase_rms_rad, most, sigmas)};
+        {relative ? "noise_injection.drive_noise_relative" : "noise_injection.turn_phase_rms_rad",
+         "dither.peak_rate_deg_s", "dither.frequency_hz", "gyro.scale_factor_arcsec"},
+        fmt::format("noise of {:.4g} rad at the turns must not exceed {} (eight standard deviations of a half cycle's "
+                    "amplitude must leave half of it)",
+                    noise.turn_rms_rad, most)};
 }
 
 Finding effects_leave_a_threshold(const Scenario& s) {
@@ -342,17 +416,23 @@ constexpr std::array all_rules = {
     Rule{"A sweep of more than one point ends at another rate than it starts from.", sweep_goes_somewhere},
     Rule{"The gyros of all points of the sweep are at most 100000000.", sweep_is_not_too_large},
     Rule{"The half cycles of all gyros, those before the record with them, are at most 1e18.", turns_can_be_counted},
-    Rule{"The turn map needs at least 100 fringes in a half cycle: 2 Omega_D / (K w_D) >= 100.", turn_map_has_fringes},
+    Rule{"The turn map needs at least 10 fringes in a half cycle: 2 Omega_D / (K w_D) >= 10.", turn_map_has_fringes},
     Rule{"The turn map needs kicks below 1 rad: 2 pi Omega_L / sqrt(K Omega_D w_D) < 1.", turn_map_has_small_kicks},
-    Rule{"The turn map needs a phase that runs fast in the middle of every half cycle, with all that rates, injected "
-         "noise, "
-         "effects, spread and the room that tables leave for them may take from it: where the dither is at 0.9 of its "
-         "peak and above, g >= 4 b and g^2 >= 105 a (g: phase rate, a: its greatest acceleration, b: coupling; "
-         "docs/turn-map.md).",
-         turn_map_has_fast_middles},
-    Rule{"Injected noise leaves at least half of each half cycle's swing within six standard deviations (checked where "
-         "an arm injects noise).",
+    Rule{
+        "The turn map needs a phase that goes through at least 10 rad from a zero-rate point to the middle of the half "
+        "cycle, and a rate there of at least 4 b (b: coupling), after rates, injected noise, effects, the spread of "
+        "the gyros and the room of the tables have taken their part (docs/turn-map.md).",
+        turn_map_has_fast_middles},
+    Rule{"Injected noise leaves at least half of each half cycle's swing within eight standard deviations "
+         "(checked where an arm injects noise).",
          noise_leaves_the_dither},
+    Rule{"The strength of injected noise is given once: by turn_phase_rms_rad, or for a drive by drive_noise_relative.",
+         noise_has_one_strength},
+    Rule{"Keys of a drive's noise need model = \"drive\".", keys_of_a_drive_need_it},
+    Rule{"The amplitude loop of a drive is stable.", amplitude_loop_is_stable},
+    Rule{"A sinusoidal modulation of the drive is slower than the dither.", sinusoidal_noise_is_slow},
+    Rule{"The turn map has no second harmonic of the coupling together with held or sinusoidal noise of a drive.",
+         changing_amplitudes_need_moebius_maps},
     Rule{"Effects change the lock-in threshold by no more than 0.9 of itself over the run.", effects_leave_a_threshold},
     Rule{"An ideal readout has no ellipse to correct.", ideal_detectors_need_no_correction},
     Rule{"Keys that only the instrument has stay at their defaults with other readout models.",

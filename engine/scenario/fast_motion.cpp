@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "engine/core/units.hpp"
 #include "engine/gyro/device.hpp"
 #include "engine/gyro/fast_motion.hpp"
 #include "engine/scenario/active_effects.hpp"
+#include "engine/scenario/injected_noise.hpp"
 
 namespace ringlock::scenario {
 
@@ -55,6 +55,7 @@ double tabulated_coupling(const Scenario& s) {
 /// What a table is asked to cover; the couplings go up to, and the amplitudes down from, those of the gyro.
 struct Room {
     double margin_rad;
+    double change_rad;  ///< of the amplitude over a half cycle
     double lowest_rate_deg_h, highest_rate_deg_h;
     double coupling;
     bool with_harmonics;  ///< of dither and coupling
@@ -75,7 +76,7 @@ bool fast(const Scenario& s, const Room& room) {
         setup.dither_asymmetry_ratio = asymmetry + off;
         gyro::Device device(setup);
         // Amplitudes, rates and couplings inside are faster: the worst are at the corners.
-        const double amplitude = device.dither_amplitude_rad - room.margin_rad;
+        const double amplitude = device.dither_amplitude_rad - room.margin_rad - 0.5 * room.change_rad;
         if (amplitude <= 0.0) return false;
         const bool series = setup.lockin_second_ratio != 0.0;
         const double b = series ? gyro::strength_with_harmonics_rad_s(device.coupling) : device.coupling.b_rad_s;
@@ -83,7 +84,9 @@ bool fast(const Scenario& s, const Room& room) {
             device.input_rate_rad_s = device.phase_per_arcsec * rate;
             for (const double sign : {1.0, -1.0}) {
                 for (const int end : {0, 1}) {
-                    if (!gyro::has_fast_middle(device.half_cycle(sign, amplitude).upright(end), b)) return false;
+                    gyro::HalfCycle half = device.half_cycle(sign, amplitude);
+                    half.amplitude_change_rad = (end == 0 ? -1.0 : 1.0) * room.change_rad;
+                    if (!gyro::has_fast_middle(half.upright(end), b)) return false;
                 }
             }
         }
@@ -95,8 +98,7 @@ bool fast(const Scenario& s, const Room& room) {
 
 bool fast_middles(const Scenario& s) {
     const auto [lowest, highest] = input_range(s.input);
-    // Eight standard deviations of half the difference of two turns, see LaneDither::amplitude_margin_rad().
-    const double noise_rad = 8.0 / std::numbers::sqrt2 * s.noise_injection.turn_phase_rms_rad;
+    const InjectedNoise injected = injected_noise(s);
     bool driven[2] = {};    // without and with noise injected
     bool inverted[2] = {};  // by a compensator with tables of its own
     for (const Arm& arm : s.arms) {
@@ -112,11 +114,12 @@ bool fast_middles(const Scenario& s) {
                             16.0 * s.gyro.scale_factor_arcsec;
     const double told = (1.0 + s.calibration.threshold_error_relative) * 1.02;
     for (const bool noisy : {false, true}) {
-        const double margin = noisy ? noise_rad : 0.0;
+        const double margin = noisy ? injected.margin_rad : 0.0;
+        const double change = noisy ? injected.change_rad : 0.0;
         const double wider = std::max(margin, 0.002 * amplitude_rad);
-        if (driven[noisy] && !fast(s, {margin, lowest - room, highest + room, tabulated_coupling(s), true}))
+        if (driven[noisy] && !fast(s, {margin, change, lowest - room, highest + room, tabulated_coupling(s), true}))
             return false;
-        if (inverted[noisy] && !fast(s, {wider, lowest - measured, highest + measured, told, false})) return false;
+        if (inverted[noisy] && !fast(s, {wider, 0.0, lowest - measured, highest + measured, told, false})) return false;
     }
     return true;
 }

@@ -16,6 +16,7 @@
 #include "engine/effects/effect.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/check.hpp"
+#include "engine/scenario/devices.hpp"
 #include "engine/scenario/schema.hpp"
 #include "engine/scenario/text.hpp"
 
@@ -66,7 +67,15 @@ class Reader {
     explicit Reader(std::string_view file) : file_(file) {}
 
     Scenario read(const toml::table& root) {
-        for (const auto& [name, node] : root) read_top(name, node);
+        if (const toml::node* device = root.get("device")) read_device_name(*device);
+        for (const auto& [name, node] : root) {
+            if (name != "device") read_top(name, node);
+        }
+        // Whoever gives the strength of a drive's noise does not give the other one, which has a default.
+        if (scenario_.noise_injection.drive_noise_relative > 0.0 &&
+            !places_.contains("noise_injection.turn_phase_rms_rad")) {
+            scenario_.noise_injection.turn_phase_rms_rad = 0.0;
+        }
         if (problems_.empty()) apply_rules();
         if (!problems_.empty()) throw InputError(report());
         return std::move(scenario_);
@@ -89,6 +98,27 @@ class Reader {
                                     : fmt::format("{}: {}", file_, p.text));
         }
         return fmt::format("{}", fmt::join(lines, "\n"));
+    }
+
+    /// The constants of a device, which the keys of the file itself override.
+    void read_device_name(const toml::node& node) {
+        const auto* name = node.as_string();
+        const DeviceFile* device = name == nullptr ? nullptr : find_device(name->get());
+        if (device == nullptr) {
+            std::vector<std::string> known;
+            for (const DeviceFile& file : device_files()) known.emplace_back(file.name);
+            const std::string hint = name == nullptr ? "" : did_you_mean(name->get(), known);
+            return note(node.source().begin,
+                        fmt::format("key \"device\" = {}: must be the name of a known device{}; devices are: {}",
+                                    value_text(node), hint, fmt::join(known, ", ")));
+        }
+        scenario_.device = device->name;
+        const toml::table constants = toml::parse(device->text, device->name);
+        for (const auto& [section_name, section_node] : constants) {
+            const Section* section = find_section(section_name);
+            if (section != nullptr && section_node.is_table()) read_section(*section, *section_node.as_table());
+        }
+        places_.clear();  // of the device's file, which the user has not written
     }
 
     void read_top(const toml::key& name, const toml::node& node) {
@@ -248,6 +278,7 @@ class Reader {
         }
         known.emplace_back("effects");
         const std::string sections = fmt::format("{}", fmt::join(known, ", "));
+        known.emplace_back("device");
         if (node.is_table()) {
             return note(name.source().begin,
                         fmt::format("section [{}]: unknown section{}; sections are: {}", name_text(name.str()),

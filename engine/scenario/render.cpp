@@ -46,6 +46,7 @@ std::string allowed_sentence(const Key& key) {
 
 std::string write(const Scenario& scenario, bool commented) {
     std::string out;
+    if (!scenario.device.empty()) out += fmt::format("device = \"{}\"\n", scenario.device);
     for (const Section& section : schema()) {
         if (!out.empty()) out += '\n';
         if (commented) out += comment(section.doc);
@@ -93,6 +94,9 @@ std::string to_toml(const Scenario& scenario) { return write(scenario, false); }
 
 std::string schema_text() {
     return comment("Every key of a ringlock scenario at its default. A scenario needs to name only what differs.") +
+           comment(
+               "device = \"NAME\", before all sections, takes the constants of a known gyro for defaults; ringlock "
+               "devices lists them.") +
            '\n' + write(Scenario{}, true);
 }
 
@@ -107,6 +111,12 @@ std::string schema_markdown() {
         "value; all of a file's errors are reported at once. Integers are accepted where a float is wanted. "
         "`ringlock run --print-schema` prints a commented file with every default.",
         "", "");
+    out +=
+        '\n' + wrapped(
+                   "`device = \"NAME\"` at the top of a scenario, before all sections, takes the constants of a known "
+                   "gyro for defaults; keys of the scenario override them one by one. `ringlock devices` lists the "
+                   "gyros and where their constants come from.",
+                   "", "");
     for (const Section& section : schema()) {
         out += fmt::format("\n## `[{}]`\n\n{}\n", section.name, wrapped(section.doc, "", ""));
         out += "| key | type | default | allowed | meaning |\n|---|---|---|---|---|\n";

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/gyro/resonator.hpp"
 #include "engine/scenario/arm.hpp"
 
 /// Plain, validated description of a study. Units are in the names; K is arcsec per fringe (2 pi of optical phase).
@@ -27,9 +28,20 @@ struct Dither {
     bool operator==(const Dither&) const = default;
 };
 
-/// Random noise on the dither angle at the turns, for arms that begin with noise_injected.
+enum class NoiseModel { turns, drive };
+
+/// Random noise injected into the dither: on the angles of the turns directly, or on the force that drives the
+/// resonator.
 struct NoiseInjection {
-    double turn_phase_rms_rad = 3.0;  ///< rms of the noise at each turn, in optical phase (K/(2 pi) arcsec each)
+    NoiseModel model = NoiseModel::turns;
+    double turn_phase_rms_rad = 3.0;    ///< rms of the noise at each turn, in optical phase (K/(2 pi) arcsec each)
+    double drive_noise_relative = 0.0;  ///< the other way to give the strength: rms of the force over its mean
+    double resonator_q = 100.0;
+    gyro::NoiseForm form = gyro::NoiseForm::held;
+    gyro::NoiseDistribution distribution = gyro::NoiseDistribution::gaussian;
+    std::int64_t hold_half_cycles = 1;
+    double modulation_hz = 1.0;
+    double amplitude_loop_hz = 0.0;
     bool operator==(const NoiseInjection&) const = default;
 };
 
@@ -146,6 +158,7 @@ double profile_angle_arcsec(const InputRate& input, double start_s, double durat
 double amplitude_change_relative(const Dither& dither, double duration_s);
 
 struct Scenario {
+    std::string device;  ///< whose constants stand in place of the defaults (devices.hpp); empty: none was named
     Gyro gyro;
     Dither dither;
     NoiseInjection noise_injection;

@@ -18,6 +18,9 @@ namespace {
 
 /// Words of each enumeration, in the order of its values.
 std::vector<std::string> words_of(ReadoutModel) { return {"ideal", "latched", "instrument"}; }
+std::vector<std::string> words_of(NoiseModel) { return {"turns", "drive"}; }
+std::vector<std::string> words_of(gyro::NoiseForm) { return {"held", "white", "sinusoidal"}; }
+std::vector<std::string> words_of(gyro::NoiseDistribution) { return {"gaussian", "uniform", "binary"}; }
 std::vector<std::string> words_of(PhaseFrom) { return {"detectors", "detectors_and_pulses"}; }
 std::vector<std::string> words_of(AngleOutput) { return {"interpolated", "quarter_fringe"}; }
 std::vector<std::string> words_of(PropagationMethod) { return {"turn_map", "direct"}; }
@@ -115,10 +118,32 @@ std::vector<Section> base_sections() {
         {"noise_injection",
          "Random noise on the dither angle, in arms that begin with noise_injected.",
          {
+             key(RINGLOCK_KEY(noise_injection, model), none,
+                 "turns: the angles of the turns are independent, which no drive can make; drive: the force that "
+                 "drives "
+                 "the dithered body, a resonator, is noisy (docs/noise-injection.md)."),
              key(RINGLOCK_KEY(noise_injection, turn_phase_rms_rad),
                  between(0.0, 1e4, "far more than it takes to randomise the turns"),
-                 "Rms of the noise at each turn, independent from turn to turn, in optical phase; 3 rad randomise the "
-                 "turns fully."),
+                 "Rms of the angle at the turns about its mean, in optical phase, stationary, behind resonator and "
+                 "amplitude loop. Independent from turn to turn, 3 rad randomise the turns fully."),
+             key(RINGLOCK_KEY(noise_injection, drive_noise_relative), between(0.0, 100.0, "the drive keeps its sense"),
+                 "Of a drive, instead of turn_phase_rms_rad: rms of the noise of the force over its mean; 0: not "
+                 "given."),
+             key(RINGLOCK_KEY(noise_injection, resonator_q), between(20.0, 1e5, "a dither is driven at its resonance"),
+                 "Of a drive: quality factor Q."),
+             key(RINGLOCK_KEY(noise_injection, form), none,
+                 "Of a drive: held: the force is constant for hold_half_cycles and then drawn anew; white: drawn anew "
+                 "32 "
+                 "times in a half cycle; sinusoidal: modulated at modulation_hz."),
+             key(RINGLOCK_KEY(noise_injection, distribution), none, "Of a drive: of the force's levels."),
+             key(RINGLOCK_KEY(noise_injection, hold_half_cycles), between<std::int64_t>(1, 10'000, "it is noise"),
+                 "Of a drive with held noise: half cycles from one redraw to the next."),
+             key(RINGLOCK_KEY(noise_injection, modulation_hz), above(0.0, 1e5, "a modulation goes up and down"),
+                 "Of a drive with sinusoidal noise: frequency of the modulation, which begins with a random phase."),
+             key(RINGLOCK_KEY(noise_injection, amplitude_loop_hz), between(0.0, 1e4, "slow beside the dither"),
+                 "Of a drive: where the open loop of the integrator that holds the amplitude has the gain 1; slower "
+                 "noise "
+                 "is taken away; 0: no loop."),
          }},
         {"readout",
          "What the electronics can know of the phase; compensators see nothing else.",

@@ -54,7 +54,7 @@ class Block {
     explicit Block(bool second_harmonic)
         : devices_(simd::lanes, device(second_harmonic)),
           dither_(devices_, bench::turn_phase_rms_rad, identities()),
-          map_(propagate::make_turn_map(devices_, dither::LaneDither::amplitude_margin_rad(bench::turn_phase_rms_rad),
+          map_(propagate::make_turn_map(devices_, {dither::LaneDither::amplitude_margin_rad(bench::turn_phase_rms_rad)},
                                         tolerance_rad)) {
         advance();  // tables
     }

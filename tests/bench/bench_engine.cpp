@@ -299,7 +299,7 @@ std::vector<std::pair<std::string, double>> stages() {
         calibration.positive_duration_s[lane] = device.positive_duration_s;
         calibration.negative_duration_s[lane] = device.negative_duration_s;
     }
-    const auto map = propagate::make_turn_map(devices, calibration.amplitude_margin_rad, table_tolerance_rad);
+    const auto map = propagate::make_turn_map(devices, {calibration.amplitude_margin_rad}, table_tolerance_rad);
     const std::vector<gyro::Ellipse> ellipses(simd::lanes);
     const readout::LaneReadout readout(devices, ellipses, {false, true, 100e6, 0.005}, readout::Wanted::accelerations);
     dither::LaneDither dither(devices, bench::turn_phase_rms_rad, who);

@@ -82,11 +82,11 @@ TEST_F(RunCommand, BadScenariosAreRefusedWithPlaceKeyValueAndWhatIsAllowed) {
         "[dither]\npeak_rate_deg_s = 20\n[ensemble]\nduration_s = 3000\n"
         "[effects.bias_temperature]\ndeg_h_per_k = 100\n"
         "[environment]\ntemperature_ramp_k_per_h = 1000\n",
-        says("bad.toml:6:15", "effects.bias_temperature.deg_h_per_k", "100.0", "too slow"));
+        says("bad.toml:6:15", "effects.bias_temperature.deg_h_per_k", "100.0", "too few fringes"));
     expect_scenario_refused(
-        "[dither]\npeak_rate_deg_s = 10\n[input]\nprofile_time_s = [0, 600]\n"
-        "profile_rate_deg_h = [0, 17280]\n",
-        says("bad.toml:5:22", "input.profile_rate_deg_h", "17280.0", "too slow"));
+        "[dither]\npeak_rate_deg_s = 0.8\n[gyro]\nlockin_threshold_deg_h = 20\n[input]\nprofile_time_s = [0, 600]\n"
+        "profile_rate_deg_h = [0, 1400]\n",
+        says("bad.toml:7:22", "input.profile_rate_deg_h", "1400.0", "too few fringes"));
     expect_scenario_refused("[arms]\nnames = []\n", says("bad.toml:2:9", "arms.names", "empty"));
     expect_scenario_refused("[arms]\nnames = [\"ideal\", \"ideal\"]\n", says("bad.toml:2:19", "stands twice"));
     expect_scenario_refused("[effects.gremlins]\nnumber = 3\n", says("bad.toml:1:", "gremlins", "unknown effect"));

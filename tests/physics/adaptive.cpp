@@ -28,7 +28,7 @@ scenario::Scenario instrument() {
 compensate::Adaptive make_adaptive(scenario::Scenario scenario, const std::vector<gyro::Setup>& setups, double factor) {
     scenario.calibration.threshold_error_relative = factor - 1.0;
     const std::vector<gyro::Device> devices(setups.begin(), setups.end());
-    const auto calibration = ensemble::calibration_of(scenario, devices, scenario.noise_injection.turn_phase_rms_rad);
+    const auto calibration = ensemble::calibration_of(scenario, devices, true);
     return {calibration, ensemble::electronics_of(scenario), 1e-10};
 }
 

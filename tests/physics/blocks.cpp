@@ -89,10 +89,10 @@ TEST(GyroBlock, FollowsAStepBetweenTwoPiecesLikeTheDirectIntegrator) {
 }
 
 TEST(GyroBlock, WithoutLockInTheDirectIntegratorNeedsNoFringes) {
-    // 28 fringes in a half cycle: no turn map has a fast middle there, that of a gyro without lock-in neither.
+    // 3 fringes in a half cycle: no turn map has a fast middle there, that of a gyro without lock-in neither.
     auto scenario = quiet();
     scenario.readout.model = scenario::ReadoutModel::ideal;
-    scenario.dither.peak_rate_deg_s = 1.5;
+    scenario.dither.peak_rate_deg_s = 0.16;
     const Outcome outcome = go(scenario, true, "ideal", 2, 64);
     const double rate_deg_h = scenario.input.rate_deg_h;
     for (std::size_t i = 0; i < outcome.angle_arcsec.size(); ++i) {
@@ -129,7 +129,7 @@ TEST(GyroBlock, RemakesTablesAFewTimesOnly) {
 TEST(TurnMapLanes, AmplitudesBeyondTheMarginAreTakenIn) {
     const std::vector<gyro::Device> devices{gyro::Device(paper_device())};
     const double a = devices[0].dither_amplitude_rad;
-    propagate::TurnMapLanes<propagate::MoebiusTurns> map(devices, 5.0, 1e-10);
+    propagate::TurnMapLanes<propagate::MoebiusTurns> map(devices, {5.0}, 1e-10);
     propagate::DirectPropagator direct(devices, 1e-10);
     double worst = 0.0;
     double plain = 0.1;
@@ -189,12 +189,14 @@ TEST(Ensemble, TellsNoTurnTwiceWhereABlockBeginsAgain) {
     scenario.output.sample_interval_s = 0.1;
     scenario.ensemble.dither_amplitude_sd_relative = 0.0;
     scenario.ensemble.dither_asymmetry_sd_ratio = 0.0;
-    // The turn map has fast middles up to 0.9 - sqrt(104.6/M) = 0.7712 of the dither's peak rate, 302 880 deg/h: the
-    // last of three gyros passes that at the step, which is in its second piece of 128 turns.
+    // 10.5 fringes in a half cycle: the turn map exists up to 0.54 of the dither's peak rate, 1100 deg/h. The last of
+    // three gyros passes that at the step, which is in its second piece of 128 turns.
+    scenario.dither.peak_rate_deg_s = 0.57;
+    scenario.gyro.lockin_threshold_deg_h = 30.0;
     scenario.input.rate_deg_h = 0.0;
-    scenario.input.sweep_stop_deg_h = 302700.0;
+    scenario.input.sweep_stop_deg_h = 1070.0;
     scenario.input.sweep_points = 3;
-    scenario.effects["bias_step"] = {{"step_deg_h", 400.0}, {"time_s", 0.8}};
+    scenario.effects["bias_step"] = {{"step_deg_h", 60.0}, {"time_s", 0.8}};
     struct Nothing final : ensemble::BlockSink {
         void cycles(std::size_t /*arm*/, std::span<const simd::LaneCounts> /*counts*/) override {}
         void finish(const ensemble::BlockResult& /*result*/) override {}

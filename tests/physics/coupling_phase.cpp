@@ -112,7 +112,7 @@ void expect_both_right(const std::vector<gyro::Device>& devices) {
     propagate::DirectPropagator direct(devices, 1e-12);
     expect_alike(go_through(direct, devices, phases_rad, whole), expected, devices.size(), 1e-9);
     const auto map =
-        propagate::make_turn_map(devices, dither::LaneDither::amplitude_margin_rad(block_noise_rad), 1e-10);
+        propagate::make_turn_map(devices, {dither::LaneDither::amplitude_margin_rad(block_noise_rad)}, 1e-10);
     expect_alike(go_through(*map, devices, phases_rad, whole), expected, devices.size(), 4e-9);
 }
 
@@ -136,9 +136,9 @@ TEST(CouplingPhase, JumpsAlikeInAnyPieces) {
         const std::array<std::size_t, 1> whole = {half_cycles};
         const std::array<std::size_t, 4> parts = {1, 3, 4, 2};
         const auto one =
-            propagate::make_turn_map(devices, dither::LaneDither::amplitude_margin_rad(block_noise_rad), 1e-10);
+            propagate::make_turn_map(devices, {dither::LaneDither::amplitude_margin_rad(block_noise_rad)}, 1e-10);
         const auto other =
-            propagate::make_turn_map(devices, dither::LaneDither::amplitude_margin_rad(block_noise_rad), 1e-10);
+            propagate::make_turn_map(devices, {dither::LaneDither::amplitude_margin_rad(block_noise_rad)}, 1e-10);
         expect_alike(go_through(*one, devices, phases_rad, whole), go_through(*other, devices, phases_rad, parts),
                      devices.size(), 1e-12);
     }

@@ -80,7 +80,7 @@ TEST(ModeHop, IsFollowedByBothPropagators) {
         ensemble::added_angles(active, s, setups)->add_angles({1, 0, start_s, duration_s}, angle_arcsec);
     }
     propagate::DirectPropagator direct(devices, 1e-12);
-    const auto map = propagate::make_turn_map(devices, 0.0, 1e-10);
+    const auto map = propagate::make_turn_map(devices, {}, 1e-10);
     for (propagate::LanePropagator* propagator : {static_cast<propagate::LanePropagator*>(&direct), map.get()}) {
         dither::LaneDither dither(devices, 0.0, {});
         gyro::LaneDrive drive;

@@ -141,7 +141,7 @@ TEST(Propagators, TurnMapMeasuresTheErrorOfItsTables) {
 
 TEST(Propagators, TurnMapRefusesADitherWithTooFewFringes) {
     gyro::Setup setup = paper_device();
-    setup.dither_peak_rate_deg_s = 1.0;  // 18 fringes a half cycle
+    setup.dither_peak_rate_deg_s = 0.1;  // 1.8 fringes a half cycle
     const gyro::Device device(setup);
     EXPECT_THROW(make_propagator(Method::turn_map, device), RunError);
 }

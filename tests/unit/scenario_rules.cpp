@@ -6,6 +6,7 @@
 #include "engine/core/error.hpp"
 #include "engine/scenario/check.hpp"
 #include "engine/scenario/parse.hpp"
+#include "engine/scenario/render.hpp"
 
 namespace ringlock::scenario {
 namespace {
@@ -130,12 +131,14 @@ TEST(Environment, TemperatureIsARampAndAWave) {
 }
 
 TEST(ScenarioRules, TheTurnMapNeedsFringes) {
-    // 2 Omega_D / (K w_D) is 2005 at the default: 100 are left at a twentieth of the dither's peak rate.
-    const std::string weak = "[dither]\npeak_rate_deg_s = 5.4\n[gyro]\nlockin_threshold_deg_h = 100\n";
-    EXPECT_THAT(complaint(weak), AllOf(HasSubstr("key \"dither.peak_rate_deg_s\" = 5.4: 99.3 fringes in a half cycle"),
-                                       HasSubstr("propagation.method = \"direct\"")));
-    EXPECT_EQ(complaint(weak + "[propagation]\nmethod = \"direct\""), "");
-    EXPECT_EQ(complaint("[dither]\npeak_rate_deg_s = 5.5\n[gyro]\nlockin_threshold_deg_h = 100\n"), "");
+    // 2 Omega_D / (K w_D) is 2005 at the default and 10 at 0.544 deg/s.
+    const std::string weak =
+        "[gyro]\nlockin_threshold_deg_h = 20\n[noise_injection]\nturn_phase_rms_rad = 1\n[dither]\n";
+    EXPECT_THAT(complaint(weak + "peak_rate_deg_s = 0.54"),
+                AllOf(HasSubstr("key \"dither.peak_rate_deg_s\" = 0.54: 9.93 fringes in a half cycle"),
+                      HasSubstr("propagation.method = \"direct\"")));
+    EXPECT_EQ(complaint(weak + "peak_rate_deg_s = 0.54\n[propagation]\nmethod = \"direct\""), "");
+    EXPECT_EQ(complaint(weak + "peak_rate_deg_s = 0.55"), "");
 }
 
 TEST(ScenarioRules, TheTurnMapNeedsSmallKicks) {
@@ -148,49 +151,110 @@ TEST(ScenarioRules, TheTurnMapNeedsSmallKicks) {
 }
 
 TEST(ScenarioRules, TheTurnMapNeedsFastMiddles) {
-    // 0.9 - rate/peak >= sqrt(104.6/M): with M = 317 rad, rates up to 0.32 of the peak of 19800 deg/h, less what noise,
-    // spread and tables take.
-    const std::string weak = "[dither]\npeak_rate_deg_s = 5.5\n[gyro]\nlockin_threshold_deg_h = 50\n";
-    EXPECT_EQ(complaint(weak + "[input]\nrate_deg_h = 5000"), "");
-    EXPECT_THAT(complaint(weak + "[input]\nrate_deg_h = -6500"),
-                AllOf(HasSubstr("s.toml:6:14: key \"input.rate_deg_h\" = -6500.0: "), HasSubstr("runs fast")));
-    EXPECT_EQ(complaint(weak + "[input]\nrate_deg_h = -6500\n[propagation]\nmethod = \"direct\""), "");
-    EXPECT_THAT(complaint(weak + "[noise_injection]\nturn_phase_rms_rad = 37"),
-                HasSubstr("s.toml:6:22: key \"noise_injection.turn_phase_rms_rad\""));
-    EXPECT_THAT(complaint(weak + "[effects.base_vibration]\nrate_deg_h = 5000"), HasSubstr("runs fast"));
+    // 11 fringes: a swing of M = 34.7 rad from the zero-rate point to the middle without input, of which 10 must be
+    // left.
+    const std::string weak =
+        "[dither]\npeak_rate_deg_s = 0.6\n[gyro]\nlockin_threshold_deg_h = 20\n[noise_injection]\n"
+        "turn_phase_rms_rad = 1\n";
+    EXPECT_EQ(complaint(weak + "[input]\nrate_deg_h = 500"), "");
+    EXPECT_THAT(
+        complaint(weak + "[input]\nrate_deg_h = -1000"),
+        AllOf(HasSubstr("s.toml:8:14: key \"input.rate_deg_h\" = -1000.0: "), HasSubstr("too few fringes between")));
+    EXPECT_EQ(complaint(weak + "[input]\nrate_deg_h = -1000\n[propagation]\nmethod = \"direct\""), "");
+    EXPECT_THAT(complaint(weak + "[effects.base_vibration]\nrate_deg_h = 1500"), HasSubstr("too few fringes between"));
 }
 
-// Every effect that adds a rate takes from the dither, and so does the input's profile; a run would fail.
+// Every effect that adds a rate takes from the swing, and so does the input's profile; a run would fail.
 TEST(ScenarioRules, AllRatesTakeFromTheFastMiddles) {
     const std::string slow = "[dither]\npeak_rate_deg_s = 20\n[ensemble]\nduration_s = 3000\n";
     EXPECT_EQ(complaint(slow), "");
-    EXPECT_THAT(complaint(slow + "[effects.bias_ramp]\ndeg_h_per_h = 1e5"),
-                AllOf(HasSubstr("s.toml:6:15: key \"effects.bias_ramp.deg_h_per_h\""), HasSubstr("runs fast")));
+    EXPECT_THAT(
+        complaint(slow + "[effects.bias_ramp]\ndeg_h_per_h = 1e5"),
+        AllOf(HasSubstr("s.toml:6:15: key \"effects.bias_ramp.deg_h_per_h\""), HasSubstr("too few fringes between")));
     EXPECT_THAT(complaint(slow + "[effects.bias_temperature]\ndeg_h_per_k = 100\n"
                                  "[environment]\ntemperature_ramp_k_per_h = 1000"),
-                AllOf(HasSubstr("s.toml:6:15: key \"effects.bias_temperature.deg_h_per_k\""), HasSubstr("runs fast")));
-    // Of a rate of 0.4 of the dither's peak a tenth is added; tables leave twice that for it.
-    const std::string fast = "[dither]\npeak_rate_deg_s = 10\n[input]\nrate_deg_h = 14500\n";
+                AllOf(HasSubstr("s.toml:6:15: key \"effects.bias_temperature.deg_h_per_k\""),
+                      HasSubstr("too few fringes between")));
+    // To a rate of 0.49 of the dither's peak a tenth is added, and tables leave twice that for it: 10 rad of M = 46 are
+    // left up to 0.63.
+    const std::string fast =
+        "[dither]\npeak_rate_deg_s = 0.8\n[gyro]\nlockin_threshold_deg_h = 20\n[noise_injection]\n"
+        "turn_phase_rms_rad = 0.1\n[input]\nrate_deg_h = 1400\n";
     EXPECT_EQ(complaint(fast), "");
-    EXPECT_THAT(complaint(fast + "[effects.scale_factor_error]\nrelative = 0.1"), HasSubstr("runs fast"));
+    EXPECT_THAT(complaint(fast + "[effects.scale_factor_error]\nrelative = 0.1"), HasSubstr("too few fringes between"));
 }
 
 TEST(ScenarioRules, AProfileTakesFromTheFastMiddlesLikeAConstantRate) {
-    const std::string slow = "[dither]\npeak_rate_deg_s = 10\n[input]\n";
-    EXPECT_THAT(complaint(slow + "rate_deg_h = 17280"),
-                AllOf(HasSubstr("s.toml:4:14: key \"input.rate_deg_h\""), HasSubstr("runs fast")));
-    EXPECT_THAT(
-        complaint(slow + "profile_time_s = [0, 600]\nprofile_rate_deg_h = [0, 17280]"),
-        AllOf(HasSubstr("s.toml:5:22: key \"input.profile_rate_deg_h\" = [0.0, 17280.0]"), HasSubstr("runs fast")));
-    EXPECT_THAT(complaint(slow + "profile_time_s = [0, 600]\nprofile_rate_deg_h = [-17280, 0]"),
-                HasSubstr("runs fast"));
-    EXPECT_EQ(complaint(slow + "profile_time_s = [0, 600]\nprofile_rate_deg_h = [0, 5000]"), "");
+    const std::string slow = "[dither]\npeak_rate_deg_s = 0.8\n[gyro]\nlockin_threshold_deg_h = 20\n[input]\n";
+    EXPECT_THAT(complaint(slow + "rate_deg_h = 1400"),
+                AllOf(HasSubstr("s.toml:6:14: key \"input.rate_deg_h\""), HasSubstr("too few fringes between")));
+    EXPECT_THAT(complaint(slow + "profile_time_s = [0, 600]\nprofile_rate_deg_h = [0, 1400]"),
+                AllOf(HasSubstr("s.toml:7:22: key \"input.profile_rate_deg_h\" = [0.0, 1400.0]"),
+                      HasSubstr("too few fringes between")));
+    EXPECT_THAT(complaint(slow + "profile_time_s = [0, 600]\nprofile_rate_deg_h = [-1400, 0]"),
+                HasSubstr("too few fringes between"));
+    EXPECT_EQ(complaint(slow + "profile_time_s = [0, 600]\nprofile_rate_deg_h = [0, 400]"), "");
 }
 
-TEST(ScenarioRules, InjectedNoiseLeavesTheDither) {
-    const std::string noisy = "[noise_injection]\nturn_phase_rms_rad = 800\n";
-    EXPECT_THAT(complaint(noisy), HasSubstr("s.toml:2:22: key \"noise_injection.turn_phase_rms_rad\" = 800.0: "));
+TEST(ScenarioRules, InjectedNoiseLeavesHalfTheSwing) {
+    // 8 s / sqrt(2) <= M / 2, M = 6299 rad.
+    const std::string noisy = "[noise_injection]\nturn_phase_rms_rad = 560\n";
+    EXPECT_THAT(complaint(noisy), AllOf(HasSubstr("s.toml:2:22: key \"noise_injection.turn_phase_rms_rad\" = 560.0: "),
+                                        HasSubstr("must not exceed 556.9 rad")));
     EXPECT_EQ(complaint(noisy + "[arms]\nnames = [\"ideal\", \"uncompensated\"]"), "");
+    EXPECT_EQ(complaint("[noise_injection]\nturn_phase_rms_rad = 556"), "");
+}
+
+TEST(ScenarioRules, NoiseOfADriveLeavesHalfTheSwing) {
+    // 8 s <= M / 2; M is 81 rad for triangle-20mm.
+    const std::string noisy = "device = \"triangle-20mm\"\n[noise_injection]\nmodel = \"drive\"\n";
+    EXPECT_THAT(complaint(noisy + "turn_phase_rms_rad = 5.1"),
+                AllOf(HasSubstr("s.toml:4:22: key \"noise_injection.turn_phase_rms_rad\" = 5.1: "),
+                      HasSubstr("must not exceed 5.05"), HasSubstr(" rad")));
+    EXPECT_EQ(complaint(noisy + "turn_phase_rms_rad = 5.0"), "");
+    EXPECT_THAT(complaint(noisy + "drive_noise_relative = 1.0"),
+                AllOf(HasSubstr("s.toml:4:24: key \"noise_injection.drive_noise_relative\" = 1.0: "),
+                      HasSubstr("must not exceed 0."), HasSubstr("of the force")));
+    EXPECT_EQ(complaint(noisy + "drive_noise_relative = 0.3"), "");
+}
+
+TEST(ScenarioRules, TheStrengthOfNoiseIsGivenOnce) {
+    const std::string drive = "[noise_injection]\nmodel = \"drive\"\ndrive_noise_relative = 0.01\n";
+    EXPECT_EQ(complaint(drive), "");
+    EXPECT_THAT(complaint(drive + "turn_phase_rms_rad = 3.0"),
+                AllOf(HasSubstr("s.toml:3:24: key \"noise_injection.drive_noise_relative\" = 0.01: "),
+                      HasSubstr("given twice")));
+    EXPECT_THAT(complaint("[noise_injection]\ndrive_noise_relative = 0.01"), HasSubstr("model = \"drive\""));
+    // Writing a scenario names every key, and must come back.
+    const Scenario s = parse_string(drive, "s.toml");
+    EXPECT_EQ(to_toml(parse_string(to_toml(s), "again.toml")), to_toml(s));
+    EXPECT_EQ(s.noise_injection.turn_phase_rms_rad, 0.0);
+}
+
+TEST(ScenarioRules, KeysOfADriveNeedADrive) {
+    for (const char* key : {"resonator_q = 50.0", "form = \"white\"", "distribution = \"binary\"",
+                            "hold_half_cycles = 2", "modulation_hz = 2.0", "amplitude_loop_hz = 1.0"}) {
+        EXPECT_THAT(complaint(std::string("[noise_injection]\n") + key),
+                    AllOf(HasSubstr("s.toml:2:"), HasSubstr("model = \"drive\" only")))
+            << key;
+        EXPECT_EQ(complaint(std::string("[noise_injection]\nmodel = \"drive\"\n") + key), "") << key;
+    }
+}
+
+TEST(ScenarioRules, ADriveHasAStableLoopAndASlowModulation) {
+    const std::string drive = "[noise_injection]\nmodel = \"drive\"\n";
+    EXPECT_THAT(complaint(drive + "amplitude_loop_hz = 100.0"),
+                AllOf(HasSubstr("s.toml:3:21: key \"noise_injection.amplitude_loop_hz\""), HasSubstr("not stable")));
+    EXPECT_EQ(complaint(drive + "amplitude_loop_hz = 1.2"), "");
+    EXPECT_THAT(complaint(drive + "form = \"sinusoidal\"\nmodulation_hz = 125.0"), HasSubstr("slower than the dither"));
+    EXPECT_EQ(complaint(drive + "form = \"sinusoidal\"\nmodulation_hz = 120.0"), "");
+}
+
+TEST(ScenarioRules, GrowingAmplitudesNeedMoebiusMaps) {
+    const std::string both =
+        "[noise_injection]\nmodel = \"drive\"\n[effects.lockin_second_harmonic]\nratio = 0.2\n[propagation]\n";
+    EXPECT_THAT(complaint(both), AllOf(HasSubstr("second harmonic"), HasSubstr("propagation.method = \"direct\"")));
+    EXPECT_EQ(complaint(both + "method = \"direct\""), "");
 }
 
 TEST(ScenarioRules, KeysOfTheInstrumentNeedTheInstrument) {

@@ -1,0 +1,19 @@
+#pragma once
+#include "engine/gyro/resonator.hpp"
+#include "engine/scenario/scenario.hpp"
+
+namespace ringlock::scenario {
+
+/// What the noise injected by a scenario does to the dither's amplitude, in optical phase.
+struct InjectedNoise {
+    double turn_rms_rad = 0.0;       ///< rms of the angle at a turn
+    double amplitude_rms_rad = 0.0;  ///< rms of a half cycle's amplitude
+    double margin_rad = 0.0;         ///< eight standard deviations of the amplitude that tables are made for
+    double change_rad = 0.0;         ///< eight of its change over a half cycle; 0: half cycles are cosines
+};
+InjectedNoise injected_noise(const Scenario& scenario);
+
+/// The resonator of [noise_injection] with model = "drive".
+gyro::DriveNoise drive_noise(const Scenario& scenario);
+
+}  // namespace ringlock::scenario
