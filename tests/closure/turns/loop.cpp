@@ -470,7 +470,7 @@ Truth jumping_rate(std::uint64_t seed, std::size_t turns) {
     truth.scale_factor_arcsec = 1.3;
     truth.dither_frequency_hz = 400.0;
     truth.dither_peak_rate_deg_s = 80.0;
-    truth.lockin_threshold_deg_h = 12000.0;
+    truth.lockin_threshold_deg_h = 100.0;
     truth.injected_noise_rad = 2.5;
     truth.readout_noise = 0.005;
     truth.rates.telegraph_bias = {8.0, 0.8};
