@@ -51,6 +51,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
     const V tick_variance = hn::Set(d, electronics.clock_hz > 0.0 ? 1.0 / (12.0 * squared(electronics.clock_hz)) : 0.0);
     const V hysteresis = hn::Set(d, electronics.comparator_hysteresis_relative);
     const V least = hn::Set(d, least_distance_rad(electronics));
+    const V least_of_mean = hn::Max(least, hn::Set(d, 1e-3));
     const double low_pass = low_pass_s(electronics);
     const V blunting = hn::Set(d, 0.5 * low_pass * low_pass);
     const bool shifted = !readings.pulses.known_shift_rad[0].empty();
@@ -66,6 +67,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
         V last_fringes = load(state.last_fringes);
         V last_whole = load(state.last_whole);
         V last_gain = load(state.last_gain);
+        V last_pull_rad_s = load(state.last_pull_rad_s);
         V cycle_gain = load(state.cycle_gain);
         V cycles = load(state.cycles);
         V contradictions = load(state.contradictions);
@@ -77,25 +79,31 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
             const std::size_t after_side = minimum ? 0 : 1;
             const std::int64_t before_turns = state.turns + static_cast<std::int64_t>(i - first_row);
             const V read = load(readings.phase_fringes[i]);
-            // The swing shows the amplitude of the half cycle that ends here, but for the input rate's share.
-            V deviation = zero;
-            if (before_turns > 0) {
-                const V gain = (load(readings.phase_whole[i]) - last_whole) + (read - last_fringes);
-                const V share = cycle_gain * load(known.half_share[1 - after_side]);
-                deviation = sm::fma(d, half * two_pi, hn::Neg(sign) * (gain - share), hn::Neg(mean_amplitude));
-            }
-            const V amplitude[2] = {mean_amplitude + deviation, sm::fma(d, half, deviation, mean_amplitude)};
-            const V accel[2] = {amplitude[0] * load(known.w2_per_amplitude[direction][0]),
-                                amplitude[1] * load(known.w2_per_amplitude[direction][1])};
             const V raw_sine = load(readings.sine[i]);
             const V raw_cosine = load(readings.cosine[i]);
             const V size =
                 one / hn::Sqrt(hn::Max(sm::fma(d, raw_sine, raw_sine, raw_cosine * raw_cosine), hn::Set(d, 1e-300)));
+            const V b_cosine = load(known.coupling_cosine_rad_s);
+            const V b_sine = load(known.coupling_sine_rad_s);
+            const V lockin_rad_s = sm::fma(d, raw_sine, b_cosine, raw_cosine * b_sine) * size;
+            const V pull_rad_s =
+                sm::fma(d, sign, lockin_rad_s, sm::fnma(d, raw_sine, b_sine, raw_cosine * b_cosine) * size);
+            // The swing shows the amplitude of the half cycle that ends here, but for the input rate's share and the
+            // lock-in's, to first order (b/2) sqrt(pi/a) (sin x + cos x) at the turn where it begins less that at its
+            // end.
+            V deviation = zero;
+            if (before_turns > 0) {
+                const V gain = (load(readings.phase_whole[i]) - last_whole) + (read - last_fringes);
+                const V share = cycle_gain * load(known.half_share[1 - after_side]);
+                const V locked_rad = (last_pull_rad_s - pull_rad_s) * half * load(known.root_pi_over_a_s[direction]);
+                deviation = sm::fma(d, half * two_pi, hn::Neg(sign) * (gain - share),
+                                    sm::fnma(d, half, locked_rad, hn::Neg(mean_amplitude)));
+            }
+            const V amplitude[2] = {mean_amplitude + deviation, sm::fma(d, half, deviation, mean_amplitude)};
+            const V accel[2] = {amplitude[0] * load(known.w2_per_amplitude[direction][0]),
+                                amplitude[1] * load(known.w2_per_amplitude[direction][1])};
             // From the dither's turn, where the sides meet, to the vertex of the side before; and that of the other one
             // less that.
-            const V lockin_rad_s =
-                sm::fma(d, raw_sine, load(known.coupling_cosine_rad_s), raw_cosine * load(known.coupling_sine_rad_s)) *
-                size;
             const V standing_rad_s = sign * sm::fma(d, cycle_gain, load(known.rad_s_per_cycle_gain), lockin_rad_s);
             const V vertex_s = hn::Neg(standing_rad_s / accel[0]);
             const V vertices_s = vertex_s * (accel[0] / accel[1] - one);
@@ -141,21 +149,25 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                 const V a = accel[side];
                 const std::size_t half_sign = side == 0 ? 1 - after_side : after_side;
                 const V bend = b / hn::Sqrt(a) * load(tables.inverse_bend[half_sign]);
-                const V curve = load(known.w2[half_sign]) / a * hn::Set(d, 1.0 / 12.0);
+                const V curve = load(known.w2[half_sign]) / a;
                 for (std::size_t pulse = 0; pulse < kept_pulses; ++pulse) {
                     const V time = load(readings.pulses.time_s[side][pulse][i]);
                     const V nominal = sm::fma(d, hn::Set(d, static_cast<double>(pulse)), quarter_rad, near);
                     V distance = side == 0 ? nominal - hysteresis : nominal + hysteresis;
                     if (shifted) distance = sm::fma(d, sign, shift[pulse], distance);
-                    const V bent = curve * nominal;
-                    const V factor = one + sm::fma(d, bend, factors.values[side][pulse] - one - bent, bent);
+                    const V straight = sinusoid_factor(d, curve * nominal);
+                    const V bent = bend * factors.values[side][pulse];
+                    const V factor = straight + bent;
                     V slope = a * time / (factor * factor);
                     V y = sm::fma(d, half * slope, time, hn::Neg(distance));
                     if (side == 1) {
                         y = sm::fnma(d, slope, vertices_s, y + deeper);
                         slope = slope - slope_of_deeper;
                     }
-                    V weight = one / sm::fma(d, (distance + distance) * a, tick_variance, pulse_variance);
+                    const V variance = sm::fma(d, (distance + distance) * a, tick_variance, pulse_variance);
+                    V weight = one / variance;
+                    // The square of a noisy time is larger in the mean, by the time's variance: v/(4 D) in phase.
+                    y = sm::fnma(d, variance, hn::Set(d, 0.25) / hn::Max(distance, least_of_mean), y);
                     if (pulse == 0) {
                         weight = hn::IfThenElseZero(hn::And(time != zero, distance > least), weight);
                     }
@@ -175,8 +187,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                     }
                     if constexpr (learning) {
                         const V scale = (distance + distance) / factor;
-                        const V of_quarter = bend * (turned.values[side][pulse] - one - bent);
-                        const V p[2] = {scale * (factor - one - bent), scale * of_quarter};
+                        const V p[2] = {scale * bent, scale * bend * turned.values[side][pulse]};
                         for (std::size_t k = 0; k < 2; ++k) {
                             const V heavy = weight * p[k];
                             bends[k].one = bends[k].one + heavy;
@@ -257,12 +268,14 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                 }
                 last_gain = gain;
             }
+            last_pull_rad_s = pull_rad_s;
             last_fringes = fringes;
             last_whole = whole;
         }
         store(last_fringes, state.last_fringes);
         store(last_whole, state.last_whole);
         store(last_gain, state.last_gain);
+        store(last_pull_rad_s, state.last_pull_rad_s);
         store(cycle_gain, state.cycle_gain);
         store(cycles, state.cycles);
         store(contradictions, state.contradictions);
@@ -305,8 +318,9 @@ FractionRecovery::FractionRecovery(std::span<const gyro::Device> devices, const 
             for (const std::size_t side : {0U, 1U}) {
                 const double half_sign = (which == 0) == (side == 1) ? 1.0 : -1.0;
                 const gyro::HalfCycle half = device.half_cycle(half_sign, amplitude);
-                known_.w2_per_amplitude[which][side][lane] =
-                    half.end_acceleration_rad_s2(side == 0 ? 1 : 0) / amplitude;
+                const double acceleration = half.end_acceleration_rad_s2(side == 0 ? 1 : 0);
+                known_.w2_per_amplitude[which][side][lane] = acceleration / amplitude;
+                if (side == 0) known_.root_pi_over_a_s[which][lane] = std::sqrt(units::pi / acceleration);
             }
         }
         make_tables(lane);

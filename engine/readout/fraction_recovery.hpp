@@ -74,6 +74,7 @@ class FractionRecovery {
     struct State {
         simd::Lanes last_fringes{}, last_whole{};  ///< phase at the turn before
         simd::Lanes last_gain{};                   ///< of the half cycle before [fringes]
+        simd::Lanes last_pull_rad_s{};             ///< b (sin x + cos x) at the turn before, x turned upright
         simd::Lanes cycle_gain{};                  ///< mean over cycles [fringes]
         simd::Lanes cycles{};
         simd::Lanes contradictions{};
@@ -86,6 +87,7 @@ class FractionRecovery {
         simd::Lanes rad_s_per_cycle_gain;
         simd::Lanes half_share[2];           ///< of the half cycles of positive and negative sign in the period
         simd::Lanes w2_per_amplitude[2][2];  ///< acceleration over amplitude, [minimum, maximum][before, after]
+        simd::Lanes root_pi_over_a_s[2];     ///< sqrt(pi/a) of the half cycle that ends there, [minimum, maximum]
         simd::Lanes w2[2];
         simd::Lanes amplitude_relative;
     };

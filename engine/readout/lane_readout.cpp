@@ -123,7 +123,7 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> pu
             }
             if (!accelerations) continue;
             for (std::size_t i = first; i < end; i += stride) {
-                const auto& [sign, before, after, extra, after_side] = sides_of(i);
+                const auto& [sign, before, after, extra, after_side, growth] = sides_of(i);
                 const auto& [walk, quarters, error] = found[(i - first) / stride];
                 const bool timed = !readings.zero_rate_s.empty();
                 if (timed) {
@@ -164,10 +164,13 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> pu
                 const auto factors = pulse_factors<2>(d, pulses, after_side, lane, quarter_of(d, floor), x, weights);
                 const V turned_s = walk.time_s;
                 V nearest_s[2];
-                const auto side_acceleration = [&](std::size_t which, V scale) HWY_ATTR {
-                    const V first_s = sm::fma(d, near_root * scale, factors.values[which][0], turned_s);
+                const auto side_acceleration = [&](std::size_t which, const Side& side, V scale) HWY_ATTR {
+                    const V curve = side.w * side.w * scale * scale;
+                    const V near_factor = factors.values[which][0] + sinusoid_factor(d, curve * near);
+                    const V far_factor = factors.values[which][1] + sinusoid_factor(d, curve * far);
+                    const V first_s = sm::fma(d, near_root * scale, near_factor, turned_s);
                     nearest_s[which] = first_s;
-                    const V second_s = sm::fma(d, far_root * scale, factors.values[which][1], turned_s);
+                    const V second_s = sm::fma(d, far_root * scale, far_factor, turned_s);
                     const V interval = ticked_interval(d, tick_fraction, first_s, second_s, electronics.clock_hz);
                     return acceleration_of_pulses(d, measured_roots, interval);
                 };
@@ -176,8 +179,8 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> pu
                     extras || i == 0 || stride != 1 ? inverse_root_acceleration<extras>(d, before, extra) : last_scale;
                 const V scale_after = inverse_root_acceleration<extras>(d, after, extra);
                 last_scale = scale_after;
-                store(side_acceleration(0, hn::Neg(scale_before)), readings.accel_before_rad_s2[i]);
-                store(side_acceleration(1, scale_after), readings.accel_after_rad_s2[i]);
+                store(side_acceleration(0, before, hn::Neg(scale_before)), readings.accel_before_rad_s2[i]);
+                store(side_acceleration(1, after, scale_after), readings.accel_after_rad_s2[i]);
                 if (timed) {
                     // Half-way between the nearest pulses on either side, in whole ticks; weighed as half cycles last,
                     // with the root of the acceleration, where they differ (docs/readout.md).

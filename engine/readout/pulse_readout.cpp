@@ -56,7 +56,8 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> ta
         const V lockin_whole = load(turns.lockin_whole);
         store(lockin_whole, angles.lockin_whole);
         for (std::size_t i = 0; i < drive.turns; ++i) {
-            const auto [sign, before, after, extra, after_side] = sides_at<extras>(d, constants, drive, i, lane);
+            const auto [sign, before, after, extra, after_side, growth] =
+                sides_at<extras>(d, constants, drive, i, lane);
             Walk walk{zero, sign * load(turns.sine[i]), load(turns.cosine[i]), zero, zero};
             if (!walk_to_zero_rate<extras>(d, before, after, extra, jump_at(d, drive, i, lane), walk)) return false;
             const V lockin = sm::fma(d, sign * walk.lockin_rad, per_rad, load(turns.lockin_fringes[i]));
@@ -81,8 +82,12 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> ta
                                 inverse_root_acceleration<extras>(d, after, extra)};
             const V bend[2] = {before.b * scale[0] * load(tables[0].inverse_bend[1 - after_side]),
                                after.b * scale[1] * load(tables[0].inverse_bend[after_side])};
-            const V curve[2] = {before.w * before.w * scale[0] * scale[0] * hn::Set(d, 1.0 / 12.0),
-                                after.w * after.w * scale[1] * scale[1] * hn::Set(d, 1.0 / 12.0)};
+            const V curve[2] = {before.w * before.w * scale[0] * scale[0], after.w * after.w * scale[1] * scale[1]};
+            // An amplitude that grows by the share g over a half cycle bends the path by g (w t)^3/(3 pi), of (w
+            // t)^2/2.
+            const V per_three_pi = hn::Set(d, 0.10610329539459689);
+            const V swell[2] = {growth[0] * before.w * scale[0] * per_three_pi,
+                                hn::Neg(growth[1]) * after.w * scale[1] * per_three_pi};
             // The parabola of the half cycle in which the extremum does not lie would have it elsewhere: at the time
             // t_0 a/a' and, from the dither's turn on, by as much more of phase.
             const V t0 = walk.time_s;
@@ -128,9 +133,10 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> ta
                     gone = gone + farther[side];
                     gone = sm::fnma(d, blunting, one / (scale[side] * scale[side]), gone);
                     if (pulse == 0) distance[side][0] = gone;
-                    const V bent = curve[side] * nominal;
-                    const V factor = one + sm::fma(d, bend[side], factors.values[side][pulse] - one - bent, bent);
-                    const V magnitude = hn::Sqrt(hn::Max(gone + gone, zero)) * scale[side] * factor;
+                    const V factor =
+                        sm::fma(d, bend[side], factors.values[side][pulse], sinusoid_factor(d, curve[side] * nominal));
+                    const V root = hn::Sqrt(hn::Max(gone + gone, zero));
+                    const V magnitude = root * scale[side] * sm::fma(d, swell[side], root, factor);
                     seen[side][pulse] = tick(side == 0 ? start[0] - magnitude : start[1] + magnitude);
                 }
             }

@@ -43,7 +43,14 @@ HWY_INLINE hn::Vec<D> pick(D d, const QuarterOf<D>& quarter, const Table& of, st
                           hn::IfThenElse(quarter.odd, value(1), value(0)));
 }
 
-/// Times of pulses over the roots of twice their distances, R of PulseTables: [before, after][nearest first].
+/// S of PulseTables: what the dither's cosine makes of the times of pulses beside a parabola's.
+template <class D, class V>
+HWY_INLINE V sinusoid_factor(D d, V share) {
+    const V half = share * hn::Set(d, 0.5);
+    return sm::fma(d, half, sm::polynomial(d, half, arcsin_series), hn::Set(d, 1.0));
+}
+
+/// Bends of the times of pulses by the lock-in, R of PulseTables: [before, after][nearest first].
 template <class V, std::size_t pulses>
 struct PulseFactors {
     V values[2][pulses];

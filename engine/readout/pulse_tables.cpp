@@ -127,6 +127,7 @@ void PulseTables::make(std::size_t lane, const gyro::Device& device, std::size_t
         for (const int side : {-1, 1}) {
             const gyro::HalfCycle half = device.half_cycle(side * direction, device.dither_amplitude_rad);
             const double root = std::sqrt(half.end_acceleration_rad_s2(side > 0 ? 0 : 1));
+            const double curve_per_rad = std::pow(half.angular_frequency_rad_s() / root, 2);
             for (std::size_t quarter = 0; quarter < quarters; ++quarter) {
                 std::array<std::array<double, terms>, kept_pulses> values{};
                 for (std::size_t i = 0; i < terms; ++i) {
@@ -140,7 +141,8 @@ void PulseTables::make(std::size_t lane, const gyro::Device& device, std::size_t
                     const double psi = direction * (static_cast<double>(quarter + 1) * quarter_rad - first);
                     const PerPulse seconds = crossings_s(half, device.coupling, side, psi, distances, pulses);
                     for (std::size_t pulse = 0; pulse < pulses; ++pulse) {
-                        values[pulse][i] = std::abs(seconds[pulse]) * root / std::sqrt(2.0 * distances[pulse]);
+                        const double whole = std::abs(seconds[pulse]) * root / std::sqrt(2.0 * distances[pulse]);
+                        values[pulse][i] = whole - sinusoid_factor(distances[pulse] * curve_per_rad);
                     }
                 }
                 for (std::size_t pulse = 0; pulse < pulses; ++pulse) {
@@ -151,6 +153,14 @@ void PulseTables::make(std::size_t lane, const gyro::Device& device, std::size_t
             }
         }
     }
+}
+
+double PulseTables::sinusoid_factor(double share) {
+    // The series of arcsin.
+    const double half = 0.5 * share;
+    double sum = 0.0;
+    for (std::size_t k = std::size(arcsin_series); k-- > 0;) sum = sum * half + arcsin_series[k];
+    return 1.0 + half * sum;
 }
 
 double PulseTables::at(const Times& times, std::size_t lane, std::size_t quarter, double first_distance_rad) {

@@ -179,6 +179,9 @@ struct Sides {
     Side before, after;
     Extras extra;
     std::size_t after_side;  ///< 0: the half cycle after the turn is of positive sign
+    /// Where amplitudes change over half cycles, change over amplitude of each; `before` and `after` have the amplitude
+    /// at the turn, which is all that matters near it but for pulses.
+    V growth[2];
 };
 
 /// The half cycles on either side of turn i of the piece.
@@ -190,10 +193,18 @@ HWY_INLINE Sides sides_at(D d, const ReadoutConstants& constants, const gyro::La
     const int direction = drive.direction(i);
     const V sign = hn::Set(d, direction);
     const std::size_t after_side = direction > 0 ? 0 : 1;
+    V change[2] = {zero, zero};
+    if (drive.amplitudes_change) {
+        for (const std::size_t side : {0U, 1U}) change[side] = load(drive.amplitude_change_rad[i + side]);
+    }
     const auto side_of = [&](std::size_t half, std::size_t which) HWY_ATTR {
-        return Side{load(drive.amplitude_rad[half]),     load(constants.angular_frequency_rad_s[which]),
-                    sign * load(drive.rate_rad_s[half]), load(drive.b_rad_s[half]),
-                    load(constants.scale_s[which]),      load(constants.scale_angle)};
+        const V to_turn = change[half - i] * hn::Set(d, half == i ? 0.5 : -0.5);
+        return Side{load(drive.amplitude_rad[half]) + to_turn,
+                    load(constants.angular_frequency_rad_s[which]),
+                    sign * load(drive.rate_rad_s[half]),
+                    load(drive.b_rad_s[half]),
+                    load(constants.scale_s[which]),
+                    load(constants.scale_angle)};
     };
     Extras extra{zero, zero, zero, zero, zero, zero, zero};
     if constexpr (extras) {
@@ -202,7 +213,9 @@ HWY_INLINE Sides sides_at(D d, const ReadoutConstants& constants, const gyro::La
                  load(constants.second_ratio),          sign * load(constants.second_sine),
                  load(constants.second_cosine)};
     }
-    return Sides{sign, side_of(i, 1 - after_side), side_of(i + 1, after_side), extra, after_side};
+    const Side before = side_of(i, 1 - after_side);
+    const Side after = side_of(i + 1, after_side);
+    return Sides{sign, before, after, extra, after_side, {change[0] / before.amplitude, change[1] / after.amplitude}};
 }
 
 }  // namespace ringlock::readout::HWY_NAMESPACE

@@ -31,7 +31,9 @@
 #include "engine/ensemble/draw.hpp"
 #include "engine/gyro/theory.hpp"
 #include "engine/readout/fraction_recovery.hpp"
+#include "engine/readout/pulse_tables.hpp"
 #include "engine/scenario/arm.hpp"
+#include "engine/scenario/devices.hpp"
 #include "engine/scenario/parse.hpp"
 #include "tests/bench/page.hpp"
 #include "tests/support/limits.hpp"
@@ -290,6 +292,64 @@ Shown shown(scenario::Scenario scenario, std::size_t turns) {
     return shown;
 }
 
+/// Of the size of the coupling that the adaptive compensator learns, in the long run (docs/compensation.md).
+struct SizeMemory {
+    double seconds = 0.0;
+    double known_to = 0.0;  ///< relative
+};
+SizeMemory size_memory(const scenario::Scenario& scenario) {
+    const double second = shown(scenario, 4096).by_a_turn / std::sqrt(2.0 * scenario.dither.frequency_hz);
+    const double memory_s = std::sqrt(second / compensate::CouplingFilter::slope_walk_s_rt_s);
+    return {memory_s, second * std::sqrt(std::numbers::sqrt2 / memory_s)};
+}
+
+/// The gyros of scenarios/devices: the bounds both ways, and what compensators leave over the one that holds for them,
+/// that of a processor that corrects a turn before it has seen the next.
+void devices() {
+    head({"device", "fringes", "parabola wrong by, pi/2 and 2 pi from the extremum [mrad]", "kick [rad]",
+          "bound, psi'' known [mrad]", "psi'' as known at the turn [mrad]", "exact over the latter", "first order",
+          "size learnt to, over the latter", "adaptive over exact", "expected of that size",
+          "exact, ideal readout, lowers the walk by"});
+    for (const scenario::DeviceFile& file : scenario::device_files()) {
+        const scenario::NamedDevice device = scenario::read_device(file);
+        scenario::Scenario scenario = base();
+        scenario.device = device.name;
+        scenario.gyro = device.scenario.gyro;
+        scenario.dither = device.scenario.dither;
+        scenario.ensemble.duration_s = 600.0;
+        // Learning is over after some memories of the size.
+        const SizeMemory memory = size_memory(scenario);
+        scenario.ensemble.settle_s = std::max(200.0, 4.0 * memory.seconds);
+        scenario.arms = scenario::parse_arms({li::exact_arm, li::adaptive_arm, "noise_injected+compensated"});
+        const li::Bounds bounds = li::bounds(scenario);
+        const li::Walks walks = li::walks(scenario);
+        const double bound = li::walk_deg_rt_h(scenario, bounds.learnt_rad);
+        scenario::Scenario ideal = scenario;
+        ideal.readout = {};
+        ideal.readout.model = scenario::ReadoutModel::ideal;
+        ideal.ensemble.gyros = 16;
+        ideal.ensemble.settle_s = 0.0;
+        ideal.arms = scenario::parse_arms({"noise_injected", li::exact_arm});
+        const li::Walks lowered = li::walks(ideal);
+        const gyro::Setup setup = ensemble::nominal_setup(scenario);
+        const auto parabola_mrad = [&setup](double distance_rad) {
+            const double factor =
+                readout::PulseTables::sinusoid_factor(distance_rad / gyro::modulation_depth_rad(setup));
+            return 1e3 * distance_rad * (factor * factor - 1.0);
+        };
+        row({device.name, fmt::format("{:.0f}", gyro::modulation_depth_rad(setup) / units::pi),
+             fmt::format("{:.3g}, {:.3g}", parabola_mrad(0.5 * units::pi), parabola_mrad(units::two_pi)),
+             fmt::format("{:.3f}", gyro::turn_kick_rad(setup)), fmt::format("{:.3f}", 1e3 * bounds.known_rad),
+             fmt::format("{:.3f}", 1e3 * bounds.learnt_rad), text(li::over(walks.of(li::exact_arm), bound)),
+             text(li::over(walks.of("noise_injected+compensated"), bound)),
+             fmt::format("{:.2f}", memory.known_to / bounds.learnt_rad),
+             text(li::over(walks.of(li::adaptive_arm), walks.of(li::exact_arm))),
+             fmt::format("{:.3f}", std::hypot(1.0, memory.known_to / bounds.learnt_rad)),
+             fmt::format("{:.2g}", li::over(lowered.of("noise_injected"), lowered.of(li::exact_arm)).value)});
+        std::fflush(stdout);
+    }
+}
+
 /// What the filter of the coupling makes of its turns in the long run, see docs/compensation.md.
 void learning() {
     using Filter = compensate::CouplingFilter;
@@ -464,6 +524,7 @@ const std::pair<const char*, std::function<void()>> blocks[] = {
     {"phase-from", [] { table("phase from", phase_from_points(), Reference::last); }},
     {"averaging-time", averaging_times},
     {"learning", learning},
+    {"devices", devices},
     {"cost", cost},
 };
 

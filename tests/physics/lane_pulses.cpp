@@ -45,7 +45,10 @@ double worst_pulse_s(double threshold_deg_h, double rate_deg_h, double amplitude
             for (const std::size_t pulse : {0U, 1U}) {
                 const double d = d1 + static_cast<double>(pulse) * quarter_rad;
                 const auto& table = tables.times[direction > 0 ? 0 : 1][side < 0 ? 0 : 1][pulse];
-                const double t = std::sqrt(2.0 * d / a) * readout::PulseTables::at(table, 0, quarter, d1);
+                const double w = half.angular_frequency_rad_s();
+                const double factor = readout::PulseTables::sinusoid_factor(d * w * w / a) +
+                                      readout::PulseTables::at(table, 0, quarter, d1);
+                const double t = std::sqrt(2.0 * d / a) * factor;
                 worst = std::max(worst, std::abs(t - std::abs(times[pulse] - path.zero_rate_time_s())));
             }
         }

@@ -5,12 +5,14 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
+#include <numbers>
 #include <random>
 #include <vector>
 
 #include "engine/ensemble/block.hpp"
 #include "engine/readout/fraction_recovery.hpp"
 #include "tests/physics/readout_support.hpp"
+#include "tests/support/devices.hpp"
 #include "tests/support/limits.hpp"
 
 namespace ringlock::test {
@@ -88,6 +90,56 @@ TEST(PulseReadout, PulsesAreThoseOfThePath) {
     // what keeps comparators with noise of 0.005 from chattering.
     EXPECT_LT(worst_pulse_s(15.0, 0.001, 1e-3, 300.0, 0.0), 1e-10);
     EXPECT_LT(worst_pulse_s(500.0, 0.001, 1e-3, 300.0, 0.03), 1e-10);
+}
+
+/// Gyros of few fringes, whose pulses lie far out on the cosine and whose amplitudes differ by tenths from turn to
+/// turn: what the times of their pulses are wrong by, in phase.
+double worst_pulse_rad(const NamedDevice& named, double amplitude_off) {
+    Uniform uniform(607);
+    double worst = 0.0;
+    for (int block = 0; block < 20; ++block) {
+        const int direction = block % 2 == 0 ? 1 : -1;
+        std::vector<Turn> turns;
+        for (std::size_t i = 0; i < lanes; ++i) {
+            turns.push_back(device_turn(uniform, 15.0, 0.001, amplitude_off));
+            const gyro::Setup drawn = turns.back().setup;
+            turns.back().setup = setup_of(named);
+            turns.back().setup.input_rate_deg_h = 15.0;
+            turns.back().setup.coupling_phase_rad = drawn.coupling_phase_rad;
+        }
+        const Read got = read(turns, block, perfect_instrument, {}, Wanted::pulses);
+        for (std::size_t i = 0; i < lanes; ++i) {
+            const TurnPath path = turns[i].path(direction);
+            const double upright = direction * path.zero_rate_phase_rad() / quarter_rad;
+            const double near = (std::floor(upright) + 1.0 - upright) * quarter_rad;
+            const auto& times = got.readings.pulses.time_s;
+            for (const std::size_t side : {0U, 1U}) {
+                const gyro::HalfCycle half = turns[i].half(side == 0 ? -direction : direction,
+                                                           side == 0 ? turns[i].before_ratio : turns[i].after_ratio);
+                for (const std::size_t k : {0U, 2U}) {
+                    // Intervals, which do not depend on when the sample was taken.
+                    const double first = near + static_cast<double>(k) * quarter_rad;
+                    const auto two = path.crossing_times_s(side == 0 ? -1 : 1, {first, first + quarter_rad});
+                    const double off = (times[side][k + 1][0][i] - times[side][k][0][i]) - (two[1] - two[0]);
+                    const double speed = std::sqrt(2.0 * (first + quarter_rad) * half.end_acceleration_rad_s2());
+                    worst = std::max(worst, std::abs(off) * speed);
+                }
+            }
+        }
+    }
+    return worst;
+}
+
+TEST(PulseReadout, PulsesOfGyrosWithFewFringesAreThoseOfTheCosine) {
+    for (const std::size_t which : {0U, 1U, 7U}) {
+        // Four standard deviations of half cycles' amplitudes with noise of 3 rad: a tenth at 26 fringes.
+        const double amplitude_off =
+            4.0 * 3.0 / std::numbers::sqrt2 / gyro::modulation_depth_rad(setup_of(named_devices[which]));
+        const double worst = worst_pulse_rad(named_devices[which], amplitude_off);
+        std::printf("%s, amplitudes off by %.2g: intervals of pulses off by %.2g rad\n", named_devices[which].name,
+                    amplitude_off, worst);
+        EXPECT_LT(worst, 1e-4) << named_devices[which].name;
+    }
 }
 
 /// Rms [rad] of the error of the phase read, over turns of all phases in a run, and its mean.
