@@ -12,7 +12,7 @@ namespace ringlock::gyro {
 ///     g(t) = rate + A w (sign sin(w t) + ratio sin(2 w t + harmonic_phase)) + sign change w sin(w t) (w t/pi - 1/2).
 ///
 /// With a change it is the path of a resonator whose force makes its amplitude grow: the acceleration at either turn is
-/// w^2 times the angle there, and goes on through the turn (docs/physics.md). All in radians of optical phase.
+/// w^2 times the angle there, and is continuous there (docs/noise-injection.md). All in radians of optical phase.
 struct HalfCycle {
     double sign = 1.0;           ///< +1: the dither rate is positive (from a minimum to a maximum), -1: negative
     double amplitude_rad = 0.0;  ///< A: half the swing; the mean of the amplitudes at the two turns

@@ -28,7 +28,7 @@ Matrix2d free_motion(double damping, double angle_rad) {
 /// Steady motion under a constant force of amplitude 1: x = -cos(w t).
 Vector2d steady_motion(double angle_rad) { return {-std::cos(angle_rad), std::sin(angle_rad)}; }
 
-/// State (u, q, loop's force, level); the level is drawn anew where `redraw`.
+/// Transition of the state (u, q, loop's force, level). With `redraw` a new level replaces the old one.
 Matrix4d keep_or_redraw(const Matrix4d& advance, bool redraw) {
     Matrix4d all = advance;
     if (redraw) all.row(3).setZero();

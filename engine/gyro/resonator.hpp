@@ -27,7 +27,7 @@ struct DriveNoise {
     double resonator_q = 100.0;
     NoiseForm form = NoiseForm::held;
     NoiseDistribution distribution = NoiseDistribution::gaussian;
-    std::int64_t hold_half_cycles = 1;  ///< of `held`: the level is drawn anew at every so many nominal turns
+    std::int64_t hold_half_cycles = 1;  ///< of `held`: number of half cycles for which a level is kept
     double modulation_hz = 0.0;         ///< of `sinusoidal`
     /// Where the gain of the amplitude loop's open loop is one; 0: there is no loop.
     double amplitude_loop_hz = 0.0;

@@ -132,18 +132,20 @@ std::vector<Section> base_sections() {
              key(RINGLOCK_KEY(noise_injection, resonator_q), between(20.0, 1e5, "a dither is driven at its resonance"),
                  "Of a drive: quality factor Q."),
              key(RINGLOCK_KEY(noise_injection, form), none,
-                 "Of a drive: held: the force is constant for hold_half_cycles and then drawn anew; white: drawn anew "
-                 "32 "
-                 "times in a half cycle; sinusoidal: modulated at modulation_hz."),
+                 "Noise of a drive. held: a random force is kept for hold_half_cycles; white: a random force is kept "
+                 "for 1/32 "
+                 "of a half cycle; sinusoidal: the force is modulated at modulation_hz."),
              key(RINGLOCK_KEY(noise_injection, distribution), none, "Of a drive: of the force's levels."),
-             key(RINGLOCK_KEY(noise_injection, hold_half_cycles), between<std::int64_t>(1, 10'000, "it is noise"),
+             key(RINGLOCK_KEY(noise_injection, hold_half_cycles),
+                 between<std::int64_t>(1, 10'000, "longer than the memory of any resonator"),
                  "Of a drive with held noise: half cycles from one redraw to the next."),
              key(RINGLOCK_KEY(noise_injection, modulation_hz), above(0.0, 1e5, "a modulation goes up and down"),
                  "Of a drive with sinusoidal noise: frequency of the modulation, which begins with a random phase."),
-             key(RINGLOCK_KEY(noise_injection, amplitude_loop_hz), between(0.0, 1e4, "slow beside the dither"),
-                 "Of a drive: where the open loop of the integrator that holds the amplitude has the gain 1; slower "
-                 "noise "
-                 "is taken away; 0: no loop."),
+             key(RINGLOCK_KEY(noise_injection, amplitude_loop_hz),
+                 between(0.0, 1e4, "an amplitude loop is slower than the dither"),
+                 "Amplitude loop of a drive: frequency at which the open-loop gain of its integrator is 1. The loop "
+                 "reduces "
+                 "noise of lower frequencies. 0: no loop."),
          }},
         {"readout",
          "What the electronics can know of the phase; compensators see nothing else.",

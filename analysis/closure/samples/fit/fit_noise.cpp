@@ -29,7 +29,7 @@ struct Free {
 };
 
 constexpr std::size_t whites = 2;    // the first of the knobs
-constexpr double negligible = 1e-4;  // of white noises, beside the other
+constexpr double negligible = 1e-4;  // ratio to the other white noise below which one has no effect on the fit
 
 std::vector<Free> knobs(SampleModel& model) {
     std::vector<Free> all{{&model.noise.angle_arcsec, true}, {&model.noise.rate_arcsec_rt_s, true}};
