@@ -318,6 +318,7 @@ void Exact::take_parts() {
         propagate::TurnTables::Part& part = parts_[which];
         part.terms = {amplitudes, 1, 1, 1};
         part.coefficients.assign(3 * amplitudes, simd::Lanes{});
+        part.amplitude_terms.assign(1, amplitudes);
         for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
             const auto scaled = [&](double value, std::size_t variable) {
                 const double x =

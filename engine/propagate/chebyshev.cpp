@@ -77,14 +77,15 @@ std::vector<Point> points_between_nodes(const Terms& terms) {
     return points;
 }
 
-void nodes_to_powers(const Terms& terms, std::size_t columns, std::span<double> values) {
-    // One quantity after the other, from values at nodes to Chebyshev coefficients to powers. The two steps must not be
-    // made one: rows of their product are as large as 2.4^terms, and a shift of many fringes would be summed up from
-    // parts as large. Chebyshev coefficients are small by then.
+namespace {
+
+/// Applies to each quantity in turn the matrices that `of` gives for its number of terms.
+template <class Of>
+void transform(const Terms& terms, std::size_t columns, std::span<double> values, const Of& of) {
     std::vector<double> next(values.size());
     std::size_t stride = columns;
     for (const std::size_t n : terms) {
-        for (const Matrix& matrix : {chebyshev_weights(n), chebyshev_powers(n)}) {
+        for (const Matrix& matrix : of(n)) {
             std::fill(next.begin(), next.end(), 0.0);
             for (std::size_t i = 0; i < values.size(); ++i) {
                 const std::size_t at = i / stride % n;
@@ -94,6 +95,24 @@ void nodes_to_powers(const Terms& terms, std::size_t columns, std::span<double> 
         }
         stride *= n;
     }
+}
+
+}  // namespace
+
+void nodes_to_chebyshev(const Terms& terms, std::size_t columns, std::span<double> values) {
+    transform(terms, columns, values, [](std::size_t n) { return std::array{chebyshev_weights(n)}; });
+}
+
+void chebyshev_to_powers(const Terms& terms, std::size_t columns, std::span<double> values) {
+    transform(terms, columns, values, [](std::size_t n) { return std::array{chebyshev_powers(n)}; });
+}
+
+void nodes_to_powers(const Terms& terms, std::size_t columns, std::span<double> values) {
+    // The two steps must not be made one: rows of their product are as large as 2.4^terms, and a shift of many fringes
+    // would be summed up from parts as large. Chebyshev coefficients are small by then.
+    transform(terms, columns, values, [](std::size_t n) {
+        return std::array{chebyshev_weights(n), chebyshev_powers(n)};
+    });
 }
 
 }  // namespace ringlock::propagate

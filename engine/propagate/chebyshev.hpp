@@ -22,8 +22,10 @@ std::vector<Point> chebyshev_nodes(const Terms& terms);
 /// Points between the nodes: spread over the ranges by the golden ratio, the corners among them.
 std::vector<Point> points_between_nodes(const Terms& terms);
 
-/// Turns values at the nodes, [change][coupling][rate][amplitude][column], into coefficients of powers in the same
-/// order.
+/// Turns values at the nodes, [change][coupling][rate][amplitude][column], into coefficients of Chebyshev polynomials
+/// in the same order, those into coefficients of powers, or the first into the last.
+void nodes_to_chebyshev(const Terms& terms, std::size_t columns, std::span<double> values);
+void chebyshev_to_powers(const Terms& terms, std::size_t columns, std::span<double> values);
 void nodes_to_powers(const Terms& terms, std::size_t columns, std::span<double> values);
 
 }  // namespace ringlock::propagate

@@ -33,7 +33,7 @@ template <class D, class V>
 HWY_INLINE HalfMapOf<V> evaluate(D d, const TurnTables::Part& part, std::size_t lane, V amplitude, V rate, V coupling,
                                  V change) {
     const auto [amplitudes, rates, couplings, changes] = part.terms;
-    const simd::Lanes* row = part.coefficients.data() + 3 * amplitudes * rates * couplings * changes;
+    std::size_t group = rates * couplings * changes;
     // Terms that a gyro does not have are zeros: 0 x + c is c to the bit.
     const V zero = hn::Zero(d);
     V sum[3] = {zero, zero, zero};
@@ -42,10 +42,12 @@ HWY_INLINE HalfMapOf<V> evaluate(D d, const TurnTables::Part& part, std::size_t 
         for (std::size_t c = 0; c < couplings; ++c) {
             V over_rate[3] = {zero, zero, zero};
             for (std::size_t b = 0; b < rates; ++b) {
-                row -= 3;
+                --group;
+                const simd::Lanes* row =
+                    part.coefficients.data() + 3 * (group * amplitudes + part.amplitude_terms[group]) - 3;
                 V over_amplitude[3];
                 for (std::size_t k = 0; k < 3; ++k) over_amplitude[k] = hn::Load(d, row[k].data() + lane);
-                for (std::size_t a = 1; a < amplitudes; ++a) {
+                for (std::size_t a = 1; a < part.amplitude_terms[group]; ++a) {
                     row -= 3;
                     for (std::size_t k = 0; k < 3; ++k) {
                         over_amplitude[k] = sm::fma(d, over_amplitude[k], amplitude, hn::Load(d, row[k].data() + lane));

@@ -86,9 +86,54 @@ struct Polynomial {
     }
 };
 
-Polynomial interpolate(const KickSource& source, const Terms& terms) {
+/// Leaves out Chebyshev terms of high orders in both amplitude and change, as long as all of them together change a
+/// half turn by no more than `negligible_rad`. The higher the order in the change, the fewer in the amplitude are kept.
+void leave_out_negligible(Polynomial& polynomial, double negligible_rad) {
+    const std::size_t amplitudes = polynomial.terms[0];
+    const std::size_t changes = polynomial.terms[3];
+    const std::size_t others = polynomial.terms[1] * polynomial.terms[2];
+    const auto size_rad = [&](std::size_t change, std::size_t amplitude) {
+        double rad = 0.0;
+        for (std::size_t other = 0; other < others; ++other) {
+            const Values& c = polynomial.coefficients[(change * others + other) * amplitudes + amplitude];
+            rad += std::max(units::two_pi * std::abs(c[0]), 2.0 * std::hypot(c[1], c[2]));
+        }
+        return rad;
+    };
+    std::vector<std::size_t> kept(changes, amplitudes);
+    double left_out_rad = 0.0;
+    for (;;) {
+        // The smallest of the highest terms that are still kept.
+        std::size_t smallest = changes;
+        double smallest_rad = negligible_rad - left_out_rad;
+        for (std::size_t e = 0; e < changes; ++e) {
+            if (kept[e] < 2 || (e + 1 < changes && kept[e] == kept[e + 1])) continue;
+            const double rad = size_rad(e, kept[e] - 1);
+            if (rad < smallest_rad) {
+                smallest_rad = rad;
+                smallest = e;
+            }
+        }
+        if (smallest == changes) break;
+        left_out_rad += smallest_rad;
+        --kept[smallest];
+    }
+    for (std::size_t i = 0; i < polynomial.coefficients.size(); ++i) {
+        if (i % amplitudes >= kept[i / amplitudes / others]) polynomial.coefficients[i] = {};
+    }
+}
+
+/// `negligible_rad`: by how much a half turn may differ from the interpolation where its amplitude changes.
+Polynomial interpolate(const KickSource& source, const Terms& terms, double negligible_rad) {
     Polynomial polynomial{terms, source.at(chebyshev_nodes(terms))};
-    nodes_to_powers(terms, 3, {polynomial.coefficients.data()->data(), 3 * polynomial.coefficients.size()});
+    const std::span<double> values(polynomial.coefficients.data()->data(), 3 * polynomial.coefficients.size());
+    if (terms[3] == 1) {
+        nodes_to_powers(terms, 3, values);
+        return polynomial;
+    }
+    nodes_to_chebyshev(terms, 3, values);
+    leave_out_negligible(polynomial, negligible_rad);
+    chebyshev_to_powers(terms, 3, values);
     return polynomial;
 }
 
@@ -110,7 +155,7 @@ std::size_t terms_needed(const KickSource& source, std::size_t variable, double 
     for (const std::size_t n : {2U, 3U, 4U, 5U, 6U, 8U, 10U, 12U, 14U, 17U, 20U, 24U, 28U}) {
         Terms terms = one_term;
         terms[variable] = n;
-        const Polynomial polynomial = interpolate(source, terms);
+        const Polynomial polynomial = interpolate(source, terms, 0.0);
         std::vector<Point> points;
         for (int i = 0; i <= 4; ++i) {  // between the nodes and at the ends
             Point point{};
@@ -167,7 +212,7 @@ void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCy
             double error = 0.0;
             for (;;) {
                 const std::size_t largest = *std::max_element(terms.begin(), terms.end());
-                polynomial = interpolate(source, terms);
+                polynomial = interpolate(source, terms, 0.25 * tolerance_rad_);
                 error = error_rad(source, polynomial, points_between_nodes(terms));
                 if (error <= tolerance_rad_) break;
                 if (largest >= most_nodes) {
@@ -218,6 +263,13 @@ void TurnTables::put(Part& part, std::size_t lane, const Terms& terms,
     for_each_of(terms, [&](std::size_t from, std::size_t to) {
         for (std::size_t k = 0; k < 3; ++k) part.coefficients[3 * to + k][lane] = coefficients[from][k];
     });
+    part.amplitude_terms.assign(grown[1] * grown[2] * grown[3], 1);
+    for (std::size_t i = 0; i < part.coefficients.size(); ++i) {
+        const double* row = part.coefficients[i].data();
+        if (std::all_of(row, row + simd::lanes, [](double value) { return value == 0.0; })) continue;
+        std::size_t& used = part.amplitude_terms[i / 3 / grown[0]];
+        used = std::max(used, i / 3 % grown[0] + 1);
+    }
 }
 
 std::size_t TurnTables::nodes() const {

@@ -42,6 +42,8 @@ class TurnTables {
         /// [change][coupling][rate][amplitude][shift in fringes, Re z, Im z], powers of the variables scaled to [-1,
         /// 1].
         std::vector<simd::Lanes> coefficients;
+        /// [change][coupling][rate]: terms in the amplitude beyond which all gyros have zeros.
+        std::vector<std::size_t> amplitude_terms;
     };
 
     /// `tolerance_rad`: interpolation error of a turn.

@@ -11,6 +11,7 @@
 
 #include "analysis/report/table.hpp"
 #include "engine/dither/lane_dither.hpp"
+#include "engine/ensemble/block.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/propagate/direct_lanes.hpp"
 #include "engine/propagate/half_turn.hpp"
@@ -18,6 +19,7 @@
 #include "engine/propagate/phase_tables.hpp"
 #include "engine/propagate/rotation.hpp"
 #include "engine/propagate/turn_tables.hpp"
+#include "engine/scenario/parse.hpp"
 #include "engine/simd/target.hpp"
 #include "tests/bench/noisy_dither.hpp"
 
@@ -27,6 +29,8 @@ using namespace ringlock;
 
 constexpr std::size_t piece = 128;
 constexpr double tolerance_rad = scenario::Propagation{}.turn_map_tolerance_rad;
+
+const char* const turn_of_a_run = "turn of a run, ideal readout, `turns`";
 
 double sink = 0.0;  // so that nothing is left out as unused
 
@@ -78,6 +82,28 @@ class Block {
     gyro::LaneTurns turns_;
 };
 
+/// A block of gyros of a device under injected noise, with an ideal readout: what a turn of a run costs.
+class DeviceBlock {
+   public:
+    DeviceBlock(const std::string& device, const std::string& noise)
+        : scenario_(scenario::parse_string(
+              fmt::format("device = \"{}\"\n[readout]\nmodel = \"ideal\"\n[arms]\nnames = [\"noise_injected\"]\n"
+                          "[noise_injection]\nturn_phase_rms_rad = 3.0\n{}",
+                          device, noise),
+              "case")),
+          block_(scenario_, scenario_.arms, 0, simd::lanes) {
+        advance();  // tables
+    }
+    void advance() {
+        block_.advance(piece);
+        sink += block_.lockin_error_rad(0, 0, 0);
+    }
+
+   private:
+    scenario::Scenario scenario_;
+    ensemble::GyroBlock block_;
+};
+
 /// Ranges of a table under injected noise.
 propagate::HalfCycleRanges noisy_ranges(const gyro::Device& device) {
     const double a = device.dither_amplitude_rad;
@@ -109,6 +135,9 @@ int main() {
     const std::vector<propagate::HalfTurnProblem> problems(8 * simd::lanes,
                                                            propagate::beginning(half, moebius.coupling));
     std::vector<propagate::HalfTurn> half_turns(problems.size());
+    const std::string drive = "model = \"drive\"\nresonator_q = 100.0\n";
+    DeviceBlock device_blocks[] = {
+        {"gao-deng-2007", ""}, {"gao-deng-2007", drive}, {"triangle-20mm", ""}, {"triangle-20mm", drive}};
     Contender contenders[] = {
         {"an exact half turn, many at once", static_cast<double>(problems.size()),
          [&] {
@@ -131,6 +160,10 @@ int main() {
          }},
         {"drive and turn of a gyro, Moebius maps", 1.0 * piece * simd::lanes, [&] { moebius_block.advance(); }},
         {"drive and turn of a gyro, second harmonic", 1.0 * piece * simd::lanes, [&] { series_block.advance(); }},
+        {turn_of_a_run, 1.0 * piece * simd::lanes, [&] { device_blocks[0].advance(); }},
+        {"turn of a run, ideal readout, `drive`, held", 1.0 * piece * simd::lanes, [&] { device_blocks[1].advance(); }},
+        {"turn of a run, 26 fringes, `turns`", 1.0 * piece * simd::lanes, [&] { device_blocks[2].advance(); }},
+        {"turn of a run, 26 fringes, `drive`, held", 1.0 * piece * simd::lanes, [&] { device_blocks[3].advance(); }},
         {"half cycle by direct integration, in blocks", 1.0 * simd::lanes,
          [&] { integrate_half_cycles(moebius, simd::lanes); }},
         {"half cycle by direct integration, alone", 1.0, [&] { integrate_half_cycles(moebius, 1); }},
@@ -143,9 +176,18 @@ int main() {
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
         }
     }
-    report::Table table({{"paper's device, injected noise", report::Align::left}, {"us", report::Align::right}});
+    report::Table table({{"injected noise of 3 rad, paper's device unless stated", report::Align::left},
+                         {"us", report::Align::right},
+                         {"over a turn of a run", report::Align::right}});
+    double turn_s = 0.0;
     for (Contender& contender : contenders) {
-        table.add_row({contender.name, fmt::format("{:.3g}", 1e6 * contender.median_s())});
+        if (contender.name == turn_of_a_run) turn_s = contender.median_s();
+    }
+    for (Contender& contender : contenders) {
+        const double seconds = contender.median_s();
+        const bool is_turn = contender.name.find("turn of a") != std::string::npos;
+        table.add_row({contender.name, fmt::format("{:.3g}", 1e6 * seconds),
+                       is_turn ? fmt::format("{:.2f}", seconds / turn_s) : std::string()});
     }
     fmt::print("{}\nInstruction set {}. Direct integration to {:.0e} rad, tables to {:.0e} rad.\n", table.text(),
                simd::active_target(), scenario::Propagation{}.direct_tolerance_rad, tolerance_rad);
