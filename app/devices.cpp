@@ -35,7 +35,7 @@ DeviceFigures figures_of(const scenario::NamedDevice& device) {
             depth_rad / units::pi,
             depth_rad,
             gyro::turn_kick_rad(setup),
-            gyro::angle_random_walk_deg_rt_h(setup),
+            gyro::randomised_arw_deg_rt_h(setup),
             gyro::band_half_width_deg_h(setup, 0),
             gyro::band_envelope_deg_h(setup)};
 }

@@ -97,6 +97,34 @@ Json json_family(const std::vector<study::FamilyDeviation>& family) {
     return json;
 }
 
+Json json_spread(const std::vector<dither::AngleSpread>& spread) {
+    Json list = Json::array();
+    for (const dither::AngleSpread& s : spread) {
+        list.push_back({{"after_s", s.after_s}, {"arcsec", number(s.arcsec)}});
+    }
+    return list;
+}
+
+Json json_noise(const study::NoiseFigures& figures) {
+    const dither::NoiseEffectiveness& predicted = figures.predicted;
+    const auto& seen = figures.measured;
+    Json json{{"input_rate_deg_h", predicted.input_rate_deg_h},
+              {"change_per_cycle_rad", number(predicted.change_per_cycle_rad)},
+              {"change_per_cycle_percent", number(figures.change_per_cycle_percent)},
+              {"arw_over_theory", number(predicted.arw_over_theory)},
+              {"bias_deg_h", number(predicted.bias_deg_h)},
+              {"reason", predicted.reason.empty() ? Json(nullptr) : Json(predicted.reason)}};
+    json["measured"] = {{"change_per_cycle_rad", number(seen.change_per_cycle_rad)},
+                        {"arw_over_theory", number(seen.arw_over_theory)},
+                        {"bias_deg_h", number(seen.bias_deg_h)},
+                        {"bias_se_deg_h", number(seen.bias_error_deg_h)}};
+    if (!predicted.angle_spread.empty()) {
+        json["angle_spread"] = json_spread(predicted.angle_spread);
+        json["measured"]["angle_spread"] = json_spread(seen.angle_spread);
+    }
+    return json;
+}
+
 Json json_arm(const study::ArmSummary& arm) {
     Json json{{"gyros", arm.gyros},
               {"arw_deg_rt_h", arm.noise_injected ? json_figure(arm.arw_deg_rt_h) : Json(nullptr)},
@@ -104,6 +132,7 @@ Json json_arm(const study::ArmSummary& arm) {
                arm.bias_instability_deg_h ? json_figure(*arm.bias_instability_deg_h) : Json(nullptr)},
               {"arw_reduction", json_reduction(arm.arw_reduction)},
               {"rate_error_deg_h", json_mean(arm.rate_error_deg_h)}};
+    if (arm.noise_effectiveness) json["noise_effectiveness"] = json_noise(*arm.noise_effectiveness);
     add_scale_factor(json, arm.scale_factor);
     json["allan"] = Json::array();
     for (const study::EnsemblePoint& point : arm.allan) {
@@ -224,6 +253,35 @@ std::string scale_factor_text(const study::Study& study, const study::Summary& s
         "of one gyro's largest deviation 68 % of the gyros (docs/scale-factor.md)\n{}\n{}",
         study.scenario.ensemble.gyros, summary.arms.front().scale_factor->full_scale_deg_h, slopes.text(),
         deviations.text());
+}
+
+std::string optional_cell(const std::optional<double>& value, const char* absent = "-") {
+    return value && std::isfinite(*value) ? fmt::format("{:.3g}", *value) : std::string(absent);
+}
+
+/// What the injected noise does, predicted and measured.
+std::string noise_text(const study::ArmSummary& arm) {
+    if (!arm.noise_effectiveness) return "";
+    const dither::NoiseEffectiveness& predicted = arm.noise_effectiveness->predicted;
+    const auto& seen = arm.noise_effectiveness->measured;
+    report::Table table({{fmt::format("injected noise at {:g} deg/h", predicted.input_rate_deg_h), report::Align::left},
+                         {"predicted", report::Align::right},
+                         {"measured", report::Align::right}});
+    table.add_row({"rms change of the amplitude per cycle [rad]", fmt::format("{:.3g}", predicted.change_per_cycle_rad),
+                   fmt::format("{:.3g}", seen.change_per_cycle_rad)});
+    table.add_row({"the same in per cent of the dither",
+                   fmt::format("{:.3g}", arm.noise_effectiveness->change_per_cycle_percent), ""});
+    table.add_row({"ARW over that of randomised turns", optional_cell(predicted.arw_over_theory),
+                   optional_cell(seen.arw_over_theory)});
+    table.add_row({"bias [deg/h]", optional_cell(predicted.bias_deg_h),
+                   seen.bias_deg_h ? fmt::format("{:.3g} +- {:.2g}", *seen.bias_deg_h, seen.bias_error_deg_h) : "-"});
+    for (std::size_t i = 0; i < predicted.angle_spread.size() && i < seen.angle_spread.size(); ++i) {
+        table.add_row({fmt::format("angle after {:g} s, sd over the gyros [arcsec]", predicted.angle_spread[i].after_s),
+                       fmt::format("{:.3g}", predicted.angle_spread[i].arcsec),
+                       optional_cell(seen.angle_spread[i].arcsec)});
+    }
+    const std::string reason = predicted.reason.empty() ? "" : fmt::format("({})\n", predicted.reason);
+    return "\n" + table.text() + reason;
 }
 
 /// What the cures take away of the injected random walk.
@@ -393,6 +451,7 @@ std::string study_json(const study::Study& study, const study::Summary& summary,
     json["arms"] = Json::object();
     for (const study::ArmSummary& arm : summary.arms) json["arms"][arm.name] = json_arm(arm);
     json["theory"] = {{"arw_deg_rt_h", number(summary.theory.arw_deg_rt_h)},
+                      {"arw_first_order_deg_rt_h", number(summary.theory.arw_first_order_deg_rt_h)},
                       {"dead_band_deg_h", number(summary.theory.dead_band_deg_h)}};
     return json.dump(2) + "\n";
 }
@@ -408,6 +467,7 @@ std::string study_text(const study::Study& study, const study::Summary& summary,
                                     "band +-{:.4g} deg/h (first order)",
                                     summary.theory.arw_deg_rt_h, summary.theory.dead_band_deg_h));
     text += reduction_text(summary);
+    for (const study::ArmSummary& arm : summary.arms) text += noise_text(arm);
     const bool deterministic =
         std::any_of(summary.arms.begin(), summary.arms.end(), [](const auto& arm) { return !arm.noise_injected; });
     if (deterministic) {

@@ -54,6 +54,9 @@ std::vector<double> over_gyros(const ArmStatistics& arm, const std::function<dou
     return values;
 }
 
+/// Of the arm's group, the predicted spread of angles after that time.
+std::string spread_attribute(double after_s) { return fmt::format("predicted_angle_spread_{:g}_s_arcsec", after_s); }
+
 void write_noise(store::Group& group, const ArmStatistics& arm) {
     store::Group noise = group.create_group("noise");
     for (const auto& column : coefficient_columns) {
@@ -136,6 +139,37 @@ void write_figures(store::Group& group, const ArmSummary& summary) {
     group.set_attribute("rate_error_deg_h_hi", summary.rate_error_deg_h.hi);
 }
 
+/// What injected noise does: predicted, measured, and the gyros' own figures.
+void write_noise_effectiveness(store::Group& group, const ArmStatistics& arm, const ArmSummary& summary) {
+    if (arm.arm.ideal || shows_noise(arm.arm)) {
+        std::vector<double> errors;
+        for (const GyroStatistics& gyro : arm.gyros) {
+            errors.insert(errors.end(), gyro.angle_error_arcsec.begin(), gyro.angle_error_arcsec.end());
+        }
+        group.write(
+            "angle_error_arcsec", std::span<const double>(errors),
+            store::Shape{arm.gyros.size(), std::size(dither::spread_times_s)},
+            {"arcsec", "angle turned beyond the input's after 1, 10 and 100 s; NaN where the record ends before"});
+    }
+    if (!summary.noise_effectiveness) return;
+    group.write("change_per_cycle_rad", over_gyros(arm, [](const GyroStatistics& g) { return g.change_per_cycle_rad; }),
+                {"rad", "rms change of the dither's amplitude from a turn to the next but one, optical phase"});
+    const NoiseFigures& figures = *summary.noise_effectiveness;
+    const dither::NoiseEffectiveness& predicted = figures.predicted;
+    group.set_attribute("predicted_input_rate_deg_h", predicted.input_rate_deg_h);
+    group.set_attribute("predicted_change_per_cycle_rad", predicted.change_per_cycle_rad);
+    group.set_attribute("predicted_arw_over_theory", or_nan(predicted.arw_over_theory));
+    group.set_attribute("predicted_bias_deg_h", or_nan(predicted.bias_deg_h));
+    group.set_attribute("predicted_reason", predicted.reason);
+    group.set_attribute("measured_change_per_cycle_rad", figures.measured.change_per_cycle_rad);
+    group.set_attribute("measured_arw_over_theory", or_nan(figures.measured.arw_over_theory));
+    group.set_attribute("measured_bias_deg_h", or_nan(figures.measured.bias_deg_h));
+    for (std::size_t i = 0; i < std::size(dither::spread_times_s); ++i) {
+        const bool told = i < predicted.angle_spread.size();
+        group.set_attribute(spread_attribute(dither::spread_times_s[i]), told ? predicted.angle_spread[i].arcsec : nan);
+    }
+}
+
 void write_gyros(store::Group& root, const Study& study) {
     store::Group gyros = root.create_group("gyros");
     for (const auto& parameter : drawn_parameters) {
@@ -181,7 +215,11 @@ std::uint64_t expected_size_bytes(const Study& study) {
     const std::uint64_t statistics =
         8 * (3 * coefficient_columns.size() + pooling_columns.size() + 1 + allan_columns.size() * taus) + taus + 2;
     std::uint64_t bytes = gyros * (8 * drawn_parameters.size() + arms * (8 * samples + statistics));
-    for (const ArmStatistics& arm : study.arms) bytes += has_closed_form(study.scenario, arm.arm) ? 8 * gyros : 0;
+    for (const ArmStatistics& arm : study.arms) {
+        bytes += has_closed_form(study.scenario, arm.arm) ? 8 * gyros : 0;
+        if (arm.arm.ideal || shows_noise(arm.arm)) bytes += 8 * gyros * std::size(dither::spread_times_s);
+        if (shows_noise(arm.arm)) bytes += 8 * gyros;
+    }
     return bytes;
 }
 
@@ -238,6 +276,7 @@ void ResultWriter::finish(const Study& study, const Summary& summary, const stor
         write_noise(group, study.arms[i]);
         write_allan(group, study, study.arms[i], summary.arms[i]);
         write_figures(group, summary.arms[i]);
+        write_noise_effectiveness(group, study.arms[i], summary.arms[i]);
     }
     records_.clear();
     file_.commit();
@@ -254,6 +293,31 @@ std::vector<double> read_column(const store::Group& group, const std::string& na
                                      fmt::join(expected, ", ")));
     }
     return dataset.read<double>();
+}
+
+/// Restores the prediction of an arm and its gyros' figures; results of earlier programs have none.
+void read_noise_effectiveness(const store::Group& group, Study& study, ArmStatistics& arm) {
+    const std::size_t gyros = arm.gyros.size();
+    constexpr std::size_t times = std::size(dither::spread_times_s);
+    if (group.has_dataset("angle_error_arcsec")) {
+        const auto errors = read_column(group, "angle_error_arcsec", {gyros, times});
+        for (std::size_t i = 0; i < errors.size(); ++i) {
+            arm.gyros[i / times].angle_error_arcsec[i % times] = errors[i];
+        }
+    }
+    if (!group.has_dataset("change_per_cycle_rad")) return;
+    const auto changes = read_column(group, "change_per_cycle_rad", {gyros});
+    for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].change_per_cycle_rad = changes[g];
+    dither::NoiseEffectiveness& predicted = study.predicted_noise.emplace();
+    predicted.input_rate_deg_h = group.double_attribute("predicted_input_rate_deg_h");
+    predicted.change_per_cycle_rad = group.double_attribute("predicted_change_per_cycle_rad");
+    predicted.arw_over_theory = or_nothing(group.double_attribute("predicted_arw_over_theory"));
+    predicted.bias_deg_h = or_nothing(group.double_attribute("predicted_bias_deg_h"));
+    predicted.reason = group.string_attribute("predicted_reason");
+    for (const double after_s : dither::spread_times_s) {
+        const double arcsec = group.double_attribute(spread_attribute(after_s));
+        if (!std::isnan(arcsec)) predicted.angle_spread.push_back({after_s, arcsec});
+    }
 }
 
 void read_arm(const store::Group& group, const Study& study, ArmStatistics& arm) {
@@ -339,7 +403,11 @@ Study read_result(const std::filesystem::path& path) {
         const auto values = read_column(gyros, parameter.name, {study.gyros.size()});
         for (std::size_t g = 0; g < values.size(); ++g) study.gyros[g].*parameter.field = values[g];
     }
-    for (ArmStatistics& arm : study.arms) read_arm(file.group("arms").group(arm.arm.name), study, arm);
+    for (ArmStatistics& arm : study.arms) {
+        const store::Group group = file.group("arms").group(arm.arm.name);
+        read_arm(group, study, arm);
+        read_noise_effectiveness(group, study, arm);
+    }
     return study;
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <mutex>
 
@@ -11,6 +13,7 @@
 #include "engine/ensemble/closed_form.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/output_counts.hpp"
+#include "engine/scenario/injected_noise.hpp"
 
 namespace ringlock::study {
 
@@ -28,6 +31,25 @@ bool has_closed_form(const scenario::Scenario& scenario, const scenario::Arm& ar
     return plain && ensemble::drive_repeats(scenario);
 }
 
+bool shows_noise(const scenario::Arm& arm) {
+    return arm.noise_injected && arm.compensator == scenario::Compensator::none;
+}
+
+void predict_noise(Study& study) {
+    const scenario::Scenario& scenario = study.scenario;
+    if (study.predicted_noise || std::none_of(scenario.arms.begin(), scenario.arms.end(), shows_noise)) return;
+    dither::InjectedTurns noise;
+    if (scenario.noise_injection.model == scenario::NoiseModel::drive) noise.drive = scenario::drive_noise(scenario);
+    noise.rms_rad = scenario::injected_noise(scenario).turn_rms_rad;
+    const bool steady = scenario.input.sweep_points == 1 && !scenario::has_profile(scenario.input);
+    gyro::Setup setup = ensemble::nominal_setup(scenario);
+    if (!steady) setup.lockin_threshold_deg_h = 0.0;  // the change per cycle does not depend on it
+    study.predicted_noise = dither::predict_noise_effectiveness(setup, noise);
+    if (steady) return;
+    study.predicted_noise->bias_deg_h.reset();
+    study.predicted_noise->reason = "the input rate is not steady";
+}
+
 namespace {
 
 /// Samples gathered before they are handed on: enough for a write to be worth its while.
@@ -41,11 +63,15 @@ class ArmStream {
         : study_(study),
           gyros_(gyros),
           on_samples_(on_samples),
+          told_(shows_noise(study.arms[arm].arm) || study.arms[arm].arm.ideal),
           record_(study.schedule.samples, fit_samples),
-          waiting_{arm, first_gyro, gyros, 0, {}} {}
+          waiting_{arm, first_gyro, gyros, 0, {}} {
+        for (auto& errors : angle_errors_counts_) errors.fill(std::numeric_limits<double>::quiet_NaN());
+    }
 
     void add(std::span<const simd::LaneCounts> counts) {
         if (cycle_ == 0 && !counts.empty()) last_ = counts.front();
+        if (told_) note_angles(counts);
         octaves_.add(counts, gyros_);
         const std::int64_t every = study_.schedule.cycles_per_sample;
         for (const simd::LaneCounts& row : counts) {
@@ -66,6 +92,11 @@ class ArmStream {
         const double duration_s = study_.schedule.cycle_s * static_cast<double>(study_.schedule.cycles() - 1);
         result.rate_error_deg_h =
             static_cast<double>(turned_[lane]) * arcsec_per_count / duration_s - setup.input_rate_deg_h;
+        for (std::size_t i = 0; i < angle_errors_counts_.size(); ++i) {
+            result.angle_error_arcsec[i] =
+                angle_errors_counts_[i][lane] * arcsec_per_count -
+                setup.input_rate_deg_h * study_.schedule.cycle_s * static_cast<double>(cycle_at(i));
+        }
         return result;
     }
 
@@ -88,6 +119,23 @@ class ArmStream {
 
    private:
     __extension__ using Wide = __int128;  // counts do not wrap round in it
+
+    /// Cycle nearest to a time at which the spread of angles is told.
+    std::int64_t cycle_at(std::size_t i) const {
+        return std::llround(dither::spread_times_s[i] / study_.schedule.cycle_s);
+    }
+
+    /// Keeps angles at those times.
+    void note_angles(std::span<const simd::LaneCounts> counts) {
+        for (std::size_t i = 0; i < angle_errors_counts_.size(); ++i) {
+            const std::int64_t row = cycle_at(i) - cycle_;
+            if (row < 0 || row >= static_cast<std::int64_t>(counts.size())) continue;
+            turn_to(counts[static_cast<std::size_t>(row)]);
+            for (std::size_t lane = 0; lane < gyros_; ++lane) {
+                angle_errors_counts_[i][lane] = static_cast<double>(turned_[lane]);
+            }
+        }
+    }
 
     /// Goes on to a later cycle, less than 2^31 fringes away.
     void turn_to(const simd::LaneCounts& row) {
@@ -115,6 +163,8 @@ class ArmStream {
     const Study& study_;
     std::size_t gyros_;
     const OnSamples& on_samples_;
+    bool told_;  ///< angles after dither::spread_times_s
+    std::array<std::array<double, simd::lanes>, std::size(dither::spread_times_s)> angle_errors_counts_;
     allan::OctaveStream octaves_;
     allan::BoundedRecord record_;
     std::int64_t cycle_ = 0;
@@ -146,6 +196,7 @@ class BlockStatistics final : public ensemble::BlockSink {
             for (std::size_t lane = 0; lane < gyros_; ++lane) {
                 GyroStatistics& found = study_.arms[arm].gyros[first_ + lane];
                 found = arms_[arm]->finish(lane, result.setups[lane]);
+                if (shows_noise(study_.arms[arm].arm)) found.change_per_cycle_rad = result.change_per_cycle_rad[lane];
                 if (closed_form) {
                     found.rate_error_closed_form_deg_h = ensemble::closed_form_rate_error_deg_h(result.setups[lane]);
                 }
@@ -170,6 +221,7 @@ class BlockStatistics final : public ensemble::BlockSink {
 }  // namespace
 
 Study run(Study study, int threads, const OnSamples& on_samples, const ensemble::Monitor& monitor) {
+    predict_noise(study);
     const scenario::Scenario& scenario = study.scenario;
     std::mutex mutex;
     const auto make_sink = [&](std::int64_t first_gyro, std::size_t gyros) {

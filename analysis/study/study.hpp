@@ -2,6 +2,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "analysis/allan/allan.hpp"
 #include "analysis/noise/fit.hpp"
+#include "engine/dither/noise_effectiveness.hpp"
 #include "engine/ensemble/ensemble.hpp"
 #include "engine/ensemble/schedule.hpp"
 #include "engine/gyro/setup.hpp"
@@ -25,6 +27,12 @@ struct GyroStatistics {
     double rate_error_deg_h = 0.0;  ///< mean output rate over the record less the input rate
     /// The same over infinite time, without simulation: where has_closed_form() and the dither has fringes enough.
     std::optional<double> rate_error_closed_form_deg_h;
+    /// Of the arm `noise_injected`: rms change of the dither's amplitude from a turn to the next but one, rad of
+    /// optical phase.
+    double change_per_cycle_rad = 0.0;
+    /// Of the arm `noise_injected` and of `ideal`: angle turned beyond the input's after dither::spread_times_s; NaN
+    /// where the record ends before.
+    std::array<double, std::size(dither::spread_times_s)> angle_error_arcsec{};
 };
 
 struct ArmStatistics {
@@ -40,7 +48,8 @@ struct Study {
     std::vector<std::int64_t> factors;  ///< averaging factors of the Allan deviations in dither cycles: octaves
     std::vector<gyro::Setup> gyros;     ///< parameters as drawn
     std::vector<ArmStatistics> arms;
-    std::int64_t turns = 0;                   ///< zero-rate points of distinct physical trajectories
+    std::optional<dither::NoiseEffectiveness> predicted_noise;  ///< of the arm `noise_injected`, by predict_noise()
+    std::int64_t turns = 0;                                     ///< zero-rate points of distinct physical trajectories
     std::int64_t tables_remade = 0;           ///< turn maps made anew because a drive left their ranges
     std::int64_t contradictory_readings = 0;  ///< turns at which pulses and detectors contradicted each other
     double turn_map_error_rad = 0.0;          ///< largest error measured between the nodes of the turn maps
@@ -49,6 +58,13 @@ struct Study {
 /// Whether the mean rate of the arm's gyros is known in closed form: a drive that repeats itself, and nothing
 /// corrected.
 bool has_closed_form(const scenario::Scenario& scenario, const scenario::Arm& arm);
+
+/// Whether the study has an arm whose output is that of the injected noise, nothing taken away: its statistics show
+/// what the noise does.
+bool shows_noise(const scenario::Arm& arm);
+
+/// Predicts what the injected noise does, where an arm has nothing but it. May take some seconds.
+void predict_noise(Study& study);
 
 /// Told of samples of the angle output of an arm: those of gyros first_gyro + i, i < gyros, from sample first_sample
 /// on, [gyro][sample] in arcsec. From any thread.

@@ -4,6 +4,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "analysis/noise/ensemble.hpp"
 #include "engine/core/units.hpp"
@@ -211,6 +212,58 @@ std::optional<Reduction> reduction(const Figure& raw, const Figure& left) {
     return result;
 }
 
+/// Mean and its standard error.
+std::pair<double, double> mean_and_error(const std::vector<double>& values) {
+    const auto count = static_cast<double>(values.size());
+    double sum = 0.0;
+    for (const double value : values) sum += value;
+    double squares = 0.0;
+    for (const double value : values) squares += (value - sum / count) * (value - sum / count);
+    const bool several = values.size() > 1;
+    return {sum / count, several ? std::sqrt(squares / (count - 1.0) / count) : std::nan("")};
+}
+
+NoiseFigures noise_figures(const Study& study, const ArmStatistics& arm, const Summary& summary, const Figure& arw) {
+    NoiseFigures figures;
+    figures.predicted = *study.predicted_noise;
+    const double depth_rad = gyro::modulation_depth_rad(ensemble::nominal_setup(study.scenario));
+    figures.change_per_cycle_percent = 100.0 * figures.predicted.change_per_cycle_rad / depth_rad;
+    const auto ideal =
+        std::find_if(study.arms.begin(), study.arms.end(), [](const ArmStatistics& a) { return a.arm.ideal; });
+    const auto beyond_ideal = [&](std::size_t gyro, const auto& what) {
+        return what(arm.gyros[gyro]) - (ideal != study.arms.end() ? what(ideal->gyros[gyro]) : 0.0);
+    };
+    double squares = 0.0;
+    std::vector<double> errors;
+    for (std::size_t gyro = 0; gyro < arm.gyros.size(); ++gyro) {
+        squares += arm.gyros[gyro].change_per_cycle_rad * arm.gyros[gyro].change_per_cycle_rad;
+        errors.push_back(beyond_ideal(gyro, [](const GyroStatistics& g) { return g.rate_error_deg_h; }));
+    }
+    NoiseFigures::Measured& measured = figures.measured;
+    measured.change_per_cycle_rad = std::sqrt(squares / static_cast<double>(arm.gyros.size()));
+    const bool steady = study.scenario.input.sweep_points == 1;
+    if (steady) {
+        const auto [bias, error] = mean_and_error(errors);
+        measured.bias_deg_h = bias;
+        measured.bias_error_deg_h = error;
+    }
+    const bool random = study.scenario.noise_injection.model == scenario::NoiseModel::turns ||
+                        study.scenario.noise_injection.form != gyro::NoiseForm::sinusoidal;
+    if (random && steady && arw.median && summary.theory.arw_deg_rt_h > 0.0) {
+        measured.arw_over_theory = *arw.median / summary.theory.arw_deg_rt_h;
+    }
+    if (random || !steady) return figures;
+    for (std::size_t i = 0; i < std::size(dither::spread_times_s); ++i) {
+        std::vector<double> angles;
+        for (std::size_t gyro = 0; gyro < arm.gyros.size(); ++gyro) {
+            angles.push_back(beyond_ideal(gyro, [i](const GyroStatistics& g) { return g.angle_error_arcsec[i]; }));
+        }
+        const double spread = mean_and_error(angles).second * std::sqrt(static_cast<double>(angles.size()));
+        measured.angle_spread.push_back({dither::spread_times_s[i], spread});
+    }
+    return figures;
+}
+
 }  // namespace
 
 std::optional<double> locked_up_to_deg_h(const ArmSummary& arm) {
@@ -251,13 +304,17 @@ Summary summarise(const Study& study) {
     summary.seed = study.scenario.ensemble.seed;
     summary.turns = study.turns;
     const gyro::Setup nominal = ensemble::nominal_setup(study.scenario);
-    summary.theory = {gyro::angle_random_walk_deg_rt_h(nominal), gyro::band_half_width_deg_h(nominal, 0)};
+    summary.theory = {gyro::randomised_arw_deg_rt_h(nominal), gyro::angle_random_walk_deg_rt_h(nominal),
+                      gyro::band_half_width_deg_h(nominal, 0)};
     for (const ArmStatistics& arm : study.arms) {
         ArmSummary out;
         out.name = arm.arm.name;
         out.gyros = static_cast<std::int64_t>(arm.gyros.size());
         out.noise_injected = arm.arm.noise_injected;
         if (out.noise_injected) out.arw_deg_rt_h = angle_random_walk(arm, summary.seed);
+        if (shows_noise(arm.arm) && study.predicted_noise) {
+            out.noise_effectiveness = noise_figures(study, arm, summary, out.arw_deg_rt_h);
+        }
         if (arm.arm.ideal || arm.arm.noise_injected) {
             const Figure floor = bias_instability(arm, summary.seed);
             if (floor.median) out.bias_instability_deg_h = floor;

@@ -66,6 +66,19 @@ struct FamilyDeviation {
     std::vector<EnsemblePoint> points;  ///< deg/h, time errors in arcsec; lo, hi and edf NaN where there are none
 };
 
+/// What injected noise was predicted to do and what the simulation shows of it.
+struct NoiseFigures {
+    dither::NoiseEffectiveness predicted;
+    double change_per_cycle_percent = 0.0;  ///< as predicted, of the dither's amplitude
+    struct Measured {
+        double change_per_cycle_rad = 0.0;
+        std::optional<double> arw_over_theory;  ///< median of the gyros
+        std::optional<double> bias_deg_h;       ///< mean rate error, less that of `ideal` where there is such an arm
+        double bias_error_deg_h = 0.0;          ///< its standard error
+        std::vector<dither::AngleSpread> angle_spread;
+    } measured;
+};
+
 struct ArmSummary {
     std::string name;
     std::int64_t gyros = 0;
@@ -74,15 +87,17 @@ struct ArmSummary {
     std::optional<Figure> bias_instability_deg_h;
     MeanFigure rate_error_deg_h;
     std::vector<EnsemblePoint> allan;
-    std::vector<SweepPoint> sweep;            ///< empty without a sweep
-    std::vector<Step> steps;                  ///< of the closed form, in the order of the sweep
-    std::optional<ScaleFactor> scale_factor;  ///< of sweeps of three rates and more, with two gyros and more
-    std::vector<FamilyDeviation> family;      ///< empty unless asked for
-    std::optional<Reduction> arw_reduction;   ///< of arms behind injected noise, beside `noise_injected` itself
+    std::vector<SweepPoint> sweep;                    ///< empty without a sweep
+    std::vector<Step> steps;                          ///< of the closed form, in the order of the sweep
+    std::optional<ScaleFactor> scale_factor;          ///< of sweeps of three rates and more, with two gyros and more
+    std::vector<FamilyDeviation> family;              ///< empty unless asked for
+    std::optional<NoiseFigures> noise_effectiveness;  ///< of the arm `noise_injected`
+    std::optional<Reduction> arw_reduction;           ///< of arms behind injected noise, beside `noise_injected` itself
 };
 
 struct Theory {
     double arw_deg_rt_h = 0.0;
+    double arw_first_order_deg_rt_h = 0.0;  ///< in the kick
     double dead_band_deg_h = 0.0;
 };
 

@@ -27,7 +27,8 @@ std::vector<gyro::Device> devices_of(const Calibration& calibration) {
 
 Adaptive::Adaptive(const Calibration& calibration, const readout::Electronics& electronics, double tolerance_rad)
     : lanes_(calibration.lanes),
-      recovery_(devices_of(calibration), electronics, calibration.amplitude_rms_rad),
+      recovery_(devices_of(calibration), electronics, calibration.amplitude_rms_rad,
+                calibration.amplitude_change_rms_rad),
       exact_(calibration, tolerance_rad, coupling_share) {
     recovery_.learn();
     for (std::size_t lane = 0; lane < lanes_; ++lane) {

@@ -95,17 +95,19 @@ bool place_last_turn(D d, bool minimum, std::size_t lane, Exact::State& state) {
 }
 
 /// Rows [first_row, last_row) of the readings; errors are told less errors.whole. `changed`: rate or coupling are
-/// others than at the row before.
+/// others than at the row before. `first_turn`: number of turns seen before the first row.
 bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const Exact::Parts& parts,
                    const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row, bool begun,
-                   bool changed, Exact::State& state, LaneErrors& errors) {
+                   bool changed, std::int64_t first_turn, Exact::State& state, LaneErrors& errors) {
     const D d;
+    const auto turns_before = [&](std::size_t row) { return first_turn + static_cast<std::int64_t>(row - first_row); };
     const V zero = hn::Zero(d);
     const V one = hn::Set(d, 1.0);
     const V half = hn::Set(d, 0.5);
     const V per_rad = hn::Set(d, 0.15915494309189535);
     const V two_pi = hn::Set(d, 6.283185307179586);
     const bool strong = tables.strong();
+    const bool changing = tables.changing();
     for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
         const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
         const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
@@ -119,6 +121,9 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
         const V rate = load(state.rate_rad_s);
         const V centre = load(tables.centre()[0]);
         const V inverse = load(tables.inverse_half_width()[0]);
+        const V change_inverse = load(tables.inverse_half_width()[3]);
+        V last_amplitude = load(state.turn_amplitude_rad);
+        V middles_rate = load(state.middles_rate_rad_s);
         V last_sine = load(state.sine);
         V last_cosine = load(state.cosine);
         V last_fringes = load(state.turn_fringes);
@@ -144,15 +149,21 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
             // The half cycle that ends here, turned upright by its own sign, which is that of the turn before.
             const V swing = hn::Neg(sign) * ((load(readings.phase_whole[i]) - last_whole) +
                                              (load(readings.phase_fringes[i]) - last_fringes));
-            const V plain_rotation = hn::Neg(sign) * rate * load(state.duration_s[1 - after]);
+            const V duration = load(state.duration_s[1 - after]);
+            const V plain_rotation = hn::Neg(sign) * (changing ? middles_rate : rate) * duration;
             // First from zero-rate point to dither's turn by the amplitude that the swing shows but for the lock-in.
             const V rough = half * sm::fma(d, swing, two_pi, hn::Neg(plain_rotation));
             const bool has_before = begun || i > 0;
-            const V before_amplitude = has_before ? rough : mean_amplitude;
+            V before_amplitude = has_before ? rough : mean_amplitude;
+            V after_amplitude = mean_amplitude;
+            if (changing && has_before) {
+                before_amplitude = after_amplitude =
+                    gm::amplitude_after_swing(d, rough, last_amplitude, sign, turns_before(i)).amplitude;
+            }
             const V standstill = sm::fma(d, b, sine, sign * rate);
             const auto ahead = standstill < zero;
             const gm::UprightSide<V> side{
-                hn::IfThenElse(ahead, mean_amplitude, before_amplitude),
+                hn::IfThenElse(ahead, after_amplitude, before_amplitude),
                 hn::IfThenElse(ahead, w_after, w_before),
                 sign * rate,
                 b,
@@ -174,14 +185,29 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                                        hn::Neg(first.z_re * (last_sine - sine)));  // Im z (e_0 - e_1)
                 const V gain_rad = sm::fma(d, bend, hn::Set(d, 2.0), first.shift * (two_pi + two_pi));
                 const V amplitude = half * (sm::fma(d, moved, two_pi, hn::Neg(plain_rotation)) - gain_rad);
-                const pm::HalfMapOf<V> map = pm::evaluate(d, part, lane, scaled(amplitude), zero, zero, zero);
-                const sm::Complex<V> z{map.z_re, map.z_im};
+                pm::HalfMapOf<V> begin, end;
+                if (changing) {
+                    // Amplitude and change as seen from either turn.
+                    const auto told = gm::amplitude_after_swing(d, amplitude, last_amplitude, sign, turns_before(i));
+                    const V change = told.amplitude - last_amplitude;
+                    const V half_change = change * half;
+                    const V scaled_change = hn::Max(hn::Min(change * change_inverse, one), hn::Neg(one));
+                    begin = pm::evaluate(d, part, lane, scaled(amplitude - half_change), zero, zero, scaled_change);
+                    end = pm::evaluate(d, part, lane, scaled(amplitude + half_change), zero, zero,
+                                       hn::Neg(scaled_change));
+                    last_amplitude = told.amplitude;
+                    middles_rate = middles_rate - told.rotation_less / duration;
+                } else {
+                    begin = end = pm::evaluate(d, part, lane, scaled(amplitude), zero, zero, zero);
+                }
+                const sm::Complex<V> z_begin{begin.z_re, begin.z_im};
+                const sm::Complex<V> z_end{end.z_re, end.z_im};
                 const sm::Complex<V> unit{one, zero};
                 const sm::Complex<V> e0{last_cosine, hn::Neg(last_sine)};
                 const sm::Complex<V> e1{hn::Neg(cosine), sine};
-                const sm::Complex<V> q = sm::mul(d, sm::mul_add(d, z, e0, unit), sm::mul_add(d, z, e1, unit));
+                const sm::Complex<V> q = sm::mul(d, sm::mul_add(d, z_begin, e0, unit), sm::mul_add(d, z_end, e1, unit));
                 const V gain = sm::fma(d, strong ? sm::arg(d, q.re, q.im) : sm::arg_right(d, q.re, q.im),
-                                       hn::Set(d, 0.3183098861837907), map.shift + map.shift);
+                                       hn::Set(d, 0.3183098861837907), begin.shift + end.shift);
                 // Whole fringes are put apart at every turn: bits must not depend on where a piece ends.
                 error = sm::fnma(d, sign, gain, error);
                 const V carry = sm::nearest(d, error);
@@ -204,6 +230,8 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 store(side.scale_s, state.read_scale_s);
             }
         }
+        store(last_amplitude, state.turn_amplitude_rad);
+        store(middles_rate, state.middles_rate_rad_s);
         store(error, state.error_fringes);
         store(error_whole, state.error_whole);
         store(last_sine, state.sine);
@@ -236,6 +264,8 @@ Exact::Exact(const Calibration& calibration, double tolerance_rad, double coupli
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
         const std::size_t which = std::min(lane, calibration.lanes - 1);
         state_.amplitude_rad[lane] = calibration.dither_amplitude_rad[which];
+        state_.turn_amplitude_rad[lane] = state_.amplitude_rad[lane];
+        state_.middles_rate_rad_s[lane] = 0.0;
         state_.b_rad_s[lane] = calibration.b_rad_s[which];
         state_.coupling_cosine[lane] = 1.0;
         state_.duration_s[0][lane] = calibration.positive_duration_s[which];
@@ -263,7 +293,9 @@ void Exact::make_tables(std::size_t lane) {
     const double rate = state_.rate_rad_s[lane];
     const double b = state_.b_rad_s[lane];
     const double spread = coupling_share_ * b;
-    tables_.make(lane, device, {{a - margin, a + margin}, {rate - width, rate + width}, {b - spread, b + spread}, {}});
+    const double change = calibration_.amplitude_change_rad;
+    tables_.make(lane, device,
+                 {{a - margin, a + margin}, {rate - width, rate + width}, {b - spread, b + spread}, {-change, change}});
 }
 
 void Exact::see_minima(const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row,
@@ -316,9 +348,14 @@ void Exact::take_parts() {
         const propagate::TurnTables::Part& whole = tables_.part(which == 0 ? -1.0 : 1.0, 0);
         const auto [amplitudes, rates, couplings, changes] = whole.terms;
         propagate::TurnTables::Part& part = parts_[which];
-        part.terms = {amplitudes, 1, 1, 1};
-        part.coefficients.assign(3 * amplitudes, simd::Lanes{});
-        part.amplitude_terms.assign(1, amplitudes);
+        part.terms = {amplitudes, 1, 1, changes};
+        part.coefficients.assign(3 * amplitudes * changes, simd::Lanes{});
+        part.amplitude_terms.clear();
+        for (std::size_t e = 0; e < changes; ++e) {
+            const auto of_change = whole.amplitude_terms.begin() + static_cast<std::ptrdiff_t>(e * rates * couplings);
+            part.amplitude_terms.push_back(
+                *std::max_element(of_change, of_change + static_cast<std::ptrdiff_t>(rates * couplings)));
+        }
         for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
             const auto scaled = [&](double value, std::size_t variable) {
                 const double x =
@@ -327,17 +364,19 @@ void Exact::take_parts() {
             };
             const double rate_x = scaled(state_.rate_rad_s[lane], 1);
             const double coupling_x = scaled(state_.b_rad_s[lane], 2);
-            for (std::size_t k = 0; k < 3 * amplitudes; ++k) {
+            for (std::size_t i = 0; i < 3 * amplitudes * changes; ++i) {
+                const std::size_t change = i / (3 * amplitudes);
+                const std::size_t k = i % (3 * amplitudes);
                 double sum = 0.0;
                 for (std::size_t c = couplings; c-- > 0;) {
                     double over_rate = 0.0;
                     for (std::size_t r = rates; r-- > 0;) {
-                        const std::size_t row = 3 * amplitudes * (c * rates + r) + k;
+                        const std::size_t row = 3 * amplitudes * ((change * couplings + c) * rates + r) + k;
                         over_rate = over_rate * rate_x + whole.coefficients[row][lane];
                     }
                     sum = sum * coupling_x + over_rate;
                 }
-                part.coefficients[k][lane] = sum;
+                part.coefficients[i][lane] = sum;
             }
         }
     }
@@ -352,7 +391,7 @@ void Exact::solve(const readout::LaneReadings& readings, std::size_t first, std:
     }
     if (!begun_ || changed_) take_parts();
     if (!HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, parts_, readings, first, last, begun_,
-                                             changed_, state_, errors)) {
+                                             changed_, turns_, state_, errors)) {
         throw RunError(
             "compensated_exact: the phase does not reverse near a turn of the dither; the input rate is too high for "
             "it");

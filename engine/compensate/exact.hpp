@@ -18,6 +18,9 @@ namespace ringlock::compensate {
 /// are carried from the zero-rate point, where they are read, to the dither's turn by the Taylor series of the equation
 /// of motion.
 ///
+/// Behind a noisy drive the amplitude changes over the half cycle, too (docs/noise-injection.md). A swing is the sum of
+/// the amplitudes at its two turns, and tells that at the later one where the earlier one is known.
+///
 /// The rate must be known roughly before the first correction: errors of the first piece of readings of a run are
 /// computed with the mean rate over that piece, which ought to hold two minima at least: with a rate of nothing the
 /// first few corrections of a fast input are off by per cents. How later readings are cut into pieces does not matter.
@@ -47,6 +50,9 @@ class Exact final : public LaneCompensator {
         simd::Lanes rate_rad_s;               ///< as estimated
         // Of the turn before: sine and cosine of its upright phase at the dither's turn, and that phase.
         simd::Lanes sine, cosine, turn_fringes, turn_whole;
+        // Where the amplitude changes over half cycles: that of the dither at that turn, and the input's rate as the
+        // middles between turns tell it.
+        simd::Lanes turn_amplitude_rad, middles_rate_rad_s;
         simd::Lanes error_fringes;  ///< at the dither's turn
         simd::Lanes error_whole;
         simd::Lanes coupling_cosine, coupling_sine;  ///< of the coupling phase
@@ -55,8 +61,8 @@ class Exact final : public LaneCompensator {
         simd::Lanes read_amplitude_rad, read_angular_frequency_rad_s, read_scale_s;
     };
 
-    /// Half turns at the rate and the coupling as known, polynomials in the amplitude: [end at a minimum, at a
-    /// maximum].
+    /// Half turns at the rate and the coupling as known, polynomials in the amplitude and its change: [end at a
+    /// minimum, at a maximum].
     using Parts = std::array<propagate::TurnTables::Part, 2>;
 
    private:

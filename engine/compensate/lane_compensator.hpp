@@ -17,6 +17,9 @@ struct Calibration {
     std::array<double, simd::lanes> negative_duration_s{};
     double amplitude_margin_rad = 0.0;  ///< half cycles' amplitudes stay within it of the mean
     double amplitude_rms_rad = 0.0;     ///< their spread about it
+    /// Amplitudes change over half cycles, evenly, by at most that much; 0: half cycles are cosines.
+    double amplitude_change_rad = 0.0;
+    double amplitude_change_rms_rad = 0.0;  ///< rms of that change
 };
 
 /// Lock-in errors at the turns of a piece, to be taken away from the phases read there.

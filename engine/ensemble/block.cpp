@@ -103,6 +103,8 @@ std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Sc
     compensate::Calibration calibration = calibration_of(scenario, devices, kind == TrajectoryKind::noise_injected);
     calibration.amplitude_margin_rad = amplitude_margin_rad(scenario, devices, kind);
     calibration.amplitude_rms_rad = amplitude_rms_rad(scenario, devices, kind);
+    calibration.amplitude_change_rad = noise_of(scenario, kind).change_rad;
+    calibration.amplitude_change_rms_rad = noise_of(scenario, kind).change_rms_rad;
     switch (arm.compensator) {
         case scenario::Compensator::published:
             return std::make_unique<compensate::FirstOrder>(calibration, compensate::FirstOrder::published);
@@ -165,7 +167,8 @@ class Branch {
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
             std::vector<gyro::Device> calibrated = devices_;
             for (gyro::Device& device : calibrated) device.coupling.b_rad_s = calibrated_b_rad_s(scenario, device);
-            recovery_.emplace(calibrated, electronics, amplitude_rms_rad(scenario, devices_, kind));
+            recovery_.emplace(calibrated, electronics, amplitude_rms_rad(scenario, devices_, kind),
+                              noise_of(scenario, kind).change_rms_rad);
         }
     }
 
@@ -175,6 +178,7 @@ class Branch {
     void advance(std::size_t turns, std::span<const simd::Lanes> angle_arcsec, const CouplingChanges& coupling,
                  const readout::ElectronicNoise& noise) {
         dither_.next(turns, angle_arcsec, coupling.threshold_factors(), drive_, coupling.phases_rad());
+        if (kind_ == TrajectoryKind::noise_injected) add_changes();
         propagator_->step(drive_, turns_);
         readout_->read(drive_, turns_, noise, every_turn_ ? 1 : 2, readings_, angles_);
         if (detailed_) hardware_ = readings_;
@@ -194,6 +198,9 @@ class Branch {
         return recovery_ ? recovery_->contradictions(lane) : 0;
     }
     TrajectoryKind kind() const { return kind_; }
+    double change_per_cycle_rad(std::size_t lane) const {
+        return changes_ > 0 ? std::sqrt(change_squares_[lane] / static_cast<double>(changes_)) : 0.0;
+    }
     const std::vector<gyro::Device>& devices() const { return devices_; }
     const propagate::LanePropagator& propagator() const { return *propagator_; }
     const readout::LaneReadings& readings() const { return readings_; }
@@ -207,6 +214,20 @@ class Branch {
     }
 
    private:
+    /// Half cycles' amplitudes are means of their turns': from a turn to the next but one the amplitude changes by
+    /// twice what it does from half cycle to half cycle.
+    void add_changes() {
+        for (std::size_t i = 0; i < drive_.turns; ++i) {
+            const simd::Lanes& before = drive_.amplitude_rad[i];
+            const simd::Lanes& after = drive_.amplitude_rad[i + 1];
+            for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
+                const double change = 2.0 * (after[lane] - before[lane]);
+                change_squares_[lane] += change * change;
+            }
+        }
+        changes_ += static_cast<std::int64_t>(drive_.turns);
+    }
+
     TrajectoryKind kind_;
     std::vector<gyro::Device> devices_;
     dither::LaneDither dither_;
@@ -220,6 +241,8 @@ class Branch {
     bool every_turn_ = false;
     bool samples_wanted_ = false;
     bool detailed_ = false;
+    simd::Lanes change_squares_{};  ///< of the amplitude from a turn to the next but one
+    std::int64_t changes_ = 0;
     gyro::LaneDrive drive_;
     gyro::LaneTurns turns_;
     readout::LaneReadings readings_;
@@ -419,6 +442,17 @@ const std::vector<gyro::Setup>& GyroBlock::setups() const { return state_->setup
 int GyroBlock::trajectories() const {
     return static_cast<int>(std::count_if(state_->branches.begin(), state_->branches.end(),
                                           [](const Branch& branch) { return branch.kind() != TrajectoryKind::ideal; }));
+}
+
+std::vector<double> GyroBlock::change_per_cycle_rad() const {
+    std::vector<double> changes;
+    for (const Branch& branch : state_->branches) {
+        if (branch.kind() != TrajectoryKind::noise_injected) continue;
+        for (std::size_t lane = 0; lane < state_->setups.size(); ++lane) {
+            changes.push_back(branch.change_per_cycle_rad(lane));
+        }
+    }
+    return changes;
 }
 
 double GyroBlock::table_error_rad() const {

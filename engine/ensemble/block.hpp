@@ -59,6 +59,9 @@ class GyroBlock {
     const std::vector<gyro::Setup>& setups() const;
     /// Physical trajectories that lock-in acts on.
     int trajectories() const;
+    /// Of each gyro, rms change of the dither's amplitude from a turn to the next but one under injected noise [rad of
+    /// optical phase]; empty where none is injected.
+    std::vector<double> change_per_cycle_rad() const;
     double table_error_rad() const;  ///< largest measured when the turn maps were tabulated; 0: no tables
     std::int64_t tables_remade() const;
     /// Turns at which pulses and detectors contradicted each other, so that the detectors' phase was kept.

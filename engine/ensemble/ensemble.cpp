@@ -116,7 +116,7 @@ void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm>
         progress.advance(0, static_cast<std::int64_t>(turns) * counted);
     }
     sink.finish({first, block.setups(), counted * schedule.turns(), block.tables_remade(),
-                 block.contradictory_readings(), block.table_error_rad()});
+                 block.contradictory_readings(), block.change_per_cycle_rad(), block.table_error_rad()});
     progress.advance(static_cast<std::int64_t>(gyros), 0);
 }
 

@@ -19,6 +19,8 @@ struct BlockResult {
     std::int64_t turns = 0;           ///< zero-rate points of the trajectories simulated, without that of `ideal`
     std::int64_t tables_remade = 0;   ///< turn maps made anew because the drive left their ranges
     std::int64_t contradictory_readings = 0;  ///< turns at which pulses and detectors contradicted each other
+    /// Of each gyro, rms change of the amplitude from a turn to the next but one [rad]; empty without injected noise.
+    std::vector<double> change_per_cycle_rad;
     double turn_map_error_rad = 0.0;  ///< largest interpolation error measured when the tables were made; 0: no tables
 };
 

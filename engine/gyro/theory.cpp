@@ -24,6 +24,28 @@ double angle_random_walk_deg_rt_h(const Setup& setup) {
            units::deg_rt_h_per_arcsec_rt_s;
 }
 
+double randomised_kick_variance_rad2(const Setup& setup) {
+    const double kick = turn_kick_rad(setup);
+    const double r2 = -std::expm1(-0.25 * kick * kick);
+    // 2 Li2(x) = 2 (x + x^2/4 + x^3/9 + ...); for kicks of many radians x is near one, where Li2(x) = pi^2/6 - ln(x)
+    // ln(1 - x) - Li2(1 - x).
+    const auto series = [](double x) {
+        double sum = 0.0;
+        double power = x;
+        for (int k = 1; power > 1e-18; ++k, power *= x) sum += power / (k * k);
+        return sum;
+    };
+    if (r2 <= 0.5) return 2.0 * series(r2);
+    const double rest = std::exp(-0.25 * kick * kick);
+    return 2.0 * (units::pi * units::pi / 6.0 - (rest > 0.0 ? std::log(r2) * std::log(rest) : 0.0) - series(rest));
+}
+
+double randomised_arw_deg_rt_h(const Setup& setup) {
+    const double kick = turn_kick_rad(setup);
+    if (kick == 0.0) return 0.0;
+    return angle_random_walk_deg_rt_h(setup) * std::sqrt(randomised_kick_variance_rad2(setup) / (0.5 * kick * kick));
+}
+
 double modulation_depth_rad(const Setup& setup) {
     return units::two_pi * peak_rate_arcsec_s(setup) / (setup.scale_factor_arcsec * angular_frequency_rad_s(setup));
 }

@@ -7,7 +7,14 @@ namespace ringlock::gyro {
 /// Kick of one whole turn to first order, amplitude [rad]: kappa = 2 pi Omega_L / sqrt(K Omega_D w_D).
 double turn_kick_rad(const Setup& setup);
 
-/// Angle random walk with turn phases fully randomised [deg/sqrt(h)]: Omega_L sqrt(K / (2 pi Omega_D)).
+/// Variance of a turn's kick at a random phase [rad^2]: 2 Li2(r^2), r^2 = 1 - exp(-kappa^2/4) the square of |z| of the
+/// turn's Moebius map (Landau and Zener); kappa^2/2 (1 - kappa^2/16 + ...).
+double randomised_kick_variance_rad2(const Setup& setup);
+
+/// Angle random walk with turn phases fully randomised [deg/sqrt(h)], exact; see angle_random_walk_deg_rt_h().
+double randomised_arw_deg_rt_h(const Setup& setup);
+
+/// The same to first order in the kick: Omega_L sqrt(K / (2 pi Omega_D)). It is 3 % high at kicks of 1 rad.
 double angle_random_walk_deg_rt_h(const Setup& setup);
 
 /// Depth of modulation M = 2 pi Omega_D / (K w_D): amplitude of the dither in optical phase [rad].

@@ -6,6 +6,8 @@
 #define RINGLOCK_TURN_SERIES
 #endif
 
+#include <cstdint>
+
 #include "engine/simd/math-inl.hpp"
 
 HWY_BEFORE_NAMESPACE();
@@ -182,6 +184,29 @@ HWY_INLINE V longest_step(D d, V rate) {
 template <class D, class V>
 HWY_INLINE auto within_step(D d, V step, V rate) {
     return step * hn::Max(hn::Abs(rate), hn::Set(d, 1.0)) <= hn::Set(d, 0.125);
+}
+
+/// What a swing tells where the dither's amplitude changes from turn to turn.
+template <class V>
+struct SwingTold {
+    V amplitude;      ///< at the turn that ends it
+    V rotation_less;  ///< by which the input turns less over a half cycle than was assumed [rad]
+};
+
+/// The mean amplitude over a half cycle, which its swing shows less the rotation by the input, is the mean of those at
+/// its two turns. An error of the first one would change its sign from turn to turn for ever, and one of the rotation
+/// would add up in them. The middles between turns stand on a straight line but for the changes of the amplitude: both
+/// errors are corrected with the gains of a line fitted to all middles so far, later to some 512 of them.
+/// `sign`: 1 at a minimum of the phase, -1 at a maximum; `turns`: seen before this one, at least one.
+template <class D, class V>
+HWY_INLINE SwingTold<V> amplitude_after_swing(D d, V mean, V before, V sign, std::int64_t turns) {
+    constexpr std::int64_t most = 512;
+    const auto j = static_cast<double>(turns < most ? turns : most);
+    const double of_line = 2.0 * (2.0 * j - 1.0) / (j * (j + 1.0));
+    const double of_slope = turns > 1 ? 6.0 / (j * (j + 1.0)) : 0.0;
+    const V plain = (mean + mean) - before;
+    const V off = (plain - before) * hn::Set(d, 0.5);
+    return {sm::fnma(d, hn::Set(d, of_line), off, plain), sign * off * hn::Set(d, of_slope)};
 }
 
 }  // namespace ringlock::gyro::HWY_NAMESPACE

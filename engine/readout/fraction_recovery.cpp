@@ -54,6 +54,8 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
     const V least_of_mean = hn::Max(least, hn::Set(d, 1e-3));
     const double low_pass = low_pass_s(electronics);
     const V blunting = hn::Set(d, 0.5 * low_pass * low_pass);
+    const bool growing = known.change_rms_rad > 0.0;
+    const V per_three_pi = hn::Set(d, 0.1061032953945969);
     const bool shifted = !readings.pulses.known_shift_rad[0].empty();
     for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
         const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
@@ -63,7 +65,9 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
         // Half cycles share a turn's noise: half of the one before's deviation is in the one after, 3/4 of the variance
         // new.
         const V amplitude_relative = load(known.amplitude_relative);
-        const V share_variance = amplitude_relative * amplitude_relative * hn::Set(d, 0.75);
+        const V share_variance = growing ? hn::Set(d, squared(known.change_rms_rad))
+                                         : amplitude_relative * amplitude_relative * hn::Set(d, 0.75);
+        V last_amplitude = load(state.turn_amplitude_rad);
         V last_fringes = load(state.last_fringes);
         V last_whole = load(state.last_whole);
         V last_gain = load(state.last_gain);
@@ -99,7 +103,15 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                 deviation = sm::fma(d, half * two_pi, hn::Neg(sign) * (gain - share),
                                     sm::fnma(d, half, locked_rad, hn::Neg(mean_amplitude)));
             }
-            const V amplitude[2] = {mean_amplitude + deviation, sm::fma(d, half, deviation, mean_amplitude)};
+            V amplitude[2] = {mean_amplitude + deviation, sm::fma(d, half, deviation, mean_amplitude)};
+            V change_before = zero;
+            if (growing && before_turns > 0) {
+                const auto told = gm::amplitude_after_swing(d, amplitude[0], last_amplitude, sign, before_turns);
+                change_before = told.amplitude - last_amplitude;
+                last_amplitude = told.amplitude;
+                cycle_gain = sm::fnma(d, told.rotation_less, per_rad + per_rad, cycle_gain);
+            }
+            if (growing) amplitude[0] = amplitude[1] = last_amplitude;
             const V accel[2] = {amplitude[0] * load(known.w2_per_amplitude[direction][0]),
                                 amplitude[1] * load(known.w2_per_amplitude[direction][1])};
             // From the dither's turn, where the sides meet, to the vertex of the side before; and that of the other one
@@ -166,6 +178,12 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                     }
                     const V variance = sm::fma(d, (distance + distance) * a, tick_variance, pulse_variance);
                     V weight = one / variance;
+                    V swelling = zero;  // of the distance, for a change of 1 rad over the half cycle
+                    if (growing) {
+                        const V angle2 = load(known.w2[half_sign]) * time * time;
+                        swelling = per_three_pi * angle2 * hn::Sqrt(angle2);
+                        if (side == 0) y = sm::fnma(d, change_before, swelling, y);
+                    }
                     // The square of a noisy time is larger in the mean, by the time's variance: v/(4 D) in phase.
                     y = sm::fnma(d, variance, hn::Set(d, 0.25) / hn::Max(distance, least_of_mean), y);
                     if (pulse == 0) {
@@ -177,7 +195,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                     s2 = sm::fma(d, weighted, slope, s2);
                     sy = sm::fma(d, weight, y, sy);
                     sgy = sm::fma(d, weighted, y, sgy);
-                    const V of_share = sm::fma(d, slope, vertex_s, distance);
+                    const V of_share = growing ? swelling : sm::fma(d, slope, vertex_s, distance);
                     if (side == 1) {
                         const V heavy = weight * of_share;
                         share_one = share_one + heavy;
@@ -229,6 +247,8 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                                 e + hn::IfThenElseZero(late, half * steeper * sampled_s * sampled_s));
             const auto agree = hn::Abs(change) < hn::Set(d, largest_step_rad);
             change = sign * hn::IfThenElseZero(agree, change);
+            // No swing has told the amplitude yet.
+            if (growing && before_turns == 0) change = zero;
             contradictions = contradictions + hn::IfThenElse(agree, zero, one);
 
             if constexpr (learning) {
@@ -262,7 +282,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
             const V whole = load(readings.phase_whole[i]);
             if (before_turns > 0) {
                 const V gain = (whole - last_whole) + (fringes - last_fringes);
-                if (before_turns > 1) {
+                if (before_turns > 1 && !growing) {
                     cycles = hn::Min(cycles + one, hn::Set(d, memory_cycles));
                     cycle_gain = cycle_gain + (gain + last_gain - cycle_gain) / cycles;
                 }
@@ -275,6 +295,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
         store(last_fringes, state.last_fringes);
         store(last_whole, state.last_whole);
         store(last_gain, state.last_gain);
+        store(last_amplitude, state.turn_amplitude_rad);
         store(last_pull_rad_s, state.last_pull_rad_s);
         store(cycle_gain, state.cycle_gain);
         store(cycles, state.cycles);
@@ -302,12 +323,13 @@ namespace ringlock::readout {
 HWY_EXPORT(recover_lanes);
 
 FractionRecovery::FractionRecovery(std::span<const gyro::Device> devices, const Electronics& electronics,
-                                   double amplitude_rms_rad)
+                                   double amplitude_rms_rad, double change_rms_rad)
     : lanes_(devices.size()), electronics_(electronics) {
+    known_.change_rms_rad = change_rms_rad;
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
         const gyro::Device& device = devices_.emplace_back(devices[std::min(lane, devices.size() - 1)]);
         const double amplitude = device.dither_amplitude_rad;
-        known_.amplitude_rad[lane] = amplitude;
+        known_.amplitude_rad[lane] = state_.turn_amplitude_rad[lane] = amplitude;
         known_.half_share[0][lane] = device.positive_duration_s / device.period_s();
         known_.half_share[1][lane] = device.negative_duration_s / device.period_s();
         known_.amplitude_relative[lane] = amplitude_rms_rad / amplitude;

@@ -22,17 +22,22 @@ namespace ringlock::readout {
 /// noise: comparator and clock (a tick's share at the phase's rate there). After the turn injected noise gives the half
 /// cycle an amplitude that is not known yet: a is wrong by a share, the same at all pulses there, which adds that share
 /// of D to each. It is a third unknown, whose variance is known beforehand.
-/// The sides meet at the dither's turn, not at the zero-rate point: at a rate r there, lock-in and input, the parabola
-/// of a side has its vertex r/a before it, so that the side after has its own by (r/a)(1 - a/a') later than the side
-/// before, a' being its acceleration. At asymmetries of 1e-3 that is 2e-10 s. The lock-in bends the two sides in
-/// opposite ways, so that an error of the coupling goes into tau; what it leaves in psi_0 is of second order in the
+/// Behind a noisy drive the amplitude is the same on both sides of the turn and grows over either half cycle
+/// (docs/noise-injection.md): the swings of successive half cycles tell the amplitude at the turn and its change
+/// before, which takes c (w t)^3/(3 pi) off the distance to a pulse; the change c after the turn is the third unknown
+/// then. The sides meet at the dither's turn, not at the zero-rate point: at a rate r there, lock-in and input, the
+/// parabola of a side has its vertex r/a before it, so that the side after has its own by (r/a)(1 - a/a') later than
+/// the side before, a' being its acceleration. At asymmetries of 1e-3 that is 2e-10 s. The lock-in bends the two sides
+/// in opposite ways, so that an error of the coupling goes into tau; what it leaves in psi_0 is of second order in the
 /// coupling.
 class FractionRecovery {
    public:
     /// \param devices           as the electronics know them: amplitude, durations, coupling
     /// \param electronics       not ideal ones
     /// \param amplitude_rms_rad spread of the half cycles' amplitudes about the device's
-    FractionRecovery(std::span<const gyro::Device> devices, const Electronics& electronics, double amplitude_rms_rad);
+    /// \param change_rms_rad    rms of an amplitude's change over a half cycle; 0: half cycles are cosines
+    FractionRecovery(std::span<const gyro::Device> devices, const Electronics& electronics, double amplitude_rms_rad,
+                     double change_rms_rad = 0.0);
 
     /// Improves phase_fringes, sine and cosine (of unit size afterwards) of consecutive readings with pulses, and,
     /// where given and interpolated, the angle output.
@@ -74,8 +79,10 @@ class FractionRecovery {
     struct State {
         simd::Lanes last_fringes{}, last_whole{};  ///< phase at the turn before
         simd::Lanes last_gain{};                   ///< of the half cycle before [fringes]
+        simd::Lanes turn_amplitude_rad{};          ///< at the turn before, where amplitudes change over half cycles
         simd::Lanes last_pull_rad_s{};             ///< b (sin x + cos x) at the turn before, x turned upright
-        simd::Lanes cycle_gain{};                  ///< mean over cycles [fringes]
+        /// Mean over cycles, or, where amplitudes change over half cycles, the rotation alone [fringes].
+        simd::Lanes cycle_gain{};
         simd::Lanes cycles{};
         simd::Lanes contradictions{};
         simd::Lanes xx{}, xy{}, yy{}, x{}, y{};  ///< normal equations of the coupling
@@ -90,6 +97,7 @@ class FractionRecovery {
         simd::Lanes root_pi_over_a_s[2];     ///< sqrt(pi/a) of the half cycle that ends there, [minimum, maximum]
         simd::Lanes w2[2];
         simd::Lanes amplitude_relative;
+        double change_rms_rad = 0.0;
     };
 
    private:

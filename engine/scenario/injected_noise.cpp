@@ -37,7 +37,8 @@ InjectedNoise injected_noise(const Scenario& scenario) {
     injected.amplitude_rms_rad = injected.turn_rms_rad;
     injected.margin_rad = sigmas_of_tables * injected.turn_rms_rad;
     if (noise.form != gyro::NoiseForm::white) {
-        injected.change_rad = injected.margin_rad * resonator.change_per_half_cycle();
+        injected.change_rms_rad = injected.turn_rms_rad * resonator.change_per_half_cycle();
+        injected.change_rad = sigmas_of_tables * injected.change_rms_rad;
     }
     return injected;
 }

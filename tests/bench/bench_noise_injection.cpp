@@ -1,16 +1,18 @@
 // What noise on the drive of a dither does to the output: angle random walk over the theory of full randomisation, and
-// bias, by the exact turn map with an ideal readout.
+// bias, by the exact turn map with an ideal readout, beside the prediction. --all: 46 cases.
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <numeric>
 #include <string>
 #include <vector>
 
+#include "engine/dither/noise_effectiveness.hpp"
 #include "engine/ensemble/block.hpp"
-#include "engine/gyro/resonator.hpp"
+#include "engine/ensemble/draw.hpp"
 #include "engine/gyro/theory.hpp"
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/injected_noise.hpp"
@@ -78,12 +80,22 @@ Seen simulate(const scenario::Scenario& s) {
     };
     const auto [variance, variance_error] = mean_and_error(mean_squares);
     const auto [bias, bias_error] = mean_and_error(rates);
-    const double theory_arcsec_rt_s = 60.0 * gyro::angle_random_walk_deg_rt_h(setup);
+    const double theory_arcsec_rt_s = 60.0 * gyro::randomised_arw_deg_rt_h(setup);
     const double arw = std::sqrt(variance);
     return {arw / theory_arcsec_rt_s, 0.5 * variance_error / arw / theory_arcsec_rt_s, bias, bias_error};
 }
 
-void row(const std::string& device, double rate_deg_h, const std::string& noise) {
+/// How far the predictions are off over all rows.
+struct Worst {
+    double arw_relative = 0.0;
+    double bias_deg_h = 0.0;
+    double bias_errors = 0.0;  ///< in standard errors of the simulation
+    int cases = 0;
+    int missed = 0;  ///< random walk off by more than 5 %, or bias by more than three errors and 0.01 deg/h
+    double slowest_s = 0.0;
+};
+
+void row(const std::string& device, double rate_deg_h, const std::string& noise, Worst& worst) {
     const scenario::Scenario s = scenario::parse_string(
         fmt::format("device = \"{}\"\n[input]\nrate_deg_h = {}\n[readout]\nmodel = \"ideal\"\n[ensemble]\ngyros = 96\n"
                     "dither_amplitude_sd_relative = 0.0\ndither_asymmetry_sd_ratio = 0.0\n[arms]\n"
@@ -91,18 +103,32 @@ void row(const std::string& device, double rate_deg_h, const std::string& noise)
                     device, rate_deg_h, noise),
         "case");
     const scenario::NoiseInjection& n = s.noise_injection;
-    const Seen seen = simulate(s);
+    dither::InjectedTurns injected;
+    injected.rms_rad = scenario::injected_noise(s).turn_rms_rad;
     std::string what = "turns";
-    double change_rad = std::sqrt(2.0) * n.turn_phase_rms_rad;
     if (n.model == scenario::NoiseModel::drive) {
+        injected.drive = scenario::drive_noise(s);
         static constexpr const char* forms[] = {"held", "white", "sinusoidal"};
         what = fmt::format("{}, Q {:g}, hold {}", forms[static_cast<int>(n.form)], n.resonator_q, n.hold_half_cycles);
-        change_rad = n.turn_phase_rms_rad * gyro::Resonator(scenario::drive_noise(s)).change_per_cycle();
     }
-    fmt::print("| {} | {} | {:g} | {:g} | {:.2f} | {:.3f} +- {:.3f} | {:.4f} +- {:.4f} |\n", device, what,
-               n.turn_phase_rms_rad, rate_deg_h, change_rad, seen.arw_over_theory, seen.arw_error, seen.bias_deg_h,
-               seen.bias_error_deg_h);
+    const auto start = std::chrono::steady_clock::now();
+    const dither::NoiseEffectiveness predicted =
+        dither::predict_noise_effectiveness(ensemble::nominal_setup(s), injected);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const Seen seen = simulate(s);
+    fmt::print("| {} | {} | {:g} | {:g} | {:.2f} | {:.3f} | {:.3f} +- {:.3f} | {:.4f} | {:.4f} +- {:.4f} |\n", device,
+               what, n.turn_phase_rms_rad, rate_deg_h, predicted.change_per_cycle_rad,
+               predicted.arw_over_theory.value_or(0.0), seen.arw_over_theory, seen.arw_error,
+               predicted.bias_deg_h.value_or(0.0), seen.bias_deg_h, seen.bias_error_deg_h);
     std::fflush(stdout);
+    const double arw = std::abs(predicted.arw_over_theory.value_or(0.0) / seen.arw_over_theory - 1.0);
+    const double bias = std::abs(predicted.bias_deg_h.value_or(0.0) - seen.bias_deg_h);
+    worst.arw_relative = std::max(worst.arw_relative, arw);
+    worst.bias_deg_h = std::max(worst.bias_deg_h, bias);
+    worst.bias_errors = std::max(worst.bias_errors, bias / seen.bias_error_deg_h);
+    worst.slowest_s = std::max(worst.slowest_s, seconds);
+    ++worst.cases;
+    if (arw > 0.05 || bias > std::max(0.01, 3.0 * seen.bias_error_deg_h)) ++worst.missed;
 }
 
 std::string drive(double q, double rms_rad, int hold, const char* form = "held") {
@@ -114,22 +140,50 @@ std::string drive(double q, double rms_rad, int hold, const char* form = "held")
 }  // namespace
 }  // namespace ringlock
 
-int main() {
+int main(int argc, char** argv) {
     using namespace ringlock;
+    const bool all = argc > 1 && std::string(argv[1]) == "--all";
+    if (argc > (all ? 2 : 1)) {
+        fmt::print(stderr, "usage: bench_noise_injection [--all]\n");
+        return 2;
+    }
     std::setvbuf(stdout, nullptr, _IOLBF, 0);
     fmt::print(
-        "| device | noise | rms at the turns [rad] | input [deg/h] | change per cycle [rad] | ARW over theory | bias "
-        "[deg/h] |\n|---|---|---|---|---|---|---|\n");
+        "| device | noise | rms at the turns [rad] | input [deg/h] | change per cycle [rad] | ARW over theory, "
+        "predicted | simulated | bias [deg/h], predicted | simulated |\n|---|---|---|---|---|---|---|---|---|\n");
     const std::string paper = "gao-deng-2007";
-    row(paper, 1.0, "turn_phase_rms_rad = 3.0\n");
-    row(paper, 1.0, drive(50, 3, 1));
-    row(paper, 1.0, drive(100, 3, 1));
-    row(paper, 1.0, drive(100, 3, 1, "white"));
-    row(paper, 1.0, drive(100, 10, 1));
-    row(paper, 1.0, drive(100, 10, 4));
-    row(paper, 1.0, drive(100, 10, 10));
-    for (const double rate : {0.0, 1.0, 15.0}) row(paper, rate, drive(300, 3, 1));
-    row("triangle-51mm", 1.0, drive(100, 3, 1));
-    row("triangle-51mm", 1.0, drive(100, 10, 1));
-    row("triangle-20mm", 1.0, drive(100, 5, 1));
+    Worst worst;
+    row(paper, 1.0, "turn_phase_rms_rad = 3.0\n", worst);
+    row(paper, 1.0, drive(50, 3, 1), worst);
+    row(paper, 1.0, drive(100, 3, 1), worst);
+    row(paper, 1.0, drive(100, 3, 1, "white"), worst);
+    row(paper, 1.0, drive(100, 10, 1), worst);
+    row(paper, 1.0, drive(100, 10, 4), worst);
+    row(paper, 1.0, drive(100, 10, 10), worst);
+    for (const double rate : {0.0, 1.0, 15.0}) row(paper, rate, drive(300, 3, 1), worst);
+    row("triangle-51mm", 1.0, drive(100, 3, 1), worst);
+    row("triangle-51mm", 1.0, drive(100, 10, 1), worst);
+    row("triangle-20mm", 1.0, drive(100, 5, 1), worst);
+    if (all) {
+        for (const char* form : {"held", "white"}) {
+            for (const double rate : {0.0, 1.0, 5.0}) {
+                row(paper, rate, drive(50, 2, 1, form), worst);
+                row(paper, rate, drive(200, 6, 1, form), worst);
+                row("square-90mm", rate, drive(100, 5, 1, form), worst);
+                row("triangle-51mm", rate, drive(200, 8, 1, form), worst);
+            }
+        }
+        for (const int hold : {2, 3, 8}) {
+            row(paper, 2.0, drive(50, 4, hold), worst);
+            row("square-70mm", 2.0, drive(100, 12, hold), worst);
+        }
+        row("triangle-20mm", 5.0, drive(50, 4, 2), worst);
+        row("triangle-20mm", 0.0, drive(200, 5, 1), worst);
+        row("square-50mm", 1.0, drive(300, 10, 4), worst);
+    }
+    fmt::print(
+        "{} cases; predictions off by at most {:.1f} % of the random walk, {:.4f} deg/h or {:.1f} standard errors "
+        "of the bias; {} beyond 5 % or both 3 standard errors and 0.01 deg/h; slowest prediction {:.2f} s\n",
+        worst.cases, 100.0 * worst.arw_relative, worst.bias_deg_h, worst.bias_errors, worst.missed, worst.slowest_s);
+    return 0;
 }

@@ -48,7 +48,7 @@ void expect_answer_of_gao_deng(double duration_s) {
     scenario::Scenario scenario = from_file("gao-deng-2007.toml");
     scenario.ensemble.duration_s = duration_s;
     const study::Summary summary = run(scenario);
-    EXPECT_NEAR(summary.theory.arw_deg_rt_h, 0.0022506, 5e-8);
+    EXPECT_NEAR(summary.theory.arw_deg_rt_h, 0.0022490, 5e-8);
     EXPECT_NEAR(summary.theory.dead_band_deg_h, 2.632, 5e-4);
     const study::Figure& injected = arm(summary, "noise_injected").arw_deg_rt_h;
     const study::Figure& published = arm(summary, "noise_injected+compensated_published").arw_deg_rt_h;
