@@ -264,17 +264,22 @@ std::string noise_text(const study::ArmSummary& arm) {
     if (!arm.noise_effectiveness) return "";
     const dither::NoiseEffectiveness& predicted = arm.noise_effectiveness->predicted;
     const auto& seen = arm.noise_effectiveness->measured;
-    report::Table table({{fmt::format("injected noise at {:g} deg/h", predicted.input_rate_deg_h), report::Align::left},
-                         {"predicted", report::Align::right},
-                         {"measured", report::Align::right}});
+    const bool steady = seen.bias_deg_h.has_value();
+    report::Table table(
+        {{steady ? fmt::format("injected noise at {:g} deg/h", predicted.input_rate_deg_h) : "injected noise",
+          report::Align::left},
+         {"predicted", report::Align::right},
+         {"measured", report::Align::right}});
     table.add_row({"rms change of the amplitude per cycle [rad]", fmt::format("{:.3g}", predicted.change_per_cycle_rad),
                    fmt::format("{:.3g}", seen.change_per_cycle_rad)});
     table.add_row({"the same in per cent of the dither",
                    fmt::format("{:.3g}", arm.noise_effectiveness->change_per_cycle_percent), ""});
-    table.add_row({"ARW over that of randomised turns", optional_cell(predicted.arw_over_theory),
-                   optional_cell(seen.arw_over_theory)});
-    table.add_row({"bias [deg/h]", optional_cell(predicted.bias_deg_h),
-                   seen.bias_deg_h ? fmt::format("{:.3g} +- {:.2g}", *seen.bias_deg_h, seen.bias_error_deg_h) : "-"});
+    if (steady) {
+        table.add_row({"ARW over that of randomised turns", optional_cell(predicted.arw_over_theory),
+                       optional_cell(seen.arw_over_theory)});
+        table.add_row({"bias [deg/h]", optional_cell(predicted.bias_deg_h),
+                       fmt::format("{:.3g} +- {:.2g}", *seen.bias_deg_h, seen.bias_error_deg_h)});
+    }
     for (std::size_t i = 0; i < predicted.angle_spread.size() && i < seen.angle_spread.size(); ++i) {
         table.add_row({fmt::format("angle after {:g} s, sd over the gyros [arcsec]", predicted.angle_spread[i].after_s),
                        fmt::format("{:.3g}", predicted.angle_spread[i].arcsec),
