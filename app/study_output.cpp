@@ -259,7 +259,7 @@ std::string optional_cell(const std::optional<double>& value, const char* absent
     return value && std::isfinite(*value) ? fmt::format("{:.3g}", *value) : std::string(absent);
 }
 
-/// What the injected noise does, predicted and measured.
+/// Effect of the injected noise, predicted and measured.
 std::string noise_text(const study::ArmSummary& arm) {
     if (!arm.noise_effectiveness) return "";
     const dither::NoiseEffectiveness& predicted = arm.noise_effectiveness->predicted;

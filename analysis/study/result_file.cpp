@@ -139,7 +139,7 @@ void write_figures(store::Group& group, const ArmSummary& summary) {
     group.set_attribute("rate_error_deg_h_hi", summary.rate_error_deg_h.hi);
 }
 
-/// What injected noise does: predicted, measured, and the gyros' own figures.
+/// Effect of the injected noise: the prediction, the measurement, and the figures of each gyro.
 void write_noise_effectiveness(store::Group& group, const ArmStatistics& arm, const ArmSummary& summary) {
     if (arm.arm.ideal || shows_noise(arm.arm)) {
         std::vector<double> errors;

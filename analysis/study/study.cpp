@@ -35,13 +35,17 @@ bool shows_noise(const scenario::Arm& arm) {
     return arm.noise_injected && arm.compensator == scenario::Compensator::none;
 }
 
+bool has_steady_input(const scenario::Scenario& scenario) {
+    return scenario.input.sweep_points == 1 && !scenario::has_profile(scenario.input);
+}
+
 void predict_noise(Study& study) {
     const scenario::Scenario& scenario = study.scenario;
     if (study.predicted_noise || std::none_of(scenario.arms.begin(), scenario.arms.end(), shows_noise)) return;
     dither::InjectedTurns noise;
     if (scenario.noise_injection.model == scenario::NoiseModel::drive) noise.drive = scenario::drive_noise(scenario);
     noise.rms_rad = scenario::injected_noise(scenario).turn_rms_rad;
-    const bool steady = scenario.input.sweep_points == 1 && !scenario::has_profile(scenario.input);
+    const bool steady = has_steady_input(scenario);
     gyro::Setup setup = ensemble::nominal_setup(scenario);
     if (!steady) setup.lockin_threshold_deg_h = 0.0;  // the change per cycle does not depend on it
     study.predicted_noise = dither::predict_noise_effectiveness(setup, noise);

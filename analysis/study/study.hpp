@@ -59,11 +59,13 @@ struct Study {
 /// corrected.
 bool has_closed_form(const scenario::Scenario& scenario, const scenario::Arm& arm);
 
-/// Whether the study has an arm whose output is that of the injected noise, nothing taken away: its statistics show
-/// what the noise does.
+/// Whether the arm has injected noise and no compensator, so that its statistics show the effect of the noise.
 bool shows_noise(const scenario::Arm& arm);
 
-/// Predicts what the injected noise does, where an arm has nothing but it. May take some seconds.
+/// Whether all gyros have one input rate, which does not change.
+bool has_steady_input(const scenario::Scenario& scenario);
+
+/// Predicts the effect of the injected noise, where an arm has nothing but it. May take some ten seconds.
 void predict_noise(Study& study);
 
 /// Told of samples of the angle output of an arm: those of gyros first_gyro + i, i < gyros, from sample first_sample

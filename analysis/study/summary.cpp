@@ -241,7 +241,7 @@ NoiseFigures noise_figures(const Study& study, const ArmStatistics& arm, const S
     }
     NoiseFigures::Measured& measured = figures.measured;
     measured.change_per_cycle_rad = std::sqrt(squares / static_cast<double>(arm.gyros.size()));
-    const bool steady = study.scenario.input.sweep_points == 1 && !scenario::has_profile(study.scenario.input);
+    const bool steady = has_steady_input(study.scenario);
     if (steady) {
         const auto [bias, error] = mean_and_error(errors);
         measured.bias_deg_h = bias;

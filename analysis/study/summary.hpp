@@ -66,7 +66,7 @@ struct FamilyDeviation {
     std::vector<EnsemblePoint> points;  ///< deg/h, time errors in arcsec; lo, hi and edf NaN where there are none
 };
 
-/// What injected noise was predicted to do and what the simulation shows of it.
+/// Effect of the injected noise, as predicted and as measured in the simulation.
 struct NoiseFigures {
     dither::NoiseEffectiveness predicted;
     double change_per_cycle_percent = 0.0;  ///< as predicted, of the dither's amplitude
@@ -92,7 +92,7 @@ struct ArmSummary {
     std::optional<ScaleFactor> scale_factor;          ///< of sweeps of three rates and more, with two gyros and more
     std::vector<FamilyDeviation> family;              ///< empty unless asked for
     std::optional<NoiseFigures> noise_effectiveness;  ///< of the arm `noise_injected`
-    std::optional<Reduction> arw_reduction;           ///< of arms behind injected noise, beside `noise_injected` itself
+    std::optional<Reduction> arw_reduction;           ///< of arms with injected noise other than `noise_injected`
 };
 
 struct Theory {

@@ -185,11 +185,8 @@ DriveNoiseLanes::DriveNoiseLanes(const gyro::DriveNoise& noise, std::span<const 
     : noise_(noise), resonator_(noise), lanes_(devices.size()), who_(who) {
     if (resonator_.decay() >= 1.0) throw RunError("noise of a drive: its amplitude loop is not stable");
     level_rad_ = rms_rad / resonator_.rms();
-    // What the state begins with is forgotten to 1e-9 before the run.
-    const double settle = std::log(1e-9) / std::log(resonator_.decay());
-    first_turn_ = noise.form == NoiseForm::sinusoidal && resonator_.loop_gain() == 0.0
-                      ? -2
-                      : -2 - static_cast<std::int64_t>(std::ceil(settle));
+    // The state at the beginning is forgotten before the run.
+    first_turn_ = -2 - static_cast<std::int64_t>(std::ceil(resonator_.settling_half_cycles()));
     turn_ = first_turn_;
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
         state_.amplitude_rad[lane] = devices[std::min(lane, devices.size() - 1)].dither_amplitude_rad;

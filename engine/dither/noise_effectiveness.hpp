@@ -19,7 +19,7 @@ struct InjectedTurns {
     double rms_rad = 0.0;                   ///< standard deviation of the amplitude at the turns [rad of optical phase]
 };
 
-/// Standard deviation over gyros of unknown phase of what lock-in has added to the angle some time after the start.
+/// Standard deviation, over gyros of unknown phase, of the angle that the lock-in has added some time after the start.
 struct AngleSpread {
     double after_s = 0.0;
     double arcsec = 0.0;
@@ -38,7 +38,8 @@ struct NoiseEffectiveness {
 
 /// Predicts the effect of the noise on one gyro: its lock-in by the exact turn map at its mean amplitude, equal half
 /// cycles, a steady input. Where the transfer operator is too large, under an amplitude loop, and for a sinusoid, the
-/// chain itself is followed: the random walk then has an error of 1 %.
+/// chain itself is followed: the random walk then has an error of 1 %. What would take more than some ten seconds is
+/// not predicted, and `reason` says so.
 NoiseEffectiveness predict_noise_effectiveness(const gyro::Setup& setup, const InjectedTurns& noise);
 
 /// Times at which AngleSpread is told [s].

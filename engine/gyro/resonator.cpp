@@ -102,6 +102,11 @@ Resonator::Resonator(const DriveNoise& noise) : noise_(noise), damping_(0.5 / no
     }
 }
 
+double Resonator::settling_half_cycles() const {
+    if (noise_.form == NoiseForm::sinusoidal && loop_gain_ == 0.0) return 0.0;
+    return std::log(1e-9) / std::log(decay_);
+}
+
 Matrix4d Resonator::advance() const {
     Matrix4d a = Matrix4d::Zero();
     a.topLeftCorner<2, 2>() = step_;

@@ -61,6 +61,8 @@ class Resonator {
     /// Largest modulus of the recursion's eigenvalues: what is left of a deviation after a half cycle. With a loop that
     /// is too fast it is 1 or more, and nothing is stationary.
     double decay() const { return decay_; }
+    /// Half cycles after which 1e-9 is left of a deviation, loop included; 0 where no chance is in it.
+    double settling_half_cycles() const;
     /// E[u_n u_{n+lag}] for lags 0...`lags`, levels of rms 1, over all phases of the hold and of the modulation.
     std::vector<double> autocovariance(int lags) const;
     /// Rms of u at the turns, for levels of rms 1.

@@ -205,6 +205,19 @@ Finding amplitude_loop_is_stable(const Scenario& s) {
         "that; a hundredth of the dither's frequency is"};
 }
 
+Finding drive_forgets_in_time(const Scenario& s) {
+    if (s.noise_injection.model != NoiseModel::drive || !loop_is_stable(s)) return {};
+    constexpr double most = 2e6;  // some seconds of a block of gyros
+    const double settling = gyro::Resonator(drive_noise(s)).settling_half_cycles();
+    if (settling <= most) return {};
+    return Complaint{
+        {"noise_injection.amplitude_loop_hz", "noise_injection.resonator_q", "dither.frequency_hz"},
+        fmt::format("resonator and amplitude loop forget a deviation in {:.3g} half cycles, which every gyro goes "
+                    "through before its run; at most {:g} are allowed: set a faster loop, none (0), or a lower "
+                    "resonator_q",
+                    settling, most)};
+}
+
 Finding noise_has_one_strength(const Scenario& s) {
     const NoiseInjection& noise = s.noise_injection;
     if (noise.drive_noise_relative == 0.0) return {};
@@ -430,6 +443,8 @@ constexpr std::array all_rules = {
          noise_has_one_strength},
     Rule{"Keys of a drive's noise need model = \"drive\".", keys_of_a_drive_need_it},
     Rule{"The amplitude loop of a drive is stable.", amplitude_loop_is_stable},
+    Rule{"Resonator and amplitude loop of a drive forget a deviation to 1e-9 within 2e6 half cycles.",
+         drive_forgets_in_time},
     Rule{"A sinusoidal modulation of the drive is slower than the dither.", sinusoidal_noise_is_slow},
     Rule{"The turn map has no second harmonic of the coupling together with held or sinusoidal noise of a drive.",
          changing_amplitudes_need_moebius_maps},

@@ -1,5 +1,5 @@
-// What noise on the drive of a dither does to the output: angle random walk over the theory of full randomisation, and
-// bias, by the exact turn map with an ideal readout, beside the prediction. --all: 46 cases.
+// Effect of noise on the drive of a dither: angle random walk over the theory of full randomisation, and bias, both as
+// predicted and as simulated by the exact turn map with an ideal readout. --all: 46 cases.
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 

@@ -36,8 +36,7 @@ std::map<std::string, double> deviations_deg_h(const std::string& device, const 
 }
 
 TEST(DriveCompensation, TheTurnMapIsInvertedWhileTheAmplitudeChanges) {
-    // From the first turn on, at which neither amplitude nor rate is known. With cosines between the turns exact would
-    // leave a part in 1600 of the walk of the 26-fringe device, and adaptive a tenth.
+    // From the first turn on, at which neither amplitude nor rate is known.
     for (const char* device : {"triangle-20mm", "triangle-51mm"}) {
         auto deviation = deviations_deg_h(device, "ideal", "drive", 8.0);
         EXPECT_LT(deviation[exact], 5e-4 * deviation["noise_injected"]);

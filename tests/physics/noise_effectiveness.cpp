@@ -121,6 +121,25 @@ TEST(NoiseEffectiveness, SaysWhyItDoesNotPredict) {
     EXPECT_GT(study.predicted_noise->change_per_cycle_rad, 0.0);
 }
 
+TEST(NoiseEffectiveness, WhatWouldTakeMinutesIsNotPredicted) {
+    gyro::Setup setup = ensemble::nominal_setup(noisy("gao-deng-2007", 1.0, ""));
+    gyro::DriveNoise noise{.frequency_hz = setup.dither_frequency_hz, .resonator_q = 1e5};
+    const auto slow = dither::predict_noise_effectiveness(setup, {noise, 3.0});
+    EXPECT_FALSE(slow.arw_over_theory);
+    EXPECT_FALSE(slow.bias_deg_h);
+    EXPECT_NE(slow.reason, "");
+    EXPECT_GT(slow.change_per_cycle_rad, 0.0);
+
+    // A sinusoid on a dither of 100 kHz is followed for 1 s only.
+    setup.dither_frequency_hz = 1e5;
+    setup.dither_peak_rate_deg_s = 3e4;
+    noise = {.frequency_hz = 1e5, .resonator_q = 100.0, .form = gyro::NoiseForm::sinusoidal, .modulation_hz = 3.0};
+    const auto fast = dither::predict_noise_effectiveness(setup, {noise, 3.0});
+    ASSERT_EQ(fast.angle_spread.size(), 1U);
+    EXPECT_EQ(fast.angle_spread[0].after_s, 1.0);
+    EXPECT_TRUE(fast.bias_deg_h);
+}
+
 TEST(NoiseEffectiveness, FastChangesOfAnySizeAreAskedForAtOnce) {
     const gyro::Setup setup = ensemble::nominal_setup(noisy("gao-deng-2007", 1.0, ""));
     const gyro::DriveNoise noise{.frequency_hz = setup.dither_frequency_hz, .resonator_q = 100.0};

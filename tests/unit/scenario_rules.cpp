@@ -246,6 +246,9 @@ TEST(ScenarioRules, ADriveHasAStableLoopAndASlowModulation) {
     EXPECT_THAT(complaint(drive + "amplitude_loop_hz = 100.0"),
                 AllOf(HasSubstr("s.toml:3:21: key \"noise_injection.amplitude_loop_hz\""), HasSubstr("not stable")));
     EXPECT_EQ(complaint(drive + "amplitude_loop_hz = 1.2"), "");
+    EXPECT_THAT(
+        complaint(drive + "amplitude_loop_hz = 1e-6"),
+        AllOf(HasSubstr("s.toml:3:21: key \"noise_injection.amplitude_loop_hz\""), HasSubstr("set a faster loop")));
     EXPECT_THAT(complaint(drive + "form = \"sinusoidal\"\nmodulation_hz = 125.0"), HasSubstr("slower than the dither"));
     EXPECT_EQ(complaint(drive + "form = \"sinusoidal\"\nmodulation_hz = 120.0"), "");
 }
