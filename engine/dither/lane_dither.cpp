@@ -246,9 +246,5 @@ void LaneDither::add_wander() {
     }
 }
 
-double LaneDither::amplitude_rms_rad(double noise_rms_rad) { return noise_rms_rad / std::sqrt(2.0); }
-
-double LaneDither::amplitude_margin_rad(double noise_rms_rad) { return 8.0 * amplitude_rms_rad(noise_rms_rad); }
-
 }  // namespace ringlock::dither
 #endif

@@ -44,11 +44,6 @@ class LaneDither {
               std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive,
               std::span<const simd::Lanes> coupling_phase_rad = {});
 
-    /// Rms of half cycles' amplitudes about the device's with noise of this rms: half the difference of two turns'.
-    static double amplitude_rms_rad(double noise_rms_rad);
-    /// Amplitude that a half cycle can have with noise of this rms, beyond the device's, but for one in 1e15.
-    static double amplitude_margin_rad(double noise_rms_rad);
-
     /// What the kernel needs, one value for each gyro; index 0 of a pair: half cycles of positive sign.
     struct Constants {
         simd::Lanes amplitude_rad, input_rate_rad_s, b_rad_s, coupling_phase_fringes;

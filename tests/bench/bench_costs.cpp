@@ -22,6 +22,7 @@
 #include "engine/scenario/parse.hpp"
 #include "engine/simd/target.hpp"
 #include "tests/bench/noisy_dither.hpp"
+#include "tests/support/drive.hpp"
 
 namespace {
 
@@ -58,7 +59,7 @@ class Block {
     explicit Block(bool second_harmonic)
         : devices_(simd::lanes, device(second_harmonic)),
           dither_(devices_, bench::turn_phase_rms_rad, identities()),
-          map_(propagate::make_turn_map(devices_, {dither::LaneDither::amplitude_margin_rad(bench::turn_phase_rms_rad)},
+          map_(propagate::make_turn_map(devices_, {test::Drive::amplitude_margin_rad(bench::turn_phase_rms_rad)},
                                         tolerance_rad)) {
         advance();  // tables
     }
@@ -107,7 +108,7 @@ class DeviceBlock {
 /// Ranges of a table under injected noise.
 propagate::HalfCycleRanges noisy_ranges(const gyro::Device& device) {
     const double a = device.dither_amplitude_rad;
-    const double margin = dither::LaneDither::amplitude_margin_rad(bench::turn_phase_rms_rad);
+    const double margin = test::Drive::amplitude_margin_rad(bench::turn_phase_rms_rad);
     return {{a - margin, a + margin},
             {device.input_rate_rad_s, device.input_rate_rad_s},
             {device.coupling.b_rad_s, device.coupling.b_rad_s}};

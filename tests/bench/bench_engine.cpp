@@ -44,6 +44,7 @@
 #include "tests/bench/random_and_sincos.hpp"
 #include "tests/bench/reference_cost.hpp"
 #include "tests/support/direct.hpp"
+#include "tests/support/drive.hpp"
 #include "tests/support/long_drive.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/turn_map.hpp"
@@ -147,7 +148,7 @@ class Trajectories {
             who.gyro[lane] = lane;
         }
         dither_ = std::make_unique<dither::LaneDither>(devices_, bench::turn_phase_rms_rad, who);
-        const double margin = dither::LaneDither::amplitude_margin_rad(bench::turn_phase_rms_rad);
+        const double margin = test::Drive::amplitude_margin_rad(bench::turn_phase_rms_rad);
         for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
             const gyro::Device& device = devices_[lane];
             const double a = device.dither_amplitude_rad;
@@ -289,7 +290,7 @@ std::vector<std::pair<std::string, double>> stages() {
     random::LaneIdentities who;
     std::vector<gyro::Device> devices;
     compensate::Calibration calibration;
-    calibration.amplitude_margin_rad = dither::LaneDither::amplitude_margin_rad(bench::turn_phase_rms_rad);
+    calibration.amplitude_margin_rad = test::Drive::amplitude_margin_rad(bench::turn_phase_rms_rad);
     for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
         const gyro::Device& device =
             devices.emplace_back(ensemble::draw_setup(scenario, static_cast<std::int64_t>(lane)));

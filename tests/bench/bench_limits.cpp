@@ -34,6 +34,7 @@
 #include "engine/readout/pulse_tables.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/devices.hpp"
+#include "engine/scenario/injected_noise.hpp"
 #include "engine/scenario/parse.hpp"
 #include "tests/bench/page.hpp"
 #include "tests/support/limits.hpp"
@@ -269,9 +270,8 @@ Shown shown(scenario::Scenario scenario, std::size_t turns) {
     const std::vector<scenario::Arm> arms{scenario::parse_arm(li::exact_arm)};
     ensemble::GyroBlock block(scenario, arms, 0, simd::lanes);
     const std::vector<gyro::Device> devices(block.setups().begin(), block.setups().end());
-    readout::FractionRecovery recovery(
-        devices, ensemble::electronics_of(scenario),
-        dither::LaneDither::amplitude_rms_rad(scenario.noise_injection.turn_phase_rms_rad));
+    readout::FractionRecovery recovery(devices, ensemble::electronics_of(scenario),
+                                       scenario::injected_noise(scenario).amplitude_rms_rad);
     recovery.learn();
     for (std::size_t done = 0; done < first + turns; done += piece) {
         for (std::size_t lane = 0; done == first && lane < simd::lanes; ++lane) recovery.forget_bends(lane);

@@ -8,6 +8,7 @@
 #include "engine/dither/lane_dither.hpp"
 #include "engine/ensemble/block.hpp"
 #include "tests/physics/support.hpp"
+#include "tests/support/drive.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -24,7 +25,7 @@ using Make = std::function<std::unique_ptr<compensate::LaneCompensator>(const co
 compensate::Calibration calibration_of(const std::vector<gyro::Setup>& setups, double noise_rms_rad) {
     compensate::Calibration calibration;
     calibration.lanes = setups.size();
-    calibration.amplitude_margin_rad = dither::LaneDither::amplitude_margin_rad(noise_rms_rad);
+    calibration.amplitude_margin_rad = Drive::amplitude_margin_rad(noise_rms_rad);
     for (std::size_t g = 0; g < setups.size(); ++g) {
         const gyro::Device device(setups[g]);
         calibration.b_rad_s[g] = device.coupling.b_rad_s;

@@ -11,6 +11,7 @@
 #include "engine/propagate/lane_propagator.hpp"
 #include "tests/physics/noisy_block.hpp"
 #include "tests/physics/readout_support.hpp"
+#include "tests/support/drive.hpp"
 #include "tests/support/odeint.hpp"
 
 // A phase of the coupling that jumps from half cycle to half cycle: psi goes on, psi + phase jumps.
@@ -111,8 +112,7 @@ void expect_both_right(const std::vector<gyro::Device>& devices) {
     const std::array<std::size_t, 1> whole = {half_cycles};
     propagate::DirectPropagator direct(devices, 1e-12);
     expect_alike(go_through(direct, devices, phases_rad, whole), expected, devices.size(), 1e-9);
-    const auto map =
-        propagate::make_turn_map(devices, {dither::LaneDither::amplitude_margin_rad(block_noise_rad)}, 1e-10);
+    const auto map = propagate::make_turn_map(devices, {Drive::amplitude_margin_rad(block_noise_rad)}, 1e-10);
     expect_alike(go_through(*map, devices, phases_rad, whole), expected, devices.size(), 4e-9);
 }
 
@@ -135,10 +135,8 @@ TEST(CouplingPhase, JumpsAlikeInAnyPieces) {
             unequal_devices(3, [&](gyro::Setup& setup, double x) { setup.lockin_second_ratio = second_ratio * x; });
         const std::array<std::size_t, 1> whole = {half_cycles};
         const std::array<std::size_t, 4> parts = {1, 3, 4, 2};
-        const auto one =
-            propagate::make_turn_map(devices, {dither::LaneDither::amplitude_margin_rad(block_noise_rad)}, 1e-10);
-        const auto other =
-            propagate::make_turn_map(devices, {dither::LaneDither::amplitude_margin_rad(block_noise_rad)}, 1e-10);
+        const auto one = propagate::make_turn_map(devices, {Drive::amplitude_margin_rad(block_noise_rad)}, 1e-10);
+        const auto other = propagate::make_turn_map(devices, {Drive::amplitude_margin_rad(block_noise_rad)}, 1e-10);
         expect_alike(go_through(*one, devices, phases_rad, whole), go_through(*other, devices, phases_rad, parts),
                      devices.size(), 1e-12);
     }

@@ -7,6 +7,7 @@
 #include "engine/dither/lane_dither.hpp"
 #include "engine/propagate/turn_kernel.hpp"
 #include "tests/physics/support.hpp"
+#include "tests/support/drive.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -37,7 +38,7 @@ Error error_of_turns(const gyro::Setup& kind, double noise_rad, double rate_widt
             setup.coupling_phase_rad = uniform(-3.0, 3.0);
             const gyro::Device device(setup);
             const double a = device.dither_amplitude_rad;
-            const double margin = 0.05 * a + dither::LaneDither::amplitude_margin_rad(noise_rad);
+            const double margin = 0.05 * a + Drive::amplitude_margin_rad(noise_rad);
             const double width = device.phase_per_arcsec * rate_width_deg_h;
             propagate::HalfCycleRanges ranges = test::ranges(device, margin);
             ranges.rate_rad_s = {device.input_rate_rad_s - width, device.input_rate_rad_s + width};

@@ -4,6 +4,7 @@
 #include "engine/dither/lane_dither.hpp"
 #include "engine/random/normal_lanes.hpp"
 #include "tests/physics/support.hpp"
+#include "tests/support/drive.hpp"
 
 /// A block of gyros, no two alike, and its noisy drive.
 namespace ringlock::test {
@@ -37,7 +38,7 @@ inline dither::LaneDither noisy_dither(const std::vector<gyro::Device>& devices)
 
 /// Half cycles that the noisy drive may ask of the device.
 inline propagate::HalfCycleRanges noisy_ranges(const gyro::Device& device) {
-    return ranges(device, dither::LaneDither::amplitude_margin_rad(block_noise_rad));
+    return ranges(device, Drive::amplitude_margin_rad(block_noise_rad));
 }
 
 }  // namespace ringlock::test

@@ -12,6 +12,7 @@
 #include "engine/propagate/rotation.hpp"
 #include "engine/simd/target.hpp"
 #include "tests/physics/support.hpp"
+#include "tests/support/drive.hpp"
 #include "tests/support/long_drive.hpp"
 
 namespace ringlock::test {
@@ -132,7 +133,7 @@ constexpr double noise_rms_rad = 4.0;
 constexpr double rate_width_deg_h = 500.0;
 
 propagate::HalfCycleRanges ranges_of(const Member& member, const gyro::Device& device) {
-    const double margin = dither::LaneDither::amplitude_margin_rad(noise_rms_rad);
+    const double margin = Drive::amplitude_margin_rad(noise_rms_rad);
     propagate::HalfCycleRanges ranges = test::ranges(device, margin);
     if (!member.angle_arcsec.empty()) {
         const double width = device.phase_per_arcsec * rate_width_deg_h;

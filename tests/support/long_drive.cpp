@@ -10,6 +10,7 @@
 #include "engine/dither/lane_dither.hpp"
 #include "engine/propagate/half_turn.hpp"
 #include "engine/propagate/turn_kernel.hpp"
+#include "tests/support/drive.hpp"
 
 namespace ringlock::test {
 
@@ -59,7 +60,7 @@ void run_block(std::span<const gyro::Setup> setups, std::uint64_t first_gyro, co
     propagate::TurnState state;
     random::LaneIdentities who;
     who.seed = wanted.seed;
-    const double margin = dither::LaneDither::amplitude_margin_rad(wanted.noise_rms_rad);
+    const double margin = Drive::amplitude_margin_rad(wanted.noise_rms_rad);
     bool symmetric = true;
     for (std::size_t lane = 0; lane < gyros; ++lane) {
         const gyro::Device device(setups[lane]);

@@ -1,14 +1,15 @@
 // Hundreds of records with known truth, which the closed loop reads blind.
 //
-//   bench_closure FOLDER [--share S] [--only KIND] [--multiple M] [--effect E,F] [--without E,F] [--direct] [--seed N]
-//                 [--series N]
+//   bench_closure FOLDER [--share S] [--only KIND] [--multiple M] [--effect E,F] [--without E,F] [--device NAME]
+//                 [--direct] [--seed N] [--series N]
 //
 // FOLDER gets records.csv (a row a record), deviations.csv (estimates less truth, in standard errors), confusion.csv
 // and the tables of the page: figures.md, misses.md, confusion.md, calibration.md. A share S of 0.1 makes a tenth of
 // the records; with a seed only that record is made, and kept as record.h5. Another series has records of the same
 // kinds that no other has. --effect and --without say which effects of the library are drawn, --multiple at which
-// multiple of their detection limits, --direct that all records are by the integration of the equation of motion. A
-// share above 1 makes more records of a kind. tools/closure puts the tables into the page.
+// multiple of their detection limits, --device whose constants stand in place of the paper's in nulls, single effects
+// and pairs, --direct that all records are by the integration of the equation of motion. A share above 1 makes more
+// records of a kind. tools/closure puts the tables into the page.
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
@@ -60,14 +61,16 @@ int main(int argc, char** argv) {
     };
     if (command.wants(Kind::null)) {
         for (std::size_t k = 0; k < command.scaled(520); ++k) {
-            add({.kind = Kind::null, .truth = {}, .condition = &conditions[k % conditions.size()]});
+            Case of{.kind = Kind::null, .truth = {}, .condition = &conditions[k % conditions.size()]};
+            of.gyro = command.gyro;
+            add(std::move(of));
         }
     }
     if (command.wants(Kind::single) || command.wants(Kind::pair)) {
         std::size_t turn = 0;
         const auto pick = [&](const std::string& effect, double multiple, Case& of) {
-            of.truth.push_back(draw(effect, multiple * start_size(effect), first_draw + 7 * cases.size() + turn,
-                                    static_cast<double>(of.turns) / (2.0 * 124.68)));
+            of.truth.push_back(
+                draw(effect, multiple * start_size(effect), first_draw + 7 * cases.size() + turn, duration_s(of)));
         };
         const auto singles = [&](double multiple, double each) {
             for (std::size_t k = 0; command.wants(Kind::single) && k < command.scaled(each); ++k) {
@@ -75,6 +78,7 @@ int main(int argc, char** argv) {
                     const Condition* condition = &conditions[(k + turn++) % conditions.size()];
                     while (!shows(effect, *condition)) condition = &conditions[turn++ % conditions.size()];
                     Case of{.kind = Kind::single, .truth = {}, .multiple = multiple, .condition = condition};
+                    of.gyro = command.gyro;
                     pick(effect, multiple, of);
                     add(std::move(of));
                 }
@@ -87,6 +91,7 @@ int main(int argc, char** argv) {
                 const Condition& condition = conditions[k % conditions.size()];
                 if (!shows(effects[a], condition) || !shows(effects[b], condition)) continue;
                 Case of{.kind = Kind::pair, .truth = {}, .multiple = 2.0, .condition = &condition};
+                of.gyro = command.gyro;
                 pick(effects[a], 2.0, of);
                 pick(effects[b], 2.0, of);
                 add(std::move(of));

@@ -92,6 +92,10 @@ std::vector<SampleCase> all_cases(const Command& command) {
 
 int main(int argc, char** argv) {
     const Command command = command_of(argc, argv, "bench_closure_samples");
+    if (command.gyro) {
+        fmt::print(stderr, "bench_closure_samples has no --device: samples do not show the gyro's constants\n");
+        return 2;
+    }
     std::vector<SampleCase> cases = all_cases(command);
     std::erase_if(cases, [&](const SampleCase& of) {
         return (!command.seed.empty() && std::to_string(of.seed) != command.seed) || !command.wants(of.multiple);

@@ -14,6 +14,10 @@
 #include <string_view>
 #include <utility>
 
+#include "engine/effects/effect.hpp"
+#include "engine/scenario/active_effects.hpp"
+#include "engine/scenario/devices.hpp"
+
 namespace ringlock::test::closure {
 
 namespace {
@@ -293,6 +297,15 @@ std::vector<std::string> names_in(const std::string& text) {
     return names;
 }
 
+gyro::Setup gyro_named(std::string_view name) {
+    const scenario::DeviceFile* file = scenario::find_device(name);
+    if (file == nullptr) {
+        fmt::print(stderr, "{}: no device (`ringlock devices` lists them)\n", name);
+        std::exit(2);
+    }
+    return scenario::configured_setup(scenario::read_device(*file).scenario);
+}
+
 }  // namespace
 
 std::vector<std::string> Command::kept(std::vector<std::string> names) const {
@@ -318,6 +331,8 @@ Command command_of(int argc, char** argv, const char* program) {
             command.effects = names_in(argv[++k]);
         } else if (argument == "--without" && followed) {
             command.without = names_in(argv[++k]);
+        } else if (argument == "--device" && followed) {
+            command.gyro = gyro_named(argv[++k]);
         } else if (argument == "--multiple" && followed) {
             command.multiple = std::strtod(argv[++k], nullptr);
         } else if (argument == "--direct") {
@@ -339,7 +354,7 @@ Command command_of(int argc, char** argv, const char* program) {
     if (wrong || command.folder.empty() || !known || !(command.share > 0.0 && command.share <= most_share)) {
         fmt::print(stderr,
                    "usage: {} FOLDER [--share S] [--only null|single|pair|foreign|other|several|mixed] "
-                   "[--multiple M] [--effect E,F] [--without E,F] [--direct] [--seed N] [--series N]\n",
+                   "[--multiple M] [--effect E,F] [--without E,F] [--device NAME] [--direct] [--seed N] [--series N]\n",
                    program);
         std::exit(2);
     }

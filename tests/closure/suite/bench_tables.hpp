@@ -20,6 +20,7 @@ struct Command {
     std::vector<std::string> effects;  ///< of the library that are drawn; none: all
     std::vector<std::string> without;  ///< of the library that are not drawn
     double multiple = 0.0;             ///< of the detection limit; 0: all
+    std::optional<gyro::Setup> gyro;   ///< in place of the paper's device
     bool direct = false;               ///< all records by the integration of the equation of motion
 
     bool wants(Kind kind) const { return only.empty() || only == name_of(kind); }

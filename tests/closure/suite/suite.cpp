@@ -114,8 +114,15 @@ void draw_other(Device& d, std::mt19937_64& random) {
 Device device_of(const Case& of) {
     std::mt19937_64 random(of.seed);
     const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
-    Device d{nominal_threshold_deg_h * between(0.8, 1.2), 109.1 * between(0.9, 1.1), between(-100.0, 100.0)};
+    const double threshold_deg_h = of.gyro ? of.gyro->lockin_threshold_deg_h : nominal_threshold_deg_h;
+    const double peak_rate_deg_s = of.gyro ? of.gyro->dither_peak_rate_deg_s : 109.1;
+    Device d{threshold_deg_h * between(0.8, 1.2), peak_rate_deg_s * between(0.9, 1.1), between(-100.0, 100.0)};
+    d.declared_threshold_deg_h = threshold_deg_h;
     d.injected_rad = of.condition->injected_rad;
+    if (of.gyro) {
+        d.scale_factor_arcsec = of.gyro->scale_factor_arcsec;
+        d.dither_frequency_hz = of.gyro->dither_frequency_hz;
+    }
     if (of.condition->other_gyro) draw_other(d, random);
     d.duration_s = 0.5 * static_cast<double>(of.turns) / d.dither_frequency_hz;
     if (of.condition->moving) {

@@ -10,6 +10,7 @@
 
 #include "analysis/closure/closure.hpp"
 #include "analysis/record/record.hpp"
+#include "engine/gyro/setup.hpp"
 
 /// Records with known truth for the closed loop to read blind, and what its answers are worth.
 namespace ringlock::test::closure {
@@ -47,7 +48,8 @@ struct Case {
     std::uint64_t seed = 1;
     std::uint64_t noise = 0;  ///< another draw of all that is random in the same gyro; of the turn map only
     std::size_t turns = 16000;
-    ringlock::closure::Where where = {};  ///< in which foreign effects show themselves
+    std::optional<gyro::Setup> gyro = {};  ///< whose scale factor, dither and threshold stand in place of the paper's
+    ringlock::closure::Where where = {};   ///< in which foreign effects show themselves
 
     std::vector<Added> added() const;
     std::string truth_text() const;
