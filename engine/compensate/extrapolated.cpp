@@ -51,12 +51,15 @@ void observe_lanes(std::size_t lanes, const readout::Electronics& electronics, c
             V s0[2], s1[2], sy[2];
             V tau_numerator = zero;
             V tau_denominator = zero;
+            V fewest = hn::Set(d, static_cast<double>(readout::kept_pulses));
+            V most = zero;
             for (const std::size_t side : {0U, 1U}) {
                 // A half cycle of positive sign begins at a minimum.
                 const std::size_t which = minimum == (side == 1) ? 0 : 1;
                 const V a = a_of[which];
                 V s2 = zero;
                 V sgy = zero;
+                V told_apart = zero;
                 s0[side] = s1[side] = sy[side] = zero;
                 for (std::size_t pulse = 0; pulse < readout::kept_pulses; ++pulse) {
                     const V time = load(readings.pulses.time_s[side][pulse][i]);
@@ -68,6 +71,7 @@ void observe_lanes(std::size_t lanes, const readout::Electronics& electronics, c
                     const V rate2 = hn::Max(distance + distance, zero) * a;
                     const V variance = sm::fma(d, rate2, tick_variance, pulse_variance);
                     const V weight = hn::IfThenElseZero(time != zero, one / variance);
+                    told_apart = told_apart + hn::IfThenElseZero(time != zero, one);
                     const V weighted = weight * slope;
                     s0[side] = s0[side] + weight;
                     s1[side] = s1[side] + weighted;
@@ -75,6 +79,8 @@ void observe_lanes(std::size_t lanes, const readout::Electronics& electronics, c
                     s2 = sm::fma(d, weighted, slope, s2);
                     sgy = sm::fma(d, weighted, y, sgy);
                 }
+                fewest = hn::Min(fewest, told_apart);
+                most = hn::Max(most, told_apart);
                 const V mean_slope = s1[side] / s0[side];
                 tau_numerator = tau_numerator + sm::fnma(d, mean_slope, sy[side], sgy);
                 tau_denominator = tau_denominator + sm::fnma(d, mean_slope, s1[side], s2);
@@ -82,7 +88,9 @@ void observe_lanes(std::size_t lanes, const readout::Electronics& electronics, c
             const V tau = tau_numerator / tau_denominator;
             const V before = sm::fma(d, s1[0], tau, hn::Neg(sy[0])) / s0[0];
             const V after = sm::fma(d, s1[1], tau, hn::Neg(sy[1])) / s0[1];
-            const V half_kick = half * per_rad * sign * (after - before);
+            // Phase and instant of the turn take a pulse on either side and one more; without these nothing is told.
+            const auto enough = hn::And(fewest >= one, most >= one + one);
+            const V half_kick = hn::IfThenElseZero(enough, half * per_rad * sign * (after - before));
             const V here = error + half_kick;
             store(here + (error_whole - told_whole), errors.fringes[i]);
             error = here + half_kick;
