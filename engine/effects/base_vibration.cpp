@@ -35,7 +35,8 @@ class BaseVibration final : public Effect {
         };
     }
     Bounds bounds(const Values& values, const Exposure& /*exposure*/) const override {
-        return {.rate_deg_h = std::abs(values.at("rate_deg_h"))};
+        const double rate = std::abs(values.at("rate_deg_h"));
+        return {.rate_deg_h = rate, .rate_slope_deg_h_s = rate * units::two_pi * values.at("frequency_hz")};
     }
 };
 

@@ -27,7 +27,8 @@ class BiasRamp final : public Effect {
         };
     }
     Bounds bounds(const Values& values, const Exposure& exposure) const override {
-        return {.rate_deg_h = std::abs(values.at("deg_h_per_h")) * exposure.duration_h};
+        const double slope = std::abs(values.at("deg_h_per_h"));
+        return {.rate_deg_h = slope * exposure.duration_h, .rate_slope_deg_h_s = slope / 3600.0};
     }
 };
 

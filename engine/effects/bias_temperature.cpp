@@ -31,7 +31,9 @@ class BiasTemperature final : public Effect {
         };
     }
     Bounds bounds(const Values& values, const Exposure& exposure) const override {
-        return {.rate_deg_h = std::abs(values.at("deg_h_per_k")) * exposure.temperature_change_k};
+        const double size = std::abs(values.at("deg_h_per_k"));
+        return {.rate_deg_h = size * exposure.temperature_change_k,
+                .rate_slope_deg_h_s = size * exposure.temperature_slope_k_per_h / 3600.0};
     }
 };
 

@@ -105,11 +105,14 @@ struct Exposure {
     double temperature_change_k = 0.0;       ///< largest magnitude of the temperature less that at the start
     double temperature_slope_k_per_h = 0.0;  ///< largest magnitude
     double input_rate_deg_h = 0.0;           ///< largest magnitude, the dither apart
+    double input_slope_deg_h_s = 0.0;        ///< largest magnitude: change of that rate in a second
 };
 
 /// How far an effect can take a gyro, chance apart: magnitudes that Change does not exceed at any time of a run.
 struct Bounds {
-    double rate_deg_h = 0.0;          ///< of the angle over the duration
+    double rate_deg_h = 0.0;  ///< of the angle over the duration
+    /// Of the slope of that rate [deg/h each second]; a rate that steps, or whose slope nobody asks for, has none.
+    std::optional<double> rate_slope_deg_h_s = {};
     double threshold_relative = 0.0;  ///< of the threshold's factor less one
     double coupling_phase_rad = 0.0;
 };

@@ -33,7 +33,9 @@ class ScaleFactorError final : public Effect {
         };
     }
     Bounds bounds(const Values& values, const Exposure& exposure) const override {
-        return {.rate_deg_h = std::abs(values.at("relative")) * exposure.input_rate_deg_h};
+        const double size = std::abs(values.at("relative"));
+        return {.rate_deg_h = size * exposure.input_rate_deg_h,
+                .rate_slope_deg_h_s = size * exposure.input_slope_deg_h_s};
     }
 };
 

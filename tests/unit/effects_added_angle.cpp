@@ -76,19 +76,29 @@ TEST(AddedAngles, AreTheIntegralsOfTheStatedRates) {
 // 20 s under a temperature of 3 K to -2 K and a rate of -40 to 80 deg/h: no rate is faster than its bound, and some
 // are as fast, which an effect that leaves its bound at zero is not.
 TEST(AddedAngles, StayWithinTheirBounds) {
-    const Exposure exposure{20.0 / 3600.0, 3.0, 0.25 * 3600.0, 80.0};
+    const Exposure exposure{20.0 / 3600.0, 3.0, 0.25 * 3600.0, 80.0, 6.0};
     for (const Stated& s : stated()) {
         const Effect& effect = *find(s.name);
         const double bound = effect.bounds(s.values, exposure).rate_deg_h;
+        const std::optional<double> slope = effect.bounds(s.values, exposure).rate_slope_deg_h_s;
         double fastest = 0.0;
+        double steepest = 0.0;
+        double last = 0.0;
         for (int i = 0; i < 20000; ++i) {
             const Interval at = between(1e-3 * i, 1e-3 * (i + 1));
-            fastest = std::max(fastest, std::abs(effect.change(s.values)(at).angle_arcsec) / at.duration_s);
+            const double rate = effect.change(s.values)(at).angle_arcsec / at.duration_s;
+            fastest = std::max(fastest, std::abs(rate));
+            if (i > 0) steepest = std::max(steepest, std::abs(rate - last) / at.duration_s);
+            last = rate;
         }
         // Temperatures of a few kelvin, 2.5e-4 K apart, are rounded.
         EXPECT_LE(fastest, bound * (1.0 + 1e-11)) << s.name;
         EXPECT_GE(fastest, 0.99 * bound) << s.name;
         EXPECT_GT(bound, 0.0) << s.name;
+        if (!slope) continue;
+        // Differences of rates, over a millisecond, are rounded; a millisecond of 20 ms is not the steepest point.
+        EXPECT_LE(steepest, *slope * (1.0 + 1e-6)) << s.name;
+        EXPECT_GE(steepest, 0.95 * *slope) << s.name;
     }
 }
 
