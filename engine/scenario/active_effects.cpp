@@ -48,6 +48,16 @@ InputRange input_range(const InputRate& input) {
     return {std::min(input.rate_deg_h, last), std::max(input.rate_deg_h, last)};
 }
 
+double input_slope_deg_h_s(const InputRate& input) {
+    const auto& times = input.profile_time_s;
+    const auto& rates = input.profile_rate_deg_h;
+    double steepest = 0.0;
+    for (std::size_t i = 1; i < std::min(times.size(), rates.size()); ++i) {
+        steepest = std::max(steepest, std::abs(rates[i] - rates[i - 1]) / (times[i] - times[i - 1]));
+    }
+    return steepest;
+}
+
 effects::Exposure exposure(const Scenario& scenario) {
     const Environment& environment = scenario.environment;
     const double ramp_k_per_h = std::abs(environment.temperature_ramp_k_per_h);
@@ -58,6 +68,7 @@ effects::Exposure exposure(const Scenario& scenario) {
     exposure.temperature_slope_k_per_h =
         ramp_k_per_h + environment.temperature_swing_k * units::two_pi * 3600.0 / environment.temperature_period_s;
     exposure.input_rate_deg_h = std::max(std::abs(lowest), std::abs(highest));
+    exposure.input_slope_deg_h_s = input_slope_deg_h_s(scenario.input);
     return exposure;
 }
 

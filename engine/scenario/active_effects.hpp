@@ -34,6 +34,9 @@ struct InputRange {
 };
 InputRange input_range(const InputRate& input);
 
+/// Steepest slope of the input's profile [deg/h each second]; 0 without one.
+double input_slope_deg_h_s(const InputRate& input);
+
 /// The most that a gyro is exposed to over the run, the time before the record included.
 effects::Exposure exposure(const Scenario& scenario);
 

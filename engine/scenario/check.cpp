@@ -77,6 +77,72 @@ Finding dither_reverses_the_rate(const Scenario& s) {
                                  rate, 0.5 * smallest)};
 }
 
+Finding dither_reverses_effects(const Scenario& s) {
+    double certain = exposure(s).input_rate_deg_h;
+    double random = 0.0;
+    std::vector<std::pair<double, std::vector<std::string>>> rates;
+    for (const EffectBounds& bounds : bounds_of_effects(s)) {
+        const double rate = bounds.certain.rate_deg_h + sigmas * bounds.rate_sd_deg_h;
+        if (rate == 0.0) continue;
+        certain += bounds.certain.rate_deg_h;
+        random = std::hypot(random, bounds.rate_sd_deg_h);
+        rates.emplace_back(rate, keys_of(*bounds.effect));
+    }
+    const double rate = certain + sigmas * random;
+    const double swing = 1.0 - amplitude_change_relative(s.dither, s.ensemble.settle_s + s.ensemble.duration_s);
+    const double smallest = peak_rate_deg_h(s) * (1.0 - sigmas * s.ensemble.dither_amplitude_sd_relative) *
+                            (1.0 - largest_asymmetry(s)) * swing;
+    constexpr double most = 0.9;
+    if (rates.empty() || rate < most * smallest) return {};
+    std::stable_sort(rates.begin(), rates.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    std::vector<std::string> keys;
+    for (const auto& [size, names] : rates) keys.insert(keys.end(), names.begin(), names.end());
+    for (const char* key : {"environment.temperature_ramp_k_per_h", "environment.temperature_swing_k",
+                            "input.profile_rate_deg_h", "input.rate_deg_h", "input.sweep_stop_deg_h",
+                            "dither.peak_rate_deg_s", "ensemble.duration_s", "ensemble.settle_s"}) {
+        keys.emplace_back(key);
+    }
+    return Complaint{std::move(keys),
+                     fmt::format("effects take the rate to as much as {:g} deg/h within {:g} sigma, input included; it "
+                                 "must stay below {:g} deg/h, {:g} of the smallest peak rate of the dither (the rate "
+                                 "must reverse in every half cycle); make the effects smaller or the run shorter, or "
+                                 "set a stronger dither",
+                                 rate, sigmas, most * smallest, most)};
+}
+
+/// Keys of the rates that matter in comparison with the dither's, that of the largest first.
+std::vector<std::string> keys_of_rates(const Scenario& s) {
+    std::vector<std::pair<double, std::vector<std::string>>> rates;
+    rates.push_back({exposure(s).input_rate_deg_h,
+                     has_profile(s.input) ? std::vector<std::string>{"input.profile_rate_deg_h"}
+                                          : std::vector<std::string>{"input.rate_deg_h", "input.sweep_stop_deg_h"}});
+    for (const EffectBounds& bounds : bounds_of_effects(s)) {
+        const double rate = bounds.certain.rate_deg_h + sigmas * bounds.rate_sd_deg_h;
+        if (rate > 0.01 * peak_rate_deg_h(s)) rates.emplace_back(rate, keys_of(*bounds.effect));
+    }
+    std::stable_sort(rates.begin(), rates.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+    std::vector<std::string> keys;
+    for (const auto& [rate, names] : rates) keys.insert(keys.end(), names.begin(), names.end());
+    return keys;
+}
+
+Finding turns_are_reached(const Scenario& s) {
+    // 20000 steps of an eighth of a radian are 2500 rad, see zero_rate-inl.hpp.
+    constexpr double most_rad = 2250.0;
+    const double way_rad = way_to_turns_rad(s);
+    if (way_rad <= most_rad) return {};
+    std::vector<std::string> keys = keys_of_rates(s);
+    for (const char* key : {"dither.peak_rate_deg_s", "dither.frequency_hz", "gyro.scale_factor_arcsec"}) {
+        keys.emplace_back(key);
+    }
+    return Complaint{
+        std::move(keys),
+        fmt::format("input rate and effects move the turn of the phase away from that of the dither by up "
+                    "to {:.4g} rad of phase, and the readout follows it for {:g} rad; lower the input rate "
+                    "or the effects, or set another dither or scale factor that makes fewer fringes",
+                    way_rad, most_rad)};
+}
+
 Finding amplitude_stays(const Scenario& s) {
     constexpr double most = 0.5;
     const double change = amplitude_change_relative(s.dither, s.ensemble.settle_s + s.ensemble.duration_s);
@@ -159,46 +225,51 @@ Finding turn_map_has_small_kicks(const Scenario& s) {
                     kick, largest)};
 }
 
-/// Keys of the rates that matter in comparison with the dither's, that of the largest first.
-std::vector<std::string> keys_of_rates(const Scenario& s) {
-    std::vector<std::pair<double, std::vector<std::string>>> rates;
-    rates.push_back({exposure(s).input_rate_deg_h,
-                     has_profile(s.input) ? std::vector<std::string>{"input.profile_rate_deg_h"}
-                                          : std::vector<std::string>{"input.rate_deg_h", "input.sweep_stop_deg_h"}});
-    for (const EffectBounds& bounds : bounds_of_effects(s)) {
-        const double rate = bounds.certain.rate_deg_h + sigmas * bounds.rate_sd_deg_h;
-        if (rate > 0.01 * peak_rate_deg_h(s)) rates.emplace_back(rate, keys_of(*bounds.effect));
-    }
-    std::stable_sort(rates.begin(), rates.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-    std::vector<std::string> keys;
-    for (const auto& [rate, names] : rates) keys.insert(keys.end(), names.begin(), names.end());
-    return keys;
-}
-
-bool loop_is_stable(const Scenario& s) {
-    return s.noise_injection.model != NoiseModel::drive || gyro::Resonator(drive_noise(s)).decay() < 1.0;
+/// What a scenario whose turn map does not exist, or cannot be tabulated, can do instead.
+std::string way_without_tables(const Scenario& s) {
+    return s.propagation.method == PropagationMethod::turn_map
+               ? "set propagation.method = \"direct\""
+               : "leave out the arms with compensated_exact and compensated_adaptive, which invert the turn map";
 }
 
 Finding turn_map_has_fast_middles(const Scenario& s) {
-    if (s.propagation.method != PropagationMethod::turn_map || !loop_is_stable(s) || fast_middles(s)) return {};
+    if (!amplitude_loop_is_stable(s) || fast_middles(s)) return {};
     std::vector<std::string> keys = keys_of_rates(s);
     for (const char* key :
          {"noise_injection.turn_phase_rms_rad", "dither.peak_rate_deg_s", "dither.frequency_hz",
           "gyro.scale_factor_arcsec", "gyro.lockin_threshold_deg_h", "calibration.threshold_error_relative",
           "ensemble.dither_amplitude_sd_relative", "ensemble.dither_asymmetry_sd_ratio",
-          "ensemble.lockin_threshold_sd_relative", "propagation.method"}) {
+          "ensemble.lockin_threshold_sd_relative", "arms.names", "propagation.method"}) {
         keys.emplace_back(key);
     }
     return Complaint{
         std::move(keys),
-        "the phase can go through too few fringes between a zero-rate point and the middle of a half cycle for the "
-        "turn map, which needs 10 rad there, after injected noise, effects and the spread of the gyros have taken "
-        "their "
-        "part; set propagation.method = \"direct\" or a stronger dither"};
+        fmt::format("the phase can go through too few fringes between a zero-rate point and the middle of a half cycle "
+                    "for the turn map, which needs 10 rad there, after injected noise, effects and the spread of the "
+                    "gyros have taken their part; {} or a stronger dither",
+                    way_without_tables(s))};
 }
 
-Finding amplitude_loop_is_stable(const Scenario& s) {
-    if (loop_is_stable(s)) return {};
+Finding turn_map_has_narrow_tables(const Scenario& s) {
+    if (!amplitude_loop_is_stable(s) || tables_hold_the_tolerance(s)) return {};
+    std::vector<std::string> keys = keys_of_rates(s);
+    for (const char* key : {"noise_injection.turn_phase_rms_rad", "noise_injection.drive_noise_relative",
+                            "dither.amplitude_wander_relative_rt_s", "dither.amplitude_drift_relative_per_h",
+                            "propagation.turn_map_tolerance_rad", "dither.peak_rate_deg_s", "dither.frequency_hz",
+                            "gyro.scale_factor_arcsec", "arms.names", "propagation.method"}) {
+        keys.emplace_back(key);
+    }
+    return Complaint{
+        std::move(keys),
+        fmt::format("the tables of the turn map cannot hold a tolerance of {:g} rad over the amplitudes and rates that "
+                    "they must cover: at a high input rate the phase at which the rate reverses moves by many radians "
+                    "with either (docs/turn-map.md); lower the input rate, or what makes rate and amplitude vary, "
+                    "raise propagation.turn_map_tolerance_rad or {}",
+                    s.propagation.turn_map_tolerance_rad, way_without_tables(s))};
+}
+
+Finding loop_must_be_stable(const Scenario& s) {
+    if (amplitude_loop_is_stable(s)) return {};
     return Complaint{
         {"noise_injection.amplitude_loop_hz", "noise_injection.resonator_q", "dither.frequency_hz"},
         "the amplitude loop is not stable: it corrects the force once in a half cycle and must be slow beside "
@@ -206,7 +277,7 @@ Finding amplitude_loop_is_stable(const Scenario& s) {
 }
 
 Finding drive_forgets_in_time(const Scenario& s) {
-    if (s.noise_injection.model != NoiseModel::drive || !loop_is_stable(s)) return {};
+    if (s.noise_injection.model != NoiseModel::drive || !amplitude_loop_is_stable(s)) return {};
     constexpr double most = 2e6;  // some seconds of a block of gyros
     const double settling = gyro::Resonator(drive_noise(s)).settling_half_cycles();
     if (settling <= most) return {};
@@ -273,7 +344,7 @@ Finding changing_amplitudes_need_moebius_maps(const Scenario& s) {
 
 Finding noise_leaves_the_dither(const Scenario& s) {
     const bool injected = std::any_of(s.arms.begin(), s.arms.end(), [](const Arm& arm) { return arm.noise_injected; });
-    if (!injected || !loop_is_stable(s)) return {};
+    if (!injected || !amplitude_loop_is_stable(s)) return {};
     // Eight standard deviations of the amplitude leave half of it.
     const InjectedNoise noise = injected_noise(s);
     const double half_swing_rad = 0.5 * phase_amplitude_rad(s);
@@ -343,6 +414,42 @@ Finding pulses_are_there(const Scenario& s) {
             fmt::format("arm \"{}\" needs the pulses' times; set readout.model = \"instrument\"", arm.name)};
     }
     return {};
+}
+
+bool follows_pulses(const Arm& arm) {
+    return arm.compensator == Compensator::extrapolated || arm.compensator == Compensator::adaptive;
+}
+
+Finding clock_tells_pulses_apart(const Scenario& s) {
+    constexpr double least_ticks = 2.0;
+    const Readout& r = s.readout;
+    if (r.model != ReadoutModel::instrument || r.clock_hz == 0.0) return {};
+    // From a turn on, the phase goes through a quarter fringe in sqrt(pi/a).
+    const double spread = (1.0 + sigmas * s.ensemble.dither_amplitude_sd_relative) * (1.0 + largest_asymmetry(s));
+    const double acceleration = phase_amplitude_rad(s) * spread * std::pow(dither_rad_s(s), 2);
+    const double quarter_s = std::sqrt(std::numbers::pi / acceleration);
+    if (r.clock_hz * quarter_s >= least_ticks) return {};
+    return Complaint{
+        {"readout.clock_hz", "dither.peak_rate_deg_s", "dither.frequency_hz", "gyro.scale_factor_arcsec",
+         "readout.model"},
+        fmt::format(
+            "the phase is a quarter fringe from a turn after {:.3g} s, so that a clock of {:g} Hz does not tell "
+            "the pulses on its two sides apart, between which the instrument finds the turn; set "
+            "readout.clock_hz to {:.3g} or more, or to 0 for continuous time",
+            quarter_s, r.clock_hz, least_ticks / quarter_s)};
+}
+
+Finding pulses_come_before_the_middle(const Scenario& s) {
+    const bool timed =
+        s.readout.model == ReadoutModel::instrument || std::any_of(s.arms.begin(), s.arms.end(), follows_pulses);
+    if (!timed || pulses_before_middles(s)) return {};
+    return Complaint{
+        {"gyro.scale_factor_arcsec", "dither.peak_rate_deg_s", "dither.frequency_hz", "gyro.lockin_threshold_deg_h",
+         "input.rate_deg_h", "input.sweep_stop_deg_h", "readout.model", "arms.names"},
+        "the phase can go through too few quarter fringes between a turn and the middle of a half cycle for the four "
+        "pulses on either side of a turn that the electronics time, after input rate, lock-in and the spread of the "
+        "gyros have taken their part; set a stronger dither, or readout.model = \"latched\" without arms that need "
+        "pulses"};
 }
 
 /// Largest rate of the phase in fringes a second: the dither's, with its spread, and the input.
@@ -421,6 +528,12 @@ constexpr std::array all_rules = {
     Rule{"The input rate, over the whole sweep, stays below half of the dither's smallest peak rate (six standard "
          "deviations of its spread and the asymmetry taken off), so that the rate reverses in every half cycle.",
          dither_reverses_the_rate},
+    Rule{"Input rate and effects together, six standard deviations of random rates taken, stay below 0.9 of that peak "
+         "rate over the run.",
+         dither_reverses_effects},
+    Rule{"Input rate and effects move the turn of the phase away from that of the dither by no more than 2250 rad of "
+         "phase: so far the readout follows it.",
+         turns_are_reached},
     Rule{"Wander and drift of the dither's amplitude stay within half of it over the run, six standard deviations "
          "taken.",
          amplitude_stays},
@@ -436,13 +549,17 @@ constexpr std::array all_rules = {
         "cycle, and a rate there of at least 4 b (b: coupling), after rates, injected noise, effects, the spread of "
         "the gyros and the room of the tables have taken their part (docs/turn-map.md).",
         turn_map_has_fast_middles},
+    Rule{"The tables of the turn map hold turn_map_tolerance_rad, by an estimate on the safe side, over the rates of "
+         "128 turns and the amplitudes that noise, wander and drift make: the wider these and the higher the input "
+         "rate, the more terms it takes (docs/turn-map.md).",
+         turn_map_has_narrow_tables},
     Rule{"Injected noise leaves at least half of each half cycle's swing within eight standard deviations "
          "(checked where an arm injects noise).",
          noise_leaves_the_dither},
     Rule{"The strength of injected noise is given once: by turn_phase_rms_rad, or for a drive by drive_noise_relative.",
          noise_has_one_strength},
     Rule{"Keys of a drive's noise need model = \"drive\".", keys_of_a_drive_need_it},
-    Rule{"The amplitude loop of a drive is stable.", amplitude_loop_is_stable},
+    Rule{"The amplitude loop of a drive is stable.", loop_must_be_stable},
     Rule{"Resonator and amplitude loop of a drive forget a deviation to 1e-9 within 2e6 half cycles.",
          drive_forgets_in_time},
     Rule{"A sinusoidal modulation of the drive is slower than the dither.", sinusoidal_noise_is_slow},
@@ -455,6 +572,12 @@ constexpr std::array all_rules = {
     Rule{"compensated_extrapolated and compensated_adaptive need the times of pulses, which the latched readout does "
          "not keep.",
          pulses_are_there},
+    Rule{"The instrument's clock has two ticks or more in the time from a turn to a quarter fringe.",
+         clock_tells_pulses_apart},
+    Rule{
+        "Where pulses are timed (by the instrument, or for those arms) the phase goes through 8 rad from a turn to the "
+        "middle of the half cycle, even against the lock-in.",
+        pulses_come_before_the_middle},
     Rule{
         "The instrument's bandwidth exceeds the fastest rate of fringes, and leaves there more of their amplitude than "
         "hysteresis and six standard deviations of the comparators' noise.",

@@ -8,4 +8,17 @@ namespace ringlock::scenario {
 /// them.
 bool fast_middles(const Scenario& scenario);
 
+/// The most that the phase of a gyro goes through between a turn of the dither and its own, where the rate of dither
+/// and input vanishes [rad]; with it what the readout's steps, limited in time as well, count for on that way.
+double way_to_turns_rad(const Scenario& scenario);
+
+/// Whether the phase of every gyro, from a turn at any input rate to the middle of the half cycle, passes the quarter
+/// fringes whose pulses are timed.
+bool pulses_before_middles(const Scenario& scenario);
+
+/// Whether the polynomials of the turn map can hold propagation.turn_map_tolerance_rad over the amplitudes and rates
+/// that a table of the scenario must cover; estimated from the phase of the zero-rate point, without making one. Tables
+/// without fast middles do not count.
+bool tables_hold_the_tolerance(const Scenario& scenario);
+
 }  // namespace ringlock::scenario

@@ -14,6 +14,9 @@ struct InjectedNoise {
 };
 InjectedNoise injected_noise(const Scenario& scenario);
 
+/// Whether the amplitude loop of a drive is stable; true without one.
+bool amplitude_loop_is_stable(const Scenario& scenario);
+
 /// The resonator of [noise_injection] with model = "drive".
 gyro::DriveNoise drive_noise(const Scenario& scenario);
 

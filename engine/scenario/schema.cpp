@@ -246,7 +246,7 @@ std::vector<Section> base_sections() {
                  between(1e-14, 1e-3, "double precision ends below it"),
                  "Error of a half cycle that the direct integrator allows."),
              key(RINGLOCK_KEY(propagation, turn_map_tolerance_rad),
-                 between(1e-14, 1e-3, "double precision ends below it"),
+                 between(1e-12, 1e-3, "the half turns that tables are made of are rounded there"),
                  "Interpolation error per turn that the turn map allows."),
          }},
         {"output",

@@ -310,5 +310,69 @@ TEST(ScenarioRules, ASampleHoldsACycleAndARunHoldsSamples) {
                 AllOf(HasSubstr("s.toml:2:14: key \"ensemble.duration_s\" = 2.9: "), HasSubstr("at least 3 samples")));
 }
 
+TEST(ScenarioRules, TheDitherMustReverseEffectsWhateverTheMethod) {
+    // 20 deg/s are 72000 deg/h; 1000 K/h are 833 K in 3000 s, and these 83333 deg/h.
+    const std::string ramp =
+        "[dither]\npeak_rate_deg_s = 20\n[environment]\ntemperature_ramp_k_per_h = 1000\n[ensemble]\n"
+        "duration_s = 3000\n[propagation]\nmethod = \"direct\"\n[effects.bias_temperature]\ndeg_h_per_k = ";
+    EXPECT_THAT(complaint(ramp + "100"),
+                AllOf(HasSubstr("s.toml:10:15: key \"effects.bias_temperature.deg_h_per_k\" = 100.0: "),
+                      HasSubstr("as much as 83348"), HasSubstr("must reverse"), HasSubstr("stronger dither")));
+    EXPECT_EQ(complaint(ramp + "70"), "");
+}
+
+TEST(ScenarioRules, TablesHoldTheirTolerance) {
+    // At 0.38 of the dither's peak rate the zero-rate point is 465 rad from the turn, and moves by 0.08 rad with each
+    // radian of the amplitude: by 0.4 rad over eight standard deviations of noise of 1 rad, by 43 rad with 100 rad,
+    // which 28 terms do not follow.
+    const std::string fast = "[input]\nrate_deg_h = 150000\n[noise_injection]\nturn_phase_rms_rad = ";
+    EXPECT_EQ(complaint(fast + "1"), "");
+    EXPECT_THAT(complaint(fast + "100"),
+                AllOf(HasSubstr("s.toml:2:14: key \"input.rate_deg_h\" = 150000.0: the tables of the turn map"),
+                      HasSubstr("turn_map_tolerance_rad"), HasSubstr("propagation.method = \"direct\"")));
+    EXPECT_EQ(complaint(fast + "100\n[propagation]\nmethod = \"direct\""), "");
+    EXPECT_THAT(complaint(fast + "100\n[propagation]\nmethod = \"direct\"\n[arms]\nnames = [\"noise_injected\", "
+                                 "\"noise_injected+compensated_exact\"]"),
+                HasSubstr("leave out the arms"));
+    // A jump of the input's profile is in one table.
+    EXPECT_THAT(complaint("[input]\nprofile_time_s = [0, 1, 1.001]\nprofile_rate_deg_h = [0, 0, 150000]"),
+                HasSubstr("s.toml:3:22: key \"input.profile_rate_deg_h\""));
+    EXPECT_EQ(complaint("[input]\nprofile_time_s = [0, 300]\nprofile_rate_deg_h = [0, 150000]\n"
+                        "[noise_injection]\nturn_phase_rms_rad = 1"),
+              "");
+}
+
+TEST(ScenarioRules, TheClockTellsPulsesApart) {
+    // A quarter fringe takes sqrt(pi/(M w_D^2)) = 28.5 us, less six sigma of amplitude and asymmetry.
+    const std::string instrument = "[readout]\nmodel = \"instrument\"\nclock_hz = ";
+    EXPECT_THAT(complaint(instrument + "5e4"), AllOf(HasSubstr("s.toml:3:12: key \"readout.clock_hz\" = 50000.0: "),
+                                                     HasSubstr("2.83e-05 s"), HasSubstr("7.06e+04 or more")));
+    EXPECT_EQ(complaint(instrument + "7.1e4"), "");
+    EXPECT_EQ(complaint(instrument + "0"), "");
+    EXPECT_EQ(complaint("[readout]\nclock_hz = 5e4"), "");
+}
+
+TEST(ScenarioRules, TheReadoutFollowsThePhaseToItsTurn) {
+    // 10000 deg/s are 183700 fringes in a half cycle: M = 577300 rad, and at 0.056 of the peak rate M 0.056^2/2 = 891
+    // rad, with 42 rad for the steps in time; at 0.11 four times as much.
+    const std::string fast =
+        "[dither]\npeak_rate_deg_s = 1e4\n[noise_injection]\nturn_phase_rms_rad = 0\n[arms]\n"
+        "names = [\"uncompensated\"]\n[input]\nrate_deg_h = ";
+    EXPECT_EQ(complaint(fast + "2e6"), "");
+    EXPECT_THAT(complaint(fast + "-4e6"), AllOf(HasSubstr("s.toml:8:14: key \"input.rate_deg_h\" = -4000000.0: "),
+                                                HasSubstr("2250 rad"), HasSubstr("lower the input rate")));
+}
+
+TEST(ScenarioRules, PulsesComeBeforeTheMiddle) {
+    // 2 fringes in a half cycle are 6.3 rad from a turn to the middle.
+    const std::string few =
+        "[gyro]\nscale_factor_arcsec = 500\nlockin_threshold_deg_h = 0\n[propagation]\nmethod = \"direct\"\n"
+        "[noise_injection]\nturn_phase_rms_rad = 0\n[arms]\nnames = [\"uncompensated\"]\n[readout]\nmodel = ";
+    EXPECT_EQ(complaint(few + "\"latched\""), "");
+    EXPECT_THAT(complaint(few + "\"instrument\"\ncomparator_noise_relative = 0"),
+                AllOf(HasSubstr("s.toml:2:23: key \"gyro.scale_factor_arcsec\" = 500.0: "),
+                      HasSubstr("too few quarter fringes")));
+}
+
 }  // namespace
 }  // namespace ringlock::scenario
