@@ -312,7 +312,7 @@ bool all_tables(const Scenario& s, Allows&& allows) {
             !allows(Room{margin, change, lowest - room, highest + room, half_width, tabulated_coupling(s), true}))
             return false;
         if (inverted[noisy] &&
-            !allows(Room{wider, 0.0, lowest - measured, highest + measured, told_width, told, false}))
+            !allows(Room{wider, change, lowest - measured, highest + measured, told_width, told, false}))
             return false;
     }
     return true;
