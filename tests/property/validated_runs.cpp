@@ -23,7 +23,6 @@
 #include "engine/scenario/devices.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/schema.hpp"
-#include "tests/support/gyro_records.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -351,36 +350,9 @@ void check_rate_error(const Scenario& s, const scenario::Arm& arm, const ensembl
                              " deg/h, where effects and lock-in make " + std::to_string(most) + " deg/h at most");
 }
 
-/// Simulates all gyros, without what a study makes of them.
-void simulate_to_the_end(const Scenario& s) {
-    const ensemble::Schedule schedule(s);
-    const auto gyros = s.ensemble.gyros * s.input.sweep_points;
-    GyroRecords records(s, static_cast<std::size_t>(gyros));
-    records.run(0, gyros, 1);
-    const double duration_s = schedule.cycle_s * static_cast<double>(schedule.cycles() - 1);
-    for (std::int64_t gyro = 0; gyro < gyros; ++gyro) {
-        for (std::size_t arm = 0; arm < s.arms.size(); ++arm) {
-            // Counts wrap round: their differences do not.
-            const std::vector<std::int64_t>& counts = records[gyro].counts[arm];
-            double turned = 0.0;
-            for (std::size_t i = 1; i < counts.size(); ++i) {
-                turned += static_cast<double>(static_cast<std::int64_t>(static_cast<std::uint64_t>(counts[i]) -
-                                                                        static_cast<std::uint64_t>(counts[i - 1])));
-            }
-            const double angle_arcsec = turned * s.gyro.scale_factor_arcsec / ensemble::counts_per_fringe;
-            check_rate_error(s, s.arms[arm], schedule,
-                             angle_arcsec / duration_s - records[gyro].setup.input_rate_deg_h);
-        }
-    }
-}
-
 /// Runs the scenario to its end; throws where it cannot, or where what comes out is no angle of a gyro.
 void run_to_the_end(const Scenario& s) {
     check_first_angles(s);
-    // A study predicts what the noise of a drive does, which takes up to minutes, however short the run.
-    const bool injected =
-        std::any_of(s.arms.begin(), s.arms.end(), [](const scenario::Arm& arm) { return arm.noise_injected; });
-    if (injected && s.noise_injection.model == scenario::NoiseModel::drive) return simulate_to_the_end(s);
     const study::Study study = study::run(study::Study(s), 1);
     const study::Summary summary = study::summarise(study);
     if (summary.arms.size() != s.arms.size()) throw std::runtime_error("the summary lacks arms");

@@ -63,7 +63,7 @@ Value random_value(const Key& key, Random& random) {
 TEST(ScenarioProperty, ResolvedTextParsesBackToAnEqualScenario) {
     Random random(20070301);
     int kept = 0;
-    for (int i = 0; i < 2000; ++i) {
+    for (int i = 0; i < 700; ++i) {
         Scenario scenario;
         for (const Section& section : schema()) {
             for (const Key& key : section.keys) {
@@ -80,7 +80,7 @@ TEST(ScenarioProperty, ResolvedTextParsesBackToAnEqualScenario) {
         ASSERT_EQ(to_toml(back), text);
     }
     // Arms that need pulses are refused beside a latched readout.
-    EXPECT_GT(kept, 1000) << "the scenarios are hardly random";
+    EXPECT_GT(kept, 350) << "the scenarios are hardly random";
 }
 
 /// Parses or refuses with a message; anything else fails the test.
