@@ -27,7 +27,7 @@ double tail_probability(const Confidence& confidence) {
 double widening(const Confidence& confidence, std::int64_t n) {
     if (confidence.sampling == Sampling::fixed) return 1.0;
     if (n < 1) throw InputError(fmt::format("t interval of {} values: at least 1 is needed", n));
-    return std::sqrt(1.0 + 2.0 / static_cast<double>(n));
+    return std::sqrt(1.04 + 2.0 / static_cast<double>(n));
 }
 
 }  // namespace ringlock::lot
