@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <boost/math/distributions/binomial.hpp>
 #include <cmath>
-#include <limits>
+#include <iterator>
 
 #include "engine/core/error.hpp"
 
