@@ -23,9 +23,19 @@ std::int64_t whole_number(std::string_view option, const std::string& text, std:
     return value;
 }
 
-scenario::Scenario load_scenario(const std::string& file, const std::optional<std::string>& seed) {
-    scenario::Scenario scenario = scenario::parse_file(file);
-    if (seed) {
+void add_settings(CLI::App& command, Changes& changes) {
+    command
+        .add_option("--set", changes.settings,
+                    "replaces what the file says of a key: --set gyro.lockin_threshold_deg_h=140; may stand several "
+                    "times")
+        ->type_name("KEY=VALUE")
+        ->take_all()
+        ->allow_extra_args(false);
+}
+
+scenario::Scenario load_scenario(const std::string& file, const Changes& changes) {
+    scenario::Scenario scenario = scenario::parse_file(file, changes.settings);
+    if (const auto& seed = changes.seed) {
         constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();  // integers of TOML are signed
         scenario.ensemble.seed = static_cast<std::uint64_t>(
             whole_number("--seed", *seed, largest, fmt::format("between 0 and {}", largest)));

@@ -1,4 +1,5 @@
 #pragma once
+#include <CLI/App.hpp>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -16,8 +17,17 @@ namespace ringlock::app {
 std::int64_t whole_number(std::string_view option, const std::string& text, std::int64_t largest,
                           std::string_view allowed);
 
-/// The scenario of the file with the seed of --seed in place of its own where that is given.
-scenario::Scenario load_scenario(const std::string& file, const std::optional<std::string>& seed);
+/// What a command is told of a scenario beside its file.
+struct Changes {
+    std::vector<std::string> settings;  ///< of --set, "section.key=value"
+    std::optional<std::string> seed;    ///< of --seed
+};
+
+/// Adds --set.
+void add_settings(CLI::App& command, Changes& changes);
+
+/// The scenario of the file with these changes.
+scenario::Scenario load_scenario(const std::string& file, const Changes& changes);
 
 /// The parts of "a, b, c", without white space around them.
 std::vector<std::string> split(const std::string& text);

@@ -21,12 +21,12 @@ struct Arguments {
     std::string scenario;
     std::string out;
     std::string gyro = "0";
-    std::optional<std::string> seed;
+    Changes changes;
     bool json = false;
 };
 
 void run(const Arguments& arguments) {
-    const scenario::Scenario scenario = load_scenario(arguments.scenario, arguments.seed);
+    const scenario::Scenario scenario = load_scenario(arguments.scenario, arguments.changes);
     constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();
     const std::int64_t gyro = whole_number("--gyro", arguments.gyro, largest, "from 0 on");
     record::check_output(arguments.out);
@@ -64,7 +64,8 @@ void add_record(CLI::App& root) {
     command->add_option("--gyro", arguments->gyro, "number of the gyro in the ensemble, from 0")
         ->capture_default_str()
         ->type_name("N");
-    command->add_option("--seed", arguments->seed, "replaces ensemble.seed")->type_name("S");
+    add_settings(*command, arguments->changes);
+    command->add_option("--seed", arguments->changes.seed, "replaces ensemble.seed")->type_name("S");
     command->add_flag("--json", arguments->json, "print one JSON object instead of a line");
     command->callback([arguments] { run(*arguments); });
 }

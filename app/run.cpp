@@ -40,7 +40,7 @@ struct Arguments {
     std::string shard;
     std::string print_schema;
     std::string threads = "0";
-    std::optional<std::string> seed;
+    Changes changes;
     bool resume = false;
     bool json = false;
     bool quiet = false;
@@ -70,7 +70,7 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     if (!arguments.shard.empty()) throw InputError("--shard is not there yet; run the whole ensemble");
     if (arguments.resume) throw InputError("--resume is not there yet; run the whole ensemble");
     const int threads = thread_count(arguments.threads);
-    const scenario::Scenario scenario = load_scenario(arguments.scenario, arguments.seed);
+    const scenario::Scenario scenario = load_scenario(arguments.scenario, arguments.changes);
     const std::filesystem::path out =
         arguments.out ? std::filesystem::path(*arguments.out)
                       : std::filesystem::path(arguments.scenario).filename().replace_extension(".h5");
@@ -120,7 +120,8 @@ void add_run(CLI::App& root, std::span<const char* const> command_line) {
     command->add_option("--threads", arguments->threads, "threads (0: all cores); results do not depend on it")
         ->capture_default_str()
         ->type_name("N");
-    command->add_option("--seed", arguments->seed, "replaces ensemble.seed")->type_name("S");
+    add_settings(*command, arguments->changes);
+    command->add_option("--seed", arguments->changes.seed, "replaces ensemble.seed")->type_name("S");
     command->add_option("--plot", arguments->plot, "also draw the figure into this SVG file");
     // Reserved, but not there yet: the help shows what can be used.
     command->add_option("--shard", arguments->shard)->group("");

@@ -7,11 +7,11 @@
 #include "analysis/record/probe.hpp"
 #include "analysis/record/record.hpp"
 #include "analysis/study/result_file.hpp"
+#include "app/arguments.hpp"
 #include "app/command.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
 #include "engine/core/error.hpp"
-#include "engine/scenario/parse.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -26,8 +26,11 @@ void validate_record(const std::string& path) {
     put(fmt::format("{}: a valid record: {}{}\n", path, record_text(record), to_close ? "" : too_short));
 }
 
-void validate(const std::string& path) {
+void validate(const std::string& path, const Changes& changes) {
     const std::filesystem::path extension = std::filesystem::path(path).extension();
+    if (!changes.settings.empty() && extension != ".toml") {
+        throw InputError(fmt::format("--set: {} is no scenario (.toml), and only keys of these can be set", path));
+    }
     if (record::is_hdf5(path) || extension == ".h5" || extension == ".hdf5") {
         const std::string format = record::hdf5_format(path);
         if (format == "rlg-record") return validate_record(path);
@@ -43,7 +46,7 @@ void validate(const std::string& path) {
                         path, format));
     }
     if (extension == ".toml") {
-        scenario::parse_file(path);
+        load_scenario(path, changes);
         return put(fmt::format("{}: a valid scenario\n", path));
     }
     if (extension == ".csv") return validate_record(path);
@@ -59,9 +62,14 @@ void validate(const std::string& path) {
 
 void add_validate(CLI::App& root) {
     CLI::App* command = root.add_subcommand("validate", "Say what is wrong in a scenario, record or result, and where");
-    auto file = std::make_shared<std::string>();
-    command->add_option("FILE", *file, "scenario (.toml), record (HDF5 or text) or result")->required();
-    command->callback([file] { validate(*file); });
+    struct Arguments {
+        std::string file;
+        Changes changes;
+    };
+    auto arguments = std::make_shared<Arguments>();
+    command->add_option("FILE", arguments->file, "scenario (.toml), record (HDF5 or text) or result")->required();
+    add_settings(*command, arguments->changes);
+    command->callback([arguments] { validate(arguments->file, arguments->changes); });
 }
 
 }  // namespace ringlock::app

@@ -5,12 +5,14 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "engine/core/error.hpp"
 #include "engine/effects/effect.hpp"
@@ -66,10 +68,23 @@ class Reader {
    public:
     explicit Reader(std::string_view file) : file_(file) {}
 
-    Scenario read(const toml::table& root) {
-        if (const toml::node* device = root.get("device")) read_device_name(*device);
-        for (const auto& [name, node] : root) {
-            if (name != "device") read_top(name, node);
+    /// Settings come after the file, in its place: text of each, and what it says.
+    Scenario read(const toml::table& root, const std::vector<std::pair<std::string, toml::table>>& settings) {
+        const toml::node* device = root.get("device");
+        std::string device_from;
+        for (const auto& [text, table] : settings) {
+            if (const toml::node* other = table.get("device")) {
+                device = other;
+                device_from = text;
+            }
+        }
+        setting_ = device_from;
+        if (device != nullptr) read_device_name(*device);
+        setting_.clear();
+        read_keys(root);
+        for (const auto& [text, table] : settings) {
+            setting_ = text;
+            read_keys(table);
         }
         // Whoever gives the strength of a drive's noise does not give the other one, which has a default.
         if (scenario_.noise_injection.drive_noise_relative > 0.0 &&
@@ -82,22 +97,43 @@ class Reader {
     }
 
    private:
-    struct Problem {
+    /// In the file, or in a setting of the command line.
+    struct Place {
         toml::source_position where;
+        std::string setting;
+    };
+    struct Problem {
+        Place place;
         std::string text;
     };
 
-    void note(toml::source_position where, std::string text) { problems_.push_back({where, std::move(text)}); }
+    void note(toml::source_position where, std::string text) {
+        problems_.push_back({{where, setting_}, std::move(text)});
+    }
 
     std::string report() {
-        std::stable_sort(problems_.begin(), problems_.end(),
-                         [](const Problem& a, const Problem& b) { return a.where < b.where; });
+        // Those of the file in its order, then those of settings in theirs.
+        std::stable_sort(problems_.begin(), problems_.end(), [](const Problem& a, const Problem& b) {
+            if (a.place.setting.empty() != b.place.setting.empty()) return a.place.setting.empty();
+            return a.place.setting.empty() && a.place.where < b.place.where;
+        });
         std::vector<std::string> lines;
-        for (const Problem& p : problems_) {
-            lines.push_back(p.where ? fmt::format("{}:{}:{}: {}", file_, p.where.line, p.where.column, p.text)
-                                    : fmt::format("{}: {}", file_, p.text));
+        for (const auto& [place, text] : problems_) {
+            if (!place.setting.empty()) {
+                lines.push_back(fmt::format("--set {}: {}", place.setting, text));
+            } else if (place.where) {
+                lines.push_back(fmt::format("{}:{}:{}: {}", file_, place.where.line, place.where.column, text));
+            } else {
+                lines.push_back(fmt::format("{}: {}", file_, text));
+            }
         }
         return fmt::format("{}", fmt::join(lines, "\n"));
+    }
+
+    void read_keys(const toml::table& root) {
+        for (const auto& [name, node] : root) {
+            if (name != "device") read_top(name, node);
+        }
     }
 
     /// The constants of a device, which the keys of the file itself override.
@@ -162,7 +198,7 @@ class Reader {
             if (found == section.keys.end()) {
                 unknown_key(section, name, node);
             } else {
-                places_[found->path()] = node.source().begin;
+                places_[found->path()] = {node.source().begin, setting_};
                 read_value(*found, node);
             }
         }
@@ -314,8 +350,8 @@ class Reader {
                                             [this](const std::string& key) { return places_.contains(key); });
             const std::string& key = named == complaint.keys.end() ? complaint.keys.front() : *named;
             const auto place = places_.find(key);
-            note(place == places_.end() ? toml::source_position{} : place->second,
-                 fmt::format("key \"{}\" = {}: {}", key, current_value(key), complaint.problem));
+            problems_.push_back({place == places_.end() ? Place{} : place->second,
+                                 fmt::format("key \"{}\" = {}: {}", key, current_value(key), complaint.problem)});
         }
     }
 
@@ -331,7 +367,8 @@ class Reader {
     std::string file_;
     Scenario scenario_;
     std::vector<Problem> problems_;
-    std::map<std::string, toml::source_position> places_;
+    std::map<std::string, Place> places_;
+    std::string setting_;  ///< that is being read; empty: the file
 };
 
 /// toml++ 3.3 follows a dotted key by recursion without a limit, and a key of some 30 000 parts overflows the stack.
@@ -366,9 +403,45 @@ void refuse_deep_keys(std::string_view text, std::string_view name) {
     }
 }
 
+/// A setting as a table. Throws InputError.
+toml::table parse_setting(const std::string& setting) {
+    const auto refuse = [&](std::string_view why) {
+        throw InputError(fmt::format("--set {}: {}", in_quotes(setting), why));
+    };
+    const std::size_t equals = setting.find('=');
+    if (equals == std::string::npos || equals == 0) {
+        refuse(
+            "must be KEY=VALUE, as in gyro.lockin_threshold_deg_h=140; `ringlock run --print-schema` prints all keys");
+    }
+    const bool one_line = std::none_of(setting.begin(), setting.end(),
+                                       [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '#'; });
+    if (!one_line) refuse("must be one line without comments");
+    std::string value = setting.substr(equals + 1);
+    value.erase(0, value.find_first_not_of(' '));
+    value.erase(value.find_last_not_of(' ') + 1);
+    if (value.empty()) refuse("has no value");
+    // Shells take quotes away: a word that is none of TOML's own is a string.
+    const bool word = value != "true" && value != "false" && value != "inf" && value != "nan" &&
+                      std::isalpha(static_cast<unsigned char>(value.front())) != 0 &&
+                      std::all_of(value.begin(), value.end(), [](char c) {
+                          return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '+';
+                      });
+    if (word) value = in_quotes(value);
+    const std::string text = setting.substr(0, equals) + " = " + value;
+    refuse_deep_keys(text, "--set " + setting);
+    try {
+        return toml::parse(text);
+    } catch (const toml::parse_error& error) {
+        refuse(fmt::format("not valid TOML: {}", error.description()));
+    }
+    return {};
+}
+
 }  // namespace
 
-Scenario parse_string(std::string_view text, std::string_view name) {
+Scenario parse_string(std::string_view text, std::string_view name, std::span<const std::string> settings) {
+    std::vector<std::pair<std::string, toml::table>> set;
+    for (const std::string& setting : settings) set.emplace_back(setting, parse_setting(setting));
     refuse_deep_keys(text, name);
     toml::table root;
     try {
@@ -378,10 +451,10 @@ Scenario parse_string(std::string_view text, std::string_view name) {
         throw InputError(
             fmt::format("{}:{}:{}: not valid TOML: {}", name, where.line, where.column, error.description()));
     }
-    return Reader(name).read(root);
+    return Reader(name).read(root, set);
 }
 
-Scenario parse_file(const std::filesystem::path& path) {
+Scenario parse_file(const std::filesystem::path& path, std::span<const std::string> settings) {
     constexpr std::size_t largest = 16 << 20;
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored)) {
@@ -395,7 +468,7 @@ Scenario parse_file(const std::filesystem::path& path) {
     text.resize(static_cast<std::size_t>(file.gcount()));
     if (text.size() > largest)
         throw InputError(fmt::format("{}: is larger than 16 MiB: not a scenario", path.string()));
-    return parse_string(text, path.string());
+    return parse_string(text, path.string(), settings);
 }
 
 }  // namespace ringlock::scenario

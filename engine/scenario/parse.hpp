@@ -1,5 +1,7 @@
 #pragma once
 #include <filesystem>
+#include <span>
+#include <string>
 #include <string_view>
 
 #include "engine/scenario/scenario.hpp"
@@ -7,10 +9,14 @@
 namespace ringlock::scenario {
 
 /// Reads and validates a scenario. Keys that are not named have their defaults; an empty file is valid.
-/// @throws InputError with every problem of the file, one a line: FILE:LINE:COLUMN, key, value, what is allowed.
-Scenario parse_file(const std::filesystem::path& path);
+///
+/// \param settings  "section.key=value" each, in place of what the file says of that key; a later one in place of an
+///                  earlier one. Values are TOML, a word without quotes is a string.
+/// @throws InputError with every problem of the file, one a line: FILE:LINE:COLUMN, key, value, what is allowed; in
+/// place of the position the setting, where that is wrong.
+Scenario parse_file(const std::filesystem::path& path, std::span<const std::string> settings = {});
 
 /// The same for text; `name` stands in messages in place of the file.
-Scenario parse_string(std::string_view text, std::string_view name);
+Scenario parse_string(std::string_view text, std::string_view name, std::span<const std::string> settings = {});
 
 }  // namespace ringlock::scenario

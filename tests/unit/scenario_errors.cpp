@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include "engine/core/error.hpp"
 #include "engine/scenario/parse.hpp"
@@ -39,6 +40,63 @@ std::string file_complaint(const std::filesystem::path& path) {
 TEST(ScenarioText, AnEmptyOneIsTheDefault) {
     EXPECT_EQ(parse_string("", "s.toml"), Scenario{});
     EXPECT_EQ(parse_string("# nothing\n[gyro]\n[effects]\n", "s.toml"), Scenario{});
+}
+
+std::string setting_complaint(const std::vector<std::string>& settings) {
+    try {
+        parse_string("[gyro]\nlockin_threshold_deg_h = 200\n", "s.toml", settings);
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    return "";
+}
+
+TEST(ScenarioSettings, StandInPlaceOfWhatTheFileSays) {
+    const std::vector<std::string> settings{
+        "gyro.lockin_threshold_deg_h=140",         "readout.model=instrument",  "readout.phase_from = \"detectors\"",
+        "effects.bias_step.step_deg_h=-0.5",       "output.angle_record=false", "ensemble.gyros=4",
+        "arms.names=[\"ideal\", \"compensated\"]", "ensemble.gyros=8"};
+    const Scenario s =
+        parse_string("[gyro]\nlockin_threshold_deg_h = 200\nscale_factor_arcsec = 1\n", "s.toml", settings);
+    EXPECT_EQ(s.gyro.lockin_threshold_deg_h, 140.0);
+    EXPECT_EQ(s.gyro.scale_factor_arcsec, 1.0);
+    EXPECT_EQ(s.readout.model, ReadoutModel::instrument);
+    EXPECT_EQ(s.readout.phase_from, PhaseFrom::detectors);
+    EXPECT_EQ(s.effects.at("bias_step").at("step_deg_h"), -0.5);
+    EXPECT_FALSE(s.output.angle_record);
+    EXPECT_EQ(s.ensemble.gyros, 8) << "the later one of two";
+    EXPECT_EQ(s.arms, parse_arms({"ideal", "compensated"}));
+}
+
+TEST(ScenarioSettings, OfADeviceLeaveTheFilesKeys) {
+    const std::vector<std::string> settings{"device=triangle-51mm"};
+    const Scenario s =
+        parse_string("device = \"square-90mm\"\n[gyro]\nlockin_threshold_deg_h = 7\n", "s.toml", settings);
+    const Scenario device = parse_string("device = \"triangle-51mm\"\n", "s.toml");
+    EXPECT_EQ(s.device, "triangle-51mm");
+    EXPECT_EQ(s.gyro.scale_factor_arcsec, device.gyro.scale_factor_arcsec);
+    EXPECT_EQ(s.gyro.lockin_threshold_deg_h, 7.0);
+}
+
+TEST(ScenarioSettings, AreRefusedWithTheirText) {
+    EXPECT_THAT(setting_complaint({"gyro.lockin_threshold_deg_h=-1"}),
+                StartsWith("--set gyro.lockin_threshold_deg_h=-1: key \"gyro.lockin_threshold_deg_h\" = -1: must be "));
+    EXPECT_THAT(setting_complaint({"gyro.lockin_treshold_deg_h=1"}), HasSubstr("did you mean"));
+    EXPECT_THAT(setting_complaint({"readout.model=instrumnt"}), HasSubstr("did you mean"));
+    EXPECT_THAT(setting_complaint({"device=square"}),
+                AllOf(StartsWith("--set device=square: "), HasSubstr("square-90mm")));
+    EXPECT_THAT(setting_complaint({"ensemble.gyros=two"}), HasSubstr("must be a whole number"));
+    EXPECT_THAT(setting_complaint({"gyro=1"}), HasSubstr("must be a table"));
+    // A rule that a setting breaks is told at the setting, not at a line of the file.
+    EXPECT_THAT(setting_complaint({"input.rate_deg_h=1e6"}), StartsWith("--set input.rate_deg_h=1e6: "));
+    for (const char* wrong : {"", "gyro", "=1", "gyro.lockin_threshold_deg_h=", "gyro.lockin_threshold_deg_h= ",
+                              "gyro.lockin_threshold_deg_h=1\nensemble.gyros=2", "gyro.lockin_threshold_deg_h=1 # x",
+                              "gyro.lockin_threshold_deg_h=1, 2", "gyro.=1", "a b=1", "gyro.x=[1", "gyro.x=\"1"}) {
+        EXPECT_THAT(setting_complaint({wrong}), StartsWith("--set ")) << wrong;
+    }
+    std::string dots = "a";
+    for (int i = 0; i < 40000; ++i) dots += ".a";
+    EXPECT_THAT(setting_complaint({dots + "=1"}), HasSubstr("parts"));
 }
 
 TEST(ScenarioText, SetsWhatItNames) {
