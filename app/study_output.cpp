@@ -8,6 +8,7 @@
 
 #include "analysis/report/table.hpp"
 #include "engine/core/units.hpp"
+#include "engine/ensemble/schedule.hpp"
 
 namespace ringlock::app {
 
@@ -113,7 +114,8 @@ Json json_noise(const study::NoiseFigures& figures) {
               {"change_per_cycle_percent", number(figures.change_per_cycle_percent)},
               {"arw_over_theory", number(predicted.arw_over_theory)},
               {"bias_deg_h", number(predicted.bias_deg_h)},
-              {"reason", predicted.reason.empty() ? Json(nullptr) : Json(predicted.reason)}};
+              {"reason", predicted.reason.empty() ? Json(nullptr) : Json(predicted.reason)},
+              {"not_randomised", figures.not_randomised.empty() ? Json(nullptr) : Json(figures.not_randomised)}};
     json["measured"] = {{"change_per_cycle_rad", number(seen.change_per_cycle_rad)},
                         {"arw_over_theory", number(seen.arw_over_theory)},
                         {"bias_deg_h", number(seen.bias_deg_h)},
@@ -125,13 +127,71 @@ Json json_noise(const study::NoiseFigures& figures) {
     return json;
 }
 
+/// Whether a random walk, or a limit of it, is told of the arm.
+bool has_arw(const study::ArmSummary& arm) { return arm.arw_deg_rt_h.median || arm.arw_deg_rt_h.hi; }
+
+Json json_arw_theory(const study::ArwTheory& theory) {
+    Json effects = Json::object();
+    for (const auto& [effect, deg_rt_h] : theory.effects_deg_rt_h) effects[effect] = deg_rt_h;
+    return {{"arw_deg_rt_h", theory.total_deg_rt_h},
+            {"lockin_arw_deg_rt_h", theory.lockin_deg_rt_h},
+            {"effects_arw_deg_rt_h", std::move(effects)}};
+}
+
+Json json_share(const lot::Share& share) {
+    return {{"value", number(share.value)},
+            {"lo", share.interval ? Json(share.interval->lo) : Json(nullptr)},
+            {"hi", share.interval ? Json(share.interval->hi) : Json(nullptr)},
+            {"passed", share.k},
+            {"gyros", share.n}};
+}
+
+Json json_yield(const study::Yield& yield) {
+    Json json = json_share(yield.share);
+    json["fails_most"] = yield.fails_most.empty() ? Json(nullptr) : Json(yield.fails_most);
+    json["limits"] = Json::object();
+    for (const study::LimitYield& limit : yield.limits) {
+        json["limits"][limit.name] = json_share(limit.share);
+        json["limits"][limit.name]["most"] = limit.most;
+    }
+    return json;
+}
+
+Json json_lot(const std::vector<study::LotFigure>& figures) {
+    Json json = Json::object();
+    for (const study::LotFigure& figure : figures) {
+        Json list = Json::array();
+        for (const lot::Quantile& q : figure.quantiles) {
+            list.push_back({{"p", q.p},
+                            {"value", number(q.value)},
+                            {"lo", number(q.lo)},
+                            {"hi", number(q.hi)},
+                            {"missing", q.missing}});
+        }
+        json[figure.name] = std::move(list);
+    }
+    return json;
+}
+
+Json json_paired(const lot::PairedFigure& figure) {
+    return {{"value", number(figure.value)},
+            {"lo", figure.interval ? number(figure.interval->lo) : Json(nullptr)},
+            {"hi", figure.interval ? number(figure.interval->hi) : Json(nullptr)},
+            {"distinguishable", figure.distinguishable},
+            {"gyros", figure.pairs}};
+}
+
 Json json_arm(const study::ArmSummary& arm) {
     Json json{{"gyros", arm.gyros},
-              {"arw_deg_rt_h", arm.noise_injected ? json_figure(arm.arw_deg_rt_h) : Json(nullptr)},
+              {"arw_deg_rt_h", has_arw(arm) ? json_figure(arm.arw_deg_rt_h) : Json(nullptr)},
+              {"arw_reason", arm.arw_reason.empty() ? Json(nullptr) : Json(arm.arw_reason)},
+              {"theory", json_arw_theory(arm.arw_theory)},
               {"bias_instability_deg_h",
                arm.bias_instability_deg_h ? json_figure(*arm.bias_instability_deg_h) : Json(nullptr)},
               {"arw_reduction", json_reduction(arm.arw_reduction)},
               {"rate_error_deg_h", json_mean(arm.rate_error_deg_h)}};
+    if (!arm.lot.empty()) json["quantiles"] = json_lot(arm.lot);
+    if (arm.yield) json["yield"] = json_yield(*arm.yield);
     if (arm.noise_effectiveness) json["noise_effectiveness"] = json_noise(*arm.noise_effectiveness);
     add_scale_factor(json, arm.scale_factor);
     json["allan"] = Json::array();
@@ -168,14 +228,14 @@ Json json_arm(const study::ArmSummary& arm) {
 }
 
 std::string arw_cell(const study::ArmSummary& arm) {
-    if (!arm.noise_injected) return "none claimed";
+    if (!has_arw(arm)) return "none";
     const study::Figure& figure = arm.arw_deg_rt_h;
     if (figure.median) return fmt::format("{:.4g}", *figure.median);
     return figure.hi ? fmt::format("< {:.2g}", *figure.hi) : "not resolved";
 }
 
 std::string interval_cell(std::optional<double> lo, std::optional<double> hi) {
-    return lo && hi ? fmt::format("{:.4g} .. {:.4g}", *lo, *hi) : "-";
+    return lo && hi ? fmt::format("{:.3g} .. {:.3g}", *lo, *hi) : "-";
 }
 
 /// Rate errors in one notation down the column.
@@ -189,25 +249,93 @@ std::string ratio_cell(double ratio) {
     return ratio < least_in_decimals ? fmt::format("{:.2g}", ratio) : fmt::format("{:.4f}", ratio);
 }
 
-report::Table arm_table(const study::Summary& summary) {
-    report::Table table({{"arm", report::Align::left},
-                         {"ARW [deg/sqrt(h)]", report::Align::right},
+/// Narrow enough for two of them beside the longest name of an arm in 100 columns.
+std::string narrow_interval(std::optional<double> lo, std::optional<double> hi) {
+    return lo && hi ? fmt::format("{:.3g}..{:.3g}", *lo, *hi) : "-";
+}
+
+/// Random walks, and below them biases: both fit 100 columns.
+std::string arm_tables(const study::Summary& summary) {
+    report::Table walks({{"arm", report::Align::left},
+                         {"ARW", report::Align::right},
                          {"95 % of median", report::Align::right},
-                         {"of theory", report::Align::right},
-                         {"bias inst. [deg/h]", report::Align::right},
-                         {"rate error [deg/h], 68 % of gyros", report::Align::right}});
+                         {"68 % of gyros", report::Align::right},
+                         {"theory's", report::Align::right}});
+    report::Table rates({{"arm", report::Align::left},
+                         {"rate error", report::Align::right},
+                         {"68 % of gyros", report::Align::right},
+                         {"bias instability", report::Align::right}});
     for (const study::ArmSummary& arm : summary.arms) {
         const study::Figure& arw = arm.arw_deg_rt_h;
-        const bool shown = arm.noise_injected && arw.median;
+        const double theory = arm.arw_theory.total_deg_rt_h;
+        walks.add_row({arm.name, arw_cell(arm), arw.median ? narrow_interval(arw.median_lo, arw.median_hi) : "-",
+                       arw.median ? narrow_interval(arw.lo, arw.hi) : "-",
+                       arw.median && theory > 0.0 ? ratio_cell(*arw.median / theory) : "-"});
         const auto& floor = arm.bias_instability_deg_h;
-        table.add_row(
-            {arm.name, arw_cell(arm), shown ? interval_cell(arw.median_lo, arw.median_hi) : "-",
-             shown && summary.theory.arw_deg_rt_h > 0.0 ? ratio_cell(*arw.median / summary.theory.arw_deg_rt_h) : "-",
-             floor ? fmt::format("{:.3g}", *floor->median) : "none claimed",
-             fmt::format("{} ({} .. {})", rate_cell(arm.rate_error_deg_h.mean), rate_cell(arm.rate_error_deg_h.lo),
-                         rate_cell(arm.rate_error_deg_h.hi))});
+        rates.add_row({arm.name, rate_cell(arm.rate_error_deg_h.mean),
+                       fmt::format("{} .. {}", rate_cell(arm.rate_error_deg_h.lo), rate_cell(arm.rate_error_deg_h.hi)),
+                       floor ? fmt::format("{:.3g}", *floor->median) : "none"});
     }
-    return table;
+    return "Angle random walk [deg/sqrt(h)], and over that of theory\n" + walks.text() +
+           "\nMean rate less the input rate, and bias instability [deg/h]\n" + rates.text();
+}
+
+/// What theory consists of, and why arms have no random walk.
+std::string walk_notes(const study::Summary& summary) {
+    std::string text =
+        fmt::format("theory: random walk of turns at random phases {:.5g} deg/sqrt(h)", summary.theory.arw_deg_rt_h);
+    for (const auto& [effect, deg_rt_h] : summary.arms.front().arw_theory.effects_deg_rt_h) {
+        text += fmt::format(", {} {:.5g}", effect, deg_rt_h);
+    }
+    text += fmt::format(";\ndead band +-{:.4g} deg/h (first order)\n", summary.theory.dead_band_deg_h);
+    for (const study::ArmSummary& arm : summary.arms) {
+        if (!arm.arw_reason.empty()) text += fmt::format("{}: no random walk; {}\n", arm.name, arm.arw_reason);
+    }
+    return text;
+}
+
+std::string percent_cell(const lot::Share& share) {
+    if (!share.value || !share.interval) return "-";
+    return fmt::format("{:.1f} ({:.1f} .. {:.1f})", 100.0 * *share.value, 100.0 * share.interval->lo,
+                       100.0 * share.interval->hi);
+}
+
+/// Gyros that pass the specification, limit by limit.
+std::string yield_text(const study::Summary& summary) {
+    if (!summary.arms.front().yield) return "";
+    report::Table table(
+        {{"arm", report::Align::left}, {"limit", report::Align::left}, {"pass [%], 95 %", report::Align::right}});
+    for (const study::ArmSummary& arm : summary.arms) {
+        table.add_row({arm.name, "all", percent_cell(arm.yield->share)});
+        for (const study::LimitYield& limit : arm.yield->limits) {
+            const char* most = limit.name == arm.yield->fails_most ? " (worst)" : "";
+            table.add_row({"", fmt::format("{} {:g}{}", limit.name, limit.most, most), percent_cell(limit.share)});
+        }
+    }
+    return "\nSpecification\n" + table.text();
+}
+
+/// Deviations at the averaging times asked for, arms down.
+std::string asked_text(const study::Study& study, const study::Summary& summary) {
+    if (study.scenario.output.tau_s.empty()) return "";
+    std::string text = "\nAllan deviation [deg/h], 68.27 % intervals\n";
+    std::vector<std::int64_t> asked;
+    for (const double tau_s : study.scenario.output.tau_s) asked.push_back(ensemble::cycles_in(study.schedule, tau_s));
+    std::sort(asked.begin(), asked.end());
+    asked.erase(std::unique(asked.begin(), asked.end()), asked.end());
+    report::Table table({{"arm", report::Align::left},
+                         {"tau [s]", report::Align::right},
+                         {"deviation", report::Align::right},
+                         {"interval", report::Align::right}});
+    for (const study::ArmSummary& arm : summary.arms) {
+        for (std::size_t i = 0; i < arm.allan.size(); ++i) {
+            if (!std::binary_search(asked.begin(), asked.end(), study.factors[i])) continue;
+            const study::EnsemblePoint& p = arm.allan[i];
+            table.add_row({arm.name, fmt::format("{:.6g}", p.tau_s), fmt::format("{:.4g}", p.dev_deg_h),
+                           interval_cell(p.lo, p.hi)});
+        }
+    }
+    return text + table.text();
 }
 
 std::string signed_cell(const study::SignedFigure& figure) {
@@ -285,22 +413,60 @@ std::string noise_text(const study::ArmSummary& arm) {
                        fmt::format("{:.3g}", predicted.angle_spread[i].arcsec),
                        optional_cell(seen.angle_spread[i].arcsec)});
     }
-    const std::string reason = predicted.reason.empty() ? "" : fmt::format("({})\n", predicted.reason);
-    return "\n" + table.text() + reason;
+    std::string notes = predicted.reason.empty() ? "" : fmt::format("({})\n", predicted.reason);
+    const std::string& why = arm.noise_effectiveness->not_randomised;
+    if (!why.empty()) notes += fmt::format("warning: the injected noise does not randomise the turns: {}\n", why);
+    return "\n" + table.text() + notes;
 }
 
 /// What the cures take away of the injected random walk.
 std::string reduction_text(const study::Summary& summary) {
-    std::string text;
+    report::Table table({{"random walk of noise_injected over that of", report::Align::left},
+                         {"ratio", report::Align::right},
+                         {"95 %", report::Align::right}});
+    bool any = false;
     for (const study::ArmSummary& arm : summary.arms) {
         const auto& reduction = arm.arw_reduction;
         if (!reduction) continue;
-        text += fmt::format("ARW of noise_injected over that of {}: ", arm.name);
-        text += reduction->ratio && reduction->hi
-                    ? fmt::format("{:.4g} (95 %: {:.4g} .. {:.4g})\n", *reduction->ratio, reduction->lo, *reduction->hi)
-                    : fmt::format("> {:.2g}\n", reduction->lo);
+        any = true;
+        const bool known = reduction->ratio && reduction->hi;
+        table.add_row({arm.name,
+                       known ? fmt::format("{:.4g}", *reduction->ratio) : fmt::format("> {:.2g}", reduction->lo),
+                       known ? fmt::format("{:.4g} .. {:.4g}", reduction->lo, *reduction->hi) : "-"});
     }
-    return text;
+    return any ? "\n" + table.text() : "";
+}
+
+/// Random walks gyro by gyro, every arm over every other.
+std::string pairs_text(const study::Summary& summary) {
+    std::vector<std::string> names;
+    for (const study::ArmSummary& arm : summary.arms) {
+        if (arm.arw_deg_rt_h.median) names.push_back(arm.name);
+    }
+    if (names.size() < 3) return "";  // one ratio is what the medians tell
+    std::vector<report::Column> columns{{"random walk, gyro by gyro: row over column", report::Align::left}};
+    for (std::size_t i = 0; i < names.size(); ++i)
+        columns.push_back({fmt::format("({})", i + 1), report::Align::right});
+    report::Table table(columns);
+    bool alike = false;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        std::vector<std::string> row{fmt::format("({}) {}", i + 1, names[i])};
+        for (std::size_t j = 0; j < names.size(); ++j) {
+            const auto pair = std::find_if(summary.pairs.begin(), summary.pairs.end(), [&](const study::ArmPair& p) {
+                return (p.first == names[i] && p.second == names[j]) || (p.first == names[j] && p.second == names[i]);
+            });
+            if (pair == summary.pairs.end() || !pair->arw_deg_rt_h.ratio.value) {
+                row.emplace_back("");
+                continue;
+            }
+            const lot::PairedFigure& ratio = pair->arw_deg_rt_h.ratio;
+            const double value = pair->first == names[i] ? *ratio.value : 1.0 / *ratio.value;
+            row.push_back(fmt::format("{:.3g}{}", value, ratio.distinguishable ? "" : " ="));
+            alike = alike || !ratio.distinguishable;
+        }
+        table.add_row(row);
+    }
+    return "\n" + table.text() + (alike ? "= : these cannot be told apart (95 %)\n" : "");
 }
 
 /// Where the arm stands on the staircase.
@@ -458,28 +624,24 @@ std::string study_json(const study::Study& study, const study::Summary& summary,
     json["theory"] = {{"arw_deg_rt_h", number(summary.theory.arw_deg_rt_h)},
                       {"arw_first_order_deg_rt_h", number(summary.theory.arw_first_order_deg_rt_h)},
                       {"dead_band_deg_h", number(summary.theory.dead_band_deg_h)}};
+    json["pairs"] = Json::array();
+    for (const study::ArmPair& pair : summary.pairs) {
+        json["pairs"].push_back({{"arms", {pair.first, pair.second}},
+                                 {"figure", "arw_deg_rt_h"},
+                                 {"ratio", json_paired(pair.arw_deg_rt_h.ratio)},
+                                 {"difference", json_paired(pair.arw_deg_rt_h.difference)}});
+    }
     return json.dump(2) + "\n";
 }
 
 std::string study_text(const study::Study& study, const study::Summary& summary, const store::Provenance& provenance) {
     const double duration_s = study.schedule.sample_interval_s * static_cast<double>(study.schedule.samples - 1);
-    std::string text = fmt::format("{}: {} gyros, {:.6g} s each, {} turns in {:.1f} s ({:.3g} a second), seed {}\n\n",
-                                   provenance.scenario_file, study.gyros.size(), duration_s, summary.turns,
-                                   provenance.wall_s, turns_per_s(summary, provenance), summary.seed);
-    text += arm_table(summary).text();
-    text += fmt::format("{}\n",
-                        fmt::format("theory: angle random walk with turns fully randomised {:.5g} deg/sqrt(h), dead "
-                                    "band +-{:.4g} deg/h (first order)",
-                                    summary.theory.arw_deg_rt_h, summary.theory.dead_band_deg_h));
-    text += reduction_text(summary);
+    std::string text = fmt::format("{}: {} gyros, {:.6g} s each, seed {}\n{} turns in {:.1f} s ({:.3g} a second)\n\n",
+                                   provenance.scenario_file, study.gyros.size(), duration_s, summary.seed,
+                                   summary.turns, provenance.wall_s, turns_per_s(summary, provenance));
+    text += arm_tables(summary) + "\n" + walk_notes(summary) + reduction_text(summary) + pairs_text(summary) +
+            asked_text(study, summary) + yield_text(summary);
     for (const study::ArmSummary& arm : summary.arms) text += noise_text(arm);
-    const bool deterministic =
-        std::any_of(summary.arms.begin(), summary.arms.end(), [](const auto& arm) { return !arm.noise_injected; });
-    if (deterministic) {
-        text +=
-            "No random walk is claimed without injected noise: the lock-in error is then a dead band and a staircase,\n"
-            "not noise.\n";
-    }
     if (!summary.arms.front().sweep.empty()) text += "\n" + sweep_text(study, summary);
     if (!summary.arms.front().family.empty()) text += family_text(summary);
     return text;

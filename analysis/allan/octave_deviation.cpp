@@ -19,7 +19,32 @@ int exponent(double mu, int differences) {
     return std::clamp(-1 - static_cast<int>(std::lround(mu)), 2 - 2 * differences, 0);
 }
 
+double variance_of(const OctaveMean& mean, int differences, double tau0_s) {
+    const double tau = static_cast<double>(mean.m) * tau0_s;
+    return mean.mean_square / ((differences == 3 ? 6.0 : 2.0) * tau * tau);
+}
+
 }  // namespace
+
+Point stream_point(const OctaveMean& mean, int alpha, int differences, std::int64_t samples, double tau0_s,
+                   double confidence) {
+    check_deviation_input(tau0_s, confidence);
+    Point p;
+    p.m = mean.m;
+    p.tau_s = static_cast<double>(p.m) * tau0_s;
+    p.dev = std::sqrt(variance_of(mean, differences, tau0_s));
+    p.terms = mean.terms;
+    p.alpha = alpha;
+    // Degrees of freedom want whole strides in tau: of a factor that has none, the next smaller one with such.
+    const std::int64_t stride = std::max<std::int64_t>(1, p.m / OctaveStream::starts_per_tau);
+    const EstimatorShape shape{.differences = differences, .starts_per_tau = p.m / stride};
+    const std::int64_t m = shape.starts_per_tau * stride;
+    // A record with gaps is worth one without that has as many terms.
+    const std::int64_t alike = std::min(samples, 1 + m * differences + (p.terms - 1) * stride + stride - 1);
+    p.edf = degrees_of_freedom(shape, p.alpha, m, alike);
+    set_interval(p, confidence);
+    return p;
+}
 
 std::vector<int> noise_of_octaves(const std::vector<double>& variances, std::int64_t samples, int differences) {
     constexpr std::int64_t sure = 100;
@@ -46,28 +71,13 @@ std::vector<int> noise_of_octaves(const std::vector<double>& variances, std::int
 std::vector<Point> octave_points(const std::vector<OctaveMean>& octaves, int differences, std::int64_t samples,
                                  double tau0_s, double confidence) {
     check_deviation_input(tau0_s, confidence);
-    const EstimatorShape shape{.differences = differences, .starts_per_tau = OctaveStream::starts_per_tau};
     std::vector<double> variances;
-    for (const OctaveMean& octave : octaves) {
-        const double tau = static_cast<double>(octave.m) * tau0_s;
-        variances.push_back(octave.mean_square / ((differences == 3 ? 6.0 : 2.0) * tau * tau));
-    }
+    for (const OctaveMean& octave : octaves) variances.push_back(variance_of(octave, differences, tau0_s));
     const std::vector<int> alpha = noise_of_octaves(variances, samples, differences);
 
     std::vector<Point> out;
     for (std::size_t i = 0; i < octaves.size(); ++i) {
-        Point p;
-        p.m = octaves[i].m;
-        p.tau_s = static_cast<double>(p.m) * tau0_s;
-        p.dev = std::sqrt(variances[i]);
-        p.terms = octaves[i].terms;
-        p.alpha = alpha[i];
-        // A record with gaps is worth one without that has as many terms.
-        const std::int64_t stride = std::max<std::int64_t>(1, p.m / OctaveStream::starts_per_tau);
-        const std::int64_t alike = std::min(samples, 1 + p.m * differences + (p.terms - 1) * stride + stride - 1);
-        p.edf = degrees_of_freedom(shape, p.alpha, p.m, alike);
-        set_interval(p, confidence);
-        out.push_back(p);
+        out.push_back(stream_point(octaves[i], alpha[i], differences, samples, tau0_s, confidence));
     }
     return out;
 }

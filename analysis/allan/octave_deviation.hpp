@@ -21,12 +21,19 @@ namespace ringlock::allan {
 /// stored records.
 std::vector<int> noise_of_octaves(const std::vector<double>& variances, std::int64_t samples, int differences = 2);
 
-/// What a stream knows of one octave.
+/// What a stream knows of one averaging factor.
 struct OctaveMean {
-    std::int64_t m = 0;        ///< averaging factor, a power of two
+    std::int64_t m = 0;        ///< averaging factor
     double mean_square = 0.0;  ///< of differences of the phase by m, in units of it
     std::int64_t terms = 0;
 };
+
+/// The deviation with its interval from a sum with a stride of tau/8, of noise of that exponent.
+///
+/// \param alpha  power-law exponent of the noise, as noise_of_octaves() has it
+/// The other parameters are those of octave_points().
+Point stream_point(const OctaveMean& mean, int alpha, int differences, std::int64_t samples, double tau0_s,
+                   double confidence);
 
 /// Deviations with intervals from sums with a stride of tau/8 (OctaveStream::starts_per_tau).
 ///

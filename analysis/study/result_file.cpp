@@ -132,25 +132,29 @@ void write_figures(store::Group& group, const ArmSummary& summary) {
         group.set_attribute(name + "_median_ci_lo", or_nan(f.median_lo));
         group.set_attribute(name + "_median_ci_hi", or_nan(f.median_hi));
     };
-    figure("arw_deg_rt_h", summary.noise_injected ? summary.arw_deg_rt_h : Figure{});
+    figure("arw_deg_rt_h", summary.arw_deg_rt_h);
+    group.set_attribute("arw_reason", summary.arw_reason);
+    group.set_attribute("theory_arw_deg_rt_h", summary.arw_theory.total_deg_rt_h);
     figure("bias_instability_deg_h", summary.bias_instability_deg_h.value_or(Figure{}));
     group.set_attribute("rate_error_deg_h_mean", summary.rate_error_deg_h.mean);
     group.set_attribute("rate_error_deg_h_lo", summary.rate_error_deg_h.lo);
     group.set_attribute("rate_error_deg_h_hi", summary.rate_error_deg_h.hi);
 }
 
+void write_angle_errors(store::Group& group, const Study& study, const ArmStatistics& arm) {
+    std::vector<double> errors;
+    for (const GyroStatistics& gyro : arm.gyros) {
+        errors.insert(errors.end(), gyro.angle_error_arcsec.begin(), gyro.angle_error_arcsec.end());
+    }
+    group.write(
+        "angle_error_arcsec", std::span<const double>(errors),
+        store::Shape{arm.gyros.size(), study.angle_times_s.size()},
+        {"arcsec", "angle turned beyond the input's after angle_error_after_s; NaN where the record ends before"});
+    group.write("angle_error_after_s", study.angle_times_s, {"s", "since the start of the record"});
+}
+
 /// Effect of the injected noise: the prediction, the measurement, and the figures of each gyro.
 void write_noise_effectiveness(store::Group& group, const ArmStatistics& arm, const ArmSummary& summary) {
-    if (arm.arm.ideal || shows_noise(arm.arm)) {
-        std::vector<double> errors;
-        for (const GyroStatistics& gyro : arm.gyros) {
-            errors.insert(errors.end(), gyro.angle_error_arcsec.begin(), gyro.angle_error_arcsec.end());
-        }
-        group.write(
-            "angle_error_arcsec", std::span<const double>(errors),
-            store::Shape{arm.gyros.size(), std::size(dither::spread_times_s)},
-            {"arcsec", "angle turned beyond the input's after 1, 10 and 100 s; NaN where the record ends before"});
-    }
     if (!summary.noise_effectiveness) return;
     group.write("change_per_cycle_rad", over_gyros(arm, [](const GyroStatistics& g) { return g.change_per_cycle_rad; }),
                 {"rad", "rms change of the dither's amplitude from a turn to the next but one, optical phase"});
@@ -217,7 +221,7 @@ std::uint64_t expected_size_bytes(const Study& study) {
     std::uint64_t bytes = gyros * (8 * drawn_parameters.size() + arms * (8 * samples + statistics));
     for (const ArmStatistics& arm : study.arms) {
         bytes += has_closed_form(study.scenario, arm.arm) ? 8 * gyros : 0;
-        if (arm.arm.ideal || shows_noise(arm.arm)) bytes += 8 * gyros * std::size(dither::spread_times_s);
+        bytes += 8 * (gyros + 1) * study.angle_times_s.size();
         if (shows_noise(arm.arm)) bytes += 8 * gyros;
     }
     return bytes;
@@ -276,6 +280,7 @@ void ResultWriter::finish(const Study& study, const Summary& summary, const stor
         write_noise(group, study.arms[i]);
         write_allan(group, study, study.arms[i], summary.arms[i]);
         write_figures(group, summary.arms[i]);
+        write_angle_errors(group, study, study.arms[i]);
         write_noise_effectiveness(group, study.arms[i], summary.arms[i]);
     }
     records_.clear();
@@ -295,16 +300,19 @@ std::vector<double> read_column(const store::Group& group, const std::string& na
     return dataset.read<double>();
 }
 
+/// Results of earlier programs have none, or only some arms have.
+void read_angle_errors(const store::Group& group, const Study& study, ArmStatistics& arm) {
+    const std::size_t gyros = arm.gyros.size();
+    const std::size_t times = study.angle_times_s.size();
+    for (GyroStatistics& gyro : arm.gyros) gyro.angle_error_arcsec.assign(times, nan);
+    if (!group.has_dataset("angle_error_arcsec")) return;
+    const auto errors = read_column(group, "angle_error_arcsec", {gyros, times});
+    for (std::size_t i = 0; i < errors.size(); ++i) arm.gyros[i / times].angle_error_arcsec[i % times] = errors[i];
+}
+
 /// Restores the prediction of an arm and its gyros' figures; results of earlier programs have none.
 void read_noise_effectiveness(const store::Group& group, Study& study, ArmStatistics& arm) {
     const std::size_t gyros = arm.gyros.size();
-    constexpr std::size_t times = std::size(dither::spread_times_s);
-    if (group.has_dataset("angle_error_arcsec")) {
-        const auto errors = read_column(group, "angle_error_arcsec", {gyros, times});
-        for (std::size_t i = 0; i < errors.size(); ++i) {
-            arm.gyros[i / times].angle_error_arcsec[i % times] = errors[i];
-        }
-    }
     if (!group.has_dataset("change_per_cycle_rad")) return;
     const auto changes = read_column(group, "change_per_cycle_rad", {gyros});
     for (std::size_t g = 0; g < gyros; ++g) arm.gyros[g].change_per_cycle_rad = changes[g];
@@ -406,6 +414,7 @@ Study read_result(const std::filesystem::path& path) {
     for (ArmStatistics& arm : study.arms) {
         const store::Group group = file.group("arms").group(arm.arm.name);
         read_arm(group, study, arm);
+        read_angle_errors(group, study, arm);
         read_noise_effectiveness(group, study, arm);
     }
     return study;

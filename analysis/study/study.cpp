@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "analysis/allan/bounded_record.hpp"
+#include "analysis/allan/factor_stream.hpp"
 #include "analysis/allan/octave_deviation.hpp"
 #include "analysis/allan/octave_stream.hpp"
 #include "engine/ensemble/closed_form.hpp"
@@ -17,10 +18,29 @@
 
 namespace ringlock::study {
 
+namespace {
+
+bool is_octave(std::int64_t m) { return (m & (m - 1)) == 0; }
+
+/// Octaves of the cycle, and the averaging times asked for in whole cycles.
+std::vector<std::int64_t> factors_of(const scenario::Scenario& scenario, const ensemble::Schedule& schedule) {
+    auto factors = allan::octave_factors(allan::largest_factor(allan::Estimator::oadev, schedule.cycles()));
+    for (const double tau_s : scenario.output.tau_s) factors.push_back(ensemble::cycles_in(schedule, tau_s));
+    const scenario::Specification& wanted = scenario.specification;
+    if (wanted.bias_stability_deg_h > 0.0) factors.push_back(ensemble::cycles_in(schedule, wanted.at_s));
+    std::sort(factors.begin(), factors.end());
+    factors.erase(std::unique(factors.begin(), factors.end()), factors.end());
+    return factors;
+}
+
+}  // namespace
+
 Study::Study(const scenario::Scenario& what)
     : scenario(what),
       schedule(what),
-      factors(allan::octave_factors(allan::largest_factor(allan::Estimator::oadev, schedule.cycles()))) {
+      factors(factors_of(what, schedule)),
+      angle_times_s(std::begin(dither::spread_times_s), std::end(dither::spread_times_s)) {
+    if (scenario.specification.angle_error_arcsec > 0.0) angle_times_s.push_back(scenario.specification.after_s);
     const auto total = static_cast<std::size_t>(ensemble::total_gyros(scenario));
     gyros.resize(total);
     for (const scenario::Arm& arm : scenario.arms) arms.push_back({arm, std::vector<GyroStatistics>(total)});
@@ -67,16 +87,20 @@ class ArmStream {
         : study_(study),
           gyros_(gyros),
           on_samples_(on_samples),
-          told_(shows_noise(study.arms[arm].arm) || study.arms[arm].arm.ideal),
+          angle_errors_counts_(study.angle_times_s.size()),
           record_(study.schedule.samples, fit_samples),
           waiting_{arm, first_gyro, gyros, 0, {}} {
         for (auto& errors : angle_errors_counts_) errors.fill(std::numeric_limits<double>::quiet_NaN());
+        for (const std::int64_t m : study.factors) {
+            if (!is_octave(m)) asked_.emplace_back(m);
+        }
     }
 
     void add(std::span<const simd::LaneCounts> counts) {
         if (cycle_ == 0 && !counts.empty()) last_ = counts.front();
-        if (told_) note_angles(counts);
+        note_angles(counts);
         octaves_.add(counts, gyros_);
+        for (allan::FactorStream& stream : asked_) stream.add(counts, gyros_);
         const std::int64_t every = study_.schedule.cycles_per_sample;
         for (const simd::LaneCounts& row : counts) {
             if (cycle_++ % every != 0) continue;
@@ -90,16 +114,22 @@ class ArmStream {
     GyroStatistics finish(std::size_t lane, const gyro::Setup& setup) const {
         const double arcsec_per_count = setup.scale_factor_arcsec / ensemble::counts_per_fringe;
         GyroStatistics result;
-        result.allan = allan::deviation(octaves_, lane, arcsec_per_count, study_.schedule.cycle_s);
+        const auto octaves = allan::deviation(octaves_, lane, arcsec_per_count, study_.schedule.cycle_s);
+        result.allan = octaves;
+        for (const allan::FactorStream& stream : asked_) {
+            result.allan.push_back(allan::deviation(stream, lane, octaves, arcsec_per_count, study_.schedule.cycle_s));
+        }
+        std::sort(result.allan.begin(), result.allan.end(),
+                  [](const allan::Point& a, const allan::Point& b) { return a.m < b.m; });
         result.noise = noise::fit_noise(record_.phase(lane, arcsec_per_count),
                                         study_.schedule.sample_interval_s * static_cast<double>(record_.interval()));
         const double duration_s = study_.schedule.cycle_s * static_cast<double>(study_.schedule.cycles() - 1);
         result.rate_error_deg_h =
             static_cast<double>(turned_[lane]) * arcsec_per_count / duration_s - setup.input_rate_deg_h;
         for (std::size_t i = 0; i < angle_errors_counts_.size(); ++i) {
-            result.angle_error_arcsec[i] =
-                angle_errors_counts_[i][lane] * arcsec_per_count -
-                setup.input_rate_deg_h * study_.schedule.cycle_s * static_cast<double>(cycle_at(i));
+            result.angle_error_arcsec.push_back(angle_errors_counts_[i][lane] * arcsec_per_count -
+                                                setup.input_rate_deg_h * study_.schedule.cycle_s *
+                                                    static_cast<double>(cycle_at(i)));
         }
         return result;
     }
@@ -124,10 +154,8 @@ class ArmStream {
    private:
     __extension__ using Wide = __int128;  // counts do not wrap round in it
 
-    /// Cycle nearest to a time at which the spread of angles is told.
-    std::int64_t cycle_at(std::size_t i) const {
-        return std::llround(dither::spread_times_s[i] / study_.schedule.cycle_s);
-    }
+    /// Cycle nearest to a time at which angles are told.
+    std::int64_t cycle_at(std::size_t i) const { return ensemble::cycles_in(study_.schedule, study_.angle_times_s[i]); }
 
     /// Keeps angles at those times.
     void note_angles(std::span<const simd::LaneCounts> counts) {
@@ -167,9 +195,9 @@ class ArmStream {
     const Study& study_;
     std::size_t gyros_;
     const OnSamples& on_samples_;
-    bool told_;  ///< angles after dither::spread_times_s
-    std::array<std::array<double, simd::lanes>, std::size(dither::spread_times_s)> angle_errors_counts_;
+    std::vector<std::array<double, simd::lanes>> angle_errors_counts_;  ///< at Study::angle_times_s
     allan::OctaveStream octaves_;
+    std::vector<allan::FactorStream> asked_;  ///< averaging times that are no octaves
     allan::BoundedRecord record_;
     std::int64_t cycle_ = 0;
     std::int64_t sample_ = 0;

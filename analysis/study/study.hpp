@@ -1,8 +1,6 @@
 #pragma once
-#include <array>
 #include <cstdint>
 #include <functional>
-#include <iterator>
 #include <optional>
 #include <span>
 #include <string>
@@ -30,9 +28,8 @@ struct GyroStatistics {
     /// Of the arm `noise_injected`: rms change of the dither's amplitude from a turn to the next but one, rad of
     /// optical phase.
     double change_per_cycle_rad = 0.0;
-    /// Of the arm `noise_injected` and of `ideal`: angle turned beyond the input's after dither::spread_times_s; NaN
-    /// where the record ends before.
-    std::array<double, std::size(dither::spread_times_s)> angle_error_arcsec{};
+    /// Angle turned beyond the input's at Study::angle_times_s; NaN where the record ends before.
+    std::vector<double> angle_error_arcsec;
 };
 
 struct ArmStatistics {
@@ -45,8 +42,13 @@ struct Study {
 
     scenario::Scenario scenario;
     ensemble::Schedule schedule;
-    std::vector<std::int64_t> factors;  ///< averaging factors of the Allan deviations in dither cycles: octaves
-    std::vector<gyro::Setup> gyros;     ///< parameters as drawn
+    /// Averaging factors of the Allan deviations in dither cycles: octaves, and those of output.tau_s and of the
+    /// specification; ascending.
+    std::vector<std::int64_t> factors;
+    /// Times since the start of the record at which angle errors are told: dither::spread_times_s, then that of the
+    /// specification.
+    std::vector<double> angle_times_s;
+    std::vector<gyro::Setup> gyros;  ///< parameters as drawn
     std::vector<ArmStatistics> arms;
     std::optional<dither::NoiseEffectiveness> predicted_noise;  ///< of the arm `noise_injected`, by predict_noise()
     std::int64_t turns = 0;                                     ///< zero-rate points of distinct physical trajectories

@@ -1,5 +1,7 @@
 #include "analysis/study/summary.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
@@ -10,6 +12,7 @@
 #include "engine/core/units.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/gyro/theory.hpp"
+#include "engine/scenario/active_effects.hpp"
 
 namespace ringlock::study {
 
@@ -78,35 +81,38 @@ bool beyond_chance(double evidence, std::size_t records) {
     return evidence > std::max(price_of_one, 0.5 * n + 4.0 * std::sqrt(1.25 * n));
 }
 
+struct Models {
+    bool red = false;          ///< most records have flicker, rate random walk or a ramp
+    bool angle_noise = false;  ///< white angle noise stands beside the random walk
+};
+
+/// What all records together choose: left to each record, those that miss angle noise would read N too high.
+Models models_of(const ArmStatistics& arm) {
+    double angle_noise_evidence = 0.0;
+    std::int64_t red = 0;
+    for (const GyroStatistics& gyro : arm.gyros) {
+        angle_noise_evidence += gyro.noise.pooling.angle_noise_evidence;
+        if (gyro.noise.pooling.red) ++red;
+    }
+    return {most(red, arm), beyond_chance(angle_noise_evidence, arm.gyros.size())};
+}
+
 /// Angle random walk is the ensemble's where all records together resolve it: gyros of an arm are alike, and a record
-/// too short to tell white noise from flicker by itself is not alone. Together they also decide whether white angle
-/// noise stands beside it; left to each record, those that miss it would read N too high.
+/// too short to tell white noise from flicker by itself is not alone.
 Figure angle_random_walk(const ArmStatistics& arm, std::uint64_t seed) {
     Figure result;
     double evidence = 0.0;
-    double angle_noise_evidence = 0.0;
     std::int64_t described = 0;
-    std::int64_t red = 0;
     for (const GyroStatistics& gyro : arm.gyros) {
         evidence += gyro.noise.pooling.arw_evidence;
-        angle_noise_evidence += gyro.noise.pooling.angle_noise_evidence;
-        if (gyro.noise.pooling.red) ++red;
         if (gyro.noise.described) ++described;
         if (gyro.noise.described && gyro.noise.arw_deg_rt_h.resolved) ++result.resolved;
     }
-    const bool angle_noise = beyond_chance(angle_noise_evidence, arm.gyros.size());
-    std::vector<double> values;
-    std::vector<double> limits;
-    for (const GyroStatistics& gyro : arm.gyros) {
-        const noise::Pooling& pooling = gyro.noise.pooling;
-        values.push_back(most(red, arm) ? pooling.arw_best_deg_rt_h
-                         : angle_noise  ? pooling.arw_beside_angle_noise_deg_rt_h
-                                        : pooling.arw_alone_deg_rt_h);
-        limits.push_back(upper_limit(gyro));
-    }
     if (most(described, arm) && beyond_chance(evidence, arm.gyros.size())) {
-        describe(result, values, seed);
+        describe(result, random_walks_deg_rt_h(arm), seed);
     } else {
+        std::vector<double> limits;
+        for (const GyroStatistics& gyro : arm.gyros) limits.push_back(upper_limit(gyro));
         result.hi = noise::quantile(limits, 0.5);
     }
     return result;
@@ -202,6 +208,36 @@ std::optional<ScaleFactor> line_of(const Study& study, const ArmStatistics& arm)
     return scale_factor(rates, errors);
 }
 
+ArwTheory arw_theory(const Study& study, const scenario::Arm& arm) {
+    ArwTheory theory;
+    if (arm.noise_injected) {
+        theory.lockin_deg_rt_h = gyro::randomised_arw_deg_rt_h(ensemble::nominal_setup(study.scenario));
+    }
+    double squares = theory.lockin_deg_rt_h * theory.lockin_deg_rt_h;
+    for (const auto& [effect, values] : scenario::active_effects(study.scenario)) {
+        const double white = effect->rate_noise(*values).white_deg2_h2_s;
+        if (!(white > 0.0)) continue;
+        const double deg_rt_h = std::sqrt(white) * units::deg_rt_h_per_arcsec_rt_s;
+        theory.effects_deg_rt_h.emplace_back(effect->name(), deg_rt_h);
+        squares += deg_rt_h * deg_rt_h;
+    }
+    theory.total_deg_rt_h = std::sqrt(squares);
+    return theory;
+}
+
+/// Random walk of an arm, and why it has none.
+void describe_random_walk(ArmSummary& out, const Study& study, const ArmStatistics& arm, std::uint64_t seed) {
+    out.arw_theory = arw_theory(study, arm.arm);
+    const bool corrected = arm.arm.compensator != scenario::Compensator::none;
+    if (!arm.arm.noise_injected && out.arw_theory.total_deg_rt_h == 0.0 && !corrected) {
+        out.arw_reason = "nothing random acts on it";
+        if (!arm.arm.ideal) out.arw_reason += " (dead band and staircase are no noise)";
+        return;
+    }
+    out.arw_deg_rt_h = angle_random_walk(arm, seed);
+    if (!out.arw_deg_rt_h.median) out.arw_reason = "its records show no white rate noise";
+}
+
 std::optional<Reduction> reduction(const Figure& raw, const Figure& left) {
     if (!raw.median) return std::nullopt;
     const std::optional<double> most = left.median ? left.median_hi : left.hi;
@@ -223,7 +259,20 @@ std::pair<double, double> mean_and_error(const std::vector<double>& values) {
     return {sum / count, several ? std::sqrt(squares / (count - 1.0) / count) : std::nan("")};
 }
 
-NoiseFigures noise_figures(const Study& study, const ArmStatistics& arm, const Summary& summary, const Figure& arw) {
+std::string why_not_randomised(const dither::NoiseEffectiveness& predicted, double arw_deg_rt_h) {
+    constexpr double tenth = 0.1;
+    std::string why;
+    if (predicted.arw_over_theory && std::abs(*predicted.arw_over_theory - 1.0) > tenth) {
+        why = fmt::format("the random walk is {:.2f} of that of random phases", *predicted.arw_over_theory);
+    }
+    // Of a mean over one hour, a random walk of N deg/sqrt(h) leaves N deg/h.
+    if (predicted.bias_deg_h && std::abs(*predicted.bias_deg_h) > arw_deg_rt_h && arw_deg_rt_h > 0.0) {
+        why += fmt::format("{}a bias of {:.2g} deg/h stays", why.empty() ? "" : ", ", *predicted.bias_deg_h);
+    }
+    return why;
+}
+
+NoiseFigures noise_figures(const Study& study, const ArmStatistics& arm, const ArwTheory& theory, const Figure& arw) {
     NoiseFigures figures;
     figures.predicted = *study.predicted_noise;
     const double depth_rad = gyro::modulation_depth_rad(ensemble::nominal_setup(study.scenario));
@@ -247,10 +296,13 @@ NoiseFigures noise_figures(const Study& study, const ArmStatistics& arm, const S
         measured.bias_deg_h = bias;
         measured.bias_error_deg_h = error;
     }
+    figures.not_randomised = why_not_randomised(figures.predicted, theory.lockin_deg_rt_h);
     const bool random = study.scenario.noise_injection.model == scenario::NoiseModel::turns ||
                         study.scenario.noise_injection.form != gyro::NoiseForm::sinusoidal;
-    if (random && steady && arw.median && summary.theory.arw_deg_rt_h > 0.0) {
-        measured.arw_over_theory = *arw.median / summary.theory.arw_deg_rt_h;
+    if (random && steady && arw.median && theory.lockin_deg_rt_h > 0.0) {
+        double square = *arw.median * *arw.median;
+        for (const auto& [effect, deg_rt_h] : theory.effects_deg_rt_h) square -= deg_rt_h * deg_rt_h;
+        measured.arw_over_theory = std::sqrt(std::max(0.0, square)) / theory.lockin_deg_rt_h;
     }
     if (random || !steady) return figures;
     for (std::size_t i = 0; i < std::size(dither::spread_times_s); ++i) {
@@ -265,6 +317,18 @@ NoiseFigures noise_figures(const Study& study, const ArmStatistics& arm, const S
 }
 
 }  // namespace
+
+std::vector<double> random_walks_deg_rt_h(const ArmStatistics& arm) {
+    const Models models = models_of(arm);
+    std::vector<double> values;
+    for (const GyroStatistics& gyro : arm.gyros) {
+        const noise::Pooling& pooling = gyro.noise.pooling;
+        values.push_back(models.red           ? pooling.arw_best_deg_rt_h
+                         : models.angle_noise ? pooling.arw_beside_angle_noise_deg_rt_h
+                                              : pooling.arw_alone_deg_rt_h);
+    }
+    return values;
+}
 
 std::optional<double> locked_up_to_deg_h(const ArmSummary& arm) {
     std::optional<double> edge;
@@ -311,9 +375,9 @@ Summary summarise(const Study& study) {
         out.name = arm.arm.name;
         out.gyros = static_cast<std::int64_t>(arm.gyros.size());
         out.noise_injected = arm.arm.noise_injected;
-        if (out.noise_injected) out.arw_deg_rt_h = angle_random_walk(arm, summary.seed);
+        describe_random_walk(out, study, arm, summary.seed);
         if (shows_noise(arm.arm) && study.predicted_noise) {
-            out.noise_effectiveness = noise_figures(study, arm, summary, out.arw_deg_rt_h);
+            out.noise_effectiveness = noise_figures(study, arm, out.arw_theory, out.arw_deg_rt_h);
         }
         if (arm.arm.ideal || arm.arm.noise_injected) {
             const Figure floor = bias_instability(arm, summary.seed);
@@ -326,7 +390,17 @@ Summary summarise(const Study& study) {
         out.sweep = sweep(study, arm);
         out.steps = steps(study, arm);
         out.scale_factor = line_of(study, arm);
+        if (study.scenario.input.sweep_points == 1) out.lot = lot_figures(study, arm);
+        if (scenario::asks(study.scenario.specification)) out.yield = yield_of(study, arm);
         summary.arms.push_back(std::move(out));
+    }
+    for (std::size_t a = 0; a < study.arms.size(); ++a) {
+        for (std::size_t b = a + 1; b < study.arms.size(); ++b) {
+            if (!summary.arms[a].arw_deg_rt_h.median || !summary.arms[b].arw_deg_rt_h.median) continue;
+            const auto first = random_walks_deg_rt_h(study.arms[a]);
+            const auto second = random_walks_deg_rt_h(study.arms[b]);
+            summary.pairs.push_back({summary.arms[a].name, summary.arms[b].name, lot::compare(first, second)});
+        }
     }
     const auto raw = std::find_if(summary.arms.begin(), summary.arms.end(),
                                   [](const ArmSummary& arm) { return arm.name == "noise_injected"; });

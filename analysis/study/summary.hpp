@@ -2,8 +2,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "analysis/study/lot_figures.hpp"
 #include "analysis/study/scale_factor.hpp"
 #include "analysis/study/study.hpp"
 
@@ -69,21 +71,37 @@ struct FamilyDeviation {
 /// Effect of the injected noise, as predicted and as measured in the simulation.
 struct NoiseFigures {
     dither::NoiseEffectiveness predicted;
+    /// Why the turns are not at random phases, by the prediction: a random walk that is off by a tenth, or a bias
+    /// beyond what the random walk leaves of a mean over an hour. Empty where they are, and where nothing was
+    /// predicted.
+    std::string not_randomised;
     double change_per_cycle_percent = 0.0;  ///< as predicted, of the dither's amplitude
     struct Measured {
         double change_per_cycle_rad = 0.0;
-        std::optional<double> arw_over_theory;  ///< median of the gyros
-        std::optional<double> bias_deg_h;       ///< mean rate error, less that of `ideal` where there is such an arm
-        double bias_error_deg_h = 0.0;          ///< its standard error
+        /// Median of the gyros over that of turns at random phases, declared noises taken off in squares.
+        std::optional<double> arw_over_theory;
+        std::optional<double> bias_deg_h;  ///< mean rate error, less that of `ideal` where there is such an arm
+        double bias_error_deg_h = 0.0;     ///< its standard error
         std::vector<dither::AngleSpread> angle_spread;
     } measured;
+};
+
+/// The angle random walk that an arm would have without a compensator, part by part; independent, so that squares add.
+struct ArwTheory {
+    double lockin_deg_rt_h = 0.0;  ///< of turns at independent random phases; 0 where no noise is injected
+    std::vector<std::pair<std::string, double>> effects_deg_rt_h;  ///< white rate noise of the effects, by their names
+    double total_deg_rt_h = 0.0;
 };
 
 struct ArmSummary {
     std::string name;
     std::int64_t gyros = 0;
     bool noise_injected = false;
-    Figure arw_deg_rt_h;  ///< meaningful only where noise_injected
+    Figure arw_deg_rt_h;
+    std::string arw_reason;  ///< why arw_deg_rt_h has no median; empty where it has one
+    ArwTheory arw_theory;
+    std::vector<LotFigure> lot;  ///< quantiles over the gyros; empty in sweeps
+    std::optional<Yield> yield;  ///< where the scenario has a specification
     std::optional<Figure> bias_instability_deg_h;
     MeanFigure rate_error_deg_h;
     std::vector<EnsemblePoint> allan;
@@ -105,7 +123,8 @@ struct Summary {
     std::uint64_t seed = 0;
     std::int64_t turns = 0;
     std::vector<ArmSummary> arms;
-    Theory theory;  ///< of the scenario's device without spread
+    std::vector<ArmPair> pairs;  ///< of arms whose gyros have random walks, each with each that follows it
+    Theory theory;               ///< of the scenario's device without spread
 };
 
 /// Highest rate of the sweep up to which, from its first rate that can tell on, every gyro of the arm is locked; none
@@ -117,9 +136,10 @@ std::optional<double> locked_up_to_deg_h(const ArmSummary& arm);
 /// \param curves  one deviation curve a gyro, all of the same averaging times
 std::vector<EnsemblePoint> ensemble_points(const std::vector<std::vector<allan::Point>>& curves);
 
-/// Sums the study up. No noise is claimed for a locking arm without injected noise: its error is deterministic, a dead
-/// band and a staircase, whatever spectrum it has. No bias instability is claimed unless most records resolve an Allan
-/// floor. An angle random walk is claimed where noise is injected only.
+/// Sums the study up. An angle random walk is claimed where the records of an arm show white rate noise. None is
+/// claimed for a locking arm on which no white rate noise acts, injected or declared, and that no compensator corrects:
+/// its error is deterministic, a dead band and a staircase, whatever spectrum it has. No bias instability is claimed
+/// unless most records resolve an Allan floor, and none for arms without injected noise but `ideal`.
 Summary summarise(const Study& study);
 
 }  // namespace ringlock::study

@@ -15,4 +15,8 @@ Schedule::Schedule(const scenario::Scenario& scenario) {
     samples = 1 + static_cast<std::int64_t>(std::floor(scenario.ensemble.duration_s / sample_interval_s + 1e-9));
 }
 
+std::int64_t cycles_in(const Schedule& schedule, double time_s) {
+    return std::max<std::int64_t>(1, std::llround(time_s / schedule.cycle_s));
+}
+
 }  // namespace ringlock::ensemble

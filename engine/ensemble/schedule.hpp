@@ -22,4 +22,7 @@ struct Schedule {
     std::int64_t turns() const { return settle_turns() + 2 * cycles_per_sample * (samples - 1) + 1; }
 };
 
+/// Whole cycles nearest to a time, one at least.
+std::int64_t cycles_in(const Schedule& schedule, double time_s);
+
 }  // namespace ringlock::ensemble

@@ -66,4 +66,9 @@ double amplitude_change_relative(const Dither& dither, double duration_s) {
            std::abs(dither.amplitude_drift_relative_per_h) * duration_s / 3600.0;
 }
 
+bool asks(const Specification& specification) {
+    return specification.arw_deg_rt_h > 0.0 || specification.bias_stability_deg_h > 0.0 ||
+           specification.rate_error_deg_h > 0.0 || specification.angle_error_arcsec > 0.0;
+}
+
 }  // namespace ringlock::scenario

@@ -123,8 +123,23 @@ struct Propagation {
 struct Output {
     double sample_interval_s = 1.0;  ///< of the decimated angle record; rounded to whole dither cycles
     bool angle_record = true;        ///< store the record of every gyro and arm, not only its statistics
+    std::vector<double> tau_s = {};  ///< averaging times at which deviations are wanted beside those of octaves
     bool operator==(const Output&) const = default;
 };
+
+/// What a gyro must meet to pass; 0: not asked for.
+struct Specification {
+    double arw_deg_rt_h = 0.0;          ///< largest angle random walk
+    double bias_stability_deg_h = 0.0;  ///< largest Allan deviation at at_s
+    double at_s = 100.0;                ///< averaging time of bias_stability_deg_h
+    double rate_error_deg_h = 0.0;      ///< largest magnitude of the mean rate error over the record
+    double angle_error_arcsec = 0.0;    ///< largest magnitude of the angle beyond the input's at after_s
+    double after_s = 100.0;             ///< time of angle_error_arcsec
+    bool operator==(const Specification&) const = default;
+};
+
+/// Whether anything is asked for.
+bool asks(const Specification& specification);
 
 enum class RecordKind { turns, samples };
 enum class RecordTrajectory { uncompensated, noise_injected };
@@ -172,6 +187,7 @@ struct Scenario {
                                         "noise_injected+compensated_published", "noise_injected+compensated"});
     Propagation propagation;
     Output output;
+    Specification specification;
     RecordSettings record;
     bool operator==(const Scenario&) const = default;
 };

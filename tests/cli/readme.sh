@@ -8,9 +8,9 @@ folder="$(mktemp -d)"
 trap 'rm -rf "$folder"' EXIT
 
 "$program" run "$repository/scenarios/gao-deng-2007.toml" -o "$folder/out.h5" --plot "$folder/out.svg" -q >"$folder/printed"
-# The first line tells durations; the table begins after it.
-sed -n '/^arm /,$p' "$folder/printed" >"$folder/table"
-awk '/^arm .*ARW/ { inside = 1 } /^```/ { inside = 0 } inside' "$repository/README.md" >"$folder/shown"
+# The first lines tell durations; the tables begin after them.
+sed -n '/^Angle random walk /,$p' "$folder/printed" >"$folder/table"
+awk '/^Angle random walk / { inside = 1 } /^```/ { inside = 0 } inside' "$repository/README.md" >"$folder/shown"
 status=0
 diff "$folder/shown" "$folder/table" || { echo "README.md shows another table than the program prints" >&2; status=1; }
 cmp "$repository/docs/figures/gao-deng-2007.svg" "$folder/out.svg" ||

@@ -152,6 +152,23 @@ TEST_F(RunCommand, ForeignFilesAreKept) {
     EXPECT_EQ(run({"run", "s.toml"}).status, 0) << "the same scenario may run again";
 }
 
+TEST_F(RunCommand, SettingsOfTheCommandLineStandInPlaceOfTheFiles) {
+    const Outcome r = run({"run", "s.toml", "--set", "ensemble.gyros=3", "--set", "specification.arw_deg_rt_h=0.1",
+                           "--set", "output.tau_s=[5]", "--json", "-q"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.out, HasSubstr("\"yield\""));
+    EXPECT_THAT(r.out, HasSubstr("\"gyros\": 3"));
+    EXPECT_THAT(r.out, HasSubstr("allan_deviation_5_s_deg_h"));
+    const Outcome again = run({"analyze", "s.h5", "--json"});
+    EXPECT_EQ(again.status, 0) << again.err;
+    EXPECT_THAT(again.out, HasSubstr("allan_deviation_5_s_deg_h"));
+    expect_refused({"run", "s.toml", "--set", "ensemble.gyros=0"}, HasSubstr("--set ensemble.gyros=0: "));
+    expect_refused({"run", "s.toml", "--set", "gyros"}, HasSubstr("KEY=VALUE"));
+    expect_refused({"validate", "s.h5", "--set", "ensemble.gyros=3"}, HasSubstr("no scenario"));
+    const Outcome valid = run({"validate", "s.toml", "--set", "device=triangle-51mm"});
+    EXPECT_EQ(valid.status, 0) << valid.err;
+}
+
 TEST_F(RunCommand, WrongCommandLinesAreRefused) {
     expect_refused({"run", "s.toml", "--threads", "-1"}, AllOf(HasSubstr("--threads -1"), HasSubstr("between 1 and")));
     expect_refused({"run", "s.toml", "--threads", "100000"}, HasSubstr("between 1 and"));
@@ -245,15 +262,18 @@ TEST_F(RunCommand, JsonIsOneObjectWithTheFieldsOfTheContract) {
         ASSERT_TRUE(arm.contains("bias_instability_deg_h"));
         EXPECT_TRUE(arm["bias_instability_deg_h"].is_null()) << "no flicker was simulated";
         ASSERT_TRUE(arm.contains("arw_deg_rt_h"));
-        if (name.starts_with("noise_injected")) {
-            const json& arw = arm["arw_deg_rt_h"];
-            ASSERT_TRUE(arw.is_object());
-            for (const char* key : {"median", "lo", "hi", "median_ci"}) EXPECT_TRUE(arw.contains(key)) << key;
-            EXPECT_TRUE(arw["hi"].is_number()) << "an upper end or limit is always given";
-            EXPECT_EQ(arw["median"].is_null(), arw["median_ci"].is_null());
-        } else {
-            EXPECT_TRUE(arm["arw_deg_rt_h"].is_null());
-        }
+        const json& arw = arm["arw_deg_rt_h"];
+        ASSERT_TRUE(arw.is_object()) << "quantum noise is declared by default";
+        for (const char* key : {"median", "lo", "hi", "median_ci"}) EXPECT_TRUE(arw.contains(key)) << key;
+        EXPECT_TRUE(arw["hi"].is_number()) << "an upper end or limit is always given";
+        EXPECT_EQ(arw["median"].is_null(), arw["median_ci"].is_null());
+        EXPECT_EQ(arw["median"].is_null(), arm["arw_reason"].is_string());
+        expect_numbers(arm["theory"], {"arw_deg_rt_h", "lockin_arw_deg_rt_h"});
+        EXPECT_TRUE(arm["theory"]["effects_arw_deg_rt_h"]["quantum_noise"].is_number());
+        EXPECT_FALSE(arm.contains("yield")) << "nothing was specified";
+        ASSERT_TRUE(arm["quantiles"]["rate_error_deg_h"].is_array());
+        EXPECT_TRUE(arm["quantiles"]["rate_error_deg_h"][0]["lo"].is_null())
+            << "four gyros do not bound the 5 % quantile";
     }
     EXPECT_EQ(left(), (std::set<std::string>{"out.h5", "s.toml"}));
 }
@@ -333,8 +353,9 @@ TEST_F(RunCommand, SweepsOfThreeRatesShowTheLineThroughThem) {
     expect_numbers(arms["noise_injected+compensated"]["arw_reduction"], {"lo"});
     EXPECT_EQ(json::parse(run({"analyze", "three.h5", "--json"}).out)["arms"], arms);
     const std::string table = run({"analyze", "three.h5"}).out;
-    for (const char* text : {"Straight lines through the rates, 3 gyros at each, full scale 60 deg/h",
-                             "repeatability [ppm]", "nonlinearity [ppm of full scale]", "ARW of noise_injected over"}) {
+    for (const char* text :
+         {"Straight lines through the rates, 3 gyros at each, full scale 60 deg/h", "repeatability [ppm]",
+          "nonlinearity [ppm of full scale]", "random walk of noise_injected over that of"}) {
         EXPECT_THAT(table, HasSubstr(text));
     }
 }
@@ -417,7 +438,7 @@ void collect(const store::Group& group, const std::string& path, std::map<std::s
         }
     }
     for (const std::string& name : group.attribute_names()) {
-        if (name == "format" || name == "compensator" || name == "predicted_reason") continue;
+        if (name == "format" || name == "compensator" || name == "predicted_reason" || name == "arw_reason") continue;
         out[path + "@" + name] = {group.double_attribute(name)};
     }
 }

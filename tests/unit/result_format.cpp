@@ -24,8 +24,9 @@ using test::write;
 std::map<hsize_t, std::string> extents(const Study& study) {
     const std::map<hsize_t, std::string> names = {{study.gyros.size(), "gyros"},
                                                   {static_cast<hsize_t>(study.schedule.samples), "samples"},
+                                                  {study.angle_times_s.size(), "times"},
                                                   {study.factors.size(), "taus"}};
-    EXPECT_EQ(names.size(), 3U) << "extents must differ to be told apart";
+    EXPECT_EQ(names.size(), 4U) << "extents must differ to be told apart";
     return names;
 }
 
@@ -50,7 +51,8 @@ TEST_F(ResultFile, HoldsWhatThePageSays) {
 }
 
 TEST_F(ResultFile, HoldsNoAngleRecordWhereNoneIsWanted) {
-    const scenario::Scenario scenario = small(false);
+    scenario::Scenario scenario = small(false);
+    scenario.ensemble.gyros = 5;  // no number that stands for anything else
     write(path_, scenario);
     Entries expected = page(the_page, names_of(scenario.arms));
     EXPECT_EQ(expected.erase("/arms/uncompensated/rate_error_closed_form_deg_h"), 1U) << "there is quantum noise";

@@ -77,6 +77,32 @@ TEST(ScenarioRules, AProfileIsAProfile) {
                 AllOf(HasSubstr("a list of numbers"), HasSubstr("whole number")));
 }
 
+TEST(ScenarioRules, AveragingTimesLieInTheRecord) {
+    const std::string run = "[ensemble]\nduration_s = 101\n[output]\ntau_s = ";
+    EXPECT_EQ(complaint(run + "[0.008, 1, 33.3, 50]"), "");
+    EXPECT_THAT(complaint(run + "[1, 60]"), AllOf(HasSubstr("s.toml:4:9: key \"output.tau_s\""), HasSubstr("60 s"),
+                                                  HasSubstr("half of the record")));
+    EXPECT_THAT(complaint(run + "[0.001]"), HasSubstr("a dither cycle"));
+    EXPECT_THAT(complaint(run + "[0]"), HasSubstr("must be above 0"));
+    std::string many = "[1";
+    for (int i = 0; i < 100; ++i) many += ", 1";
+    EXPECT_THAT(complaint(run + many + "]"), HasSubstr("101 averaging times"));
+}
+
+TEST(ScenarioRules, ASpecificationCanBeMet) {
+    const std::string run = "[ensemble]\nduration_s = 101\n[specification]\n";
+    EXPECT_EQ(complaint(run + "arw_deg_rt_h = 0.001\nrate_error_deg_h = 0.1\n"), "");
+    EXPECT_EQ(complaint(run + "bias_stability_deg_h = 0.01\nat_s = 50\nangle_error_arcsec = 1\nafter_s = 101\n"), "");
+    EXPECT_EQ(complaint(run + "at_s = 500\n"), "") << "of a limit that is not asked for";
+    EXPECT_THAT(complaint(run + "bias_stability_deg_h = 0.01\nat_s = 51\n"),
+                AllOf(HasSubstr("key \"specification.at_s\" = 51"), HasSubstr("half of the record")));
+    EXPECT_THAT(complaint(run + "angle_error_arcsec = 1\nafter_s = 102\n"),
+                AllOf(HasSubstr("key \"specification.after_s\" = 102"), HasSubstr("ends after 101 s")));
+    EXPECT_THAT(complaint(run + "arw_deg_rt_h = 0.001\n[effects.quantum_noise]\ndeg_rt_h = 0.0011\n"),
+                AllOf(HasSubstr("no arm can meet it"), HasSubstr("0.0011")));
+    EXPECT_EQ(complaint(run + "arw_deg_rt_h = 0.001\n[effects.quantum_noise]\ndeg_rt_h = 0.0009\n"), "");
+}
+
 TEST(ScenarioRules, TheAmplitudeStays) {
     EXPECT_EQ(complaint("[dither]\namplitude_wander_relative_rt_s = 1e-3"), "");
     EXPECT_THAT(complaint("[dither]\namplitude_wander_relative_rt_s = 0.01"),
