@@ -48,14 +48,31 @@ InputRange input_range(const InputRate& input) {
     return {std::min(input.rate_deg_h, last), std::max(input.rate_deg_h, last)};
 }
 
-double input_slope_deg_h_s(const InputRate& input) {
-    const auto& times = input.profile_time_s;
-    const auto& rates = input.profile_rate_deg_h;
+namespace {
+
+/// Of a profile, a second.
+double steepest_slope(const std::vector<double>& times_s, const std::vector<double>& values) {
     double steepest = 0.0;
-    for (std::size_t i = 1; i < std::min(times.size(), rates.size()); ++i) {
-        steepest = std::max(steepest, std::abs(rates[i] - rates[i - 1]) / (times[i] - times[i - 1]));
+    for (std::size_t i = 1; i < std::min(times_s.size(), values.size()); ++i) {
+        steepest = std::max(steepest, std::abs(values[i] - values[i - 1]) / (times_s[i] - times_s[i - 1]));
     }
     return steepest;
+}
+
+/// Largest magnitude of the profile's temperature less that at the start.
+double largest_change_k(const Environment& environment) {
+    if (environment.profile_time_s.empty() || environment.profile_temperature_k.empty()) return 0.0;
+    double largest = 0.0;
+    for (const double time_s : environment.profile_time_s) {
+        largest = std::max(largest, std::abs(temperature_change_k(environment, time_s)));
+    }
+    return largest;
+}
+
+}  // namespace
+
+double input_slope_deg_h_s(const InputRate& input) {
+    return steepest_slope(input.profile_time_s, input.profile_rate_deg_h);
 }
 
 effects::Exposure exposure(const Scenario& scenario) {
@@ -64,9 +81,11 @@ effects::Exposure exposure(const Scenario& scenario) {
     const auto [lowest, highest] = input_range(scenario.input);
     effects::Exposure exposure;
     exposure.duration_h = (scenario.ensemble.settle_s + scenario.ensemble.duration_s) / 3600.0;
-    exposure.temperature_change_k = ramp_k_per_h * exposure.duration_h + environment.temperature_swing_k;
+    exposure.temperature_change_k =
+        ramp_k_per_h * exposure.duration_h + environment.temperature_swing_k + largest_change_k(environment);
     exposure.temperature_slope_k_per_h =
-        ramp_k_per_h + environment.temperature_swing_k * units::two_pi * 3600.0 / environment.temperature_period_s;
+        3600.0 * steepest_slope(environment.profile_time_s, environment.profile_temperature_k) + ramp_k_per_h +
+        environment.temperature_swing_k * units::two_pi * 3600.0 / environment.temperature_period_s;
     exposure.input_rate_deg_h = std::max(std::abs(lowest), std::abs(highest));
     exposure.input_slope_deg_h_s = input_slope_deg_h_s(scenario.input);
     return exposure;

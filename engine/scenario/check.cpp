@@ -97,9 +97,10 @@ Finding dither_reverses_effects(const Scenario& s) {
     std::stable_sort(rates.begin(), rates.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
     std::vector<std::string> keys;
     for (const auto& [size, names] : rates) keys.insert(keys.end(), names.begin(), names.end());
-    for (const char* key : {"environment.temperature_ramp_k_per_h", "environment.temperature_swing_k",
-                            "input.profile_rate_deg_h", "input.rate_deg_h", "input.sweep_stop_deg_h",
-                            "dither.peak_rate_deg_s", "ensemble.duration_s", "ensemble.settle_s"}) {
+    for (const char* key :
+         {"environment.temperature_ramp_k_per_h", "environment.temperature_swing_k",
+          "environment.profile_temperature_k", "input.profile_rate_deg_h", "input.rate_deg_h", "input.sweep_stop_deg_h",
+          "dither.peak_rate_deg_s", "ensemble.duration_s", "ensemble.settle_s"}) {
         keys.emplace_back(key);
     }
     return Complaint{std::move(keys),
@@ -154,18 +155,40 @@ Finding amplitude_stays(const Scenario& s) {
                                  change, most, sigmas)};
 }
 
-Finding profile_is_a_profile(const Scenario& s) {
-    const auto& times = s.input.profile_time_s;
-    if (times.size() != s.input.profile_rate_deg_h.size()) {
-        return Complaint{{"input.profile_rate_deg_h", "input.profile_time_s"},
-                         fmt::format("a profile of {} times has as many rates, not {}", times.size(),
-                                     s.input.profile_rate_deg_h.size())};
+/// As many values as times, in order of time.
+Finding wrong_profile(const std::vector<double>& times, const std::vector<double>& values, const std::string& time_key,
+                      const std::string& value_key, const char* what) {
+    if (times.size() != values.size()) {
+        return Complaint{
+            {value_key, time_key},
+            fmt::format("a profile of {} times has as many {}, not {}", times.size(), what, values.size())};
     }
     for (std::size_t i = 1; i < times.size(); ++i) {
         if (times[i] > times[i - 1]) continue;
         return Complaint{
-            {"input.profile_time_s"},
+            {time_key},
             fmt::format("{:g} s comes after {:g} s; times of a profile must increase", times[i], times[i - 1])};
+    }
+    return {};
+}
+
+Finding temperatures_are_a_profile(const Scenario& s) {
+    const Environment& e = s.environment;
+    if (auto wrong = wrong_profile(e.profile_time_s, e.profile_temperature_k, "environment.profile_time_s",
+                                   "environment.profile_temperature_k", "temperatures")) {
+        return wrong;
+    }
+    if (e.profile_time_s.empty() || (e.temperature_ramp_k_per_h == 0.0 && e.temperature_swing_k == 0.0)) return {};
+    return Complaint{
+        {"environment.profile_time_s", "environment.temperature_ramp_k_per_h", "environment.temperature_swing_k"},
+        "a temperature that follows a profile has no ramp and no swing; leave them out, or the profile"};
+}
+
+Finding profile_is_a_profile(const Scenario& s) {
+    const auto& times = s.input.profile_time_s;
+    if (auto wrong = wrong_profile(times, s.input.profile_rate_deg_h, "input.profile_time_s",
+                                   "input.profile_rate_deg_h", "rates")) {
+        return wrong;
     }
     if (times.empty() || s.input.sweep_points == 1) return {};
     return Complaint{{"input.profile_time_s", "input.sweep_points"},
@@ -373,7 +396,7 @@ Finding effects_leave_a_threshold(const Scenario& s) {
         for (std::string& key : keys_of(*bounds.effect)) keys.push_back(std::move(key));
     }
     keys.insert(keys.end(), {"environment.temperature_ramp_k_per_h", "environment.temperature_swing_k",
-                             "ensemble.duration_s", "ensemble.settle_s"});
+                             "environment.profile_temperature_k", "ensemble.duration_s", "ensemble.settle_s"});
     return Complaint{std::move(keys),
                      fmt::format("the temperature changes by up to {:g} K, the threshold by {:g} of itself; it must "
                                  "not change by more than {:g}",
@@ -601,6 +624,9 @@ constexpr std::array all_rules = {
          amplitude_stays},
     Rule{"A profile of the input rate has as many times as rates, in order of time, and there is no sweep beside it.",
          profile_is_a_profile},
+    Rule{"A profile of the temperature has as many times as temperatures, in order of time, and neither ramp nor swing "
+         "beside it.",
+         temperatures_are_a_profile},
     Rule{"A sweep of more than one point ends at another rate than it starts from.", sweep_goes_somewhere},
     Rule{"The gyros of all points of the sweep are at most 100000000.", sweep_is_not_too_large},
     Rule{"The half cycles of all gyros, those before the record with them, are at most 1e18.", turns_can_be_counted},

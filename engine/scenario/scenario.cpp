@@ -17,10 +17,25 @@ EffectSettings default_effect_settings() {
 }
 
 bool temperature_varies(const Environment& environment) {
-    return environment.temperature_ramp_k_per_h != 0.0 || environment.temperature_swing_k != 0.0;
+    const auto& profile = environment.profile_temperature_k;
+    const bool moves = std::any_of(profile.begin(), profile.end(), [&](double k) { return k != profile.front(); });
+    return moves || environment.temperature_ramp_k_per_h != 0.0 || environment.temperature_swing_k != 0.0;
+}
+
+double profile_value(const std::vector<double>& times_s, const std::vector<double>& values, double time_s) {
+    const auto after = std::upper_bound(times_s.begin(), times_s.end(), time_s);
+    if (after == times_s.begin()) return values.front();
+    if (after == times_s.end()) return values.back();
+    const auto i = static_cast<std::size_t>(after - times_s.begin());
+    const double share = (time_s - times_s[i - 1]) / (times_s[i] - times_s[i - 1]);
+    return values[i - 1] + share * (values[i] - values[i - 1]);
 }
 
 double temperature_change_k(const Environment& environment, double time_s) {
+    if (!environment.profile_time_s.empty()) {
+        return profile_value(environment.profile_time_s, environment.profile_temperature_k, time_s) -
+               profile_value(environment.profile_time_s, environment.profile_temperature_k, 0.0);
+    }
     const double phase = 2.0 * std::numbers::pi * std::fmod(time_s / environment.temperature_period_s, 1.0);
     return environment.temperature_ramp_k_per_h * time_s / 3600.0 + environment.temperature_swing_k * std::sin(phase);
 }
@@ -35,13 +50,7 @@ double input_rate_deg_h(const InputRate& input, std::int64_t point) {
 bool has_profile(const InputRate& input) { return !input.profile_time_s.empty(); }
 
 double profile_rate_deg_h(const InputRate& input, double time_s) {
-    const auto& times = input.profile_time_s;
-    const auto& rates = input.profile_rate_deg_h;
-    const auto after = std::upper_bound(times.begin(), times.end(), time_s);
-    if (after == times.begin()) return rates.front();
-    if (after == times.end()) return rates.back();
-    const auto i = static_cast<std::size_t>(after - times.begin());
-    return rates[i - 1] + (time_s - times[i - 1]) / (times[i] - times[i - 1]) * (rates[i] - rates[i - 1]);
+    return profile_value(input.profile_time_s, input.profile_rate_deg_h, time_s);
 }
 
 double profile_angle_arcsec(const InputRate& input, double start_s, double duration_s) {

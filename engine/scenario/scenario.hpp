@@ -82,11 +82,15 @@ struct InputRate {
     bool operator==(const InputRate&) const = default;
 };
 
-/// Temperature of the gyros against that at the start: ramp t + swing sin(2 pi t / period).
+/// Temperature of the gyros against that at the start: ramp t + swing sin(2 pi t / period), or a profile.
 struct Environment {
     double temperature_ramp_k_per_h = 0.0;
     double temperature_swing_k = 0.0;
     double temperature_period_s = 86400.0;
+    /// A temperature that takes the place of ramp and swing: linear between these points, constant beyond them. Only
+    /// its difference from that at the start of the run counts.
+    std::vector<double> profile_time_s = {};
+    std::vector<double> profile_temperature_k = {};
     bool operator==(const Environment&) const = default;
 };
 
@@ -162,6 +166,10 @@ EffectSettings default_effect_settings();
 
 /// Input rate of one point of the sweep, 0 <= point < sweep_points; the points are evenly spaced, both ends included.
 double input_rate_deg_h(const InputRate& input, std::int64_t point);
+
+/// The value of a profile: linear between its points, constant beyond them. It has a point at least, and increasing
+/// times.
+double profile_value(const std::vector<double>& times_s, const std::vector<double>& values, double time_s);
 
 /// Whether the input rate follows a profile. The functions below need one.
 bool has_profile(const InputRate& input);

@@ -212,6 +212,11 @@ std::vector<Section> base_sections() {
                  "Amplitude of the periodic change."),
              key(RINGLOCK_KEY(environment, temperature_period_s), between(1.0, 1e9, "slower than the dither"),
                  "Period of that; the default is a day."),
+             key(RINGLOCK_KEY(environment, profile_time_s), between(-1e9, 1e9, "30 years"),
+                 "Times of a profile of the temperature, from the start of the run, that takes the place of ramp and "
+                 "swing: linear between its points, constant beyond them."),
+             key(RINGLOCK_KEY(environment, profile_temperature_k), between(-1000.0, 1000.0, "a gyro, not a furnace"),
+                 "Temperatures at these times; only their difference from that at the start counts."),
          }},
         {"ensemble",
          "How many gyros, for how long, and how they differ.",

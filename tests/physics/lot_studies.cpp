@@ -133,6 +133,21 @@ TEST(LotStudies, AngleErrorsGrowAsTheRandomWalkSays) {
     }
 }
 
+TEST(LotStudies, EffectsFollowAProfileOfTheTemperature) {
+    scenario::Scenario scenario = short_study({"ideal"});
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
+    scenario.effects["bias_temperature"]["deg_h_per_k"] = 0.5;
+    scenario.environment.profile_time_s = {0.0, 40.0, 80.0};
+    scenario.environment.profile_temperature_k = {293.0, 297.0, 291.0};
+    const study::Study study = simulated(scenario);
+    // The mean of the change over [0, 40, 80, end]: 2 K, then 1 K, then -2 K.
+    const double end_s = study.schedule.cycle_s * static_cast<double>(study.schedule.cycles() - 1);
+    const double mean_k = (40.0 * 2.0 + 40.0 * 1.0 - (end_s - 80.0) * 2.0) / end_s;
+    // Readings of the angle by interpolated detectors are wrong by a small part of a fringe at either end.
+    const double reading_deg_h = 0.05 * scenario.gyro.scale_factor_arcsec / end_s;
+    for (const auto& gyro : study.arms[0].gyros) EXPECT_NEAR(gyro.rate_error_deg_h, 0.5 * mean_k, reading_deg_h);
+}
+
 TEST(LotStudies, QuantilesOfSmallLotsHaveNoOuterEnds) {
     const study::Summary summary = study::summarise(simulated(short_study({"noise_injected"})));
     ASSERT_FALSE(summary.arms[0].lot.empty());

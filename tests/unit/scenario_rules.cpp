@@ -156,6 +156,34 @@ TEST(Environment, TemperatureIsARampAndAWave) {
     EXPECT_NEAR(temperature_change_k(environment, 700.0), 7.0 / 6.0 - 2.0, 1e-12);
 }
 
+TEST(Environment, TemperatureFollowsAProfile) {
+    Environment environment;
+    environment.profile_time_s = {-100.0, 100.0, 300.0};
+    environment.profile_temperature_k = {290.0, 300.0, 296.0};
+    EXPECT_TRUE(temperature_varies(environment));
+    EXPECT_EQ(temperature_change_k(environment, 0.0), 0.0) << "295 K is that at the start";
+    EXPECT_NEAR(temperature_change_k(environment, 50.0), 2.5, 1e-12);
+    EXPECT_NEAR(temperature_change_k(environment, 100.0), 5.0, 1e-12);
+    EXPECT_NEAR(temperature_change_k(environment, 200.0), 3.0, 1e-12);
+    EXPECT_NEAR(temperature_change_k(environment, 1e6), 1.0, 1e-12);
+    environment.profile_temperature_k = {290.0, 290.0, 290.0};
+    EXPECT_FALSE(temperature_varies(environment));
+}
+
+TEST(ScenarioRules, AProfileOfTheTemperatureIsOne) {
+    const std::string profile = "[environment]\nprofile_time_s = [0, 100, 200]\nprofile_temperature_k = ";
+    EXPECT_EQ(complaint(profile + "[293, 300, 295]"), "");
+    EXPECT_THAT(complaint(profile + "[293]"), AllOf(HasSubstr("s.toml:3:25: key \"environment.profile_temperature_k\""),
+                                                    HasSubstr("as many temperatures")));
+    EXPECT_THAT(complaint("[environment]\nprofile_time_s = [0, 0]\nprofile_temperature_k = [1, 2]"),
+                HasSubstr("0 s comes after 0 s"));
+    EXPECT_THAT(complaint(profile + "[293, 300, 295]\ntemperature_swing_k = 1"), HasSubstr("no ramp and no swing"));
+    // Effects that follow the temperature know how far it goes, and how fast.
+    EXPECT_THAT(complaint(profile + "[293, 304, 295]\n[effects.lockin_temperature]\nrelative_per_k = 0.1"),
+                AllOf(HasSubstr("effects.lockin_temperature.relative_per_k"), HasSubstr("11 K")));
+    EXPECT_EQ(complaint(profile + "[293, 301, 295]\n[effects.lockin_temperature]\nrelative_per_k = 0.1"), "");
+}
+
 TEST(ScenarioRules, TheTurnMapNeedsFringes) {
     // 2 Omega_D / (K w_D) is 2005 at the default and 10 at 0.544 deg/s.
     const std::string weak =
