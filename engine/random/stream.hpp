@@ -30,6 +30,9 @@ enum class Purpose : std::uint64_t {
     fitted_parameters = 16,
     drive_noise = 17,
     drive_noise_phase = 18,
+    design_scrambling = 19,
+    design_strata = 20,
+    sensitivity_bootstrap = 21,
 };
 
 /// Who draws: the study's seed and the gyro's number.

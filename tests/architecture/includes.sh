@@ -25,6 +25,7 @@ declare -A may=(
     [analysis/allan/statistics]="engine/core"
     [analysis/noise]="analysis/allan analysis/allan/sums engine/core engine/random"
     [analysis/lot]="engine/core"
+    [analysis/design]="engine/core engine/random"
     [analysis/record]="analysis/allan analysis/allan/sums analysis/noise engine/core engine/store"
     [analysis/instrument]="analysis/record engine/*"
     [analysis/study]="analysis/allan analysis/allan/sums analysis/lot analysis/noise engine/*"
