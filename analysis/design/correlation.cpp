@@ -84,7 +84,7 @@ GaussianCopula::GaussianCopula(std::span<const Factor> factors, std::span<const 
     }
     factor_ = cholesky.matrixL();
     for (Eigen::Index i = 0; i < n; ++i) {
-        depends_[static_cast<std::size_t>(i)] = factor_.row(i).head(i).cwiseAbs().maxCoeff() > 0.0 ? 1 : 0;
+        depends_[static_cast<std::size_t>(i)] = (factor_.row(i).head(i).array() != 0.0).any() ? 1 : 0;
     }
 }
 

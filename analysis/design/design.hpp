@@ -19,8 +19,8 @@ enum class Kind {
 /// A design as it is asked for.
 struct Plan {
     Kind kind = Kind::sobol;
-    std::vector<Factor> factors;
-    std::vector<Correlation> correlations;  ///< between factors with distributions; none in a grid or a list
+    std::vector<Factor> factors = {};
+    std::vector<Correlation> correlations = {};  ///< between factors with distributions; none in a grid or a list
     CorrelationOf correlation_of = CorrelationOf::ranks;
     std::uint64_t points =
         0;                   ///< of a Latin hypercube or a Sobol' sequence; a grid or a list have as many as they have

@@ -12,9 +12,9 @@ namespace ringlock::design {
 /// The points at which a model is evaluated for its sensitivity indices, in the unit cube.
 ///
 /// The 2 k coordinates of one scrambled Sobol' sequence are the points A and B of k independent factors; AB_i is A with
-/// coordinate i from B (Saltelli et al., Comput. Phys. Commun. 181, 259, 2010, "radial" with one sequence of 2 k
-/// dimensions). The k + 2 points of a base point follow each other, A, B, AB_1 ... AB_k, and a design with more base
-/// points begins with that of fewer: evaluations made already need not be made again.
+/// coordinate i from B (Saltelli et al., Comput. Phys. Commun. 181, 259, 2010). The k + 2 points of a base point follow
+/// each other, A, B, AB_1 ... AB_k, and a design with more base points begins with that of fewer: evaluations made
+/// already need not be made again.
 ///
 /// \param base_points  n; powers of 2 are balanced best
 /// \param factors      k
@@ -29,10 +29,10 @@ struct Evaluations {
     std::size_t outputs = 0;
     /// [evaluation][output], evaluations in the order of sensitivity_points(). What is not finite leaves its base point
     /// out, for that output.
-    std::span<const double> values;
+    std::span<const double> values = {};
     /// Variance that each value has of its own noise: of a Monte Carlo estimate, the square of its standard error. As
     /// many as values and >= 0 where the value is finite, or empty: not known.
-    std::span<const double> noise_variance;
+    std::span<const double> noise_variance = {};
 };
 
 /// How the ends of the intervals follow from the bootstrap's replicates.
@@ -80,7 +80,8 @@ inline constexpr std::size_t fewest_base_points = 16;
 ///
 /// With m and V mean and variance of f over the points A and B together, and f_B' = f_B - m:
 ///
-///     S_i  = mean(f_B' (f_AB_i - f_A))/V         Saltelli et al. 2010, eq. 16, the mean taken off as in Sobol', Math.
+///     S_i  = mean(f_B' (f_AB_i - f_A))/V         Saltelli et al. 2010, Table 2 (b), the mean taken off as in Sobol',
+///     Math.
 ///                                                Comput. Simul. 55, 271, 2001, and in Owen, ACM Trans. Model. Comput.
 ///                                                Simul. 23, 11, 2013
 ///     ST_i = mean((f_A - f_AB_i)^2)/(2 V)        Jansen, Comput. Phys. Commun. 117, 35, 1999
