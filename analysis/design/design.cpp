@@ -127,7 +127,7 @@ std::uint64_t point_count(const Plan& plan, std::uint64_t limit) {
     return count;
 }
 
-Points make(const Plan& plan, std::uint64_t limit) {
+Points make_points(const Plan& plan, std::uint64_t limit) {
     const std::uint64_t count = point_count(plan, limit);
     if (plan.kind == Kind::grid) return grid(plan, count, limit);
     if (plan.kind == Kind::list) return list(plan, count, limit);

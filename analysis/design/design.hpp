@@ -40,7 +40,7 @@ std::uint64_t point_count(const Plan& plan, std::uint64_t limit);
 ///
 /// The same plan gives the same points; a Sobol' sequence with more points begins with those of one with fewer. Throws
 /// what point_count() throws, before memory is asked for, and what room_for() throws.
-Points make(const Plan& plan, std::uint64_t limit);
+Points make_points(const Plan& plan, std::uint64_t limit);
 
 /// Points of the unit cube at the quantiles of independent factors: what a design for sensitivity indices wants.
 ///

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,18 +44,23 @@ OutputIndices with_independent(const KnownFunction& f, std::size_t base_points, 
 bool holds(const Index& i, double known) { return i.lo <= known && known <= i.hi; }
 double half_width(const Index& i) { return 0.5 * (i.hi - i.lo); }
 
+/// Closed form, estimate, interval, whether it holds the closed form, half width.
+std::vector<std::string> cells(const Index& index, double known) {
+    return {fmt::format("{:.6f}", known), fmt::format("{:.6f}", index.estimate),
+            fmt::format("{:.6f} .. {:.6f}", index.lo, index.hi), holds(index, known) ? "yes" : "no",
+            fmt::format("{:.2g}", half_width(index))};
+}
+
 void one_seed() {
-    head({"function", "index", "closed form", "estimate", "95 % interval", "inside", "half width"});
+    head({"factor", "S, closed form", "S", "95 %", "inside", "half width", "ST, closed form", "ST", "95 %", "inside",
+          "half width"});
     for (const KnownFunction& f : functions()) {
         const OutputIndices indices = with_sobol(f, many_base_points, first_seed, {.seed = first_seed});
-        for (const bool total : {false, true}) {
-            for (std::size_t i = 0; i < f.factors.size(); ++i) {
-                const Index& index = total ? indices.factors[i].total : indices.factors[i].first;
-                const double known = total ? f.indices[i].total : f.indices[i].first;
-                row({f.name, fmt::format("{}{}", total ? "ST" : "S", i + 1), number(known, 5),
-                     number(index.estimate, 5), fmt::format("{:.5f} .. {:.5f}", index.lo, index.hi),
-                     holds(index, known) ? "yes" : "no", number(half_width(index), 5)});
-            }
+        for (std::size_t i = 0; i < f.factors.size(); ++i) {
+            std::vector<std::string> line = {fmt::format("{}, {}", f.name, f.factors[i].key)};
+            std::ranges::copy(cells(indices.factors[i].first, f.indices[i].first), std::back_inserter(line));
+            std::ranges::copy(cells(indices.factors[i].total, f.indices[i].total), std::back_inserter(line));
+            row(line);
         }
     }
 }
@@ -112,29 +118,30 @@ struct Coverage {
 
 void bootstraps() {
     constexpr std::uint64_t seeds = 300;
-    head({"points", "base points", "function", "S, percentile", "S, BCa", "ST, percentile", "ST, BCa",
+    head({"points", "base points", "S, percentile", "S, BCa", "ST, percentile", "ST, BCa",
           "width of BCa over percentile, S; ST"});
     for (const bool sobol : {false, true}) {
         for (const std::size_t base_points : {std::size_t{64}, std::size_t{256}, std::size_t{1024}}) {
+            Coverage percentile[2];
+            Coverage bca[2];
             for (const KnownFunction& f : functions()) {
-                Coverage coverage[2][2];
                 for (std::uint64_t seed = first_seed; seed < first_seed + seeds; ++seed) {
                     for (const Bootstrap kind : {Bootstrap::percentile, Bootstrap::bca}) {
-                        const auto indices =
-                            sobol ? with_sobol(f, base_points, seed, {.seed = seed, .bootstrap = kind})
-                                  : with_independent(f, base_points, seed, {.seed = seed, .bootstrap = kind});
-                        Coverage* of_kind = coverage[kind == Bootstrap::bca ? 1 : 0];
+                        const design::SensitivityOptions options{.seed = seed, .bootstrap = kind};
+                        const OutputIndices indices = sobol ? with_sobol(f, base_points, seed, options)
+                                                            : with_independent(f, base_points, seed, options);
+                        Coverage* coverage = kind == Bootstrap::bca ? bca : percentile;
                         for (std::size_t i = 0; i < f.factors.size(); ++i) {
-                            of_kind[0].add(indices.factors[i].first, f.indices[i].first);
-                            of_kind[1].add(indices.factors[i].total, f.indices[i].total);
+                            coverage[0].add(indices.factors[i].first, f.indices[i].first);
+                            coverage[1].add(indices.factors[i].total, f.indices[i].total);
                         }
                     }
                 }
-                row({sobol ? "Sobol'" : "independent", fmt::format("{}", base_points), f.name, coverage[0][0].percent(),
-                     coverage[1][0].percent(), coverage[0][1].percent(), coverage[1][1].percent(),
-                     fmt::format("{:.2f}; {:.2f}", coverage[1][0].width / coverage[0][0].width,
-                                 coverage[1][1].width / coverage[0][1].width)});
             }
+            row({sobol ? "Sobol'" : "independent", fmt::format("{}", base_points), percentile[0].percent(),
+                 bca[0].percent(), percentile[1].percent(), bca[1].percent(),
+                 fmt::format("{:.2f}; {:.2f}", bca[0].width / percentile[0].width,
+                             bca[1].width / percentile[1].width)});
         }
     }
 }

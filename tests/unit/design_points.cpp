@@ -302,7 +302,7 @@ TEST(Designs, GridsHaveTheLastFactorFastest) {
         .kind = Kind::grid,
         .factors = {values("a", {1.0, 2.0}), values("b", {5.0}), {.key = "c", .takes = Range{0.0, 1.0, 3}}}};
     EXPECT_EQ(point_count(plan, 6), 6U);
-    const Points points = make(plan, 6);
+    const Points points = make_points(plan, 6);
     EXPECT_EQ(points.dimensions, 3U);
     EXPECT_THAT(points.values, ElementsAre(1, 5, 0, 1, 5, 0.5, 1, 5, 1, 2, 5, 0, 2, 5, 0.5, 2, 5, 1));
     EXPECT_THAT(message_of<InputError>([&] { point_count(plan, 5); }), HasSubstr("2 x 1 x 3 points: 5 is the limit"));
@@ -313,8 +313,8 @@ TEST(Designs, GridsAreCountedBeforeMemoryIsAskedFor) {
     for (int i = 0; i < 10; ++i) {
         plan.factors.push_back({.key = fmt::format("f{}", i), .takes = Range{0.0, 1.0, 1000}});
     }
-    EXPECT_THAT(message_of<InputError>([&] { make(plan, 1000000); }), HasSubstr("1000 x 1000"));
-    EXPECT_THROW(make(plan, no_limit), InputError);
+    EXPECT_THAT(message_of<InputError>([&] { make_points(plan, 1000000); }), HasSubstr("1000 x 1000"));
+    EXPECT_THROW(make_points(plan, no_limit), InputError);
     // A product of 2^64 would be 0.
     plan.factors.assign(2, {.key = "a", .takes = Range{0.0, 1.0, std::uint64_t{1} << 32}});
     plan.factors[1].key = "b";
@@ -325,16 +325,16 @@ TEST(Designs, GridsAreCountedBeforeMemoryIsAskedFor) {
 
 TEST(Designs, ListsPairTheValues) {
     Plan plan{.kind = Kind::list, .factors = {values("a", {1.0, 2.0, 3.0}), values("b", {6.0, 5.0, 4.0})}};
-    EXPECT_THAT(make(plan, 3).values, ElementsAre(1, 6, 2, 5, 3, 4));
-    EXPECT_THROW(make(plan, 2), InputError);
+    EXPECT_THAT(make_points(plan, 3).values, ElementsAre(1, 6, 2, 5, 3, 4));
+    EXPECT_THROW(make_points(plan, 2), InputError);
     plan.points = 4;
-    EXPECT_THAT(message_of<InputError>([&] { make(plan, 9); }), HasSubstr("its factors make 3"));
+    EXPECT_THAT(message_of<InputError>([&] { make_points(plan, 9); }), HasSubstr("its factors make 3"));
     plan.points = 3;
-    EXPECT_NO_THROW(make(plan, 9));
+    EXPECT_NO_THROW(make_points(plan, 9));
     plan.factors[1] = values("b", {6.0, 5.0});
-    EXPECT_THAT(message_of<InputError>([&] { make(plan, 9); }), HasSubstr("a has 3 values and factor b has 2"));
+    EXPECT_THAT(message_of<InputError>([&] { make_points(plan, 9); }), HasSubstr("a has 3 values and factor b has 2"));
     plan.factors[1] = {.key = "b", .takes = Range{0.0, 1.0, 3}};
-    EXPECT_THAT(message_of<InputError>([&] { make(plan, 9); }),
+    EXPECT_THAT(message_of<InputError>([&] { make_points(plan, 9); }),
                 HasSubstr("factor b: in a list every factor has values"));
 }
 
@@ -343,7 +343,7 @@ TEST(Designs, UnitCubesAreMappedToQuantiles) {
     const Factor levels = values("b", {1.0, 5.0, 3.0});
     for (const Kind kind : {Kind::sobol, Kind::latin_hypercube}) {
         const Plan plan{.kind = kind, .factors = {normal, levels}, .points = 300, .seed = 21};
-        const Points points = make(plan, 300);
+        const Points points = make_points(plan, 300);
         const Points unit = kind == Kind::sobol ? sobol(300, 2, 21, 300) : latin_hypercube(300, 2, 21, 300);
         const Marginal marginal(normal);
         std::map<double, int> count;
@@ -363,18 +363,18 @@ TEST(Designs, UnitCubesAreMappedToQuantiles) {
 
 TEST(Designs, PlansThatCannotBeAreRefused) {
     Plan plan{.kind = Kind::sobol, .factors = {{.key = "a", .takes = Normal{}}}};
-    EXPECT_THAT(message_of<InputError>([&] { make(plan, 10); }), HasSubstr("of no points"));
+    EXPECT_THAT(message_of<InputError>([&] { make_points(plan, 10); }), HasSubstr("of no points"));
     plan.points = 11;
-    EXPECT_THAT(message_of<InputError>([&] { make(plan, 10); }), HasSubstr("10 is the limit"));
+    EXPECT_THAT(message_of<InputError>([&] { make_points(plan, 10); }), HasSubstr("10 is the limit"));
     plan.kind = Kind::grid;
     plan.points = 0;
-    EXPECT_THAT(message_of<InputError>([&] { make(plan, 10); }),
+    EXPECT_THAT(message_of<InputError>([&] { make_points(plan, 10); }),
                 HasSubstr("a: a grid has no place for a distribution"));
     plan.factors.push_back({.key = "b", .takes = Normal{}});
     plan.correlations = {{"a", "b", 0.5}};
-    EXPECT_THAT(message_of<InputError>([&] { make(plan, 10); }), HasSubstr("a grid has no correlations"));
+    EXPECT_THAT(message_of<InputError>([&] { make_points(plan, 10); }), HasSubstr("a grid has no correlations"));
     plan.factors.clear();
-    EXPECT_THROW(make(plan, 10), InputError);
+    EXPECT_THROW(make_points(plan, 10), InputError);
 }
 
 Plan correlated_plan(CorrelationOf of) {
@@ -394,7 +394,7 @@ TEST(Correlations, AreThoseAskedFor) {
     const boost::math::normal standard;
     for (const CorrelationOf of : {CorrelationOf::ranks, CorrelationOf::normal_scores}) {
         const Plan plan = correlated_plan(of);
-        const Points points = make(plan, no_limit);
+        const Points points = make_points(plan, no_limit);
         const auto n = static_cast<double>(points.count);
         std::vector<std::vector<double>> scores(plan.factors.size());
         for (std::size_t f = 0; f < scores.size(); ++f) {
@@ -424,8 +424,8 @@ TEST(Correlations, LeaveTheDistributionsAsTheyAre) {
     const Plan plan = correlated_plan(CorrelationOf::ranks);
     Plan independent = plan;
     independent.correlations.clear();
-    const Points points = make(plan, no_limit);
-    const Points without = make(independent, no_limit);
+    const Points points = make_points(plan, no_limit);
+    const Points without = make_points(independent, no_limit);
     // Factors that nothing is said of, and the first of those that depend on each other, keep their values.
     for (const std::size_t f : {0U, 1U, 4U}) EXPECT_EQ(column(points, f), column(without, f));
     for (const std::size_t f : {2U, 3U}) {
