@@ -101,7 +101,7 @@ void GaussianCopula::operator()(std::span<const double> u, std::span<Probability
         z[i] = u[i] < 0.5 ? boost::math::quantile(standard, u[i])
                           : boost::math::quantile(boost::math::complement(standard, 1.0 - u[i]));
     }
-    // In place from the last on: rows need only what is before them.
+    // The product overwrites z, so it runs from the last row to the first: a row uses only the scores before its own.
     for (std::size_t i = u.size(); i-- > 0;) {
         if (depends_[i] == 0) continue;
         double w = 0.0;

@@ -39,7 +39,7 @@ std::uint64_t point_count(const Plan& plan, std::uint64_t limit);
 /// The points of the plan in the units of the factors: points x factors, in the order of the plan.
 ///
 /// The same plan gives the same points; a Sobol' sequence with more points begins with those of one with fewer. Throws
-/// what point_count() throws, before memory is asked for, and what room_for() throws.
+/// InputError under the conditions of point_count(), before memory is asked for, and of room_for().
 Points make_points(const Plan& plan, std::uint64_t limit);
 
 /// Points of the unit cube at the quantiles of independent factors: what a design for sensitivity indices wants.

@@ -78,7 +78,7 @@ void check(const Factor& factor);
 /// The same for all factors of a design; also where there is none or two have one key.
 void check(std::span<const Factor> factors);
 
-/// A probability and what it leaves to 1, each exact where it is small.
+/// A probability and its complement, each exact where it is small.
 struct Probability {
     double below = 0.0;
     double above = 1.0;
@@ -87,11 +87,11 @@ struct Probability {
 
 /// From the unit interval to values of one factor.
 ///
-/// A distribution F with bounds a and b has the quantile function of what lies within, x(u) = F^-1(F(a) + u (F(b) -
-/// F(a))); outside of the bounds there is nothing, and mean and deviation are those of the distribution cut off.
-/// Boost's quantiles are asked by the smaller of the two tails, so that no digits are lost in either. x(u) never
-/// decreases (but for the last digit of Boost's quantiles, where two u are neighbours) and never leaves the bounds.
-/// Levels are equally likely: u in [i/n, (i + 1)/n) is level i of n.
+/// A distribution F is truncated at its bounds a and b. Its quantile function is x(u) = F^-1(F(a) + u (F(b) - F(a))),
+/// so that mean and standard deviation are those of the truncated distribution. Boost's quantiles are asked by the
+/// smaller of the two tails, so that no digits are lost in either. x(u) never decreases (but for the last digit of
+/// Boost's quantiles, where two u are neighbours) and never leaves the bounds. Levels are equally likely: u in [i/n, (i
+/// + 1)/n) is level i of n.
 class Marginal {
    public:
     /// Throws what check() throws.

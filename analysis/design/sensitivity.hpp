@@ -19,7 +19,8 @@ namespace ringlock::design {
 /// \param base_points  n; powers of 2 are balanced best
 /// \param factors      k
 /// \param limit        on the number of evaluations n (k + 2)
-/// Throws InputError where n or k is 0, n (k + 2) is above the limit (no overflow), and what sobol() throws for 2 k.
+/// Throws InputError where n or k is 0, where n (k + 2) is above the limit (computed without overflow), and where
+/// sobol() does not support 2 k dimensions.
 Points sensitivity_points(std::uint64_t base_points, std::uint64_t factors, std::uint64_t seed, std::uint64_t limit);
 
 /// What a model made of sensitivity_points().
@@ -27,8 +28,8 @@ struct Evaluations {
     std::size_t base_points = 0;
     std::size_t factors = 0;
     std::size_t outputs = 0;
-    /// [evaluation][output], evaluations in the order of sensitivity_points(). What is not finite leaves its base point
-    /// out, for that output.
+    /// [evaluation][output], evaluations in the order of sensitivity_points(). A base point with a value
+    /// that is not finite is left out, for that output.
     std::span<const double> values = {};
     /// Variance that each value has of its own noise: of a Monte Carlo estimate, the square of its standard error. As
     /// many as values and >= 0 where the value is finite, or empty: not known.
@@ -86,10 +87,10 @@ inline constexpr std::size_t fewest_base_points = 16;
 ///                                                Simul. 23, 11, 2013
 ///     ST_i = mean((f_A - f_AB_i)^2)/(2 V)        Jansen, Comput. Phys. Commun. 117, 35, 1999
 ///
-/// Intervals: bootstrap over base points, m and V anew in each round. It takes base points for independent; those of a
-/// scrambled Sobol' sequence are better than that, and intervals are wider than the errors of smooth models
-/// (docs/design.md has what was measured). Indices are not clipped: of factors without influence they scatter about 0,
-/// and S_i below it.
+/// Intervals are bootstrap intervals over the base points; each round estimates m and V anew. The bootstrap assumes
+/// independent base points. Those of a scrambled Sobol' sequence cover the cube more evenly, so that the intervals are
+/// wider than the errors of smooth models (docs/design.md has what was measured). Indices are not clipped: of factors
+/// without influence they scatter about 0, and S_i below it.
 ///
 /// Noise of the evaluations that is independent between them lowers S_i by the factor 1 - noise share, and brings ST_i
 /// towards 1: ST_i (1 - share) + share, also for factors without influence. Where evaluations share their random

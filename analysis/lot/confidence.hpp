@@ -17,7 +17,7 @@ struct Interval {
 /// How the number of gyros came about.
 enum class Sampling {
     fixed,          ///< chosen before any gyro was seen
-    until_precise,  ///< a StoppingRule looked at the figures and decided: intervals are wider by what that costs
+    until_precise,  ///< a StoppingRule chose it from the figures; intervals are wider, so that they keep their coverage
 };
 
 /// What an interval is to hold.

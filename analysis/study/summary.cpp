@@ -330,6 +330,13 @@ std::vector<double> random_walks_deg_rt_h(const ArmStatistics& arm) {
     return values;
 }
 
+bool has_arw(const ArmSummary& arm) { return arm.arw_deg_rt_h.median || arm.arw_deg_rt_h.hi; }
+
+bool has_closed_form(const ArmSummary& arm) {
+    return std::any_of(arm.sweep.begin(), arm.sweep.end(),
+                       [](const SweepPoint& point) { return point.closed_form_rate_deg_h.has_value(); });
+}
+
 std::optional<double> locked_up_to_deg_h(const ArmSummary& arm) {
     std::optional<double> edge;
     for (const SweepPoint& point : arm.sweep) {

@@ -127,6 +127,12 @@ struct Summary {
     Theory theory;               ///< of the scenario's device without spread
 };
 
+/// Whether a random walk, or a limit of it, is told of the arm.
+bool has_arw(const ArmSummary& arm);
+
+/// Whether rates of the arm's sweep are known in closed form.
+bool has_closed_form(const ArmSummary& arm);
+
 /// Highest rate of the sweep up to which, from its first rate that can tell on, every gyro of the arm is locked; none
 /// where the first is not.
 std::optional<double> locked_up_to_deg_h(const ArmSummary& arm);
