@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "engine/core/units.hpp"
 #include "engine/scenario/active_effects.hpp"
@@ -49,6 +50,22 @@ std::vector<std::string> with_keys_of_effects(const Scenario& s, std::vector<std
     return keys;
 }
 
+/// A rate and the keys that it comes from.
+struct RateOfKeys {
+    double rate_deg_h;
+    std::vector<std::string> keys;
+};
+
+/// Keys of all these rates, those of the largest first.
+std::vector<std::string> keys_by_rate(std::vector<RateOfKeys> rates) {
+    // Stable, so that equal rates keep the order of effects.
+    std::stable_sort(rates.begin(), rates.end(),
+                     [](const RateOfKeys& a, const RateOfKeys& b) { return a.rate_deg_h > b.rate_deg_h; });
+    std::vector<std::string> keys;
+    for (const RateOfKeys& rate : rates) keys.insert(keys.end(), rate.keys.begin(), rate.keys.end());
+    return keys;
+}
+
 Finding dither_reverses_the_rate(const Scenario& s) {
     const double asymmetry = largest_asymmetry(s);
     const double smallest =
@@ -80,13 +97,13 @@ Finding dither_reverses_the_rate(const Scenario& s) {
 Finding dither_reverses_effects(const Scenario& s) {
     double certain = exposure(s).input_rate_deg_h;
     double random = 0.0;
-    std::vector<std::pair<double, std::vector<std::string>>> rates;
+    std::vector<RateOfKeys> rates;
     for (const EffectBounds& bounds : bounds_of_effects(s)) {
         const double rate = bounds.certain.rate_deg_h + sigmas * bounds.rate_sd_deg_h;
         if (rate == 0.0) continue;
         certain += bounds.certain.rate_deg_h;
         random = std::hypot(random, bounds.rate_sd_deg_h);
-        rates.emplace_back(rate, keys_of(*bounds.effect));
+        rates.push_back({rate, keys_of(*bounds.effect)});
     }
     const double rate = certain + sigmas * random;
     const double swing = 1.0 - amplitude_change_relative(s.dither, s.ensemble.settle_s + s.ensemble.duration_s);
@@ -94,9 +111,7 @@ Finding dither_reverses_effects(const Scenario& s) {
                             (1.0 - largest_asymmetry(s)) * swing;
     constexpr double most = 0.9;
     if (rates.empty() || rate < most * smallest) return {};
-    std::stable_sort(rates.begin(), rates.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-    std::vector<std::string> keys;
-    for (const auto& [size, names] : rates) keys.insert(keys.end(), names.begin(), names.end());
+    std::vector<std::string> keys = keys_by_rate(std::move(rates));
     for (const char* key :
          {"environment.temperature_ramp_k_per_h", "environment.temperature_swing_k",
           "environment.profile_temperature_k", "input.profile_rate_deg_h", "input.rate_deg_h", "input.sweep_stop_deg_h",
@@ -113,18 +128,15 @@ Finding dither_reverses_effects(const Scenario& s) {
 
 /// Keys of the rates that matter in comparison with the dither's, that of the largest first.
 std::vector<std::string> keys_of_rates(const Scenario& s) {
-    std::vector<std::pair<double, std::vector<std::string>>> rates;
+    std::vector<RateOfKeys> rates;
     rates.push_back({exposure(s).input_rate_deg_h,
                      has_profile(s.input) ? std::vector<std::string>{"input.profile_rate_deg_h"}
                                           : std::vector<std::string>{"input.rate_deg_h", "input.sweep_stop_deg_h"}});
     for (const EffectBounds& bounds : bounds_of_effects(s)) {
         const double rate = bounds.certain.rate_deg_h + sigmas * bounds.rate_sd_deg_h;
-        if (rate > 0.01 * peak_rate_deg_h(s)) rates.emplace_back(rate, keys_of(*bounds.effect));
+        if (rate > 0.01 * peak_rate_deg_h(s)) rates.push_back({rate, keys_of(*bounds.effect)});
     }
-    std::stable_sort(rates.begin(), rates.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-    std::vector<std::string> keys;
-    for (const auto& [rate, names] : rates) keys.insert(keys.end(), names.begin(), names.end());
-    return keys;
+    return keys_by_rate(std::move(rates));
 }
 
 Finding turns_are_reached(const Scenario& s) {
@@ -291,6 +303,10 @@ Finding turn_map_has_narrow_tables(const Scenario& s) {
                     s.propagation.turn_map_tolerance_rad, way_without_tables(s))};
 }
 
+bool an_arm_injects_noise(const Scenario& s) {
+    return std::any_of(s.arms.begin(), s.arms.end(), [](const Arm& arm) { return arm.noise_injected; });
+}
+
 Finding loop_must_be_stable(const Scenario& s) {
     if (amplitude_loop_is_stable(s)) return {};
     return Complaint{
@@ -354,9 +370,8 @@ Finding sinusoidal_noise_is_slow(const Scenario& s) {
 }
 
 Finding changing_amplitudes_need_moebius_maps(const Scenario& s) {
-    const bool injected = std::any_of(s.arms.begin(), s.arms.end(), [](const Arm& arm) { return arm.noise_injected; });
     const NoiseInjection& noise = s.noise_injection;
-    if (!injected || noise.model != NoiseModel::drive || noise.form == gyro::NoiseForm::white) return {};
+    if (!an_arm_injects_noise(s) || noise.model != NoiseModel::drive || noise.form == gyro::NoiseForm::white) return {};
     if (s.propagation.method != PropagationMethod::turn_map || configured_setup(s).lockin_second_ratio == 0.0)
         return {};
     return Complaint{
@@ -366,8 +381,7 @@ Finding changing_amplitudes_need_moebius_maps(const Scenario& s) {
 }
 
 Finding noise_leaves_the_dither(const Scenario& s) {
-    const bool injected = std::any_of(s.arms.begin(), s.arms.end(), [](const Arm& arm) { return arm.noise_injected; });
-    if (!injected || !amplitude_loop_is_stable(s)) return {};
+    if (!an_arm_injects_noise(s) || !amplitude_loop_is_stable(s)) return {};
     // Eight standard deviations of the amplitude leave half of it.
     const InjectedNoise noise = injected_noise(s);
     const double half_swing_rad = 0.5 * phase_amplitude_rad(s);
@@ -428,19 +442,19 @@ Finding keys_are_the_instruments(const Scenario& s) {
                                  key)};
 }
 
+bool follows_pulses(const Arm& arm) {
+    return arm.compensator == Compensator::extrapolated || arm.compensator == Compensator::adaptive;
+}
+
 Finding pulses_are_there(const Scenario& s) {
     if (s.readout.model != ReadoutModel::latched) return {};
     for (const Arm& arm : s.arms) {
-        if (arm.compensator != Compensator::extrapolated && arm.compensator != Compensator::adaptive) continue;
+        if (!follows_pulses(arm)) continue;
         return Complaint{
             {"arms.names", "readout.model"},
             fmt::format("arm \"{}\" needs the pulses' times; set readout.model = \"instrument\"", arm.name)};
     }
     return {};
-}
-
-bool follows_pulses(const Arm& arm) {
-    return arm.compensator == Compensator::extrapolated || arm.compensator == Compensator::adaptive;
 }
 
 Finding clock_tells_pulses_apart(const Scenario& s) {
