@@ -1,0 +1,113 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/core/units.hpp"
+#include "engine/scenario/active_effects.hpp"
+#include "engine/scenario/rules.hpp"
+
+namespace ringlock::scenario {
+namespace {
+
+Finding sample_holds_a_cycle(const Scenario& s) {
+    const double cycle = 1.0 / s.dither.frequency_hz;
+    if (s.output.sample_interval_s >= cycle) return {};
+    return Complaint{{"output.sample_interval_s", "dither.frequency_hz"},
+                     fmt::format("samples every {:g} s must be at least one dither cycle apart, {:.6g} s",
+                                 s.output.sample_interval_s, cycle)};
+}
+
+Finding run_holds_samples(const Scenario& s) {
+    constexpr double fewest = 3.0;
+    if (s.ensemble.duration_s >= fewest * s.output.sample_interval_s) return {};
+    return Complaint{
+        {"ensemble.duration_s", "output.sample_interval_s"},
+        fmt::format("a run of {:g} s must hold at least {:g} samples of {:g} s each (an Allan deviation needs "
+                    "them)",
+                    s.ensemble.duration_s, fewest, s.output.sample_interval_s)};
+}
+
+/// Dither cycles of the longest averaging time: an Allan deviation needs two of it, and the record is of whole samples
+/// of whole cycles.
+double longest_average_cycles(const Scenario& s) {
+    const double frequency = s.dither.frequency_hz;
+    const double sample_cycles = std::max(1.0, std::round(s.output.sample_interval_s * frequency));
+    const double samples = std::floor(s.ensemble.duration_s * frequency / sample_cycles + 1e-9);
+    return std::floor(0.5 * samples * sample_cycles);
+}
+
+bool has_deviation_at(const Scenario& s, double tau_s) {
+    const double cycles = std::round(tau_s * s.dither.frequency_hz);
+    return cycles >= 1.0 && cycles <= longest_average_cycles(s);
+}
+
+std::string deviations_text(const Scenario& s) {
+    return fmt::format("there are Allan deviations from {:.4g} s (a dither cycle) to {:.6g} s (half of the record)",
+                       1.0 / s.dither.frequency_hz, longest_average_cycles(s) / s.dither.frequency_hz);
+}
+
+Finding averaging_times_fit(const Scenario& s) {
+    constexpr std::size_t most = 100;
+    if (s.output.tau_s.size() > most) {
+        return Complaint{
+            {"output.tau_s"},
+            fmt::format("has {} averaging times; at most {} can be asked for", s.output.tau_s.size(), most)};
+    }
+    for (const double tau_s : s.output.tau_s) {
+        if (has_deviation_at(s, tau_s)) continue;
+        return Complaint{{"output.tau_s", "ensemble.duration_s", "dither.frequency_hz"},
+                         fmt::format("an averaging time of {:g} s is not there: {}", tau_s, deviations_text(s))};
+    }
+    return {};
+}
+
+Finding specification_can_be_met(const Scenario& s) {
+    const Specification& wanted = s.specification;
+    if (wanted.bias_stability_deg_h > 0.0 && !has_deviation_at(s, wanted.at_s)) {
+        return Complaint{{"specification.at_s", "specification.bias_stability_deg_h", "ensemble.duration_s"},
+                         fmt::format("an averaging time of {:g} s is not there: {}", wanted.at_s, deviations_text(s))};
+    }
+    if (wanted.angle_error_arcsec > 0.0 && wanted.after_s > s.ensemble.duration_s) {
+        return Complaint{{"specification.after_s", "specification.angle_error_arcsec", "ensemble.duration_s"},
+                         fmt::format("the record ends after {:g} s; ask for an earlier time or set a longer "
+                                     "ensemble.duration_s",
+                                     s.ensemble.duration_s)};
+    }
+    double white = 0.0;
+    std::vector<std::string> keys{"specification.arw_deg_rt_h"};
+    for (const auto& [effect, values] : active_effects(s)) {
+        const double density = effect->rate_noise(*values).white_deg2_h2_s;
+        if (!(density > 0.0)) continue;
+        white += density;
+        const auto more = keys_of(*effect);
+        keys.insert(keys.end(), more.begin(), more.end());
+    }
+    const double declared = std::sqrt(white) * units::deg_rt_h_per_arcsec_rt_s;
+    if (wanted.arw_deg_rt_h == 0.0 || wanted.arw_deg_rt_h > declared) return {};
+    return Complaint{
+        std::move(keys),
+        fmt::format("no arm can meet it: effects alone make a random walk of {:.4g} deg/sqrt(h)", declared)};
+}
+
+constexpr std::array all_output_rules = {
+    Rule{"A sample of the output is at least one dither cycle long.", sample_holds_a_cycle},
+    Rule{"A run holds at least three samples.", run_holds_samples},
+    Rule{"Averaging times asked for (at most 100) are between a dither cycle and half of the record.",
+         averaging_times_fit},
+    Rule{"A specification asks for averaging and other times that the record has, and for no less random walk than "
+         "effects make by themselves.",
+         specification_can_be_met},
+};
+
+}  // namespace
+
+std::span<const Rule> output_rules() { return all_output_rules; }
+
+}  // namespace ringlock::scenario
