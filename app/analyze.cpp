@@ -1,8 +1,18 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include "analysis/allan/estimator.hpp"
 #include "analysis/report/plot.hpp"
 #include "analysis/study/family.hpp"
 #include "analysis/study/result_file.hpp"
@@ -10,37 +20,125 @@
 #include "app/command.hpp"
 #include "app/output.hpp"
 #include "app/study_output.hpp"
+#include "engine/core/error.hpp"
 
 namespace ringlock::app {
+namespace {
+
+struct Arguments {
+    std::string file;
+    std::string plot;
+    std::string dev;
+    std::optional<std::string> tau;
+    bool json = false;
+};
+
+/// A result without records can only be made anew; the error says how to run it.
+void need_angle_records(const std::string& file, const study::Study& study, const std::vector<AveragingTime>& asked) {
+    if (study.scenario.output.angle_record) return;
+    const double interval_s = study.schedule.sample_interval_s;
+    std::string times;
+    for (const AveragingTime& time : asked) {
+        times += fmt::format("{}{:.10g}", times.empty() ? "" : ", ",
+                             time.time_s.value_or(interval_s * static_cast<double>(time.samples)));
+    }
+    throw InputError(fmt::format(
+        "{}: --tau needs the angle records, which were not stored (output.angle_record = false). Run the scenario "
+        "anew with output.tau_s = [{}], which is computed while the study runs, or with output.angle_record = true",
+        file, times));
+}
+
+/// Fills in the nearest whole number of samples. Who asks for the interval between samples or for half of the duration
+/// as the scenario names them finds them, although they were rounded to whole cycles of the dither and whole samples.
+void find_among_samples(const study::Study& study, AveragingTime& time) {
+    const scenario::Scenario& scenario = study.scenario;
+    const std::int64_t largest = allan::largest_factor(allan::Estimator::oadev, study.schedule.samples);
+    const double interval_s = study.schedule.sample_interval_s;
+    const auto range = [&] {
+        return fmt::format(
+            "the stored samples have averaging times from {:.6g} s (one sample) to {:.6g} s ({} samples)", interval_s,
+            interval_s * static_cast<double>(largest), largest);
+    };
+    if (!time.time_s) {
+        if (time.samples <= largest) return;
+        throw InputError(
+            fmt::format("--tau {}: more samples than half of the record, and an Allan deviation needs two of the "
+                        "averaging time; {}. A time in seconds has the unit s",
+                        time.text, range()));
+    }
+    if (*time.time_s < std::min(interval_s, scenario.output.sample_interval_s)) {
+        throw InputError(fmt::format(
+            "--tau {}: shorter than a stored sample; {}. A run with this time in output.tau_s has it, from a cycle of "
+            "the dither ({:.4g} s) on",
+            time.text, range(), study.schedule.cycle_s));
+    }
+    constexpr double rounding = 1.0 + 1e-9;  // of a duration that is no binary fraction
+    if (*time.time_s > 0.5 * scenario.ensemble.duration_s * rounding) {
+        throw InputError(
+            fmt::format("--tau {}: longer than half of the record, and an Allan deviation needs two of the averaging "
+                        "time; {}. A longer one wants a longer ensemble.duration_s",
+                        time.text, range()));
+    }
+    time.samples = std::min(std::max<std::int64_t>(1, std::llround(*time.time_s / interval_s)), largest);
+}
+
+/// The averaging times of --tau among the samples of the result: ascending, each once.
+std::vector<AveragingTime> averaging_times(const std::string& file, const study::Study& study,
+                                           std::vector<AveragingTime> asked) {
+    if (asked.empty()) return asked;
+    need_angle_records(file, study, asked);
+    for (AveragingTime& time : asked) find_among_samples(study, time);
+    const auto key = [](const AveragingTime& time) { return std::pair(time.samples, time.time_s); };
+    std::sort(asked.begin(), asked.end(), [&](const auto& a, const auto& b) { return key(a) < key(b); });
+    asked.erase(std::unique(asked.begin(), asked.end(), [&](const auto& a, const auto& b) { return key(a) == key(b); }),
+                asked.end());
+    return asked;
+}
+
+void add_asked(const std::string& file, const study::Study& study, const std::vector<AveragingTime>& asked,
+               study::Summary& summary) {
+    if (asked.empty()) return;
+    std::vector<std::int64_t> factors;
+    for (const AveragingTime& time : asked) {
+        if (factors.empty() || factors.back() != time.samples) factors.push_back(time.samples);
+    }
+    const auto family = study::family_deviations(file, study, std::array{allan::Estimator::oadev}, factors);
+    for (std::size_t i = 0; i < family.size(); ++i) summary.arms[i].asked = family[i].front().points;
+}
+
+void analyze(const Arguments& arguments) {
+    check_figure(arguments.plot);
+    const auto estimators = arguments.dev.empty() ? std::vector<allan::Estimator>{} : parse_deviations(arguments.dev);
+    auto asked = arguments.tau ? parse_averaging_times("--tau", *arguments.tau) : std::vector<AveragingTime>{};
+    const study::Study study = study::read_result(arguments.file);
+    asked = averaging_times(arguments.file, study, std::move(asked));
+    const store::Provenance provenance = study::read_provenance(arguments.file);
+    study::Summary summary = study::summarise(study);
+    if (!estimators.empty()) {
+        auto family = study::family_deviations(arguments.file, study, estimators);
+        for (std::size_t i = 0; i < family.size(); ++i) summary.arms[i].family = std::move(family[i]);
+    }
+    add_asked(arguments.file, study, asked, summary);
+    if (!arguments.plot.empty()) report::write_svg(arguments.plot, study_figure(study, summary));
+    if (arguments.json) return put(study_json(study, summary, provenance));
+    put(study_text(study, summary, provenance) + (asked.empty() ? "" : asked_text(study, summary, asked)));
+}
+
+}  // namespace
 
 void add_analyze(CLI::App& root) {
-    struct Arguments {
-        std::string file;
-        std::string plot;
-        std::string dev;
-        bool json = false;
-    };
     CLI::App* command =
         root.add_subcommand("analyze", "Compare the arms of a result: Allan deviation, noise, rate error");
     auto arguments = std::make_shared<Arguments>();
     command->add_option("OUT.h5", arguments->file, "result of ringlock run")->required();
     command->add_option("--dev", arguments->dev,
                         "also these deviations of the angle records, comma between: " + known_deviations());
+    command->add_option("--tau", arguments->tau,
+                        "also the Allan deviation of the angle records at these averaging times, comma between: times "
+                        "with a unit (100s, 2min, 1h) or averaging factors M of stored samples");
     command->add_option("--plot", arguments->plot, "also draw the figure into this SVG file");
     command->add_flag("--json", arguments->json, "print one JSON object instead of a table");
-    command->callback([arguments] {
-        check_figure(arguments->plot);
-        const auto asked = arguments->dev.empty() ? std::vector<allan::Estimator>{} : parse_deviations(arguments->dev);
-        const study::Study study = study::read_result(arguments->file);
-        const store::Provenance provenance = study::read_provenance(arguments->file);
-        study::Summary summary = study::summarise(study);
-        if (!asked.empty()) {
-            auto family = study::family_deviations(arguments->file, study, asked);
-            for (std::size_t i = 0; i < family.size(); ++i) summary.arms[i].family = std::move(family[i]);
-        }
-        if (!arguments->plot.empty()) report::write_svg(arguments->plot, study_figure(study, summary));
-        put(arguments->json ? study_json(study, summary, provenance) : study_text(study, summary, provenance));
-    });
+    command->callback([arguments] { analyze(*arguments); });
 }
 
 }  // namespace ringlock::app

@@ -4,13 +4,50 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include "engine/core/error.hpp"
 #include "engine/scenario/parse.hpp"
 
 namespace ringlock::app {
+namespace {
+
+/// The number at the beginning of a text, and what follows it; nothing where there is none.
+template <class T>
+std::optional<std::pair<T, std::string_view>> leading_number(std::string_view text) {
+    T value{};
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc()) return std::nullopt;
+    return std::pair{value, text.substr(static_cast<std::size_t>(end - text.data()))};
+}
+
+/// Seconds in a unit of time; 0 for what is none.
+double seconds_in(std::string_view unit) {
+    if (unit == "s") return 1.0;
+    if (unit == "min") return 60.0;
+    return unit == "h" ? 3600.0 : 0.0;
+}
+
+std::optional<AveragingTime> averaging_time(const std::string& text) {
+    if (const auto factor = leading_number<std::int64_t>(text); factor && factor->second.empty()) {
+        if (factor->first < 1) return std::nullopt;
+        return AveragingTime{text, std::nullopt, factor->first};
+    }
+    const auto number = leading_number<double>(text);
+    if (!number) return std::nullopt;
+    const double time_s = number->first * seconds_in(number->second);
+    if (!(time_s > 0.0) || !std::isfinite(time_s)) return std::nullopt;
+    return AveragingTime{text, time_s, 0};
+}
+
+}  // namespace
 
 std::int64_t whole_number(std::string_view option, const std::string& text, std::int64_t largest,
                           std::string_view allowed) {
@@ -71,6 +108,28 @@ std::vector<allan::Estimator> parse_deviations(const std::string& list) {
             throw InputError(fmt::format("--dev '{}' is not known; there are {}", part, known_deviations()));
         }
         if (std::find(out.begin(), out.end(), *estimator) == out.end()) out.push_back(*estimator);
+    }
+    return out;
+}
+
+std::vector<AveragingTime> parse_averaging_times(std::string_view option, const std::string& list) {
+    constexpr std::string_view allowed =
+        "times with a unit (100s, 2min, 1h) or averaging factors (whole numbers of samples from 1), comma between";
+    if (list.find_first_not_of(' ') == std::string::npos) {
+        throw InputError(fmt::format("{}: the list is empty; say {}", option, allowed));
+    }
+    const std::vector<std::string> parts = split(list);
+    constexpr std::size_t most = 100;
+    if (parts.size() > most) {
+        throw InputError(
+            fmt::format("{}: {} averaging times; at most {} can be asked for at once, the others in another call",
+                        option, parts.size(), most));
+    }
+    std::vector<AveragingTime> out;
+    for (const std::string& part : parts) {
+        const auto time = averaging_time(part);
+        if (!time) throw InputError(fmt::format("{} '{}': must be {}", option, part, allowed));
+        out.push_back(*time);
     }
     return out;
 }

@@ -38,4 +38,14 @@ std::string known_deviations();
 /// The deviations of a list such as --dev has, each once. Throws InputError.
 std::vector<allan::Estimator> parse_deviations(const std::string& list);
 
+/// One of the averaging times of a list such as `analyze --tau` has.
+struct AveragingTime {
+    std::string text;              ///< as given
+    std::optional<double> time_s;  ///< of a number with a unit
+    std::int64_t samples = 0;      ///< averaging factor; 0 where a time is given and no sampling interval is known yet
+};
+
+/// Numbers with a unit are times (100s, 2min, 1h), those without are averaging factors. Throws InputError.
+std::vector<AveragingTime> parse_averaging_times(std::string_view option, const std::string& list);
+
 }  // namespace ringlock::app

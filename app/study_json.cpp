@@ -162,6 +162,18 @@ Json json_paired(const lot::PairedFigure& figure) {
             {"gyros", figure.pairs}};
 }
 
+Json json_allan(const std::vector<study::EnsemblePoint>& points) {
+    Json list = Json::array();
+    for (const study::EnsemblePoint& point : points) {
+        list.push_back({{"tau_s", point.tau_s},
+                        {"dev_deg_h", number(point.dev_deg_h)},
+                        {"lo", number(point.lo)},
+                        {"hi", number(point.hi)},
+                        {"edf", number(point.edf)}});
+    }
+    return list;
+}
+
 Json json_arm(const study::ArmSummary& arm) {
     Json json{{"gyros", arm.gyros},
               {"arw_deg_rt_h", study::has_arw(arm) ? json_figure(arm.arw_deg_rt_h) : Json(nullptr)},
@@ -175,14 +187,8 @@ Json json_arm(const study::ArmSummary& arm) {
     if (arm.yield) json["yield"] = json_yield(*arm.yield);
     if (arm.noise_effectiveness) json["noise_effectiveness"] = json_noise(*arm.noise_effectiveness);
     add_scale_factor(json, arm.scale_factor);
-    json["allan"] = Json::array();
-    for (const study::EnsemblePoint& point : arm.allan) {
-        json["allan"].push_back({{"tau_s", point.tau_s},
-                                 {"dev_deg_h", number(point.dev_deg_h)},
-                                 {"lo", number(point.lo)},
-                                 {"hi", number(point.hi)},
-                                 {"edf", number(point.edf)}});
-    }
+    json["allan"] = json_allan(arm.allan);
+    if (!arm.asked.empty()) json["asked"] = json_allan(arm.asked);
     if (!arm.family.empty()) json["deviations"] = json_family(arm.family);
     if (!arm.sweep.empty()) {
         json["locked_up_to_deg_h"] = number(study::locked_up_to_deg_h(arm));

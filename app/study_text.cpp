@@ -99,24 +99,30 @@ std::string yield_text(const study::Summary& summary) {
     return "\nSpecification\n" + table.text();
 }
 
-/// Deviations at the averaging times asked for, arms down.
-std::string asked_text(const study::Study& study, const study::Summary& summary) {
+void add_deviation(report::Table& table, const std::string& arm, const study::EnsemblePoint& p) {
+    table.add_row({arm, fmt::format("{:.6g}", p.tau_s), fmt::format("{:.4g}", p.dev_deg_h), interval_cell(p.lo, p.hi)});
+}
+
+report::Table deviation_table() {
+    return report::Table({{"arm", report::Align::left},
+                          {"tau [s]", report::Align::right},
+                          {"deviation", report::Align::right},
+                          {"interval", report::Align::right}});
+}
+
+/// Deviations at the averaging times that the scenario asks for, arms down.
+std::string scenario_times_text(const study::Study& study, const study::Summary& summary) {
     if (study.scenario.output.tau_s.empty()) return "";
     std::string text = "\nAllan deviation [deg/h], 68.27 % intervals\n";
     std::vector<std::int64_t> asked;
     for (const double tau_s : study.scenario.output.tau_s) asked.push_back(ensemble::cycles_in(study.schedule, tau_s));
     std::sort(asked.begin(), asked.end());
     asked.erase(std::unique(asked.begin(), asked.end()), asked.end());
-    report::Table table({{"arm", report::Align::left},
-                         {"tau [s]", report::Align::right},
-                         {"deviation", report::Align::right},
-                         {"interval", report::Align::right}});
+    report::Table table = deviation_table();
     for (const study::ArmSummary& arm : summary.arms) {
         for (std::size_t i = 0; i < arm.allan.size(); ++i) {
             if (!std::binary_search(asked.begin(), asked.end(), study.factors[i])) continue;
-            const study::EnsemblePoint& p = arm.allan[i];
-            table.add_row({arm.name, fmt::format("{:.6g}", p.tau_s), fmt::format("{:.4g}", p.dev_deg_h),
-                           interval_cell(p.lo, p.hi)});
+            add_deviation(table, arm.name, arm.allan[i]);
         }
     }
     return text + table.text();
@@ -341,10 +347,31 @@ std::string study_text(const study::Study& study, const study::Summary& summary,
                     provenance.scenario_file, study.gyros.size(), duration_s, summary.seed, summary.turns,
                     provenance.wall_s, static_cast<double>(summary.turns) / provenance.wall_s);
     text += arm_tables(summary) + "\n" + walk_notes(summary) + reduction_text(summary) + pairs_text(summary) +
-            asked_text(study, summary) + yield_text(summary);
+            scenario_times_text(study, summary) + yield_text(summary);
     for (const study::ArmSummary& arm : summary.arms) text += noise_text(arm);
     if (!summary.arms.front().sweep.empty()) text += "\n" + sweep_text(study, summary);
     if (!summary.arms.front().family.empty()) text += family_text(summary);
+    return text;
+}
+
+std::string asked_text(const study::Study& study, const study::Summary& summary, std::span<const AveragingTime> asked) {
+    report::Table table = deviation_table();
+    for (const study::ArmSummary& arm : summary.arms) {
+        for (const study::EnsemblePoint& point : arm.asked) add_deviation(table, arm.name, point);
+    }
+    const double interval_s = study.schedule.sample_interval_s;
+    std::string text = fmt::format(
+        "\nAllan deviation [deg/h] at the averaging times asked for, from stored samples of {:.6g} s;\n"
+        "68.27 % intervals\n{}",
+        interval_s, table.text());
+    for (const AveragingTime& time : asked) {
+        if (!time.time_s) continue;
+        // Both in the digits that the table has: what is the same in them is not worth a line.
+        const std::string wanted = fmt::format("{:.6g}", *time.time_s);
+        const std::string found = fmt::format("{:.6g}", interval_s * static_cast<double>(time.samples));
+        if (wanted == found) continue;
+        text += fmt::format("asked {} s, nearest whole number of samples: {} s\n", wanted, found);
+    }
     return text;
 }
 

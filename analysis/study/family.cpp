@@ -2,6 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
 #include "analysis/allan/allan.hpp"
 #include "analysis/allan/sums/phase.hpp"
 #include "engine/core/error.hpp"
@@ -10,14 +15,25 @@
 namespace ringlock::study {
 namespace {
 
-std::vector<FamilyDeviation> of_arm(const store::Dataset& angles, std::size_t gyros, double interval_s,
-                                    std::span<const allan::Estimator> estimators) {
+/// The record of one gyro. Simulated records have no gaps, and the mean over the gyros wants the same points of all.
+allan::Phase phase_of_row(const store::Dataset& angles, std::size_t gyro, double interval_s) {
+    const std::vector<double> record = angles.read_rows<double>(gyro, 1);
+    if (!std::all_of(record.begin(), record.end(), [](double angle) { return std::isfinite(angle); })) {
+        throw InputError(fmt::format("{}: dataset {}, row {}: holds values that are not finite: the result is damaged",
+                                     angles.file(), angles.path(), gyro));
+    }
+    return allan::phase_of(record, allan::Kind::phase, interval_s);
+}
+
+std::vector<FamilyDeviation> of_arm(const store::Dataset& angles, double interval_s,
+                                    std::span<const allan::Estimator> estimators, std::span<const std::int64_t> asked) {
     std::vector<std::vector<std::vector<allan::Point>>> curves(estimators.size());
-    for (std::size_t gyro = 0; gyro < gyros; ++gyro) {
-        const allan::Phase phase = allan::phase_of(angles.read_rows<double>(gyro, 1), allan::Kind::phase, interval_s);
+    for (std::size_t gyro = 0; gyro < angles.shape()[0]; ++gyro) {
+        const allan::Phase phase = phase_of_row(angles, gyro, interval_s);
         const auto points = static_cast<std::int64_t>(phase.x.size());
         for (std::size_t k = 0; k < estimators.size(); ++k) {
-            const auto factors = allan::octave_factors(allan::largest_factor(estimators[k], points));
+            std::vector<std::int64_t> factors(asked.begin(), asked.end());
+            if (factors.empty()) factors = allan::octave_factors(allan::largest_factor(estimators[k], points));
             curves[k].push_back(allan::deviation(estimators[k], phase, interval_s, factors));
         }
     }
@@ -31,7 +47,8 @@ std::vector<FamilyDeviation> of_arm(const store::Dataset& angles, std::size_t gy
 }  // namespace
 
 std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesystem::path& path, const Study& study,
-                                                            std::span<const allan::Estimator> estimators) {
+                                                            std::span<const allan::Estimator> estimators,
+                                                            std::span<const std::int64_t> factors) {
     const store::File file = store::File::open(path);
     if (!study.scenario.output.angle_record) {
         throw InputError(fmt::format(
@@ -42,11 +59,12 @@ std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesyste
     std::vector<std::vector<FamilyDeviation>> out;
     for (const ArmStatistics& arm : study.arms) {
         const store::Dataset angles = file.group("arms").group(arm.arm.name).dataset("angle_arcsec");
-        if (angles.shape().size() != 2 || angles.shape()[0] != study.gyros.size()) {
-            throw InputError(fmt::format("{}: dataset {} has not one row a gyro: the result is damaged", path.string(),
-                                         angles.path()));
+        if (angles.shape() != store::Shape{study.gyros.size(), static_cast<std::uint64_t>(study.schedule.samples)}) {
+            throw InputError(
+                fmt::format("{}: dataset {} has not one row a gyro and one column a sample: the result is damaged",
+                            path.string(), angles.path()));
         }
-        out.push_back(of_arm(angles, study.gyros.size(), study.schedule.sample_interval_s, estimators));
+        out.push_back(of_arm(angles, study.schedule.sample_interval_s, estimators, factors));
     }
     return out;
 }

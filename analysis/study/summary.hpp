@@ -109,6 +109,7 @@ struct ArmSummary {
     std::vector<Step> steps;                          ///< of the closed form, in the order of the sweep
     std::optional<ScaleFactor> scale_factor;          ///< of sweeps of three rates and more, with two gyros and more
     std::vector<FamilyDeviation> family;              ///< empty unless asked for
+    std::vector<EnsemblePoint> asked;                 ///< of stored samples, at times asked for; empty unless asked for
     std::optional<NoiseFigures> noise_effectiveness;  ///< of the arm `noise_injected`
     std::optional<Reduction> arw_reduction;           ///< of arms with injected noise other than `noise_injected`
 };

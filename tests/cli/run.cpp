@@ -1,10 +1,13 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "engine/store/hdf5.hpp"
 #include "tests/cli/program.hpp"
@@ -416,6 +419,86 @@ TEST_F(RunCommand, AnalyzeTakesTheFamilyFromAngleRecords) {
     }
     EXPECT_THAT(run({"analyze", "out.h5", "--dev", "tdev"}).out, HasSubstr("tdev [arcsec]"));
     expect_refused({"analyze", "out.h5", "--dev", "pdev"}, HasSubstr("'pdev' is not known"));
+}
+
+// Four gyros whose samples are not a whole number of seconds apart.
+TEST_F(RunCommand, AnalyzeTakesDeviationsAtTimesAskedForFromAngleRecords) {
+    ASSERT_EQ(run({"run", "s.toml", "-o", "out.h5", "--set", "dither.frequency_hz=401.3"}).status, 0);
+    // Factors and times may be mixed; what is asked for twice is told once.
+    const Outcome r = run({"analyze", "out.h5", "--json", "--tau", "10s, 1,3,0.1min,1s,3"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    const json found = json::parse(r.out);
+    const double interval_s = found["sample_interval_s"];
+    EXPECT_DOUBLE_EQ(interval_s, 401.0 / 401.3);
+    for (const auto& [name, arm] : found["arms"].items()) {
+        ASSERT_EQ(arm["asked"].size(), 4U) << name;
+        std::map<std::int64_t, double> variance;
+        for (int gyro = 0; gyro < 4; ++gyro) {
+            const std::string column = "/arms/" + name + "/angle_arcsec[" + std::to_string(gyro) + ",:]";
+            const Outcome one = run({"allan", "out.h5", "--column", column, "--kind", "phase", "--unit", "arcsec",
+                                     "--rate", "1.00074812967581", "--tau", "1,3,6,10", "--json"});
+            ASSERT_EQ(one.status, 0) << one.err;
+            for (const json& point : json::parse(one.out)["deviations"]["oadev"]) {
+                variance[point["m"]] += std::pow(point["dev"].get<double>(), 2) / 4.0;
+            }
+        }
+        auto point = arm["asked"].begin();
+        for (const auto& [m, mean] : variance) {
+            SCOPED_TRACE(name + " " + std::to_string(m));
+            EXPECT_DOUBLE_EQ((*point)["tau_s"], static_cast<double>(m) * interval_s);
+            EXPECT_NEAR((*point)["dev_deg_h"].get<double>() / std::sqrt(mean), 1.0, 1e-12) << "rounding of --rate";
+            EXPECT_LT((*point)["lo"], (*point)["dev_deg_h"]);
+            EXPECT_GT((*point)["hi"], (*point)["dev_deg_h"]);
+            EXPECT_GT((*point)["edf"], 4.0);
+            ++point;
+        }
+    }
+    EXPECT_FALSE(json::parse(run({"analyze", "out.h5", "--json"}).out)["arms"]["ideal"].contains("asked"));
+}
+
+TEST_F(RunCommand, AnalyzeSaysWhichTimesAreNoWholeNumberOfSamples) {
+    ASSERT_EQ(run({"run", "s.toml", "-o", "out.h5", "--set", "dither.frequency_hz=401.3"}).status, 0);
+    const Outcome r = run({"analyze", "out.h5", "--tau", "10s,1,25s"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    const std::size_t begin = r.out.find("Allan deviation [deg/h] at the averaging times asked for");
+    ASSERT_NE(begin, std::string::npos) << r.out;
+    const std::string table = r.out.substr(begin);
+    EXPECT_THAT(table, AllOf(HasSubstr("from stored samples of 0.999252 s;\n68.27 % intervals\n"),
+                             HasSubstr("noise_injected+compensated   9.99252")));
+    EXPECT_THAT(table, testing::EndsWith("\nasked 10 s, nearest whole number of samples: 9.99252 s\n"
+                                         "asked 25 s, nearest whole number of samples: 24.9813 s\n"));
+    std::istringstream lines(r.out);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100U) << line;
+    // Samples of a second, to the digits shown: nothing to say.
+    ASSERT_EQ(run({"run", "s.toml", "-o", "whole.h5", "--set", "dither.frequency_hz=400"}).status, 0);
+    EXPECT_THAT(run({"analyze", "whole.h5", "--tau", "10s,25s"}).out, Not(HasSubstr("nearest whole number")));
+}
+
+TEST_F(RunCommand, AveragingTimesThatAreNotThereAreRefused) {
+    ASSERT_EQ(run({"run", "s.toml", "-o", "out.h5", "--set", "dither.frequency_hz=401.3"}).status, 0);
+    const auto refused = [&](const std::string& list, auto... parts) {
+        SCOPED_TRACE(list);
+        expect_refused({"analyze", "out.h5", "--tau", list}, AllOf(HasSubstr("--tau"), HasSubstr(parts)...));
+    };
+    const char* const range = "from 0.999252 s (one sample) to 24.9813 s (25 samples)";
+    refused("10s,0.9s", "0.9s", "shorter than a stored sample", range, "output.tau_s");
+    refused("25.1s", "25.1s", "longer than half of the record", range, "ensemble.duration_s");
+    refused("1e300h", "longer than half of the record");
+    refused("26", "--tau 26", "half of the record", range, "unit s");
+    refused("", "empty", "100s");
+    refused(" ", "empty");
+    for (const char* wrong : {"10s,", ",", "0", "-3", "0s", "-1s", "1.5", "10 s", "5ms", "s", "ten", "nans", "infs",
+                              "1e400s", "0x10", "10S", "10s;20s", "99999999999999999999"}) {
+        refused(wrong, "must be times with a unit (100s, 2min, 1h) or averaging factors");
+    }
+    std::string many = "1s";
+    for (int i = 1; i < 100; ++i) many += ",1s";
+    EXPECT_EQ(run({"analyze", "out.h5", "--tau", many}).status, 0);
+    refused(many + ",1s", "101 averaging times; at most 100");
+    ASSERT_EQ(run({"run", "s.toml", "-o", "bare.h5", "--set", "output.angle_record=false"}).status, 0);
+    expect_refused({"analyze", "bare.h5", "--tau", "10s,0.5s"},
+                   AllOf(HasSubstr("bare.h5"), HasSubstr("not stored"), HasSubstr("output.tau_s = [10, 0.5]"),
+                         HasSubstr("output.angle_record = true")));
 }
 
 TEST_F(RunCommand, DamagedResultsAreRefusedByName) {

@@ -3,10 +3,19 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <set>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include "analysis/study/family.hpp"
 #include "analysis/study/result_file.hpp"
 #include "engine/core/error.hpp"
 #include "tests/unit/result_support.hpp"
@@ -119,6 +128,40 @@ TEST_F(DamagedResult, WrongShapesAreNamedWithBoth) {
     reshape("arms/uncompensated/allan/edf", {taus, 3});
     EXPECT_THAT(complaint_of(path_),
                 AllOf(HasSubstr("/arms/uncompensated/allan/edf"), HasSubstr("the result is damaged")));
+}
+
+TEST_F(DamagedResult, AngleRecordsThatAreNotWholeAreNamed) {
+    const auto complaint = [&]() -> std::string {
+        try {
+            (void)family_deviations(path_, read_result(path_), std::array{allan::Estimator::oadev},
+                                    std::array<std::int64_t, 1>{20});
+        } catch (const InputError& error) {
+            return error.what();
+        }
+        return "(accepted)";
+    };
+    ASSERT_EQ(complaint(), "(accepted)");
+    const std::string name = "/arms/uncompensated/angle_arcsec";
+    // A gyro is missing, a sample is missing, rows are columns.
+    for (const std::vector<hsize_t>& extent : std::vector<std::vector<hsize_t>>{{2, 45}, {3, 44}, {45, 3}, {135}}) {
+        reshape(name.c_str(), extent);
+        EXPECT_THAT(complaint(), AllOf(HasSubstr(path_.string()), HasSubstr(name), HasSubstr("the result is damaged")));
+    }
+    // A value that is none, within a record and at its end: neither is a gap to be bridged.
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    for (const auto& [place, value] : {std::pair{45 + 20, nan}, {2 * 45 - 1, nan}, {45 + 20, infinite}}) {
+        reshape(name.c_str(), {3, 45});
+        change([&](hid_t file) {
+            std::vector<double> angles(3 * 45);
+            for (std::size_t i = 0; i < angles.size(); ++i) angles[i] = std::sin(static_cast<double>(i));
+            angles[static_cast<std::size_t>(place)] = value;
+            const hid_t dataset = H5Dopen2(file, name.c_str(), H5P_DEFAULT);
+            ASSERT_GE(H5Dwrite(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, angles.data()), 0);
+            H5Dclose(dataset);
+        });
+        EXPECT_THAT(complaint(), AllOf(HasSubstr(name), HasSubstr("row 1"), HasSubstr("not finite")));
+    }
 }
 
 TEST_F(DamagedResult, WrongKindsAreNamed) {
