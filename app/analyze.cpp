@@ -95,14 +95,14 @@ std::vector<AveragingTime> averaging_times(const std::string& file, const study:
     return asked;
 }
 
-void add_asked(const std::string& file, const study::Study& study, const std::vector<AveragingTime>& asked,
-               study::Summary& summary) {
+void add_asked(const std::string& file, const study::Experiment& experiment, std::size_t point,
+               const std::vector<AveragingTime>& asked, study::Summary& summary) {
     if (asked.empty()) return;
     std::vector<std::int64_t> factors;
     for (const AveragingTime& time : asked) {
         if (factors.empty() || factors.back() != time.samples) factors.push_back(time.samples);
     }
-    const auto family = study::family_deviations(file, study, std::array{allan::Estimator::oadev}, factors);
+    const auto family = study::family_deviations(file, experiment, point, std::array{allan::Estimator::oadev}, factors);
     for (std::size_t i = 0; i < family.size(); ++i) summary.arms[i].asked = family[i].front().points;
 }
 
@@ -110,18 +110,26 @@ void analyze(const Arguments& arguments) {
     check_figure(arguments.plot);
     const auto estimators = arguments.dev.empty() ? std::vector<allan::Estimator>{} : parse_deviations(arguments.dev);
     auto asked = arguments.tau ? parse_averaging_times("--tau", *arguments.tau) : std::vector<AveragingTime>{};
-    const study::Study study = study::read_result(arguments.file);
-    asked = averaging_times(arguments.file, study, std::move(asked));
+    const study::Experiment experiment = study::read_result(arguments.file);
+    // Points with angle records have one schedule.
+    asked = averaging_times(arguments.file, experiment.points.front(), std::move(asked));
     const store::Provenance provenance = study::read_provenance(arguments.file);
-    study::Summary summary = study::summarise(study);
-    if (!estimators.empty()) {
-        auto family = study::family_deviations(arguments.file, study, estimators);
-        for (std::size_t i = 0; i < family.size(); ++i) summary.arms[i].family = std::move(family[i]);
+    std::vector<study::Summary> summaries = study::summarise(experiment);
+    for (std::size_t point = 0; point < summaries.size(); ++point) {
+        if (!estimators.empty()) {
+            auto family = study::family_deviations(arguments.file, experiment, point, estimators);
+            for (std::size_t i = 0; i < family.size(); ++i) summaries[point].arms[i].family = std::move(family[i]);
+        }
+        add_asked(arguments.file, experiment, point, asked, summaries[point]);
     }
-    add_asked(arguments.file, study, asked, summary);
-    if (!arguments.plot.empty()) report::write_svg(arguments.plot, study_figure(study, summary));
-    if (arguments.json) return put(study_json(study, summary, provenance));
-    put(study_text(study, summary, provenance) + (asked.empty() ? "" : asked_text(study, summary, asked)));
+    if (!arguments.plot.empty()) report::write_svg(arguments.plot, experiment_figure(experiment, summaries));
+    if (arguments.json) return put(experiment_json(experiment, summaries, provenance));
+    std::string text = experiment_text(experiment, summaries, provenance);
+    for (std::size_t point = 0; point < summaries.size() && !asked.empty(); ++point) {
+        if (experiment.has_design()) text += fmt::format("\nPoint {}:", point + 1);
+        text += asked_text(experiment.points[point], summaries[point], asked);
+    }
+    put(text);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/study/design_points.hpp"
 #include "engine/core/error.hpp"
 #include "engine/scenario/parse.hpp"
 
@@ -71,13 +72,13 @@ void add_settings(CLI::App& command, Changes& changes) {
 }
 
 scenario::Scenario load_scenario(const std::string& file, const Changes& changes) {
-    scenario::Scenario scenario = scenario::parse_file(file, changes.settings);
+    std::vector<std::string> settings = changes.settings;
     if (const auto& seed = changes.seed) {
         constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();  // integers of TOML are signed
-        scenario.ensemble.seed = static_cast<std::uint64_t>(
-            whole_number("--seed", *seed, largest, fmt::format("between 0 and {}", largest)));
+        settings.push_back(fmt::format(
+            "ensemble.seed={}", whole_number("--seed", *seed, largest, fmt::format("between 0 and {}", largest))));
     }
-    return scenario;
+    return scenario::parse_file(file, settings, study::complaints);
 }
 
 std::vector<std::string> split(const std::string& text) {

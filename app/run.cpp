@@ -12,6 +12,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -23,7 +24,6 @@
 #include "app/study_output.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
-#include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/progress.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/render.hpp"
@@ -63,6 +63,21 @@ int thread_count(const std::string& asked) {
     return threads > 0 ? threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 }
 
+/// Refuses what the disk cannot hold, before hours are spent on it.
+void check_room(const std::filesystem::path& out, const study::Experiment& plan) {
+    std::error_code unknown;
+    const auto folder = out.has_parent_path() ? out.parent_path() : std::filesystem::path(".");
+    const std::filesystem::space_info space = std::filesystem::space(folder, unknown);
+    const std::uint64_t bytes = study::expected_size_bytes(plan);
+    if (unknown || bytes <= space.available) return;
+    const bool records = plan.scenario.output.angle_record;
+    throw InputError(
+        fmt::format("{}: the result will take about {:.1f} GB, and the disk has {:.1f} GB; {}give a "
+                    "place on another disk with -o",
+                    out.string(), static_cast<double>(bytes) * 1e-9, static_cast<double>(space.available) * 1e-9,
+                    records ? "set output.angle_record = false, or " : ""));
+}
+
 void run(const Arguments& arguments, std::span<const char* const> command_line) {
     if (!arguments.print_schema.empty()) return print_schema(arguments.print_schema);
     if (arguments.scenario.empty())
@@ -78,34 +93,38 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
 
     store::Provenance provenance = store::collect_provenance(command_line, threads, arguments.scenario);
     const auto start = std::chrono::steady_clock::now();
-    study::Study plan(scenario);
+    study::Experiment plan(scenario);
+    check_room(out, plan);
     study::ResultWriter writer(out, plan);
-    const std::int64_t gyros = ensemble::total_gyros(scenario);
+    const std::int64_t gyros = plan.gyros();
     if (!arguments.quiet) {
-        const double duration_s = plan.schedule.sample_interval_s * static_cast<double>(plan.schedule.samples - 1);
-        tell(fmt::format("{}: {} gyros x {:.6g} s, {} arms, {} threads; the result will take about {:.1f} MB\n",
-                         arguments.scenario, gyros, duration_s, scenario.arms.size(), threads,
+        const study::Study& first = plan.points.front();
+        const double duration_s = first.schedule.sample_interval_s * static_cast<double>(first.schedule.samples - 1);
+        std::string points = plan.has_design() ? fmt::format("{} points, ", plan.points.size()) : "";
+        if (scenario::asks(scenario.stop)) points += "until precise, first ";
+        tell(fmt::format("{}: {}{} gyros x {:.6g} s, {} arms, {} threads; the result will take about {:.1f} MB\n",
+                         arguments.scenario, points, gyros, duration_s, scenario.arms.size(), threads,
                          static_cast<double>(study::expected_size_bytes(plan)) * 1e-6));
     }
-    ensemble::Progress progress(
-        gyros, {.quiet = arguments.quiet, .total_turns = ensemble::expected_turns(scenario, scenario.arms)});
+    ensemble::Progress progress(gyros, {.quiet = arguments.quiet, .total_turns = study::expected_turns(plan)});
     study::OnSamples on_samples;
     if (scenario.output.angle_record) {
         on_samples = [&](const study::SampledAngles& samples) { writer.write_samples(samples); };
     }
     const ensemble::Monitor monitor{interrupted,
                                     [&](std::int64_t done, std::int64_t turns) { progress.advance(done, turns); }};
-    const study::Study study = study::run(std::move(plan), threads, on_samples, monitor);
+    const study::Experiment experiment = study::run(std::move(plan), threads, on_samples, monitor);
     progress.finish();
     check_interrupt();
 
     provenance.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    provenance.turns_per_s = static_cast<double>(study.turns) / provenance.wall_s;
+    provenance.turns_per_s = static_cast<double>(experiment.turns()) / provenance.wall_s;
     provenance.instruction_set = simd::active_target();
-    const study::Summary summary = study::summarise(study);
-    writer.finish(study, summary, provenance);
-    if (!arguments.plot.empty()) report::write_svg(arguments.plot, study_figure(study, summary));
-    put(arguments.json ? study_json(study, summary, provenance) : study_text(study, summary, provenance));
+    const std::vector<study::Summary> summaries = study::summarise(experiment);
+    writer.finish(experiment, summaries, provenance);
+    if (!arguments.plot.empty()) report::write_svg(arguments.plot, experiment_figure(experiment, summaries));
+    put(arguments.json ? experiment_json(experiment, summaries, provenance)
+                       : experiment_text(experiment, summaries, provenance));
     if (!arguments.quiet) tell(fmt::format("result: {}\n", writer.path().string()));
 }
 

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "analysis/study/sensitivity.hpp"
 #include "app/study_output.hpp"
 
 namespace ringlock::app {
@@ -174,6 +175,19 @@ Json json_allan(const std::vector<study::EnsemblePoint>& points) {
     return list;
 }
 
+Json json_interval(double value, const std::optional<lot::Interval>& interval) {
+    return {{"value", number(value)},
+            {"lo", interval ? number(interval->lo) : Json(nullptr)},
+            {"hi", interval ? number(interval->hi) : Json(nullptr)}};
+}
+
+Json json_scatter(const study::Scatter& scatter) {
+    return {{"sd_deg_h", number(scatter.sd_deg_h)},
+            {"lo", number(scatter.interval.lo)},
+            {"hi", number(scatter.interval.hi)},
+            {"degrees_of_freedom", scatter.degrees_of_freedom}};
+}
+
 Json json_arm(const study::ArmSummary& arm) {
     Json json{{"gyros", arm.gyros},
               {"arw_deg_rt_h", study::has_arw(arm) ? json_figure(arm.arw_deg_rt_h) : Json(nullptr)},
@@ -184,6 +198,16 @@ Json json_arm(const study::ArmSummary& arm) {
               {"arw_reduction", json_reduction(arm.arw_reduction)},
               {"rate_error_deg_h", json_mean(arm.rate_error_deg_h)}};
     if (!arm.lot.empty()) json["quantiles"] = json_lot(arm.lot);
+    const auto& mean = arm.arw_mean_deg_rt_h;
+    json["arw_mean_deg_rt_h"] = mean.value ? json_interval(*mean.value, mean.interval) : Json(nullptr);
+    json["average_scatter"] = Json::array();
+    for (const study::AverageScatter& average : arm.scatter) {
+        Json scatter = json_scatter(average.scatter);
+        scatter["after_s"] = average.after_s;
+        json["average_scatter"].push_back(std::move(scatter));
+    }
+    json["turn_on_repeatability"] =
+        arm.turn_on_repeatability ? json_scatter(*arm.turn_on_repeatability) : Json(nullptr);
     if (arm.yield) json["yield"] = json_yield(*arm.yield);
     if (arm.noise_effectiveness) json["noise_effectiveness"] = json_noise(*arm.noise_effectiveness);
     add_scale_factor(json, arm.scale_factor);
@@ -214,14 +238,8 @@ Json json_arm(const study::ArmSummary& arm) {
     return json;
 }
 
-}  // namespace
-
-std::string study_json(const study::Study& study, const study::Summary& summary, const store::Provenance& provenance) {
-    Json json{{"scenario", provenance.scenario_file},
-              {"seed", summary.seed},
-              {"turns", summary.turns},
-              {"wall_s", number(provenance.wall_s)},
-              {"turns_per_s", number(static_cast<double>(summary.turns) / provenance.wall_s)}};
+/// Arms, theory and pairs: what every point of a design has.
+void add_summary(Json& json, const study::Study& study, const study::Summary& summary) {
     json["sample_interval_s"] = study.schedule.sample_interval_s;
     json["turn_map_error_rad"] = number(study.turn_map_error_rad);
     json["arms"] = Json::object();
@@ -235,6 +253,82 @@ std::string study_json(const study::Study& study, const study::Summary& summary,
                                  {"figure", "arw_deg_rt_h"},
                                  {"ratio", json_paired(pair.arw_deg_rt_h.ratio)},
                                  {"difference", json_paired(pair.arw_deg_rt_h.difference)}});
+    }
+}
+
+Json json_index(const design::Index& index) {
+    return {{"value", number(index.estimate)}, {"lo", number(index.lo)}, {"hi", number(index.hi)}};
+}
+
+Json json_sensitivity(const study::Experiment& experiment) {
+    Json json = Json::object();
+    for (const study::ArmSensitivity& arm : study::sensitivity(experiment)) {
+        for (const study::SensitiveFigure& figure : arm.figures) {
+            const design::OutputIndices& found = figure.indices;
+            Json one{{"base_points", found.base_points},
+                     {"left_out", found.left_out},
+                     {"mean", number(found.mean)},
+                     {"variance", number(found.variance)},
+                     {"noise_share", number(found.noise_share)},
+                     {"absent", found.absent.empty() ? Json(nullptr) : Json(found.absent)},
+                     {"keys", Json::object()}};
+            for (std::size_t k = 0; k < found.factors.size(); ++k) {
+                one["keys"][experiment.axes[k].key] = {{"first", json_index(found.factors[k].first)},
+                                                       {"total", json_index(found.factors[k].total)}};
+            }
+            json[arm.arm][figure.name] = std::move(one);
+        }
+    }
+    return json;
+}
+
+Json json_design(const study::Experiment& experiment, const std::vector<study::Summary>& summaries) {
+    Json json{{"keys", Json::array()}, {"points", Json::array()}};
+    for (const study::Axis& axis : experiment.axes) json["keys"].push_back({{"key", axis.key}, {"unit", axis.unit}});
+    for (std::size_t p = 0; p < experiment.points.size(); ++p) {
+        Json point{{"values", Json::object()}};
+        for (const study::Axis& axis : experiment.axes) point["values"][axis.key] = axis.values[p];
+        add_summary(point, experiment.points[p], summaries[p]);
+        for (std::size_t arm = 0; arm < summaries[p].arms.size(); ++arm) {
+            const auto over_first = study::arw_over_first(experiment, summaries, p, arm);
+            point["arms"][summaries[p].arms[arm].name]["arw_over_first_point"] =
+                over_first ? json_paired(*over_first) : Json(nullptr);
+        }
+        json["points"].push_back(std::move(point));
+    }
+    if (experiment.scenario.design.sensitivity_base_points > 0) json["sensitivity"] = json_sensitivity(experiment);
+    const auto lines = study::scale_factors(experiment);
+    if (!lines.empty()) {
+        json["scale_factor"] = Json::object();
+        for (std::size_t arm = 0; arm < lines.size(); ++arm) {
+            Json line = Json::object();
+            add_scale_factor(line, lines[arm]);
+            json["scale_factor"][experiment.scenario.arms[arm].name] = std::move(line);
+        }
+    }
+    return json;
+}
+
+}  // namespace
+
+std::string experiment_json(const study::Experiment& experiment, const std::vector<study::Summary>& summaries,
+                            const store::Provenance& provenance) {
+    const std::int64_t turns = experiment.turns();
+    Json json{{"scenario", provenance.scenario_file},
+              {"seed", experiment.scenario.ensemble.seed},
+              {"turns", turns},
+              {"wall_s", number(provenance.wall_s)},
+              {"turns_per_s", number(static_cast<double>(turns) / provenance.wall_s)}};
+    if (experiment.growth) {
+        json["stop"] = {{"gyros", experiment.growth->looks.back()},
+                        {"looks", experiment.growth->looks},
+                        {"precise", experiment.growth->precise},
+                        {"why", experiment.growth->why}};
+    }
+    if (experiment.has_design()) {
+        json["design"] = json_design(experiment, summaries);
+    } else {
+        add_summary(json, experiment.points.front(), summaries.front());
     }
     return json.dump(2) + "\n";
 }

@@ -64,6 +64,27 @@ std::string arm_tables(const study::Summary& summary) {
            "\nMean rate less the input rate, and bias instability [deg/h]\n" + rates.text();
 }
 
+/// Scatter of averages from gyro to gyro, and of turn-ons.
+std::string scatter_text(const study::Summary& summary) {
+    if (summary.arms.front().scatter.empty()) return "";
+    std::vector<report::Column> columns{{"arm", report::Align::left}};
+    for (const study::AverageScatter& average : summary.arms.front().scatter) {
+        columns.push_back({fmt::format("{:.4g} s", average.after_s), report::Align::right});
+    }
+    const bool turn_ons = summary.arms.front().turn_on_repeatability.has_value();
+    if (turn_ons) columns.push_back({"turn-on to turn-on", report::Align::right});
+    report::Table table(columns);
+    for (const study::ArmSummary& arm : summary.arms) {
+        std::vector<std::string> row{arm.name};
+        for (const study::AverageScatter& average : arm.scatter) {
+            row.push_back(fmt::format("{:.3g}", average.scatter.sd_deg_h));
+        }
+        if (turn_ons) row.push_back(fmt::format("{:.3g}", arm.turn_on_repeatability->sd_deg_h));
+        table.add_row(row);
+    }
+    return "\nScatter over the gyros of rates averaged from the start on [deg/h]\n" + table.text();
+}
+
 /// What theory consists of, and why arms have no random walk.
 std::string walk_notes(const study::Summary& summary) {
     std::string text =
@@ -340,14 +361,10 @@ std::string family_text(const study::Summary& summary) {
 
 }  // namespace
 
-std::string study_text(const study::Study& study, const study::Summary& summary, const store::Provenance& provenance) {
-    const double duration_s = study.schedule.sample_interval_s * static_cast<double>(study.schedule.samples - 1);
-    std::string text =
-        fmt::format("{}: {} gyros, {:.6g} s each, seed {}\n{} turns in {:.1f} s ({:.3g} a second)\n\n",
-                    provenance.scenario_file, study.gyros.size(), duration_s, summary.seed, summary.turns,
-                    provenance.wall_s, static_cast<double>(summary.turns) / provenance.wall_s);
-    text += arm_tables(summary) + "\n" + walk_notes(summary) + reduction_text(summary) + pairs_text(summary) +
-            scenario_times_text(study, summary) + yield_text(summary);
+std::string study_text(const study::Study& study, const study::Summary& summary) {
+    std::string text = arm_tables(summary) + scatter_text(summary) + "\n" + walk_notes(summary) +
+                       reduction_text(summary) + pairs_text(summary) + scenario_times_text(study, summary) +
+                       yield_text(summary);
     for (const study::ArmSummary& arm : summary.arms) text += noise_text(arm);
     if (!summary.arms.front().sweep.empty()) text += "\n" + sweep_text(study, summary);
     if (!summary.arms.front().family.empty()) text += family_text(summary);

@@ -36,9 +36,11 @@ void validate(const std::string& path, const Changes& changes) {
         if (format == "rlg-record") return validate_record(path);
         if (format == "ringlock-result") {
             record::try_reading(path, [&] { study::read_result(path); });
-            const study::Study study = study::read_result(path);
-            return put(fmt::format("{}: a valid result of {} gyros and {} arms\n", path, study.gyros.size(),
-                                   study.arms.size()));
+            const study::Experiment experiment = study::read_result(path);
+            const std::string points =
+                experiment.has_design() ? fmt::format("{} points, ", experiment.points.size()) : "";
+            return put(fmt::format("{}: a valid result of {}{} gyros and {} arms\n", path, points, experiment.gyros(),
+                                   experiment.scenario.arms.size()));
         }
         throw InputError(
             fmt::format("{}: /: attribute format is \"{}\"; it says what the file is and must be "

@@ -25,11 +25,17 @@ allan::Phase phase_of_row(const store::Dataset& angles, std::size_t gyro, double
     return allan::phase_of(record, allan::Kind::phase, interval_s);
 }
 
-std::vector<FamilyDeviation> of_arm(const store::Dataset& angles, double interval_s,
+/// Rows of the gyros of one point.
+struct Rows {
+    std::size_t first;
+    std::size_t gyros;
+};
+
+std::vector<FamilyDeviation> of_arm(const store::Dataset& angles, const Rows& rows, double interval_s,
                                     std::span<const allan::Estimator> estimators, std::span<const std::int64_t> asked) {
     std::vector<std::vector<std::vector<allan::Point>>> curves(estimators.size());
-    for (std::size_t gyro = 0; gyro < angles.shape()[0]; ++gyro) {
-        const allan::Phase phase = phase_of_row(angles, gyro, interval_s);
+    for (std::size_t row = rows.first; row < rows.first + rows.gyros; ++row) {
+        const allan::Phase phase = phase_of_row(angles, row, interval_s);
         const auto points = static_cast<std::int64_t>(phase.x.size());
         for (std::size_t k = 0; k < estimators.size(); ++k) {
             std::vector<std::int64_t> factors(asked.begin(), asked.end());
@@ -46,10 +52,13 @@ std::vector<FamilyDeviation> of_arm(const store::Dataset& angles, double interva
 
 }  // namespace
 
-std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesystem::path& path, const Study& study,
+std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesystem::path& path,
+                                                            const Experiment& experiment, std::size_t point,
                                                             std::span<const allan::Estimator> estimators,
                                                             std::span<const std::int64_t> factors) {
     const store::File file = store::File::open(path);
+    const Study& study = experiment.points[point];
+    const std::size_t gyros = study.gyros.size();  // of every point as many
     if (!study.scenario.output.angle_record) {
         throw InputError(fmt::format(
             "{}: holds no angle records, which other deviations than its own are made of; run the scenario with "
@@ -59,12 +68,13 @@ std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesyste
     std::vector<std::vector<FamilyDeviation>> out;
     for (const ArmStatistics& arm : study.arms) {
         const store::Dataset angles = file.group("arms").group(arm.arm.name).dataset("angle_arcsec");
-        if (angles.shape() != store::Shape{study.gyros.size(), static_cast<std::uint64_t>(study.schedule.samples)}) {
+        if (angles.shape() !=
+            store::Shape{gyros * experiment.points.size(), static_cast<std::uint64_t>(study.schedule.samples)}) {
             throw InputError(
                 fmt::format("{}: dataset {} has not one row a gyro and one column a sample: the result is damaged",
                             path.string(), angles.path()));
         }
-        out.push_back(of_arm(angles, study.schedule.sample_interval_s, estimators, factors));
+        out.push_back(of_arm(angles, {point * gyros, gyros}, study.schedule.sample_interval_s, estimators, factors));
     }
     return out;
 }

@@ -1,10 +1,11 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <span>
 #include <vector>
 
-#include "analysis/study/study.hpp"
+#include "analysis/study/experiment.hpp"
 #include "analysis/study/summary.hpp"
 
 namespace ringlock::study {
@@ -14,14 +15,16 @@ namespace ringlock::study {
 /// study runs, they begin at the sampling interval and overlap fully.
 ///
 /// \param path     result of the study
-/// \param study    read_result(path)
+/// \param experiment  read_result(path)
+/// \param point    of its points
 /// \param factors  averaging factors [samples], one point each in their order; octaves, up to the largest that an
 ///                 estimator has, where none is given
-/// \return one list an arm, in the order of the study's arms
+/// \return one list an arm, in the order of the scenario's arms
 ///
 /// Throws InputError where the result was written without angle records, its records are damaged or too short for a
 /// factor.
-std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesystem::path& path, const Study& study,
+std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesystem::path& path,
+                                                            const Experiment& experiment, std::size_t point,
                                                             std::span<const allan::Estimator> estimators,
                                                             std::span<const std::int64_t> factors = {});
 

@@ -38,50 +38,87 @@ std::vector<double> angle_errors(const ArmStatistics& arm, std::size_t time) {
 
 }  // namespace
 
-std::vector<LotFigure> lot_figures(const Study& study, const ArmStatistics& arm) {
-    std::vector<LotFigure> figures;
-    const auto add = [&](std::string name, const std::vector<double>& values) {
-        figures.push_back({std::move(name), lot::quantiles(values, told_quantiles)});
-    };
-    add("arw_deg_rt_h", random_walks_deg_rt_h(arm));
-    add("rate_error_deg_h", rate_errors(arm));
+lot::Confidence confidence_of(const scenario::Scenario& scenario) {
+    lot::Confidence confidence;
+    if (scenario::asks(scenario.stop)) confidence.sampling = lot::Sampling::until_precise;
+    return confidence;
+}
+
+std::vector<LotValues> lot_values(const Study& study, const ArmStatistics& arm) {
+    std::vector<LotValues> figures;
+    figures.push_back({"arw_deg_rt_h", random_walks_deg_rt_h(arm)});
+    figures.push_back({"rate_error_deg_h", rate_errors(arm)});
     std::vector<double> taus = study.scenario.output.tau_s;
     const scenario::Specification& wanted = study.scenario.specification;
     if (wanted.bias_stability_deg_h > 0.0) taus.push_back(wanted.at_s);
     for (const double tau_s : taus) {
-        add(fmt::format("allan_deviation_{:g}_s_deg_h", tau_s), deviations_at(study, arm, tau_s));
+        figures.push_back({fmt::format("allan_deviation_{:g}_s_deg_h", tau_s), deviations_at(study, arm, tau_s)});
     }
     const double end_s = study.schedule.cycle_s * static_cast<double>(study.schedule.cycles() - 1);
     for (std::size_t i = 0; i < study.angle_times_s.size(); ++i) {
         if (study.angle_times_s[i] > end_s) continue;
-        add(fmt::format("angle_error_{:g}_s_arcsec", study.angle_times_s[i]), angle_errors(arm, i));
+        figures.push_back({fmt::format("angle_error_{:g}_s_arcsec", study.angle_times_s[i]), angle_errors(arm, i)});
     }
     return figures;
 }
 
-Yield yield_of(const Study& study, const ArmStatistics& arm) {
+std::vector<LotFigure> lot_figures(const Study& study, const ArmStatistics& arm) {
+    std::vector<LotFigure> figures;
+    for (LotValues& figure : lot_values(study, arm)) {
+        figures.push_back(
+            {std::move(figure.name), lot::quantiles(figure.values, told_quantiles, confidence_of(study.scenario))});
+    }
+    return figures;
+}
+
+namespace {
+
+/// One limit of a specification, and what of each gyro must not exceed it in magnitude.
+struct Limit {
+    std::string name;
+    double most;
+    std::vector<double> values;
+
+    bool holds(std::size_t gyro) const { return std::abs(values[gyro]) <= most; }  // false for what is no number
+};
+
+std::vector<Limit> limits_of(const Study& study, const ArmStatistics& arm) {
     const scenario::Specification& wanted = study.scenario.specification;
-    const auto gyros = static_cast<std::int64_t>(arm.gyros.size());
-    std::vector<char> passes(arm.gyros.size(), 1);
-    Yield yield;
-    const auto limit = [&](std::string name, double most, const std::vector<double>& values) {
-        std::int64_t within = 0;
-        for (std::size_t i = 0; i < values.size(); ++i) {
-            const bool good = std::abs(values[i]) <= most;  // false for what is no number
-            within += good ? 1 : 0;
-            if (!good) passes[i] = 0;
-        }
-        yield.limits.push_back({std::move(name), most, lot::share(within, gyros)});
-    };
-    if (wanted.arw_deg_rt_h > 0.0) limit("arw_deg_rt_h", wanted.arw_deg_rt_h, random_walks_deg_rt_h(arm));
+    std::vector<Limit> limits;
+    if (wanted.arw_deg_rt_h > 0.0) limits.push_back({"arw_deg_rt_h", wanted.arw_deg_rt_h, random_walks_deg_rt_h(arm)});
     if (wanted.bias_stability_deg_h > 0.0) {
-        limit("bias_stability_deg_h", wanted.bias_stability_deg_h, deviations_at(study, arm, wanted.at_s));
+        limits.push_back({"bias_stability_deg_h", wanted.bias_stability_deg_h, deviations_at(study, arm, wanted.at_s)});
     }
-    if (wanted.rate_error_deg_h > 0.0) limit("rate_error_deg_h", wanted.rate_error_deg_h, rate_errors(arm));
+    if (wanted.rate_error_deg_h > 0.0)
+        limits.push_back({"rate_error_deg_h", wanted.rate_error_deg_h, rate_errors(arm)});
     if (wanted.angle_error_arcsec > 0.0) {
-        limit("angle_error_arcsec", wanted.angle_error_arcsec, angle_errors(arm, study.angle_times_s.size() - 1));
+        limits.push_back(
+            {"angle_error_arcsec", wanted.angle_error_arcsec, angle_errors(arm, study.angle_times_s.size() - 1)});
     }
-    yield.share = lot::share(std::count(passes.begin(), passes.end(), 1), gyros);
+    return limits;
+}
+
+}  // namespace
+
+std::vector<bool> passed_gyros(const Study& study, const ArmStatistics& arm) {
+    std::vector<bool> passed(arm.gyros.size(), true);
+    for (const Limit& limit : limits_of(study, arm)) {
+        for (std::size_t i = 0; i < passed.size(); ++i) passed[i] = passed[i] && limit.holds(i);
+    }
+    return passed;
+}
+
+Yield yield_of(const Study& study, const ArmStatistics& arm) {
+    const auto gyros = static_cast<std::int64_t>(arm.gyros.size());
+    const lot::Confidence confidence = confidence_of(study.scenario);
+    Yield yield;
+    for (const Limit& limit : limits_of(study, arm)) {
+        std::int64_t within = 0;
+        for (std::size_t i = 0; i < arm.gyros.size(); ++i) within += limit.holds(i) ? 1 : 0;
+        yield.limits.push_back({limit.name, limit.most, lot::share(within, gyros, confidence)});
+    }
+    const std::vector<bool> passed = passed_gyros(study, arm);
+    yield.share = lot::share(std::count(passed.begin(), passed.end(), true), gyros, confidence);
     const auto worst = std::min_element(yield.limits.begin(), yield.limits.end(),
                                         [](const auto& a, const auto& b) { return a.share.k < b.share.k; });
     if (worst != yield.limits.end() && worst->share.k < gyros) yield.fails_most = worst->name;

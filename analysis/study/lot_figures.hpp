@@ -37,9 +37,24 @@ struct ArmPair {
     lot::Comparison arw_deg_rt_h;
 };
 
+/// Of a study's intervals over its gyros: 95 %, wider where a stopping rule chose their number.
+lot::Confidence confidence_of(const scenario::Scenario& scenario);
+
 /// Random walks of the gyros [deg/sqrt(h)], in the model that all records together choose: what medians, quantiles and
 /// yields are made of.
 std::vector<double> random_walks_deg_rt_h(const ArmStatistics& arm);
+
+/// One figure of every gyro of an arm; NaN where its record does not have it.
+struct LotValues {
+    std::string name;  ///< with its unit
+    std::vector<double> values;
+};
+
+/// Random walk, mean rate error, deviations at the averaging times asked for, and angle errors.
+std::vector<LotValues> lot_values(const Study& study, const ArmStatistics& arm);
+
+/// Which gyros meet the scenario's specification.
+std::vector<bool> passed_gyros(const Study& study, const ArmStatistics& arm);
 
 /// Quantiles of random walk, mean rate error, deviations at the averaging times asked for, and angle errors.
 std::vector<LotFigure> lot_figures(const Study& study, const ArmStatistics& arm);

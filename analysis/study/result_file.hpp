@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "analysis/study/study.hpp"
+#include "analysis/study/experiment.hpp"
 #include "analysis/study/summary.hpp"
 #include "engine/store/atomic_file.hpp"
 #include "engine/store/provenance.hpp"
@@ -19,25 +19,29 @@ class ResultWriter {
    public:
     /// Claims the output. Throws InputError where it cannot be written, or where another study's result has the name:
     /// a result of the same scenario and seed is replaced, anything else is kept.
-    ResultWriter(const std::filesystem::path& path, const Study& study);
+    ResultWriter(const std::filesystem::path& path, const Experiment& experiment);
 
     /// Writes samples of the angle output, where the scenario stores them. From any thread.
     void write_samples(const SampledAngles& samples);
     /// Writes everything else and gives the file its name.
-    void finish(const Study& study, const Summary& summary, const store::Provenance& provenance);
+    ///
+    /// \param summaries  of its points, by summarise()
+    void finish(const Experiment& experiment, const std::vector<Summary>& summaries,
+                const store::Provenance& provenance);
 
     const std::filesystem::path& path() const { return file_.target(); }
 
    private:
     store::AtomicFile file_;
-    std::vector<store::Dataset> records_;  // one for each arm, or none
+    std::vector<store::Dataset> records_;    // one for each arm, or none
+    std::vector<std::uint64_t> first_rows_;  // of each point's gyros
 };
 
-/// Bytes a result file of this study will take, but for some tens of kilobytes that hold names and units.
-std::uint64_t expected_size_bytes(const Study& study);
+/// Bytes a result file of this experiment will take, but for some tens of kilobytes that hold names and units.
+std::uint64_t expected_size_bytes(const Experiment& experiment);
 
 /// Reads a result without its angle records. Throws InputError where the file is no result or is damaged.
-Study read_result(const std::filesystem::path& path);
+Experiment read_result(const std::filesystem::path& path);
 
 /// The provenance of a result.
 store::Provenance read_provenance(const std::filesystem::path& path);

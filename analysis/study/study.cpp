@@ -1,5 +1,7 @@
 #include "analysis/study/study.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -82,14 +84,14 @@ constexpr std::size_t gathered_samples = 256;
 /// The statistics of one arm of one block while it is simulated.
 class ArmStream {
    public:
-    ArmStream(const Study& study, std::size_t arm, std::int64_t first_gyro, std::size_t gyros,
+    ArmStream(const Study& study, std::size_t number, std::size_t arm, std::int64_t first_gyro, std::size_t gyros,
               const OnSamples& on_samples)
         : study_(study),
           gyros_(gyros),
           on_samples_(on_samples),
           angle_errors_counts_(study.angle_times_s.size()),
           record_(study.schedule.samples, fit_samples),
-          waiting_{arm, first_gyro, gyros, 0, {}} {
+          waiting_{number, arm, first_gyro, gyros, 0, {}} {
         for (auto& errors : angle_errors_counts_) errors.fill(std::numeric_limits<double>::quiet_NaN());
         for (const std::int64_t m : study.factors) {
             if (!is_octave(m)) asked_.emplace_back(m);
@@ -211,11 +213,11 @@ class ArmStream {
 /// One block of gyros of a study.
 class BlockStatistics final : public ensemble::BlockSink {
    public:
-    BlockStatistics(Study& study, std::mutex& mutex, std::int64_t first_gyro, std::size_t gyros,
+    BlockStatistics(Study& study, std::size_t number, std::mutex& mutex, std::int64_t first_gyro, std::size_t gyros,
                     const OnSamples& on_samples)
         : study_(study), mutex_(mutex), first_(static_cast<std::size_t>(first_gyro)), gyros_(gyros) {
         for (std::size_t arm = 0; arm < study.arms.size(); ++arm) {
-            arms_.push_back(std::make_unique<ArmStream>(study, arm, first_gyro, gyros, on_samples));
+            arms_.push_back(std::make_unique<ArmStream>(study, number, arm, first_gyro, gyros, on_samples));
         }
     }
 
@@ -252,14 +254,31 @@ class BlockStatistics final : public ensemble::BlockSink {
 
 }  // namespace
 
-Study run(Study study, int threads, const OnSamples& on_samples, const ensemble::Monitor& monitor) {
-    predict_noise(study);
-    const scenario::Scenario& scenario = study.scenario;
+void extend(Study& study, std::int64_t gyros) {
+    study.scenario.ensemble.gyros = gyros;
+    study.gyros.resize(static_cast<std::size_t>(gyros));
+    for (ArmStatistics& arm : study.arms) arm.gyros.resize(static_cast<std::size_t>(gyros));
+}
+
+void run(std::span<Study> studies, std::int64_t first, int threads, const OnSamples& on_samples,
+         const ensemble::Monitor& monitor) {
     std::mutex mutex;
-    const auto make_sink = [&](std::int64_t first_gyro, std::size_t gyros) {
-        return std::make_unique<BlockStatistics>(study, mutex, first_gyro, gyros, on_samples);
-    };
-    ensemble::run(scenario, scenario.arms, 0, ensemble::total_gyros(scenario), threads, make_sink, monitor);
+    std::vector<ensemble::Job> jobs;
+    for (std::size_t number = 0; number < studies.size(); ++number) {
+        Study& study = studies[number];
+        predict_noise(study);
+        const scenario::Scenario& scenario = study.scenario;
+        const auto make_sink = [&, number](std::int64_t first_gyro, std::size_t gyros) {
+            return std::make_unique<BlockStatistics>(study, number, mutex, first_gyro, gyros, on_samples);
+        };
+        jobs.push_back({&scenario, scenario.arms, first, ensemble::total_gyros(scenario), make_sink,
+                        studies.size() > 1 ? fmt::format("point {}", number + 1) : ""});
+    }
+    ensemble::run(jobs, threads, monitor);
+}
+
+Study run(Study study, int threads, const OnSamples& on_samples, const ensemble::Monitor& monitor) {
+    run({&study, 1}, 0, threads, on_samples, monitor);
     return study;
 }
 

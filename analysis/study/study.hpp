@@ -15,7 +15,7 @@
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/scenario.hpp"
 
-/// A study: the ensemble simulated and every gyro's record analysed.
+/// A study of one scenario, or a point of a design: the ensemble simulated and every gyro's record analysed.
 namespace ringlock::study {
 
 /// What one gyro's record of one arm shows.
@@ -73,6 +73,7 @@ void predict_noise(Study& study);
 /// Told of samples of the angle output of an arm: those of gyros first_gyro + i, i < gyros, from sample first_sample
 /// on, [gyro][sample] in arcsec. From any thread.
 struct SampledAngles {
+    std::size_t study = 0;  ///< of those that run together
     std::size_t arm = 0;
     std::int64_t first_gyro = 0;
     std::size_t gyros = 0;
@@ -85,6 +86,15 @@ using OnSamples = std::function<void(const SampledAngles& samples)>;
 /// deviations from every cycle of the dither, noise coefficients from at most `fit_samples` of the samples; nothing
 /// grows with the simulated time but the number of octaves. Throws RunError, Interrupted.
 Study run(Study study, int threads, const OnSamples& on_samples = nullptr, const ensemble::Monitor& monitor = {});
+
+/// The same for several studies side by side: a study is to the bit what it is alone.
+///
+/// \param first  gyro of each study to begin with; those before it are there already
+void run(std::span<Study> studies, std::int64_t first, int threads, const OnSamples& on_samples,
+         const ensemble::Monitor& monitor);
+
+/// Makes room for more gyros: what is there stays as it is in a study of so many. Without a sweep only.
+void extend(Study& study, std::int64_t gyros);
 
 /// Most samples of a gyro that noise coefficients are fitted to: N is known to 1 % from as many.
 inline constexpr std::int64_t fit_samples = 8192;

@@ -398,6 +398,11 @@ Summary summarise(const Study& study) {
         out.steps = steps(study, arm);
         out.scale_factor = line_of(study, arm);
         if (study.scenario.input.sweep_points == 1) out.lot = lot_figures(study, arm);
+        out.scatter = scatter_of_averages(study, arm);
+        out.turn_on_repeatability = turn_on_repeatability(study, arm);
+        if (out.arw_deg_rt_h.median) {
+            out.arw_mean_deg_rt_h = lot::geometric_mean(random_walks_deg_rt_h(arm), confidence_of(study.scenario));
+        }
         if (scenario::asks(study.scenario.specification)) out.yield = yield_of(study, arm);
         summary.arms.push_back(std::move(out));
     }
@@ -406,7 +411,8 @@ Summary summarise(const Study& study) {
             if (!summary.arms[a].arw_deg_rt_h.median || !summary.arms[b].arw_deg_rt_h.median) continue;
             const auto first = random_walks_deg_rt_h(study.arms[a]);
             const auto second = random_walks_deg_rt_h(study.arms[b]);
-            summary.pairs.push_back({summary.arms[a].name, summary.arms[b].name, lot::compare(first, second)});
+            summary.pairs.push_back({summary.arms[a].name, summary.arms[b].name,
+                                     lot::compare(first, second, confidence_of(study.scenario))});
         }
     }
     const auto raw = std::find_if(summary.arms.begin(), summary.arms.end(),

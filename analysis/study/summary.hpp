@@ -5,7 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/lot/mean.hpp"
 #include "analysis/study/lot_figures.hpp"
+#include "analysis/study/repeatability.hpp"
 #include "analysis/study/scale_factor.hpp"
 #include "analysis/study/study.hpp"
 
@@ -100,8 +102,11 @@ struct ArmSummary {
     Figure arw_deg_rt_h;
     std::string arw_reason;  ///< why arw_deg_rt_h has no median; empty where it has one
     ArwTheory arw_theory;
-    std::vector<LotFigure> lot;  ///< quantiles over the gyros; empty in sweeps
-    std::optional<Yield> yield;  ///< where the scenario has a specification
+    std::vector<LotFigure> lot;                    ///< quantiles over the gyros; empty in sweeps
+    lot::GeometricMean arw_mean_deg_rt_h;          ///< where arw_deg_rt_h has a median
+    std::vector<AverageScatter> scatter;           ///< of averages over given times, from gyro to gyro
+    std::optional<Scatter> turn_on_repeatability;  ///< where gyros are switched on more than once
+    std::optional<Yield> yield;                    ///< where the scenario has a specification
     std::optional<Figure> bias_instability_deg_h;
     MeanFigure rate_error_deg_h;
     std::vector<EnsemblePoint> allan;

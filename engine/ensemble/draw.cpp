@@ -30,6 +30,11 @@ random::Identity identity(const scenario::Scenario& scenario, std::int64_t gyro)
     return {scenario.ensemble.seed, static_cast<std::uint64_t>(gyro % scenario.ensemble.gyros)};
 }
 
+random::Identity device_identity(const scenario::Scenario& scenario, std::int64_t gyro) {
+    const random::Identity turn_on = identity(scenario, gyro);
+    return {turn_on.seed, turn_on.gyro / static_cast<std::uint64_t>(scenario.ensemble.turn_ons)};
+}
+
 gyro::Setup nominal_setup(const scenario::Scenario& scenario) {
     gyro::Setup setup = scenario::configured_setup(scenario);
     setup.input_rate_deg_h = input_rate_deg_h(scenario, 0);
@@ -39,7 +44,8 @@ gyro::Setup nominal_setup(const scenario::Scenario& scenario) {
 gyro::Setup draw_setup(const scenario::Scenario& scenario, std::int64_t gyro) {
     const auto who = identity(scenario, gyro);
     const auto& spread = scenario.ensemble;
-    const auto normal = [&](random::Purpose purpose) { return random::NormalStream(who, purpose)(); };
+    const auto device = device_identity(scenario, gyro);
+    const auto normal = [&](random::Purpose purpose) { return random::NormalStream(device, purpose)(); };
 
     gyro::Setup setup = nominal_setup(scenario);
     setup.input_rate_deg_h = input_rate_deg_h(scenario, gyro);

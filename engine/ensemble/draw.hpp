@@ -20,6 +20,9 @@ double input_rate_at_deg_h(const scenario::Scenario& scenario, const gyro::Setup
 /// compared in pairs like arms.
 random::Identity identity(const scenario::Scenario& scenario, std::int64_t gyro);
 
+/// Who gyro g is to the streams that its constants are drawn from: one for all its turn-ons.
+random::Identity device_identity(const scenario::Scenario& scenario, std::int64_t gyro);
+
 /// Draws the parameters of gyro g and lets the scenario's effects change them. Depends on the scenario and g only.
 gyro::Setup draw_setup(const scenario::Scenario& scenario, std::int64_t gyro);
 

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <mutex>
 #include <string>
-#include <utility>
+#include <tuple>
 #include <vector>
 
 #include "engine/core/error.hpp"
@@ -26,16 +26,18 @@ constexpr std::size_t most_failures_named = 10;
 /// Failures of single gyros, collected so that one bad gyro of a thousand does not hide the others.
 class Failures {
    public:
-    void add(std::int64_t gyro, const std::string& why) {
+    void add(std::size_t job, std::int64_t gyro, const std::string& why) {
         const std::lock_guard lock(mutex_);
-        failures_.emplace_back(gyro, why);
+        failures_.push_back({job, gyro, why});
     }
-    void report(std::int64_t gyros) {
+    void report(std::span<const Job> jobs, std::int64_t gyros) {
         if (failures_.empty()) return;
         std::sort(failures_.begin(), failures_.end());
         std::string text = fmt::format("{} of {} gyros could not be simulated", failures_.size(), gyros);
         for (std::size_t i = 0; i < std::min(failures_.size(), most_failures_named); ++i) {
-            text += fmt::format("\n  gyro {}: {}", failures_[i].first, failures_[i].second);
+            const auto& [job, gyro, why] = failures_[i];
+            const std::string& name = jobs[job].name;
+            text += fmt::format("\n  {}gyro {}: {}", name.empty() ? "" : name + ", ", gyro, why);
         }
         if (failures_.size() > most_failures_named) text += "\n  ...";
         throw RunError(text);
@@ -43,7 +45,14 @@ class Failures {
 
    private:
     std::mutex mutex_;
-    std::vector<std::pair<std::int64_t, std::string>> failures_;
+    std::vector<std::tuple<std::size_t, std::int64_t, std::string>> failures_;
+};
+
+/// Gyros that are simulated side by side.
+struct Block {
+    std::size_t job;
+    std::int64_t first;
+    std::int64_t gyros;
 };
 
 /// A trajectory that cannot be followed: a failure of that gyro, where one of a sink (a disk that is full) is the
@@ -131,48 +140,55 @@ std::int64_t expected_turns(const scenario::Scenario& scenario, std::span<const 
     return total_gyros(scenario) * trajectories * Schedule(scenario).turns();
 }
 
-void run(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first, std::int64_t last,
-         int threads, const SinkFactory& make_sink, const Monitor& monitor) {
-    if (first == last) return;
+void run(std::span<const Job> jobs, int threads, const Monitor& monitor) {
+    std::int64_t all = 0;
+    for (const Job& job : jobs) all += job.last - job.first;
+    if (all == 0) return;
+    std::vector<Block> blocks;
+    const std::int64_t size = block_size(all, threads);
+    for (std::size_t job = 0; job < jobs.size(); ++job) {
+        for (std::int64_t gyro = jobs[job].first; gyro < jobs[job].last; gyro += size) {
+            blocks.push_back({job, gyro, std::min(size, jobs[job].last - gyro)});
+        }
+    }
+    Failures failures;
+    const auto simulate_gyros = [&](const Job& job, std::int64_t gyro, std::int64_t gyros, BlockProgress& progress) {
+        const auto sink = job.make_sink(gyro, static_cast<std::size_t>(gyros));
+        simulate(*job.scenario, job.arms, gyro, static_cast<std::size_t>(gyros), *sink, progress);
+    };
+    const auto simulate_block = [&](const Block& block) {
+        const Job& job = jobs[block.job];
+        BlockProgress progress(monitor);
+        try {
+            simulate_gyros(job, block.first, block.gyros, progress);
+        } catch (const TrajectoryFailure& together) {
+            progress.begin_again();
+            // Which ones? Those of the block that can be simulated are so by themselves.
+            for (std::int64_t one = block.first; one < block.first + block.gyros; ++one) {
+                try {
+                    if (block.gyros == 1) throw together;
+                    simulate_gyros(job, one, 1, progress);
+                } catch (const TrajectoryFailure& failure) {
+                    failures.add(block.job, one, failure.why);
+                }
+            }
+        }
+    };
     // An arena alone gets no more workers than there are cores; asked for more threads, give more.
     const oneapi::tbb::global_control control(oneapi::tbb::global_control::max_allowed_parallelism,
                                               static_cast<std::size_t>(threads));
     oneapi::tbb::task_arena arena(threads);
-    Failures failures;
-    const std::int64_t size = block_size(last - first, threads);
-    const auto simulate_block = [&](std::int64_t gyro, std::int64_t gyros, BlockProgress& progress) {
-        const auto sink = make_sink(gyro, static_cast<std::size_t>(gyros));
-        simulate(scenario, arms, gyro, static_cast<std::size_t>(gyros), *sink, progress);
-    };
     arena.execute([&] {
         // Its own context: cancelling this loop must not cancel a loop of the caller around it.
         oneapi::tbb::task_group_context context(oneapi::tbb::task_group_context::isolated);
         oneapi::tbb::parallel_for(
-            oneapi::tbb::blocked_range<std::int64_t>(0, (last - first + size - 1) / size, 1),
-            [&](const oneapi::tbb::blocked_range<std::int64_t>& blocks) {
-                for (std::int64_t block = blocks.begin(); block != blocks.end(); ++block) {
-                    const std::int64_t gyro = first + block * size;
-                    const std::int64_t gyros = std::min(size, last - gyro);
-                    BlockProgress progress(monitor);
-                    try {
-                        simulate_block(gyro, gyros, progress);
-                    } catch (const TrajectoryFailure& together) {
-                        progress.begin_again();
-                        // Which ones? Those of the block that can be simulated are so by themselves.
-                        for (std::int64_t one = gyro; one < gyro + gyros; ++one) {
-                            try {
-                                if (gyros == 1) throw together;
-                                simulate_block(one, 1, progress);
-                            } catch (const TrajectoryFailure& failure) {
-                                failures.add(one, failure.why);
-                            }
-                        }
-                    }
-                }
+            oneapi::tbb::blocked_range<std::size_t>(0, blocks.size(), 1),
+            [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
+                for (std::size_t i = range.begin(); i != range.end(); ++i) simulate_block(blocks[i]);
             },
             oneapi::tbb::simple_partitioner(), context);
     });
-    failures.report(last - first);
+    failures.report(jobs, all);
 }
 
 }  // namespace ringlock::ensemble

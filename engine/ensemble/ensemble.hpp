@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "engine/gyro/setup.hpp"
@@ -50,12 +51,21 @@ struct Monitor {
 /// bits hold.
 std::int64_t expected_turns(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms);
 
-/// Simulates gyros [first, last) of the scenario on `threads` threads of oneTBB, in blocks of at most simd::lanes.
+/// Gyros [first, last) of one scenario, and where their output goes.
+struct Job {
+    const scenario::Scenario* scenario;  ///< outlives the run, as the arms do
+    std::span<const scenario::Arm> arms;
+    std::int64_t first;
+    std::int64_t last;
+    SinkFactory make_sink;
+    std::string name = {};  ///< of the scenario among several, for failures; empty: there is one
+};
+
+/// Simulates the gyros of all jobs on `threads` threads of oneTBB, in blocks of at most simd::lanes, none of two jobs.
 ///
-/// What a gyro does depends on its number, never on block or thread: results are the same for any number of threads.
-/// Gyros that fail do not stop the others; their failures are reported together in one RunError at the end.
-/// What a sink throws stops all and is passed on; cancellation stops all and throws Interrupted.
-void run(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first, std::int64_t last,
-         int threads, const SinkFactory& make_sink, const Monitor& monitor);
+/// What a gyro does depends on its scenario and number, never on block, thread or other jobs: results are the same for
+/// any number of threads. Gyros that fail do not stop the others; their failures are reported together in one RunError
+/// at the end. What a sink throws stops all and is passed on; cancellation stops all and throws Interrupted.
+void run(std::span<const Job> jobs, int threads, const Monitor& monitor);
 
 }  // namespace ringlock::ensemble

@@ -74,6 +74,15 @@ Finding specification_can_be_met(const Scenario& s) {
         return Complaint{{"specification.at_s", "specification.bias_stability_deg_h", "ensemble.duration_s"},
                          fmt::format("an averaging time of {:g} s is not there: {}", wanted.at_s, deviations_text(s))};
     }
+    constexpr double fewest_increments = 32.0;  // of a record that a random walk is fitted to, noise::Options
+    if (wanted.arw_deg_rt_h > 0.0 && s.ensemble.duration_s < fewest_increments * s.output.sample_interval_s) {
+        return Complaint{
+            {"specification.arw_deg_rt_h", "ensemble.duration_s", "output.sample_interval_s"},
+            fmt::format("no arm can show that it meets it: a random walk is fitted to {:g} samples or "
+                        "more, and the record has {:.0f}; set a longer ensemble.duration_s or a shorter "
+                        "output.sample_interval_s",
+                        fewest_increments, std::floor(s.ensemble.duration_s / s.output.sample_interval_s))};
+    }
     if (wanted.angle_error_arcsec > 0.0 && wanted.after_s > s.ensemble.duration_s) {
         return Complaint{{"specification.after_s", "specification.angle_error_arcsec", "ensemble.duration_s"},
                          fmt::format("the record ends after {:g} s; ask for an earlier time or set a longer "
@@ -101,8 +110,8 @@ constexpr std::array all_output_rules = {
     Rule{"A run holds at least three samples.", run_holds_samples},
     Rule{"Averaging times asked for (at most 100) are between a dither cycle and half of the record.",
          averaging_times_fit},
-    Rule{"A specification asks for averaging and other times that the record has, and for no less random walk than "
-         "effects make by themselves.",
+    Rule{"A specification asks for averaging and other times that the record has, for no less random walk than effects "
+         "make by themselves, and for one of records of 32 samples or more only.",
          specification_can_be_met},
 };
 

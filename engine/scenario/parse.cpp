@@ -66,7 +66,7 @@ std::string name_text(std::string_view name) {
 /// Walks a parsed file, sets what is right and notes what is wrong.
 class Reader {
    public:
-    explicit Reader(std::string_view file) : file_(file) {}
+    Reader(std::string_view file, const Rules& rules) : file_(file), rules_(rules) {}
 
     /// Settings come after the file, in its place: text of each, and what it says.
     Scenario read(const toml::table& root, const std::vector<std::pair<std::string, toml::table>>& settings) {
@@ -101,6 +101,7 @@ class Reader {
     struct Place {
         toml::source_position where;
         std::string setting;
+        std::string value = {};  ///< as it stands there
     };
     struct Problem {
         Place place;
@@ -160,7 +161,7 @@ class Reader {
     void read_top(const toml::key& name, const toml::node& node) {
         if (name == "effects") return read_effects(name, node);
         const Section* section = find_section(name);
-        if (section == nullptr) return unknown_top(name, node);
+        if (section == nullptr || section->elements) return unknown_top(name, node);
         const toml::table* table = as_table(*section, name, node);
         if (table != nullptr) read_section(*section, *table);
     }
@@ -193,6 +194,11 @@ class Reader {
 
     void read_section(const Section& section, const toml::table& table) {
         for (const auto& [name, node] : table) {
+            const Section* list = find_section(fmt::format("{}.{}", section.name, name.str()));
+            if (list != nullptr && list->elements) {
+                read_elements(*list, name, node);
+                continue;
+            }
             const auto found = std::find_if(section.keys.begin(), section.keys.end(),
                                             [&k = name](const Key& key) { return key.name == k.str(); });
             if (found == section.keys.end()) {
@@ -204,6 +210,57 @@ class Reader {
         }
     }
 
+    /// Tables [[NAME]], in the place of any that there were.
+    void read_elements(const Section& section, const toml::key& name, const toml::node& node) {
+        const toml::array* list = node.as_array();
+        const bool tables = list != nullptr &&
+                            std::all_of(list->begin(), list->end(), [](const toml::node& n) { return n.is_table(); });
+        if (!tables) {
+            return note(
+                name.source().begin,
+                fmt::format("key \"{}\" = {}: must be tables, not {}; write [[{}]] and its keys below, once for "
+                            "each",
+                            section.name, value_text(node), type_text(node), section.name));
+        }
+        section.elements->resize(scenario_, 0);
+        for (std::size_t i = 0; i < list->size(); ++i) {
+            section.elements->resize(scenario_, i + 1);
+            read_element(section, fmt::format("{}[{}]", section.name, i + 1), *(*list)[i].as_table());
+        }
+    }
+
+    /// One of them, with the keys that belong together and no others.
+    void read_element(const Section& section, const std::string& element, const toml::table& table) {
+        const std::size_t before = problems_.size();
+        read_section(section, table);
+        const std::string& first = section.keys.front().name;
+        for (const auto& [name, node] : table) {
+            places_[fmt::format("{}.{}", element, name.str())] = {node.source().begin, setting_, value_text(node)};
+        }
+        if (problems_.size() > before) return;
+        const VariationForm form = section.elements->form(scenario_);
+        std::vector<std::string_view> missing;
+        if (!table.contains(first)) missing.emplace_back(first);
+        for (const std::string_view key : form.required) {
+            if (!table.contains(key)) missing.push_back(key);
+        }
+        if (!missing.empty()) {
+            note(table.source().begin,
+                 fmt::format("[[{}]] lacks {}; {} has the keys {}, {}", section.name, fmt::join(missing, ", "),
+                             form.name, first, fmt::join(form.required, ", ")));
+        }
+        for (const auto& [name, node] : table) {
+            const auto is_it = [&k = name](std::string_view key) { return k.str() == key; };
+            if (name == first || std::any_of(form.required.begin(), form.required.end(), is_it) ||
+                std::any_of(form.optional.begin(), form.optional.end(), is_it)) {
+                continue;
+            }
+            note(node.source().begin,
+                 fmt::format("key \"{}.{}\" = {}: does not belong to {}, which has the keys {}, {}", section.name,
+                             name.str(), value_text(node), form.name, first, fmt::join(form.required, ", ")));
+        }
+    }
+
     void read_value(const Key& key, const toml::node& node) {
         if (key.type == Type::arms) return read_arms(key, node);
         if (key.type == Type::reals) return read_reals(key, node);
@@ -212,7 +269,7 @@ class Reader {
             return wrong(key, node, fmt::format("must be {}, not {}", allowed_text(key), type_text(node)));
         }
         if (const auto* word = std::get_if<std::string>(&*value)) {
-            if (std::find(key.words.begin(), key.words.end(), *word) == key.words.end()) {
+            if (key.type == Type::word && std::find(key.words.begin(), key.words.end(), *word) == key.words.end()) {
                 return wrong(key, node, fmt::format("must be {}{}", range_text(key), did_you_mean(*word, key.words)));
             }
         } else if (key.type != Type::boolean && !within_bounds(key, *value)) {
@@ -231,7 +288,7 @@ class Reader {
         if (key.type == Type::integer && integer != nullptr) return integer->get();
         if (key.type == Type::real && integer != nullptr) return static_cast<double>(integer->get());
         if (key.type == Type::real && node.is_floating_point()) return node.as_floating_point()->get();
-        if (key.type == Type::word && node.is_string()) return node.as_string()->get();
+        if ((key.type == Type::word || key.type == Type::text) && node.is_string()) return node.as_string()->get();
         return {};
     }
 
@@ -300,6 +357,7 @@ class Reader {
     static std::string elsewhere(std::string_view name) {
         for (const Section& section : schema()) {
             for (const Key& key : section.keys) {
+                if (section.elements) continue;
                 if (key.path() == name) return fmt::format(" (write {} without quotes)", name);
                 if (key.name == name) return fmt::format(" (\"{}\" belongs to [{}])", name, section.name);
             }
@@ -310,7 +368,7 @@ class Reader {
     void unknown_top(const toml::key& name, const toml::node& node) {
         std::vector<std::string> known;
         for (const Section& section : schema()) {
-            if (!section.name.starts_with(effects_prefix)) known.push_back(section.name);
+            if (!section.name.starts_with(effects_prefix) && !section.elements) known.push_back(section.name);
         }
         known.emplace_back("effects");
         const std::string sections = fmt::format("{}", fmt::join(known, ", "));
@@ -345,26 +403,21 @@ class Reader {
 
     /// Each broken rule is reported at the first of its keys that the file names.
     void apply_rules() {
-        for (const Complaint& complaint : check(scenario_)) {
+        for (const Complaint& complaint : rules_(scenario_)) {
             const auto named = std::find_if(complaint.keys.begin(), complaint.keys.end(),
                                             [this](const std::string& key) { return places_.contains(key); });
             const std::string& key = named == complaint.keys.end() ? complaint.keys.front() : *named;
-            const auto place = places_.find(key);
-            problems_.push_back({place == places_.end() ? Place{} : place->second,
-                                 fmt::format("key \"{}\" = {}: {}", key, current_value(key), complaint.problem)});
+            const auto found = places_.find(key);
+            const Place place = found == places_.end() ? Place{} : found->second;
+            const Key* known = find_key(key);
+            problems_.push_back({place, fmt::format("key \"{}\" = {}: {}", key,
+                                                    known != nullptr ? to_toml(known->get(scenario_)) : place.value,
+                                                    complaint.problem)});
         }
-    }
-
-    std::string current_value(std::string_view path) const {
-        for (const Section& section : schema()) {
-            for (const Key& key : section.keys) {
-                if (key.path() == path) return to_toml(key.get(scenario_));
-            }
-        }
-        return "";
     }
 
     std::string file_;
+    const Rules& rules_;
     Scenario scenario_;
     std::vector<Problem> problems_;
     std::map<std::string, Place> places_;
@@ -439,7 +492,8 @@ toml::table parse_setting(const std::string& setting) {
 
 }  // namespace
 
-Scenario parse_string(std::string_view text, std::string_view name, std::span<const std::string> settings) {
+Scenario parse_string(std::string_view text, std::string_view name, std::span<const std::string> settings,
+                      const Rules& rules) {
     std::vector<std::pair<std::string, toml::table>> set;
     for (const std::string& setting : settings) set.emplace_back(setting, parse_setting(setting));
     refuse_deep_keys(text, name);
@@ -451,10 +505,10 @@ Scenario parse_string(std::string_view text, std::string_view name, std::span<co
         throw InputError(
             fmt::format("{}:{}:{}: not valid TOML: {}", name, where.line, where.column, error.description()));
     }
-    return Reader(name).read(root, set);
+    return Reader(name, rules).read(root, set);
 }
 
-Scenario parse_file(const std::filesystem::path& path, std::span<const std::string> settings) {
+Scenario parse_file(const std::filesystem::path& path, std::span<const std::string> settings, const Rules& rules) {
     constexpr std::size_t largest = 16 << 20;
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored)) {
@@ -468,7 +522,7 @@ Scenario parse_file(const std::filesystem::path& path, std::span<const std::stri
     text.resize(static_cast<std::size_t>(file.gcount()));
     if (text.size() > largest)
         throw InputError(fmt::format("{}: is larger than 16 MiB: not a scenario", path.string()));
-    return parse_string(text, path.string(), settings);
+    return parse_string(text, path.string(), settings, rules);
 }
 
 }  // namespace ringlock::scenario

@@ -1,22 +1,31 @@
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "engine/scenario/check.hpp"
 #include "engine/scenario/scenario.hpp"
 
 namespace ringlock::scenario {
+
+/// What a scenario must keep to once each of its keys is right.
+using Rules = std::function<std::vector<Complaint>(const Scenario&)>;
 
 /// Reads and validates a scenario. Keys that are not named have their defaults; an empty file is valid.
 ///
 /// \param settings  "section.key=value" each, in place of what the file says of that key; a later one in place of an
 ///                  earlier one. Values are TOML, a word without quotes is a string.
+/// \param rules     those of a study are study::complaints(), which looks at every point of a design
 /// @throws InputError with every problem of the file, one a line: FILE:LINE:COLUMN, key, value, what is allowed; in
 /// place of the position the setting, where that is wrong.
-Scenario parse_file(const std::filesystem::path& path, std::span<const std::string> settings = {});
+Scenario parse_file(const std::filesystem::path& path, std::span<const std::string> settings = {},
+                    const Rules& rules = check);
 
 /// The same for text; `name` stands in messages in place of the file.
-Scenario parse_string(std::string_view text, std::string_view name, std::span<const std::string> settings = {});
+Scenario parse_string(std::string_view text, std::string_view name, std::span<const std::string> settings = {},
+                      const Rules& rules = check);
 
 }  // namespace ringlock::scenario

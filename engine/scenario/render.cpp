@@ -44,10 +44,45 @@ std::string allowed_sentence(const Key& key) {
     return key.bounds.why.empty() ? text + "." : fmt::format("{}: {}.", text, key.bounds.why);
 }
 
+/// The elements of a section that may stand several times, each with the keys that it has.
+std::string elements_text(const Section& section, const Scenario& scenario) {
+    std::string out;
+    const std::size_t count = section.elements->count(scenario);
+    for (std::size_t i = 0; i < count; ++i) {
+        Scenario up_to_it = scenario;
+        section.elements->resize(up_to_it, i + 1);
+        const VariationForm form = section.elements->form(up_to_it);
+        out += fmt::format("\n[[{}]]\n", section.name);
+        for (const Key& key : section.keys) {
+            const auto is_it = [&](std::string_view name) { return name == key.name; };
+            const bool has = &key == &section.keys.front() ||
+                             std::any_of(form.required.begin(), form.required.end(), is_it) ||
+                             std::any_of(form.optional.begin(), form.optional.end(), is_it);
+            if (has) out += fmt::format("{} = {}\n", key.name, to_toml(key.get(up_to_it)));
+        }
+    }
+    return out;
+}
+
+/// What such an element could be: there is none by default.
+std::string commented_element(const Section& section) {
+    std::string out = fmt::format("# [[{}]]\n", section.name);
+    for (const Key& key : section.keys) {
+        out += comment(fmt::format("{} {}", key.doc, allowed_sentence(key)));
+        out += fmt::format("# {} = {}\n", key.name, to_toml(key.default_value()));
+    }
+    return out;
+}
+
 std::string write(const Scenario& scenario, bool commented) {
     std::string out;
     if (!scenario.device.empty()) out += fmt::format("device = \"{}\"\n", scenario.device);
     for (const Section& section : schema()) {
+        if (section.elements) {
+            out +=
+                commented ? '\n' + comment(section.doc) + commented_element(section) : elements_text(section, scenario);
+            continue;
+        }
         if (!out.empty()) out += '\n';
         if (commented) out += comment(section.doc);
         out += fmt::format("[{}]\n", section.name);
@@ -68,6 +103,7 @@ std::string_view type_name(Type type) {
         case Type::real:
             return "float";
         case Type::word:
+        case Type::text:
             return "string";
         case Type::reals:
             return "list of floats";
@@ -118,7 +154,9 @@ std::string schema_markdown() {
                    "gyros and where their constants come from.",
                    "", "");
     for (const Section& section : schema()) {
-        out += fmt::format("\n## `[{}]`\n\n{}\n", section.name, wrapped(section.doc, "", ""));
+        const std::string heading =
+            section.elements ? fmt::format("[[{}]]", section.name) : fmt::format("[{}]", section.name);
+        out += fmt::format("\n## `{}`\n\n{}\n", heading, wrapped(section.doc, "", ""));
         out += "| key | type | default | allowed | meaning |\n|---|---|---|---|---|\n";
         for (const Key& key : section.keys) {
             out += fmt::format("| `{}` | {} | `{}` | {} | {} |\n", key.name, type_name(key.type),
@@ -149,7 +187,9 @@ std::string schema_json() {
             if (key.type == Type::arms) entry["words"] = arm_names();
             keys.push_back(std::move(entry));
         }
-        sections.push_back({{"name", section.name}, {"doc", section.doc}, {"keys", std::move(keys)}});
+        Json entry{{"name", section.name}, {"doc", section.doc}, {"keys", std::move(keys)}};
+        if (section.elements) entry["several"] = true;
+        sections.push_back(std::move(entry));
     }
     return Json{{"sections", std::move(sections)}, {"rules", rules()}}.dump(2) + "\n";
 }

@@ -72,14 +72,49 @@ Finding turns_can_be_counted(const Scenario& s) {
     // A gyro has two trajectories at most, and twice this fits 64 bits.
     constexpr double most = 1e18;
     const double simulated_s = s.ensemble.settle_s + s.ensemble.duration_s;
-    const double half_cycles = static_cast<double>(s.ensemble.gyros) * static_cast<double>(s.input.sweep_points) *
-                               simulated_s * 2.0 * s.dither.frequency_hz;
+    const std::int64_t gyros = asks(s.stop) ? s.stop.most_gyros : s.ensemble.gyros;
+    const double half_cycles = static_cast<double>(gyros) * static_cast<double>(s.input.sweep_points) * simulated_s *
+                               2.0 * s.dither.frequency_hz;
     if (half_cycles <= most) return {};
     return Complaint{
         {"ensemble.duration_s", "ensemble.settle_s", "ensemble.gyros", "dither.frequency_hz", "input.sweep_points"},
         fmt::format(
             "{:.3g} half cycles of the dither, of all gyros together, are more than the {:g} that a run can hold",
             half_cycles, most)};
+}
+
+Finding turn_ons_are_whole(const Scenario& s) {
+    const std::int64_t each = s.ensemble.turn_ons;
+    constexpr std::int64_t first_look = 16;
+    if (asks(s.stop) && first_look % each != 0) {
+        return Complaint{{"ensemble.turn_ons", "stop.arw_relative", "stop.yield_absolute"},
+                         fmt::format("must divide {}, the gyros of the first look of [stop]", first_look)};
+    }
+    if (asks(s.stop) || s.ensemble.gyros % each == 0) return {};
+    return Complaint{
+        {"ensemble.turn_ons", "ensemble.gyros"},
+        fmt::format("{} gyros are not a whole number of gyros with {} turn-ons each", s.ensemble.gyros, each)};
+}
+
+Finding lot_can_grow(const Scenario& s) {
+    if (!asks(s.stop)) return {};
+    const std::vector<std::string> stop{"stop.arw_relative", "stop.yield_absolute"};
+    const auto refuse = [&](const char* key, const char* why) {
+        std::vector<std::string> keys{key};
+        keys.insert(keys.end(), stop.begin(), stop.end());
+        return Complaint{std::move(keys), why};
+    };
+    if (s.input.sweep_points > 1) {
+        return refuse("input.sweep_points", "a sweep has no stopping rule; vary input.rate_deg_h in a [design]");
+    }
+    if (s.output.angle_record) {
+        return refuse("output.angle_record",
+                      "records of a lot whose size is not known beforehand cannot be stored; set it to false");
+    }
+    if (s.stop.yield_absolute > 0.0 && !asks(s.specification)) {
+        return Complaint{{"stop.yield_absolute"}, "there is no yield without a [specification]"};
+    }
+    return {};
 }
 
 constexpr std::array all_run_rules = {
@@ -91,6 +126,11 @@ constexpr std::array all_run_rules = {
     Rule{"A sweep of more than one point ends at another rate than it starts from.", sweep_goes_somewhere},
     Rule{"The gyros of all points of the sweep are at most 100000000.", sweep_is_not_too_large},
     Rule{"The half cycles of all gyros, those before the record with them, are at most 1e18.", turns_can_be_counted},
+    Rule{"Gyros that are switched on several times are a whole number of gyros; of a lot with a stopping rule the "
+         "turn-ons divide 16.",
+         turn_ons_are_whole},
+    Rule{"A lot with a stopping rule has no sweep and no angle records, and for a yield a specification.",
+         lot_can_grow},
 };
 
 }  // namespace

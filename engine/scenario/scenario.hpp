@@ -7,6 +7,7 @@
 
 #include "engine/gyro/resonator.hpp"
 #include "engine/scenario/arm.hpp"
+#include "engine/scenario/design.hpp"
 
 /// Plain, validated description of a study. Units are in the names; K is arcsec per fringe (2 pi of optical phase).
 namespace ringlock::scenario {
@@ -103,6 +104,9 @@ double temperature_change_k(const Environment& environment, double time_s);
 /// How many gyros, for how long, and how they differ.
 struct Ensemble {
     std::int64_t gyros = 64;
+    /// So many gyros one after the other are the same one, switched on anew: its constants are drawn once, initial
+    /// phases and noises each time.
+    std::int64_t turn_ons = 1;
     double settle_s = 0.0;  ///< simulated before the record begins; rounded to whole dither cycles
     double duration_s = 600.0;
     std::uint64_t seed = 1;
@@ -196,6 +200,8 @@ struct Scenario {
     Propagation propagation;
     Output output;
     Specification specification;
+    Design design;  ///< empty: the scenario itself is the only point of the study
+    Stop stop;      ///< where it asks(), it sets the number of gyros
     RecordSettings record;
     bool operator==(const Scenario&) const = default;
 };

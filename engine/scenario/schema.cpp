@@ -3,308 +3,18 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
-#include <limits>
-#include <type_traits>
 
-#include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
 #include "engine/scenario/arm.hpp"
+#include "engine/scenario/sections.hpp"
 #include "engine/scenario/text.hpp"
 
 namespace ringlock::scenario {
 namespace {
-
-/// Words of each enumeration, in the order of its values.
-std::vector<std::string> words_of(ReadoutModel) { return {"ideal", "latched", "instrument"}; }
-std::vector<std::string> words_of(NoiseModel) { return {"turns", "drive"}; }
-std::vector<std::string> words_of(gyro::NoiseForm) { return {"held", "white", "sinusoidal"}; }
-std::vector<std::string> words_of(gyro::NoiseDistribution) { return {"gaussian", "uniform", "binary"}; }
-std::vector<std::string> words_of(PhaseFrom) { return {"detectors", "detectors_and_pulses"}; }
-std::vector<std::string> words_of(AngleOutput) { return {"interpolated", "quarter_fringe"}; }
-std::vector<std::string> words_of(PropagationMethod) { return {"turn_map", "direct"}; }
-std::vector<std::string> words_of(RecordKind) { return {"turns", "samples"}; }
-std::vector<std::string> words_of(RecordTrajectory) { return {"uncompensated", "noise_injected"}; }
-
-template <class Number>
-Bounds between(Number min, Number max, std::string why) {
-    return {.min = min, .max = max, .why = std::move(why)};
-}
-Bounds above(double min, double max, std::string why) {
-    return {.min = min, .max = max, .min_excluded = true, .why = std::move(why)};
-}
-Bounds zero_or(double min, double max, std::string why) {
-    return {.min = min, .max = max, .or_zero = true, .why = std::move(why)};
-}
-
-Bounds zero_or_whole(std::int64_t min, std::int64_t max, std::string why) {
-    return {.min = min, .max = max, .or_zero = true, .why = std::move(why)};
-}
-
-/// A key bound to a field; its type follows from the field's.
-template <class Access>
-Key key(std::string section, std::string name, Access access, Bounds bounds, std::string doc) {
-    using Field = std::remove_cvref_t<decltype(access(std::declval<Scenario&>()))>;
-    Key k{.section = std::move(section),
-          .name = std::move(name),
-          .type{},
-          .bounds = std::move(bounds),
-          .words{},
-          .doc = std::move(doc),
-          .get{},
-          .set{}};
-    if constexpr (std::is_enum_v<Field>) {
-        k.type = Type::word;
-        k.words = words_of(Field{});
-        k.get = [access, words = k.words](const Scenario& s) { return words.at(static_cast<std::size_t>(access(s))); };
-        k.set = [access, words = k.words](Scenario& s, const Value& v) {
-            for (std::size_t i = 0; i < words.size(); ++i) {
-                if (words[i] == std::get<std::string>(v)) access(s) = static_cast<Field>(i);
-            }
-        };
-    } else if constexpr (std::is_same_v<Field, std::vector<Arm>>) {
-        k.type = Type::arms;
-        k.get = [access](const Scenario& s) -> Value { return access(s); };
-        k.set = [access](Scenario& s, const Value& v) { access(s) = std::get<Field>(v); };
-    } else if constexpr (std::is_same_v<Field, std::vector<double>>) {
-        k.type = Type::reals;
-        k.get = [access](const Scenario& s) -> Value { return access(s); };
-        k.set = [access](Scenario& s, const Value& v) { access(s) = std::get<Field>(v); };
-    } else {
-        // Unsigned fields are signed in TOML.
-        using Plain = std::conditional_t<std::is_same_v<Field, std::uint64_t>, std::int64_t, Field>;
-        k.type = std::is_same_v<Plain, bool>     ? Type::boolean
-                 : std::is_same_v<Plain, double> ? Type::real
-                                                 : Type::integer;
-        k.get = [access](const Scenario& s) -> Value { return static_cast<Plain>(access(s)); };
-        k.set = [access](Scenario& s, const Value& v) { access(s) = static_cast<Field>(std::get<Plain>(v)); };
-    }
-    return k;
-}
-
-/// Key NAME of section SECTION, bound to the field of the same name.
-#define RINGLOCK_KEY(section, name) \
-#section, #name, [](auto& s) -> auto& { return s.section.name; }
-
-std::vector<Section> base_sections() {
-    constexpr std::int64_t largest_integer = std::numeric_limits<std::int64_t>::max();
-    constexpr const char* six_sigma = "six sigma must not reach zero";
-    const Bounds none;
-    return {
-        {"gyro",
-         "The optical cavity.",
-         {
-             key(RINGLOCK_KEY(gyro, scale_factor_arcsec), between(1e-3, 1e3, "real fringes are 0.1 to 10 arcsec"),
-                 "K: arcsec of rotation per fringe, that is per 2 pi of optical phase."),
-             key(RINGLOCK_KEY(gyro, lockin_threshold_deg_h),
-                 between(0.0, 1e5, "0 is a gyro free of lock-in; no usable one locks above 28 deg/s"),
-                 "Omega_L: half width of the lock-in band without dither."),
-         }},
-        {"dither",
-         "The mechanical dither, a sinusoid before noise and effects.",
-         {
-             key(RINGLOCK_KEY(dither, frequency_hz), between(1.0, 1e5, "mechanical dither runs at some hundred Hz"),
-                 "Frequency; the default is 783.4 rad/s."),
-             key(RINGLOCK_KEY(dither, peak_rate_deg_s), above(0.0, 1e4, "without dither there are no turns to follow"),
-                 "Omega_D: peak rate of the case against the cavity."),
-             key(RINGLOCK_KEY(dither, amplitude_wander_relative_rt_s), between(0.0, 0.1, "a dither is driven steadily"),
-                 "Random walk of the amplitude from turn to turn, relative, per square root of a second, from zero at "
-                 "the start."),
-             key(RINGLOCK_KEY(dither, amplitude_drift_relative_per_h),
-                 between(-100.0, 100.0, "a dither is driven steadily"),
-                 "Steady change of the amplitude, relative to that at the start."),
-         }},
-        {"noise_injection",
-         "Random noise on the dither angle, in arms that begin with noise_injected.",
-         {
-             key(RINGLOCK_KEY(noise_injection, model), none,
-                 "turns: the angles of the turns are independent, which no drive can make; drive: the force that "
-                 "drives "
-                 "the dithered body, a resonator, is noisy (docs/noise-injection.md)."),
-             key(RINGLOCK_KEY(noise_injection, turn_phase_rms_rad),
-                 between(0.0, 1e4, "far more than it takes to randomise the turns"),
-                 "Rms of the angle at the turns about its mean, in optical phase, stationary, behind resonator and "
-                 "amplitude loop. Independent from turn to turn, 3 rad randomise the turns fully."),
-             key(RINGLOCK_KEY(noise_injection, drive_noise_relative), between(0.0, 100.0, "the drive keeps its sense"),
-                 "Of a drive, instead of turn_phase_rms_rad: rms of the noise of the force over its mean; 0: not "
-                 "given."),
-             key(RINGLOCK_KEY(noise_injection, resonator_q), between(20.0, 1e5, "a dither is driven at its resonance"),
-                 "Of a drive: quality factor Q."),
-             key(RINGLOCK_KEY(noise_injection, form), none,
-                 "Noise of a drive. held: a random force is kept for hold_half_cycles; white: a random force is kept "
-                 "for 1/32 "
-                 "of a half cycle; sinusoidal: the force is modulated at modulation_hz."),
-             key(RINGLOCK_KEY(noise_injection, distribution), none, "Of a drive: of the force's levels."),
-             key(RINGLOCK_KEY(noise_injection, hold_half_cycles),
-                 between<std::int64_t>(1, 10'000, "longer than the memory of any resonator"),
-                 "Of a drive with held noise: half cycles from one redraw to the next."),
-             key(RINGLOCK_KEY(noise_injection, modulation_hz), above(0.0, 1e5, "a modulation goes up and down"),
-                 "Of a drive with sinusoidal noise: frequency of the modulation, which begins with a random phase."),
-             key(RINGLOCK_KEY(noise_injection, amplitude_loop_hz),
-                 between(0.0, 1e4, "an amplitude loop is slower than the dither"),
-                 "Amplitude loop of a drive: frequency at which the open-loop gain of its integrator is 1. The loop "
-                 "reduces "
-                 "noise of lower frequencies. 0: no loop."),
-         }},
-        {"readout",
-         "What the electronics can know of the phase; compensators see nothing else.",
-         {
-             key(RINGLOCK_KEY(readout, model), none,
-                 "ideal: phases and times without error; latched: quadrature detectors with noise, sampled at the "
-                 "zero-rate point itself, quarter-fringe counter, noiseless pulses on a clock; instrument: noisy "
-                 "comparators with hysteresis, a converter, a finite bandwidth, and the zero-rate point found from the "
-                 "pulses."),
-             key(RINGLOCK_KEY(readout, angle_output), none,
-                 "interpolated: the angle from the quadrature phase; quarter_fringe: from the up/down counter alone, "
-                 "in steps of K/4."),
-             key(RINGLOCK_KEY(readout, clock_hz), zero_or(1e3, 1e12, "0 is continuous time"),
-                 "Clock that times pulses and turns."),
-             key(RINGLOCK_KEY(readout, detector_noise_relative),
-                 between(0.0, 0.5, "beyond it the fringe cannot be followed"),
-                 "Rms noise of each detector sample over the amplitude of the fringe."),
-             key(RINGLOCK_KEY(readout, ellipse_correction), none,
-                 "Learn gain, offsets and orthogonality of the detectors from their own readings, and take them away."),
-             key(RINGLOCK_KEY(readout, phase_from), none,
-                 "Of the instrument: the phase at the zero-rate point from the sampled detectors alone, or also from "
-                 "the times of the four nearest pulses on either side."),
-             key(RINGLOCK_KEY(readout, comparator_noise_relative), between(0.0, 0.1, "a quarter fringe is 1.57"),
-                 "Of the instrument: rms noise at each comparator's input when it switches, over the amplitude of the "
-                 "fringe."),
-             key(RINGLOCK_KEY(readout, comparator_hysteresis_relative), between(0.0, 0.3, "a quarter fringe is 1.57"),
-                 "Of the instrument: comparators switch this far beyond zero, over the amplitude of the fringe."),
-             key(RINGLOCK_KEY(readout, detector_bandwidth_hz), zero_or(1e4, 1e12, "0 is unlimited"),
-                 "Of the instrument: first-order low-pass of detectors and comparators."),
-             key(RINGLOCK_KEY(readout, adc_bits), zero_or_whole(4, 24, "0 is a continuous converter"),
-                 "Of the instrument: bits of the converter of the detectors, which spans 1.25 fringe amplitudes to "
-                 "either side."),
-         }},
-        {"calibration",
-         "What compensators and electronics are told of the gyros.",
-         {
-             key(RINGLOCK_KEY(calibration, threshold_error_relative),
-                 between(-0.9, 9.0, "a threshold is positive and not unknown by powers of ten"),
-                 "Lock-in threshold as told over the true one, less one."),
-         }},
-        {"input",
-         "Rate of the case about the input axis, the dither apart.",
-         {
-             key(RINGLOCK_KEY(input, rate_deg_h), between(-1e7, 1e7, "the dither must reverse it"),
-                 "The rate, or the first one of a sweep."),
-             key(RINGLOCK_KEY(input, sweep_stop_deg_h), between(-1e7, 1e7, "the dither must reverse it"),
-                 "Last rate of a sweep; not used where sweep_points is 1."),
-             key(RINGLOCK_KEY(input, sweep_points), between<std::int64_t>(1, 100'000, "1 is no sweep"),
-                 "Evenly spaced rates of the sweep, both ends included; each gets ensemble.gyros gyros."),
-             key(RINGLOCK_KEY(input, profile_time_s), between(-1e9, 1e9, "30 years"),
-                 "Times of a profile, from the start of the run, that takes the place of rate_deg_h: linear between "
-                 "its "
-                 "points, constant beyond them. The rate that results are compared with is its mean over the record."),
-             key(RINGLOCK_KEY(input, profile_rate_deg_h), between(-1e7, 1e7, "the dither must reverse it"),
-                 "Rates at these times."),
-         }},
-        {"environment",
-         "Temperature of the gyros against that at the start, for effects that follow it: ramp t + swing sin(2 pi t / "
-         "period).",
-         {
-             key(RINGLOCK_KEY(environment, temperature_ramp_k_per_h), between(-1000.0, 1000.0, "a gyro warming up"),
-                 "Steady change of the temperature."),
-             key(RINGLOCK_KEY(environment, temperature_swing_k), between(0.0, 100.0, "a day in the desert"),
-                 "Amplitude of the periodic change."),
-             key(RINGLOCK_KEY(environment, temperature_period_s), between(1.0, 1e9, "slower than the dither"),
-                 "Period of that; the default is a day."),
-             key(RINGLOCK_KEY(environment, profile_time_s), between(-1e9, 1e9, "30 years"),
-                 "Times of a profile of the temperature, from the start of the run, that takes the place of ramp and "
-                 "swing: linear between its points, constant beyond them."),
-             key(RINGLOCK_KEY(environment, profile_temperature_k), between(-1000.0, 1000.0, "a gyro, not a furnace"),
-                 "Temperatures at these times; only their difference from that at the start counts."),
-         }},
-        {"ensemble",
-         "How many gyros, for how long, and how they differ.",
-         {
-             key(RINGLOCK_KEY(ensemble, gyros),
-                 between<std::int64_t>(1, 10'000'000, "a study needs a gyro, and each one's results are kept"),
-                 "Independent gyros at each input rate."),
-             key(RINGLOCK_KEY(ensemble, settle_s), between(0.0, 1e9, "30 years"),
-                 "Simulated time of each gyro before its record begins, for compensators that learn."),
-             key(RINGLOCK_KEY(ensemble, duration_s), above(0.0, 1e9, "30 years"), "Simulated time of each gyro."),
-             key(RINGLOCK_KEY(ensemble, seed), between<std::int64_t>(0, largest_integer, "integers of TOML are signed"),
-                 "Seed of every random number; the same seed gives the same result."),
-             key(RINGLOCK_KEY(ensemble, initial_phase_spread_rad),
-                 between(0.0, units::two_pi, "more than a whole fringe is the same"),
-                 "Full width of the uniform distribution of the optical phase at the first turn; 0 starts all gyros "
-                 "alike."),
-             key(RINGLOCK_KEY(ensemble, dither_asymmetry_sd_ratio),
-                 between(0.0, 0.05, "six sigma must leave both half cycles"),
-                 "Standard deviation of the dither asymmetry over the gyros."),
-             key(RINGLOCK_KEY(ensemble, lockin_threshold_sd_relative), between(0.0, 0.16, six_sigma),
-                 "Standard deviation of the lock-in threshold over the gyros, relative to its mean."),
-             key(RINGLOCK_KEY(ensemble, dither_amplitude_sd_relative), between(0.0, 0.16, six_sigma),
-                 "Standard deviation of the dither's peak rate over the gyros, relative to its mean."),
-         }},
-        {"propagation",
-         "How the equation of motion is solved.",
-         {
-             key(RINGLOCK_KEY(propagation, method), none,
-                 "turn_map: one exact map for each turn, the fast way; direct: adaptive integration through every "
-                 "fringe, the reference."),
-             key(RINGLOCK_KEY(propagation, direct_tolerance_rad),
-                 between(1e-14, 1e-3, "double precision ends below it"),
-                 "Error of a half cycle that the direct integrator allows."),
-             key(RINGLOCK_KEY(propagation, turn_map_tolerance_rad),
-                 between(1e-12, 1e-3, "the half turns that tables are made of are rounded there"),
-                 "Interpolation error per turn that the turn map allows."),
-         }},
-        {"output",
-         "What the result file holds.",
-         {
-             key(RINGLOCK_KEY(output, sample_interval_s), above(0.0, 1e6, "it is rounded to whole dither cycles"),
-                 "Time between samples of the decimated angle."),
-             key(RINGLOCK_KEY(output, angle_record), none,
-                 "Store the angle record of every gyro and arm, not only its statistics."),
-             key(RINGLOCK_KEY(output, tau_s), above(0.0, 1e9, "30 years"),
-                 "Averaging times at which Allan deviations are wanted beside those of octaves of the dither cycle; "
-                 "each is rounded to whole cycles."),
-         }},
-        {"specification",
-         "What a gyro must meet over ensemble.duration_s to pass; 0 asks for nothing. Arms are told with the share of "
-         "the gyros that pass (docs/studies.md).",
-         {
-             key(RINGLOCK_KEY(specification, arw_deg_rt_h), between(0.0, 1e3, "no gyro is worse"),
-                 "Largest angle random walk."),
-             key(RINGLOCK_KEY(specification, bias_stability_deg_h), between(0.0, 1e6, "no gyro is worse"),
-                 "Largest Allan deviation at the averaging time at_s."),
-             key(RINGLOCK_KEY(specification, at_s), above(0.0, 1e9, "30 years"),
-                 "Averaging time of bias_stability_deg_h; it is rounded to whole dither cycles."),
-             key(RINGLOCK_KEY(specification, rate_error_deg_h), between(0.0, 1e6, "no gyro is worse"),
-                 "Largest magnitude of the mean output rate less the input rate, over the whole record."),
-             key(RINGLOCK_KEY(specification, angle_error_arcsec), between(0.0, 1e9, "no gyro is worse"),
-                 "Largest magnitude of the angle beyond the input's at after_s."),
-             key(RINGLOCK_KEY(specification, after_s), above(0.0, 1e9, "30 years"),
-                 "Time since the start of the record at which angle_error_arcsec holds."),
-         }},
-        {"record",
-         "What `ringlock record` writes of one gyro over ensemble.duration_s.",
-         {
-             key(RINGLOCK_KEY(record, kind), none,
-                 "turns: every zero-rate point as the electronics have it; samples: increments of the stripped angle."),
-             key(RINGLOCK_KEY(record, trajectory), none, "With or without noise on the dither."),
-             key(RINGLOCK_KEY(record, rate_hz), between(1e-3, 1e6, "faster than any output"),
-                 "Samples a second; the angle is known at turns and interpolated linearly between them."),
-             key(RINGLOCK_KEY(record, temperature_interval_s), between(1e-3, 1e6, "a thermometer is slow"),
-                 "Time between rows of the temperature, where that changes."),
-         }},
-        {"arms",
-         "What is done to the gyros; all arms share their random numbers gyro by gyro.",
-         {
-             key(
-                 "arms", "names", [](auto& s) -> auto& { return s.arms; }, none,
-                 "Arms of the run, in the order of the result."),
-         }},
-    };
-}
-
-#undef RINGLOCK_KEY
-
 Section effect_section(const effects::Effect& effect) {
     const std::string name(effect.name());
     const auto sentence = [](std::string_view text) {
@@ -350,10 +60,50 @@ std::string list_text(const std::vector<std::string>& words) {
 const std::vector<Section>& schema() {
     static const std::vector<Section> all = [] {
         std::vector<Section> sections = base_sections();
+        for (Section& section : design_sections()) sections.push_back(std::move(section));
         for (const effects::Effect* effect : effects::registry()) sections.push_back(effect_section(*effect));
         return sections;
     }();
     return all;
+}
+
+const Key* find_key(std::string_view path) {
+    for (const Section& section : schema()) {
+        if (section.elements || !path.starts_with(section.name)) continue;
+        for (const Key& key : section.keys) {
+            if (key.path() == path) return &key;
+        }
+    }
+    return nullptr;
+}
+
+std::string_view unit_of(std::string_view name) {
+    // Longer endings before those that they end in.
+    constexpr std::array<std::pair<std::string_view, std::string_view>, 22> endings{{
+        {"relative_rt_s", "1/sqrt(s)"},
+        {"relative_per_h", "1/h"},
+        {"relative_per_k", "1/K"},
+        {"deg_h_per_k_h", "deg/h/(K/h)"},
+        {"deg_h_per_h", "deg/h/h"},
+        {"deg_h_per_k", "deg/h/K"},
+        {"deg_h_rt_h", "deg/h/sqrt(h)"},
+        {"deg_rt_h", "deg/sqrt(h)"},
+        {"k_per_h", "K/h"},
+        {"hz_per_s2", "Hz/s^2"},
+        {"hz_per_s3", "Hz/s^3"},
+        {"hz_per_s4", "Hz/s^4"},
+        {"hz_per_s5", "Hz/s^5"},
+        {"hz_per_s", "Hz/s"},
+        {"deg_h", "deg/h"},
+        {"deg_s", "deg/s"},
+        {"arcsec", "arcsec"},
+        {"hz", "Hz"},
+        {"rad", "rad"},
+        {"_k", "K"},
+        {"_s", "s"},
+        {"", "1"},
+    }};
+    return std::find_if(endings.begin(), endings.end(), [&](const auto& e) { return name.ends_with(e.first); })->second;
 }
 
 bool within_bounds(const Key& key, const Value& value) {
@@ -368,6 +118,18 @@ bool within_bounds(const Key& key, const Value& value) {
     return std::isfinite(real) && number_within(key.bounds, real);
 }
 
+Value value_of(const Key& key, double number) {
+    if (key.type == Type::integer) return static_cast<std::int64_t>(std::llround(number));
+    return number;
+}
+
+bool can_take(const Key& key, double number) {
+    constexpr double largest_exact = 9007199254740992.0;  // 2^53
+    if (key.type == Type::real) return within_bounds(key, number);
+    const bool whole = std::abs(number) <= largest_exact && number == std::round(number);
+    return whole && within_bounds(key, value_of(key, number));
+}
+
 std::string range_text(const Key& key) {
     switch (key.type) {
         case Type::boolean:
@@ -376,6 +138,8 @@ std::string range_text(const Key& key) {
             return fmt::format("one of {}", list_text(key.words));
         case Type::arms:
             return fmt::format("a list of different arms of {}", list_text(arm_names()));
+        case Type::text:
+            return "a string";
         case Type::integer:
         case Type::real:
         case Type::reals:

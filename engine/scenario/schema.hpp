@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -14,7 +15,7 @@ namespace ringlock::scenario {
 
 using Value = std::variant<bool, std::int64_t, double, std::string, std::vector<Arm>, std::vector<double>>;
 
-enum class Type { boolean, integer, real, word, arms, reals };
+enum class Type { boolean, integer, real, word, text, arms, reals };
 
 /// What a number may be. The limits have the type of the key.
 struct Bounds {
@@ -39,17 +40,37 @@ struct Key {
     Value default_value() const { return get(Scenario{}); }
 };
 
+/// A section that may stand several times, [[NAME]]. Its keys get and set the last of its elements.
+struct Elements {
+    std::function<std::size_t(const Scenario&)> count;
+    std::function<void(Scenario&, std::size_t)> resize;
+    std::function<VariationForm(const Scenario&)> form;  ///< which keys the last element has, the first key apart
+};
+
 struct Section {
     std::string name;
     std::string doc;
     std::vector<Key> keys;
+    std::optional<Elements> elements = {};
 };
 
 /// All sections in the order in which they are printed.
 const std::vector<Section>& schema();
 
+/// The key of that path, outside of sections that may stand several times; nullptr where there is none.
+const Key* find_key(std::string_view path);
+
+/// The unit that the name of a key ends in: "deg/h" of "lockin_threshold_deg_h", "1" where it has none.
+std::string_view unit_of(std::string_view name);
+
 /// True where a number of the key's type lies within its bounds, all of a list do; a real must be finite as well.
 bool within_bounds(const Key& key, const Value& value);
+
+/// Whether the key, a number, can be this one; of a whole number also whether it is one.
+bool can_take(const Key& key, double number);
+
+/// A number as the key's value; can_take(key, number) holds.
+Value value_of(const Key& key, double number);
 
 /// "between 1 and 10000000", "above 0 and at most 10000", "one of "a", "b"".
 std::string range_text(const Key& key);

@@ -250,8 +250,9 @@ void ensemble_run(std::int64_t gyros, int threads) {
     scenario.ensemble.gyros = gyros;
     scenario.ensemble.duration_s = 60.0;
     const auto arms = arms_of({"noise_injected", "noise_injected+compensated"});
-    ensemble::run(scenario, arms, 0, gyros, threads,
-                  [](std::int64_t, std::size_t) { return std::make_unique<Nothing>(); }, {});
+    const ensemble::Job job{&scenario, arms, 0, gyros,
+                            [](std::int64_t, std::size_t) { return std::make_unique<Nothing>(); }};
+    ensemble::run({&job, 1}, threads, {});
 }
 
 /// Peak memory [MB] of `ringlock run` over a study of so many hours.

@@ -25,7 +25,7 @@ std::string arw_text(const study::ArmSummary& arm) {
 }  // namespace
 
 void coefficients(const char* file) {
-    const study::Study all = study::read_result(file);
+    const study::Study all = study::read_result(file).points.front();
     const auto points = static_cast<std::size_t>(all.scenario.input.sweep_points);
     const auto per_point = static_cast<std::size_t>(all.scenario.ensemble.gyros);
     std::vector<std::string> titles = {"input [deg/h]"};

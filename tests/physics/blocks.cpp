@@ -210,8 +210,9 @@ TEST(Ensemble, TellsNoTurnTwiceWhereABlockBeginsAgain) {
                                         turns_told += turns;
                                     }};
     const std::string message = message_of<RunError>([&] {
-        ensemble::run(
-            scenario, arms, 0, 3, 1, [](std::int64_t, std::size_t) { return std::make_unique<Nothing>(); }, monitor);
+        const ensemble::Job job{&scenario, arms, 0, 3,
+                                [](std::int64_t, std::size_t) { return std::make_unique<Nothing>(); }};
+        ensemble::run({&job, 1}, 1, monitor);
     });
     EXPECT_THAT(message, testing::HasSubstr("1 of 3 gyros"));
     EXPECT_EQ(gyros_told, 2);
@@ -248,7 +249,8 @@ TEST(Ensemble, AFailureOfTheSinkIsTheRunsNotAGyros) {
         ++blocks;
         return std::make_unique<Full>();
     };
-    EXPECT_EQ(message_of<RunError>([&] { ensemble::run(scenario, arms, 0, 64, 1, make_sink, {}); }), "disk full");
+    const ensemble::Job job{&scenario, arms, 0, 64, make_sink};
+    EXPECT_EQ(message_of<RunError>([&] { ensemble::run({&job, 1}, 1, {}); }), "disk full");
     EXPECT_EQ(blocks, 1) << "nothing is tried again";
 }
 

@@ -367,14 +367,15 @@ TEST(Studies, TheSizeOfTheResultIsKnownBeforehand) {
     for (const bool record : {false, true}) {
         scenario.output.angle_record = record;
         const auto path = directory / (record ? "with.h5" : "without.h5");
-        study::ResultWriter writer(path, study::Study(scenario));
-        const study::Study study = study::run(
-            study::Study(scenario), 2, [&](const study::SampledAngles& samples) { writer.write_samples(samples); });
+        study::ResultWriter writer(path, study::Experiment(scenario));
+        const study::Experiment experiment =
+            study::run(study::Experiment(scenario), 2,
+                       [&](const study::SampledAngles& samples) { writer.write_samples(samples); });
         store::Provenance provenance;
-        writer.finish(study, study::summarise(study), provenance);
+        writer.finish(experiment, study::summarise(experiment), provenance);
         // Names, units and descriptions of some hundred objects come on top.
         const auto size = static_cast<double>(std::filesystem::file_size(path));
-        const auto expected = static_cast<double>(study::expected_size_bytes(study));
+        const auto expected = static_cast<double>(study::expected_size_bytes(experiment));
         EXPECT_GT(size, expected);
         EXPECT_LT(size, expected + 66e3);
     }

@@ -66,7 +66,7 @@ class Corners {
         const double density = log_uniform(0.01, 0.4);
         for (const Section& section : scenario::schema()) {
             if (section.name == "ensemble" || section.name == "output" || section.name == "input") continue;
-            if (section.name.starts_with("effects.")) continue;
+            if (section.name.starts_with("effects.") || section.name.starts_with("design")) continue;
             for (const Key& key : section.keys) {
                 if (key.type != Type::arms && chance(density)) set(key, value(key));
             }

@@ -29,9 +29,11 @@ class GyroRecords {
     }
 
     void run(std::int64_t first, std::int64_t last, int threads) {
-        ensemble::run(
-            scenario_, scenario_.arms, first, last, threads,
-            [this](std::int64_t gyro, std::size_t gyros) { return std::make_unique<Sink>(*this, gyro, gyros); }, {});
+        const auto make_sink = [this](std::int64_t gyro, std::size_t gyros) {
+            return std::make_unique<Sink>(*this, gyro, gyros);
+        };
+        const ensemble::Job job{&scenario_, scenario_.arms, first, last, make_sink};
+        ensemble::run({&job, 1}, threads, {});
     }
     const GyroRecord& operator[](std::int64_t gyro) const { return records_[static_cast<std::size_t>(gyro)]; }
 

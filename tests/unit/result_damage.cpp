@@ -37,8 +37,8 @@ TEST_F(ResultFile, ReplacesAResultOfTheSameScenarioOnly) {
     write(path_, small(false));
     EXPECT_NO_THROW(write(path_, small(false)));
     const std::string before = bytes(path_);
-    EXPECT_THROW(ResultWriter(path_, Study(small(false, 6))), InputError) << "another seed";
-    EXPECT_THROW(ResultWriter(path_, Study(small(true))), InputError) << "another scenario";
+    EXPECT_THROW(ResultWriter(path_, Experiment(small(false, 6))), InputError) << "another seed";
+    EXPECT_THROW(ResultWriter(path_, Experiment(small(true))), InputError) << "another scenario";
     EXPECT_EQ(bytes(path_), before);
     EXPECT_EQ(left(), std::set<std::string>{"out.h5"});
 }
@@ -46,21 +46,21 @@ TEST_F(ResultFile, ReplacesAResultOfTheSameScenarioOnly) {
 TEST_F(ResultFile, KeepsFilesThatAreNoResult) {
     for (const std::string& content : {std::string("not HDF5\n"), std::string()}) {
         std::ofstream(path_, std::ios::binary) << content;
-        EXPECT_THROW(ResultWriter(path_, Study(small(false))), InputError);
+        EXPECT_THROW(ResultWriter(path_, Experiment(small(false))), InputError);
         EXPECT_EQ(bytes(path_), content);
     }
     store::File::create(path_).set_attribute("format", "rlg-record");
     const std::string before = bytes(path_);
-    EXPECT_THROW(ResultWriter(path_, Study(small(false))), InputError);
+    EXPECT_THROW(ResultWriter(path_, Experiment(small(false))), InputError);
     EXPECT_EQ(bytes(path_), before);
     EXPECT_EQ(left(), std::set<std::string>{"out.h5"});
 }
 
 TEST_F(ResultFile, LeavesNothingWithoutFinish) {
-    { ResultWriter writer(path_, Study(small(true))); }
+    { ResultWriter writer(path_, Experiment(small(true))); }
     EXPECT_EQ(left(), std::set<std::string>{});
-    EXPECT_THROW(ResultWriter(directory_ / "missing" / "out.h5", Study(small(true))), InputError);
-    EXPECT_THROW(ResultWriter(directory_ / std::string(300, 'x'), Study(small(true))), InputError);
+    EXPECT_THROW(ResultWriter(directory_ / "missing" / "out.h5", Experiment(small(true))), InputError);
+    EXPECT_THROW(ResultWriter(directory_ / std::string(300, 'x'), Experiment(small(true))), InputError);
     EXPECT_EQ(left(), std::set<std::string>{});
 }
 
@@ -133,7 +133,7 @@ TEST_F(DamagedResult, WrongShapesAreNamedWithBoth) {
 TEST_F(DamagedResult, AngleRecordsThatAreNotWholeAreNamed) {
     const auto complaint = [&]() -> std::string {
         try {
-            (void)family_deviations(path_, read_result(path_), std::array{allan::Estimator::oadev},
+            (void)family_deviations(path_, read_result(path_), 0, std::array{allan::Estimator::oadev},
                                     std::array<std::int64_t, 1>{20});
         } catch (const InputError& error) {
             return error.what();

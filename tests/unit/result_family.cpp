@@ -43,10 +43,11 @@ double overlapping_variance(const std::vector<double>& angle_arcsec, std::size_t
 
 TEST_F(ResultFile, DeviationsAtFactorsAskedForAreThoseOfTheStoredAngles) {
     write(path_, small(true));
-    const Study study = read_result(path_);
+    const Experiment experiment = read_result(path_);
+    const Study& study = experiment.points.front();
     ASSERT_EQ(study.schedule.samples, 45);
     const std::vector<std::int64_t> factors = {1, 7, 22};  // no octaves; 22 is the largest of 45 samples
-    const auto family = family_deviations(path_, study, oadev, factors);
+    const auto family = family_deviations(path_, experiment, 0, oadev, factors);
     ASSERT_EQ(family.size(), study.arms.size());
     const double interval_s = study.schedule.sample_interval_s;
     const store::File file = store::File::open(path_);
@@ -89,10 +90,11 @@ TEST_F(ResultFile, DeviationsOfSamplesAtEveryCycleAreThoseOfTheRun) {
     scenario.ensemble.duration_s = 10.0;
     scenario.output.sample_interval_s = 1.0 / scenario.dither.frequency_hz;
     write(path_, scenario);
-    const Study study = read_result(path_);
+    const Experiment experiment = read_result(path_);
+    const Study& study = experiment.points.front();
     ASSERT_EQ(study.schedule.cycles_per_sample, 1);
     const Summary summary = summarise(study);
-    const auto family = family_deviations(path_, study, oadev, study.factors);
+    const auto family = family_deviations(path_, experiment, 0, oadev, study.factors);
     for (std::size_t a = 0; a < family.size(); ++a) {
         const std::vector<EnsemblePoint>& run = summary.arms[a].allan;
         ASSERT_EQ(family[a][0].points.size(), run.size());
@@ -111,10 +113,11 @@ TEST_F(ResultFile, DeviationsOfSamplesAtEveryCycleAreThoseOfTheRun) {
 
 TEST_F(ResultFile, WithoutFactorsDeviationsAreAtOctaves) {
     write(path_, small(true));
-    const Study study = read_result(path_);
-    const auto octaves = family_deviations(path_, study, oadev).at(0).at(0).points;
+    const Experiment experiment = read_result(path_);
+    const Study& study = experiment.points.front();
+    const auto octaves = family_deviations(path_, experiment, 0, oadev).at(0).at(0).points;
     const std::vector<std::int64_t> factors = {1, 2, 4, 8, 16};
-    const auto given = family_deviations(path_, study, oadev, factors).at(0).at(0).points;
+    const auto given = family_deviations(path_, experiment, 0, oadev, factors).at(0).at(0).points;
     ASSERT_EQ(octaves.size(), given.size());
     for (std::size_t i = 0; i < given.size(); ++i) {
         EXPECT_EQ(octaves[i].tau_s, given[i].tau_s);
@@ -124,7 +127,7 @@ TEST_F(ResultFile, WithoutFactorsDeviationsAreAtOctaves) {
 
 std::string complaint_at(const std::filesystem::path& path, const std::vector<std::int64_t>& factors) {
     try {
-        (void)family_deviations(path, read_result(path), oadev, factors);
+        (void)family_deviations(path, read_result(path), 0, oadev, factors);
     } catch (const InputError& error) {
         return error.what();
     }

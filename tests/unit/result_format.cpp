@@ -25,8 +25,9 @@ std::map<hsize_t, std::string> extents(const Study& study) {
     const std::map<hsize_t, std::string> names = {{study.gyros.size(), "gyros"},
                                                   {static_cast<hsize_t>(study.schedule.samples), "samples"},
                                                   {study.angle_times_s.size(), "times"},
+                                                  {study.arms.size(), "arms"},
                                                   {study.factors.size(), "taus"}};
-    EXPECT_EQ(names.size(), 4U) << "extents must differ to be told apart";
+    EXPECT_EQ(names.size(), 5U) << "extents must differ to be told apart";
     return names;
 }
 

@@ -53,7 +53,7 @@ TEST_F(ResultFile, GivesTheStudyBack) {
     scenario::Scenario scenario = small(true);
     scenario.arms = scenario::parse_arms({"ideal", "noise_injected", "noise_injected+compensated"});
     scenario.input = {.rate_deg_h = 1.0, .sweep_stop_deg_h = 2.0, .sweep_points = 2};
-    ResultWriter writer(path_, Study(scenario));
+    ResultWriter writer(path_, Experiment(scenario));
     std::vector<double> record;                                       // of gyro 4 in the first arm
     const OnSamples on_samples = [&](const SampledAngles& samples) {  // one thread
         writer.write_samples(samples);
@@ -63,12 +63,13 @@ TEST_F(ResultFile, GivesTheStudyBack) {
         record.insert(record.end(), samples.angle_arcsec.begin() + row * count,
                       samples.angle_arcsec.begin() + (row + 1) * count);
     };
-    const Study study = run(Study(scenario), 1, on_samples);
+    const Experiment experiment = run(Experiment(scenario), 1, on_samples);
+    const Study& study = experiment.points.front();
     store::Provenance provenance = store::collect_provenance({}, 1, "small.toml");
     provenance.wall_s = 1.5;
-    writer.finish(study, summarise(study), provenance);
+    writer.finish(experiment, summarise(experiment), provenance);
 
-    const Study read = read_result(path_);
+    const Study read = read_result(path_).points.front();
     EXPECT_EQ(read.scenario, study.scenario);
     EXPECT_EQ(read.factors, study.factors);
     EXPECT_EQ(read.turns, study.turns);
@@ -120,7 +121,7 @@ TEST_F(ResultFile, GivesClosedFormsBackWhereTheDriveRepeatsItself) {
     const auto read = [&] {
         fs::remove(path_);
         write(path_, scenario);
-        return read_result(path_);
+        return read_result(path_).points.front();
     };
     for (const ArmStatistics& arm : read().arms) {
         for (const GyroStatistics& gyro : arm.gyros) EXPECT_FALSE(gyro.rate_error_closed_form_deg_h) << arm.arm.name;
@@ -153,7 +154,7 @@ TEST_F(ResultFile, GivesClosedFormsBackWhereTheDriveRepeatsItself) {
     const hid_t file = H5Fopen(path_.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
     ASSERT_GE(H5Ldelete(file, "arms/uncompensated/rate_error_closed_form_deg_h", H5P_DEFAULT), 0);
     H5Fclose(file);
-    const ArmSummary older = summarise(read_result(path_)).arms.at(1);
+    const ArmSummary older = summarise(read_result(path_)).front().arms.at(1);
     EXPECT_FALSE(older.sweep.at(0).closed_form_rate_deg_h);
     EXPECT_TRUE(older.steps.empty());
 }

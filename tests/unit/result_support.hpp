@@ -28,10 +28,10 @@ inline scenario::Scenario small(bool angle_record, std::uint64_t seed = 5) {
 }
 
 inline void write(const std::filesystem::path& path, const scenario::Scenario& scenario) {
-    study::ResultWriter writer(path, study::Study(scenario));
-    const study::Study study = study::run(study::Study(scenario), 2,
-                                          [&](const study::SampledAngles& samples) { writer.write_samples(samples); });
-    writer.finish(study, study::summarise(study), store::collect_provenance({}, 2, "small.toml"));
+    study::ResultWriter writer(path, study::Experiment(scenario));
+    const study::Experiment experiment = study::run(
+        study::Experiment(scenario), 2, [&](const study::SampledAngles& samples) { writer.write_samples(samples); });
+    writer.finish(experiment, study::summarise(experiment), store::collect_provenance({}, 2, "small.toml"));
 }
 
 inline std::string bytes(const std::filesystem::path& path) {

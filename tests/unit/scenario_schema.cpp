@@ -50,6 +50,9 @@ TEST(Schema, EveryKeySetsWhatItGets) {
                     other = key.words.back() == std::get<std::string>(key.default_value()) ? key.words.front()
                                                                                            : key.words.back();
                     break;
+                case Type::text:
+                    other = std::string("gyro.lockin_threshold_deg_h");
+                    break;
                 case Type::reals:
                     other = std::vector<double>{1.0, 2.0};
                     break;
@@ -58,11 +61,13 @@ TEST(Schema, EveryKeySetsWhatItGets) {
                     break;
             }
             Scenario scenario;
+            if (section.elements) section.elements->resize(scenario, 1);
+            const Scenario before = scenario;
             key.set(scenario, other);
             EXPECT_EQ(key.get(scenario), other) << key.path();
-            EXPECT_NE(scenario, Scenario{}) << key.path();
+            EXPECT_NE(scenario, before) << key.path();
             key.set(scenario, key.default_value());
-            EXPECT_EQ(scenario, Scenario{}) << key.path() << " is bound to another key's field";
+            EXPECT_EQ(scenario, before) << key.path() << " is bound to another key's field";
         }
     }
 }

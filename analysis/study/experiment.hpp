@@ -1,0 +1,57 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/lot/pairs.hpp"
+#include "analysis/study/design_points.hpp"
+#include "analysis/study/scale_factor.hpp"
+#include "analysis/study/study.hpp"
+#include "analysis/study/summary.hpp"
+
+/// A study with all points of its design; without a design it has one.
+namespace ringlock::study {
+
+/// How a lot grew, where the scenario has a stopping rule.
+struct Growth {
+    std::vector<std::int64_t> looks;  ///< numbers of gyros at which the rule was asked
+    bool precise = false;             ///< all that was asked for is reached
+    std::string why;                  ///< why no gyros were added: a sentence
+};
+
+struct Experiment {
+    /// Plans it: nothing is simulated. Throws InputError where complaints() are about the design.
+    explicit Experiment(const scenario::Scenario& what) : Experiment(what, design_axes(what)) {}
+    /// The same with these axes in the place of design_axes().
+    Experiment(const scenario::Scenario& what, std::vector<Axis> with_axes);
+
+    scenario::Scenario scenario;   ///< as written, with its design
+    std::vector<Axis> axes;        ///< empty without a design
+    std::vector<Study> points;     ///< each the study of its scenario alone
+    std::optional<Growth> growth;  ///< of a run with a stopping rule
+
+    bool has_design() const { return !axes.empty(); }
+    std::int64_t gyros() const;  ///< of all points
+    std::int64_t turns() const;  ///< of all points
+};
+
+/// Runs all points side by side. With a stopping rule gyros are added to all points until every one is precise, and
+/// ensemble.gyros of the scenario becomes their number. Throws RunError, Interrupted.
+Experiment run(Experiment experiment, int threads, const OnSamples& on_samples = nullptr,
+               const ensemble::Monitor& monitor = {});
+
+/// Sums every point up.
+std::vector<Summary> summarise(const Experiment& experiment);
+
+/// Random walks of an arm at a point over those at the first one, gyro by gyro: both share their random numbers.
+/// Nothing where either point's records show none.
+std::optional<lot::PairedFigure> arw_over_first(const Experiment& experiment, const std::vector<Summary>& summaries,
+                                                std::size_t point, std::size_t arm);
+
+/// The straight line of every arm through the rates of a design that varies input.rate_deg_h alone; empty for others.
+std::vector<std::optional<ScaleFactor>> scale_factors(const Experiment& experiment);
+
+/// Turns that the whole experiment will count; with a stopping rule, at most.
+std::int64_t expected_turns(const Experiment& experiment);
+
+}  // namespace ringlock::study

@@ -1,0 +1,171 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/report/table.hpp"
+#include "analysis/study/sensitivity.hpp"
+#include "app/study_output.hpp"
+
+namespace ringlock::app {
+
+namespace {
+
+/// Widest line of a table.
+constexpr std::size_t most_columns = 100;
+
+/// Rows of a long design that are shown; all are in the file and in --json.
+constexpr std::size_t most_rows = 40;
+
+std::string heading(const study::Experiment& experiment, const store::Provenance& provenance) {
+    const study::Study& first = experiment.points.front();
+    const double duration_s = first.schedule.sample_interval_s * static_cast<double>(first.schedule.samples - 1);
+    const std::string what =
+        experiment.has_design()
+            ? fmt::format("{} points of {} gyros", experiment.points.size(), experiment.scenario.ensemble.gyros)
+            : fmt::format("{} gyros, {:.6g} s each", first.gyros.size(), duration_s);
+    const auto turns = static_cast<double>(experiment.turns());
+    return fmt::format("{}: {}, seed {}\n{} turns in {:.1f} s ({:.3g} a second)\n\n", provenance.scenario_file, what,
+                       experiment.scenario.ensemble.seed, experiment.turns(), provenance.wall_s,
+                       turns / provenance.wall_s);
+}
+
+std::string walk_cell(const study::Figure& arw) {
+    if (!arw.median) return arw.hi ? fmt::format("< {:.2g}", *arw.hi) : "-";
+    return fmt::format("{:.4g}", *arw.median);
+}
+
+std::string yield_cell(const study::ArmSummary& arm) {
+    return arm.yield && arm.yield->share.value ? fmt::format("{:.0f}", 100.0 * *arm.yield->share.value) : "-";
+}
+
+std::string rate_cell(const study::ArmSummary& arm) { return fmt::format("{:.4f}", arm.rate_error_deg_h.mean); }
+
+std::size_t width(const std::string& table) { return table.find('\n'); }
+
+/// One figure of all arms, points down: a table as wide as the page, or one below the other where arms are many.
+template <class Cell>
+std::string points_table(const study::Experiment& experiment, const std::vector<study::Summary>& summaries,
+                         Cell&& cell) {
+    const std::size_t arms = summaries.front().arms.size();
+    const std::size_t step = (summaries.size() + most_rows - 1) / most_rows;
+    const auto table_of = [&](std::size_t first, std::size_t last) {
+        std::vector<report::Column> columns{{"point", report::Align::right}};
+        for (std::size_t k = 0; k < experiment.axes.size(); ++k) {
+            columns.push_back({fmt::format("[{}]", k + 1), report::Align::right});
+        }
+        for (std::size_t a = first; a < last; ++a)
+            columns.push_back({fmt::format("({})", a + 1), report::Align::right});
+        report::Table table(columns);
+        for (std::size_t p = 0; p < summaries.size(); p += step) {
+            std::vector<std::string> row{fmt::format("{}", p + 1)};
+            for (const study::Axis& axis : experiment.axes) row.push_back(fmt::format("{:.5g}", axis.values[p]));
+            for (std::size_t a = first; a < last; ++a) row.push_back(cell(summaries[p].arms[a]));
+            table.add_row(row);
+        }
+        return table.text();
+    };
+    std::string text;
+    for (std::size_t first = 0; first < arms;) {
+        std::size_t last = arms;
+        while (last > first + 1 && width(table_of(first, last)) > most_columns) --last;
+        text += table_of(first, last);
+        first = last;
+    }
+    return text;
+}
+
+std::string index_cell(const design::Index& index) {
+    return fmt::format("{:.2f} ({:.2f} .. {:.2f})", index.estimate, index.lo, index.hi);
+}
+
+/// The keys that decide, arm by arm and figure by figure.
+std::string sensitivity_text(const study::Experiment& experiment) {
+    std::string text;
+    for (const study::ArmSensitivity& arm : study::sensitivity(experiment)) {
+        for (const study::SensitiveFigure& figure : arm.figures) {
+            const design::OutputIndices& found = figure.indices;
+            text += fmt::format("\n{}, {}: Sobol' indices, 95 %", arm.arm, figure.name);
+            if (found.noise_share)
+                text += fmt::format("; estimation noise is {:.2g} of the variance", *found.noise_share);
+            text += "\n";
+            if (!found.absent.empty()) {
+                text += "none: " + found.absent + "\n";
+                continue;
+            }
+            report::Table table({{"key", report::Align::left},
+                                 {"first order", report::Align::right},
+                                 {"total order", report::Align::right}});
+            for (std::size_t k = 0; k < found.factors.size(); ++k) {
+                table.add_row(
+                    {experiment.axes[k].key, index_cell(found.factors[k].first), index_cell(found.factors[k].total)});
+            }
+            text += table.text();
+        }
+    }
+    return text;
+}
+
+std::string design_text(const study::Experiment& experiment, const std::vector<study::Summary>& summaries) {
+    std::string text;
+    for (std::size_t k = 0; k < experiment.axes.size(); ++k) {
+        text += fmt::format("[{}] {} [{}]\n", k + 1, experiment.axes[k].key, experiment.axes[k].unit);
+    }
+    const auto& arms = summaries.front().arms;
+    for (std::size_t a = 0; a < arms.size(); ++a) text += fmt::format("({}) {}\n", a + 1, arms[a].name);
+    if (summaries.size() > most_rows) text += "Of the points some are shown; all are in the file and in --json.\n";
+    text += "\nAngle random walk, median of the gyros [deg/sqrt(h)]\n";
+    text +=
+        points_table(experiment, summaries, [](const study::ArmSummary& arm) { return walk_cell(arm.arw_deg_rt_h); });
+    text += "\nMean rate less the input rate [deg/h]\n";
+    text += points_table(experiment, summaries, rate_cell);
+    if (arms.front().yield) {
+        text += "\nGyros that meet the specification [%]\n";
+        text += points_table(experiment, summaries, yield_cell);
+    }
+    return text + sensitivity_text(experiment);
+}
+
+report::Figure design_figure(const study::Experiment& experiment, const std::vector<study::Summary>& summaries) {
+    report::Figure figure;
+    const bool one_key = experiment.axes.size() == 1;
+    const study::Axis& key = experiment.axes.front();
+    figure.title = fmt::format("Angle random walk, {} points of {} gyros", experiment.points.size(),
+                               experiment.scenario.ensemble.gyros);
+    figure.x_label = one_key ? fmt::format("{} [{}]", key.key, key.unit) : "point of the design";
+    figure.y_label = "angle random walk [deg/sqrt(h)]";
+    figure.whole_x = !one_key;
+    figure.log_y = true;
+    for (std::size_t a = 0; a < summaries.front().arms.size(); ++a) {
+        report::Curve curve{summaries.front().arms[a].name, {}, {}, {}, {}, report::Curve::Style::points};
+        for (std::size_t p = 0; p < summaries.size(); ++p) {
+            const study::Figure& arw = summaries[p].arms[a].arw_deg_rt_h;
+            curve.x.push_back(one_key ? key.values[p] : static_cast<double>(p + 1));
+            curve.y.push_back(arw.median.value_or(std::nan("")));
+            curve.lo.push_back(arw.median_lo.value_or(std::nan("")));
+            curve.hi.push_back(arw.median_hi.value_or(std::nan("")));
+        }
+        figure.curves.push_back(std::move(curve));
+    }
+    return figure;
+}
+
+}  // namespace
+
+std::string experiment_text(const study::Experiment& experiment, const std::vector<study::Summary>& summaries,
+                            const store::Provenance& provenance) {
+    std::string growth;
+    if (experiment.growth) {
+        growth = fmt::format("stopped at {} gyros: {}\n\n", experiment.growth->looks.back(), experiment.growth->why);
+    }
+    return heading(experiment, provenance) + growth +
+           (experiment.has_design() ? design_text(experiment, summaries)
+                                    : study_text(experiment.points.front(), summaries.front()));
+}
+
+report::Figure experiment_figure(const study::Experiment& experiment, const std::vector<study::Summary>& summaries) {
+    return experiment.has_design() ? design_figure(experiment, summaries)
+                                   : study_figure(experiment.points.front(), summaries.front());
+}
+
+}  // namespace ringlock::app
