@@ -1,6 +1,7 @@
 #include "analysis/study/design_points.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +12,7 @@
 
 #include "analysis/design/design.hpp"
 #include "analysis/design/sensitivity.hpp"
+#include "analysis/study/study.hpp"
 #include "engine/core/error.hpp"
 #include "engine/ensemble/schedule.hpp"
 #include "engine/scenario/schema.hpp"
@@ -261,6 +263,23 @@ std::vector<Complaint> complaints_of_points(const Scenario& scenario, const std:
     return found;
 }
 
+/// More points than memory holds, by the schedule of the scenario itself. Throws InputError where points cannot be
+/// counted.
+std::optional<Complaint> too_large(const Scenario& scenario) {
+    const auto base_points = static_cast<std::uint64_t>(scenario.design.sensitivity_base_points);
+    const std::uint64_t keys = scenario.design.vary.size();
+    const std::uint64_t limit = point_limit(scenario);
+    const std::uint64_t points =
+        base_points > 0 ? base_points * (keys + 2) : design::point_count(plan_of(scenario), limit);
+    const auto needed = static_cast<double>(points) * static_cast<double>(expected_memory_bytes(scenario));
+    const double there = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
+    if (needed <= there) return std::nullopt;
+    return Complaint{{"design.points", "design.sensitivity_base_points", "design.kind"},
+                     fmt::format("{} points of {} gyros need about {:.0f} GB of memory, and the machine has {:.0f} GB; "
+                                 "take fewer points or gyros",
+                                 points, scenario.ensemble.gyros, needed * 1e-9, there * 1e-9)};
+}
+
 bool same_schedule(const Scenario& scenario, const std::vector<Axis>& axes) {
     const auto changes = [](const Axis& axis) {
         return axis.values.end() != std::adjacent_find(axis.values.begin(), axis.values.end(), std::not_equal_to<>());
@@ -303,6 +322,7 @@ std::vector<Complaint> complaints(const Scenario& scenario) {
     if (scenario.design.vary.empty()) return scenario::check(scenario);
     std::vector<Axis> axes;
     try {
+        if (auto complaint = too_large(scenario)) return {*complaint};
         axes = design_axes(scenario);
     } catch (const InputError& error) {
         return {{{"design.points", "design.sensitivity_base_points", "design.kind"}, error.what()}};

@@ -1,6 +1,8 @@
 #include "analysis/study/study.hpp"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -42,10 +44,28 @@ Study::Study(const scenario::Scenario& what)
       schedule(what),
       factors(factors_of(what, schedule)),
       angle_times_s(std::begin(dither::spread_times_s), std::end(dither::spread_times_s)) {
+    const std::vector<double>& asked = scenario.output.angle_after_s;
+    angle_times_s.insert(angle_times_s.end(), asked.begin(), asked.end());
     if (scenario.specification.angle_error_arcsec > 0.0) angle_times_s.push_back(scenario.specification.after_s);
     const auto total = static_cast<std::size_t>(ensemble::total_gyros(scenario));
     gyros.resize(total);
     for (const scenario::Arm& arm : scenario.arms) arms.push_back({arm, std::vector<GyroStatistics>(total)});
+}
+
+std::uint64_t expected_memory_bytes(const scenario::Scenario& scenario) {
+    const Study one = [&] {
+        scenario::Scenario single = scenario;
+        single.design = {};
+        single.ensemble.gyros = single.ensemble.turn_ons = 1;
+        return Study(single);
+    }();
+    const std::int64_t gyros = scenario::asks(scenario.stop) ? scenario.stop.most_gyros : scenario.ensemble.gyros;
+    const std::uint64_t of_gyro =
+        sizeof(GyroStatistics) + one.factors.size() * sizeof(allan::Point) + one.angle_times_s.size() * sizeof(double);
+    // A scenario with its effects, in some hundred nodes of its maps.
+    constexpr std::uint64_t of_point = 24'000;
+    return of_point + static_cast<std::uint64_t>(gyros) *
+                          (sizeof(gyro::Setup) + static_cast<std::uint64_t>(scenario.arms.size()) * of_gyro);
 }
 
 bool has_closed_form(const scenario::Scenario& scenario, const scenario::Arm& arm) {
@@ -262,11 +282,15 @@ void extend(Study& study, std::int64_t gyros) {
 
 void run(std::span<Study> studies, std::int64_t first, int threads, const OnSamples& on_samples,
          const ensemble::Monitor& monitor) {
+    // Some seconds each for the noise of a drive.
+    oneapi::tbb::task_arena arena(threads);
+    arena.execute([&] {
+        oneapi::tbb::parallel_for(std::size_t{0}, studies.size(), [&](std::size_t i) { predict_noise(studies[i]); });
+    });
     std::mutex mutex;
     std::vector<ensemble::Job> jobs;
     for (std::size_t number = 0; number < studies.size(); ++number) {
         Study& study = studies[number];
-        predict_noise(study);
         const scenario::Scenario& scenario = study.scenario;
         const auto make_sink = [&, number](std::int64_t first_gyro, std::size_t gyros) {
             return std::make_unique<BlockStatistics>(study, number, mutex, first_gyro, gyros, on_samples);

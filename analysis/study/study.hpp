@@ -45,8 +45,8 @@ struct Study {
     /// Averaging factors of the Allan deviations in dither cycles: octaves, and those of output.tau_s and of the
     /// specification; ascending.
     std::vector<std::int64_t> factors;
-    /// Times since the start of the record at which angle errors are told: dither::spread_times_s, then that of the
-    /// specification.
+    /// Times since the start of the record at which angle errors are told: dither::spread_times_s, then those asked
+    /// for, then that of the specification.
     std::vector<double> angle_times_s;
     std::vector<gyro::Setup> gyros;  ///< parameters as drawn
     std::vector<ArmStatistics> arms;
@@ -56,6 +56,9 @@ struct Study {
     std::int64_t contradictory_readings = 0;  ///< turns at which pulses and detectors contradicted each other
     double turn_map_error_rad = 0.0;          ///< largest error measured between the nodes of the turn maps
 };
+
+/// Bytes of memory that the study of a scenario takes, its design apart; estimated.
+std::uint64_t expected_memory_bytes(const scenario::Scenario& scenario);
 
 /// Whether the mean rate of the arm's gyros is known in closed form: a drive that repeats itself, and nothing
 /// corrected.

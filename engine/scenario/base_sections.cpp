@@ -181,6 +181,9 @@ std::vector<Section> base_sections() {
                  "Time between samples of the decimated angle."),
              key(RINGLOCK_KEY(output, angle_record), none,
                  "Store the angle record of every gyro and arm, not only its statistics."),
+             key(RINGLOCK_KEY(output, angle_after_s), above(0.0, 1e9, "30 years"),
+                 "Times since the start of the record at which the angle turned beyond the input's is told, beside 1, "
+                 "10 and 100 s; at the nearest whole number of dither cycles."),
              key(RINGLOCK_KEY(output, tau_s), above(0.0, 1e9, "30 years"),
                  "Averaging times at which Allan deviations are wanted beside those of octaves of the dither cycle; "
                  "each is rounded to whole cycles."),

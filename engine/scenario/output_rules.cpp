@@ -68,6 +68,20 @@ Finding averaging_times_fit(const Scenario& s) {
     return {};
 }
 
+Finding angle_times_fit(const Scenario& s) {
+    constexpr std::size_t most = 100;
+    if (s.output.angle_after_s.size() > most) {
+        return Complaint{{"output.angle_after_s"},
+                         fmt::format("has {} times; at most {} can be asked for", s.output.angle_after_s.size(), most)};
+    }
+    for (const double after_s : s.output.angle_after_s) {
+        if (after_s <= s.ensemble.duration_s) continue;
+        return Complaint{{"output.angle_after_s", "ensemble.duration_s"},
+                         fmt::format("the record ends after {:g} s, before {:g} s", s.ensemble.duration_s, after_s)};
+    }
+    return {};
+}
+
 Finding specification_can_be_met(const Scenario& s) {
     const Specification& wanted = s.specification;
     if (wanted.bias_stability_deg_h > 0.0 && !has_deviation_at(s, wanted.at_s)) {
@@ -110,6 +124,7 @@ constexpr std::array all_output_rules = {
     Rule{"A run holds at least three samples.", run_holds_samples},
     Rule{"Averaging times asked for (at most 100) are between a dither cycle and half of the record.",
          averaging_times_fit},
+    Rule{"Times asked for angles (at most 100) are within the record.", angle_times_fit},
     Rule{"A specification asks for averaging and other times that the record has, for no less random walk than effects "
          "make by themselves, and for one of records of 32 samples or more only.",
          specification_can_be_met},

@@ -129,9 +129,10 @@ struct Propagation {
 
 /// What the result file holds.
 struct Output {
-    double sample_interval_s = 1.0;  ///< of the decimated angle record; rounded to whole dither cycles
-    bool angle_record = true;        ///< store the record of every gyro and arm, not only its statistics
-    std::vector<double> tau_s = {};  ///< averaging times at which deviations are wanted beside those of octaves
+    double sample_interval_s = 1.0;          ///< of the decimated angle record; rounded to whole dither cycles
+    bool angle_record = true;                ///< store the record of every gyro and arm, not only its statistics
+    std::vector<double> angle_after_s = {};  ///< times since the start of the record at which angle errors are told
+    std::vector<double> tau_s = {};          ///< averaging times at which deviations are wanted beside those of octaves
     bool operator==(const Output&) const = default;
 };
 
