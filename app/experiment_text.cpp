@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "analysis/report/table.hpp"
 #include "analysis/study/sensitivity.hpp"
@@ -40,6 +43,18 @@ std::string yield_cell(const study::ArmSummary& arm) {
 }
 
 std::string rate_cell(const study::ArmSummary& arm) { return fmt::format("{:.4f}", arm.rate_error_deg_h.mean); }
+
+/// Lines no wider than a table.
+std::string wrapped(std::string_view text) {
+    std::string out;
+    while (text.size() > most_columns) {
+        std::size_t end = text.rfind(' ', most_columns);
+        if (end == std::string_view::npos || end == 0) end = most_columns;
+        out += fmt::format("{}\n", text.substr(0, end));
+        text.remove_prefix(std::min(text.size(), end + 1));
+    }
+    return out + fmt::format("{}\n", text);
+}
 
 std::size_t width(const std::string& table) { return table.find('\n'); }
 
@@ -85,7 +100,7 @@ std::string sensitivity_text(const study::Experiment& experiment) {
     for (const study::ArmSensitivity& arm : study::sensitivity(experiment)) {
         for (const study::SensitiveFigure& figure : arm.figures) {
             const design::OutputIndices& found = figure.indices;
-            text += fmt::format("\n{}, {}: Sobol' indices, 95 %", arm.arm, figure.name);
+            text += fmt::format("\n{}, {}:\nSobol' indices, 95 %", arm.arm, figure.name);
             if (found.noise_share)
                 text += fmt::format("; estimation noise is {:.2g} of the variance", *found.noise_share);
             text += "\n";
@@ -156,7 +171,9 @@ std::string experiment_text(const study::Experiment& experiment, const std::vect
                             const store::Provenance& provenance) {
     std::string growth;
     if (experiment.growth) {
-        growth = fmt::format("stopped at {} gyros: {}\n\n", experiment.growth->looks.back(), experiment.growth->why);
+        growth =
+            wrapped(fmt::format("stopped at {} gyros: {}", experiment.growth->looks.back(), experiment.growth->why)) +
+            "\n";
     }
     return heading(experiment, provenance) + growth +
            (experiment.has_design() ? design_text(experiment, summaries)

@@ -19,7 +19,6 @@ namespace {
 using test::TemporaryDirectory;
 using testing::AllOf;
 using testing::HasSubstr;
-using testing::Not;
 
 scenario::Scenario parsed(const std::string& text) {
     return scenario::parse_string(text, "s.toml", {}, study::complaints);
@@ -297,6 +296,8 @@ TEST(Designs, WhatIsWrongWithADesignIsSaid) {
     EXPECT_THAT(complaint(sobol + normal + "mean = 300.0\nsd = 10.0\n"), HasSubstr("say how many"));
     EXPECT_THAT(complaint(sobol + "points = 8\n" + normal + "mean = 300.0\nsd = 0.0\n"), HasSubstr("sd"));
     EXPECT_THAT(complaint(sobol + "points = 100000000\n" + normal + "mean = 300.0\nsd = 10.0\n"),
+                AllOf(HasSubstr("design.points"), HasSubstr("is the limit")));
+    EXPECT_THAT(complaint(sobol + "points = 1000000\n" + normal + "mean = 300.0\nsd = 10.0\n"),
                 AllOf(HasSubstr("design.points"), HasSubstr("of memory, and the machine has")));
     EXPECT_THAT(complaint("[design]\nkind = \"grid\"\n"), HasSubstr("varies nothing"));
     EXPECT_THAT(complaint("[design]\npoints = 3\n"), HasSubstr("varies nothing"));
