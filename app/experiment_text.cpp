@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <string>
 
 #include "analysis/report/table.hpp"
 #include "analysis/study/sensitivity.hpp"
@@ -16,6 +18,25 @@ constexpr std::size_t most_columns = 100;
 
 /// Rows of a long design that are shown; all are in the file and in --json.
 constexpr std::size_t most_rows = 40;
+
+/// Lines broken between words where they are wider than a table.
+std::string wrapped(const std::string& text) {
+    std::string lines;
+    std::size_t column = 0;
+    for (std::size_t begin = 0; begin < text.size();) {
+        const std::size_t end = std::min(text.find(' ', begin), text.size());
+        const std::size_t length = end - begin;
+        if (column > 0) {
+            const bool fits = column + 1 + length <= most_columns;
+            lines += fits ? ' ' : '\n';
+            column = fits ? column + 1 : 0;
+        }
+        lines += text.substr(begin, length);
+        column += length;
+        begin = end + 1;
+    }
+    return lines;
+}
 
 std::string heading(const study::Experiment& experiment, const store::Provenance& provenance) {
     const study::Study& first = experiment.points.front();
@@ -39,7 +60,7 @@ std::string yield_cell(const study::ArmSummary& arm) {
     return arm.yield && arm.yield->share.value ? fmt::format("{:.0f}", 100.0 * *arm.yield->share.value) : "-";
 }
 
-std::string rate_cell(const study::ArmSummary& arm) { return fmt::format("{:.4f}", arm.rate_error_deg_h.mean); }
+std::string rate_cell(const study::ArmSummary& arm) { return rate_text(arm.rate_error_deg_h.mean); }
 
 std::size_t width(const std::string& table) { return table.find('\n'); }
 
@@ -86,9 +107,9 @@ std::string sensitivity_text(const study::Experiment& experiment) {
         for (const study::SensitiveFigure& figure : arm.figures) {
             const design::OutputIndices& found = figure.indices;
             text += fmt::format("\n{}, {}: Sobol' indices, 95 %", arm.arm, figure.name);
-            if (found.noise_share)
-                text += fmt::format("; estimation noise is {:.2g} of the variance", *found.noise_share);
             text += "\n";
+            if (found.noise_share)
+                text += fmt::format("estimation noise is {:.2g} of the variance\n", *found.noise_share);
             if (!found.absent.empty()) {
                 text += "none: " + found.absent + "\n";
                 continue;
@@ -156,7 +177,9 @@ std::string experiment_text(const study::Experiment& experiment, const std::vect
                             const store::Provenance& provenance) {
     std::string growth;
     if (experiment.growth) {
-        growth = fmt::format("stopped at {} gyros: {}\n\n", experiment.growth->looks.back(), experiment.growth->why);
+        growth =
+            wrapped(fmt::format("stopped at {} gyros: {}", experiment.growth->looks.back(), experiment.growth->why)) +
+            "\n\n";
     }
     return heading(experiment, provenance) + growth +
            (experiment.has_design() ? design_text(experiment, summaries)
