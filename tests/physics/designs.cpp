@@ -310,6 +310,8 @@ TEST(Designs, WhatIsWrongWithADesignIsSaid) {
         HasSubstr("output.angle_record = false"));
     EXPECT_THAT(complaint(sobol + "sensitivity_base_points = 16\npoints = 3\n" + normal + "mean = 300.0\nsd = 10.0\n"),
                 HasSubstr("leave design.points out"));
+    EXPECT_THAT(complaint(sobol + "sensitivity_base_points = 15\n" + normal + "mean = 300.0\nsd = 10.0\n"),
+                AllOf(HasSubstr("design.sensitivity_base_points"), HasSubstr("fewer than 16 base points")));
 }
 
 }  // namespace
