@@ -296,8 +296,10 @@ TEST(Designs, WhatIsWrongWithADesignIsSaid) {
                 HasSubstr("only 0 of its distribution lies within"));
     EXPECT_THAT(complaint(sobol + normal + "mean = 300.0\nsd = 10.0\n"), HasSubstr("say how many"));
     EXPECT_THAT(complaint(sobol + "points = 8\n" + normal + "mean = 300.0\nsd = 0.0\n"), HasSubstr("sd"));
-    EXPECT_THAT(complaint(sobol + "points = 100000000\n" + normal + "mean = 300.0\nsd = 10.0\n"),
+    EXPECT_THAT(complaint(sobol + "points = 1500000\n" + normal + "mean = 300.0\nsd = 10.0\n"),
                 AllOf(HasSubstr("design.points"), HasSubstr("of memory, and the machine has")));
+    EXPECT_THAT(complaint(sobol + "points = 100000000\n" + normal + "mean = 300.0\nsd = 10.0\n"),
+                AllOf(HasSubstr("design.points"), HasSubstr("1562500 is the limit")));
     EXPECT_THAT(complaint("[design]\nkind = \"grid\"\n"), HasSubstr("varies nothing"));
     EXPECT_THAT(complaint("[design]\npoints = 3\n"), HasSubstr("varies nothing"));
     EXPECT_THAT(complaint("[[design.vary]]\nkey = " + key + "values = [100.0]\n"), HasSubstr("set \"grid\""));
