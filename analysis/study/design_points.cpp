@@ -48,7 +48,9 @@ std::string why_not(const std::string& path) {
     return "";
 }
 
+/// Throws InputError where the key is none of a scenario.
 design::Factor factor_of(const Variation& v) {
+    if (scenario::find_key(v.key) == nullptr) throw InputError(fmt::format("\"{}\" {}", v.key, why_not(v.key)));
     design::Factor factor{v.key, design::Values{v.values}};
     switch (v.distribution) {
         case scenario::LotDistribution::normal:

@@ -277,6 +277,13 @@ TEST(Designs, KeysThatCannotVaryAreRefused) {
     EXPECT_THAT(refused("input.sweep_points"), HasSubstr("vary input.rate_deg_h"));
 }
 
+TEST(Designs, UnknownKeysAreRefusedWithoutComplaintsToo) {
+    scenario::Scenario s;
+    s.design.kind = scenario::DesignKind::list;
+    s.design.vary = {{.key = "gyro.lockin_treshold_deg_h", .values = {1.0}}};
+    EXPECT_THROW(study::Experiment{s}, InputError);
+}
+
 TEST(Designs, AllPointsThatBreakARuleAreNamed) {
     const std::string text = complaint(grid + std::string("\"input.rate_deg_h\"\nvalues = [1.0, 3e5, 5.0, 4e5]\n"));
     EXPECT_THAT(text, AllOf(HasSubstr("s.toml:6:7"), HasSubstr("points 2 and 4 of 4, the first"),
