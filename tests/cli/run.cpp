@@ -358,6 +358,15 @@ TEST_F(RunCommand, SweepsOfThreeRatesShowTheLineThroughThem) {
     expect_numbers(arms["noise_injected+compensated"]["arw_reduction"], {"lo"});
     EXPECT_EQ(json::parse(run({"analyze", "three.h5", "--json"}).out)["arms"], arms);
     const std::string table = run({"analyze", "three.h5"}).out;
+    const auto printed_yield = [&](const Arguments& arguments) {
+        return json::parse(run(arguments).out)["arms"]["noise_injected"]["yield"];
+    };
+    const json yield = printed_yield(
+        {"run", "three.toml", "--json", "-o", "yield.h5", "--set", "specification.scale_factor_error_ppm=1e5"});
+    EXPECT_EQ(yield["gyros"], 3) << "gyros, not records";
+    EXPECT_EQ(yield["limits"]["scale_factor_error_ppm"]["most"], 1e5);
+    expect_refused({"run", "two.toml", "-o", "no.h5", "--set", "specification.scale_factor_error_ppm=5"},
+                   AllOf(HasSubstr("--set specification.scale_factor_error_ppm=5"), HasSubstr("sweep_points to 3")));
     for (const char* text :
          {"Straight lines through the rates, 3 gyros at each, full scale 60 deg/h", "repeatability [ppm]",
           "nonlinearity [ppm of full scale]", "random walk of noise_injected over that of"}) {
