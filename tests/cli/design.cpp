@@ -118,6 +118,27 @@ TEST_F(DesignCommand, TableHasThePointsAndTheFigureIsDrawn) {
     EXPECT_EQ(read("again.svg"), read("d.svg"));
 }
 
+TEST_F(DesignCommand, ManyKeysAndArmsStayWithinThePage) {
+    std::string text =
+        "[ensemble]\ngyros = 2\nduration_s = 20.0\n[output]\nangle_record = false\n[design]\n"
+        "kind = \"sobol\"\npoints = 2\n";
+    for (const char* key :
+         {"gyro.lockin_threshold_deg_h", "input.rate_deg_h", "dither.frequency_hz",
+          "noise_injection.turn_phase_rms_rad", "effects.quantum_noise.deg_rt_h",
+          "calibration.threshold_error_relative", "effects.bias_temperature.deg_h_per_k",
+          "ensemble.lockin_threshold_sd_relative", "ensemble.dither_amplitude_sd_relative", "dither.peak_rate_deg_s"}) {
+        const std::string name = key;
+        const bool large = name.starts_with("dither") || name.starts_with("gyro");
+        text += "[[design.vary]]\nkey = \"" + name + "\"\ndistribution = \"uniform\"\n" +
+                (large ? "from = 123.45678\nto = 150.0\n" : "from = 0.000123456\nto = 0.01\n");
+    }
+    write("many.toml", text);
+    const Outcome r = run({"run", "many.toml"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.out, AllOf(HasSubstr("\nKeys\n"), HasSubstr("[10]")));
+    expect_narrow(r.out);
+}
+
 TEST_F(DesignCommand, JsonHasThePointsWithTheirValuesAndArms) {
     const json out = printed({"run", "d.toml", "--json", "--quiet"});
     EXPECT_FALSE(out.contains("stop"));
