@@ -125,9 +125,13 @@ void analyze(const Arguments& arguments) {
     if (!arguments.plot.empty()) report::write_svg(arguments.plot, experiment_figure(experiment, summaries));
     if (arguments.json) return put(experiment_json(experiment, summaries, provenance));
     std::string text = experiment_text(experiment, summaries, provenance);
-    for (std::size_t point = 0; point < summaries.size() && !asked.empty(); ++point) {
-        if (experiment.has_design()) text += fmt::format("\nPoint {}:", point + 1);
-        text += asked_text(experiment.points[point], summaries[point], asked);
+    for (std::size_t point = 0; point < summaries.size(); ++point) {
+        std::string more;
+        // The text of a study has its deviations already.
+        if (experiment.has_design()) more += family_text(summaries[point]);
+        if (!asked.empty()) more += asked_text(experiment.points[point], summaries[point], asked);
+        if (experiment.has_design() && !more.empty()) text += fmt::format("\nPoint {}:", point + 1);
+        text += more;
     }
     put(text);
 }

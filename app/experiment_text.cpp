@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <functional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "analysis/report/table.hpp"
@@ -19,6 +20,25 @@ constexpr std::size_t most_columns = 100;
 
 /// Rows of a long design that are shown; all are in the file and in --json.
 constexpr std::size_t most_rows = 40;
+
+/// Lines broken between words where they are wider than a table.
+std::string wrapped(const std::string& text) {
+    std::string lines;
+    std::size_t column = 0;
+    for (std::size_t begin = 0; begin < text.size();) {
+        const std::size_t end = std::min(text.find(' ', begin), text.size());
+        const std::size_t length = end - begin;
+        if (column > 0) {
+            const bool fits = column + 1 + length <= most_columns;
+            lines += fits ? ' ' : '\n';
+            column = fits ? column + 1 : 0;
+        }
+        lines += text.substr(begin, length);
+        column += length;
+        begin = end + 1;
+    }
+    return lines;
+}
 
 std::string heading(const study::Experiment& experiment, const store::Provenance& provenance) {
     const study::Study& first = experiment.points.front();
@@ -42,52 +62,68 @@ std::string yield_cell(const study::ArmSummary& arm) {
     return arm.yield && arm.yield->share.value ? fmt::format("{:.0f}", 100.0 * *arm.yield->share.value) : "-";
 }
 
-std::string rate_cell(const study::ArmSummary& arm) { return fmt::format("{:.4f}", arm.rate_error_deg_h.mean); }
-
-/// Lines no wider than a table.
-std::string wrapped(std::string_view text) {
-    std::string out;
-    while (text.size() > most_columns) {
-        std::size_t end = text.rfind(' ', most_columns);
-        if (end == std::string_view::npos || end == 0) end = most_columns;
-        out += fmt::format("{}\n", text.substr(0, end));
-        text.remove_prefix(std::min(text.size(), end + 1));
-    }
-    return out + fmt::format("{}\n", text);
-}
+std::string rate_cell(const study::ArmSummary& arm) { return rate_text(arm.rate_error_deg_h.mean); }
 
 std::size_t width(const std::string& table) { return table.find('\n'); }
 
-/// One figure of all arms, points down: a table as wide as the page, or one below the other where arms are many.
-template <class Cell>
-std::string points_table(const study::Experiment& experiment, const std::vector<study::Summary>& summaries,
-                         Cell&& cell) {
-    const std::size_t arms = summaries.front().arms.size();
-    const std::size_t step = (summaries.size() + most_rows - 1) / most_rows;
+/// A column of a table of points.
+struct PointColumn {
+    std::string name;
+    std::function<std::string(std::size_t point)> cell;
+};
+
+/// Points down: what they lead with in every table, and the columns in as many tables below each other as the page is
+/// too narrow for one.
+std::string points_table(std::size_t points, const std::vector<PointColumn>& leading,
+                         const std::vector<PointColumn>& columns) {
+    const std::size_t step = (points + most_rows - 1) / most_rows;
     const auto table_of = [&](std::size_t first, std::size_t last) {
-        std::vector<report::Column> columns{{"point", report::Align::right}};
-        for (std::size_t k = 0; k < experiment.axes.size(); ++k) {
-            columns.push_back({fmt::format("[{}]", k + 1), report::Align::right});
-        }
-        for (std::size_t a = first; a < last; ++a)
-            columns.push_back({fmt::format("({})", a + 1), report::Align::right});
-        report::Table table(columns);
-        for (std::size_t p = 0; p < summaries.size(); p += step) {
+        std::vector<PointColumn> shown = leading;
+        shown.insert(shown.end(), columns.begin() + static_cast<std::ptrdiff_t>(first),
+                     columns.begin() + static_cast<std::ptrdiff_t>(last));
+        std::vector<report::Column> heads{{"point", report::Align::right}};
+        for (const PointColumn& column : shown) heads.push_back({column.name, report::Align::right});
+        report::Table table(heads);
+        for (std::size_t p = 0; p < points; p += step) {
             std::vector<std::string> row{fmt::format("{}", p + 1)};
-            for (const study::Axis& axis : experiment.axes) row.push_back(fmt::format("{:.5g}", axis.values[p]));
-            for (std::size_t a = first; a < last; ++a) row.push_back(cell(summaries[p].arms[a]));
+            for (const PointColumn& column : shown) row.push_back(column.cell(p));
             table.add_row(row);
         }
         return table.text();
     };
     std::string text;
-    for (std::size_t first = 0; first < arms;) {
-        std::size_t last = arms;
+    for (std::size_t first = 0; first < columns.size();) {
+        std::size_t last = columns.size();
         while (last > first + 1 && width(table_of(first, last)) > most_columns) --last;
         text += table_of(first, last);
         first = last;
     }
     return text;
+}
+
+/// Most keys that stand beside the figures; more have tables of their own.
+constexpr std::size_t most_keys_beside = 4;
+
+std::vector<PointColumn> key_columns(const study::Experiment& experiment) {
+    std::vector<PointColumn> columns;
+    for (std::size_t k = 0; k < experiment.axes.size(); ++k) {
+        columns.push_back({fmt::format("[{}]", k + 1), [&values = experiment.axes[k].values](std::size_t p) {
+                               return fmt::format("{:.5g}", values[p]);
+                           }});
+    }
+    return columns;
+}
+
+/// One figure of all arms, points down.
+template <class Cell>
+std::string figure_table(const study::Experiment& experiment, const std::vector<study::Summary>& summaries,
+                         Cell&& cell) {
+    const bool beside = experiment.axes.size() <= most_keys_beside;
+    std::vector<PointColumn> arms;
+    for (std::size_t a = 0; a < summaries.front().arms.size(); ++a) {
+        arms.push_back({fmt::format("({})", a + 1), [&, a](std::size_t p) { return cell(summaries[p].arms[a]); }});
+    }
+    return points_table(summaries.size(), beside ? key_columns(experiment) : std::vector<PointColumn>{}, arms);
 }
 
 std::string index_cell(const design::Index& index) {
@@ -100,10 +136,10 @@ std::string sensitivity_text(const study::Experiment& experiment) {
     for (const study::ArmSensitivity& arm : study::sensitivity(experiment)) {
         for (const study::SensitiveFigure& figure : arm.figures) {
             const design::OutputIndices& found = figure.indices;
-            text += fmt::format("\n{}, {}:\nSobol' indices, 95 %", arm.arm, figure.name);
-            if (found.noise_share)
-                text += fmt::format("; estimation noise is {:.2g} of the variance", *found.noise_share);
+            text += fmt::format("\n{}, {}: Sobol' indices, 95 %", arm.arm, figure.name);
             text += "\n";
+            if (found.noise_share)
+                text += fmt::format("estimation noise is {:.2g} of the variance\n", *found.noise_share);
             if (!found.absent.empty()) {
                 text += "none: " + found.absent + "\n";
                 continue;
@@ -129,14 +165,17 @@ std::string design_text(const study::Experiment& experiment, const std::vector<s
     const auto& arms = summaries.front().arms;
     for (std::size_t a = 0; a < arms.size(); ++a) text += fmt::format("({}) {}\n", a + 1, arms[a].name);
     if (summaries.size() > most_rows) text += "Of the points some are shown; all are in the file and in --json.\n";
+    if (experiment.axes.size() > most_keys_beside) {
+        text += "\nKeys\n" + points_table(summaries.size(), {}, key_columns(experiment));
+    }
     text += "\nAngle random walk, median of the gyros [deg/sqrt(h)]\n";
     text +=
-        points_table(experiment, summaries, [](const study::ArmSummary& arm) { return walk_cell(arm.arw_deg_rt_h); });
+        figure_table(experiment, summaries, [](const study::ArmSummary& arm) { return walk_cell(arm.arw_deg_rt_h); });
     text += "\nMean rate less the input rate [deg/h]\n";
-    text += points_table(experiment, summaries, rate_cell);
+    text += figure_table(experiment, summaries, rate_cell);
     if (arms.front().yield) {
         text += "\nGyros that meet the specification [%]\n";
-        text += points_table(experiment, summaries, yield_cell);
+        text += figure_table(experiment, summaries, yield_cell);
     }
     return text + sensitivity_text(experiment);
 }
@@ -173,7 +212,7 @@ std::string experiment_text(const study::Experiment& experiment, const std::vect
     if (experiment.growth) {
         growth =
             wrapped(fmt::format("stopped at {} gyros: {}", experiment.growth->looks.back(), experiment.growth->why)) +
-            "\n";
+            "\n\n";
     }
     return heading(experiment, provenance) + growth +
            (experiment.has_design() ? design_text(experiment, summaries)

@@ -96,15 +96,18 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     study::Experiment plan(scenario);
     check_room(out, plan);
     study::ResultWriter writer(out, plan);
-    const std::int64_t gyros = plan.gyros();
+    const bool growing = scenario::asks(scenario.stop);
+    // Of a lot that grows, the most that it can come to: its rule may stop it long before.
+    const std::int64_t gyros =
+        growing ? scenario.stop.most_gyros * static_cast<std::int64_t>(plan.points.size()) : plan.gyros();
     if (!arguments.quiet) {
         const study::Study& first = plan.points.front();
         const double duration_s = first.schedule.sample_interval_s * static_cast<double>(first.schedule.samples - 1);
         std::string points = plan.has_design() ? fmt::format("{} points, ", plan.points.size()) : "";
-        if (scenario::asks(scenario.stop)) points += "until precise, first ";
-        tell(fmt::format("{}: {}{} gyros x {:.6g} s, {} arms, {} threads; the result will take about {:.1f} MB\n",
+        if (growing) points += "until precise, at most ";
+        tell(fmt::format("{}: {}{} gyros x {:.6g} s, {} arms, {} threads; the result will take {} {:.1f} MB\n",
                          arguments.scenario, points, gyros, duration_s, scenario.arms.size(), threads,
-                         static_cast<double>(study::expected_size_bytes(plan)) * 1e-6));
+                         growing ? "up to" : "about", static_cast<double>(study::expected_size_bytes(plan)) * 1e-6));
     }
     ensemble::Progress progress(gyros, {.quiet = arguments.quiet, .total_turns = study::expected_turns(plan)});
     study::OnSamples on_samples;

@@ -28,6 +28,13 @@ std::string asked_text(const study::Study& study, const study::Summary& summary,
 /// random walks against its key, or against the number of the point where several keys vary.
 report::Figure experiment_figure(const study::Experiment& experiment, const std::vector<study::Summary>& summaries);
 
+/// The deviations of stored samples (ArmSummary::family): one table each, averaging times down, arms across. Empty
+/// where there are none.
+std::string family_text(const study::Summary& summary);
+
+/// A rate [deg/h] in the one notation of a column; what rounds to zero has no sign.
+std::string rate_text(double rate_deg_h);
+
 /// The text of one study, below its heading.
 std::string study_text(const study::Study& study, const study::Summary& summary);
 

@@ -22,12 +22,6 @@ std::string interval_cell(std::optional<double> lo, std::optional<double> hi) {
     return lo && hi ? fmt::format("{:.3g} .. {:.3g}", *lo, *hi) : "-";
 }
 
-/// Rate errors in one notation down the column.
-std::string rate_cell(double rate_deg_h) {
-    constexpr double half_a_digit = 5e-5;
-    return fmt::format("{:.4f}", std::abs(rate_deg_h) < half_a_digit ? 0.0 : rate_deg_h);
-}
-
 std::string ratio_cell(double ratio) {
     constexpr double least_in_decimals = 1e-3;
     return ratio < least_in_decimals ? fmt::format("{:.2g}", ratio) : fmt::format("{:.4f}", ratio);
@@ -56,8 +50,8 @@ std::string arm_tables(const study::Summary& summary) {
                        arw.median ? narrow_interval(arw.lo, arw.hi) : "-",
                        arw.median && theory > 0.0 ? ratio_cell(*arw.median / theory) : "-"});
         const auto& floor = arm.bias_instability_deg_h;
-        rates.add_row({arm.name, rate_cell(arm.rate_error_deg_h.mean),
-                       fmt::format("{} .. {}", rate_cell(arm.rate_error_deg_h.lo), rate_cell(arm.rate_error_deg_h.hi)),
+        rates.add_row({arm.name, rate_text(arm.rate_error_deg_h.mean),
+                       fmt::format("{} .. {}", rate_text(arm.rate_error_deg_h.lo), rate_text(arm.rate_error_deg_h.hi)),
                        floor ? fmt::format("{:.3g}", *floor->median) : "none"});
     }
     return "Angle random walk [deg/sqrt(h)], and over that of theory\n" + walks.text() +
@@ -288,7 +282,7 @@ std::string steps_text(const study::ArmSummary& arm) {
                          {"from input deg/h", report::Align::right},
                          {"to", report::Align::right}});
     for (const study::Step& step : arm.steps) {
-        table.add_row({fmt::format("{}", step.order), rate_cell(step.output_rate_deg_h),
+        table.add_row({fmt::format("{}", step.order), rate_text(step.output_rate_deg_h),
                        fmt::format("{:.3f}", step.first_deg_h), fmt::format("{:.3f}", step.last_deg_h)});
     }
     return fmt::format("\n{}: all gyros locked to n fringes a dither cycle (closed form)\n{}\n", arm.name,
@@ -311,9 +305,9 @@ std::string sweep_text(const study::Study& study, const study::Summary& summary)
         std::vector<std::string> row{fmt::format("{:.3f}", points[i].input_rate_deg_h)};
         for (const study::ArmSummary& arm : summary.arms) {
             const study::SweepPoint& point = arm.sweep[i];
-            row.push_back(rate_cell(point.output_rate_deg_h.mean));
+            row.push_back(rate_text(point.output_rate_deg_h.mean));
             if (!study::has_closed_form(arm)) continue;
-            row.push_back(point.closed_form_rate_deg_h ? rate_cell(*point.closed_form_rate_deg_h) : "-");
+            row.push_back(point.closed_form_rate_deg_h ? rate_text(*point.closed_form_rate_deg_h) : "-");
         }
         table.add_row(row);
     }
@@ -335,7 +329,13 @@ std::string sweep_text(const study::Study& study, const study::Summary& summary)
     return text;
 }
 
-/// One table a deviation: averaging times down, arms across.
+}  // namespace
+
+std::string rate_text(double rate_deg_h) {
+    constexpr double half_a_digit = 5e-5;
+    return fmt::format("{:.4f}", std::abs(rate_deg_h) < half_a_digit ? 0.0 : rate_deg_h);
+}
+
 std::string family_text(const study::Summary& summary) {
     std::string text;
     const auto& first = summary.arms.front().family;
@@ -359,16 +359,13 @@ std::string family_text(const study::Summary& summary) {
     return text;
 }
 
-}  // namespace
-
 std::string study_text(const study::Study& study, const study::Summary& summary) {
     std::string text = arm_tables(summary) + scatter_text(summary) + "\n" + walk_notes(summary) +
                        reduction_text(summary) + pairs_text(summary) + scenario_times_text(study, summary) +
                        yield_text(summary);
     for (const study::ArmSummary& arm : summary.arms) text += noise_text(arm);
     if (!summary.arms.front().sweep.empty()) text += "\n" + sweep_text(study, summary);
-    if (!summary.arms.front().family.empty()) text += family_text(summary);
-    return text;
+    return text + family_text(summary);
 }
 
 std::string asked_text(const study::Study& study, const study::Summary& summary, std::span<const AveragingTime> asked) {

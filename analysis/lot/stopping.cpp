@@ -4,6 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <vector>
 
 #include "analysis/lot/mean.hpp"
 #include "analysis/lot/share.hpp"
@@ -12,14 +16,31 @@
 namespace ringlock::lot {
 namespace {
 
+/// Most figures that a sentence names.
+constexpr std::size_t most_named = 4;
+
+/// Figures that reached what is wanted of them, or did not: those that are furthest from it, or were last to reach it.
 std::string list_of(const std::vector<Reached>& figures, bool met) {
-    std::string text;
+    std::vector<const Reached*> listed;
     for (const Reached& f : figures) {
-        if (f.met != met) continue;
+        if (f.met == met) listed.push_back(&f);
+    }
+    const auto share = [](const Reached* f) {
+        return f->reached ? *f->reached / f->wanted : std::numeric_limits<double>::infinity();
+    };
+    const std::size_t named = std::min(listed.size(), most_named);
+    if (named < listed.size()) {
+        std::stable_sort(listed.begin(), listed.end(),
+                         [&](const Reached* a, const Reached* b) { return share(a) > share(b); });
+    }
+    std::string text;
+    for (std::size_t i = 0; i < named; ++i) {
+        const Reached& f = *listed[i];
         const std::string reached =
             f.reached ? fmt::format("+-{:.3g} of +-{:.3g}", *f.reached, f.wanted) : "no interval yet";
         text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", f.name, reached);
     }
+    if (named < listed.size()) text += fmt::format(" and {} more", listed.size() - named);
     return text;
 }
 

@@ -48,7 +48,9 @@ std::string why_not(const std::string& path) {
     return "";
 }
 
+/// Throws InputError where the key is none of a scenario.
 design::Factor factor_of(const Variation& v) {
+    if (scenario::find_key(v.key) == nullptr) throw InputError(fmt::format("\"{}\" {}", v.key, why_not(v.key)));
     design::Factor factor{v.key, design::Values{v.values}};
     switch (v.distribution) {
         case scenario::LotDistribution::normal:
@@ -150,6 +152,10 @@ std::vector<Complaint> complaints_of_design(const Scenario& scenario) {
         const char* key = "design.sensitivity_base_points";
         if (wanted.kind != scenario::DesignKind::sobol) complain(key, "needs design.kind = \"sobol\"");
         if (wanted.points > 0) complain(key, "sets the number of points itself; leave design.points out");
+        if (static_cast<std::size_t>(wanted.sensitivity_base_points) < design::fewest_base_points) {
+            complain(key, fmt::format("fewer than {} base points have no indices; set as many, or 0 for none",
+                                      design::fewest_base_points));
+        }
         if (!wanted.correlation.empty()) {
             complain(key, "Sobol' indices are of independent factors; leave the correlations out, or the indices");
         }
@@ -274,13 +280,14 @@ std::optional<Complaint> too_large(const Scenario& scenario) {
     const auto needed = static_cast<double>(points) * static_cast<double>(expected_memory_bytes(scenario));
     const double there = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
     if (needed <= there) return std::nullopt;
+    const std::int64_t gyros = asks(scenario.stop) ? scenario.stop.most_gyros : scenario.ensemble.gyros;
     return Complaint{{"design.points", "design.sensitivity_base_points", "design.kind"},
                      fmt::format("{} points of {} gyros need about {:.0f} GB of memory, and the machine has {:.0f} GB; "
                                  "take fewer points or gyros",
-                                 points, scenario.ensemble.gyros, needed * 1e-9, there * 1e-9)};
+                                 points, gyros, needed * 1e-9, there * 1e-9)};
 }
 
-bool same_schedule(const Scenario& scenario, const std::vector<Axis>& axes) {
+bool same_schedule(const std::vector<Axis>& axes) {
     const auto changes = [](const Axis& axis) {
         return axis.values.end() != std::adjacent_find(axis.values.begin(), axis.values.end(), std::not_equal_to<>());
     };
@@ -328,7 +335,7 @@ std::vector<Complaint> complaints(const Scenario& scenario) {
         return {{{"design.points", "design.sensitivity_base_points", "design.kind"}, error.what()}};
     }
     found = complaints_of_points(scenario, axes);
-    if (scenario.output.angle_record && !same_schedule(scenario, axes)) {
+    if (scenario.output.angle_record && !same_schedule(axes)) {
         std::vector<std::string> keys{"output.angle_record"};
         for (std::string& key : keys_of_axes(axes)) keys.push_back(std::move(key));
         found.push_back({std::move(keys),

@@ -4,8 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
 #include <utility>
+#include <vector>
 
+#include "analysis/study/scale_factor.hpp"
 #include "engine/ensemble/schedule.hpp"
 
 namespace ringlock::study {
@@ -73,14 +78,34 @@ std::vector<LotFigure> lot_figures(const Study& study, const ArmStatistics& arm)
 
 namespace {
 
-/// One limit of a specification, and what of each gyro must not exceed it in magnitude.
+/// Gyros that are told apart: those of one rate of a sweep are those of every other.
+std::size_t members_of(const Study& study, const ArmStatistics& arm) {
+    return arm.gyros.size() / static_cast<std::size_t>(study.scenario.input.sweep_points);
+}
+
+/// One limit of a specification, and what must not exceed it in magnitude: of every gyro, at every rate of a sweep
+/// where there is one value each, as the rows of a study are.
 struct Limit {
     std::string name;
     double most;
     std::vector<double> values;
 
-    bool holds(std::size_t gyro) const { return std::abs(values[gyro]) <= most; }  // false for what is no number
+    bool holds(std::size_t member, std::size_t members) const {
+        for (std::size_t row = member; row < values.size(); row += members) {
+            if (!(std::abs(values[row]) <= most)) return false;  // what is no number does not pass
+        }
+        return true;
+    }
 };
+
+/// Of every gyro, through its rates of the sweep.
+std::vector<double> scale_factor_errors(const Study& study, const ArmStatistics& arm) {
+    std::vector<double> rates;
+    for (std::int64_t rate = 0; rate < study.scenario.input.sweep_points; ++rate) {
+        rates.push_back(scenario::input_rate_deg_h(study.scenario.input, rate));
+    }
+    return scale_factor_errors_ppm(rates, rate_errors(arm));
+}
 
 std::vector<Limit> limits_of(const Study& study, const ArmStatistics& arm) {
     const scenario::Specification& wanted = study.scenario.specification;
@@ -91,6 +116,9 @@ std::vector<Limit> limits_of(const Study& study, const ArmStatistics& arm) {
     }
     if (wanted.rate_error_deg_h > 0.0)
         limits.push_back({"rate_error_deg_h", wanted.rate_error_deg_h, rate_errors(arm)});
+    if (wanted.scale_factor_error_ppm > 0.0) {
+        limits.push_back({"scale_factor_error_ppm", wanted.scale_factor_error_ppm, scale_factor_errors(study, arm)});
+    }
     if (wanted.angle_error_arcsec > 0.0) {
         limits.push_back(
             {"angle_error_arcsec", wanted.angle_error_arcsec, angle_errors(arm, study.angle_times_s.size() - 1)});
@@ -101,20 +129,22 @@ std::vector<Limit> limits_of(const Study& study, const ArmStatistics& arm) {
 }  // namespace
 
 std::vector<bool> passed_gyros(const Study& study, const ArmStatistics& arm) {
-    std::vector<bool> passed(arm.gyros.size(), true);
+    const std::size_t members = members_of(study, arm);
+    std::vector<bool> passed(members, true);
     for (const Limit& limit : limits_of(study, arm)) {
-        for (std::size_t i = 0; i < passed.size(); ++i) passed[i] = passed[i] && limit.holds(i);
+        for (std::size_t i = 0; i < members; ++i) passed[i] = passed[i] && limit.holds(i, members);
     }
     return passed;
 }
 
 Yield yield_of(const Study& study, const ArmStatistics& arm) {
-    const auto gyros = static_cast<std::int64_t>(arm.gyros.size());
+    const std::size_t members = members_of(study, arm);
+    const auto gyros = static_cast<std::int64_t>(members);
     const lot::Confidence confidence = confidence_of(study.scenario);
     Yield yield;
     for (const Limit& limit : limits_of(study, arm)) {
         std::int64_t within = 0;
-        for (std::size_t i = 0; i < arm.gyros.size(); ++i) within += limit.holds(i) ? 1 : 0;
+        for (std::size_t i = 0; i < members; ++i) within += limit.holds(i, members) ? 1 : 0;
         yield.limits.push_back({limit.name, limit.most, lot::share(within, gyros, confidence)});
     }
     const std::vector<bool> passed = passed_gyros(study, arm);

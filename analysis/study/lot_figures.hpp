@@ -53,13 +53,14 @@ struct LotValues {
 /// Random walk, mean rate error, deviations at the averaging times asked for, and angle errors.
 std::vector<LotValues> lot_values(const Study& study, const ArmStatistics& arm);
 
-/// Which gyros meet the scenario's specification.
+/// Which gyros meet the scenario's specification: of a sweep, those that do at every one of its rates, one value a gyro
+/// and not one a row.
 std::vector<bool> passed_gyros(const Study& study, const ArmStatistics& arm);
 
 /// Quantiles of random walk, mean rate error, deviations at the averaging times asked for, and angle errors.
 std::vector<LotFigure> lot_figures(const Study& study, const ArmStatistics& arm);
 
-/// The share of the gyros that meet the scenario's specification. What a record does not have (NaN) does not pass.
+/// The share of passed_gyros(), and of each limit by itself. What a record does not have (NaN) does not pass.
 Yield yield_of(const Study& study, const ArmStatistics& arm);
 
 }  // namespace ringlock::study

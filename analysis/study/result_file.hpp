@@ -37,7 +37,8 @@ class ResultWriter {
     std::vector<std::uint64_t> first_rows_;  // of each point's gyros
 };
 
-/// Bytes a result file of this experiment will take, but for some tens of kilobytes that hold names and units.
+/// Bytes a result file of this experiment will take, but for some tens of kilobytes that hold names and units; with a
+/// stopping rule, at most.
 std::uint64_t expected_size_bytes(const Experiment& experiment);
 
 /// Reads a result without its angle records. Throws InputError where the file is no result or is damaged.

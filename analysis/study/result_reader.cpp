@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "analysis/study/columns.hpp"
 #include "analysis/study/result_file.hpp"
@@ -11,7 +14,6 @@
 #include "engine/core/error.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/scenario/parse.hpp"
-#include "engine/scenario/schema.hpp"
 
 namespace ringlock::study {
 
@@ -192,12 +194,18 @@ std::vector<Axis> read_axes(const store::File& file, const scenario::Scenario& s
     if (axes.empty()) return axes;
     const store::Group design = file.group("design");
     for (Axis& axis : axes) {
-        axis.values = read_column(design, axis.key, {axis.values.size()});
-        const scenario::Key& key = *scenario::find_key(axis.key);
-        for (const double value : axis.values) {
-            if (scenario::can_take(key, value)) continue;
-            throw InputError(fmt::format("{}: dataset {}/{} holds {:g}, which the key cannot be: the result is damaged",
-                                         design.file(), design.path(), axis.key, value));
+        const std::vector<double> drawn =
+            std::exchange(axis.values, read_column(design, axis.key, {axis.values.size()}));
+        // Far more than rounding, and less than anyone would set by hand.
+        constexpr double rounding = 1e-9;
+        double scale = 0.0;
+        for (const double value : drawn) scale = std::max(scale, std::abs(value));
+        for (std::size_t p = 0; p < drawn.size(); ++p) {
+            if (std::abs(axis.values[p] - drawn[p]) <= rounding * scale) continue;
+            throw InputError(fmt::format(
+                "{}: dataset {}/{} holds {:.10g} for point {}, where the scenario's design has {:.10g}: the result is "
+                "damaged",
+                design.file(), design.path(), axis.key, axis.values[p], p + 1, drawn[p]));
         }
     }
     return axes;

@@ -419,7 +419,9 @@ std::uint64_t expected_size_bytes(const Experiment& experiment) {
     const std::uint64_t figures = real * (20 + 6 * taus);  // of each point and arm, in a design
     std::uint64_t bytes = 0;
     for (const Study& study : experiment.points) {
-        const auto gyros = static_cast<std::uint64_t>(study.gyros.size());
+        const scenario::Stop& stop = study.scenario.stop;
+        const auto gyros = scenario::asks(stop) ? static_cast<std::uint64_t>(stop.most_gyros)
+                                                : static_cast<std::uint64_t>(study.gyros.size());
         const auto arms = static_cast<std::uint64_t>(study.arms.size());
         const auto samples =
             study.scenario.output.angle_record ? static_cast<std::uint64_t>(study.schedule.samples) : 0;

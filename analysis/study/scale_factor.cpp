@@ -66,34 +66,55 @@ SizeFigure beyond_noise(double slope_sd, double noise_sd, double freedom, double
     return figure;
 }
 
+/// The gyros' lines through their rate errors.
+struct Lines {
+    double centre = 0.0;          ///< mean of the rates
+    double squares = 0.0;         ///< sum of squares of the rates about it
+    std::vector<double> slopes;   ///< empty where there is no line
+    std::vector<double> middles;  ///< values at the centre
+};
+
+Lines lines_through(std::span<const double> input_rates_deg_h, std::span<const double> errors_deg_h) {
+    const std::size_t rates = input_rates_deg_h.size();
+    Lines lines;
+    if (rates < 3) return lines;
+    const std::size_t gyros = errors_deg_h.size() / rates;
+    const auto k = static_cast<double>(rates);
+    for (const double x : input_rates_deg_h) lines.centre += x / k;
+    for (const double x : input_rates_deg_h) lines.squares += (x - lines.centre) * (x - lines.centre);
+    if (!(lines.squares > 0.0)) return lines;
+    lines.slopes.assign(gyros, 0.0);
+    lines.middles.assign(gyros, 0.0);
+    for (std::size_t j = 0; j < rates; ++j) {
+        for (std::size_t m = 0; m < gyros; ++m) {
+            const double error = errors_deg_h[j * gyros + m];
+            lines.slopes[m] += (input_rates_deg_h[j] - lines.centre) / lines.squares * error;
+            lines.middles[m] += error / k;
+        }
+    }
+    return lines;
+}
+
 }  // namespace
+
+std::vector<double> scale_factor_errors_ppm(std::span<const double> input_rates_deg_h,
+                                            std::span<const double> errors_deg_h) {
+    std::vector<double> errors_ppm = lines_through(input_rates_deg_h, errors_deg_h).slopes;
+    for (double& error : errors_ppm) error *= ppm;
+    return errors_ppm;
+}
 
 std::optional<ScaleFactor> scale_factor(std::span<const double> input_rates_deg_h,
                                         std::span<const double> errors_deg_h) {
     const std::size_t rates = input_rates_deg_h.size();
     const std::size_t gyros = rates == 0 ? 0 : errors_deg_h.size() / rates;
-    if (rates < 3 || gyros < 2) return std::nullopt;
+    if (gyros < 2) return std::nullopt;
+    const auto [centre, squares, slopes, middles] = lines_through(input_rates_deg_h, errors_deg_h);
+    if (slopes.empty()) return std::nullopt;
     const auto k = static_cast<double>(rates);
     const auto n = static_cast<double>(gyros);
-    double centre = 0.0;
-    for (const double x : input_rates_deg_h) centre += x / k;
-    double squares = 0.0;  // sum of squares of the rates about their mean
     ScaleFactor result;
-    for (const double x : input_rates_deg_h) {
-        squares += (x - centre) * (x - centre);
-        result.full_scale_deg_h = std::max(result.full_scale_deg_h, std::abs(x));
-    }
-    if (!(squares > 0.0)) return std::nullopt;
-
-    std::vector<double> slopes(gyros, 0.0);
-    std::vector<double> middles(gyros, 0.0);
-    for (std::size_t j = 0; j < rates; ++j) {
-        for (std::size_t m = 0; m < gyros; ++m) {
-            const double error = errors_deg_h[j * gyros + m];
-            slopes[m] += (input_rates_deg_h[j] - centre) / squares * error;
-            middles[m] += error / k;
-        }
-    }
+    for (const double x : input_rates_deg_h) result.full_scale_deg_h = std::max(result.full_scale_deg_h, std::abs(x));
     std::vector<double> biases(gyros);
     for (std::size_t m = 0; m < gyros; ++m) biases[m] = middles[m] - slopes[m] * centre;
 

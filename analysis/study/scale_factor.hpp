@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <vector>
 
 /// The straight line through a sweep of input rates: what a rate table tells of gyros (docs/scale-factor.md).
 namespace ringlock::study {
@@ -37,6 +38,14 @@ struct ScaleFactor {
     double gyro_deviation_hi_deg_h = 0.0;
     double scatter_deg_h = 0.0;  ///< rms deviation of a gyro's rates from its line and what all gyros share
 };
+
+/// Slopes less one of the gyros' own lines [ppm]: least squares of output over input rate. Not a number where a rate of
+/// the gyro is none.
+///
+/// \param input_rates_deg_h, errors_deg_h  as below
+/// Empty where there are fewer than three rates, or the rates are all the same.
+std::vector<double> scale_factor_errors_ppm(std::span<const double> input_rates_deg_h,
+                                            std::span<const double> errors_deg_h);
 
 /// Fits each gyro's rate errors by a line, and takes the lines together.
 ///

@@ -189,8 +189,9 @@ std::vector<Section> base_sections() {
                  "each is rounded to whole cycles."),
          }},
         {"specification",
-         "What a gyro must meet over ensemble.duration_s to pass; 0 asks for nothing. Arms are told with the share of "
-         "the gyros that pass (docs/studies.md).",
+         "What a gyro must meet over ensemble.duration_s to pass, in a sweep at every rate; 0 asks for nothing. Arms "
+         "are "
+         "told with the share of the gyros that pass (docs/studies.md).",
          {
              key(RINGLOCK_KEY(specification, arw_deg_rt_h), between(0.0, 1e3, "no gyro is worse"),
                  "Largest angle random walk."),
@@ -200,6 +201,10 @@ std::vector<Section> base_sections() {
                  "Averaging time of bias_stability_deg_h; it is rounded to whole dither cycles."),
              key(RINGLOCK_KEY(specification, rate_error_deg_h), between(0.0, 1e6, "no gyro is worse"),
                  "Largest magnitude of the mean output rate less the input rate, over the whole record."),
+             key(RINGLOCK_KEY(specification, scale_factor_error_ppm), between(0.0, 1e6, "all of the rate"),
+                 "Largest magnitude of a gyro's scale factor error: the slope of its straight line through the rates "
+                 "of "
+                 "a sweep, output over input rate, less one."),
              key(RINGLOCK_KEY(specification, angle_error_arcsec), between(0.0, 1e9, "no gyro is worse"),
                  "Largest magnitude of the angle beyond the input's at after_s."),
              key(RINGLOCK_KEY(specification, after_s), above(0.0, 1e9, "30 years"),

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <utility>
@@ -119,6 +120,16 @@ Finding specification_can_be_met(const Scenario& s) {
         fmt::format("no arm can meet it: effects alone make a random walk of {:.4g} deg/sqrt(h)", declared)};
 }
 
+Finding scale_factor_has_a_sweep(const Scenario& s) {
+    constexpr std::int64_t fewest_rates = 3;  // of a line that says how far it is off, as in study::scale_factor
+    if (s.specification.scale_factor_error_ppm == 0.0 || s.input.sweep_points >= fewest_rates) return {};
+    return Complaint{{"specification.scale_factor_error_ppm", "input.sweep_points"},
+                     fmt::format("a scale factor error is that of a straight line through the rates of a sweep, and "
+                                 "input.sweep_points = {}; set input.sweep_points to {} or more and "
+                                 "input.sweep_stop_deg_h to the last rate, or leave the limit out (0)",
+                                 s.input.sweep_points, fewest_rates)};
+}
+
 constexpr std::array all_output_rules = {
     Rule{"A sample of the output is at least one dither cycle long.", sample_holds_a_cycle},
     Rule{"A run holds at least three samples.", run_holds_samples},
@@ -128,6 +139,8 @@ constexpr std::array all_output_rules = {
     Rule{"A specification asks for averaging and other times that the record has, for no less random walk than effects "
          "make by themselves, and for one of records of 32 samples or more only.",
          specification_can_be_met},
+    Rule{"A specification of the scale factor error is one of a sweep of three rates or more.",
+         scale_factor_has_a_sweep},
 };
 
 }  // namespace

@@ -77,7 +77,8 @@ double amplitude_change_relative(const Dither& dither, double duration_s) {
 
 bool asks(const Specification& specification) {
     return specification.arw_deg_rt_h > 0.0 || specification.bias_stability_deg_h > 0.0 ||
-           specification.rate_error_deg_h > 0.0 || specification.angle_error_arcsec > 0.0;
+           specification.rate_error_deg_h > 0.0 || specification.scale_factor_error_ppm > 0.0 ||
+           specification.angle_error_arcsec > 0.0;
 }
 
 }  // namespace ringlock::scenario

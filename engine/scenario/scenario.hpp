@@ -138,12 +138,13 @@ struct Output {
 
 /// What a gyro must meet to pass; 0: not asked for.
 struct Specification {
-    double arw_deg_rt_h = 0.0;          ///< largest angle random walk
-    double bias_stability_deg_h = 0.0;  ///< largest Allan deviation at at_s
-    double at_s = 100.0;                ///< averaging time of bias_stability_deg_h
-    double rate_error_deg_h = 0.0;      ///< largest magnitude of the mean rate error over the record
-    double angle_error_arcsec = 0.0;    ///< largest magnitude of the angle beyond the input's at after_s
-    double after_s = 100.0;             ///< time of angle_error_arcsec
+    double arw_deg_rt_h = 0.0;            ///< largest angle random walk
+    double bias_stability_deg_h = 0.0;    ///< largest Allan deviation at at_s
+    double at_s = 100.0;                  ///< averaging time of bias_stability_deg_h
+    double rate_error_deg_h = 0.0;        ///< largest magnitude of the mean rate error over the record
+    double scale_factor_error_ppm = 0.0;  ///< largest magnitude of the slope of output over input rate less one
+    double angle_error_arcsec = 0.0;      ///< largest magnitude of the angle beyond the input's at after_s
+    double after_s = 100.0;               ///< time of angle_error_arcsec
     bool operator==(const Specification&) const = default;
 };
 

@@ -4,19 +4,21 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "engine/store/hdf5.hpp"
 #include "tests/cli/program.hpp"
+#include "tests/cli/result_data.hpp"
 
 namespace ringlock {
 namespace {
 
 using nlohmann::json;
+using test::data;
 using test::Outcome;
+using test::same_bits;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
@@ -356,6 +358,15 @@ TEST_F(RunCommand, SweepsOfThreeRatesShowTheLineThroughThem) {
     expect_numbers(arms["noise_injected+compensated"]["arw_reduction"], {"lo"});
     EXPECT_EQ(json::parse(run({"analyze", "three.h5", "--json"}).out)["arms"], arms);
     const std::string table = run({"analyze", "three.h5"}).out;
+    const auto printed_yield = [&](const Arguments& arguments) {
+        return json::parse(run(arguments).out)["arms"]["noise_injected"]["yield"];
+    };
+    const json yield = printed_yield(
+        {"run", "three.toml", "--json", "-o", "yield.h5", "--set", "specification.scale_factor_error_ppm=1e5"});
+    EXPECT_EQ(yield["gyros"], 3) << "gyros, not records";
+    EXPECT_EQ(yield["limits"]["scale_factor_error_ppm"]["most"], 1e5);
+    expect_refused({"run", "two.toml", "-o", "no.h5", "--set", "specification.scale_factor_error_ppm=5"},
+                   AllOf(HasSubstr("--set specification.scale_factor_error_ppm=5"), HasSubstr("sweep_points to 3")));
     for (const char* text :
          {"Straight lines through the rates, 3 gyros at each, full scale 60 deg/h", "repeatability [ppm]",
           "nonlinearity [ppm of full scale]", "random walk of noise_injected over that of"}) {
@@ -508,32 +519,6 @@ TEST_F(RunCommand, DamagedResultsAreRefusedByName) {
     expect_refused({"analyze", "out.h5"}, HasSubstr("out.h5"));
     expect_refused({"validate", "out.h5"}, HasSubstr("out.h5"));
     expect_refused({"run", "s.toml", "-o", "out.h5"}, HasSubstr("it is kept"));
-}
-
-/// Every dataset outside /provenance, as text of bytes.
-void collect(const store::Group& group, const std::string& path, std::map<std::string, std::vector<double>>& out) {
-    for (const std::string& name : group.children()) {
-        if (name == "provenance") continue;
-        if (group.has_group(name)) {
-            collect(group.group(name), path + "/" + name, out);
-        } else if (path + "/" + name != "/scenario") {
-            out[path + "/" + name] = group.dataset(name).read<double>();
-        }
-    }
-    for (const std::string& name : group.attribute_names()) {
-        if (name == "format" || name == "compensator" || name == "predicted_reason" || name == "arw_reason") continue;
-        out[path + "@" + name] = {group.double_attribute(name)};
-    }
-}
-
-std::map<std::string, std::vector<double>> data(const std::filesystem::path& path) {
-    std::map<std::string, std::vector<double>> out;
-    collect(store::File::open(path), "", out);
-    return out;
-}
-
-bool same_bits(const std::vector<double>& a, const std::vector<double>& b) {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
 }
 
 TEST_F(RunCommand, DataAreTheSameToTheBitForAnyNumberOfThreads) {

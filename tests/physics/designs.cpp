@@ -19,6 +19,7 @@ namespace {
 using test::TemporaryDirectory;
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 scenario::Scenario parsed(const std::string& text) {
     return scenario::parse_string(text, "s.toml", {}, study::complaints);
@@ -276,6 +277,13 @@ TEST(Designs, KeysThatCannotVaryAreRefused) {
     EXPECT_THAT(refused("input.sweep_points"), HasSubstr("vary input.rate_deg_h"));
 }
 
+TEST(Designs, UnknownKeysAreRefusedWithoutComplaintsToo) {
+    scenario::Scenario s;
+    s.design.kind = scenario::DesignKind::list;
+    s.design.vary = {{.key = "gyro.lockin_treshold_deg_h", .values = {1.0}}};
+    EXPECT_THROW(study::Experiment{s}, InputError);
+}
+
 TEST(Designs, AllPointsThatBreakARuleAreNamed) {
     const std::string text = complaint(grid + std::string("\"input.rate_deg_h\"\nvalues = [1.0, 3e5, 5.0, 4e5]\n"));
     EXPECT_THAT(text, AllOf(HasSubstr("s.toml:6:7"), HasSubstr("points 2 and 4 of 4, the first"),
@@ -295,10 +303,10 @@ TEST(Designs, WhatIsWrongWithADesignIsSaid) {
                 HasSubstr("only 0 of its distribution lies within"));
     EXPECT_THAT(complaint(sobol + normal + "mean = 300.0\nsd = 10.0\n"), HasSubstr("say how many"));
     EXPECT_THAT(complaint(sobol + "points = 8\n" + normal + "mean = 300.0\nsd = 0.0\n"), HasSubstr("sd"));
-    EXPECT_THAT(complaint(sobol + "points = 100000000\n" + normal + "mean = 300.0\nsd = 10.0\n"),
-                AllOf(HasSubstr("design.points"), HasSubstr("is the limit")));
-    EXPECT_THAT(complaint(sobol + "points = 1000000\n" + normal + "mean = 300.0\nsd = 10.0\n"),
+    EXPECT_THAT(complaint(sobol + "points = 1500000\n" + normal + "mean = 300.0\nsd = 10.0\n"),
                 AllOf(HasSubstr("design.points"), HasSubstr("of memory, and the machine has")));
+    EXPECT_THAT(complaint(sobol + "points = 100000000\n" + normal + "mean = 300.0\nsd = 10.0\n"),
+                AllOf(HasSubstr("design.points"), HasSubstr("1562500 is the limit")));
     EXPECT_THAT(complaint("[design]\nkind = \"grid\"\n"), HasSubstr("varies nothing"));
     EXPECT_THAT(complaint("[design]\npoints = 3\n"), HasSubstr("varies nothing"));
     EXPECT_THAT(complaint("[[design.vary]]\nkey = " + key + "values = [100.0]\n"), HasSubstr("set \"grid\""));
@@ -311,6 +319,8 @@ TEST(Designs, WhatIsWrongWithADesignIsSaid) {
         HasSubstr("output.angle_record = false"));
     EXPECT_THAT(complaint(sobol + "sensitivity_base_points = 16\npoints = 3\n" + normal + "mean = 300.0\nsd = 10.0\n"),
                 HasSubstr("leave design.points out"));
+    EXPECT_THAT(complaint(sobol + "sensitivity_base_points = 15\n" + normal + "mean = 300.0\nsd = 10.0\n"),
+                AllOf(HasSubstr("design.sensitivity_base_points"), HasSubstr("fewer than 16 base points")));
 }
 
 }  // namespace

@@ -3,10 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <string>
+#include <vector>
 
 #include "analysis/study/summary.hpp"
 #include "engine/ensemble/schedule.hpp"
+#include "engine/scenario/check.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -118,6 +123,73 @@ TEST(LotStudies, YieldsCountTheRecordsWithinEveryLimit) {
     }
     EXPECT_EQ(summary.arms[1].yield->share.k, 16) << "compensation meets what noise alone does not";
     EXPECT_LT(summary.arms[0].yield->share.k, 16);
+}
+
+/// A sweep of five gyros that is planned only, with these rate errors [deg/h], [rate][gyro].
+study::Study made_by_hand(const std::vector<std::vector<double>>& errors_deg_h) {
+    scenario::Scenario scenario = short_study({"ideal"});
+    scenario.ensemble.gyros = static_cast<std::int64_t>(errors_deg_h.front().size());
+    scenario.input.rate_deg_h = 100.0;
+    scenario.input.sweep_stop_deg_h = 300.0;
+    scenario.input.sweep_points = static_cast<std::int64_t>(errors_deg_h.size());
+    scenario.specification.rate_error_deg_h = 0.05;
+    scenario.specification.scale_factor_error_ppm = 100.0;
+    study::Study study(scenario);
+    std::size_t row = 0;
+    for (const std::vector<double>& rate : errors_deg_h) {
+        for (const double error : rate) study.arms[0].gyros[row++].rate_error_deg_h = error;
+    }
+    return study;
+}
+
+TEST(LotStudies, GyrosOfASweepPassAtAllRatesTogether) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    // A bias alone; a slope of 50 ppm; one of -150 ppm; a deviation at the middle rate, without slope; a rate that is
+    // not there.
+    const study::Study study = made_by_hand({{0.04, 0.005, -0.015, 0.0, 0.0},  // at 100 deg/h
+                                             {0.04, 0.010, -0.030, 0.06, 0.0},
+                                             {0.04, 0.015, -0.045, 0.0, nan}});
+    EXPECT_EQ(study::passed_gyros(study, study.arms[0]), (std::vector<bool>{true, true, false, false, false}));
+    const study::Yield yield = study::yield_of(study, study.arms[0]);
+    EXPECT_EQ(yield.share.k, 2);
+    EXPECT_EQ(yield.share.n, 5) << "gyros, not records";
+    ASSERT_EQ(yield.limits.size(), 2U);
+    EXPECT_EQ(yield.limits[0].name, "rate_error_deg_h");
+    EXPECT_EQ(yield.limits[0].share.k, 3) << "all but the deviation and the missing rate";
+    EXPECT_EQ(yield.limits[1].name, "scale_factor_error_ppm");
+    EXPECT_EQ(yield.limits[1].most, 100.0);
+    EXPECT_EQ(yield.limits[1].share.k, 3) << "all but -150 ppm and the missing rate";
+    EXPECT_EQ(yield.limits[1].share.n, 5);
+    // Clopper-Pearson of 2 of 5.
+    ASSERT_TRUE(yield.share.interval);
+    EXPECT_NEAR(yield.share.interval->lo, 0.0527, 1e-4);
+    EXPECT_NEAR(yield.share.interval->hi, 0.8534, 1e-4);
+}
+
+TEST(LotStudies, OneGyroHasAScaleFactorToo) {
+    // Locked: it reads nothing, and its slope is off by all of the rate.
+    study::Study study = made_by_hand({{-100.0}, {-200.0}, {-300.0}});
+    study.scenario.specification.rate_error_deg_h = 0.0;
+    EXPECT_EQ(study::yield_of(study, study.arms[0]).share.k, 0);
+    study.scenario.specification.scale_factor_error_ppm = 1e6 * (1.0 + 1e-12);  // rounding
+    EXPECT_EQ(study::yield_of(study, study.arms[0]).share.k, 1);
+}
+
+TEST(LotStudies, AScaleFactorIsSpecifiedOfASweepOfThreeRatesOnly) {
+    scenario::Scenario scenario = short_study({"ideal"});
+    scenario.specification.scale_factor_error_ppm = 5.0;
+    const auto complaints = [&] { return scenario::check(scenario); };
+    for (const std::int64_t points : {1, 2}) {
+        scenario.input.sweep_points = points;
+        scenario.input.sweep_stop_deg_h = points == 1 ? scenario.input.rate_deg_h : 60.0;
+        ASSERT_EQ(complaints().size(), 1U);
+        EXPECT_EQ(complaints()[0].keys,
+                  (std::vector<std::string>{"specification.scale_factor_error_ppm", "input.sweep_points"}));
+        EXPECT_NE(complaints()[0].problem.find("set input.sweep_points to 3 or more"), std::string::npos)
+            << complaints()[0].problem;
+    }
+    scenario.input.sweep_points = 3;
+    EXPECT_TRUE(complaints().empty());
 }
 
 TEST(LotStudies, AngleErrorsGrowAsTheRandomWalkSays) {

@@ -26,6 +26,7 @@ namespace {
 using test::bytes;
 using test::ResultFile;
 using test::small;
+using test::small_design;
 using test::write;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -208,6 +209,74 @@ TEST_F(DamagedResult, OverwrittenBytesNeverCrash) {
             EXPECT_THAT(error.what(), HasSubstr(path_.string()));
         }
     }
+}
+
+class DamagedDesign : public DamagedResult {
+   protected:
+    void SetUp() override {
+        ResultFile::SetUp();
+        rewrite();
+    }
+    void rewrite() {
+        fs::remove(path_);
+        write(path_, small_design(true));
+    }
+    void fill(const char* name, const std::vector<double>& values) {
+        reshape(name, {values.size()});
+        change([&](hid_t file) {
+            const hid_t dataset = H5Dopen2(file, name, H5P_DEFAULT);
+            ASSERT_GE(H5Dwrite(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+            H5Dclose(dataset);
+        });
+    }
+};
+
+constexpr const char* varied = "/design/gyro.lockin_threshold_deg_h";
+
+TEST_F(DamagedDesign, ValuesOfAKeyThatAreNotThoseOfTheDesignAreNamed) {
+    ASSERT_EQ(complaint_of(path_), "(accepted)");
+    fill(varied, {200.0, 300.0});
+    ASSERT_EQ(complaint_of(path_), "(accepted)");
+    for (const std::vector<double>& values : {std::vector{200.0}, std::vector{200.0, 300.0, 400.0}}) {
+        fill(varied, values);
+        EXPECT_THAT(complaint_of(path_), AllOf(HasSubstr(path_.string()), HasSubstr(varied), HasSubstr("[2]"),
+                                               HasSubstr("the result is damaged")));
+    }
+    // No number, no threshold, and a threshold that is not the scenario's.
+    for (const double value :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), -1.0, 301.0, 300.0001}) {
+        fill(varied, {200.0, value});
+        EXPECT_THAT(complaint_of(path_),
+                    AllOf(HasSubstr(path_.string()), HasSubstr(varied), HasSubstr("the result is damaged")))
+            << value;
+    }
+    // A last digit may be that of another machine.
+    fill(varied, {200.0, std::nextafter(300.0, 0.0)});
+    EXPECT_EQ(complaint_of(path_), "(accepted)");
+}
+
+TEST_F(DamagedDesign, MissingObjectsAreNamed) {
+    for (const char* name : {varied, "/design/turns", "/design/turn_map_error_rad", "/design",
+                             "/arms/uncompensated/allan/tau_s", "/arms/uncompensated/rate_error_deg_h"}) {
+        rewrite();
+        remove(name);
+        EXPECT_THAT(complaint_of(path_), AllOf(HasSubstr(path_.string()), HasSubstr(name), HasSubstr("missing")));
+    }
+}
+
+TEST_F(DamagedDesign, WrongShapesAreNamed) {
+    const std::size_t taus = Study(small(true)).factors.size();
+    const auto refused = [&](const char* name, const std::vector<hsize_t>& extent) {
+        rewrite();
+        reshape(name, extent);
+        EXPECT_THAT(complaint_of(path_),
+                    AllOf(HasSubstr(path_.string()), HasSubstr(name), HasSubstr("the result is damaged")));
+    };
+    refused("/design/turn_map_error_rad", {3});
+    refused("/arms/uncompensated/allan/tau_s", {taus});
+    refused("/arms/uncompensated/allan/edf", {3, taus});
+    refused("/arms/noise_injected+compensated/rate_error_deg_h", {3});
+    refused("/gyros/initial_phase_rad", {3});
 }
 
 }  // namespace

@@ -114,7 +114,6 @@ TEST_F(ResultFile, DeviationsOfSamplesAtEveryCycleAreThoseOfTheRun) {
 TEST_F(ResultFile, WithoutFactorsDeviationsAreAtOctaves) {
     write(path_, small(true));
     const Experiment experiment = read_result(path_);
-    const Study& study = experiment.points.front();
     const auto octaves = family_deviations(path_, experiment, 0, oadev).at(0).at(0).points;
     const std::vector<std::int64_t> factors = {1, 2, 4, 8, 16};
     const auto given = family_deviations(path_, experiment, 0, oadev, factors).at(0).at(0).points;

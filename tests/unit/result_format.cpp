@@ -3,8 +3,16 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
 #include <map>
+#include <regex>
 #include <set>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "analysis/study/result_file.hpp"
 #include "tests/unit/format_page.hpp"
@@ -18,6 +26,8 @@ using test::Entries;
 using test::page;
 using test::ResultFile;
 using test::small;
+using test::small_design;
+using test::unit_of_name;
 using test::walk;
 using test::write;
 
@@ -64,6 +74,140 @@ TEST_F(ResultFile, HoldsNoAngleRecordWhereNoneIsWanted) {
                entry.first.starts_with("/arms/noise_injected ");
     });
     compare(expected, walk(path_, extents(Study(scenario))));
+}
+
+/// The page's section on designs.
+std::string section_on_designs() {
+    std::ifstream in(the_page);
+    std::string text{std::istreambuf_iterator<char>(in), {}};
+    const std::size_t begin = text.find("\n## Designs\n");
+    EXPECT_NE(begin, std::string::npos);
+    text.erase(0, begin + 1);
+    return text.substr(0, text.find("\n## "));
+}
+
+/// Names in the section's quotes that begin so, with the type in brackets that follows them.
+std::map<std::string, std::string> told(const std::string& section, const std::string& beginning) {
+    std::map<std::string, std::string> found;
+    std::vector<std::string> without_type;
+    const std::regex token("`([^`]+)`|\\((i64|f64)\\)");
+    for (std::sregex_iterator i(section.begin(), section.end(), token), end; i != end; ++i) {
+        if ((*i)[2].matched) {
+            for (const std::string& name : without_type) found[name] = (*i)[2];
+            without_type.clear();
+        } else if ((*i)[1].str().starts_with(beginning)) {
+            without_type.push_back((*i)[1]);
+        }
+    }
+    return found;
+}
+
+/// What the page says of the file of a design: its tables, with the differences of the section on designs.
+Entries page_of_design(const scenario::Scenario& scenario, const std::map<std::string, std::string>& keys) {
+    const std::string section = section_on_designs();
+    const auto says = [&](const char* text) { EXPECT_NE(section.find(text), std::string::npos) << text; };
+    Entries out;
+    for (const auto& [name, entry] : page(the_page, names_of(scenario.arms))) {
+        const std::size_t at = name.find(" @");
+        const std::string object = name.substr(0, at);
+        const std::string attribute = at == std::string::npos ? "" : name.substr(at + 2);
+        const std::set<std::string> of_the_arm{"ideal", "noise_injected", "compensator"};
+        if (object.starts_with("/arms/") && std::count(object.begin(), object.end(), '/') == 2 && !attribute.empty() &&
+            !of_the_arm.contains(attribute)) {
+            const std::string unit = entry.type == "string" ? "" : unit_of_name(attribute);
+            out[object + "/points/" + attribute] = {entry.type, "points", unit};
+            out[object + "/points @"] = {};
+        } else {
+            out[name] = entry;
+        }
+    }
+    says(
+        "`/arms/ARM/points/NAME`, P: what without a design are the attributes of `/arms/ARM` from "
+        "`arw_deg_rt_h_median` on");
+
+    out["/design @"] = {};
+    says("`/design/KEY`, f64, P: ");
+    for (const auto& [key, unit] : keys) out["/design/" + key] = {"f64", "points", unit};
+    const auto totals = told(section.substr(section.find("`/design/turns`")), "/design/");
+    EXPECT_EQ(totals.size(), 7U);
+    const std::set<std::string> kept{"turns", "tables_remade", "contradictory_readings"};
+    says("`/` keeps the sums `turns`, `tables_remade` and\n  `contradictory_readings`");
+    for (const auto& [path, type] : totals) {
+        const std::string name = path.substr(std::string_view("/design/").size());
+        out[path] = {type, "points", unit_of_name(name)};
+        EXPECT_TRUE(out.contains("/ @" + name)) << name;
+        if (!kept.contains(name)) out.erase("/ @" + name);
+    }
+
+    says("`tau_s`, `averaging_factor`, `terms` and the four `ensemble_` datasets in `/arms/ARM/allan` are P x taus");
+    says("`angle_error_after_s` is P x times");
+    says("`/pairs/arw_ratio` and the others there have the rows of all points below each other: P arms x arms");
+    for (auto& [name, entry] : out) {
+        if (entry.shape == "taus" || entry.shape == "times") entry.shape = "points x " + entry.shape;
+        if (name.starts_with("/pairs/")) entry.shape = "points arms x arms";
+    }
+    return out;
+}
+
+std::map<hsize_t, std::string> extents(const Experiment& plan) {
+    const Study& first = plan.points.front();
+    std::size_t taus = 0;
+    for (const Study& point : plan.points) taus = std::max(taus, point.factors.size());
+    const std::map<hsize_t, std::string> names = {{static_cast<hsize_t>(plan.gyros()), "gyros"},
+                                                  {static_cast<hsize_t>(first.schedule.samples), "samples"},
+                                                  {first.angle_times_s.size(), "times"},
+                                                  {first.arms.size(), "arms"},
+                                                  {taus, "taus"},
+                                                  {plan.points.size(), "points"},
+                                                  {plan.points.size() * first.arms.size(), "points arms"}};
+    EXPECT_EQ(names.size(), 7U) << "extents must differ to be told apart";
+    return names;
+}
+
+TEST_F(ResultFile, OfADesignHoldsWhatThePageSays) {
+    scenario::Scenario scenario = small_design(true);
+    scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;  // the drive repeats itself: closed forms, too
+    scenario.arms = scenario::parse_arms({"ideal", "uncompensated", "noise_injected", "noise_injected+compensated"});
+    scenario.ensemble.gyros = 5;  // no number that stands for anything else
+    scenario.design.vary.push_back({.key = "ensemble.lockin_threshold_sd_relative", .values = {0.0, 1e-4}});
+    write(path_, scenario);
+    const Entries file = walk(path_, extents(Experiment(scenario)));
+    compare(page_of_design(scenario,
+                           {{"gyro.lockin_threshold_deg_h", "deg/h"}, {"ensemble.lockin_threshold_sd_relative", "1"}}),
+            file);
+    EXPECT_EQ(left(), std::set<std::string>{"out.h5"});
+}
+
+TEST_F(ResultFile, OfADesignEndsWithNothingWhereAPointHasFewerAveragingTimes) {
+    scenario::Scenario scenario = small_design(false);
+    scenario.design.vary = {{.key = "dither.frequency_hz", .values = {120.0, 250.0}}};
+    write(path_, scenario);
+    const Experiment plan(scenario);
+    const std::size_t taus = plan.points[1].factors.size();
+    const std::size_t fewer = plan.points[0].factors.size();
+    ASSERT_LT(fewer, taus);
+    const store::File file = store::File::open(path_);
+    const store::Group allan = file.group("arms").group("uncompensated").group("allan");
+    for (const char* name : {"tau_s", "ensemble_deviation_deg_h", "ensemble_edf"}) {
+        const store::Dataset dataset = allan.dataset(name);
+        ASSERT_EQ(dataset.shape(), (store::Shape{2, taus})) << name;
+        const auto values = dataset.read<double>();
+        for (std::size_t t = 0; t < 2 * taus; ++t) {
+            EXPECT_EQ(std::isnan(values[t]), t >= fewer && t < taus) << name << " " << t;
+        }
+    }
+    for (const char* name : {"averaging_factor", "terms"}) {
+        const auto values = allan.dataset(name).read<std::int64_t>();
+        ASSERT_EQ(values.size(), 2 * taus) << name;
+        for (std::size_t t = 0; t < 2 * taus; ++t)
+            EXPECT_EQ(values[t] == 0, t >= fewer && t < taus) << name << " " << t;
+    }
+    // Three gyros a point.
+    const auto deviations = allan.dataset("deviation_deg_h").read<double>();
+    ASSERT_EQ(deviations.size(), 6 * taus);
+    for (std::size_t i = 0; i < deviations.size(); ++i) {
+        EXPECT_EQ(std::isnan(deviations[i]), i / taus < 3 && i % taus >= fewer) << i;
+    }
 }
 
 }  // namespace

@@ -27,6 +27,14 @@ inline scenario::Scenario small(bool angle_record, std::uint64_t seed = 5) {
     return scenario;
 }
 
+/// Two points that differ in a key of the gyro.
+inline scenario::Scenario small_design(bool angle_record) {
+    scenario::Scenario scenario = small(angle_record);
+    scenario.design.kind = scenario::DesignKind::list;
+    scenario.design.vary = {{.key = "gyro.lockin_threshold_deg_h", .values = {200.0, 300.0}}};
+    return scenario;
+}
+
 inline void write(const std::filesystem::path& path, const scenario::Scenario& scenario) {
     study::ResultWriter writer(path, study::Experiment(scenario));
     const study::Experiment experiment = study::run(

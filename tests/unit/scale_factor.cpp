@@ -55,6 +55,23 @@ TEST(ScaleFactor, OfExactLinesIsTheirMeanAndSpread) {
     EXPECT_NEAR(line->scatter_deg_h, 0.0, 1e-9);
 }
 
+TEST(ScaleFactor, EachGyroHasASlopeOfItsOwn) {
+    // 2 and -3 ppm beside biases and a deviation that has no slope.
+    const std::vector<double> rates = {-100.0, 0.0, 100.0};
+    std::vector<double> errors;
+    for (const double x : rates) {
+        errors.push_back(0.5 + 2e-6 * x);
+        errors.push_back(-3e-6 * x + (x == 0.0 ? 0.1 : 0.0));
+    }
+    const std::vector<double> slopes = scale_factor_errors_ppm(rates, errors);
+    ASSERT_EQ(slopes.size(), 2U);
+    EXPECT_NEAR(slopes[0], 2.0, 1e-9);
+    EXPECT_NEAR(slopes[1], -3.0, 1e-9);
+    EXPECT_EQ(scale_factor_errors_ppm(rates, std::vector<double>(3, 0.0)), std::vector<double>{0.0});
+    EXPECT_TRUE(scale_factor_errors_ppm(std::vector{1.0, 2.0}, errors).empty());
+    EXPECT_TRUE(scale_factor_errors_ppm(std::vector{1.0, 1.0, 1.0}, errors).empty());
+}
+
 TEST(ScaleFactor, ScatterIsWhatALineAndTheOthersDoNotExplain) {
     // Two gyros that deviate by +-(1, -2, 1) d: nothing is shared, and there is one degree of freedom,
     // so that scatter^2 = 2 * 6 d^2. Both lines are flat.
