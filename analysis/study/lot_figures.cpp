@@ -78,9 +78,18 @@ std::vector<LotFigure> lot_figures(const Study& study, const ArmStatistics& arm)
 
 namespace {
 
-/// Gyros that are told apart: those of one rate of a sweep are those of every other.
-std::size_t members_of(const Study& study, const ArmStatistics& arm) {
-    return arm.gyros.size() / static_cast<std::size_t>(study.scenario.input.sweep_points);
+/// Gyros that are told apart: those of one rate of a sweep are those of every other, and turn-ons in a row are of one.
+struct Members {
+    std::size_t rows_of_rate;
+    std::size_t turn_ons;
+
+    std::size_t count() const { return rows_of_rate / turn_ons; }
+    std::size_t of_row(std::size_t row) const { return row % rows_of_rate / turn_ons; }
+};
+
+Members members_of(const Study& study, const ArmStatistics& arm) {
+    return {arm.gyros.size() / static_cast<std::size_t>(study.scenario.input.sweep_points),
+            static_cast<std::size_t>(study.scenario.ensemble.turn_ons)};
 }
 
 /// One limit of a specification, and what must not exceed it in magnitude: of every gyro, at every rate of a sweep
@@ -90,11 +99,13 @@ struct Limit {
     double most;
     std::vector<double> values;
 
-    bool holds(std::size_t member, std::size_t members) const {
-        for (std::size_t row = member; row < values.size(); row += members) {
-            if (!(std::abs(values[row]) <= most)) return false;  // what is no number does not pass
+    /// Of every member whether all its values are within the limit; what is no number is not.
+    std::vector<bool> holds(const Members& members) const {
+        std::vector<bool> within(members.count(), true);
+        for (std::size_t row = 0; row < values.size(); ++row) {
+            if (!(std::abs(values[row]) <= most)) within[members.of_row(row)] = false;
         }
-        return true;
+        return within;
     }
 };
 
@@ -129,23 +140,24 @@ std::vector<Limit> limits_of(const Study& study, const ArmStatistics& arm) {
 }  // namespace
 
 std::vector<bool> passed_gyros(const Study& study, const ArmStatistics& arm) {
-    const std::size_t members = members_of(study, arm);
-    std::vector<bool> passed(members, true);
+    const Members members = members_of(study, arm);
+    std::vector<bool> passed(members.count(), true);
     for (const Limit& limit : limits_of(study, arm)) {
-        for (std::size_t i = 0; i < members; ++i) passed[i] = passed[i] && limit.holds(i, members);
+        const std::vector<bool> within = limit.holds(members);
+        for (std::size_t i = 0; i < passed.size(); ++i) passed[i] = passed[i] && within[i];
     }
     return passed;
 }
 
 Yield yield_of(const Study& study, const ArmStatistics& arm) {
-    const std::size_t members = members_of(study, arm);
-    const auto gyros = static_cast<std::int64_t>(members);
+    const Members members = members_of(study, arm);
+    const auto gyros = static_cast<std::int64_t>(members.count());
     const lot::Confidence confidence = confidence_of(study.scenario);
     Yield yield;
     for (const Limit& limit : limits_of(study, arm)) {
-        std::int64_t within = 0;
-        for (std::size_t i = 0; i < members; ++i) within += limit.holds(i, members) ? 1 : 0;
-        yield.limits.push_back({limit.name, limit.most, lot::share(within, gyros, confidence)});
+        const std::vector<bool> within = limit.holds(members);
+        yield.limits.push_back(
+            {limit.name, limit.most, lot::share(std::count(within.begin(), within.end(), true), gyros, confidence)});
     }
     const std::vector<bool> passed = passed_gyros(study, arm);
     yield.share = lot::share(std::count(passed.begin(), passed.end(), true), gyros, confidence);

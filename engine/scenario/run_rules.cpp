@@ -114,6 +114,11 @@ Finding lot_can_grow(const Scenario& s) {
     if (s.stop.yield_absolute > 0.0 && !asks(s.specification)) {
         return Complaint{{"stop.yield_absolute"}, "there is no yield without a [specification]"};
     }
+    if (s.stop.yield_absolute > 0.0 && s.ensemble.turn_ons > 1) {
+        return refuse("ensemble.turn_ons",
+                      "a yield is a share of gyros, and the rule counts turn-ons; set it to 1, or "
+                      "leave out stop.yield_absolute");
+    }
     return {};
 }
 

@@ -149,6 +149,21 @@ TEST(TurnOns, KeepTheGyroAndDrawTheRestAnew) {
     EXPECT_NE(ensemble::draw_setup(s, 0).lockin_threshold_deg_h, ensemble::draw_setup(s, 3).lockin_threshold_deg_h);
 }
 
+TEST(TurnOns, AGyroMeetsTheSpecificationWhereAllItsTurnOnsDo) {
+    scenario::Scenario s;
+    s.ensemble.gyros = 6;
+    s.ensemble.turn_ons = 2;
+    s.arms = scenario::parse_arms({"ideal"});
+    s.specification.rate_error_deg_h = 1.0;
+    study::Study study(s);
+    const std::vector<double> errors{0.5, -0.5, 0.5, 1.5, -1.5, 1.5};
+    for (std::size_t g = 0; g < 6; ++g) study.arms[0].gyros[g].rate_error_deg_h = errors[g];
+    EXPECT_EQ(study::passed_gyros(study, study.arms[0]), (std::vector<bool>{true, false, false}));
+    const study::Yield yield = study::yield_of(study, study.arms[0]);
+    EXPECT_EQ(yield.share.k, 1);
+    EXPECT_EQ(yield.share.n, 3);
+}
+
 TEST(TurnOns, RepeatabilityLeavesOutWhatDiffersBetweenGyros) {
     // Biases of the published compensator differ from gyro to gyro with the asymmetry; here they are made large by
     // hand, and what is left within a gyro is known.
