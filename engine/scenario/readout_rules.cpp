@@ -56,6 +56,41 @@ Finding pulses_are_there(const Scenario& s) {
     return {};
 }
 
+/// Half cycles that are not alike have different accelerations, and meet where the dither itself turns. An input rate
+/// moves the turn of the phase away from there: with the meeting point among the four pulses from which the phase at
+/// the turn is extrapolated, a parabola through them is wrong by as much as the phases of the two half cycles differ.
+Finding pulses_see_one_acceleration(const Scenario& s) {
+    constexpr double most_rad = 1.0;
+    constexpr double pulses_rad = 2.0 * std::numbers::pi;  // four quarter fringes
+    double rate = exposure(s).input_rate_deg_h;
+    for (const EffectBounds& bounds : bounds_of_effects(s)) {
+        rate += bounds.certain.rate_deg_h + sigmas * bounds.rate_sd_deg_h;
+    }
+    const double asymmetry = largest_asymmetry(s);
+    const double least_peak = peak_rate_deg_h(s) * std::max(0.0, 1.0 - asymmetry);
+    const double shift_s = std::asin(std::min(1.0, rate / least_peak)) / dither_rad_s(s);
+    const double acceleration = phase_amplitude_rad(s) * std::pow(dither_rad_s(s), 2);
+    const double window_s = std::sqrt(2.0 * pulses_rad / acceleration);
+    const double wrong_rad = 2.0 * asymmetry * acceleration * shift_s * window_s;
+    if (wrong_rad <= most_rad) return {};
+    for (const Arm& arm : s.arms) {
+        if (arm.compensator != Compensator::extrapolated) continue;
+        std::vector<std::string> keys =
+            with_keys_of_effects(s, {"input.rate_deg_h", "input.sweep_stop_deg_h", "input.profile_rate_deg_h"},
+                                 [](const gyro::Setup& a, const gyro::Setup& b) {
+                                     return a.dither_asymmetry_ratio != b.dither_asymmetry_ratio;
+                                 });
+        keys.insert(keys.end(), {"ensemble.dither_asymmetry_sd_ratio", "arms.names"});
+        return Complaint{
+            std::move(keys),
+            fmt::format("arm \"{}\" extrapolates from four pulses, among which the two unlike half cycles "
+                        "of the dither meet where the rate is {:g} deg/h: its phases would be wrong by {:.2g} "
+                        "rad, and {:g} is the most; make rate or asymmetry smaller, or leave the arm out",
+                        arm.name, rate, wrong_rad, most_rad)};
+    }
+    return {};
+}
+
 Finding clock_tells_pulses_apart(const Scenario& s) {
     constexpr double least_ticks = 2.0;
     const Readout& r = s.readout;
@@ -144,6 +179,10 @@ constexpr std::array all_readout_rules = {
     Rule{"compensated_extrapolated and compensated_adaptive need the times of pulses, which the latched readout does "
          "not keep.",
          pulses_are_there},
+    Rule{"Where compensated_extrapolated extrapolates, the two half cycles of an asymmetric dither do not meet among "
+         "its "
+         "pulses: rate and asymmetry together leave its phases right to 1 rad.",
+         pulses_see_one_acceleration},
     Rule{"The instrument's clock has two ticks or more in the time from a turn to a quarter fringe.",
          clock_tells_pulses_apart},
     Rule{

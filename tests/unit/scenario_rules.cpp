@@ -428,5 +428,23 @@ TEST(ScenarioRules, PulsesComeBeforeTheMiddle) {
                       HasSubstr("too few quarter fringes")));
 }
 
+TEST(ScenarioRules, UnlikeHalfCyclesDoNotMeetAmongThePulsesOfAnExtrapolation) {
+    Scenario s;
+    s.readout.model = ReadoutModel::ideal;
+    s.arms = parse_arms({"compensated_extrapolated"});
+    s.input.rate_deg_h = 17950.0;
+    EXPECT_TRUE(check(s).empty()) << "half cycles of common gyros are alike enough";
+    s.effects["dither_asymmetry"]["ratio"] = 0.1;
+    const auto found = check(s);
+    ASSERT_EQ(found.size(), 1U);
+    EXPECT_EQ(found.front().keys.front(), "input.rate_deg_h");
+    EXPECT_NE(found.front().problem.find("two unlike half cycles"), std::string::npos);
+    s.input.rate_deg_h = 15.0;
+    EXPECT_TRUE(check(s).empty());
+    s.input.rate_deg_h = 17950.0;
+    s.arms = parse_arms({"compensated_exact"});
+    EXPECT_TRUE(check(s).empty()) << "other arms do not extrapolate";
+}
+
 }  // namespace
 }  // namespace ringlock::scenario
