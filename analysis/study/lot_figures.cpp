@@ -59,9 +59,8 @@ std::vector<LotValues> lot_values(const Study& study, const ArmStatistics& arm) 
     for (const double tau_s : taus) {
         figures.push_back({fmt::format("allan_deviation_{:g}_s_deg_h", tau_s), deviations_at(study, arm, tau_s)});
     }
-    const double end_s = study.schedule.cycle_s * static_cast<double>(study.schedule.cycles() - 1);
     for (std::size_t i = 0; i < study.angle_times_s.size(); ++i) {
-        if (study.angle_times_s[i] > end_s) continue;
+        if (!study.angle_cycle(i)) continue;
         figures.push_back({fmt::format("angle_error_{:g}_s_arcsec", study.angle_times_s[i]), angle_errors(arm, i)});
     }
     return figures;

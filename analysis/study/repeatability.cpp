@@ -52,9 +52,11 @@ std::vector<AverageScatter> scatter_of_averages(const Study& study, const ArmSta
         found.push_back({after_s, scatter_of(squares_about_mean(rates), nu, confidence)});
     };
     for (std::size_t i = 0; i < study.angle_times_s.size(); ++i) {
+        const auto cycle = study.angle_cycle(i);
+        if (!cycle || *cycle >= study.schedule.cycles() - 1) continue;  // the whole record comes below
         const double after_s = study.angle_times_s[i];
-        if (after_s >= end_s) continue;
-        add(after_s, [&](const GyroStatistics& g) { return g.angle_error_arcsec[i] / after_s; });  // arcsec/s: deg/h
+        const double true_s = study.schedule.cycle_s * static_cast<double>(*cycle);
+        add(after_s, [&](const GyroStatistics& g) { return g.angle_error_arcsec[i] / true_s; });  // arcsec/s: deg/h
     }
     add(end_s, [](const GyroStatistics& g) { return g.rate_error_deg_h; });
     return found;

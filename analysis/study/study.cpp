@@ -52,6 +52,13 @@ Study::Study(const scenario::Scenario& what)
     for (const scenario::Arm& arm : scenario.arms) arms.push_back({arm, std::vector<GyroStatistics>(total)});
 }
 
+std::optional<std::int64_t> Study::angle_cycle(std::size_t time) const {
+    const std::int64_t cycle = ensemble::cycles_in(schedule, angle_times_s[time]);
+    const std::int64_t last = schedule.cycles() - 1;
+    if (cycle > last + schedule.cycles_per_sample) return std::nullopt;
+    return std::min(cycle, last);
+}
+
 std::uint64_t expected_memory_bytes(const scenario::Scenario& scenario) {
     const Study one = [&] {
         scenario::Scenario single = scenario;
@@ -176,8 +183,8 @@ class ArmStream {
    private:
     __extension__ using Wide = __int128;  // counts do not wrap round in it
 
-    /// Cycle nearest to a time at which angles are told.
-    std::int64_t cycle_at(std::size_t i) const { return ensemble::cycles_in(study_.schedule, study_.angle_times_s[i]); }
+    /// Cycle at which an angle is told; none of the record where it has none.
+    std::int64_t cycle_at(std::size_t i) const { return study_.angle_cycle(i).value_or(study_.schedule.cycles()); }
 
     /// Keeps angles at those times.
     void note_angles(std::span<const simd::LaneCounts> counts) {

@@ -48,6 +48,9 @@ struct Study {
     /// Times since the start of the record at which angle errors are told: dither::spread_times_s, then those asked
     /// for, then that of the specification.
     std::vector<double> angle_times_s;
+    /// Cycle at which the angle of such a time is told: the nearest one. A record of whole samples may end up to a
+    /// sample before the duration asked for; a time beyond its end by no more is told at its end. Absent beyond that.
+    std::optional<std::int64_t> angle_cycle(std::size_t time) const;
     std::vector<gyro::Setup> gyros;  ///< parameters as drawn
     std::vector<ArmStatistics> arms;
     std::optional<dither::NoiseEffectiveness> predicted_noise;  ///< of the arm `noise_injected`, by predict_noise()

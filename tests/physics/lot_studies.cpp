@@ -259,5 +259,26 @@ TEST(LotStudies, NoiseThatDoesNotRandomiseIsSaid) {
     EXPECT_NE(why.find("bias of -0.31 deg/h"), std::string::npos) << why;
 }
 
+TEST(LotStudies, AnAngleAtTheEndIsToldThoughTheRecordIsOfWholeSamples) {
+    // Samples of ten seconds of the paper's device are 1247 cycles: the record ends before the 60 s asked for.
+    scenario::Scenario scenario = short_study({"ideal"});
+    scenario.ensemble.duration_s = 60.0;
+    scenario.output.sample_interval_s = 10.0;
+    scenario.output.angle_after_s = {60.0};
+    scenario.specification.angle_error_arcsec = 1e6;
+    scenario.specification.after_s = 60.0;
+    const study::Study study = simulated(scenario);
+    ASSERT_LT(study.schedule.cycle_s * static_cast<double>(study.schedule.cycles() - 1), 60.0);
+    ASSERT_EQ(study.angle_times_s.size(), 5U);
+    EXPECT_FALSE(study.angle_cycle(2)) << "100 s";
+    EXPECT_EQ(study.angle_cycle(3), study.schedule.cycles() - 1);
+    for (const study::GyroStatistics& gyro : study.arms[0].gyros) {
+        EXPECT_TRUE(std::isnan(gyro.angle_error_arcsec[2]));
+        EXPECT_TRUE(std::isfinite(gyro.angle_error_arcsec[3]));
+        EXPECT_EQ(gyro.angle_error_arcsec[3], gyro.angle_error_arcsec[4]);
+    }
+    EXPECT_EQ(study::summarise(study).arms[0].yield->share.k, 16);
+}
+
 }  // namespace
 }  // namespace ringlock::test
