@@ -87,10 +87,10 @@ inline constexpr std::size_t fewest_base_points = 16;
 ///                                                Simul. 23, 11, 2013
 ///     ST_i = mean((f_A - f_AB_i)^2)/(2 V)        Jansen, Comput. Phys. Commun. 117, 35, 1999
 ///
-/// Intervals are bootstrap intervals over the base points; each round estimates m and V anew. The bootstrap assumes
-/// independent base points. Those of a scrambled Sobol' sequence cover the cube more evenly, so that the intervals are
-/// wider than the errors of smooth models (docs/design.md has what was measured). Indices are not clipped: of factors
-/// without influence they scatter about 0, and S_i below it.
+/// The intervals come from a bootstrap over the base points, in which each resample has its own m and V. The bootstrap
+/// treats base points as independent. Those of a scrambled Sobol' sequence cover the cube more evenly, so that the
+/// intervals are wider than the errors of smooth models (docs/design.md has what was measured). Indices are not
+/// clipped: of factors without influence they scatter about 0, and S_i below it.
 ///
 /// Noise of the evaluations that is independent between them lowers S_i by the factor 1 - noise share, and brings ST_i
 /// towards 1: ST_i (1 - share) + share, also for factors without influence. Where evaluations share their random

@@ -19,7 +19,8 @@ namespace {
 /// Most figures that a sentence names.
 constexpr std::size_t most_named = 4;
 
-/// Figures that reached what is wanted of them, or did not: those that are furthest from it, or were last to reach it.
+/// Lists the figures that met their precision, or those that did not: the ones with the largest ratio of reached to
+/// wanted half width come first.
 std::string list_of(const std::vector<Reached>& figures, bool met) {
     std::vector<const Reached*> listed;
     for (const Reached& f : figures) {

@@ -21,7 +21,7 @@ constexpr std::int64_t first_look = 16;
 /// Throws InputError where n or most is outside.
 std::optional<std::int64_t> next_look(std::int64_t n, std::int64_t most);
 
-/// Half widths of intervals at which a lot is large enough; what is absent is not asked for.
+/// Half widths of intervals at which a lot is large enough; an absent one is no condition.
 struct Precision {
     /// Of the geometric mean of each arm's random walk: upper end over mean less 1. Positive.
     std::optional<double> arw_relative;
@@ -62,7 +62,7 @@ struct Decision {
 /// where that does not stop. It reports all figures of the lot with confidence(), the last look's included.
 class StoppingRule {
    public:
-    /// \param precision   what is asked for
+    /// \param precision   half widths to reach
     /// \param most_gyros  the lot stops there in any case, at least 1
     /// \param level       of every interval, in (0, 1)
     /// Throws InputError where one is outside.

@@ -15,7 +15,7 @@
 #include "analysis/study/study.hpp"
 #include "engine/core/error.hpp"
 #include "engine/ensemble/schedule.hpp"
-#include "engine/scenario/schema.hpp"
+#include "engine/scenario/keys/schema.hpp"
 
 namespace ringlock::study {
 
@@ -125,7 +125,7 @@ design::Points points_of(const Scenario& scenario) {
 
 bool whole_number_key(const scenario::Key& key) { return key.type == scenario::Type::integer; }
 
-/// What is wrong with a design before it has points.
+/// Errors of a design that can be found before its points are made.
 std::vector<Complaint> complaints_of_design(const Scenario& scenario) {
     const scenario::Design& wanted = scenario.design;
     std::vector<Complaint> found;
@@ -287,6 +287,31 @@ std::optional<Complaint> too_large(const Scenario& scenario) {
                                  points, gyros, needed * 1e-9, there * 1e-9)};
 }
 
+/// Points have the same limits and the same figures: results are compared across them, and stand in one dataset.
+std::vector<Complaint> complaints_of_specification(const Scenario& scenario, const std::vector<Axis>& axes) {
+    std::vector<Complaint> found;
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+        const Axis& axis = axes[i];
+        if (!axis.key.starts_with("specification.")) continue;
+        const bool some = std::find(axis.values.begin(), axis.values.end(), 0.0) != axis.values.end();
+        const bool all = std::all_of(axis.values.begin(), axis.values.end(), [](double value) { return value == 0.0; });
+        if (some && !all) {
+            found.push_back({{key_of(i, "key")},
+                             fmt::format("{} is 0 at some points, which do not ask for it, and not at others; leave 0 "
+                                         "out",
+                                         axis.key)});
+        }
+        const bool time = axis.key == "specification.at_s" || axis.key == "specification.after_s";
+        if (time && scenario.design.sensitivity_base_points > 0) {
+            found.push_back({{key_of(i, "key")},
+                             fmt::format("{} sets which figure is meant, and an index is of one figure; leave it out, "
+                                         "or the indices",
+                                         axis.key)});
+        }
+    }
+    return found;
+}
+
 bool same_schedule(const std::vector<Axis>& axes) {
     const auto changes = [](const Axis& axis) {
         return axis.values.end() != std::adjacent_find(axis.values.begin(), axis.values.end(), std::not_equal_to<>());
@@ -335,6 +360,7 @@ std::vector<Complaint> complaints(const Scenario& scenario) {
         return {{{"design.points", "design.sensitivity_base_points", "design.kind"}, error.what()}};
     }
     found = complaints_of_points(scenario, axes);
+    for (Complaint& complaint : complaints_of_specification(scenario, axes)) found.push_back(std::move(complaint));
     if (scenario.output.angle_record && !same_schedule(axes)) {
         std::vector<std::string> keys{"output.angle_record"};
         for (std::string& key : keys_of_axes(axes)) keys.push_back(std::move(key));

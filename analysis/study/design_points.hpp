@@ -23,8 +23,8 @@ std::vector<Axis> design_axes(const scenario::Scenario& scenario);
 /// The scenario alone of one point, without a design.
 scenario::Scenario scenario_at(const scenario::Scenario& scenario, const std::vector<Axis>& axes, std::size_t point);
 
-/// The rules of a study: those of the scenario where it has no design; otherwise what is wrong with the design, or the
-/// rules that its points break, each once with the points that break it.
+/// Checks a study. Without a design these are the rules of the scenario. With one they are the errors of the design
+/// itself or, where it has none, the rules that its points break: each rule once, with the points that break it.
 std::vector<scenario::Complaint> complaints(const scenario::Scenario& scenario);
 
 }  // namespace ringlock::study

@@ -51,7 +51,7 @@ Judged judged(const Experiment& experiment, const std::vector<Summary>& summarie
         const std::string point = experiment.has_design() ? fmt::format("point {}, ", p + 1) : "";
         for (std::size_t a = 0; a < summaries[p].arms.size(); ++a) {
             const ArmSummary& arm = summaries[p].arms[a];
-            if (arm.yield) all.yields.push_back({point + arm.name, arm.yield->share.k});
+            if (arm.yield) all.yields.push_back({fmt::format("yield of {}{}", point, arm.name), arm.yield->share.k});
             if (!arm.arw_deg_rt_h.median) continue;
             all.names.push_back(point + arm.name);
             all.walks.push_back(random_walks_deg_rt_h(experiment.points[p].arms[a]));
@@ -68,7 +68,7 @@ lot::StoppingRule rule_of(const scenario::Stop& stop) {
     return {precision, stop.most_gyros};
 }
 
-/// The rule's answer, with what it cannot know.
+/// The decision of the rule at a look; the wall time, and arms that show no random walk yet, are not known to the rule.
 lot::Decision decide(const lot::StoppingRule& rule, const scenario::Stop& stop, std::int64_t gyros,
                      const Experiment& experiment, double hours) {
     const Judged all = judged(experiment, summarise(experiment));

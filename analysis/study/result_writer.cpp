@@ -9,9 +9,9 @@
 #include "analysis/study/result_file.hpp"
 #include "analysis/study/result_layout.hpp"
 #include "engine/core/error.hpp"
+#include "engine/scenario/keys/schema.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/render.hpp"
-#include "engine/scenario/schema.hpp"
 
 namespace ringlock::study {
 
@@ -229,7 +229,7 @@ class ArmWriter {
                 errors.insert(errors.end(), gyro.angle_error_arcsec.begin(), gyro.angle_error_arcsec.end());
             }
         }
-        // All points have as many times: those asked for once by the specification may differ between points.
+        // All points have as many times (complaints() see to it); that of the specification may differ.
         const std::size_t times = experiment_.points.front().angle_times_s.size();
         std::vector<double> after_s;
         for (const Study& study : experiment_.points) {

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/scenario/rules.hpp"
+#include "engine/scenario/rules/rules.hpp"
 
 namespace ringlock::scenario {
 namespace {

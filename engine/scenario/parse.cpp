@@ -19,7 +19,7 @@
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/check.hpp"
 #include "engine/scenario/devices.hpp"
-#include "engine/scenario/schema.hpp"
+#include "engine/scenario/keys/schema.hpp"
 #include "engine/scenario/text.hpp"
 
 namespace ringlock::scenario {

@@ -8,7 +8,7 @@
 
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/check.hpp"
-#include "engine/scenario/schema.hpp"
+#include "engine/scenario/keys/schema.hpp"
 
 namespace ringlock::scenario {
 namespace {

@@ -323,5 +323,17 @@ TEST(Designs, WhatIsWrongWithADesignIsSaid) {
                 AllOf(HasSubstr("design.sensitivity_base_points"), HasSubstr("fewer than 16 base points")));
 }
 
+TEST(Designs, AllPointsAskForTheSameFigures) {
+    const std::string text = "[ensemble]\nduration_s = 200.0\n" + std::string(grid);
+    EXPECT_EQ(complaint(text + "\"specification.angle_error_arcsec\"\nvalues = [5.0, 10.0]\n"), "(accepted)");
+    EXPECT_THAT(complaint(text + "\"specification.angle_error_arcsec\"\nvalues = [0.0, 10.0]\n"),
+                AllOf(HasSubstr("s.toml:8:7"), HasSubstr("is 0 at some points")));
+    EXPECT_THAT(
+        complaint("[output]\nangle_record = false\n[specification]\nbias_stability_deg_h = 1.0\n[design]\nkind = "
+                  "\"sobol\"\nsensitivity_base_points = 16\n[[design.vary]]\nkey = \"specification.at_s\"\n"
+                  "values = [50.0, 100.0]\n"),
+        HasSubstr("an index is of one figure"));
+}
+
 }  // namespace
 }  // namespace ringlock

@@ -21,8 +21,8 @@
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/devices.hpp"
+#include "engine/scenario/keys/schema.hpp"
 #include "engine/scenario/parse.hpp"
-#include "engine/scenario/schema.hpp"
 
 namespace ringlock::test {
 namespace {

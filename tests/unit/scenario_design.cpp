@@ -5,9 +5,9 @@
 #include <string>
 
 #include "engine/core/error.hpp"
+#include "engine/scenario/keys/schema.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/render.hpp"
-#include "engine/scenario/schema.hpp"
 
 namespace ringlock::scenario {
 namespace {

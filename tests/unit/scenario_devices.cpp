@@ -6,9 +6,9 @@
 #include "engine/gyro/theory.hpp"
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/devices.hpp"
+#include "engine/scenario/keys/schema.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/render.hpp"
-#include "engine/scenario/schema.hpp"
 #include "tests/support/devices.hpp"
 #include "tests/support/expect_throw.hpp"
 

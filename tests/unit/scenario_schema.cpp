@@ -9,9 +9,9 @@
 #include "engine/core/error.hpp"
 #include "engine/effects/effect.hpp"
 #include "engine/scenario/arm.hpp"
+#include "engine/scenario/keys/schema.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/render.hpp"
-#include "engine/scenario/schema.hpp"
 
 namespace ringlock::scenario {
 namespace {

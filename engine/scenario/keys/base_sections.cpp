@@ -1,6 +1,7 @@
 #include <limits>
 
-#include "engine/scenario/sections.hpp"
+#include "engine/core/units.hpp"
+#include "engine/scenario/keys/sections.hpp"
 
 namespace ringlock::scenario {
 

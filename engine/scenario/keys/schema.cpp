@@ -1,4 +1,4 @@
-#include "engine/scenario/schema.hpp"
+#include "engine/scenario/keys/schema.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -10,7 +10,7 @@
 
 #include "engine/effects/effect.hpp"
 #include "engine/scenario/arm.hpp"
-#include "engine/scenario/sections.hpp"
+#include "engine/scenario/keys/sections.hpp"
 #include "engine/scenario/text.hpp"
 
 namespace ringlock::scenario {

@@ -12,7 +12,7 @@
 
 #include "engine/core/units.hpp"
 #include "engine/scenario/active_effects.hpp"
-#include "engine/scenario/rules.hpp"
+#include "engine/scenario/rules/rules.hpp"
 
 namespace ringlock::scenario {
 namespace {

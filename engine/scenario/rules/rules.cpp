@@ -1,4 +1,4 @@
-#include "engine/scenario/rules.hpp"
+#include "engine/scenario/rules/rules.hpp"
 
 #include <algorithm>
 #include <cmath>

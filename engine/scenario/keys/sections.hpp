@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/scenario/schema.hpp"
+#include "engine/scenario/keys/schema.hpp"
 
 /// How keys are bound to fields of a scenario; for the tables of sections only.
 namespace ringlock::scenario {

@@ -10,7 +10,7 @@
 #include "engine/core/units.hpp"
 #include "engine/scenario/fast_motion.hpp"
 #include "engine/scenario/injected_noise.hpp"
-#include "engine/scenario/rules.hpp"
+#include "engine/scenario/rules/rules.hpp"
 
 namespace ringlock::scenario {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/fast_motion.hpp"
-#include "engine/scenario/rules.hpp"
+#include "engine/scenario/rules/rules.hpp"
 
 namespace ringlock::scenario {
 namespace {

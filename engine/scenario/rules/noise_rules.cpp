@@ -8,7 +8,7 @@
 #include "engine/gyro/resonator.hpp"
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/injected_noise.hpp"
-#include "engine/scenario/rules.hpp"
+#include "engine/scenario/rules/rules.hpp"
 
 namespace ringlock::scenario {
 namespace {

@@ -11,7 +11,7 @@
 #include "engine/gyro/setup.hpp"
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/fast_motion.hpp"
-#include "engine/scenario/rules.hpp"
+#include "engine/scenario/rules/rules.hpp"
 
 namespace ringlock::scenario {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/scenario/active_effects.hpp"
-#include "engine/scenario/rules.hpp"
+#include "engine/scenario/rules/rules.hpp"
 
 namespace ringlock::scenario {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/scenario/rules.hpp"
+#include "engine/scenario/rules/rules.hpp"
 
 namespace ringlock::scenario {
 namespace {

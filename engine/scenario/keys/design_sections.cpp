@@ -1,4 +1,4 @@
-#include "engine/scenario/sections.hpp"
+#include "engine/scenario/keys/sections.hpp"
 
 namespace ringlock::scenario {
 namespace {
