@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -59,6 +60,13 @@ std::int64_t whole_number(std::string_view option, const std::string& text, std:
         throw InputError(fmt::format("{} {}: must be a whole number {}", option, text, allowed));
     }
     return value;
+}
+
+int thread_count(const std::string& asked) {
+    constexpr int most = 4096;
+    const auto threads = static_cast<int>(
+        whole_number("--threads", asked, most, fmt::format("between 1 and {}, or 0 for all cores", most)));
+    return threads > 0 ? threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 }
 
 void add_settings(CLI::App& command, Changes& changes) {

@@ -17,6 +17,9 @@ namespace ringlock::app {
 std::int64_t whole_number(std::string_view option, const std::string& text, std::int64_t largest,
                           std::string_view allowed);
 
+/// Threads of --threads; 0 means all cores. Throws InputError.
+int thread_count(const std::string& asked);
+
 /// What a command is told of a scenario beside its file.
 struct Changes {
     std::vector<std::string> settings;  ///< of --set, "section.key=value"

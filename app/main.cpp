@@ -64,6 +64,8 @@ int main(int argc, char** argv) {
     app::add_closure(root);
     app::add_record(root);
     app::add_devices(root);
+    app::add_merge(root, {argv, static_cast<std::size_t>(argc)});
+    app::add_status(root);
     app::add_planned(root);
     try {
         const ringlock::InterruptGuard guard;
@@ -77,8 +79,8 @@ int main(int argc, char** argv) {
         return complain(input_wrong, error.what());
     } catch (const ringlock::RunError& error) {
         return complain(run_failed, error.what());
-    } catch (const ringlock::Interrupted&) {
-        app::tell("ringlock: interrupted, nothing written\n");
+    } catch (const ringlock::Interrupted& interrupted) {
+        app::tell(fmt::format("ringlock: {}\n", interrupted.what()));
     } catch (const std::bad_alloc&) {
         return complain(run_failed, "out of memory; run fewer gyros at a time, or store fewer samples");
     } catch (const std::exception& error) {

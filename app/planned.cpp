@@ -11,15 +11,15 @@ namespace ringlock::app {
 
 void add_planned(CLI::App& root) {
     // Their names are reserved, but the help shows what can be used.
-    constexpr std::array planned = {"merge", "replay", "report"};
+    constexpr std::array planned = {"replay", "report"};
     for (const char* const name : planned) {
         CLI::App* command = root.add_subcommand(name)->group("");
         command->allow_extras();
         const std::string text = name;
         command->callback([text] {
             throw InputError(
-                fmt::format("the command \"{}\" is not there yet; there are run, analyze, allan, validate, import, "
-                            "record, devices and closure",
+                fmt::format("the command \"{}\" is not there yet; there are run, merge, status, analyze, allan, "
+                            "validate, import, record, devices and closure",
                             text));
         });
     }

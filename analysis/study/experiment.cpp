@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
+#include <algorithm>
 #include <chrono>
+#include <limits>
+#include <memory>
 #include <ratio>
 #include <utility>
 
@@ -95,10 +98,55 @@ void grow(Experiment& experiment, std::int64_t gyros) {
 
 }  // namespace
 
-Experiment run(Experiment experiment, int threads, const OnSamples& on_samples, const ensemble::Monitor& monitor) {
+std::vector<Stretch> missing(std::size_t point, std::int64_t first, std::int64_t last, std::vector<Stretch> there) {
+    std::sort(there.begin(), there.end(), [](const Stretch& a, const Stretch& b) { return a.first < b.first; });
+    std::vector<Stretch> gaps;
+    std::int64_t next = first;
+    for (const Stretch& stretch : there) {
+        if (stretch.first > next) gaps.push_back({point, next, stretch.first});
+        next = stretch.last;
+    }
+    if (next < last) gaps.push_back({point, next, last});
+    return gaps;
+}
+
+namespace {
+
+/// Keeps nothing.
+class NoStore final : public Store {
+   public:
+    explicit NoStore(const OnSamples& on_samples) : make_keeper_(hand_on(on_samples)) {}
+    std::vector<Stretch> take_up(std::span<Study> points, std::int64_t first, std::int64_t) override {
+        std::vector<Stretch> all;
+        for (std::size_t point = 0; point < points.size(); ++point) {
+            const Stretch rest{point, first, static_cast<std::int64_t>(points[point].gyros.size())};
+            if (rest.first < rest.last) all.push_back(rest);
+        }
+        return all;
+    }
+    std::unique_ptr<BlockKeeper> keeper(std::size_t point, std::int64_t first_gyro, std::size_t gyros) override {
+        return make_keeper_(point, first_gyro, gyros);
+    }
+    double hours_before() const override { return 0.0; }
+
+   private:
+    MakeKeeper make_keeper_;
+};
+
+}  // namespace
+
+Experiment run(Experiment experiment, int threads, Store& store, const ensemble::Monitor& monitor) {
+    predict_noise(experiment.points, threads);
+    const MakeKeeper make_keeper = [&](std::size_t point, std::int64_t first_gyro, std::size_t gyros) {
+        return store.keeper(point, first_gyro, gyros);
+    };
+    const auto simulate = [&](std::int64_t first, std::int64_t last) {
+        const std::vector<Stretch> stretches = store.take_up(experiment.points, first, last);
+        run(experiment.points, stretches, threads, make_keeper, monitor);
+    };
     const scenario::Stop stop = experiment.scenario.stop;
     if (!scenario::asks(stop)) {
-        run(experiment.points, 0, threads, on_samples, monitor);
+        simulate(0, std::numeric_limits<std::int64_t>::max());
         return experiment;
     }
     const lot::StoppingRule rule = rule_of(stop);
@@ -107,16 +155,21 @@ Experiment run(Experiment experiment, int threads, const OnSamples& on_samples, 
     std::optional<std::int64_t> next = rule.next(0);
     for (std::int64_t there = 0; next; there = growth.looks.back()) {
         grow(experiment, *next);
-        run(experiment.points, there, threads, on_samples, monitor);
+        simulate(there, *next);
         growth.looks.push_back(*next);
         const std::chrono::duration<double, std::ratio<3600>> gone = std::chrono::steady_clock::now() - start;
-        const lot::Decision decision = decide(rule, stop, *next, experiment, gone.count());
+        const lot::Decision decision = decide(rule, stop, *next, experiment, store.hours_before() + gone.count());
         growth.precise = decision.precise;
         growth.why = decision.why;
         next = decision.stop ? std::nullopt : decision.next;
     }
     experiment.growth = std::move(growth);
     return experiment;
+}
+
+Experiment run(Experiment experiment, int threads, const OnSamples& on_samples, const ensemble::Monitor& monitor) {
+    NoStore store(on_samples);
+    return run(std::move(experiment), threads, store, monitor);
 }
 
 std::vector<Summary> summarise(const Experiment& experiment) {

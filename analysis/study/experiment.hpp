@@ -1,5 +1,8 @@
 #pragma once
+#include <cstdint>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -35,10 +38,29 @@ struct Experiment {
     std::int64_t turns() const;  ///< of all points
 };
 
+/// Where the gyros of an experiment come from and go to: it keeps blocks that are finished, so that what was simulated
+/// before need not be simulated again.
+class Store {
+   public:
+    virtual ~Store() = default;
+    /// Puts what is kept of gyros [first, last) of each point into the points, and returns what is missing of them.
+    virtual std::vector<Stretch> take_up(std::span<Study> points, std::int64_t first, std::int64_t last) = 0;
+    /// A keeper of what is about to be simulated.
+    virtual std::unique_ptr<BlockKeeper> keeper(std::size_t point, std::int64_t first_gyro, std::size_t gyros) = 0;
+    /// Wall time that was spent on what is kept [h].
+    virtual double hours_before() const = 0;
+};
+
 /// Runs all points side by side. With a stopping rule gyros are added to all points until every one is precise, and
 /// ensemble.gyros of the scenario becomes their number. Throws RunError, Interrupted.
+Experiment run(Experiment experiment, int threads, Store& store, const ensemble::Monitor& monitor);
+
+/// The same without a store; samples are handed on.
 Experiment run(Experiment experiment, int threads, const OnSamples& on_samples = nullptr,
                const ensemble::Monitor& monitor = {});
+
+/// Of a point, [first, last) without the stretches that are there; they do not overlap.
+std::vector<Stretch> missing(std::size_t point, std::int64_t first, std::int64_t last, std::vector<Stretch> there);
 
 /// Sums every point up.
 std::vector<Summary> summarise(const Experiment& experiment);

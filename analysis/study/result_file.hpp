@@ -1,11 +1,13 @@
 #pragma once
 #include <filesystem>
+#include <mutex>
 #include <optional>
 #include <vector>
 
 #include "analysis/study/experiment.hpp"
 #include "analysis/study/summary.hpp"
 #include "engine/store/atomic_file.hpp"
+#include "engine/store/hdf5.hpp"
 #include "engine/store/provenance.hpp"
 
 /// The result file; results/FORMAT.md lists every dataset.
@@ -13,8 +15,10 @@ namespace ringlock::study {
 
 inline constexpr std::int64_t result_format_version = 2;
 
-/// Writes a result as the study goes on: samples as they come, the rest at the end. The file has its name only
-/// after finish().
+/// Whether the file is the result of this scenario and seed. False for anything else, and where there is no file.
+bool is_result_of(const std::filesystem::path& path, const Experiment& experiment);
+
+/// Writes a result: its samples first, as they come, the rest at the end. The file has its name only after finish().
 class ResultWriter {
    public:
     /// Claims the output. Throws InputError where it cannot be written, or where another study's result has the name:
@@ -32,9 +36,15 @@ class ResultWriter {
     const std::filesystem::path& path() const { return file_.target(); }
 
    private:
+    void begin();
+
     store::AtomicFile file_;
-    std::vector<store::Dataset> records_;    // one for each arm, or none
-    std::vector<std::uint64_t> first_rows_;  // of each point's gyros
+    scenario::Scenario scenario_;
+    std::vector<Axis> axes_;
+    std::vector<std::uint64_t> first_rows_;  // of each point's gyros, and how many there are
+    std::uint64_t samples_;                  // of an angle record
+    std::once_flag begun_;
+    std::vector<store::Dataset> records_;  // one for each arm, or none
 };
 
 /// Bytes a result file of this experiment will take, but for some tens of kilobytes that hold names and units; with a

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <mutex>
 #include <string>
 #include <system_error>
 #include <type_traits>
@@ -391,15 +392,7 @@ bool is_text_of(const std::string& text, const Experiment& experiment) {
 /// Keeps results that are there: only a result of this very study may be replaced.
 std::filesystem::path refuse_to_lose(const std::filesystem::path& path, const Experiment& experiment) {
     std::error_code unreachable;  // claiming the output says what is wrong with what is no file
-    if (!std::filesystem::is_regular_file(path, unreachable)) return path;
-    bool same = false;
-    try {
-        const store::File file = store::File::open(path);
-        if (layout::is_result(file)) same = is_text_of(file.dataset("scenario").read<std::string>().at(0), experiment);
-    } catch (const std::exception&) {
-        // Not HDF5 or not readable: somebody's file all the same.
-    }
-    if (!same) {
+    if (std::filesystem::is_regular_file(path, unreachable) && !is_result_of(path, experiment)) {
         throw InputError(
             fmt::format("{}: the file is there and is not a result of this scenario and seed; it is kept. Give "
                         "another name with -o, or remove it",
@@ -409,6 +402,15 @@ std::filesystem::path refuse_to_lose(const std::filesystem::path& path, const Ex
 }
 
 }  // namespace
+
+bool is_result_of(const std::filesystem::path& path, const Experiment& experiment) {
+    try {
+        const store::File file = store::File::open(path);
+        return layout::is_result(file) && is_text_of(file.dataset("scenario").read<std::string>().at(0), experiment);
+    } catch (const std::exception&) {
+        return false;  // not there, not HDF5 or not readable: at any rate not a result
+    }
+}
 
 std::uint64_t expected_size_bytes(const Experiment& experiment) {
     constexpr std::uint64_t real = 8;
@@ -437,37 +439,44 @@ std::uint64_t expected_size_bytes(const Experiment& experiment) {
 }
 
 ResultWriter::ResultWriter(const std::filesystem::path& path, const Experiment& experiment)
-    : file_(refuse_to_lose(path, experiment)) {
-    store::File& root = file_.file();
-    root.set_attribute("format", layout::format_name);
-    root.set_attribute("format_version", result_format_version);
-    root.set_attribute("seed", experiment.scenario.ensemble.seed);
-    if (experiment.has_design()) {
-        store::Group design = root.create_group("design");
-        for (const Axis& axis : experiment.axes) {
-            design.write(axis.key, axis.values, {axis.unit, "value of the key at each point"});
-        }
-    }
+    : file_(refuse_to_lose(path, experiment)),
+      scenario_(experiment.scenario),
+      axes_(experiment.axes),
+      samples_(static_cast<std::uint64_t>(experiment.points.front().schedule.samples)) {
     std::uint64_t rows = 0;
     for (const Study& study : experiment.points) {
         first_rows_.push_back(rows);
         rows += study.gyros.size();
     }
+    first_rows_.push_back(rows);
+}
+
+void ResultWriter::begin() {
+    store::File& root = file_.file();
+    root.set_attribute("format", layout::format_name);
+    root.set_attribute("format_version", result_format_version);
+    root.set_attribute("seed", scenario_.ensemble.seed);
+    if (!axes_.empty()) {
+        store::Group design = root.create_group("design");
+        for (const Axis& axis : axes_) {
+            design.write(axis.key, axis.values, {axis.unit, "value of the key at each point"});
+        }
+    }
     store::Group arms = root.create_group("arms");
-    const Study& first = experiment.points.front();
-    for (const ArmStatistics& arm : first.arms) {
-        store::Group group = arms.create_group(arm.arm.name);
-        group.set_attribute("ideal", static_cast<std::int64_t>(arm.arm.ideal));
-        group.set_attribute("noise_injected", static_cast<std::int64_t>(arm.arm.noise_injected));
-        group.set_attribute("compensator", compensator_name(arm.arm.compensator));
-        if (!experiment.scenario.output.angle_record) continue;
+    for (const scenario::Arm& arm : scenario_.arms) {
+        store::Group group = arms.create_group(arm.name);
+        group.set_attribute("ideal", static_cast<std::int64_t>(arm.ideal));
+        group.set_attribute("noise_injected", static_cast<std::int64_t>(arm.noise_injected));
+        group.set_attribute("compensator", compensator_name(arm.compensator));
+        if (!scenario_.output.angle_record) continue;
         records_.push_back(
-            group.create_dataset<double>("angle_arcsec", {rows, static_cast<std::uint64_t>(first.schedule.samples)},
+            group.create_dataset<double>("angle_arcsec", {first_rows_.back(), samples_},
                                          {"arcsec", "angle output with the dither stripped, one row a gyro"}));
     }
 }
 
 void ResultWriter::write_samples(const SampledAngles& samples) {
+    std::call_once(begun_, [&] { begin(); });
     if (records_.empty()) return;
     const std::uint64_t columns = samples.angle_arcsec.size() / samples.gyros;
     records_[samples.arm].write_block(first_rows_[samples.study] + static_cast<std::uint64_t>(samples.first_gyro),
@@ -477,6 +486,7 @@ void ResultWriter::write_samples(const SampledAngles& samples) {
 
 void ResultWriter::finish(const Experiment& experiment, const std::vector<Summary>& summaries,
                           const store::Provenance& provenance) {
+    std::call_once(begun_, [&] { begin(); });
     store::File& root = file_.file();
     // Not before: a stopping rule sets the number of gyros.
     root.write("scenario", std::vector<std::string>{scenario::to_toml(experiment.scenario)},

@@ -10,6 +10,7 @@
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <utility>
 
 #include "analysis/allan/bounded_record.hpp"
 #include "analysis/allan/factor_stream.hpp"
@@ -112,10 +113,11 @@ constexpr std::size_t gathered_samples = 256;
 class ArmStream {
    public:
     ArmStream(const Study& study, std::size_t number, std::size_t arm, std::int64_t first_gyro, std::size_t gyros,
-              const OnSamples& on_samples)
+              BlockKeeper& keeper)
         : study_(study),
           gyros_(gyros),
-          on_samples_(on_samples),
+          keeper_(keeper),
+          wants_samples_(keeper.wants_samples()),
           angle_errors_counts_(study.angle_times_s.size()),
           record_(study.schedule.samples, fit_samples),
           waiting_{number, arm, first_gyro, gyros, 0, {}} {
@@ -175,7 +177,7 @@ class ArmStream {
                     static_cast<double>(waiting_rows_[i][lane]) * arcsec_per_count;
             }
         }
-        on_samples_(waiting_);
+        keeper_.samples(waiting_);
         waiting_.first_sample += static_cast<std::int64_t>(samples);
         waiting_rows_.clear();
     }
@@ -216,14 +218,15 @@ class ArmStream {
             angle[lane] = origin_[lane] + turned_[lane];
         }
         ++sample_;
-        if (!on_samples_) return;
+        if (!wants_samples_) return;
         waiting_rows_.push_back(angle);
         if (waiting_rows_.size() == gathered_samples) flush();
     }
 
     const Study& study_;
     std::size_t gyros_;
-    const OnSamples& on_samples_;
+    BlockKeeper& keeper_;
+    bool wants_samples_;
     std::vector<std::array<double, simd::lanes>> angle_errors_counts_;  ///< at Study::angle_times_s
     allan::OctaveStream octaves_;
     std::vector<allan::FactorStream> asked_;  ///< averaging times that are no octaves
@@ -241,45 +244,87 @@ class ArmStream {
 class BlockStatistics final : public ensemble::BlockSink {
    public:
     BlockStatistics(Study& study, std::size_t number, std::mutex& mutex, std::int64_t first_gyro, std::size_t gyros,
-                    const OnSamples& on_samples)
-        : study_(study), mutex_(mutex), first_(static_cast<std::size_t>(first_gyro)), gyros_(gyros) {
+                    std::unique_ptr<BlockKeeper> keeper)
+        : study_(study), mutex_(mutex), number_(number), gyros_(gyros), keeper_(std::move(keeper)) {
         for (std::size_t arm = 0; arm < study.arms.size(); ++arm) {
-            arms_.push_back(std::make_unique<ArmStream>(study, number, arm, first_gyro, gyros, on_samples));
+            arms_.push_back(std::make_unique<ArmStream>(study, number, arm, first_gyro, gyros, *keeper_));
         }
     }
 
     void cycles(std::size_t arm, std::span<const simd::LaneCounts> counts) override { arms_[arm]->add(counts); }
 
     void finish(const ensemble::BlockResult& result) override {
+        FinishedBlock block{number_,
+                            result.first_gyro,
+                            result.setups,
+                            {},
+                            result.turns,
+                            result.tables_remade,
+                            result.contradictory_readings,
+                            result.turn_map_error_rad};
         for (std::size_t arm = 0; arm < arms_.size(); ++arm) {
             arms_[arm]->flush();
-            const bool closed_form = has_closed_form(study_.scenario, study_.arms[arm].arm);
-            for (std::size_t lane = 0; lane < gyros_; ++lane) {
-                GyroStatistics& found = study_.arms[arm].gyros[first_ + lane];
-                found = arms_[arm]->finish(lane, result.setups[lane]);
-                if (shows_noise(study_.arms[arm].arm)) found.change_per_cycle_rad = result.change_per_cycle_rad[lane];
-                if (closed_form) {
-                    found.rate_error_closed_form_deg_h = ensemble::closed_form_rate_error_deg_h(result.setups[lane]);
-                }
-            }
+            block.arms.push_back(statistics(arm, result));
         }
-        for (std::size_t lane = 0; lane < gyros_; ++lane) study_.gyros[first_ + lane] = result.setups[lane];
-        const std::lock_guard lock(mutex_);  // sums of whole numbers and a maximum: their order does not matter
-        study_.turns += result.turns;
-        study_.tables_remade += result.tables_remade;
-        study_.contradictory_readings += result.contradictory_readings;
-        study_.turn_map_error_rad = std::max(study_.turn_map_error_rad, result.turn_map_error_rad);
+        keeper_->finish(block);
+        const std::lock_guard lock(mutex_);
+        take_up(study_, block);
     }
 
    private:
+    std::vector<GyroStatistics> statistics(std::size_t arm, const ensemble::BlockResult& result) const {
+        const scenario::Arm& which = study_.arms[arm].arm;
+        const bool closed_form = has_closed_form(study_.scenario, which);
+        std::vector<GyroStatistics> found;
+        for (std::size_t lane = 0; lane < gyros_; ++lane) {
+            GyroStatistics& gyro = found.emplace_back(arms_[arm]->finish(lane, result.setups[lane]));
+            if (shows_noise(which)) gyro.change_per_cycle_rad = result.change_per_cycle_rad[lane];
+            if (closed_form) {
+                gyro.rate_error_closed_form_deg_h = ensemble::closed_form_rate_error_deg_h(result.setups[lane]);
+            }
+        }
+        return found;
+    }
+
     Study& study_;
     std::mutex& mutex_;
-    std::size_t first_;
+    std::size_t number_;
     std::size_t gyros_;
+    std::unique_ptr<BlockKeeper> keeper_;
     std::vector<std::unique_ptr<ArmStream>> arms_;
 };
 
+class Forwarding final : public BlockKeeper {
+   public:
+    explicit Forwarding(const OnSamples& on_samples) : on_samples_(on_samples) {}
+    bool wants_samples() const override { return static_cast<bool>(on_samples_); }
+    void samples(const SampledAngles& samples) override { on_samples_(samples); }
+    void finish(const FinishedBlock&) override {}
+
+   private:
+    const OnSamples& on_samples_;
+};
+
 }  // namespace
+
+MakeKeeper hand_on(OnSamples on_samples) {
+    return [on_samples = std::move(on_samples)](std::size_t, std::int64_t, std::size_t) {
+        return std::make_unique<Forwarding>(on_samples);
+    };
+}
+
+void take_up(Study& study, const FinishedBlock& block) {
+    const auto first = static_cast<std::size_t>(block.first_gyro);
+    std::copy(block.gyros.begin(), block.gyros.end(), study.gyros.begin() + block.first_gyro);
+    for (std::size_t arm = 0; arm < block.arms.size(); ++arm) {
+        for (std::size_t i = 0; i < block.arms[arm].size(); ++i) study.arms[arm].gyros[first + i] = block.arms[arm][i];
+    }
+    // Sums of whole numbers and a maximum: the order of the blocks does not matter.
+    study.turns += block.turns;
+    study.tables_remade += block.tables_remade;
+    study.contradictory_readings += block.contradictory_readings;
+    study.turn_map_error_rad = std::max(study.turn_map_error_rad, block.turn_map_error_rad);
+}
 
 void extend(Study& study, std::int64_t gyros) {
     study.scenario.ensemble.gyros = gyros;
@@ -287,29 +332,34 @@ void extend(Study& study, std::int64_t gyros) {
     for (ArmStatistics& arm : study.arms) arm.gyros.resize(static_cast<std::size_t>(gyros));
 }
 
-void run(std::span<Study> studies, std::int64_t first, int threads, const OnSamples& on_samples,
-         const ensemble::Monitor& monitor) {
+void predict_noise(std::span<Study> studies, int threads) {
     // Some seconds each for the noise of a drive.
     oneapi::tbb::task_arena arena(threads);
     arena.execute([&] {
         oneapi::tbb::parallel_for(std::size_t{0}, studies.size(), [&](std::size_t i) { predict_noise(studies[i]); });
     });
+}
+
+void run(std::span<Study> studies, std::span<const Stretch> stretches, int threads, const MakeKeeper& make_keeper,
+         const ensemble::Monitor& monitor) {
     std::mutex mutex;
     std::vector<ensemble::Job> jobs;
-    for (std::size_t number = 0; number < studies.size(); ++number) {
-        Study& study = studies[number];
-        const scenario::Scenario& scenario = study.scenario;
-        const auto make_sink = [&, number](std::int64_t first_gyro, std::size_t gyros) {
-            return std::make_unique<BlockStatistics>(study, number, mutex, first_gyro, gyros, on_samples);
+    for (const Stretch& stretch : stretches) {
+        Study& study = studies[stretch.study];
+        const auto make_sink = [&, number = stretch.study](std::int64_t first_gyro, std::size_t gyros) {
+            return std::make_unique<BlockStatistics>(study, number, mutex, first_gyro, gyros,
+                                                     make_keeper(number, first_gyro, gyros));
         };
-        jobs.push_back({&scenario, scenario.arms, first, ensemble::total_gyros(scenario), make_sink,
-                        studies.size() > 1 ? fmt::format("point {}", number + 1) : ""});
+        jobs.push_back({&study.scenario, study.scenario.arms, stretch.first, stretch.last, make_sink,
+                        studies.size() > 1 ? fmt::format("point {}", stretch.study + 1) : ""});
     }
     ensemble::run(jobs, threads, monitor);
 }
 
 Study run(Study study, int threads, const OnSamples& on_samples, const ensemble::Monitor& monitor) {
-    run({&study, 1}, 0, threads, on_samples, monitor);
+    predict_noise({&study, 1}, threads);
+    const Stretch all{0, 0, ensemble::total_gyros(study.scenario)};
+    run({&study, 1}, {&all, 1}, threads, hand_on(on_samples), monitor);
     return study;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -88,16 +89,60 @@ struct SampledAngles {
 };
 using OnSamples = std::function<void(const SampledAngles& samples)>;
 
+/// All that a finished block of gyros leaves, its samples apart.
+struct FinishedBlock {
+    std::size_t study = 0;  ///< of those that run together
+    std::int64_t first_gyro = 0;
+    std::vector<gyro::Setup> gyros;
+    std::vector<std::vector<GyroStatistics>> arms;  ///< [arm][gyro of the block]
+    std::int64_t turns = 0;                         ///< this and the rest as in Study
+    std::int64_t tables_remade = 0;
+    std::int64_t contradictory_readings = 0;
+    double turn_map_error_rad = 0.0;
+};
+
+/// Puts into its study what a block of it left. Each gyro must come once.
+void take_up(Study& study, const FinishedBlock& block);
+
+/// Keeps what one block leaves. Where it is destroyed before finish(), the block failed and is forgotten.
+class BlockKeeper {
+   public:
+    virtual ~BlockKeeper() = default;
+    virtual bool wants_samples() const = 0;
+    /// Samples of an arm of the block, as they come, where it wants them.
+    virtual void samples(const SampledAngles& samples) = 0;
+    /// The block is done.
+    virtual void finish(const FinishedBlock& block) = 0;
+};
+
+/// Makes the keeper of a block of gyros of one of the studies; called from the thread that simulates it.
+using MakeKeeper =
+    std::function<std::unique_ptr<BlockKeeper>(std::size_t study, std::int64_t first_gyro, std::size_t gyros)>;
+
+/// A keeper that hands samples on and keeps nothing.
+MakeKeeper hand_on(OnSamples on_samples);
+
+/// Gyros [first, last) of one of several studies.
+struct Stretch {
+    std::size_t study = 0;
+    std::int64_t first = 0;
+    std::int64_t last = 0;
+
+    bool operator==(const Stretch&) const = default;
+};
+
 /// Runs a study that is planned only, and returns it with its results. Statistics are taken while it runs: Allan
 /// deviations from every cycle of the dither, noise coefficients from at most `fit_samples` of the samples; nothing
 /// grows with the simulated time but the number of octaves. Throws RunError, Interrupted.
 Study run(Study study, int threads, const OnSamples& on_samples = nullptr, const ensemble::Monitor& monitor = {});
 
-/// The same for several studies side by side: a study is to the bit what it is alone.
-///
-/// \param first  gyro of each study to begin with; those before it are there already
-void run(std::span<Study> studies, std::int64_t first, int threads, const OnSamples& on_samples,
+/// Simulates some gyros of several studies side by side: a gyro is to the bit what it is in any other company. The
+/// effect of injected noise is not predicted.
+void run(std::span<Study> studies, std::span<const Stretch> stretches, int threads, const MakeKeeper& make_keeper,
          const ensemble::Monitor& monitor);
+
+/// predict_noise() of several studies on that many threads.
+void predict_noise(std::span<Study> studies, int threads);
 
 /// Makes room for more gyros: what is there stays as it is in a study of so many. Without a sweep only.
 void extend(Study& study, std::int64_t gyros);

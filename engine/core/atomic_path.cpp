@@ -71,6 +71,8 @@ int sync(const fs::path& path, int flags) {
 
 }  // namespace
 
+fs::path resolved_target(const fs::path& target) { return resolve(target); }
+
 AtomicPath::AtomicPath(const fs::path& target) : target_(resolve(target)), partial_(claim(target_)) {
     remove_on_kill_.emplace(partial_.string());
 }
@@ -92,10 +94,11 @@ void AtomicPath::commit() {
 
 void write_text(const fs::path& path, std::string_view text) {
     AtomicPath target(path);
+    errno = 0;
     std::ofstream file(target.partial(), std::ios::binary);
     file << text;
     file.close();
-    if (!file) throw RunError(fmt::format("{}: cannot be written; is the disk full?", path.string()));
+    if (!file) throw RunError(fmt::format("{}: cannot be written: {}", path.string(), reason(errno)));
     target.commit();
 }
 

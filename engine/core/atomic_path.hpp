@@ -7,6 +7,10 @@
 
 namespace ringlock {
 
+/// The file that an output's name means: absolute, and where a symbolic link leads. Throws InputError where there is
+/// something that cannot be replaced by a file.
+std::filesystem::path resolved_target(const std::filesystem::path& target);
+
 /// A file that appears whole or not at all.
 ///
 /// Write to partial(), a file of its own beside the target; commit() brings it to the disk and gives it the target's

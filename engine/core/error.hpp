@@ -19,10 +19,11 @@ class RunError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// The user asked to stop (Ctrl-C); nothing half-written is left.
+/// The user asked to stop (Ctrl-C); nothing half-written is left. The message says what is.
 class Interrupted : public std::runtime_error {
    public:
-    Interrupted() : std::runtime_error("interrupted") {}
+    Interrupted() : Interrupted("interrupted, nothing written") {}
+    explicit Interrupted(const std::string& what_is_left) : std::runtime_error(what_is_left) {}
 };
 
 }  // namespace ringlock

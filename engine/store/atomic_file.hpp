@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <optional>
 
 #include "engine/core/atomic_path.hpp"
 #include "engine/store/hdf5.hpp"
@@ -9,10 +10,11 @@ namespace ringlock::store {
 /// An HDF5 file that appears whole or not at all (see AtomicPath).
 class AtomicFile {
    public:
-    /// Throws InputError where the target cannot be written.
+    /// Claims the name. Throws InputError where the target cannot be written.
     explicit AtomicFile(const std::filesystem::path& target);
 
-    File& file() { return file_; }
+    /// Made when it is asked for first.
+    File& file();
     const std::filesystem::path& target() const { return path_.target(); }
 
     /// Closes the file, brings it to the disk and gives it the target's name. Throws RunError where the disk refuses.
@@ -20,7 +22,8 @@ class AtomicFile {
 
    private:
     AtomicPath path_;  // outlives the file, whose name it removes
-    File file_;
+    std::filesystem::path shown_as_;
+    std::optional<File> file_;
 };
 
 }  // namespace ringlock::store

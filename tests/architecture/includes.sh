@@ -29,6 +29,7 @@ declare -A may=(
     [analysis/record]="analysis/allan analysis/allan/sums analysis/noise engine/core engine/store"
     [analysis/instrument]="analysis/record engine/*"
     [analysis/study]="analysis/allan analysis/allan/sums analysis/design analysis/lot analysis/noise engine/*"
+    [analysis/parts]="analysis/study analysis/allan analysis/noise engine/*"
     # The closed loop has rooms of its own: its halves, turns and samples, never include each other.
     [analysis/closure]="engine/core engine/effects analysis/record"
     [analysis/closure/stats]="analysis/closure engine/core engine/simd"

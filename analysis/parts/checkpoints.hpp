@@ -1,0 +1,116 @@
+#pragma once
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "analysis/parts/folder.hpp"
+#include "analysis/parts/part_files.hpp"
+#include "analysis/study/experiment.hpp"
+
+namespace ringlock::parts {
+
+/// Keeps the finished blocks of a run in its folder: written beside, brought to the disk and renamed, so that whatever
+/// ends the process leaves whole files only.
+///
+/// Where the disk refuses, the run is told so and waits; finished blocks stay in memory, and are written when there is
+/// room again. A folder that is gone ends the run after some seconds. Only the time since the start of the process is
+/// used, so that the clock of the machine may be set.
+class Checkpoints final : public study::Store {
+   public:
+    struct Options {
+        double every_s = 30.0;                               ///< 0: every block by itself
+        std::optional<Shard> shard = {};                     ///< what is simulated of the run; else all
+        std::int64_t of_gyros = 0;                           ///< of which write_status() tells
+        std::function<std::optional<double>()> left_s = {};  ///< time left, for write_status()
+    };
+
+    /// Reads what the folder holds. Files that are damaged are told of and put aside: their gyros are simulated again.
+    Checkpoints(const Folder& folder, const study::Experiment& plan, Options options, Tell tell);
+    /// Stops; what is not kept by then is lost.
+    ~Checkpoints() override;
+
+    std::vector<study::Stretch> take_up(std::span<study::Study> points, std::int64_t first, std::int64_t last) override;
+    std::unique_ptr<study::BlockKeeper> keeper(std::size_t point, std::int64_t first_gyro, std::size_t gyros) override;
+    double hours_before() const override { return seconds_before_ / 3600.0; }
+
+    /// What this process has to simulate, of an experiment that does not grow.
+    std::vector<study::Stretch> to_do() const;
+
+    /// Turns that this process has simulated since it was asked last.
+    void count(std::int64_t turns) { turns_ += turns; }
+
+    /// Gyros that were finished before this process.
+    std::int64_t gyros_before() const { return gyros_before_; }
+    /// Gyros that are finished, whether kept yet or not.
+    std::int64_t gyros() const;
+    /// Blocks that this process has finished, and the mean time that one took a thread [s]; nothing where there is
+    /// none.
+    std::optional<double> mean_block_s() const;
+
+    /// Keeps what is finished, or waits until the disk takes it. Throws Interrupted.
+    void keep_all();
+    /// The same after an interruption or a failure: tries once. Returns whether all is kept now.
+    bool keep_what_can_be() noexcept;
+
+    /// What is finished. After all of it is simulated, and keep_all().
+    const FinishedGyros& finished() const { return finished_; }
+
+   private:
+    class Keeper;
+    /// A finished block that is not kept yet: by itself, or in a file of its own.
+    struct Waiting {
+        study::FinishedBlock block;  ///< without its gyros where a file has them
+        std::int64_t gyros = 0;
+        std::filesystem::path partial;
+        std::filesystem::path file;
+    };
+
+    void take(Waiting waiting, double block_s);
+    void keep_blocks(std::vector<Waiting>& blocks);
+    void settle(const std::filesystem::path& partial, const std::filesystem::path& file);
+    std::filesystem::path next_file();
+    double wall_s() const;
+    void wait_out(const std::string& problem, int error);
+    void work(const std::stop_token& stop);
+    void tell_status();
+
+    const std::filesystem::path path_;
+    const std::string who_;
+    const Manifest manifest_;
+    const Options options_;
+    const Tell tell_;
+    const bool samples_;
+    std::vector<std::int64_t> gyros_of_points_;
+    FinishedGyros finished_;
+    double seconds_before_ = 0.0;
+    std::int64_t gyros_before_ = 0;
+    const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+
+    std::mutex keeping_;        ///< one writes at a time
+    mutable std::mutex mutex_;  ///< guards what follows
+    std::condition_variable_any wake_;
+    std::vector<Waiting> waiting_;
+    std::int64_t numbers_ = 0;
+    std::int64_t blocks_ = 0;
+    std::int64_t gyros_ = 0;
+    double blocks_s_ = 0.0;
+    std::string last_block_;
+    std::atomic<std::int64_t> turns_ = 0;
+    std::atomic<bool> patient_ = true;
+    std::optional<std::chrono::steady_clock::time_point> told_;  ///< that the run waits
+    std::optional<std::chrono::steady_clock::time_point> gone_;  ///< since when the folder is
+    std::jthread worker_;                                        // last: it uses all of the above
+};
+
+}  // namespace ringlock::parts

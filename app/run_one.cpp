@@ -1,0 +1,405 @@
+#include "app/run_one.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <chrono>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "analysis/parts/checkpoints.hpp"
+#include "analysis/parts/folder.hpp"
+#include "analysis/parts/manifest.hpp"
+#include "analysis/parts/shard.hpp"
+#include "analysis/report/plot.hpp"
+#include "analysis/study/result_file.hpp"
+#include "app/arguments.hpp"
+#include "app/output.hpp"
+#include "app/run_text.hpp"
+#include "app/study_output.hpp"
+#include "engine/core/atomic_path.hpp"
+#include "engine/core/error.hpp"
+#include "engine/core/interrupt.hpp"
+#include "engine/core/version.hpp"
+#include "engine/ensemble/progress.hpp"
+#include "engine/simd/lanes.hpp"
+#include "engine/simd/target.hpp"
+
+namespace ringlock::app {
+
+namespace {
+
+parts::Beginning beginning_of(const RunArguments& arguments) {
+    if (arguments.resume) return parts::Beginning::resume;
+    return arguments.discard ? parts::Beginning::discard : parts::Beginning::refuse;
+}
+
+/// Refuses what the disk cannot hold, before hours are spent on it.
+void check_room(const std::filesystem::path& out, const study::Experiment& plan, bool checkpoints) {
+    std::error_code unknown;
+    const auto folder = out.has_parent_path() ? out.parent_path() : std::filesystem::path(".");
+    const std::filesystem::space_info space = std::filesystem::space(folder, unknown);
+    // Samples are kept twice while the result is made of what is finished.
+    const std::uint64_t bytes = study::expected_size_bytes(plan) * (checkpoints ? 2 : 1);
+    if (unknown || bytes <= space.available) return;
+    const bool records = plan.scenario.output.angle_record;
+    throw InputError(fmt::format(
+        "{}: the result will take about {:.1f} GB, {}and the disk has {:.1f} GB; {}give a "
+        "place on another disk with -o",
+        out.string(), static_cast<double>(study::expected_size_bytes(plan)) * 1e-9,
+        checkpoints ? "what is kept of it while it is made as much, " : "", static_cast<double>(space.available) * 1e-9,
+        records ? "set output.angle_record = false, or " : ""));
+}
+
+/// Seconds between checkpoints; nothing where there are to be none.
+std::optional<double> checkpoint_interval_s(const std::string& asked) {
+    if (asked == "never") return std::nullopt;
+    double seconds = 0.0;
+    const auto [end, error] = std::from_chars(asked.data(), asked.data() + asked.size(), seconds);
+    if (error != std::errc() || end != asked.data() + asked.size() || !(seconds >= 0.0 && seconds <= 86400.0)) {
+        throw InputError(fmt::format("--checkpoint-every {}: must be seconds between 0 and 86400, or never", asked));
+    }
+    return seconds;
+}
+
+/// Turns that stretches of an experiment will count.
+std::int64_t turns_of(const study::Experiment& plan, std::span<const study::Stretch> stretches) {
+    std::int64_t turns = 0;
+    for (const study::Stretch& stretch : stretches) {
+        const study::Study& point = plan.points[stretch.study];
+        const std::int64_t all = ensemble::expected_turns(point.scenario, point.scenario.arms);
+        turns += all / static_cast<std::int64_t>(point.gyros.size()) * (stretch.last - stretch.first);
+    }
+    return turns;
+}
+
+std::int64_t gyros_of(std::span<const study::Stretch> stretches) {
+    std::int64_t gyros = 0;
+    for (const study::Stretch& stretch : stretches) gyros += stretch.last - stretch.first;
+    return gyros;
+}
+
+void say(const std::string& line) { tell(fmt::format("ringlock: {}\n", line)); }
+
+/// What is simulated, and where it goes.
+struct Task {
+    std::string scenario_file;
+    study::Experiment plan;
+    std::filesystem::path result;
+    std::filesystem::path target;  ///< result or shard
+    std::optional<parts::Shard> shard;
+    int threads = 1;
+    bool quiet = false;
+
+    bool grows() const { return scenario::asks(plan.scenario.stop); }
+};
+
+/// Gyros that will be finished at the end; of a lot that grows, at most.
+std::int64_t gyros_of(const Task& task) {
+    if (task.grows()) return task.plan.scenario.stop.most_gyros * static_cast<std::int64_t>(task.plan.points.size());
+    if (!task.shard) return task.plan.gyros();
+    std::vector<std::int64_t> gyros;
+    for (const study::Study& point : task.plan.points) gyros.push_back(static_cast<std::int64_t>(point.gyros.size()));
+    return gyros_of(parts::stretches_of(*task.shard, gyros));
+}
+
+/// A run that keeps what is finished.
+class Session {
+   public:
+    Session(Task task, double every_s, parts::Beginning beginning)
+        : task_(std::move(task)),
+          folder_(task_.target, parts::manifest_of(task_.plan.scenario, task_.shard), beginning, say),
+          all_gyros_(gyros_of(task_)),
+          checkpoints_(folder_, task_.plan, options(every_s), say) {
+        const std::int64_t before = checkpoints_.gyros_before();
+        if (before > 0) say(fmt::format("resumed: {} of {} are finished", before, gyros_text(all_gyros_)));
+    }
+
+    std::int64_t all_gyros() const { return all_gyros_; }
+
+    /// Does the work, and tells what is left of it where that does not end well.
+    template <class Work>
+    void keep_whatever_happens(Work&& work) {
+        try {
+            work();
+        } catch (const Interrupted&) {
+            const bool all = checkpoints_.keep_what_can_be();
+            throw Interrupted(after("interrupted", all));
+        } catch (const RunError& error) {
+            const bool all = checkpoints_.keep_what_can_be();
+            if (checkpoints_.gyros() == 0) throw;
+            throw RunError(after(error.what(), all));
+        }
+    }
+
+    Task& task() { return task_; }
+    parts::Folder& folder() { return folder_; }
+    parts::Checkpoints& checkpoints() { return checkpoints_; }
+
+   private:
+    parts::Checkpoints::Options options(double every_s) const {
+        parts::Checkpoints::Options options;
+        options.every_s = every_s;
+        options.shard = task_.shard;
+        options.of_gyros = all_gyros_;
+        return options;
+    }
+
+    std::string after(const std::string& what, bool all_kept) const {
+        const std::int64_t gyros = checkpoints_.gyros();
+        std::string text = what;
+        if (gyros == 0) {
+            text += ", nothing written";
+        } else if (all_kept) {
+            text += fmt::format("; {} of {} are kept in {}: the same command with --resume goes on from there", gyros,
+                                gyros_text(all_gyros_), folder_.path().string());
+        } else {
+            text += fmt::format("; {} could not all be kept in {}: --resume goes on from what is there",
+                                gyros_text(gyros), folder_.path().string());
+        }
+        if (const auto block_s = checkpoints_.mean_block_s()) {
+            text += fmt::format("; a block of up to {} takes a thread about {}, and blocks under way are lost",
+                                gyros_text(simd::lanes), duration_text(*block_s));
+        }
+        return text;
+    }
+
+    Task task_;
+    parts::Folder folder_;
+    const std::int64_t all_gyros_;
+    parts::Checkpoints checkpoints_;
+};
+
+void announce(const Task& task, std::int64_t gyros) {
+    const study::Study& first = task.plan.points.front();
+    const double duration_s = first.schedule.sample_interval_s * static_cast<double>(first.schedule.samples - 1);
+    std::string points = task.plan.has_design() ? fmt::format("{} points, ", task.plan.points.size()) : "";
+    if (task.grows()) points += "until precise, at most ";
+    if (task.shard) points += fmt::format("shard {}, ", parts::to_string(*task.shard));
+    tell(fmt::format("{}: {}{} gyros x {:.6g} s, {} arms, {} threads; the result will take {} {:.1f} MB\n",
+                     task.scenario_file, points, gyros, duration_s, task.plan.scenario.arms.size(), task.threads,
+                     task.grows() ? "up to" : "about",
+                     static_cast<double>(study::expected_size_bytes(task.plan)) * 1e-6));
+}
+
+/// The outcome, the result and the figure of a run that is through.
+class Outcome {
+   public:
+    Outcome(const RunArguments& arguments, store::Provenance provenance, const OnOutcome& on_outcome)
+        : arguments_(arguments), provenance_(std::move(provenance)), on_outcome_(on_outcome) {}
+
+    /// \param before_s  wall time of earlier processes that went into it
+    void spent(const study::Experiment& experiment, double before_s) {
+        const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - start_;
+        provenance_.wall_s = before_s + gone.count();
+        provenance_.turns_per_s = static_cast<double>(experiment.turns()) / provenance_.wall_s;
+        provenance_.instruction_set = simd::active_target();
+    }
+    double wall_s() const { return provenance_.wall_s; }
+
+    void write(study::ResultWriter& writer, const study::Experiment& experiment,
+               const std::function<void()>& write_samples) {
+        const std::vector<study::Summary> summaries = study::summarise(experiment);
+        try {
+            on_outcome_(experiment, summaries, provenance_);
+        } catch (const RunError&) {
+            not_told_ = std::current_exception();
+        }
+        write_samples();
+        check_interrupt();
+        writer.finish(experiment, summaries, provenance_);
+        if (!arguments_.plot.empty()) report::write_svg(arguments_.plot, experiment_figure(experiment, summaries));
+        if (!arguments_.quiet) tell(fmt::format("result: {}\n", writer.path().string()));
+    }
+
+    /// A table that cannot be printed must not cost the result, but is a failure when that is safe.
+    void fail_if_not_told() const {
+        if (not_told_) std::rethrow_exception(not_told_);
+    }
+
+   private:
+    const RunArguments& arguments_;
+    store::Provenance provenance_;
+    const OnOutcome& on_outcome_;
+    std::exception_ptr not_told_;
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+ensemble::ProgressOptions progress_options(const Task& task, std::int64_t turns) {
+    return {.quiet = task.quiet, .total_turns = turns};
+}
+
+/// Without checkpoints: samples go into the result as they come.
+void run_without_checkpoints(const RunArguments& arguments, Task task, Outcome outcome) {
+    study::ResultWriter writer(task.target, task.plan);
+    parts::Folder folder(task.target, parts::manifest_of(task.plan.scenario, {}), beginning_of(arguments), say);
+    const std::int64_t gyros = gyros_of(task);
+    if (!task.quiet) announce(task, gyros);
+    ensemble::Progress progress(gyros, progress_options(task, study::expected_turns(task.plan)));
+    const ensemble::Monitor monitor{interrupted,
+                                    [&](std::int64_t done, std::int64_t turns) { progress.advance(done, turns); }};
+    study::OnSamples on_samples;
+    if (task.plan.scenario.output.angle_record) {
+        on_samples = [&](const study::SampledAngles& samples) { writer.write_samples(samples); };
+    }
+    const study::Experiment experiment = study::run(std::move(task.plan), task.threads, on_samples, monitor);
+    progress.finish();
+    check_interrupt();
+    outcome.spent(experiment, 0.0);
+    outcome.write(writer, experiment, [] {});
+    outcome.fail_if_not_told();
+}
+
+void run_whole(const RunArguments& arguments, Task task, double every_s, Outcome outcome) {
+    study::ResultWriter writer(task.target, task.plan);
+    Session session(std::move(task), every_s, beginning_of(arguments));
+    parts::Checkpoints& checkpoints = session.checkpoints();
+    const bool grows = session.task().grows();
+    const std::int64_t gyros = session.all_gyros() - checkpoints.gyros_before();
+    if (!arguments.quiet) announce(session.task(), session.all_gyros());
+    const std::int64_t turns =
+        grows ? study::expected_turns(session.task().plan) : turns_of(session.task().plan, checkpoints.to_do());
+    ensemble::Progress progress(gyros, progress_options(session.task(), turns));
+    const ensemble::Monitor monitor{interrupted, [&](std::int64_t done, std::int64_t more_turns) {
+                                        checkpoints.count(more_turns);
+                                        progress.advance(done, more_turns);
+                                    }};
+    session.keep_whatever_happens([&] {
+        const study::Experiment experiment =
+            study::run(std::move(session.task().plan), session.task().threads, checkpoints, monitor);
+        progress.finish();
+        check_interrupt();
+        outcome.spent(experiment, 3600.0 * checkpoints.hours_before());
+        outcome.write(writer, experiment, [&] {
+            if (!experiment.scenario.output.angle_record) return;
+            checkpoints.keep_all();
+            checkpoints.finished().each_samples([&](const study::SampledAngles& samples) {
+                check_interrupt();
+                writer.write_samples(samples);
+            });
+        });
+        session.folder().remove();
+    });
+    outcome.fail_if_not_told();
+}
+
+void run_shard(const RunArguments& arguments, Task task, double every_s, Outcome outcome) {
+    AtomicPath claim(task.target);
+    Session session(std::move(task), every_s, beginning_of(arguments));
+    parts::Checkpoints& checkpoints = session.checkpoints();
+    const std::vector<study::Stretch> to_do = checkpoints.to_do();
+    if (!arguments.quiet) announce(session.task(), session.all_gyros());
+    study::Experiment& plan = session.task().plan;
+    ensemble::Progress progress(gyros_of(to_do), progress_options(session.task(), turns_of(plan, to_do)));
+    const ensemble::Monitor monitor{interrupted, [&](std::int64_t done, std::int64_t turns) {
+                                        checkpoints.count(turns);
+                                        progress.advance(done, turns);
+                                    }};
+    session.keep_whatever_happens([&] {
+        checkpoints.take_up(plan.points, 0, std::numeric_limits<std::int64_t>::max());
+        study::run(
+            plan.points, to_do, session.task().threads,
+            [&](std::size_t point, std::int64_t first, std::size_t gyros) {
+                return checkpoints.keeper(point, first, gyros);
+            },
+            monitor);
+        progress.finish();
+        checkpoints.keep_all();
+        check_interrupt();
+        outcome.spent(session.task().plan, 3600.0 * checkpoints.hours_before());
+        parts::write_shard(claim.partial(), session.folder().manifest(), checkpoints.finished(), outcome.wall_s());
+        claim.commit();
+        session.folder().remove();
+    });
+    const std::string file = claim.target().string();
+    const std::string shard = parts::to_string(*session.task().shard);
+    if (arguments.json) {
+        put(nlohmann::ordered_json{{"shard", shard}, {"gyros", session.all_gyros()}, {"file", file}}.dump() + "\n");
+    } else if (!arguments.quiet) {
+        tell(fmt::format("shard {}: {}; ringlock merge {} makes the result of all shards\n", shard, file,
+                         session.task().result.string()));
+    }
+}
+
+bool is_shard_of(const std::filesystem::path& file, const parts::Manifest& manifest) {
+    return store::is_part(file) && parts::differences(parts::read_manifest(file), manifest).empty();
+}
+
+void refuse_what_does_not_go_together(const RunArguments& arguments, const scenario::Scenario& scenario) {
+    if (arguments.shard.empty()) return;
+    if (scenario::asks(scenario.stop)) {
+        throw InputError(
+            "--shard: a lot with a stopping rule grows as a whole and cannot be divided; give ensemble.gyros "
+            "and no [stop], or run it without --shard");
+    }
+    if (!arguments.plot.empty()) {
+        throw InputError(
+            "--shard with --plot: a shard has no figure; ringlock analyze draws that of the merged result");
+    }
+    if (arguments.checkpoint_every == "never") {
+        throw InputError("--shard with --checkpoint-every never: a shard is made of its checkpoints; give seconds");
+    }
+}
+
+}  // namespace
+
+bool is_finished(const std::filesystem::path& result, const study::Experiment& plan) {
+    // A run that was interrupted before it could remove what it kept is finished; one that was to replace a result of
+    // another program is not.
+    return study::is_result_of(result, plan) && (parts::part_files(parts::folder_of(result)).empty() ||
+                                                 study::read_provenance(result).git_hash == git_hash());
+}
+
+bool run_one(const RunArguments& arguments, const std::string& scenario_file, const std::filesystem::path& result,
+             std::span<const char* const> command_line, const OnOutcome& on_outcome) {
+    const int threads = thread_count(arguments.threads);
+    const std::optional<double> every_s = checkpoint_interval_s(arguments.checkpoint_every);
+    std::optional<parts::Shard> shard;
+    if (!arguments.shard.empty()) shard = parts::parse_shard(arguments.shard);
+    const scenario::Scenario scenario = load_scenario(scenario_file, arguments.changes);
+    refuse_what_does_not_go_together(arguments, scenario);
+    check_figure(arguments.plot);
+
+    Outcome outcome(arguments, store::collect_provenance(command_line, threads, scenario_file), on_outcome);
+    Task task{scenario_file,  study::Experiment(scenario),
+              result,         shard ? parts::shard_file(result, *shard) : result,
+              shard,          threads,
+              arguments.quiet};
+    const parts::Manifest manifest = parts::manifest_of(scenario, shard);
+    const bool is_there = shard ? is_shard_of(task.target, manifest) : is_finished(result, task.plan);
+    if (arguments.resume && is_there) {
+        // Whatever a run kept beside its result is of no use any more.
+        parts::Folder(task.target, manifest, parts::Beginning::resume, say).remove();
+        tell(fmt::format("{}: is finished; there is nothing to resume\n", task.target.string()));
+        return false;
+    }
+    std::error_code unknown;
+    if (shard && !is_there && std::filesystem::exists(task.target, unknown)) {
+        throw InputError(
+            fmt::format("{}: the file is there and is no shard of this run; it is kept. Give another name "
+                        "with -o, or remove it",
+                        task.target.string()));
+    }
+    check_room(task.target, task.plan, every_s.has_value());
+    if (shard) {
+        run_shard(arguments, std::move(task), *every_s, std::move(outcome));
+    } else if (every_s) {
+        run_whole(arguments, std::move(task), *every_s, std::move(outcome));
+    } else {
+        run_without_checkpoints(arguments, std::move(task), std::move(outcome));
+    }
+    return true;
+}
+
+}  // namespace ringlock::app

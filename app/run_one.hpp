@@ -1,0 +1,43 @@
+#pragma once
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "analysis/study/experiment.hpp"
+#include "analysis/study/summary.hpp"
+#include "app/arguments.hpp"
+#include "engine/store/provenance.hpp"
+
+namespace ringlock::app {
+
+/// What `run` is told.
+struct RunArguments {
+    std::vector<std::string> scenarios;
+    std::optional<std::string> out;
+    std::string plot;
+    std::string shard;
+    std::string checkpoint_every = "30";
+    std::string print_schema;
+    std::string threads = "0";
+    Changes changes;
+    bool resume = false;
+    bool discard = false;
+    bool json = false;
+    bool quiet = false;
+};
+
+/// Told of the outcome of a run before its file is complete: a disk that is full cannot take that away.
+using OnOutcome = std::function<void(const study::Experiment& experiment, const std::vector<study::Summary>& summaries,
+                                     const store::Provenance& provenance)>;
+
+/// Simulates one scenario, or goes on with it, and writes its result or shard. False where --resume finds it finished.
+bool run_one(const RunArguments& arguments, const std::string& scenario_file, const std::filesystem::path& result,
+             std::span<const char* const> command_line, const OnOutcome& on_outcome);
+
+/// Whether the file is the result of the experiment, so that nothing is left to resume.
+bool is_finished(const std::filesystem::path& result, const study::Experiment& plan);
+
+}  // namespace ringlock::app
