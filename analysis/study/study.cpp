@@ -66,7 +66,8 @@ std::uint64_t expected_memory_bytes(const scenario::Scenario& scenario) {
         single.ensemble.gyros = single.ensemble.turn_ons = 1;
         return Study(single);
     }();
-    const std::int64_t gyros = scenario::asks(scenario.stop) ? scenario.stop.most_gyros : scenario.ensemble.gyros;
+    const std::int64_t gyros =
+        scenario::asks(scenario.stop) ? scenario.stop.most_gyros : ensemble::total_gyros(scenario);
     const std::uint64_t of_gyro =
         sizeof(GyroStatistics) + one.factors.size() * sizeof(allan::Point) + one.angle_times_s.size() * sizeof(double);
     // A scenario with its effects, in some hundred nodes of its maps.
@@ -144,7 +145,8 @@ class ArmStream {
         const double arcsec_per_count = setup.scale_factor_arcsec / ensemble::counts_per_fringe;
         GyroStatistics result;
         const auto octaves = allan::deviation(octaves_, lane, arcsec_per_count, study_.schedule.cycle_s);
-        result.allan = octaves;
+        result.allan.reserve(octaves.size() + asked_.size());
+        result.allan.insert(result.allan.end(), octaves.begin(), octaves.end());
         for (const allan::FactorStream& stream : asked_) {
             result.allan.push_back(allan::deviation(stream, lane, octaves, arcsec_per_count, study_.schedule.cycle_s));
         }
@@ -155,6 +157,7 @@ class ArmStream {
         const double duration_s = study_.schedule.cycle_s * static_cast<double>(study_.schedule.cycles() - 1);
         result.rate_error_deg_h =
             static_cast<double>(turned_[lane]) * arcsec_per_count / duration_s - setup.input_rate_deg_h;
+        result.angle_error_arcsec.reserve(angle_errors_counts_.size());
         for (std::size_t i = 0; i < angle_errors_counts_.size(); ++i) {
             result.angle_error_arcsec.push_back(angle_errors_counts_[i][lane] * arcsec_per_count -
                                                 setup.input_rate_deg_h * study_.schedule.cycle_s *
