@@ -78,7 +78,7 @@ int main(int argc, char** argv) {
     } catch (const ringlock::RunError& error) {
         return complain(run_failed, error.what());
     } catch (const ringlock::Interrupted&) {
-        app::tell("ringlock: interrupted, nothing written\n");
+        app::tell(ringlock::farewell());
     } catch (const std::bad_alloc&) {
         return complain(run_failed, "out of memory; run fewer gyros at a time, or store fewer samples");
     } catch (const std::exception& error) {

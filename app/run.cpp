@@ -12,15 +12,17 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <thread>
 #include <vector>
 
 #include "analysis/report/plot.hpp"
 #include "analysis/study/result_file.hpp"
+#include "analysis/study/room.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/files.hpp"
 #include "app/output.hpp"
+#include "app/room.hpp"
 #include "app/study_output.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
@@ -63,19 +65,12 @@ int thread_count(const std::string& asked) {
     return threads > 0 ? threads : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 }
 
-/// Refuses what the disk cannot hold, before hours are spent on it.
-void check_room(const std::filesystem::path& out, const study::Experiment& plan) {
-    std::error_code unknown;
-    const auto folder = out.has_parent_path() ? out.parent_path() : std::filesystem::path(".");
-    const std::filesystem::space_info space = std::filesystem::space(folder, unknown);
-    const std::uint64_t bytes = study::expected_size_bytes(plan);
-    if (unknown || bytes <= space.available) return;
-    const bool records = plan.scenario.output.angle_record;
-    throw InputError(
-        fmt::format("{}: the result will take about {:.1f} GB, and the disk has {:.1f} GB; {}give a "
-                    "place on another disk with -o",
-                    out.string(), static_cast<double>(bytes) * 1e-9, static_cast<double>(space.available) * 1e-9,
-                    records ? "set output.angle_record = false, or " : ""));
+/// What the run takes, and what would make it less.
+Needs needs_of(const scenario::Scenario& scenario, int threads) {
+    const study::Room room = study::expected_room(scenario, threads);
+    return {room.memory_bytes, room.disk_bytes,
+            "run fewer gyros at a time (ensemble.gyros, stop.most_gyros, design.points), or fewer arms",
+            scenario.output.angle_record ? "set output.angle_record = false" : "run fewer gyros at a time"};
 }
 
 void run(const Arguments& arguments, std::span<const char* const> command_line) {
@@ -89,13 +84,15 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     const std::filesystem::path out =
         arguments.out ? std::filesystem::path(*arguments.out)
                       : std::filesystem::path(arguments.scenario).filename().replace_extension(".h5");
-    check_figure(arguments.plot);
+    refuse_same_files({{"SCENARIO", arguments.scenario, NamedFile::Use::input},
+                       {"-o", out, NamedFile::Use::output},
+                       {"--plot", arguments.plot, NamedFile::Use::output}});
+    check_room(out, needs_of(scenario, threads), arguments.quiet);
+    const std::unique_ptr<AtomicPath> figure = claim_figure(arguments.plot);
 
     store::Provenance provenance = store::collect_provenance(command_line, threads, arguments.scenario);
     const auto start = std::chrono::steady_clock::now();
     study::Experiment plan(scenario);
-    check_room(out, plan);
-    study::ResultWriter writer(out, plan);
     const bool growing = scenario::asks(scenario.stop);
     // Of a lot that grows, the most that it can come to: its rule may stop it long before.
     const std::int64_t gyros =
@@ -109,6 +106,8 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
                          arguments.scenario, points, gyros, duration_s, scenario.arms.size(), threads,
                          growing ? "up to" : "about", static_cast<double>(study::expected_size_bytes(plan)) * 1e-6));
     }
+    // Not before: the disk may take a while to set aside the room for angle records.
+    study::ResultWriter writer(out, plan);
     ensemble::Progress progress(gyros, {.quiet = arguments.quiet, .total_turns = study::expected_turns(plan)});
     study::OnSamples on_samples;
     if (scenario.output.angle_record) {
@@ -125,7 +124,7 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
     provenance.instruction_set = simd::active_target();
     const std::vector<study::Summary> summaries = study::summarise(experiment);
     writer.finish(experiment, summaries, provenance);
-    if (!arguments.plot.empty()) report::write_svg(arguments.plot, experiment_figure(experiment, summaries));
+    if (figure) report::write_svg(*figure, experiment_figure(experiment, summaries));
     put(arguments.json ? experiment_json(experiment, summaries, provenance)
                        : experiment_text(experiment, summaries, provenance));
     if (!arguments.quiet) tell(fmt::format("result: {}\n", writer.path().string()));
