@@ -109,23 +109,24 @@ void run(const Arguments& arguments, std::span<const char* const> command_line) 
                          arguments.scenario, points, gyros, duration_s, scenario.arms.size(), threads,
                          growing ? "up to" : "about", static_cast<double>(study::expected_size_bytes(plan)) * 1e-6));
     }
-    ensemble::Progress progress(gyros, {.quiet = arguments.quiet, .total_turns = study::expected_turns(plan)});
+    ensemble::Progress progress(
+        gyros, {.quiet = arguments.quiet, .total_turns = study::expected_turns(plan), .grows = growing});
     study::OnSamples on_samples;
     if (scenario.output.angle_record) {
         on_samples = [&](const study::SampledAngles& samples) { writer.write_samples(samples); };
     }
-    const ensemble::Monitor monitor{interrupted,
-                                    [&](std::int64_t done, std::int64_t turns) { progress.advance(done, turns); }};
-    const study::Experiment experiment = study::run(std::move(plan), threads, on_samples, monitor);
-    progress.finish();
+    const study::Experiment experiment = study::run(std::move(plan), threads, on_samples, {interrupted, &progress});
     check_interrupt();
+    progress.stage("summing up");
 
     provenance.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     provenance.turns_per_s = static_cast<double>(experiment.turns()) / provenance.wall_s;
     provenance.instruction_set = simd::active_target();
     const std::vector<study::Summary> summaries = study::summarise(experiment);
+    progress.stage("writing the result");
     writer.finish(experiment, summaries, provenance);
     if (!arguments.plot.empty()) report::write_svg(arguments.plot, experiment_figure(experiment, summaries));
+    progress.finish();
     put(arguments.json ? experiment_json(experiment, summaries, provenance)
                        : experiment_text(experiment, summaries, provenance));
     if (!arguments.quiet) tell(fmt::format("result: {}\n", writer.path().string()));

@@ -109,6 +109,7 @@ Experiment run(Experiment experiment, int threads, const OnSamples& on_samples, 
         grow(experiment, *next);
         run(experiment.points, there, threads, on_samples, monitor);
         growth.looks.push_back(*next);
+        if (monitor.observer) monitor.observer->stage("judging the precision");
         const std::chrono::duration<double, std::ratio<3600>> gone = std::chrono::steady_clock::now() - start;
         const lot::Decision decision = decide(rule, stop, *next, experiment, gone.count());
         growth.precise = decision.precise;

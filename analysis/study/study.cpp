@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -88,9 +89,18 @@ bool has_steady_input(const scenario::Scenario& scenario) {
     return scenario.input.sweep_points == 1 && !scenario::has_profile(scenario.input);
 }
 
+namespace {
+
+bool awaits_prediction(const Study& study) {
+    const std::vector<scenario::Arm>& arms = study.scenario.arms;
+    return !study.predicted_noise && std::any_of(arms.begin(), arms.end(), shows_noise);
+}
+
+}  // namespace
+
 void predict_noise(Study& study) {
+    if (!awaits_prediction(study)) return;
     const scenario::Scenario& scenario = study.scenario;
-    if (study.predicted_noise || std::none_of(scenario.arms.begin(), scenario.arms.end(), shows_noise)) return;
     dither::InjectedTurns noise;
     if (scenario.noise_injection.model == scenario::NoiseModel::drive) noise.drive = scenario::drive_noise(scenario);
     noise.rms_rad = scenario::injected_noise(scenario).turn_rms_rad;
@@ -279,6 +289,25 @@ class BlockStatistics final : public ensemble::BlockSink {
     std::vector<std::unique_ptr<ArmStream>> arms_;
 };
 
+/// Some seconds each for the noise of a drive.
+void predict_all(std::span<Study> studies, int threads, ensemble::Observer* observer) {
+    const auto predictions = std::count_if(studies.begin(), studies.end(), awaits_prediction);
+    if (predictions == 0) return;
+    std::atomic<std::int64_t> done = 0;
+    const auto tell = [&](std::int64_t predicted) {
+        if (observer) observer->stage(fmt::format("predicting what noise does, {}/{}", predicted, predictions));
+    };
+    tell(0);
+    oneapi::tbb::task_arena arena(threads);
+    arena.execute([&] {
+        oneapi::tbb::parallel_for(std::size_t{0}, studies.size(), [&](std::size_t i) {
+            if (!awaits_prediction(studies[i])) return;
+            predict_noise(studies[i]);
+            tell(++done);
+        });
+    });
+}
+
 }  // namespace
 
 void extend(Study& study, std::int64_t gyros) {
@@ -289,11 +318,7 @@ void extend(Study& study, std::int64_t gyros) {
 
 void run(std::span<Study> studies, std::int64_t first, int threads, const OnSamples& on_samples,
          const ensemble::Monitor& monitor) {
-    // Some seconds each for the noise of a drive.
-    oneapi::tbb::task_arena arena(threads);
-    arena.execute([&] {
-        oneapi::tbb::parallel_for(std::size_t{0}, studies.size(), [&](std::size_t i) { predict_noise(studies[i]); });
-    });
+    predict_all(studies, threads, monitor.observer);
     std::mutex mutex;
     std::vector<ensemble::Job> jobs;
     for (std::size_t number = 0; number < studies.size(); ++number) {
