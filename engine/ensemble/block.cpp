@@ -194,6 +194,13 @@ class Branch {
         }
     }
 
+    std::int64_t tables_made() const {
+        std::int64_t sum = propagator_->tables_made();
+        for (const Listener& listener : listeners_) {
+            if (listener.compensator) sum += listener.compensator->tables_made();
+        }
+        return sum;
+    }
     std::int64_t contradictory_readings(std::size_t lane) const {
         return recovery_ ? recovery_->contradictions(lane) : 0;
     }
@@ -480,6 +487,12 @@ std::int64_t GyroBlock::tables_remade() const {
         if (branch.kind() == TrajectoryKind::ideal) continue;
         for (std::size_t lane = 0; lane < state_->setups.size(); ++lane) sum += branch.propagator().tables_remade(lane);
     }
+    return sum;
+}
+
+std::int64_t GyroBlock::tables_made() const {
+    std::int64_t sum = 0;
+    for (const Branch& branch : state_->branches) sum += branch.tables_made();
     return sum;
 }
 

@@ -64,6 +64,8 @@ class GyroBlock {
     std::vector<double> change_per_cycle_rad() const;
     double table_error_rad() const;  ///< largest measured when the turn maps were tabulated; 0: no tables
     std::int64_t tables_remade() const;
+    /// Times that turn maps of any gyro were tabulated, those of compensators included.
+    std::int64_t tables_made() const;
     /// Turns at which pulses and detectors contradicted each other, so that the detectors' phase was kept.
     std::int64_t contradictory_readings() const;
 

@@ -116,12 +116,12 @@ class BlockProgress {
         already_ += told_;
         told_ = 0;
     }
-    void advance(std::int64_t gyros, std::int64_t turns) {
+    void advance(std::int64_t gyros, std::int64_t turns, bool tabulated) {
         const std::int64_t again = std::min(already_, turns);
         already_ -= again;
         told_ += turns - again;
         if (monitor_.observer && (gyros > 0 || turns > again)) {
-            monitor_.observer->advance(block_, gyros, turns - again);
+            monitor_.observer->advance(block_, gyros, turns - again, tabulated);
         }
     }
     bool cancelled() const { return monitor_.cancelled && monitor_.cancelled(); }
@@ -146,6 +146,7 @@ void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm>
     GyroBlock block = follow([&] { return GyroBlock(scenario, arms, first, gyros); });
     const std::int64_t counted = static_cast<std::int64_t>(gyros) * block.trajectories();
     progress.enter(BlockStage::turns);
+    std::int64_t tables = 0;
     for (std::int64_t turn = 0; turn < schedule.turns();) {
         if (progress.cancelled()) throw Interrupted();
         const bool settling = turn < schedule.settle_turns();
@@ -154,12 +155,13 @@ void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm>
         follow([&] { block.advance(turns); });
         for (std::size_t arm = 0; arm < arms.size() && !settling; ++arm) sink.cycles(arm, block.counts(arm));
         turn += static_cast<std::int64_t>(turns);
-        progress.advance(0, static_cast<std::int64_t>(turns) * counted);
+        progress.advance(0, static_cast<std::int64_t>(turns) * counted, block.tables_made() > tables);
+        tables = block.tables_made();
     }
     progress.enter(BlockStage::output);
     sink.finish({first, block.setups(), counted * schedule.turns(), block.tables_remade(),
                  block.contradictory_readings(), block.change_per_cycle_rad(), block.table_error_rad()});
-    progress.advance(static_cast<std::int64_t>(gyros), 0);
+    progress.advance(static_cast<std::int64_t>(gyros), 0, false);
 }
 
 /// Turns that one gyro will count.

@@ -14,7 +14,7 @@ struct PlannedBlock {
 
 /// What a block is at; it goes through all of them in this order, once.
 enum class BlockStage {
-    set_up,  ///< its gyros are drawn and their turn maps tabulated
+    set_up,  ///< its gyros are drawn
     turns,   ///< goes through the turns
     output,  ///< its statistics are finished and handed on
     over,    ///< done, or failed
@@ -31,8 +31,9 @@ class Observer {
     virtual void plan(std::span<const PlannedBlock> blocks, int threads) = 0;
     /// A block, by its place in the plan, is at this stage from now on.
     virtual void enter(std::size_t block, BlockStage stage) = 0;
-    /// A block is done with so many gyros and turns more.
-    virtual void advance(std::size_t block, std::int64_t gyros, std::int64_t turns) = 0;
+    /// A block is done with so many gyros and turns more. `tabulated`: turn maps were tabulated on the way, which takes
+    /// much longer than the turns themselves: at the first turns of a block, and wherever its drive leaves their ranges.
+    virtual void advance(std::size_t block, std::int64_t gyros, std::int64_t turns, bool tabulated) = 0;
 };
 
 }  // namespace ringlock::ensemble

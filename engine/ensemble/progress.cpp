@@ -85,13 +85,13 @@ void Progress::enter(std::size_t block, BlockStage stage) {
     update();
 }
 
-void Progress::advance(std::size_t block, std::int64_t gyros, std::int64_t turns) {
+void Progress::advance(std::size_t block, std::int64_t gyros, std::int64_t turns, bool tabulated) {
     const std::lock_guard lock(mutex_);
     if (silent()) return;
     read_clock();
     gyros_ += gyros;
     turns_ += turns;
-    time_left_.advance(block, turns, now_s());
+    time_left_.advance(block, turns, tabulated, now_s());
     update();
 }
 
@@ -147,9 +147,8 @@ void Progress::show(bool last) {
     std::string status =
         fmt::format("{:3} %  {}/{} gyros", static_cast<int>(100.0 * share_done()), gyros, total().gyros);
     if (options_.grows && !last) status += fmt::format(", {} at most", total_gyros_);
-    const double turning_s = time_left_.turning_s(now_s());
-    const std::string rate =
-        turning_s > 0.0 && turns_ > 0 ? fmt::format("  {:.3g} turns/s", static_cast<double>(turns_) / turning_s) : "";
+    const double turns_per_s = time_left_.turns_per_s(now_s());
+    const std::string rate = turns_per_s > 0.0 ? fmt::format("  {:.3g} turns/s", turns_per_s) : "";
     if (last) {
         status += rate + "  in " + duration(now_s());
     } else if (!stage_.empty()) {

@@ -37,7 +37,7 @@ struct ProgressOptions {
 /// one every 10 s at most, and the last), nothing when quiet.
 ///
 /// A line names what goes on where that is not the simulation: the set-up, until a first block goes through its turns,
-/// and the stages. The rate is of the time in which turns were gone through; the time left is as TimeLeft has it.
+/// and the stages. Rate and time left are as TimeLeft has them: no set-up is in the rate.
 ///
 /// All functions may be called from any thread. Output that fails is given up silently: it must not stop a run.
 class Progress final : public Observer {
@@ -51,7 +51,7 @@ class Progress final : public Observer {
     void stage(const std::string& name) override;
     void plan(std::span<const PlannedBlock> blocks, int threads) override;
     void enter(std::size_t block, BlockStage stage) override;
-    void advance(std::size_t block, std::int64_t gyros, std::int64_t turns) override;
+    void advance(std::size_t block, std::int64_t gyros, std::int64_t turns, bool tabulated) override;
 
     /// The run is over: clears the bar, or writes the last plain line. Later calls do nothing.
     void finish();

@@ -22,9 +22,9 @@ constexpr std::size_t many = 32;
 }  // namespace
 
 void TimeLeft::plan(std::span<const PlannedBlock> blocks, int threads) {
-    const double turning_s = turning_s_;
+    const Speed speed = speed_;
     *this = {};
-    turning_s_ = turning_s;
+    speed_ = speed;
     threads_ = static_cast<std::size_t>(std::max(1, threads));
     blocks_.reserve(blocks.size());
     for (const PlannedBlock& planned : blocks) {
@@ -39,83 +39,99 @@ void TimeLeft::plan(std::span<const PlannedBlock> blocks, int threads) {
 
 void TimeLeft::enter(std::size_t number, BlockStage stage, double now_s) {
     Block& block = blocks_.at(number);
-    switch (block.stage) {
-        case BlockStage::set_up:
-            if (block.begun) set_up_.add(now_s - block.since_s);
-            break;
-        case BlockStage::turns:
-            measure(block, 0.0, now_s);
-            if (--turning_ == 0) turning_s_ += now_s - turning_since_s_;
-            break;
-        case BlockStage::output:
-            output_.add(now_s - block.since_s);
-            break;
-        case BlockStage::over:
-            break;
-    }
+    speed_ = speed_until(now_s);
     if (!block.begun) {
         block.begun = true;
         waiting_work_ -= block.work;
         --waiting_;
         active_.push_back(number);
+    } else if (block.stage == BlockStage::set_up) {
+        block.prepared_s += now_s - block.since_s;
+    } else if (block.stage == BlockStage::output) {
+        output_.add(now_s - block.since_s);
     }
     block.stage = stage;
     block.since_s = now_s;
-    if (stage == BlockStage::turns) {
-        if (!origin_s_) origin_s_ = now_s;
-        if (turning_++ == 0) turning_since_s_ = now_s;
+    if (stage == BlockStage::over) {
+        preparation_.add(block.prepared_s);
+        std::erase(active_, number);
     }
-    if (stage == BlockStage::over) std::erase(active_, number);
 }
 
-void TimeLeft::advance(std::size_t number, std::int64_t turns, double now_s) {
+void TimeLeft::advance(std::size_t number, std::int64_t turns, bool tabulated, double now_s) {
     Block& block = blocks_.at(number);
-    const double work = block.per_turn * static_cast<double>(turns);
-    block.left = std::max(0.0, block.left - work);
-    if (block.stage == BlockStage::turns) measure(block, work, now_s);
+    if (block.stage == BlockStage::turns) {
+        if (tabulated) {
+            block.prepared_s += now_s - block.since_s;
+        } else {
+            measure(block, turns, now_s);
+        }
+        block.since_s = now_s;
+    }
+    block.left = std::max(0.0, block.left - block.per_turn * static_cast<double>(turns));
 }
 
-void TimeLeft::measure(Block& block, double work, double now_s) {
+void TimeLeft::measure(Block& block, std::int64_t turns, double now_s) {
+    if (!origin_s_) origin_s_ = block.since_s;
     const double weight = now_s - *origin_s_;
     const double time_s = now_s - block.since_s;
-    block.since_s = now_s;
     for (Rate* rate : {&block.measured, &measured_}) {
-        rate->work += weight * work;
+        rate->work += weight * block.per_turn * static_cast<double>(turns);
         rate->time_s += weight * time_s;
     }
+    speed_.turns += static_cast<double>(turns);
+    speed_.turns_s += time_s;
 }
 
-double TimeLeft::left_of_s(const Block& block, double now_s) const {
-    const double at_stage_s = now_s - block.since_s;
-    switch (block.stage) {
-        case BlockStage::set_up: {
-            const double set_up_s = std::max(0.0, set_up_.value_s() - at_stage_s);
-            return set_up_s + block.left * measured_.time_s / measured_.work + output_.value_s();
-        }
-        case BlockStage::turns: {
-            const double others_s = own_rate_s * (now_s - *origin_s_);  // weighted as what is measured
-            const double work = block.measured.work + others_s * measured_.work / measured_.time_s;
-            const double time_s = block.measured.time_s + others_s;
-            return std::max(0.0, block.left * time_s / work - at_stage_s) + output_.value_s();
-        }
-        case BlockStage::output:
-            return std::max(0.0, output_.value_s() - at_stage_s);
-        case BlockStage::over:
-            break;
+TimeLeft::Speed TimeLeft::speed_until(double now_s) const {
+    Speed speed = speed_;
+    const double time_s = now_s - speed.counted_s;
+    speed.busy_s += time_s * static_cast<double>(active_.size());
+    speed.run_s += active_.empty() ? 0.0 : time_s;
+    speed.counted_s = now_s;
+    return speed;
+}
+
+double TimeLeft::turns_per_s(double now_s) const {
+    const Speed speed = speed_until(now_s);
+    if (!(speed.turns_s > 0.0 && speed.run_s > 0.0)) return 0.0;
+    return speed.turns / speed.turns_s * (speed.busy_s / speed.run_s);
+}
+
+double TimeLeft::preparation_s() const {
+    if (preparation_.count > 0) return preparation_.value_s();
+    Mean begun;  // the least that it can be
+    for (const std::size_t number : active_) {
+        if (blocks_[number].stage != BlockStage::set_up) begun.add(blocks_[number].prepared_s);
     }
-    return 0.0;
+    return begun.value_s();
+}
+
+double TimeLeft::left_of_s(const Block& block, double preparation_s, double now_s) const {
+    const double at_stage_s = now_s - block.since_s;
+    if (block.stage == BlockStage::output) return std::max(0.0, output_.value_s() - at_stage_s);
+    if (block.stage == BlockStage::set_up) {
+        return std::max(0.0, preparation_s - at_stage_s) + block.left * measured_.time_s / measured_.work +
+               output_.value_s();
+    }
+    const double others_s = own_rate_s * (now_s - *origin_s_);  // weighted as what is measured
+    const double work = block.measured.work + others_s * measured_.work / measured_.time_s;
+    const double time_s = block.measured.time_s + others_s;
+    return std::max(0.0, preparation_s - block.prepared_s) + std::max(0.0, block.left * time_s / work - at_stage_s) +
+           output_.value_s();
 }
 
 std::optional<double> TimeLeft::estimate_s(double now_s) const {
     if (!(measured_.work > 0.0 && measured_.time_s > 0.0)) return std::nullopt;
+    const double preparation = preparation_s();
     std::vector<double> free_in_s;  // of each thread
     double sum_s = 0.0;
     for (const std::size_t number : active_) {
-        free_in_s.push_back(left_of_s(blocks_[number], now_s));
+        free_in_s.push_back(left_of_s(blocks_[number], preparation, now_s));
         sum_s += free_in_s.back();
     }
     free_in_s.resize(std::max(threads_, free_in_s.size()), 0.0);
-    const double fixed_s = set_up_.value_s() + output_.value_s();
+    const double fixed_s = preparation + output_.value_s();
     const double s_per_work = measured_.time_s / measured_.work;
     if (waiting_ > many * threads_) {
         return (sum_s + static_cast<double>(waiting_) * fixed_s + waiting_work_ * s_per_work) /

@@ -217,14 +217,16 @@ TEST(Ensemble, TellsNoTurnTwiceWhereABlockBeginsAgain) {
             EXPECT_EQ(block, 0);
             stages.push_back(stage);
         }
-        void advance(std::size_t block, std::int64_t more_gyros, std::int64_t more_turns) override {
+        void advance(std::size_t block, std::int64_t more_gyros, std::int64_t more_turns, bool tables) override {
             EXPECT_EQ(block, 0);
             EXPECT_GE(more_turns, 0);
             gyros += more_gyros;
             turns += more_turns;
+            tabulated.push_back(tables);
         }
         std::vector<ensemble::PlannedBlock> planned;
         std::vector<ensemble::BlockStage> stages;
+        std::vector<bool> tabulated;  // of each call
         std::int64_t gyros = 0;
         std::int64_t turns = 0;
     } told;
