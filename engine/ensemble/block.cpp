@@ -46,25 +46,25 @@ dither::Wander wander_of(const scenario::Scenario& scenario) {
     return {scenario.dither.amplitude_wander_relative_rt_s, scenario.dither.amplitude_drift_relative_per_h / 3600.0};
 }
 
-/// What drift and wander can make of the amplitudes.
-double wander_margin_rad(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices) {
-    double largest = 0.0;
-    for (const gyro::Device& device : devices) largest = std::max(largest, device.dither_amplitude_rad);
+/// What drift and wander can make of the amplitudes: of the scenario's device, drawn large. Tables depend on it, and a
+/// gyro must not know the others of its block.
+double wander_margin_rad(const scenario::Scenario& scenario) {
+    constexpr double sigmas = 6.0;
+    const double largest = gyro::Device(nominal_setup(scenario)).dither_amplitude_rad *
+                           (1.0 + sigmas * scenario.ensemble.dither_amplitude_sd_relative);
     return largest * scenario::amplitude_change_relative(scenario.dither,
                                                          scenario.ensemble.settle_s + scenario.ensemble.duration_s);
 }
 
 /// How far noise, drift and wander take the amplitude of a half cycle from the device's.
-double amplitude_margin_rad(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices,
-                            TrajectoryKind kind) {
-    return noise_of(scenario, kind).margin_rad + wander_margin_rad(scenario, devices);
+double amplitude_margin_rad(const scenario::Scenario& scenario, TrajectoryKind kind) {
+    return noise_of(scenario, kind).margin_rad + wander_margin_rad(scenario);
 }
 
 /// Their spread about it.
-double amplitude_rms_rad(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices,
-                         TrajectoryKind kind) {
+double amplitude_rms_rad(const scenario::Scenario& scenario, TrajectoryKind kind) {
     constexpr double sigmas = 6.0;  // that the margin of the wander stands for
-    return std::hypot(noise_of(scenario, kind).amplitude_rms_rad, wander_margin_rad(scenario, devices) / sigmas);
+    return std::hypot(noise_of(scenario, kind).amplitude_rms_rad, wander_margin_rad(scenario) / sigmas);
 }
 
 std::vector<gyro::Device> make_devices(const std::vector<gyro::Setup>& setups, TrajectoryKind kind) {
@@ -92,7 +92,7 @@ std::unique_ptr<propagate::LanePropagator> make_propagator(const scenario::Scena
     // Without lock-in there is nothing to tabulate; the map is that of the plain phase.
     propagate::AmplitudeRoom room;
     if (kind != TrajectoryKind::ideal) {
-        room = {amplitude_margin_rad(scenario, devices, kind), noise_of(scenario, kind).change_rad};
+        room = {amplitude_margin_rad(scenario, kind), noise_of(scenario, kind).change_rad};
     }
     return propagate::make_turn_map(devices, room, scenario.propagation.turn_map_tolerance_rad);
 }
@@ -101,8 +101,8 @@ std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Sc
                                                               const std::vector<gyro::Device>& devices,
                                                               const scenario::Arm& arm, TrajectoryKind kind) {
     compensate::Calibration calibration = calibration_of(scenario, devices, kind == TrajectoryKind::noise_injected);
-    calibration.amplitude_margin_rad = amplitude_margin_rad(scenario, devices, kind);
-    calibration.amplitude_rms_rad = amplitude_rms_rad(scenario, devices, kind);
+    calibration.amplitude_margin_rad = amplitude_margin_rad(scenario, kind);
+    calibration.amplitude_rms_rad = amplitude_rms_rad(scenario, kind);
     calibration.amplitude_change_rad = noise_of(scenario, kind).change_rad;
     calibration.amplitude_change_rms_rad = noise_of(scenario, kind).change_rms_rad;
     switch (arm.compensator) {
@@ -167,7 +167,7 @@ class Branch {
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
             std::vector<gyro::Device> calibrated = devices_;
             for (gyro::Device& device : calibrated) device.coupling.b_rad_s = calibrated_b_rad_s(scenario, device);
-            recovery_.emplace(calibrated, electronics, amplitude_rms_rad(scenario, devices_, kind),
+            recovery_.emplace(calibrated, electronics, amplitude_rms_rad(scenario, kind),
                               noise_of(scenario, kind).change_rms_rad);
         }
     }
