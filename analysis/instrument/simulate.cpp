@@ -175,9 +175,7 @@ void add_turns(const ensemble::GyroBlock& block, std::int64_t first_turn, double
         if (clock_hz > 0.0) time_s = std::nearbyint(time_s * clock_hz) / clock_hz;
         turns.time_s.push_back(time_s);
         turns.direction.push_back(readings.minimum(i) ? 1 : -1);
-        const double off = block.count_errors().empty() ? 0.0 : block.count_errors()[i][0];
-        turns.quarter_count.push_back(4 * static_cast<std::int64_t>(readings.phase_whole[i][0]) +
-                                      static_cast<std::int64_t>(readings.count[i][0] + off));
+        turns.quarter_count.push_back(block.quarter_count(0, i, 0));
         turns.sine.push_back(readings.sine[i][0]);
         turns.cosine.push_back(readings.cosine[i][0]);
         turns.accel_before_rad_s2.push_back(readings.accel_before_rad_s2[i][0]);

@@ -36,6 +36,7 @@ struct Listener {
     std::unique_ptr<compensate::LaneCompensator> compensator;
     compensate::LaneErrors errors;
     std::vector<simd::LaneCounts> counts;
+    std::vector<simd::LaneCounts> turn_counts;  ///< at maxima, too, where asked for
 };
 
 scenario::InjectedNoise noise_of(const scenario::Scenario& scenario, TrajectoryKind kind) {
@@ -143,10 +144,11 @@ class Branch {
         : kind_(kind),
           devices_(make_devices(setups, kind)),
           dither_(make_dither(scenario, devices_, who, kind)),
-          detailed_(detail == Detail::hardware) {
+          detailed_(detail != Detail::output),
+          true_(detail == Detail::truth) {
         for (std::size_t i = 0; i < arms.size(); ++i) {
             if (kind_of(arms[i]) != kind) continue;
-            listeners_.push_back({i, make_compensator(scenario, devices_, arms[i], kind), {}, {}});
+            listeners_.push_back({i, make_compensator(scenario, devices_, arms[i], kind), {}, {}, {}});
             const auto& compensator = listeners_.back().compensator;
             compensated_ = compensated_ || compensator != nullptr;
             samples_wanted_ = samples_wanted_ || (compensator && compensator->wants_samples());
@@ -155,13 +157,15 @@ class Branch {
         propagator_ = make_propagator(scenario, devices_, kind);
         const readout::Electronics electronics = electronics_of(scenario);
         const bool instrument = scenario.readout.model == scenario::ReadoutModel::instrument;
+        pulses_ = instrument || samples_wanted_;
         every_turn_ = compensated_ || instrument || scenario.readout.ellipse_correction || detailed_;
         readout_.emplace(devices_, ellipses_of(setups), electronics,
-                         instrument || samples_wanted_ ? readout::Wanted::pulses
-                         : compensated_ || detailed_   ? readout::Wanted::accelerations
-                                                       : readout::Wanted::phase,
+                         pulses_                     ? readout::Wanted::pulses
+                         : compensated_ || detailed_ ? readout::Wanted::accelerations
+                                                     : readout::Wanted::phase,
                          phases_vary);
         if (detailed_) readout_->keep_times();
+        if (true_) readout_->keep_truth();
         interpolated_ = electronics.interpolate;
         if (scenario.readout.ellipse_correction) ellipse_.emplace(devices_.size());
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
@@ -186,11 +190,10 @@ class Branch {
         if (samples_wanted_) samples_ = readings_;
         if (recovery_) recovery_->recover(readings_, &angles_);
         for (Listener& listener : listeners_) {
-            if (listener.compensator) {
-                const bool samples = listener.compensator->wants_samples();
-                listener.compensator->observe(samples ? samples_ : readings_, listener.errors);
-            }
-            output_counts(angles_, listener.compensator ? &listener.errors : nullptr, turns, listener.counts);
+            if (listener.compensator) listener.compensator->observe(observed(listener), listener.errors);
+            const compensate::LaneErrors* errors = listener.compensator ? &listener.errors : nullptr;
+            output_counts(angles_, errors, turns, listener.counts);
+            if (true_) output_counts(angles_, errors, turns, listener.turn_counts, 1);
         }
     }
 
@@ -205,6 +208,11 @@ class Branch {
     const propagate::LanePropagator& propagator() const { return *propagator_; }
     const readout::LaneReadings& readings() const { return readings_; }
     const readout::LaneReadings& hardware() const { return hardware_; }
+    const readout::LaneReadings& observed(const Listener& listener) const {
+        return listener.compensator && listener.compensator->wants_samples() ? samples_ : readings_;
+    }
+    bool has_pulses() const { return pulses_; }
+    const gyro::LaneDrive& drive() const { return drive_; }
     const readout::LaneAngles& angles() const { return angles_; }
     const Listener* listener(std::size_t arm) const {
         for (const Listener& listener : listeners_) {
@@ -240,7 +248,9 @@ class Branch {
     bool compensated_ = false;
     bool every_turn_ = false;
     bool samples_wanted_ = false;
+    bool pulses_ = false;
     bool detailed_ = false;
+    bool true_ = false;
     simd::Lanes change_squares_{};  ///< of the amplitude from a turn to the next but one
     std::int64_t changes_ = 0;
     gyro::LaneDrive drive_;
@@ -424,7 +434,21 @@ std::span<const simd::LaneCounts> GyroBlock::counts(std::size_t arm) const {
 
 const readout::LaneReadings& GyroBlock::readings(std::size_t arm) const { return state_->branch_of(arm).readings(); }
 
+const readout::LaneReadings& GyroBlock::observed(std::size_t arm) const {
+    const Branch& branch = state_->branch_of(arm);
+    return branch.observed(*branch.listener(arm));
+}
+
 const readout::LaneReadings& GyroBlock::hardware(std::size_t arm) const { return state_->branch_of(arm).hardware(); }
+
+std::int64_t GyroBlock::quarter_count(std::size_t arm, std::size_t turn, std::size_t lane) const {
+    const readout::LaneReadings& readings = hardware(arm);
+    const double off = count_errors().empty() ? 0.0 : count_errors()[turn][lane];
+    return 4 * static_cast<std::int64_t>(readings.phase_whole[turn][lane]) +
+           static_cast<std::int64_t>(readings.count[turn][lane] + off);
+}
+
+bool GyroBlock::has_pulses(std::size_t arm) const { return state_->branch_of(arm).has_pulses(); }
 
 double GyroBlock::turn_time_s(std::int64_t turn, std::size_t lane) const { return state_->turn_time_s(turn, lane); }
 
@@ -435,6 +459,17 @@ std::span<const simd::Lanes> GyroBlock::count_errors() const { return state_->co
 double GyroBlock::lockin_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const {
     const readout::LaneAngles& angles = state_->branch_of(arm).angles();
     return units::two_pi * (angles.lockin_whole[lane] + angles.lockin_fringes[turn][lane]);
+}
+
+const compensate::LaneErrors* GyroBlock::corrections(std::size_t arm) const {
+    const Listener& listener = *state_->branch_of(arm).listener(arm);
+    return listener.compensator ? &listener.errors : nullptr;
+}
+
+const gyro::LaneDrive& GyroBlock::drive(std::size_t arm) const { return state_->branch_of(arm).drive(); }
+
+std::span<const simd::LaneCounts> GyroBlock::turn_counts(std::size_t arm) const {
+    return state_->branch_of(arm).listener(arm)->turn_counts;
 }
 
 const std::vector<gyro::Setup>& GyroBlock::setups() const { return state_->setups; }

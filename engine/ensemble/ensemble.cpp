@@ -79,11 +79,6 @@ std::int64_t block_size(std::int64_t gyros, int threads) {
     return share >= full ? full : std::min<std::int64_t>(gyros, std::max<std::int64_t>(share, full / 2));
 }
 
-/// Turns between two looks at the monitor: a dither second, or less where each takes milliseconds.
-std::size_t piece_turns(const scenario::Scenario& scenario) {
-    return scenario.propagation.method == scenario::PropagationMethod::direct ? 8 : 128;
-}
-
 /// Tells the monitor what a block does. Where the block fails and its gyros go through the same turns again one by one,
 /// no turn is told twice.
 class BlockProgress {
@@ -111,14 +106,12 @@ class BlockProgress {
 void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first,
               std::size_t gyros, BlockSink& sink, BlockProgress& progress) {
     const Schedule schedule(scenario);
-    const std::size_t piece = piece_turns(scenario);
     GyroBlock block = follow([&] { return GyroBlock(scenario, arms, first, gyros); });
     const std::int64_t counted = static_cast<std::int64_t>(gyros) * block.trajectories();
     for (std::int64_t turn = 0; turn < schedule.turns();) {
         if (progress.cancelled()) throw Interrupted();
         const bool settling = turn < schedule.settle_turns();
-        const std::int64_t end = settling ? schedule.settle_turns() : schedule.turns();
-        const auto turns = static_cast<std::size_t>(std::min(static_cast<std::int64_t>(piece), end - turn));
+        const auto turns = static_cast<std::size_t>(schedule.piece_end(turn) - turn);
         follow([&] { block.advance(turns); });
         for (std::size_t arm = 0; arm < arms.size() && !settling; ++arm) sink.cycles(arm, block.counts(arm));
         turn += static_cast<std::int64_t>(turns);
