@@ -15,6 +15,7 @@
 #include "analysis/allan/factor_stream.hpp"
 #include "analysis/allan/octave_deviation.hpp"
 #include "analysis/allan/octave_stream.hpp"
+#include "analysis/study/angle_counts.hpp"
 #include "engine/ensemble/closed_form.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/output_counts.hpp"
@@ -126,7 +127,7 @@ class ArmStream {
     }
 
     void add(std::span<const simd::LaneCounts> counts) {
-        if (cycle_ == 0 && !counts.empty()) last_ = counts.front();
+        if (cycle_ == 0 && !counts.empty()) angle_.start(counts.front());
         note_angles(counts);
         octaves_.add(counts, gyros_);
         for (allan::FactorStream& stream : asked_) stream.add(counts, gyros_);
@@ -137,7 +138,7 @@ class ArmStream {
             take_sample(row);
         }
         // Counts wrap round within hours at high rates, which may be between two samples: never within a piece.
-        if (!counts.empty()) turn_to(counts.back());
+        if (!counts.empty()) angle_.turn_to(counts.back());
     }
 
     GyroStatistics finish(std::size_t lane, const gyro::Setup& setup) const {
@@ -152,9 +153,7 @@ class ArmStream {
                   [](const allan::Point& a, const allan::Point& b) { return a.m < b.m; });
         result.noise = noise::fit_noise(record_.phase(lane, arcsec_per_count),
                                         study_.schedule.sample_interval_s * static_cast<double>(record_.interval()));
-        const double duration_s = study_.schedule.cycle_s * static_cast<double>(study_.schedule.cycles() - 1);
-        result.rate_error_deg_h =
-            static_cast<double>(turned_[lane]) * arcsec_per_count / duration_s - setup.input_rate_deg_h;
+        result.rate_error_deg_h = rate_error_deg_h(angle_.turned(lane), study_.schedule, setup);
         for (std::size_t i = 0; i < angle_errors_counts_.size(); ++i) {
             result.angle_error_arcsec.push_back(angle_errors_counts_[i][lane] * arcsec_per_count -
                                                 setup.input_rate_deg_h * study_.schedule.cycle_s *
@@ -168,11 +167,10 @@ class ArmStream {
         if (waiting_rows_.empty()) return;
         const std::size_t samples = waiting_rows_.size();
         waiting_.angle_arcsec.resize(gyros_ * samples);
-        const double arcsec_per_count = study_.scenario.gyro.scale_factor_arcsec / ensemble::counts_per_fringe;
+        const double scale_factor_arcsec = study_.scenario.gyro.scale_factor_arcsec;
         for (std::size_t lane = 0; lane < gyros_; ++lane) {
             for (std::size_t i = 0; i < samples; ++i) {
-                waiting_.angle_arcsec[lane * samples + i] =
-                    static_cast<double>(waiting_rows_[i][lane]) * arcsec_per_count;
+                waiting_.angle_arcsec[lane * samples + i] = angle_arcsec(waiting_rows_[i][lane], scale_factor_arcsec);
             }
         }
         on_samples_(waiting_);
@@ -181,8 +179,6 @@ class ArmStream {
     }
 
    private:
-    __extension__ using Wide = __int128;  // counts do not wrap round in it
-
     /// Cycle at which an angle is told; none of the record where it has none.
     std::int64_t cycle_at(std::size_t i) const { return study_.angle_cycle(i).value_or(study_.schedule.cycles()); }
 
@@ -191,32 +187,18 @@ class ArmStream {
         for (std::size_t i = 0; i < angle_errors_counts_.size(); ++i) {
             const std::int64_t row = cycle_at(i) - cycle_;
             if (row < 0 || row >= static_cast<std::int64_t>(counts.size())) continue;
-            turn_to(counts[static_cast<std::size_t>(row)]);
+            angle_.turn_to(counts[static_cast<std::size_t>(row)]);
             for (std::size_t lane = 0; lane < gyros_; ++lane) {
-                angle_errors_counts_[i][lane] = static_cast<double>(turned_[lane]);
+                angle_errors_counts_[i][lane] = static_cast<double>(angle_.turned(lane));
             }
         }
     }
 
-    /// Goes on to a later cycle, less than 2^31 fringes away.
-    void turn_to(const simd::LaneCounts& row) {
-        for (std::size_t lane = 0; lane < gyros_; ++lane) {
-            turned_[lane] += static_cast<std::int64_t>(static_cast<std::uint64_t>(row[lane]) -
-                                                       static_cast<std::uint64_t>(last_[lane]));
-        }
-        last_ = row;
-    }
-
     void take_sample(const simd::LaneCounts& row) {
-        turn_to(row);
-        std::array<Wide, simd::lanes> angle{};
-        for (std::size_t lane = 0; lane < gyros_; ++lane) {
-            // The first sample is an angle by itself; from then on differences tell.
-            if (sample_ == 0) origin_[lane] = row[lane];
-            angle[lane] = origin_[lane] + turned_[lane];
-        }
-        ++sample_;
+        angle_.turn_to(row);
         if (!on_samples_) return;
+        std::array<WideCounts, simd::lanes> angle{};
+        for (std::size_t lane = 0; lane < gyros_; ++lane) angle[lane] = angle_.angle(lane);
         waiting_rows_.push_back(angle);
         if (waiting_rows_.size() == gathered_samples) flush();
     }
@@ -229,12 +211,9 @@ class ArmStream {
     std::vector<allan::FactorStream> asked_;  ///< averaging times that are no octaves
     allan::BoundedRecord record_;
     std::int64_t cycle_ = 0;
-    std::int64_t sample_ = 0;
-    simd::LaneCounts last_;
-    std::array<Wide, simd::lanes> origin_{};
-    std::array<Wide, simd::lanes> turned_{};
+    AngleCounts angle_;
     SampledAngles waiting_;
-    std::vector<std::array<Wide, simd::lanes>> waiting_rows_;
+    std::vector<std::array<WideCounts, simd::lanes>> waiting_rows_;
 };
 
 /// One block of gyros of a study.
