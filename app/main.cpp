@@ -64,6 +64,7 @@ int main(int argc, char** argv) {
     app::add_closure(root);
     app::add_record(root);
     app::add_devices(root);
+    app::add_replay(root, {argv, static_cast<std::size_t>(argc)});
     app::add_planned(root);
     try {
         const ringlock::InterruptGuard guard;
