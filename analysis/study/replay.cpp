@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <ranges>
 #include <vector>
 
@@ -15,17 +17,17 @@
 namespace ringlock::study {
 namespace {
 
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
 
 /// A phase of so many fringes and whole ones.
-WholePhase phase_of(double fringes, double whole) {
+WholePhase whole_phase(double fringes, double whole) {
     const double nearest = std::nearbyint(fringes);
     return {static_cast<std::int64_t>(whole + nearest), units::two_pi * (fringes - nearest)};
 }
 
 ReplayedTurn::Reading reading_of(const readout::LaneReadings& readings, std::size_t row) {
     return {readings.sine[row][0], readings.cosine[row][0],
-            phase_of(readings.phase_fringes[row][0], readings.phase_whole[row][0])};
+            whole_phase(readings.phase_fringes[row][0], readings.phase_whole[row][0])};
 }
 
 /// An error in fringes, the whole ones apart, so that the steps of a large one are exact.
@@ -126,7 +128,7 @@ ReplayedTurn GyroReplay::turn_at(std::size_t row) const {
     turn.time_s = time_s(seen.first_turn + static_cast<std::int64_t>(row));
     turn.direction = seen.minimum(row) ? 1 : -1;
     turn.zero_rate_s = angles.zero_rate_s[row][0];
-    turn.phase = phase_of(angles.phase_fringes[row][0], seen.phase_whole[row][0]);
+    turn.phase = whole_phase(angles.phase_fringes[row][0], seen.phase_whole[row][0]);
     turn.rotation_arcsec =
         setup().scale_factor_arcsec * (drive.rotation_whole[row][0] + drive.rotation_fringes[row][0]);
     turn.dither_amplitude_rad = drive.amplitude_rad[row][0];
@@ -153,7 +155,7 @@ ReplayFigures GyroReplay::run(const Range& range, TurnSink& sink, const OnSample
     ReplayFigures figures;
     Output output(scenario_, schedule_, setup());
     MeanSquare steps, left_steps;
-    Fringes error_before{0.0, nothing}, left_before{0.0, nothing};
+    Fringes error_before{0.0, no_number}, left_before{0.0, no_number};
     std::vector<ReplayedTurn> wanted;
     for (std::int64_t first = 0; first < range.last; first = schedule_.piece_end(first)) {
         if (monitor.cancelled && monitor.cancelled()) throw Interrupted();

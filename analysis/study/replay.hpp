@@ -2,9 +2,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "analysis/study/study.hpp"
 #include "engine/ensemble/block.hpp"

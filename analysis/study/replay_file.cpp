@@ -132,7 +132,7 @@ std::string program_text(std::string_view version, std::string_view hash) {
 std::string scenario_text(const Experiment& experiment) { return scenario::to_toml(experiment.scenario); }
 
 /// Keeps files that are there: only a replay of the same gyro may be replaced.
-std::filesystem::path refuse_to_lose(const std::filesystem::path& path, const GyroOfResult& of) {
+std::filesystem::path keep_other_files(const std::filesystem::path& path, const GyroOfResult& of) {
     std::error_code unreachable;  // claiming the output says what is wrong with what is no file
     if (!std::filesystem::is_regular_file(path, unreachable)) return path;
     bool same = false;
@@ -237,7 +237,7 @@ void ReplayWriter::create(const Columns& columns, std::uint64_t rows) {
 
 ReplayWriter::ReplayWriter(const std::filesystem::path& path, const GyroOfResult& of, const GyroReplay& replay,
                            const GyroReplay::Range& range)
-    : file_(refuse_to_lose(path, of)), of_(of), pulses_(replay.has_pulses()) {
+    : file_(keep_other_files(path, of)), of_(of), pulses_(replay.has_pulses()) {
     store::File& root = file_.file();
     const ensemble::Schedule& schedule = replay.schedule();
     root.set_attribute("format", format_name);

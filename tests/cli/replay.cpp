@@ -168,7 +168,9 @@ TEST_F(ReplayCommand, EveryArmIsItsStoredRecordToTheBit) {
         if (arm.ends_with("compensated_exact")) {
             EXPECT_LT(told["left_step_rms_rad"].get<double>(), 0.3 * told["lockin_step_rms_rad"].get<double>());
         }
-        if (arm == "uncompensated") EXPECT_EQ(told["left_step_rms_rad"], told["lockin_step_rms_rad"]);
+        if (arm == "uncompensated") {
+            EXPECT_EQ(told["left_step_rms_rad"], told["lockin_step_rms_rad"]);
+        }
     }
 }
 

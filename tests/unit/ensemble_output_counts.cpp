@@ -69,7 +69,9 @@ TEST(OutputCounts, OfEveryTurnAreThoseOfTheMinimaAndMore) {
     ASSERT_EQ(turns.size(), 63U);
     for (std::size_t i = 0; i < 63; ++i) {
         for (std::size_t g = 0; g < lanes; ++g) {
-            if (i % 2 == 0) EXPECT_EQ(turns[i][g], minima[i / 2][g]);
+            if (i % 2 == 0) {
+                EXPECT_EQ(turns[i][g], minima[i / 2][g]);
+            }
             const long double off = static_cast<long double>(turns[i][g]) - exact_counts(piece, true, i, g);
             ASSERT_LE(std::abs(off), 0.5L + 1e-5L);
         }
