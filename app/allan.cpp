@@ -19,6 +19,7 @@
 #include "app/allan_output.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/files.hpp"
 #include "app/output.hpp"
 #include "engine/core/error.hpp"
 
@@ -153,7 +154,6 @@ Request checked(const Arguments& a) {
         throw InputError(fmt::format("--confidence {}: must lie between 0 and 1, such as 0.6827", a.confidence));
     }
     out.taus = parse_tau(a.tau);
-    if (!a.plot.empty()) check_figure(a.plot);
     const auto named = [](const std::string& name) {
         return name.empty() ? std::nullopt : std::optional<std::string>(name);
     };
@@ -253,6 +253,8 @@ void from_stream(const Arguments& a, const Request& request, AllanOutput& out) {
 
 void run(const Arguments& a) {
     const Request request = checked(a);
+    refuse_same_files({{"DATA", a.data, NamedFile::Use::input}, {"--plot", a.plot, NamedFile::Use::output}});
+    const std::unique_ptr<AtomicPath> figure = claim_figure(a.plot);
     AllanOutput out;
     out.data = a.data;
     out.kind = a.kind;
@@ -261,7 +263,7 @@ void run(const Arguments& a) {
     out.tau0_s = 1.0 / a.rate_hz;
     out.confidence = a.confidence;
     a.stream ? from_stream(a, request, out) : from_record(a, request, out);
-    if (!a.plot.empty()) report::write_svg(a.plot, allan_figure(out));
+    if (figure) report::write_svg(*figure, allan_figure(out));
     put(a.json ? allan_json(out) : allan_text(out));
 }
 

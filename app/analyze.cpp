@@ -18,6 +18,7 @@
 #include "analysis/study/result_file.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/study_output.hpp"
 #include "engine/core/error.hpp"
@@ -107,7 +108,9 @@ void add_asked(const std::string& file, const study::Experiment& experiment, std
 }
 
 void analyze(const Arguments& arguments) {
-    check_figure(arguments.plot);
+    refuse_same_files(
+        {{"OUT.h5", arguments.file, NamedFile::Use::input}, {"--plot", arguments.plot, NamedFile::Use::output}});
+    const std::unique_ptr<AtomicPath> figure = claim_figure(arguments.plot);
     const auto estimators = arguments.dev.empty() ? std::vector<allan::Estimator>{} : parse_deviations(arguments.dev);
     auto asked = arguments.tau ? parse_averaging_times("--tau", *arguments.tau) : std::vector<AveragingTime>{};
     const study::Experiment experiment = study::read_result(arguments.file);
@@ -122,7 +125,7 @@ void analyze(const Arguments& arguments) {
         }
         add_asked(arguments.file, experiment, point, asked, summaries[point]);
     }
-    if (!arguments.plot.empty()) report::write_svg(arguments.plot, experiment_figure(experiment, summaries));
+    if (figure) report::write_svg(*figure, experiment_figure(experiment, summaries));
     if (arguments.json) return put(experiment_json(experiment, summaries, provenance));
     std::string text = experiment_text(experiment, summaries, provenance);
     for (std::size_t point = 0; point < summaries.size(); ++point) {

@@ -5,15 +5,19 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
+#include "analysis/closure/report/folder.hpp"
 #include "analysis/closure/report/report.hpp"
 #include "analysis/record/record.hpp"
 #include "analysis/report/closure_page.hpp"
 #include "app/command.hpp"
+#include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
 #include "engine/core/error.hpp"
@@ -32,6 +36,16 @@ void declare(record::Declared& declared, const scenario::Scenario& model) {
     fill(declared.lockin_threshold_deg_h, model.gyro.lockin_threshold_deg_h);
     fill(declared.dither_frequency_hz, model.dither.frequency_hz);
     fill(declared.dither_peak_rate_deg_s, model.dither.peak_rate_deg_s);
+}
+
+/// Refuses, before the work, an output folder in which somebody's file would be lost.
+void refuse_to_lose(const std::string& record, const std::string& model, const std::string& folder) {
+    std::vector<NamedFile> files{{"RECORD", record, NamedFile::Use::input}, {"--model", model, NamedFile::Use::input}};
+    for (const std::filesystem::path& file : closure::files_of(folder)) {
+        files.push_back({"-o", file, NamedFile::Use::output});
+    }
+    refuse_same_files(files);
+    closure::check_folder(folder);
 }
 
 /// Shows the stage of the loop and the time since it began: one line that is replaced on a terminal, a line for each
@@ -81,6 +95,7 @@ void add_closure(CLI::App& root) {
     command->add_flag("--json", arguments->json, "one JSON object on standard output");
     command->add_flag("-q,--quiet", arguments->quiet, "no progress on standard error");
     command->callback([arguments] {
+        if (!arguments->out.empty()) refuse_to_lose(arguments->record, arguments->model, arguments->out);
         record::Record record = record::read_record(arguments->record);
         tell_warnings(arguments->record, record);
         if (!arguments->model.empty()) declare(record.declared, scenario::parse_file(arguments->model));
@@ -94,16 +109,24 @@ void add_closure(CLI::App& root) {
         }
         nlohmann::json json = closure::to_json(closure);
         std::string text = closure::to_text(closure);
+        std::exception_ptr not_written;
         if (!arguments->out.empty()) {
             const std::string name = std::filesystem::path(arguments->record).filename().string();
             monitor.tell("simulating the closed model");
             const closure::Predictive predictive = closure::check_predictive(record, closure);
-            closure::write_closure(arguments->out, name, record, closure, predictive);
-            report::write_closure_page(arguments->out, name, closure, predictive);
             json["predictive"] = closure::to_json(predictive);
             text += "\n" + closure::to_text(predictive);
+            try {
+                closure::write_closure(arguments->out, name, record, closure, predictive);
+                report::write_closure_page(arguments->out, name, closure, predictive);
+            } catch (const Interrupted&) {
+                throw;
+            } catch (...) {
+                not_written = std::current_exception();  // what was found is printed all the same
+            }
         }
         put(arguments->json ? json.dump() + "\n" : text);
+        if (not_written) std::rethrow_exception(not_written);
     });
 }
 

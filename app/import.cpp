@@ -5,6 +5,7 @@
 
 #include "analysis/record/record.hpp"
 #include "app/command.hpp"
+#include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
 
@@ -21,10 +22,12 @@ void add_import(CLI::App& root) {
         ->required();
     command->add_option("-o,--output", arguments->out, "record to write (.h5)")->required();
     command->callback([arguments] {
-        record::check_output(arguments->out);
+        refuse_same_files(
+            {{"DATA", arguments->data, NamedFile::Use::input}, {"-o", arguments->out, NamedFile::Use::output}});
+        record::RecordWriter writer(arguments->out);
         const record::Record record = record::read_record(arguments->data);
         tell_warnings(arguments->data, record);
-        record::write_record(arguments->out, record);
+        writer.write(record);
         put(fmt::format("{}: {}\n", arguments->out, record_text(record)));
     });
 }

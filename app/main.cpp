@@ -66,6 +66,7 @@ int main(int argc, char** argv) {
     app::add_devices(root);
     app::add_merge(root, {argv, static_cast<std::size_t>(argc)});
     app::add_status(root);
+    app::add_replay(root, {argv, static_cast<std::size_t>(argc)});
     app::add_planned(root);
     try {
         const ringlock::InterruptGuard guard;
@@ -80,7 +81,8 @@ int main(int argc, char** argv) {
     } catch (const ringlock::RunError& error) {
         return complain(run_failed, error.what());
     } catch (const ringlock::Interrupted& interrupted) {
-        app::tell(fmt::format("ringlock: {}\n", interrupted.what()));
+        app::tell(interrupted.says_more() ? fmt::format("ringlock: {}\n", interrupted.what())
+                                          : std::string(ringlock::farewell()));
     } catch (const std::bad_alloc&) {
         return complain(run_failed, "out of memory; run fewer gyros at a time, or store fewer samples");
     } catch (const std::exception& error) {

@@ -15,6 +15,7 @@
 #include "analysis/study/result_file.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/run_text.hpp"
 #include "app/study_output.hpp"
@@ -69,12 +70,15 @@ void merge(const Arguments& arguments, std::span<const char* const> command_line
             "-o {}",
             arguments.out, missing.size(), missing.size() == 1 ? "" : "s", list_of(missing), arguments.out));
     }
+    std::vector<NamedFile> named = {{"OUT.h5", arguments.out, NamedFile::Use::output}};
+    for (const std::filesystem::path& file : files) named.push_back({"SHARD", file, NamedFile::Use::input});
+    refuse_same_files(named);
     study::ResultWriter writer(arguments.out, plan);
     parts::Manifest whole = shards.manifest();
     whole.shard.reset();
     parts::Folder lock(arguments.out, whole, parts::Beginning::refuse, [](const auto&) {});
 
-    study::predict_noise(plan.points, threads);
+    study::predict_noise(plan.points, threads, nullptr);
     shards.finished().take_up(plan.points, 0, std::numeric_limits<std::int64_t>::max());
     store::Provenance provenance = store::collect_provenance(command_line, threads, "");
     provenance.wall_s = shards.wall_s();

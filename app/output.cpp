@@ -8,26 +8,27 @@
 #include <cstdio>
 #include <system_error>
 
-#include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/waiting.hpp"
 
 namespace ringlock::app {
 
 void put(std::string_view text) {
-    if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0) return;
-    throw RunError(fmt::format("standard output cannot be written: {}", std::generic_category().message(errno)));
+    const int error = write_all(STDOUT_FILENO, text);
+    if (error == 0) return;
+    throw RunError(fmt::format("standard output cannot be written: {}", std::generic_category().message(error)));
 }
 
 void tell(std::string_view text) {
     if (std::fwrite(text.data(), 1, text.size(), stderr) != text.size()) std::clearerr(stderr);
 }
 
-void check_figure(const std::filesystem::path& path) {
-    if (path.empty()) return;
+std::unique_ptr<AtomicPath> claim_figure(const std::filesystem::path& path) {
+    if (path.empty()) return nullptr;
     if (path.extension() != ".svg") {
         throw InputError(fmt::format("--plot {}: the name of a figure must end in .svg", path.string()));
     }
-    const AtomicPath probe(path);
+    return std::make_unique<AtomicPath>(path);
 }
 
 void hold_standard_streams() {

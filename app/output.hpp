@@ -1,19 +1,22 @@
 #pragma once
 #include <filesystem>
+#include <memory>
 #include <string_view>
+
+#include "engine/core/atomic_path.hpp"
 
 namespace ringlock::app {
 
 /// Writes to standard output, at once. Throws RunError where it cannot be written (a full disk, say): results that
-/// nobody can read are no success.
+/// nobody can read are no success. Throws Interrupted where the user asks to stop while it is written.
 void put(std::string_view text);
 
 /// Writes to standard error what people may want to know. What nobody can read changes nothing about the run.
 void tell(std::string_view text);
 
-/// Finds out before a run, not after it, that the figure of --plot cannot be written; no name is none. It must end in
-/// .svg: a figure replaces the file it finds, which had better not be the scenario or the result. Throws InputError.
-void check_figure(const std::filesystem::path& path);
+/// Claims the figure of --plot, so that it is known before a run, not after it, that it cannot be written; no name is
+/// none. It must end in .svg: a figure replaces the file it finds. Throws InputError.
+std::unique_ptr<AtomicPath> claim_figure(const std::filesystem::path& path);
 
 /// Opens standard streams that the caller has closed (on nothing), so that no file of ours gets their numbers and what
 /// is told ends up in it.

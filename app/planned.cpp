@@ -11,7 +11,7 @@ namespace ringlock::app {
 
 void add_planned(CLI::App& root) {
     // Their names are reserved, but the help shows what can be used.
-    constexpr std::array planned = {"replay", "report"};
+    constexpr std::array planned = {"report"};
     for (const char* const name : planned) {
         CLI::App* command = root.add_subcommand(name)->group("");
         command->allow_extras();
@@ -19,7 +19,7 @@ void add_planned(CLI::App& root) {
         command->callback([text] {
             throw InputError(
                 fmt::format("the command \"{}\" is not there yet; there are run, merge, status, analyze, allan, "
-                            "validate, import, record, devices and closure",
+                            "validate, import, record, replay, devices and closure",
                             text));
         });
     }

@@ -11,8 +11,10 @@
 #include "analysis/instrument/simulate.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
+#include "app/room.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -29,9 +31,14 @@ void run(const Arguments& arguments) {
     const scenario::Scenario scenario = load_scenario(arguments.scenario, arguments.changes);
     constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();
     const std::int64_t gyro = whole_number("--gyro", arguments.gyro, largest, "from 0 on");
-    record::check_output(arguments.out);
+    refuse_same_files(
+        {{"SCENARIO", arguments.scenario, NamedFile::Use::input}, {"-o", arguments.out, NamedFile::Use::output}});
+    const instrument::Room room = instrument::expected_room(scenario, gyro);
+    const std::string shorter = "record a shorter time (ensemble.duration_s)";
+    check_room(arguments.out, {room.memory_bytes, room.disk_bytes, shorter, shorter}, false);
+    record::RecordWriter writer(arguments.out);
     const record::Record record = instrument::simulate_record(scenario, gyro);
-    record::write_record(arguments.out, record);
+    writer.write(record);
     if (!arguments.json) {
         put(fmt::format("{}: gyro {}, seed {}: {}\n", arguments.out, gyro, scenario.ensemble.seed,
                         record_text(record)));

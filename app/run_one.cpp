@@ -24,8 +24,11 @@
 #include "analysis/parts/shard.hpp"
 #include "analysis/report/plot.hpp"
 #include "analysis/study/result_file.hpp"
+#include "analysis/study/room.hpp"
 #include "app/arguments.hpp"
+#include "app/files.hpp"
 #include "app/output.hpp"
+#include "app/room.hpp"
 #include "app/run_text.hpp"
 #include "app/study_output.hpp"
 #include "engine/core/atomic_path.hpp"
@@ -45,21 +48,18 @@ parts::Beginning beginning_of(const RunArguments& arguments) {
     return arguments.discard ? parts::Beginning::discard : parts::Beginning::refuse;
 }
 
-/// Refuses what the disk cannot hold, before hours are spent on it.
-void check_room(const std::filesystem::path& out, const study::Experiment& plan, bool checkpoints) {
-    std::error_code unknown;
-    const auto folder = out.has_parent_path() ? out.parent_path() : std::filesystem::path(".");
-    const std::filesystem::space_info space = std::filesystem::space(folder, unknown);
+/// What the run takes, and what would make it less.
+Needs needs_of(const scenario::Scenario& scenario, int threads, bool checkpoints, std::int64_t shards) {
+    const study::Room room = study::expected_room(scenario, threads);
     // Samples are kept twice while the result is made of what is finished.
-    const std::uint64_t bytes = study::expected_size_bytes(plan) * (checkpoints ? 2 : 1);
-    if (unknown || bytes <= space.available) return;
-    const bool records = plan.scenario.output.angle_record;
-    throw InputError(fmt::format(
-        "{}: the result will take about {:.1f} GB, {}and the disk has {:.1f} GB; {}give a "
-        "place on another disk with -o",
-        out.string(), static_cast<double>(study::expected_size_bytes(plan)) * 1e-9,
-        checkpoints ? "what is kept of it while it is made as much, " : "", static_cast<double>(space.available) * 1e-9,
-        records ? "set output.angle_record = false, or " : ""));
+    const std::uint64_t disk_bytes = room.disk_bytes * (checkpoints ? 2 : 1) / static_cast<std::uint64_t>(shards);
+    std::string less_disk = "run fewer gyros at a time";
+    if (scenario.output.angle_record) {
+        less_disk = "set output.angle_record = false";
+        if (checkpoints && shards == 1) less_disk += ", or give --checkpoint-every never, which takes half of it";
+    }
+    return {room.memory_bytes, disk_bytes,
+            "run fewer gyros at a time (ensemble.gyros, stop.most_gyros, design.points), or fewer arms", less_disk};
 }
 
 /// Seconds between checkpoints; nothing where there are to be none.
@@ -121,9 +121,11 @@ class Session {
         : task_(std::move(task)),
           folder_(task_.target, parts::manifest_of(task_.plan.scenario, task_.shard), beginning, say),
           all_gyros_(gyros_of(task_)),
-          checkpoints_(folder_, task_.plan, options(every_s), say) {
+          checkpoints_(folder_, task_.plan, options(every_s), say),
+          progress_(all_gyros_, progress_options()) {
         const std::int64_t before = checkpoints_.gyros_before();
         if (before > 0) say(fmt::format("resumed: {} of {} are finished", before, gyros_text(all_gyros_)));
+        checkpoints_.begin([this] { return progress_.pace(); });
     }
 
     std::int64_t all_gyros() const { return all_gyros_; }
@@ -146,6 +148,8 @@ class Session {
     Task& task() { return task_; }
     parts::Folder& folder() { return folder_; }
     parts::Checkpoints& checkpoints() { return checkpoints_; }
+    ensemble::Progress& progress() { return progress_; }
+    ensemble::Monitor monitor() { return {interrupted, &progress_}; }
 
    private:
     parts::Checkpoints::Options options(double every_s) const {
@@ -153,6 +157,23 @@ class Session {
         options.every_s = every_s;
         options.shard = task_.shard;
         options.of_gyros = all_gyros_;
+        return options;
+    }
+
+    ensemble::ProgressOptions progress_options() const {
+        ensemble::ProgressOptions options{.quiet = task_.quiet, .grows = task_.grows()};
+        options.already_done.gyros = checkpoints_.gyros_before();
+        if (task_.grows()) {
+            options.total_turns = study::expected_turns(task_.plan);
+            return options;
+        }
+        const std::vector<study::Stretch> to_do = checkpoints_.to_do();
+        const std::int64_t turns = turns_of(task_.plan, to_do);
+        const std::int64_t gyros = gyros_of(to_do);
+        // Gyros that are there count as many turns as the others: of a design they may be of other points, but the
+        // share that is shown need not be exact.
+        if (gyros > 0) options.already_done.turns = turns / gyros * options.already_done.gyros;
+        options.total_turns = turns + options.already_done.turns;
         return options;
     }
 
@@ -179,6 +200,7 @@ class Session {
     parts::Folder folder_;
     const std::int64_t all_gyros_;
     parts::Checkpoints checkpoints_;
+    ensemble::Progress progress_;
 };
 
 void announce(const Task& task, std::int64_t gyros) {
@@ -197,7 +219,10 @@ void announce(const Task& task, std::int64_t gyros) {
 class Outcome {
    public:
     Outcome(const RunArguments& arguments, store::Provenance provenance, const OnOutcome& on_outcome)
-        : arguments_(arguments), provenance_(std::move(provenance)), on_outcome_(on_outcome) {}
+        : arguments_(arguments),
+          provenance_(std::move(provenance)),
+          on_outcome_(on_outcome),
+          figure_(claim_figure(arguments.plot)) {}
 
     /// \param before_s  wall time of earlier processes that went into it
     void spent(const study::Experiment& experiment, double before_s) {
@@ -208,9 +233,11 @@ class Outcome {
     }
     double wall_s() const { return provenance_.wall_s; }
 
-    void write(study::ResultWriter& writer, const study::Experiment& experiment,
+    void write(study::ResultWriter& writer, const study::Experiment& experiment, ensemble::Progress& progress,
                const std::function<void()>& write_samples) {
+        progress.stage("summing up");
         const std::vector<study::Summary> summaries = study::summarise(experiment);
+        progress.finish();
         try {
             on_outcome_(experiment, summaries, provenance_);
         } catch (const RunError&) {
@@ -219,7 +246,7 @@ class Outcome {
         write_samples();
         check_interrupt();
         writer.finish(experiment, summaries, provenance_);
-        if (!arguments_.plot.empty()) report::write_svg(arguments_.plot, experiment_figure(experiment, summaries));
+        if (figure_) report::write_svg(*figure_, experiment_figure(experiment, summaries));
         if (!arguments_.quiet) tell(fmt::format("result: {}\n", writer.path().string()));
     }
 
@@ -232,13 +259,10 @@ class Outcome {
     const RunArguments& arguments_;
     store::Provenance provenance_;
     const OnOutcome& on_outcome_;
+    std::unique_ptr<AtomicPath> figure_;
     std::exception_ptr not_told_;
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
-
-ensemble::ProgressOptions progress_options(const Task& task, std::int64_t turns) {
-    return {.quiet = task.quiet, .total_turns = turns};
-}
 
 /// Without checkpoints: samples go into the result as they come.
 void run_without_checkpoints(const RunArguments& arguments, Task task, Outcome outcome) {
@@ -246,18 +270,17 @@ void run_without_checkpoints(const RunArguments& arguments, Task task, Outcome o
     parts::Folder folder(task.target, parts::manifest_of(task.plan.scenario, {}), beginning_of(arguments), say);
     const std::int64_t gyros = gyros_of(task);
     if (!task.quiet) announce(task, gyros);
-    ensemble::Progress progress(gyros, progress_options(task, study::expected_turns(task.plan)));
-    const ensemble::Monitor monitor{interrupted,
-                                    [&](std::int64_t done, std::int64_t turns) { progress.advance(done, turns); }};
+    ensemble::Progress progress(
+        gyros, {.quiet = task.quiet, .total_turns = study::expected_turns(task.plan), .grows = task.grows()});
     study::OnSamples on_samples;
     if (task.plan.scenario.output.angle_record) {
         on_samples = [&](const study::SampledAngles& samples) { writer.write_samples(samples); };
     }
-    const study::Experiment experiment = study::run(std::move(task.plan), task.threads, on_samples, monitor);
-    progress.finish();
+    const study::Experiment experiment =
+        study::run(std::move(task.plan), task.threads, on_samples, {interrupted, &progress});
     check_interrupt();
     outcome.spent(experiment, 0.0);
-    outcome.write(writer, experiment, [] {});
+    outcome.write(writer, experiment, progress, [] {});
     outcome.fail_if_not_told();
 }
 
@@ -265,23 +288,13 @@ void run_whole(const RunArguments& arguments, Task task, double every_s, Outcome
     study::ResultWriter writer(task.target, task.plan);
     Session session(std::move(task), every_s, beginning_of(arguments));
     parts::Checkpoints& checkpoints = session.checkpoints();
-    const bool grows = session.task().grows();
-    const std::int64_t gyros = session.all_gyros() - checkpoints.gyros_before();
     if (!arguments.quiet) announce(session.task(), session.all_gyros());
-    const std::int64_t turns =
-        grows ? study::expected_turns(session.task().plan) : turns_of(session.task().plan, checkpoints.to_do());
-    ensemble::Progress progress(gyros, progress_options(session.task(), turns));
-    const ensemble::Monitor monitor{interrupted, [&](std::int64_t done, std::int64_t more_turns) {
-                                        checkpoints.count(more_turns);
-                                        progress.advance(done, more_turns);
-                                    }};
     session.keep_whatever_happens([&] {
         const study::Experiment experiment =
-            study::run(std::move(session.task().plan), session.task().threads, checkpoints, monitor);
-        progress.finish();
+            study::run(std::move(session.task().plan), session.task().threads, checkpoints, session.monitor());
         check_interrupt();
         outcome.spent(experiment, 3600.0 * checkpoints.hours_before());
-        outcome.write(writer, experiment, [&] {
+        outcome.write(writer, experiment, session.progress(), [&] {
             if (!experiment.scenario.output.angle_record) return;
             checkpoints.keep_all();
             checkpoints.finished().each_samples([&](const study::SampledAngles& samples) {
@@ -298,26 +311,21 @@ void run_shard(const RunArguments& arguments, Task task, double every_s, Outcome
     AtomicPath claim(task.target);
     Session session(std::move(task), every_s, beginning_of(arguments));
     parts::Checkpoints& checkpoints = session.checkpoints();
-    const std::vector<study::Stretch> to_do = checkpoints.to_do();
     if (!arguments.quiet) announce(session.task(), session.all_gyros());
     study::Experiment& plan = session.task().plan;
-    ensemble::Progress progress(gyros_of(to_do), progress_options(session.task(), turns_of(plan, to_do)));
-    const ensemble::Monitor monitor{interrupted, [&](std::int64_t done, std::int64_t turns) {
-                                        checkpoints.count(turns);
-                                        progress.advance(done, turns);
-                                    }};
     session.keep_whatever_happens([&] {
-        checkpoints.take_up(plan.points, 0, std::numeric_limits<std::int64_t>::max());
+        const std::vector<study::Stretch> to_do =
+            checkpoints.take_up(plan.points, 0, std::numeric_limits<std::int64_t>::max());
         study::run(
             plan.points, to_do, session.task().threads,
             [&](std::size_t point, std::int64_t first, std::size_t gyros) {
                 return checkpoints.keeper(point, first, gyros);
             },
-            monitor);
-        progress.finish();
+            session.monitor());
+        session.progress().finish();
         checkpoints.keep_all();
         check_interrupt();
-        outcome.spent(session.task().plan, 3600.0 * checkpoints.hours_before());
+        outcome.spent(plan, 3600.0 * checkpoints.hours_before());
         parts::write_shard(claim.partial(), session.folder().manifest(), checkpoints.finished(), outcome.wall_s());
         claim.commit();
         session.folder().remove();
@@ -369,13 +377,14 @@ bool run_one(const RunArguments& arguments, const std::string& scenario_file, co
     if (!arguments.shard.empty()) shard = parts::parse_shard(arguments.shard);
     const scenario::Scenario scenario = load_scenario(scenario_file, arguments.changes);
     refuse_what_does_not_go_together(arguments, scenario);
-    check_figure(arguments.plot);
+    const std::filesystem::path target = shard ? parts::shard_file(result, *shard) : result;
+    refuse_same_files({{"SCENARIO", scenario_file, NamedFile::Use::input},
+                       {"-o", target, NamedFile::Use::output},
+                       {"--plot", arguments.plot, NamedFile::Use::output}});
+    check_room(target, needs_of(scenario, threads, every_s.has_value(), shard ? shard->count : 1), arguments.quiet);
 
     Outcome outcome(arguments, store::collect_provenance(command_line, threads, scenario_file), on_outcome);
-    Task task{scenario_file,  study::Experiment(scenario),
-              result,         shard ? parts::shard_file(result, *shard) : result,
-              shard,          threads,
-              arguments.quiet};
+    Task task{scenario_file, study::Experiment(scenario), result, target, shard, threads, arguments.quiet};
     const parts::Manifest manifest = parts::manifest_of(scenario, shard);
     const bool is_there = shard ? is_shard_of(task.target, manifest) : is_finished(result, task.plan);
     if (arguments.resume && is_there) {
@@ -391,7 +400,6 @@ bool run_one(const RunArguments& arguments, const std::string& scenario_file, co
                         "with -o, or remove it",
                         task.target.string()));
     }
-    check_room(task.target, task.plan, every_s.has_value());
     if (shard) {
         run_shard(arguments, std::move(task), *every_s, std::move(outcome));
     } else if (every_s) {

@@ -25,9 +25,14 @@ using scenario::Scenario;
 
 constexpr std::size_t piece_turns = 4096;  // even
 constexpr std::int64_t most_rows = 200'000'000;
+constexpr double most_witnesses = 4.0;  // three axes and a temperature
 
-/// The scenario with the one arm that is recorded, its rules checked.
-Scenario with_trajectory(Scenario scenario) {
+/// The scenario with the one arm that is recorded, its rules and the number of the gyro checked.
+Scenario with_trajectory(Scenario scenario, std::int64_t gyro) {
+    const std::int64_t gyros = ensemble::total_gyros(scenario);
+    if (gyro < 0 || gyro >= gyros) {
+        throw InputError(fmt::format("gyro {}: the scenario has the gyros 0 to {}", gyro, gyros - 1));
+    }
     const bool noisy = scenario.record.trajectory == scenario::RecordTrajectory::noise_injected;
     scenario.arms = scenario::parse_arms({noisy ? "noise_injected" : "uncompensated"});
     const auto complaints = scenario::check(scenario);
@@ -115,6 +120,7 @@ class Sampler {
         time_s_ = time_s;
         angle_ = angle_arcsec;
     }
+    void reserve(std::size_t samples) { samples_.values.reserve(samples); }
     /// Increments begun and ended so far.
     std::size_t size() const { return samples_.values.size(); }
     record::Samples finish(std::size_t wanted) {
@@ -166,6 +172,16 @@ void apply(const Stages& stages, double record_hz, double start_s, std::size_t w
     for (auto& [name, values] : samples.witnesses) values.resize(samples.values.size());
 }
 
+void reserve(std::size_t rows, record::Turns& turns) {
+    turns.time_s.reserve(rows);
+    turns.direction.reserve(rows);
+    turns.quarter_count.reserve(rows);
+    for (std::vector<double>* column :
+         {&turns.sine, &turns.cosine, &turns.accel_before_rad_s2, &turns.accel_after_rad_s2}) {
+        column->reserve(rows);
+    }
+}
+
 void add_turns(const ensemble::GyroBlock& block, std::int64_t first_turn, double clock_hz, record::Turns& turns) {
     const readout::LaneReadings& readings = block.hardware(0);
     for (std::size_t i = 0; i < readings.turns; ++i) {
@@ -175,9 +191,7 @@ void add_turns(const ensemble::GyroBlock& block, std::int64_t first_turn, double
         if (clock_hz > 0.0) time_s = std::nearbyint(time_s * clock_hz) / clock_hz;
         turns.time_s.push_back(time_s);
         turns.direction.push_back(readings.minimum(i) ? 1 : -1);
-        const double off = block.count_errors().empty() ? 0.0 : block.count_errors()[i][0];
-        turns.quarter_count.push_back(4 * static_cast<std::int64_t>(readings.phase_whole[i][0]) +
-                                      static_cast<std::int64_t>(readings.count[i][0] + off));
+        turns.quarter_count.push_back(block.quarter_count(0, i, 0));
         turns.sine.push_back(readings.sine[i][0]);
         turns.cosine.push_back(readings.cosine[i][0]);
         turns.accel_before_rad_s2.push_back(readings.accel_before_rad_s2[i][0]);
@@ -185,17 +199,21 @@ void add_turns(const ensemble::GyroBlock& block, std::int64_t first_turn, double
     }
 }
 
-}  // namespace
+/// How many rows a record has, and what its samples are made of.
+struct Extent {
+    bool samples = false;
+    double rows = 0.0;  ///< of the record
+    Stages stages;      ///< of samples
+    double source_hz = 0.0;
+    double source_rows = 0.0;  ///< samples taken before the stages
+};
 
-record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
-    const std::int64_t gyros = ensemble::total_gyros(asked);
-    if (gyro < 0 || gyro >= gyros) {
-        throw InputError(fmt::format("gyro {}: the scenario has the gyros 0 to {}", gyro, gyros - 1));
-    }
-    const Scenario s = with_trajectory(asked);
-    const bool samples = s.record.kind == scenario::RecordKind::samples;
+/// Throws InputError where the record would have none, or more than are allowed.
+Extent extent_of(const Scenario& s, std::int64_t gyro) {
+    Extent extent;
+    const bool samples = extent.samples = s.record.kind == scenario::RecordKind::samples;
     const double cycles = s.ensemble.duration_s * s.dither.frequency_hz;
-    const double rows = samples ? s.ensemble.duration_s * s.record.rate_hz : 2.0 * cycles;
+    const double rows = extent.rows = samples ? s.ensemble.duration_s * s.record.rate_hz : 2.0 * cycles;
     if (!(rows <= static_cast<double>(most_rows)) || !(2.0 * cycles <= 1e12)) {
         throw InputError(
             fmt::format("key \"ensemble.duration_s\" = {:g}: a record of {:.3g} rows; at most {} are "
@@ -206,6 +224,36 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
         throw InputError(fmt::format("key \"record.rate_hz\" = {:g}: a record of {:g} s holds no sample",
                                      s.record.rate_hz, s.ensemble.duration_s));
     }
+    if (!samples) return extent;
+    extent.stages = sample_stages(s, gyro);
+    double source_hz = s.record.rate_hz;
+    std::string key = "record.rate_hz";
+    for (const Stage& stage : extent.stages) {
+        const double needed_hz = stage.does->source_hz(source_hz);
+        if (needed_hz != source_hz) {
+            const effects::Parameter* rate = effects::first_of(*stage.effect, effects::Role::sampled);
+            key = fmt::format("effects.{}.{}", stage.effect->name(), rate->name);
+        }
+        source_hz = needed_hz;
+    }
+    const double source_rows =
+        std::ceil(s.ensemble.duration_s * source_hz - 1e-9) + (extent.stages.empty() ? 0.0 : 1.0);
+    if (!(source_rows <= static_cast<double>(most_rows))) {
+        throw InputError(fmt::format("key \"{}\" = {:g}: {:.3g} samples; at most {} are allowed", key, source_hz,
+                                     source_rows, most_rows));
+    }
+    extent.source_hz = source_hz;
+    extent.source_rows = source_rows;
+    return extent;
+}
+
+}  // namespace
+
+record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
+    const Scenario s = with_trajectory(asked, gyro);
+    const Extent extent = extent_of(s, gyro);
+    const bool samples = extent.samples;
+    const double cycles = s.ensemble.duration_s * s.dither.frequency_hz;
     ensemble::GyroBlock block(s, s.arms, gyro, 1, ensemble::Detail::hardware);
     const ensemble::Schedule schedule(s);
 
@@ -231,25 +279,10 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
     const double end_s = block.turn_time_s(settle_turns + turns - 1, 0);
     out.declared = declared(s, start_s, end_s);
     if (samples) {
-        const Stages stages = sample_stages(s, gyro);
-        double source_hz = s.record.rate_hz;
-        std::string key = "record.rate_hz";
-        for (const Stage& stage : stages) {
-            const double needed_hz = stage.does->source_hz(source_hz);
-            if (needed_hz != source_hz) {
-                const effects::Parameter* rate = effects::first_of(*stage.effect, effects::Role::sampled);
-                key = fmt::format("effects.{}.{}", stage.effect->name(), rate->name);
-            }
-            source_hz = needed_hz;
-        }
-        const double source_rows = std::ceil(s.ensemble.duration_s * source_hz - 1e-9) + (stages.empty() ? 0.0 : 1.0);
-        if (!(source_rows <= static_cast<double>(most_rows))) {
-            throw InputError(fmt::format("key \"{}\" = {:g}: {:.3g} samples; at most {} are allowed", key, source_hz,
-                                         source_rows, most_rows));
-        }
-        Sampler sampler(source_hz, start_s);
-        const auto wanted = static_cast<std::size_t>(std::floor(rows + 1e-9));
-        const auto taken = stages.empty() ? wanted : static_cast<std::size_t>(source_rows);
+        const Stages& stages = extent.stages;
+        Sampler sampler(extent.source_hz, start_s);
+        const auto wanted = static_cast<std::size_t>(std::floor(extent.rows + 1e-9));
+        const auto taken = stages.empty() ? wanted : static_cast<std::size_t>(extent.source_rows);
         const auto sample = [&](std::int64_t first, std::size_t n) {
             const readout::LaneAngles& angles = block.angles(0);
             for (std::size_t i = 0; i < n; ++i) {
@@ -258,6 +291,7 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
                             s.gyro.scale_factor_arcsec * fringes);
             }
         };
+        sampler.reserve(taken + 64);
         // A few turns more, for the end of the last sample to lie between two of them.
         advance(settle_turns + turns + 4, sample);
         while (!stages.empty() && sampler.size() < taken) advance(turn + 2, sample);
@@ -266,6 +300,7 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
     } else {
         const bool clocked = s.readout.model != scenario::ReadoutModel::ideal && s.readout.clock_hz > 0.0;
         out.turns.emplace();
+        reserve(static_cast<std::size_t>(turns), *out.turns);
         advance(settle_turns + turns, [&](std::int64_t first, std::size_t) {
             add_turns(block, first, clocked ? s.readout.clock_hz : 0.0, *out.turns);
         });
@@ -273,6 +308,23 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
     out.input_rate_deg_h = input_rate(s, gyro, start_s, end_s);
     out.temperature_c = temperature(s, start_s, end_s);
     return out;
+}
+
+Room expected_room(const Scenario& asked, std::int64_t gyro) {
+    const Scenario s = with_trajectory(asked, gyro);
+    const Extent extent = extent_of(s, gyro);
+    constexpr double of_program = 40e6;
+    constexpr double real = 8.0;
+    if (!extent.samples) {
+        constexpr double of_turn = 6.0 * real + 1.0;  // five numbers, a count, a direction
+        return {static_cast<std::uint64_t>(of_program + of_turn * extent.rows),
+                static_cast<std::uint64_t>(of_turn * extent.rows)};
+    }
+    // Stages make new samples of the old ones beside them, and may add a witness for each axis.
+    const double source_bytes = real * extent.source_rows;
+    const double made_bytes = extent.stages.empty() ? 0.0 : source_bytes + real * most_witnesses * extent.rows;
+    return {static_cast<std::uint64_t>(of_program + source_bytes + made_bytes),
+            static_cast<std::uint64_t>(real * (extent.stages.empty() ? 1.0 : 1.0 + most_witnesses) * extent.rows)};
 }
 
 }  // namespace ringlock::instrument

@@ -18,6 +18,16 @@ namespace ringlock::instrument {
 /// trajectory cannot be followed, Interrupted.
 record::Record simulate_record(const scenario::Scenario& scenario, std::int64_t gyro = 0);
 
+/// What such a record takes: memory while it is made, and the disk when it is written.
+struct Room {
+    std::uint64_t memory_bytes = 0;
+    std::uint64_t disk_bytes = 0;
+};
+
+/// Estimated from the scenario alone, before anything is simulated; at most. Throws InputError as simulate_record()
+/// does.
+Room expected_room(const scenario::Scenario& scenario, std::int64_t gyro = 0);
+
 inline constexpr double start_temperature_c = 20.0;
 
 }  // namespace ringlock::instrument

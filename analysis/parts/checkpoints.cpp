@@ -122,6 +122,10 @@ Checkpoints::Checkpoints(const Folder& folder, const study::Experiment& plan, Op
     }
     seconds_before_ = finished_.wall_s();
     gyros_before_ = gyros_ = finished_.gyros();
+}
+
+void Checkpoints::begin(std::function<ensemble::Progress::Pace()> pace) {
+    pace_ = std::move(pace);
     worker_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
@@ -179,6 +183,7 @@ bool Checkpoints::keep_what_can_be() noexcept try {
     patient_ = false;
     worker_.request_stop();
     if (worker_.joinable()) worker_.join();
+    const HoldEnd until_it_is_kept;
     keep_all();
     return true;
 } catch (...) {
@@ -206,6 +211,7 @@ void Checkpoints::keep_all() {
 void Checkpoints::keep_blocks(std::vector<Waiting>& blocks) {
     const auto note = [&](const Waiting& block, const fs::path& file) {
         const std::lock_guard lock(mutex_);
+        if (finished_.blocks() == 0) note_written(path_);
         finished_.add_block(block.block.study, block.block.first_gyro, block.gyros, file, true);
     };
     while (!blocks.empty() && !blocks.back().partial.empty()) {
@@ -330,8 +336,9 @@ void Checkpoints::tell_status() {
     status.time_utc = now_utc();
     status.elapsed_s = std::chrono::duration<double>(Clock::now() - start_).count();
     status.of_gyros = options_.of_gyros;
-    status.turns_per_s = static_cast<double>(turns_) / std::max(status.elapsed_s, 1e-9);
-    if (options_.left_s) status.left_s = options_.left_s();
+    const ensemble::Progress::Pace pace = pace_();
+    status.turns_per_s = pace.turns_per_s;
+    status.left_s = pace.left_s;
     {
         const std::lock_guard lock(mutex_);
         status.gyros = gyros_;

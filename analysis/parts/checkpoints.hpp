@@ -17,6 +17,7 @@
 #include "analysis/parts/folder.hpp"
 #include "analysis/parts/part_files.hpp"
 #include "analysis/study/experiment.hpp"
+#include "engine/ensemble/progress.hpp"
 
 namespace ringlock::parts {
 
@@ -29,10 +30,9 @@ namespace ringlock::parts {
 class Checkpoints final : public study::Store {
    public:
     struct Options {
-        double every_s = 30.0;                               ///< 0: every block by itself
-        std::optional<Shard> shard = {};                     ///< what is simulated of the run; else all
-        std::int64_t of_gyros = 0;                           ///< of which write_status() tells
-        std::function<std::optional<double>()> left_s = {};  ///< time left, for write_status()
+        double every_s = 30.0;            ///< 0: every block by itself
+        std::optional<Shard> shard = {};  ///< what is simulated of the run; else all
+        std::int64_t of_gyros = 0;        ///< of which write_status() tells
     };
 
     /// Reads what the folder holds. Files that are damaged are told of and put aside: their gyros are simulated again.
@@ -44,11 +44,11 @@ class Checkpoints final : public study::Store {
     std::unique_ptr<study::BlockKeeper> keeper(std::size_t point, std::int64_t first_gyro, std::size_t gyros) override;
     double hours_before() const override { return seconds_before_ / 3600.0; }
 
+    /// Begins to keep what is finished, and to tell how far it is. Before the first block is simulated.
+    void begin(std::function<ensemble::Progress::Pace()> pace);
+
     /// What this process has to simulate, of an experiment that does not grow.
     std::vector<study::Stretch> to_do() const;
-
-    /// Turns that this process has simulated since it was asked last.
-    void count(std::int64_t turns) { turns_ += turns; }
 
     /// Gyros that were finished before this process.
     std::int64_t gyros_before() const { return gyros_before_; }
@@ -91,6 +91,7 @@ class Checkpoints final : public study::Store {
     const Options options_;
     const Tell tell_;
     const bool samples_;
+    std::function<ensemble::Progress::Pace()> pace_;
     std::vector<std::int64_t> gyros_of_points_;
     FinishedGyros finished_;
     double seconds_before_ = 0.0;
@@ -106,7 +107,6 @@ class Checkpoints final : public study::Store {
     std::int64_t gyros_ = 0;
     double blocks_s_ = 0.0;
     std::string last_block_;
-    std::atomic<std::int64_t> turns_ = 0;
     std::atomic<bool> patient_ = true;
     std::optional<std::chrono::steady_clock::time_point> told_;  ///< that the run waits
     std::optional<std::chrono::steady_clock::time_point> gone_;  ///< since when the folder is

@@ -16,6 +16,7 @@
 #include <system_error>
 
 #include "analysis/parts/part_files.hpp"
+#include "analysis/parts/status.hpp"
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/system_text.hpp"
@@ -68,7 +69,9 @@ bool has_name(int fd, const fs::path& path) {
 
 }  // namespace
 
-fs::path folder_of(const fs::path& output) { return resolved_target(output).string() + std::string(folder_suffix); }
+fs::path folder_of(const fs::path& output) {
+    return follow_links(fs::absolute(output)).string() + std::string(folder_suffix);
+}
 
 fs::path shard_file(const fs::path& output, const Shard& shard) {
     return fmt::format("{}.shard-{}-of-{}", output.string(), shard.number, shard.count);
@@ -152,7 +155,7 @@ Folder::Folder(const fs::path& output, const Manifest& manifest, Beginning begin
             }
         }
         clear(tell);
-        write_text(path_ / manifest_name, to_json(manifest_));
+        replace_text(path_ / manifest_name, to_json(manifest_));
     } catch (...) {
         if (!has_finished()) remove();
         close(lock_fd_);

@@ -1,15 +1,29 @@
 #include "analysis/parts/status.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
+#include <cerrno>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "analysis/parts/folder.hpp"
+#include "engine/core/error.hpp"
+#include "engine/core/system_text.hpp"
 
 namespace ringlock::parts {
+
+void replace_text(const std::filesystem::path& file, const std::string& text) {
+    const std::filesystem::path partial = file.string() + std::string(partial_suffix);
+    errno = 0;
+    std::ofstream out(partial, std::ios::binary);
+    out << text;
+    out.close();
+    if (!out) throw RunError(fmt::format("{}: cannot be written: {}", file.string(), system_text(errno)));
+    std::error_code error;
+    std::filesystem::rename(partial, file, error);
+    if (error) throw RunError(fmt::format("{}: cannot be named: {}", file.string(), error.message()));
+}
 
 void write_status(const std::filesystem::path& folder, const Status& status) {
     nlohmann::ordered_json json{
@@ -17,13 +31,11 @@ void write_status(const std::filesystem::path& folder, const Status& status) {
         {"gyros", status.gyros},     {"of_gyros", status.of_gyros},    {"turns_per_s", status.turns_per_s},
         {"left_s", nullptr},         {"last_block", status.last_block}};
     if (status.left_s) json["left_s"] = *status.left_s;
-    // Renamed so that nobody reads half of it; not synced, since after a crash of the machine it is worth nothing.
-    const std::filesystem::path partial = folder / fmt::format("{}{}", status_name, partial_suffix);
-    std::ofstream out(partial);
-    out << json.dump(2) << '\n';
-    out.close();
-    std::error_code ignored;
-    if (out) std::filesystem::rename(partial, folder / status_name, ignored);
+    try {
+        replace_text(folder / status_name, json.dump(2) + "\n");
+    } catch (const RunError&) {
+        return;
+    }
 }
 
 std::optional<Status> read_status(const std::filesystem::path& folder) try {

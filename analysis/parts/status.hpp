@@ -18,6 +18,10 @@ struct Status {
     std::string last_block;  ///< "gyros 16 to 31 at 2026-01-01T00:00:00Z"; empty where none is finished yet
 };
 
+/// Puts text in the place of a file of a folder, so that nobody reads half of it. Not brought to the disk: after a
+/// crash of the machine it is worth nothing. Throws RunError.
+void replace_text(const std::filesystem::path& file, const std::string& text);
+
 /// Writes it for read_status(). Fails silently: a run goes on without.
 void write_status(const std::filesystem::path& folder, const Status& status);
 

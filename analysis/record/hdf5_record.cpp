@@ -9,7 +9,6 @@
 #include "analysis/record/probe.hpp"
 #include "analysis/record/readers.hpp"
 #include "engine/core/error.hpp"
-#include "engine/store/atomic_file.hpp"
 
 namespace ringlock::record {
 namespace {
@@ -35,7 +34,7 @@ store::Dataset open_column(const store::Group& group, const std::string& name) {
     double rows = 1.0;
     for (const std::uint64_t extent : shape) rows *= static_cast<double>(extent);
     if (8.0 * columns * rows > memory_bytes()) {
-        fail(dataset, fmt::format("has {} rows, more than this machine has memory for (is the file damaged?); cut the "
+        fail(dataset, fmt::format("has {} rows, more than memory is free for (is the file damaged?); cut the "
                                   "record into pieces",
                                   rows));
     }
@@ -296,31 +295,33 @@ std::string hdf5_format(const std::string& path) {
     return read();
 }
 
-void check_output(const std::string& path) {
+namespace {
+
+/// The path, where no other file than a record would be lost.
+const std::string& refuse_to_lose(const std::string& path) {
     std::error_code ignored;
-    if (!std::filesystem::exists(path, ignored)) return;
-    if (std::filesystem::is_regular_file(path, ignored)) {
-        bool record = false;
-        if (is_hdf5(path)) {
-            try {
-                record = hdf5_format(path) == format_name;
-            } catch (const InputError&) {
-                record = false;
-            }
-        }
-        if (!record) {
-            throw InputError(
-                fmt::format("cannot write {}: it is there and no rlg-record in HDF5; name another file or "
-                            "move it away",
-                            path));
+    if (!std::filesystem::is_regular_file(path, ignored)) return path;
+    bool record = false;
+    if (is_hdf5(path)) {
+        try {
+            record = hdf5_format(path) == format_name;
+        } catch (const InputError&) {
+            record = false;
         }
     }
+    if (record) return path;
+    throw InputError(
+        fmt::format("cannot write {}: it is there and no rlg-record in HDF5; name another file or move it away", path));
 }
 
-void write_record(const std::string& path, const Record& record) {
-    check_output(path);
-    store::AtomicFile atomic(path);
-    store::File& file = atomic.file();
+}  // namespace
+
+RecordWriter::RecordWriter(const std::string& path) : file_(refuse_to_lose(path)) {}
+
+void write_record(const std::string& path, const Record& record) { RecordWriter(path).write(record); }
+
+void RecordWriter::write(const Record& record) {
+    store::File& file = file_.file();
     file.set_attribute("format", format_name);
     file.set_attribute("format_version", format_version);
     for (const TextName& name : text_names) {
@@ -345,7 +346,7 @@ void write_record(const std::string& path, const Record& record) {
                     temperature ? store::Label{"degC", "temperature of the gyro, linear between the rows"}
                                 : store::Label{"deg/h", "rate about the input axis, linear between the rows"});
     }
-    atomic.commit();
+    file_.commit();
 }
 
 }  // namespace ringlock::record

@@ -14,6 +14,7 @@
 
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
+#include "engine/core/waiting.hpp"
 
 namespace ringlock::record {
 namespace {
@@ -56,10 +57,9 @@ void try_reading(const std::string& path, const std::function<void()>& read) {
     const pid_t probe = fork();
     if (probe == 0) be_the_probe(read, seconds);
     if (probe < 0) throw RunError(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
-    int status = 0;
-    while (waitpid(probe, &status, 0) < 0) {
-        if (errno != EINTR) return;  // nobody knows: somebody else waits for our children
-    }
+    const int status = wait_for_child(probe);
+    check_interrupt();         // Ctrl-C reaches the probe, too
+    if (status == -1) return;  // nobody knows: somebody else waits for our children
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
     throw InputError(
         fmt::format("{}: is damaged: the HDF5 library does not get through it; take another copy, or have "

@@ -52,7 +52,7 @@ inline constexpr std::array<SampleKind, 3> sample_kinds = {SampleKind::angle_inc
 inline constexpr const char* format_name = "rlg-record";
 inline constexpr std::int64_t format_version = 1;
 
-/// Bytes of the machine's memory.
+/// Bytes of memory that were free when it was first asked for: before the columns of a record took some of them.
 double memory_bytes();
 
 /// "a, b, c", at most the first 20.

@@ -1,7 +1,6 @@
 #include "analysis/record/record.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -13,6 +12,7 @@
 
 #include "analysis/record/readers.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/free_memory.hpp"
 
 namespace ringlock::record {
 
@@ -38,7 +38,8 @@ const char* name_of(SampleKind kind) {
 }
 
 double memory_bytes() {
-    return static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+    static const auto bytes = static_cast<double>(free_memory_bytes());
+    return bytes;
 }
 
 bool is_hdf5(const std::string& path) {

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "engine/store/atomic_file.hpp"
+
 /// Measured data from files.
 namespace ringlock::record {
 
@@ -82,12 +84,23 @@ std::string hdf5_format(const std::string& path);
 /// zeros.
 Record read_record(const std::string& path);
 
-/// Writes the HDF5 form, whole or not at all, unchecked; accelerations without any row are left out. Only another
-/// record is replaced. Throws InputError where the file cannot be written, RunError where the disk refuses.
-void write_record(const std::string& path, const Record& record);
+/// The HDF5 form of a record, which appears whole or not at all.
+class RecordWriter {
+   public:
+    /// Claims the file: before the work, not after it. Throws InputError where it cannot be written, or is there and no
+    /// record: only another record is replaced.
+    explicit RecordWriter(const std::string& path);
 
-/// Throws InputError where write_record() would not write there: before the work, not after it.
-void check_output(const std::string& path);
+    /// Writes the record, unchecked, and gives the file its name; accelerations without any row are left out. Throws
+    /// RunError where the disk refuses or somebody else has made or changed the file since it was claimed.
+    void write(const Record& record);
+
+   private:
+    store::AtomicFile file_;
+};
+
+/// Claims the file and writes the record.
+void write_record(const std::string& path, const Record& record);
 
 enum class Severity {
     error,    ///< no record: reading refuses it

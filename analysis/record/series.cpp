@@ -55,7 +55,7 @@ class Collector {
         constexpr double bytes_a_value = 3.0 * sizeof(double);
         if (bytes_a_value * static_cast<double>(values) <= memory_bytes()) return;
         throw InputError(
-            fmt::format("{}: has more values than this machine has memory for ({} and more, those that "
+            fmt::format("{}: has more values than memory is free for ({} and more, those that "
                         "are missing included); cut the record into pieces",
                         file_, values));
     }

@@ -1,16 +1,15 @@
 #include "analysis/record/text_lines.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <charconv>
-#include <cstdio>
 #include <cstring>
-#include <memory>
 #include <vector>
 
 #include "engine/core/error.hpp"
-#include "engine/core/interrupt.hpp"
+#include "engine/core/waiting.hpp"
 
 namespace ringlock::record {
 
@@ -49,8 +48,6 @@ std::errc parse_whole_field(std::string_view field, Number& value) {
     return end == field.data() + field.size() ? error : std::errc::invalid_argument;
 }
 
-int leave_open(std::FILE*) { return 0; }
-
 }  // namespace
 
 bool parse_number(std::string_view field, double& value) { return parse_whole_field(field, value) == std::errc(); }
@@ -71,23 +68,22 @@ std::string name_of_file(const std::string& path) { return path == standard_inpu
 void for_each_line(const std::string& given_path, const std::function<void(std::string_view)>& line) {
     const bool standard = given_path == standard_input;
     const std::string path = name_of_file(given_path);
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(standard ? stdin : std::fopen(path.c_str(), "rb"),
-                                                               standard ? &leave_open : &std::fclose);
-    if (!file) throw InputError(fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
+    const Descriptor file = standard ? Descriptor() : open_to_read(path);
+    if (!standard && !file.valid()) {
+        throw InputError(fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
+    }
+    const int descriptor = standard ? STDIN_FILENO : file.get();
     constexpr std::size_t longest_line = std::size_t{1} << 22;
     std::vector<char> buffer(std::size_t{1} << 18);
     std::size_t filled = 0;
     for (;;) {
-        check_interrupt();
-        const std::size_t got = std::fread(buffer.data() + filled, 1, buffer.size() - filled, file.get());
+        const ssize_t got = read_some(descriptor, buffer.data() + filled, buffer.size() - filled);
+        if (got < 0) throw InputError(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
         if (got == 0) {
-            if (std::ferror(file.get())) {
-                throw InputError(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));
-            }
             if (filled > 0) line({buffer.data(), filled});
             break;
         }
-        filled += got;
+        filled += static_cast<std::size_t>(got);
         std::size_t begin = 0;
         while (const void* found = std::memchr(buffer.data() + begin, '\n', filled - begin)) {
             const auto end = static_cast<std::size_t>(static_cast<const char*>(found) - buffer.data());

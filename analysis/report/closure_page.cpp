@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "analysis/closure/report/report.hpp"
+#include "analysis/closure/report/seal.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/report/plot.hpp"
 #include "engine/core/atomic_path.hpp"
@@ -216,7 +217,8 @@ void write_closure_page(const std::filesystem::path& folder, const std::string& 
     std::string problem;
     for (const Picture& picture : pictures(source, closure, predictive)) {
         try {
-            write_svg(folder / picture.file, picture.figure);
+            const std::string figure = draw_svg(picture.figure, (folder / picture.file).string());
+            write_text(folder / picture.file, closure::sealed(figure, closure::Comment::markup));
             page += fmt::format("![{}]({})\n\n{}\n\n", picture.figure.title, picture.file, picture.caption);
         } catch (const RunError& error) {
             problem = error.what();
@@ -239,7 +241,7 @@ void write_closure_page(const std::filesystem::path& folder, const std::string& 
         "## The files\n\n- `closed.toml`: the device as fitted, for `ringlock run` and `ringlock record`\n- "
         "`closure.h5`: parameters, one-step predictions, scores, the predictive check point by point\n- "
         "`closure.json`: this page for programs\n";
-    write_text(folder / "report.md", page);
+    write_text(folder / "report.md", closure::sealed(page, closure::Comment::markup));
 }
 
 }  // namespace ringlock::report

@@ -9,11 +9,13 @@
 
 #include <cerrno>
 #include <csignal>
+#include <limits>
 #include <string_view>
 #include <system_error>
-#include <utility>
 
 #include "engine/core/error.hpp"
+#include "engine/core/interrupt.hpp"
+#include "engine/core/waiting.hpp"
 
 extern char** environ;
 
@@ -22,40 +24,9 @@ namespace {
 
 std::string reason(int error) { return std::generic_category().message(error); }
 
-class Descriptor {
-   public:
-    explicit Descriptor(int fd) : fd_(fd) {}
-    Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-    Descriptor(const Descriptor&) = delete;
-    Descriptor& operator=(const Descriptor&) = delete;
-    ~Descriptor() {
-        if (fd_ >= 0) ::close(fd_);
-    }
-
-    int get() const { return fd_; }
-
-   private:
-    int fd_;
-};
-
-/// Removes a file at the end of its scope.
-class Removal {
-   public:
-    explicit Removal(std::filesystem::path path) : path_(std::move(path)) {}
-    Removal(const Removal&) = delete;
-    Removal& operator=(const Removal&) = delete;
-    ~Removal() {
-        std::error_code ignored;
-        std::filesystem::remove(path_, ignored);
-    }
-
-   private:
-    std::filesystem::path path_;
-};
-
 Descriptor memory_file(const char* name) {
     Descriptor file(::memfd_create(name, MFD_CLOEXEC));
-    if (file.get() < 0) throw RunError(fmt::format("cannot make a buffer for gnuplot: {}", reason(errno)));
+    if (!file.valid()) throw RunError(fmt::format("cannot make a buffer for gnuplot: {}", reason(errno)));
     return file;
 }
 
@@ -128,43 +99,32 @@ int run(int in, int out, int err) {
     }
     if (error != 0) throw RunError(fmt::format("cannot start gnuplot: {}", reason(error)));
 
-    int status = 0;
-    while (::waitpid(child, &status, 0) < 0) {
-        if (errno != EINTR) throw RunError(fmt::format("lost sight of gnuplot: {}", reason(errno)));
-    }
+    const int status = wait_for_child(child);
+    if (status == -1) throw RunError(fmt::format("lost sight of gnuplot: {}", reason(errno)));
     return status;
 }
 
 }  // namespace
 
-void run_gnuplot(const std::string& script, const std::filesystem::path& output) {
-    const std::filesystem::path partial = output.string() + fmt::format(".{}.partial", ::getpid());
+std::string run_gnuplot(const std::string& script, const std::string& shown_as) {
     const Descriptor in = readable(script);
+    const Descriptor out = memory_file("gnuplot-figure");
     const Descriptor messages = memory_file("gnuplot-messages");
-    const Descriptor out(::open(partial.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-    if (out.get() < 0) throw RunError(fmt::format("cannot write {}: {}", output.string(), reason(errno)));
-    const Removal removal(partial);
-
     const int status = run(in.get(), out.get(), messages.get());
+    check_interrupt();  // Ctrl-C reaches gnuplot, too
     if (WIFSIGNALED(status)) {
-        throw RunError(
-            fmt::format("cannot draw {}: gnuplot was ended by signal {}", output.string(), WTERMSIG(status)));
+        throw RunError(fmt::format("cannot draw {}: gnuplot was ended by signal {}", shown_as, WTERMSIG(status)));
     }
     if (WEXITSTATUS(status) != 0) {
-        throw RunError(fmt::format("cannot draw {}: gnuplot failed: {}", output.string(), complaint(messages.get())));
+        throw RunError(fmt::format("cannot draw {}: gnuplot failed: {}", shown_as, complaint(messages.get())));
     }
-    // gnuplot does not notice when the disk is full.
-    const std::string end = tail(out.get(), 32);
-    if (end.find("</svg>") == std::string::npos) {
-        throw RunError(fmt::format("cannot draw {}: gnuplot left it incomplete (is the disk full?): {}",
-                                   output.string(), complaint(messages.get())));
+    std::string figure = tail(out.get(), std::numeric_limits<off_t>::max());
+    // gnuplot does not notice when it cannot write.
+    if (figure.find("</svg>") == std::string::npos) {
+        throw RunError(fmt::format("cannot draw {}: gnuplot left it incomplete (is the memory full?): {}", shown_as,
+                                   complaint(messages.get())));
     }
-    if (::fsync(out.get()) != 0 && errno != EINVAL) {
-        throw RunError(fmt::format("cannot write {}: {}", output.string(), reason(errno)));
-    }
-    std::error_code error;
-    std::filesystem::rename(partial, output, error);
-    if (error) throw RunError(fmt::format("cannot write {}: {}", output.string(), error.message()));
+    return figure;
 }
 
 }  // namespace ringlock::report

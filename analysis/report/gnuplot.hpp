@@ -1,13 +1,12 @@
 #pragma once
-#include <filesystem>
 #include <string>
 
 namespace ringlock::report {
 
-/// Runs gnuplot on a script whose figure goes to standard output, and puts that into a file, complete or not at all.
+/// Runs gnuplot on a script whose figure goes to standard output, and returns the figure, complete.
 ///
-/// Settings of the user (~/.gnuplot) are not read. Throws RunError when gnuplot is missing or fails (with what it said)
-/// or the file cannot be written.
-void run_gnuplot(const std::string& script, const std::filesystem::path& output);
+/// Settings of the user (~/.gnuplot) are not read. `shown_as` names the figure in errors. Throws RunError when gnuplot
+/// is missing or fails (with what it said), Interrupted where the user asks to stop.
+std::string run_gnuplot(const std::string& script, const std::string& shown_as);
 
 }  // namespace ringlock::report

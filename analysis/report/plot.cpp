@@ -7,12 +7,14 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
 
 #include "analysis/report/code_points.hpp"
 #include "analysis/report/gnuplot.hpp"
+#include "engine/core/error.hpp"
 
 namespace ringlock::report {
 namespace {
@@ -309,6 +311,22 @@ std::string script(const Figure& figure) {
 
 }  // namespace
 
-void write_svg(const std::filesystem::path& path, const Figure& figure) { run_gnuplot(script(figure), path); }
+std::string draw_svg(const Figure& figure, const std::string& shown_as) {
+    return run_gnuplot(script(figure), shown_as);
+}
+
+void write_svg(AtomicPath& target, const Figure& figure) {
+    write_text(target, draw_svg(figure, target.target().string()));
+}
+
+void write_svg(const std::filesystem::path& path, const Figure& figure) {
+    std::optional<AtomicPath> target;
+    try {
+        target.emplace(path);
+    } catch (const InputError& error) {
+        throw RunError(error.what());
+    }
+    write_svg(*target, figure);
+}
 
 }  // namespace ringlock::report

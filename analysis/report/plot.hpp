@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/atomic_path.hpp"
+
 namespace ringlock::report {
 
 /// One curve of a figure. Labels and titles are UTF-8 and are shown as they are.
@@ -35,10 +37,15 @@ struct Figure {
 ///
 /// Points that an axis cannot show (not finite, or not above zero on a logarithmic one) are left out; a curve that has
 /// no other keeps its place in the legend, which says so. Bars reaching out of the axes end at them. The same figure
-/// always gives the same bytes under the same gnuplot. The file appears complete or not at all.
+/// always gives the same bytes under the same gnuplot. `shown_as` names it in errors.
 ///
 /// Throws std::invalid_argument when the vectors of a curve differ in length, and RunError when gnuplot is missing or
-/// fails or the file cannot be written.
+/// fails.
+std::string draw_svg(const Figure& figure, const std::string& shown_as);
+
+/// Draws it into a file that is claimed, complete or not at all. Throws RunError, too, when the file cannot be written.
+void write_svg(AtomicPath& target, const Figure& figure);
+/// The same, the file claimed now.
 void write_svg(const std::filesystem::path& path, const Figure& figure);
 
 }  // namespace ringlock::report

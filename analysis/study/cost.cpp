@@ -3,11 +3,17 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <set>
+#include <span>
+#include <string>
 
 #include "engine/core/error.hpp"
 #include "engine/ensemble/draw.hpp"
+#include "engine/ensemble/observer.hpp"
 #include "engine/simd/lanes.hpp"
 
 namespace ringlock::study {
@@ -22,6 +28,27 @@ struct Trial {
     std::int64_t turns = 0;
     double turning_s = 0.0;
     double setup_s = 0.0;
+};
+
+/// Counts turns from when the first block begins to go through them.
+class TrialObserver final : public ensemble::Observer {
+   public:
+    void stage(const std::string&) override {}
+    void plan(std::span<const ensemble::PlannedBlock>, int) override {}
+    void enter(std::size_t, ensemble::BlockStage stage) override {
+        double none = -1.0;
+        if (stage == ensemble::BlockStage::turns) setup_s_.compare_exchange_strong(none, since(start_));
+    }
+    void advance(std::size_t, std::int64_t, std::int64_t turns, bool) override { turns_ += turns; }
+
+    std::int64_t turns() const { return turns_; }
+    double setup_s() const { return std::max(0.0, setup_s_.load()); }
+    double turning_s() const { return setup_s_ < 0.0 ? 0.0 : since(start_) - setup_s_; }
+
+   private:
+    Clock::time_point start_ = Clock::now();
+    std::atomic<double> setup_s_ = -1.0;
+    std::atomic<std::int64_t> turns_ = 0;
 };
 
 /// Takes no statistics: these are made of what the gyros do, and cost little beside it.
@@ -42,20 +69,8 @@ Trial try_point(const scenario::Scenario& of, int threads, double seconds, const
         }
         return Study(enough);
     }();
-    const Clock::time_point start = Clock::now();
-    std::atomic<double> first_turn_s = -1.0;
-    std::atomic<std::int64_t> turns = 0;
-    const auto enough = [&] {
-        const double begun_s = first_turn_s;
-        return begun_s >= 0.0 && since(start) - begun_s >= seconds;
-    };
-    const ensemble::Monitor monitor{[&] { return cancelled() || enough(); },
-                                    [&](std::int64_t, std::int64_t more) {
-                                        double none = -1.0;
-                                        // The first piece of turns is set-up as well: caches are cold.
-                                        if (first_turn_s.compare_exchange_strong(none, since(start))) return;
-                                        turns += more;
-                                    }};
+    TrialObserver observer;
+    const ensemble::Monitor monitor{[&] { return cancelled() || observer.turning_s() >= seconds; }, &observer};
     const Stretch all{0, 0,
                       std::min<std::int64_t>(ensemble::total_gyros(study.scenario),
                                              static_cast<std::int64_t>(threads) * simd::lanes)};
@@ -66,8 +81,7 @@ Trial try_point(const scenario::Scenario& of, int threads, double seconds, const
     } catch (const Interrupted&) {
         if (cancelled()) throw;
     }
-    const double begun_s = std::max(0.0, first_turn_s.load());
-    return {turns, since(start) - begun_s, begun_s};
+    return {observer.turns(), observer.turning_s(), observer.setup_s()};
 }
 
 }  // namespace

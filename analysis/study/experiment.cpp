@@ -136,7 +136,7 @@ class NoStore final : public Store {
 }  // namespace
 
 Experiment run(Experiment experiment, int threads, Store& store, const ensemble::Monitor& monitor) {
-    predict_noise(experiment.points, threads);
+    predict_noise(experiment.points, threads, monitor.observer);
     const MakeKeeper make_keeper = [&](std::size_t point, std::int64_t first_gyro, std::size_t gyros) {
         return store.keeper(point, first_gyro, gyros);
     };
@@ -157,6 +157,7 @@ Experiment run(Experiment experiment, int threads, Store& store, const ensemble:
         grow(experiment, *next);
         simulate(there, *next);
         growth.looks.push_back(*next);
+        if (monitor.observer) monitor.observer->stage("judging the precision");
         const std::chrono::duration<double, std::ratio<3600>> gone = std::chrono::steady_clock::now() - start;
         const lot::Decision decision = decide(rule, stop, *next, experiment, store.hours_before() + gone.count());
         growth.precise = decision.precise;

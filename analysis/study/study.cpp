@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -16,6 +17,7 @@
 #include "analysis/allan/factor_stream.hpp"
 #include "analysis/allan/octave_deviation.hpp"
 #include "analysis/allan/octave_stream.hpp"
+#include "analysis/study/angle_counts.hpp"
 #include "engine/ensemble/closed_form.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/output_counts.hpp"
@@ -67,9 +69,13 @@ std::uint64_t expected_memory_bytes(const scenario::Scenario& scenario) {
         single.ensemble.gyros = single.ensemble.turn_ons = 1;
         return Study(single);
     }();
-    const std::int64_t gyros = scenario::asks(scenario.stop) ? scenario.stop.most_gyros : scenario.ensemble.gyros;
-    const std::uint64_t of_gyro =
-        sizeof(GyroStatistics) + one.factors.size() * sizeof(allan::Point) + one.angle_times_s.size() * sizeof(double);
+    const std::int64_t gyros =
+        scenario::asks(scenario.stop) ? scenario.stop.most_gyros : ensemble::total_gyros(scenario);
+    // Each vector and each text has a head of its own in the heap.
+    constexpr std::uint64_t of_block = 16;
+    constexpr std::uint64_t of_reason = 64;
+    const std::uint64_t of_gyro = sizeof(GyroStatistics) + one.factors.size() * sizeof(allan::Point) + of_block +
+                                  one.angle_times_s.size() * sizeof(double) + of_block + of_reason;
     // A scenario with its effects, in some hundred nodes of its maps.
     constexpr std::uint64_t of_point = 24'000;
     return of_point + static_cast<std::uint64_t>(gyros) *
@@ -89,9 +95,18 @@ bool has_steady_input(const scenario::Scenario& scenario) {
     return scenario.input.sweep_points == 1 && !scenario::has_profile(scenario.input);
 }
 
+namespace {
+
+bool awaits_prediction(const Study& study) {
+    const std::vector<scenario::Arm>& arms = study.scenario.arms;
+    return !study.predicted_noise && std::any_of(arms.begin(), arms.end(), shows_noise);
+}
+
+}  // namespace
+
 void predict_noise(Study& study) {
+    if (!awaits_prediction(study)) return;
     const scenario::Scenario& scenario = study.scenario;
-    if (study.predicted_noise || std::none_of(scenario.arms.begin(), scenario.arms.end(), shows_noise)) return;
     dither::InjectedTurns noise;
     if (scenario.noise_injection.model == scenario::NoiseModel::drive) noise.drive = scenario::drive_noise(scenario);
     noise.rms_rad = scenario::injected_noise(scenario).turn_rms_rad;
@@ -128,7 +143,7 @@ class ArmStream {
     }
 
     void add(std::span<const simd::LaneCounts> counts) {
-        if (cycle_ == 0 && !counts.empty()) last_ = counts.front();
+        if (cycle_ == 0 && !counts.empty()) angle_.start(counts.front());
         note_angles(counts);
         octaves_.add(counts, gyros_);
         for (allan::FactorStream& stream : asked_) stream.add(counts, gyros_);
@@ -139,14 +154,15 @@ class ArmStream {
             take_sample(row);
         }
         // Counts wrap round within hours at high rates, which may be between two samples: never within a piece.
-        if (!counts.empty()) turn_to(counts.back());
+        if (!counts.empty()) angle_.turn_to(counts.back());
     }
 
     GyroStatistics finish(std::size_t lane, const gyro::Setup& setup) const {
         const double arcsec_per_count = setup.scale_factor_arcsec / ensemble::counts_per_fringe;
         GyroStatistics result;
         const auto octaves = allan::deviation(octaves_, lane, arcsec_per_count, study_.schedule.cycle_s);
-        result.allan = octaves;
+        result.allan.reserve(octaves.size() + asked_.size());
+        result.allan.insert(result.allan.end(), octaves.begin(), octaves.end());
         for (const allan::FactorStream& stream : asked_) {
             result.allan.push_back(allan::deviation(stream, lane, octaves, arcsec_per_count, study_.schedule.cycle_s));
         }
@@ -154,9 +170,8 @@ class ArmStream {
                   [](const allan::Point& a, const allan::Point& b) { return a.m < b.m; });
         result.noise = noise::fit_noise(record_.phase(lane, arcsec_per_count),
                                         study_.schedule.sample_interval_s * static_cast<double>(record_.interval()));
-        const double duration_s = study_.schedule.cycle_s * static_cast<double>(study_.schedule.cycles() - 1);
-        result.rate_error_deg_h =
-            static_cast<double>(turned_[lane]) * arcsec_per_count / duration_s - setup.input_rate_deg_h;
+        result.rate_error_deg_h = rate_error_deg_h(angle_.turned(lane), study_.schedule, setup);
+        result.angle_error_arcsec.reserve(angle_errors_counts_.size());
         for (std::size_t i = 0; i < angle_errors_counts_.size(); ++i) {
             result.angle_error_arcsec.push_back(angle_errors_counts_[i][lane] * arcsec_per_count -
                                                 setup.input_rate_deg_h * study_.schedule.cycle_s *
@@ -170,11 +185,10 @@ class ArmStream {
         if (waiting_rows_.empty()) return;
         const std::size_t samples = waiting_rows_.size();
         waiting_.angle_arcsec.resize(gyros_ * samples);
-        const double arcsec_per_count = study_.scenario.gyro.scale_factor_arcsec / ensemble::counts_per_fringe;
+        const double scale_factor_arcsec = study_.scenario.gyro.scale_factor_arcsec;
         for (std::size_t lane = 0; lane < gyros_; ++lane) {
             for (std::size_t i = 0; i < samples; ++i) {
-                waiting_.angle_arcsec[lane * samples + i] =
-                    static_cast<double>(waiting_rows_[i][lane]) * arcsec_per_count;
+                waiting_.angle_arcsec[lane * samples + i] = angle_arcsec(waiting_rows_[i][lane], scale_factor_arcsec);
             }
         }
         keeper_.samples(waiting_);
@@ -183,8 +197,6 @@ class ArmStream {
     }
 
    private:
-    __extension__ using Wide = __int128;  // counts do not wrap round in it
-
     /// Cycle at which an angle is told; none of the record where it has none.
     std::int64_t cycle_at(std::size_t i) const { return study_.angle_cycle(i).value_or(study_.schedule.cycles()); }
 
@@ -193,32 +205,18 @@ class ArmStream {
         for (std::size_t i = 0; i < angle_errors_counts_.size(); ++i) {
             const std::int64_t row = cycle_at(i) - cycle_;
             if (row < 0 || row >= static_cast<std::int64_t>(counts.size())) continue;
-            turn_to(counts[static_cast<std::size_t>(row)]);
+            angle_.turn_to(counts[static_cast<std::size_t>(row)]);
             for (std::size_t lane = 0; lane < gyros_; ++lane) {
-                angle_errors_counts_[i][lane] = static_cast<double>(turned_[lane]);
+                angle_errors_counts_[i][lane] = static_cast<double>(angle_.turned(lane));
             }
         }
     }
 
-    /// Goes on to a later cycle, less than 2^31 fringes away.
-    void turn_to(const simd::LaneCounts& row) {
-        for (std::size_t lane = 0; lane < gyros_; ++lane) {
-            turned_[lane] += static_cast<std::int64_t>(static_cast<std::uint64_t>(row[lane]) -
-                                                       static_cast<std::uint64_t>(last_[lane]));
-        }
-        last_ = row;
-    }
-
     void take_sample(const simd::LaneCounts& row) {
-        turn_to(row);
-        std::array<Wide, simd::lanes> angle{};
-        for (std::size_t lane = 0; lane < gyros_; ++lane) {
-            // The first sample is an angle by itself; from then on differences tell.
-            if (sample_ == 0) origin_[lane] = row[lane];
-            angle[lane] = origin_[lane] + turned_[lane];
-        }
-        ++sample_;
+        angle_.turn_to(row);
         if (!wants_samples_) return;
+        std::array<WideCounts, simd::lanes> angle{};
+        for (std::size_t lane = 0; lane < gyros_; ++lane) angle[lane] = angle_.angle(lane);
         waiting_rows_.push_back(angle);
         if (waiting_rows_.size() == gathered_samples) flush();
     }
@@ -232,12 +230,9 @@ class ArmStream {
     std::vector<allan::FactorStream> asked_;  ///< averaging times that are no octaves
     allan::BoundedRecord record_;
     std::int64_t cycle_ = 0;
-    std::int64_t sample_ = 0;
-    simd::LaneCounts last_;
-    std::array<Wide, simd::lanes> origin_{};
-    std::array<Wide, simd::lanes> turned_{};
+    AngleCounts angle_;
     SampledAngles waiting_;
-    std::vector<std::array<Wide, simd::lanes>> waiting_rows_;
+    std::vector<std::array<WideCounts, simd::lanes>> waiting_rows_;
 };
 
 /// One block of gyros of a study.
@@ -332,11 +327,21 @@ void extend(Study& study, std::int64_t gyros) {
     for (ArmStatistics& arm : study.arms) arm.gyros.resize(static_cast<std::size_t>(gyros));
 }
 
-void predict_noise(std::span<Study> studies, int threads) {
-    // Some seconds each for the noise of a drive.
+void predict_noise(std::span<Study> studies, int threads, ensemble::Observer* observer) {
+    const auto predictions = std::count_if(studies.begin(), studies.end(), awaits_prediction);
+    if (predictions == 0) return;
+    std::atomic<std::int64_t> done = 0;
+    const auto tell = [&](std::int64_t predicted) {
+        if (observer) observer->stage(fmt::format("predicting what noise does, {}/{}", predicted, predictions));
+    };
+    tell(0);
     oneapi::tbb::task_arena arena(threads);
     arena.execute([&] {
-        oneapi::tbb::parallel_for(std::size_t{0}, studies.size(), [&](std::size_t i) { predict_noise(studies[i]); });
+        oneapi::tbb::parallel_for(std::size_t{0}, studies.size(), [&](std::size_t i) {
+            if (!awaits_prediction(studies[i])) return;
+            predict_noise(studies[i]);
+            tell(++done);
+        });
     });
 }
 
@@ -357,7 +362,7 @@ void run(std::span<Study> studies, std::span<const Stretch> stretches, int threa
 }
 
 Study run(Study study, int threads, const OnSamples& on_samples, const ensemble::Monitor& monitor) {
-    predict_noise({&study, 1}, threads);
+    predict_noise({&study, 1}, threads, monitor.observer);
     const Stretch all{0, 0, ensemble::total_gyros(study.scenario)};
     run({&study, 1}, {&all, 1}, threads, hand_on(on_samples), monitor);
     return study;

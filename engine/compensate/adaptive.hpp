@@ -27,6 +27,7 @@ class Adaptive final : public LaneCompensator {
 
     void observe(const readout::LaneReadings& readings, LaneErrors& errors) override;
     bool wants_samples() const override { return true; }
+    std::int64_t tables_made() const override { return exact_.tables_made(); }
 
     /// As estimated by now.
     readout::FractionRecovery::Coupling coupling(std::size_t lane) const { return filters_[lane].coupling(); }

@@ -41,6 +41,7 @@ class Exact final : public LaneCompensator {
     /// Rows [first_row, last_row), in this order, all of the same readings into the same errors.
     void observe(const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row,
                  LaneErrors& errors);
+    std::int64_t tables_made() const override { return tables_.made(); }
 
     struct State {
         simd::Lanes amplitude_rad, b_rad_s;

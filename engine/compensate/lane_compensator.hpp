@@ -1,5 +1,7 @@
 #pragma once
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "engine/readout/lane_readings.hpp"
@@ -37,6 +39,8 @@ class LaneCompensator {
     /// Takes the next readings, consecutive and without gaps, and gives the error accumulated up to each. An error
     /// never depends on later readings, but that the first piece of a run may be taken as one.
     virtual void observe(const readout::LaneReadings& readings, LaneErrors& errors) = 0;
+    /// Times that turn maps of any gyro were tabulated.
+    virtual std::int64_t tables_made() const { return 0; }
 };
 
 }  // namespace ringlock::compensate

@@ -19,11 +19,16 @@ class RunError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// The user asked to stop (Ctrl-C); nothing half-written is left. The message says what is.
+/// The user asked to stop (Ctrl-C); nothing half-written is left.
 class Interrupted : public std::runtime_error {
    public:
-    Interrupted() : Interrupted("interrupted, nothing written") {}
-    explicit Interrupted(const std::string& what_is_left) : std::runtime_error(what_is_left) {}
+    Interrupted() : std::runtime_error("interrupted") {}
+    /// With a message that says more than that: what is left, and how to go on.
+    explicit Interrupted(const std::string& message) : std::runtime_error(message), says_more_(true) {}
+    bool says_more() const { return says_more_; }
+
+   private:
+    bool says_more_ = false;
 };
 
 }  // namespace ringlock

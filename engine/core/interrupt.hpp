@@ -1,7 +1,9 @@
 #pragma once
 #include <csignal>
 #include <cstddef>
+#include <filesystem>
 #include <string>
+#include <string_view>
 
 /// Ctrl-C and its relatives: a run stops where it can do so cleanly and leaves nothing half-written.
 namespace ringlock {
@@ -15,10 +17,21 @@ void check_interrupt();
 /// The signal that interrupted() is about, also after the guard is gone; SIGINT where there was none.
 int interrupt_signal();
 
+/// A descriptor that poll() finds readable from the first signal on; -1 while no InterruptGuard stands.
+int interrupt_descriptor();
+
+/// The line that tells of the interruption: that nothing was written or, by name, what was (note_written()).
+std::string_view farewell();
+
+/// Announces a file that is whole and has its name, for farewell().
+void note_written(const std::filesystem::path& path);
+
 /// Turns SIGINT, SIGTERM and SIGHUP into a flag for as long as it lives; the handlers it found return on destruction.
 ///
-/// The first signal only sets the flag. The second ends the process at once, by that signal, after removing the
-/// files announced by RemoveOnKill. SIGHUP stays ignored where it was (nohup). One guard at a time, made in main().
+/// The first signal sets the flag and leaves the program 0.8 s to end by itself. What does not look at the flag for
+/// so long (a system call that waits, hours within a library) is not waited for: then, or at the second signal, the
+/// process tells farewell(), removes the files announced by RemoveOnKill and ends by the first or the second signal.
+/// SIGHUP stays ignored where it was (nohup). One guard at a time, made in main().
 class InterruptGuard {
    public:
     InterruptGuard();
@@ -27,8 +40,17 @@ class InterruptGuard {
     InterruptGuard& operator=(const InterruptGuard&) = delete;
 
    private:
-    static constexpr std::size_t signals_ = 3;
+    static constexpr std::size_t signals_ = 4;  // the fourth is that of the clock
     struct sigaction before_[signals_] = {};
+};
+
+/// While one lives, no signal ends the process: for steps that belong together and take no time to speak of.
+class HoldEnd {
+   public:
+    HoldEnd();
+    ~HoldEnd();
+    HoldEnd(const HoldEnd&) = delete;
+    HoldEnd& operator=(const HoldEnd&) = delete;
 };
 
 /// Announces a file that the signal handler removes before it ends the process. Up to 16 at a time; more are not

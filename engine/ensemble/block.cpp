@@ -36,6 +36,7 @@ struct Listener {
     std::unique_ptr<compensate::LaneCompensator> compensator;
     compensate::LaneErrors errors;
     std::vector<simd::LaneCounts> counts;
+    std::vector<simd::LaneCounts> turn_counts;  ///< at maxima, too, where asked for
 };
 
 scenario::InjectedNoise noise_of(const scenario::Scenario& scenario, TrajectoryKind kind) {
@@ -46,25 +47,25 @@ dither::Wander wander_of(const scenario::Scenario& scenario) {
     return {scenario.dither.amplitude_wander_relative_rt_s, scenario.dither.amplitude_drift_relative_per_h / 3600.0};
 }
 
-/// What drift and wander can make of the amplitudes.
-double wander_margin_rad(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices) {
-    double largest = 0.0;
-    for (const gyro::Device& device : devices) largest = std::max(largest, device.dither_amplitude_rad);
+/// What drift and wander can make of the amplitudes: of the scenario's device, drawn large. Tables depend on it, and a
+/// gyro must not know the others of its block.
+double wander_margin_rad(const scenario::Scenario& scenario) {
+    constexpr double sigmas = 6.0;
+    const double largest = gyro::Device(nominal_setup(scenario)).dither_amplitude_rad *
+                           (1.0 + sigmas * scenario.ensemble.dither_amplitude_sd_relative);
     return largest * scenario::amplitude_change_relative(scenario.dither,
                                                          scenario.ensemble.settle_s + scenario.ensemble.duration_s);
 }
 
 /// How far noise, drift and wander take the amplitude of a half cycle from the device's.
-double amplitude_margin_rad(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices,
-                            TrajectoryKind kind) {
-    return noise_of(scenario, kind).margin_rad + wander_margin_rad(scenario, devices);
+double amplitude_margin_rad(const scenario::Scenario& scenario, TrajectoryKind kind) {
+    return noise_of(scenario, kind).margin_rad + wander_margin_rad(scenario);
 }
 
 /// Their spread about it.
-double amplitude_rms_rad(const scenario::Scenario& scenario, const std::vector<gyro::Device>& devices,
-                         TrajectoryKind kind) {
+double amplitude_rms_rad(const scenario::Scenario& scenario, TrajectoryKind kind) {
     constexpr double sigmas = 6.0;  // that the margin of the wander stands for
-    return std::hypot(noise_of(scenario, kind).amplitude_rms_rad, wander_margin_rad(scenario, devices) / sigmas);
+    return std::hypot(noise_of(scenario, kind).amplitude_rms_rad, wander_margin_rad(scenario) / sigmas);
 }
 
 std::vector<gyro::Device> make_devices(const std::vector<gyro::Setup>& setups, TrajectoryKind kind) {
@@ -92,7 +93,7 @@ std::unique_ptr<propagate::LanePropagator> make_propagator(const scenario::Scena
     // Without lock-in there is nothing to tabulate; the map is that of the plain phase.
     propagate::AmplitudeRoom room;
     if (kind != TrajectoryKind::ideal) {
-        room = {amplitude_margin_rad(scenario, devices, kind), noise_of(scenario, kind).change_rad};
+        room = {amplitude_margin_rad(scenario, kind), noise_of(scenario, kind).change_rad};
     }
     return propagate::make_turn_map(devices, room, scenario.propagation.turn_map_tolerance_rad);
 }
@@ -101,8 +102,8 @@ std::unique_ptr<compensate::LaneCompensator> make_compensator(const scenario::Sc
                                                               const std::vector<gyro::Device>& devices,
                                                               const scenario::Arm& arm, TrajectoryKind kind) {
     compensate::Calibration calibration = calibration_of(scenario, devices, kind == TrajectoryKind::noise_injected);
-    calibration.amplitude_margin_rad = amplitude_margin_rad(scenario, devices, kind);
-    calibration.amplitude_rms_rad = amplitude_rms_rad(scenario, devices, kind);
+    calibration.amplitude_margin_rad = amplitude_margin_rad(scenario, kind);
+    calibration.amplitude_rms_rad = amplitude_rms_rad(scenario, kind);
     calibration.amplitude_change_rad = noise_of(scenario, kind).change_rad;
     calibration.amplitude_change_rms_rad = noise_of(scenario, kind).change_rms_rad;
     switch (arm.compensator) {
@@ -143,10 +144,11 @@ class Branch {
         : kind_(kind),
           devices_(make_devices(setups, kind)),
           dither_(make_dither(scenario, devices_, who, kind)),
-          detailed_(detail == Detail::hardware) {
+          detailed_(detail != Detail::output),
+          true_(detail == Detail::truth) {
         for (std::size_t i = 0; i < arms.size(); ++i) {
             if (kind_of(arms[i]) != kind) continue;
-            listeners_.push_back({i, make_compensator(scenario, devices_, arms[i], kind), {}, {}});
+            listeners_.push_back({i, make_compensator(scenario, devices_, arms[i], kind), {}, {}, {}});
             const auto& compensator = listeners_.back().compensator;
             compensated_ = compensated_ || compensator != nullptr;
             samples_wanted_ = samples_wanted_ || (compensator && compensator->wants_samples());
@@ -155,19 +157,21 @@ class Branch {
         propagator_ = make_propagator(scenario, devices_, kind);
         const readout::Electronics electronics = electronics_of(scenario);
         const bool instrument = scenario.readout.model == scenario::ReadoutModel::instrument;
+        pulses_ = instrument || samples_wanted_;
         every_turn_ = compensated_ || instrument || scenario.readout.ellipse_correction || detailed_;
         readout_.emplace(devices_, ellipses_of(setups), electronics,
-                         instrument || samples_wanted_ ? readout::Wanted::pulses
-                         : compensated_ || detailed_   ? readout::Wanted::accelerations
-                                                       : readout::Wanted::phase,
+                         pulses_                     ? readout::Wanted::pulses
+                         : compensated_ || detailed_ ? readout::Wanted::accelerations
+                                                     : readout::Wanted::phase,
                          phases_vary);
         if (detailed_) readout_->keep_times();
+        if (true_) readout_->keep_truth();
         interpolated_ = electronics.interpolate;
         if (scenario.readout.ellipse_correction) ellipse_.emplace(devices_.size());
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
             std::vector<gyro::Device> calibrated = devices_;
             for (gyro::Device& device : calibrated) device.coupling.b_rad_s = calibrated_b_rad_s(scenario, device);
-            recovery_.emplace(calibrated, electronics, amplitude_rms_rad(scenario, devices_, kind),
+            recovery_.emplace(calibrated, electronics, amplitude_rms_rad(scenario, kind),
                               noise_of(scenario, kind).change_rms_rad);
         }
     }
@@ -186,14 +190,20 @@ class Branch {
         if (samples_wanted_) samples_ = readings_;
         if (recovery_) recovery_->recover(readings_, &angles_);
         for (Listener& listener : listeners_) {
-            if (listener.compensator) {
-                const bool samples = listener.compensator->wants_samples();
-                listener.compensator->observe(samples ? samples_ : readings_, listener.errors);
-            }
-            output_counts(angles_, listener.compensator ? &listener.errors : nullptr, turns, listener.counts);
+            if (listener.compensator) listener.compensator->observe(observed(listener), listener.errors);
+            const compensate::LaneErrors* errors = listener.compensator ? &listener.errors : nullptr;
+            output_counts(angles_, errors, turns, listener.counts);
+            if (true_) output_counts(angles_, errors, turns, listener.turn_counts, 1);
         }
     }
 
+    std::int64_t tables_made() const {
+        std::int64_t sum = propagator_->tables_made();
+        for (const Listener& listener : listeners_) {
+            if (listener.compensator) sum += listener.compensator->tables_made();
+        }
+        return sum;
+    }
     std::int64_t contradictory_readings(std::size_t lane) const {
         return recovery_ ? recovery_->contradictions(lane) : 0;
     }
@@ -205,6 +215,11 @@ class Branch {
     const propagate::LanePropagator& propagator() const { return *propagator_; }
     const readout::LaneReadings& readings() const { return readings_; }
     const readout::LaneReadings& hardware() const { return hardware_; }
+    const readout::LaneReadings& observed(const Listener& listener) const {
+        return listener.compensator && listener.compensator->wants_samples() ? samples_ : readings_;
+    }
+    bool has_pulses() const { return pulses_; }
+    const gyro::LaneDrive& drive() const { return drive_; }
     const readout::LaneAngles& angles() const { return angles_; }
     const Listener* listener(std::size_t arm) const {
         for (const Listener& listener : listeners_) {
@@ -240,7 +255,9 @@ class Branch {
     bool compensated_ = false;
     bool every_turn_ = false;
     bool samples_wanted_ = false;
+    bool pulses_ = false;
     bool detailed_ = false;
+    bool true_ = false;
     simd::Lanes change_squares_{};  ///< of the amplitude from a turn to the next but one
     std::int64_t changes_ = 0;
     gyro::LaneDrive drive_;
@@ -424,7 +441,21 @@ std::span<const simd::LaneCounts> GyroBlock::counts(std::size_t arm) const {
 
 const readout::LaneReadings& GyroBlock::readings(std::size_t arm) const { return state_->branch_of(arm).readings(); }
 
+const readout::LaneReadings& GyroBlock::observed(std::size_t arm) const {
+    const Branch& branch = state_->branch_of(arm);
+    return branch.observed(*branch.listener(arm));
+}
+
 const readout::LaneReadings& GyroBlock::hardware(std::size_t arm) const { return state_->branch_of(arm).hardware(); }
+
+std::int64_t GyroBlock::quarter_count(std::size_t arm, std::size_t turn, std::size_t lane) const {
+    const readout::LaneReadings& readings = hardware(arm);
+    const double off = count_errors().empty() ? 0.0 : count_errors()[turn][lane];
+    return 4 * static_cast<std::int64_t>(readings.phase_whole[turn][lane]) +
+           static_cast<std::int64_t>(readings.count[turn][lane] + off);
+}
+
+bool GyroBlock::has_pulses(std::size_t arm) const { return state_->branch_of(arm).has_pulses(); }
 
 double GyroBlock::turn_time_s(std::int64_t turn, std::size_t lane) const { return state_->turn_time_s(turn, lane); }
 
@@ -435,6 +466,17 @@ std::span<const simd::Lanes> GyroBlock::count_errors() const { return state_->co
 double GyroBlock::lockin_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const {
     const readout::LaneAngles& angles = state_->branch_of(arm).angles();
     return units::two_pi * (angles.lockin_whole[lane] + angles.lockin_fringes[turn][lane]);
+}
+
+const compensate::LaneErrors* GyroBlock::corrections(std::size_t arm) const {
+    const Listener& listener = *state_->branch_of(arm).listener(arm);
+    return listener.compensator ? &listener.errors : nullptr;
+}
+
+const gyro::LaneDrive& GyroBlock::drive(std::size_t arm) const { return state_->branch_of(arm).drive(); }
+
+std::span<const simd::LaneCounts> GyroBlock::turn_counts(std::size_t arm) const {
+    return state_->branch_of(arm).listener(arm)->turn_counts;
 }
 
 const std::vector<gyro::Setup>& GyroBlock::setups() const { return state_->setups; }
@@ -480,6 +522,12 @@ std::int64_t GyroBlock::tables_remade() const {
         if (branch.kind() == TrajectoryKind::ideal) continue;
         for (std::size_t lane = 0; lane < state_->setups.size(); ++lane) sum += branch.propagator().tables_remade(lane);
     }
+    return sum;
+}
+
+std::int64_t GyroBlock::tables_made() const {
+    std::int64_t sum = 0;
+    for (const Branch& branch : state_->branches) sum += branch.tables_made();
     return sum;
 }
 

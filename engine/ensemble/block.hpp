@@ -4,7 +4,9 @@
 #include <span>
 #include <vector>
 
+#include "engine/compensate/lane_compensator.hpp"
 #include "engine/ensemble/schedule.hpp"
+#include "engine/gyro/lane_drive.hpp"
 #include "engine/gyro/setup.hpp"
 #include "engine/readout/lane_readings.hpp"
 #include "engine/scenario/arm.hpp"
@@ -17,6 +19,7 @@ namespace ringlock::ensemble {
 enum class Detail {
     output,    ///< what the arms ask for
     hardware,  ///< also what the electronics have of every turn: readings uncorrected, times, counts
+    truth,     ///< also what is true of every turn, and the arms' output there
 };
 
 /// Consecutive gyros of a study, at most simd::lanes, taken through all its arms at once, piece after piece. What a
@@ -43,9 +46,15 @@ class GyroBlock {
     std::span<const simd::LaneCounts> counts(std::size_t arm) const;
     /// Readings of the trajectory of an arm. Where no arm of it has a compensator those at maxima are missing.
     const readout::LaneReadings& readings(std::size_t arm) const;
-    /// The readings as the electronics have them, before ellipse or phase are improved, with times and counts; of
-    /// Detail::hardware only.
+    /// Readings that the compensator of an arm was given; those of the trajectory where it has none.
+    const readout::LaneReadings& observed(std::size_t arm) const;
+    /// The readings as the electronics have them, before ellipse or phase are improved, with times and counts; from
+    /// Detail::hardware on.
     const readout::LaneReadings& hardware(std::size_t arm) const;
+    /// What the counter says at a turn of the piece, in quarter fringes; from Detail::hardware on.
+    std::int64_t quarter_count(std::size_t arm, std::size_t turn, std::size_t lane) const;
+    /// Whether readings of an arm hold the times of pulses.
+    bool has_pulses(std::size_t arm) const;
     /// Nominal time of a turn of the dither, counted from the start of the run [s].
     double turn_time_s(std::int64_t turn, std::size_t lane) const;
     /// What is true of these turns.
@@ -55,6 +64,12 @@ class GyroBlock {
     std::span<const simd::Lanes> count_errors() const;
     /// Lock-in error of the trajectory of an arm at a turn of the piece [rad].
     double lockin_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const;
+    /// What the compensator of an arm takes for that error, at every turn of the piece; null where it has none.
+    const compensate::LaneErrors* corrections(std::size_t arm) const;
+    /// Dither, rates and couplings of the trajectory of an arm over the half cycles of the piece.
+    const gyro::LaneDrive& drive(std::size_t arm) const;
+    /// counts() at every turn of the piece, maxima included; of Detail::truth only.
+    std::span<const simd::LaneCounts> turn_counts(std::size_t arm) const;
 
     const std::vector<gyro::Setup>& setups() const;
     /// Physical trajectories that lock-in acts on.
@@ -64,6 +79,8 @@ class GyroBlock {
     std::vector<double> change_per_cycle_rad() const;
     double table_error_rad() const;  ///< largest measured when the turn maps were tabulated; 0: no tables
     std::int64_t tables_remade() const;
+    /// Times that turn maps of any gyro were tabulated, those of compensators included.
+    std::int64_t tables_made() const;
     /// Turns at which pulses and detectors contradicted each other, so that the detectors' phase was kept.
     std::int64_t contradictory_readings() const;
 

@@ -7,7 +7,10 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <mutex>
+#include <numbers>
+#include <numeric>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -79,31 +82,54 @@ std::int64_t block_size(std::int64_t gyros, int threads) {
     return share >= full ? full : std::min<std::int64_t>(gyros, std::max<std::int64_t>(share, full / 2));
 }
 
-/// Turns between two looks at the monitor: a dither second, or less where each takes milliseconds.
-std::size_t piece_turns(const scenario::Scenario& scenario) {
-    return scenario.propagation.method == scenario::PropagationMethod::direct ? 8 : 128;
+/// Takes the blocks of several jobs in another order, in which any few of them stand for all: points of a design that
+/// take longer and longer would else make every guess of the time left too short. The step from one block to the next
+/// is the golden section of their number, or nearly, as no block may be met twice.
+std::vector<Block> spread(const std::vector<Block>& blocks) {
+    const std::size_t count = blocks.size();
+    auto step = static_cast<std::size_t>(std::llround(static_cast<double>(count) * (std::numbers::phi - 1.0)));
+    while (std::gcd(step, count) > 1) ++step;
+    std::vector<Block> order;
+    for (std::size_t i = 0, at = 0; i < count; ++i, at = (at + step) % count) order.push_back(blocks[at]);
+    return order;
 }
 
 /// Tells the monitor what a block does. Where the block fails and its gyros go through the same turns again one by one,
-/// no turn is told twice.
+/// no turn is told twice, and no stage.
 class BlockProgress {
    public:
-    explicit BlockProgress(const Monitor& monitor) : monitor_(monitor) {}
+    BlockProgress(const Monitor& monitor, std::size_t block) : monitor_(monitor), block_(block) { tell(); }
 
+    void enter(BlockStage stage) {
+        // Of gyros one by one only that all are over is news.
+        if (stage <= stage_ || (again_ && stage == BlockStage::output)) return;
+        stage_ = stage;
+        tell();
+    }
     void begin_again() {
+        again_ = true;
         already_ += told_;
         told_ = 0;
     }
-    void advance(std::int64_t gyros, std::int64_t turns) {
+    void advance(std::int64_t gyros, std::int64_t turns, bool tabulated) {
         const std::int64_t again = std::min(already_, turns);
         already_ -= again;
         told_ += turns - again;
-        if (monitor_.on_progress && (gyros > 0 || turns > again)) monitor_.on_progress(gyros, turns - again);
+        if (monitor_.observer && (gyros > 0 || turns > again)) {
+            monitor_.observer->advance(block_, gyros, turns - again, tabulated);
+        }
     }
     bool cancelled() const { return monitor_.cancelled && monitor_.cancelled(); }
 
    private:
+    void tell() const {
+        if (monitor_.observer) monitor_.observer->enter(block_, stage_);
+    }
+
     const Monitor& monitor_;
+    std::size_t block_;
+    BlockStage stage_ = BlockStage::set_up;
+    bool again_ = false;
     std::int64_t told_ = 0;     ///< since the last beginning
     std::int64_t already_ = 0;  ///< told before it and not gone through again so far
 };
@@ -111,33 +137,49 @@ class BlockProgress {
 void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first,
               std::size_t gyros, BlockSink& sink, BlockProgress& progress) {
     const Schedule schedule(scenario);
-    const std::size_t piece = piece_turns(scenario);
     GyroBlock block = follow([&] { return GyroBlock(scenario, arms, first, gyros); });
     const std::int64_t counted = static_cast<std::int64_t>(gyros) * block.trajectories();
+    progress.enter(BlockStage::turns);
+    std::int64_t tables = 0;
     for (std::int64_t turn = 0; turn < schedule.turns();) {
         if (progress.cancelled()) throw Interrupted();
         const bool settling = turn < schedule.settle_turns();
-        const std::int64_t end = settling ? schedule.settle_turns() : schedule.turns();
-        const auto turns = static_cast<std::size_t>(std::min(static_cast<std::int64_t>(piece), end - turn));
+        const auto turns = static_cast<std::size_t>(schedule.piece_end(turn) - turn);
         follow([&] { block.advance(turns); });
         for (std::size_t arm = 0; arm < arms.size() && !settling; ++arm) sink.cycles(arm, block.counts(arm));
         turn += static_cast<std::int64_t>(turns);
-        progress.advance(0, static_cast<std::int64_t>(turns) * counted);
+        progress.advance(0, static_cast<std::int64_t>(turns) * counted, block.tables_made() > tables);
+        tables = block.tables_made();
     }
+    progress.enter(BlockStage::output);
     sink.finish({first, block.setups(), counted * schedule.turns(), block.tables_remade(),
                  block.contradictory_readings(), block.change_per_cycle_rad(), block.table_error_rad()});
-    progress.advance(static_cast<std::int64_t>(gyros), 0);
+    progress.advance(static_cast<std::int64_t>(gyros), 0, false);
 }
 
-}  // namespace
-
-std::int64_t expected_turns(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms) {
+/// Turns that one gyro will count.
+std::int64_t turns_of_gyro(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms) {
     std::int64_t trajectories = 0;
     for (const TrajectoryKind kind : {TrajectoryKind::plain, TrajectoryKind::noise_injected}) {
         const auto is = [&](const scenario::Arm& arm) { return kind_of(arm) == kind; };
         trajectories += std::any_of(arms.begin(), arms.end(), is) ? 1 : 0;
     }
-    return total_gyros(scenario) * trajectories * Schedule(scenario).turns();
+    return trajectories * Schedule(scenario).turns();
+}
+
+void tell_plan(std::span<const Job> jobs, std::span<const Block> blocks, int threads, const Monitor& monitor) {
+    if (!monitor.observer) return;
+    std::vector<std::int64_t> turns;
+    for (const Job& job : jobs) turns.push_back(turns_of_gyro(*job.scenario, job.arms));
+    std::vector<PlannedBlock> planned;
+    for (const Block& block : blocks) planned.push_back({block.gyros, block.gyros * turns[block.job]});
+    monitor.observer->plan(planned, threads);
+}
+
+}  // namespace
+
+std::int64_t expected_turns(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms) {
+    return total_gyros(scenario) * turns_of_gyro(scenario, arms);
 }
 
 void run(std::span<const Job> jobs, int threads, const Monitor& monitor) {
@@ -151,14 +193,17 @@ void run(std::span<const Job> jobs, int threads, const Monitor& monitor) {
             blocks.push_back({job, gyro, std::min(size, jobs[job].last - gyro)});
         }
     }
+    if (jobs.size() > 1) blocks = spread(blocks);
+    tell_plan(jobs, blocks, threads, monitor);
     Failures failures;
     const auto simulate_gyros = [&](const Job& job, std::int64_t gyro, std::int64_t gyros, BlockProgress& progress) {
         const auto sink = job.make_sink(gyro, static_cast<std::size_t>(gyros));
         simulate(*job.scenario, job.arms, gyro, static_cast<std::size_t>(gyros), *sink, progress);
     };
-    const auto simulate_block = [&](const Block& block) {
+    const auto simulate_block = [&](std::size_t number) {
+        const Block& block = blocks[number];
         const Job& job = jobs[block.job];
-        BlockProgress progress(monitor);
+        BlockProgress progress(monitor, number);
         try {
             simulate_gyros(job, block.first, block.gyros, progress);
         } catch (const TrajectoryFailure& together) {
@@ -173,6 +218,7 @@ void run(std::span<const Job> jobs, int threads, const Monitor& monitor) {
                 }
             }
         }
+        progress.enter(BlockStage::over);
     };
     // An arena alone gets no more workers than there are cores; asked for more threads, give more.
     const oneapi::tbb::global_control control(oneapi::tbb::global_control::max_allowed_parallelism,
@@ -184,7 +230,7 @@ void run(std::span<const Job> jobs, int threads, const Monitor& monitor) {
         oneapi::tbb::parallel_for(
             oneapi::tbb::blocked_range<std::size_t>(0, blocks.size(), 1),
             [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
-                for (std::size_t i = range.begin(); i != range.end(); ++i) simulate_block(blocks[i]);
+                for (std::size_t i = range.begin(); i != range.end(); ++i) simulate_block(i);
             },
             oneapi::tbb::simple_partitioner(), context);
     });

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/ensemble/observer.hpp"
 #include "engine/gyro/setup.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/scenario.hpp"
@@ -40,11 +41,10 @@ class BlockSink {
 /// Makes the sink of a block; called from the thread that simulates it.
 using SinkFactory = std::function<std::unique_ptr<BlockSink>(std::int64_t first_gyro, std::size_t gyros)>;
 
-/// What a simulation tells while it runs, and asks; both may be empty, and are called from any thread.
+/// What a simulation asks and tells while it runs; both may be empty, and are called from any thread.
 struct Monitor {
-    std::function<bool()> cancelled;  ///< true stops the simulation with Interrupted
-    /// So many gyros and turns more are done; turns as BlockResult::turns counts them.
-    std::function<void(std::int64_t gyros, std::int64_t turns)> on_progress;
+    std::function<bool()> cancelled = {};  ///< true stops the simulation with Interrupted
+    Observer* observer = nullptr;          ///< outlives the simulation
 };
 
 /// Turns that the whole ensemble will count. A scenario without complaints (scenario/check.hpp) has no more than 64

@@ -12,7 +12,7 @@ namespace ringlock::ensemble::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 void count(const readout::LaneAngles& angles, const compensate::LaneErrors* errors, std::size_t turns,
-           std::vector<simd::LaneCounts>& counts) {
+           std::size_t stride, std::vector<simd::LaneCounts>& counts) {
     const hn::CappedTag<double, simd::lanes> d;
     const hn::Rebind<std::int64_t, decltype(d)> di;
     // Whole numbers below 2^51 stand in the low bits once this is added.
@@ -20,7 +20,7 @@ void count(const readout::LaneAngles& angles, const compensate::LaneErrors* erro
     const auto bias = hn::BitCast(di, magic);
     for (std::size_t lane = 0; lane < simd::lanes; lane += hn::Lanes(d)) {
         const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
-        for (std::size_t i = 0; i < turns; i += 2) {
+        for (std::size_t i = 0; i < turns; i += stride) {
             auto fringes = load(angles.angle_fringes[i]);
             auto whole = load(angles.angle_whole[i]);
             if (errors != nullptr) {
@@ -29,7 +29,7 @@ void count(const readout::LaneAngles& angles, const compensate::LaneErrors* erro
             }
             const auto fine = hn::BitCast(di, fringes * hn::Set(d, counts_per_fringe) + magic) - bias;
             const auto coarse = hn::ShiftLeft<32>(hn::BitCast(di, whole + magic) - bias);
-            hn::Store(coarse + fine, di, counts[i / 2].data() + lane);
+            hn::Store(coarse + fine, di, counts[i / stride].data() + lane);
         }
     }
 }
@@ -43,9 +43,9 @@ namespace ringlock::ensemble {
 HWY_EXPORT(count);
 
 void output_counts(const readout::LaneAngles& angles, const compensate::LaneErrors* errors, std::size_t turns,
-                   std::vector<simd::LaneCounts>& counts) {
-    counts.resize((turns + 1) / 2);
-    HWY_DYNAMIC_DISPATCH(count)(angles, errors, turns, counts);
+                   std::vector<simd::LaneCounts>& counts, std::size_t stride) {
+    counts.resize((turns + stride - 1) / stride);
+    HWY_DYNAMIC_DISPATCH(count)(angles, errors, turns, stride, counts);
 }
 
 }  // namespace ringlock::ensemble

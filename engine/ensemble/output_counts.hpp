@@ -13,7 +13,9 @@ inline constexpr double counts_per_fringe = 4294967296.0;
 
 /// Angle output of an arm at the minima of a piece, from its first turn on, which is a minimum: [minimum][gyro] in
 /// counts. `errors` of the arm's compensator are taken away where given. Counts wrap round, so that differences hold.
+///
+/// \param stride  turns from an output to the next: 1 gives the maxima, too
 void output_counts(const readout::LaneAngles& angles, const compensate::LaneErrors* errors, std::size_t turns,
-                   std::vector<simd::LaneCounts>& counts);
+                   std::vector<simd::LaneCounts>& counts, std::size_t stride = 2);
 
 }  // namespace ringlock::ensemble

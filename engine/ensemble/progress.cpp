@@ -12,8 +12,6 @@
 namespace ringlock::ensemble {
 namespace {
 
-using Seconds = std::chrono::duration<double>;
-
 constexpr std::chrono::milliseconds bar_interval{200};
 constexpr std::chrono::seconds line_interval{10};
 constexpr int longest_bar = 40;
@@ -35,13 +33,13 @@ std::string duration(double seconds) {
 }  // namespace
 
 Progress::Progress(std::int64_t total_gyros, ProgressOptions options)
-    : total_(total_gyros), options_(std::move(options)) {
+    : total_gyros_(total_gyros), options_(std::move(options)) {
     out_ = options_.out ? options_.out : &std::cerr;
     terminal_ = options_.out ? options_.is_terminal : ::isatty(STDERR_FILENO) == 1;
     if (!options_.clock) options_.clock = [] { return std::chrono::steady_clock::now(); };
     if (!options_.terminal_width) options_.terminal_width = width_of_standard_error;
-    start_ = options_.clock();
-    shown_ = start_;
+    read_ = options_.clock();
+    planned_ = options_.already_done;
 }
 
 Progress::~Progress() {
@@ -52,49 +50,126 @@ Progress::~Progress() {
     }
 }
 
-void Progress::advance(std::int64_t gyros, std::int64_t turns) {
+void Progress::stage(const std::string& name) {
     const std::lock_guard lock(mutex_);
+    if (finished_) return;
+    read_clock();
+    stage_ = name;
+    // No event may follow for long that would draw the bar.
+    if (terminal_) {
+        show(false);
+    } else {
+        update();
+    }
+}
+
+void Progress::plan(std::span<const PlannedBlock> blocks, int threads) {
+    const std::lock_guard lock(mutex_);
+    if (finished_) return;
+    read_clock();
+    stage_.clear();
+    for (const PlannedBlock& block : blocks) {
+        planned_.gyros += block.gyros;
+        planned_.turns += block.turns;
+    }
+    left_s_.reset();
+    time_left_.plan(blocks, threads);
+    update();
+}
+
+void Progress::enter(std::size_t block, BlockStage stage) {
+    const std::lock_guard lock(mutex_);
+    if (finished_) return;
+    read_clock();
+    time_left_.enter(block, stage, now_s());
+    update();
+}
+
+void Progress::advance(std::size_t block, std::int64_t gyros, std::int64_t turns, bool tabulated) {
+    const std::lock_guard lock(mutex_);
+    if (finished_) return;
+    read_clock();
     gyros_ += gyros;
     turns_ += turns;
-    if (options_.quiet || finished_) return;
-    const Time now = options_.clock();
-    const bool due = terminal_ ? now - shown_ >= bar_interval : now - shown_ >= line_interval;
-    if (any_shown_ && !due) return;
-    show(now, false);
+    time_left_.advance(block, turns, tabulated, now_s());
+    update();
 }
 
 void Progress::finish() {
     const std::lock_guard lock(mutex_);
-    if (options_.quiet || finished_) return;
+    if (finished_) return;
+    read_clock();
     finished_ = true;
+    if (options_.quiet) return;
     if (terminal_) {
         clear_bar();
     } else {
-        show(options_.clock(), true);
+        show(true);
     }
+}
+
+void Progress::read_clock() {
+    const Clock::time_point read = options_.clock();
+    now_ += std::max(Clock::duration{}, read - read_);
+    read_ = read;
+}
+
+ProgressOptions::Done Progress::done() const {
+    return {options_.already_done.gyros + gyros_, options_.already_done.turns + turns_};
+}
+
+ProgressOptions::Done Progress::total() const {
+    return options_.grows ? planned_ : ProgressOptions::Done{total_gyros_, options_.total_turns};
 }
 
 double Progress::share_done() const {
-    const double share = options_.total_turns > 0
-                             ? static_cast<double>(turns_) / static_cast<double>(options_.total_turns)
-                         : total_ > 0 ? static_cast<double>(gyros_) / static_cast<double>(total_)
-                                      : 1.0;
+    const auto [gyros, turns] = done();
+    const auto [all_gyros, all_turns] = total();
+    const double share = all_turns > 0    ? static_cast<double>(turns) / static_cast<double>(all_turns)
+                         : all_gyros > 0  ? static_cast<double>(gyros) / static_cast<double>(all_gyros)
+                         : options_.grows ? 0.0
+                                          : 1.0;
     return std::clamp(share, 0.0, 1.0);
 }
 
-void Progress::show(Time now, bool last) {
-    const double elapsed = Seconds(now - start_).count();
-    const double done = share_done();
+void Progress::update() {
+    const bool look = now_ - looked_ >= bar_interval;
+    if (look) {
+        looked_ = now_;
+        left_s_ = time_left_.seconds(now_s());
+    }
+    const bool due = terminal_ ? look : now_ - shown_ >= line_interval;
+    if (due || !any_shown_) show(false);
+}
+
+Progress::Pace Progress::pace() {
+    const std::lock_guard lock(mutex_);
+    read_clock();
+    if (!stage_.empty()) return {time_left_.turns_per_s(now_s()), std::nullopt};
+    return {time_left_.turns_per_s(now_s()), time_left_.seconds(now_s())};
+}
+
+void Progress::show(bool last) {
+    if (options_.quiet) return;
+    const auto [gyros, turns] = done();
     // Cut off, not rounded: 100 % means that all is done.
-    std::string status = fmt::format("{:3} %  {}/{} gyros", static_cast<int>(100.0 * done), gyros_, total_);
-    if (elapsed > 0.0) status += fmt::format("  {:.3g} turns/s", static_cast<double>(turns_) / elapsed);
+    std::string status =
+        fmt::format("{:3} %  {}/{} gyros", static_cast<int>(100.0 * share_done()), gyros, total().gyros);
+    if (options_.grows && !last) status += fmt::format(", {} at most", total_gyros_);
+    const double speed = time_left_.turns_per_s(now_s());
+    const std::string rate = speed > 0.0 ? fmt::format("  {:.3g} turns/s", speed) : "";
     if (last) {
-        status += "  in " + duration(elapsed);
-    } else if (done > 0.0 && elapsed > 0.0) {
-        status += fmt::format("  {} left", duration(elapsed * std::max(0.0, 1.0 / done - 1.0)));
+        status += rate + "  in " + duration(now_s());
+    } else if (!stage_.empty()) {
+        status += "  " + stage_;
+    } else if (time_left_.setting_up()) {
+        status += "  set-up";
+    } else {
+        status += rate;
+        if (left_s_) status += fmt::format("  {} {}", duration(*left_s_), options_.grows ? "to the next look" : "left");
     }
     any_shown_ = true;
-    shown_ = now;
+    shown_ = now_;
     if (terminal_) {
         draw_bar(status);
     } else {

@@ -13,6 +13,12 @@ Schedule::Schedule(const scenario::Scenario& scenario) {
     sample_interval_s = static_cast<double>(cycles_per_sample) / frequency;
     // The small slack keeps a duration of whole samples from losing one to rounding.
     samples = 1 + static_cast<std::int64_t>(std::floor(scenario.ensemble.duration_s / sample_interval_s + 1e-9));
+    // Whoever follows a run looks at it between pieces: they are shorter where each turn takes milliseconds.
+    piece_turns = scenario.propagation.method == scenario::PropagationMethod::direct ? 8 : 128;
+}
+
+std::int64_t Schedule::piece_end(std::int64_t turn) const {
+    return std::min(turn + piece_turns, turn < settle_turns() ? settle_turns() : turns());
 }
 
 std::int64_t cycles_in(const Schedule& schedule, double time_s) {

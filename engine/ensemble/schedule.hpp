@@ -20,6 +20,11 @@ struct Schedule {
     /// Zero-rate points of one trajectory before the record, and with it.
     std::int64_t settle_turns() const { return 2 * settle_cycles; }
     std::int64_t turns() const { return settle_turns() + 2 * cycles_per_sample * (samples - 1) + 1; }
+
+    std::int64_t piece_turns;  ///< most turns that are gone through at once
+    /// Turn before which the piece that begins with this one ends. Pieces are part of what a gyro does: compensators
+    /// and tables take the first one as a whole. None holds turns both before the record and of it.
+    std::int64_t piece_end(std::int64_t turn) const;
 };
 
 /// Whole cycles nearest to a time, one at least.

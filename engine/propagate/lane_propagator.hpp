@@ -25,6 +25,8 @@ class LanePropagator {
     virtual double table_error_rad(std::size_t lane) const = 0;
     /// Times that a gyro's tables were made anew because the drive left their ranges.
     virtual std::int64_t tables_remade(std::size_t lane) const = 0;
+    /// Times that tables of any gyro were made, the first ones included.
+    virtual std::int64_t tables_made() const = 0;
 };
 
 /// How half cycles of a coupling are tabulated and gone through.
@@ -60,6 +62,7 @@ class TurnMapLanes final : public LanePropagator {
     void step(const gyro::LaneDrive& drive, gyro::LaneTurns& turns) override;
     double table_error_rad(std::size_t lane) const override { return tables_.measured_error_rad(lane); }
     std::int64_t tables_remade(std::size_t lane) const override { return remade_[lane]; }
+    std::int64_t tables_made() const override { return tables_.made(); }
 
    private:
     void cover(const gyro::LaneDrive& drive);
@@ -85,6 +88,7 @@ class DirectPropagator final : public LanePropagator {
     void step(const gyro::LaneDrive& drive, gyro::LaneTurns& turns) override { direct_.step(drive, &turns); }
     double table_error_rad(std::size_t /*lane*/) const override { return 0.0; }
     std::int64_t tables_remade(std::size_t /*lane*/) const override { return 0; }
+    std::int64_t tables_made() const override { return 0; }
 
    private:
     DirectLanes direct_;

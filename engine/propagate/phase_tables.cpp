@@ -300,6 +300,7 @@ void PhaseTables::make(std::size_t lane, const gyro::Device& device, const HalfC
             "turn map: series in the phase, for a coupling with a second harmonic, have no amplitude that changes over "
             "a half cycle");
     }
+    ++made_;
     ranges_[lane] = wanted;
     const std::array<Range, variables> ranges{wanted.amplitude_rad, wanted.rate_rad_s, wanted.b_rad_s};
     for (std::size_t v = 0; v < variables; ++v) {

@@ -2,6 +2,7 @@
 #include <array>
 #include <complex>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "engine/gyro/device.hpp"
@@ -55,6 +56,8 @@ class PhaseTables {
     /// Largest error of a turn of that gyro, against the equation integrated through every fringe of the half turns,
     /// between the nodes and between the phases of all its tables so far [rad].
     double measured_error_rad(std::size_t lane) const { return error_rad_[lane]; }
+    /// Times that a gyro's were made.
+    std::int64_t made() const { return made_; }
     /// Largest number of terms in any variable.
     std::size_t nodes() const;
     /// Largest number of harmonics of any gyro.
@@ -73,6 +76,7 @@ class PhaseTables {
     void lay_out(std::size_t part);
 
     double tolerance_rad_;
+    std::int64_t made_ = 0;
     std::array<Part, 4> parts_;
     std::array<std::array<LanePart, simd::lanes>, 4> lane_parts_;
     std::array<simd::Lanes, variables> centre_;

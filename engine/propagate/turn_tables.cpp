@@ -187,6 +187,7 @@ void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCy
             fmt::format("turn map: a coupling with a second harmonic, {:.3g} of the first, is no Moebius map",
                         device.coupling.second_ratio));
     }
+    ++made_;
     ranges_[lane] = wanted;
     const std::array<Range, variables> ranges{wanted.amplitude_rad, wanted.rate_rad_s, wanted.b_rad_s,
                                               wanted.amplitude_change_rad};

@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "engine/gyro/device.hpp"
@@ -67,6 +68,8 @@ class TurnTables {
     const HalfCycleRanges& ranges(std::size_t lane) const { return ranges_[lane]; }
     /// Largest interpolation error of a turn of that gyro, measured between the nodes of all its tables so far [rad].
     double measured_error_rad(std::size_t lane) const { return error_rad_[lane]; }
+    /// Times that a gyro's were made.
+    std::int64_t made() const { return made_; }
     /// Largest number of terms in any variable.
     std::size_t nodes() const;
 
@@ -75,6 +78,7 @@ class TurnTables {
     void put(Part& part, std::size_t lane, const Terms& terms, const std::vector<std::array<double, 3>>& coefficients);
 
     double tolerance_rad_;
+    std::int64_t made_ = 0;
     bool symmetric_ = true;
     bool strong_ = false;
     bool changing_ = false;

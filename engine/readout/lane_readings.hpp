@@ -66,6 +66,9 @@ struct LaneAngles {
     /// Lock-in error at the zero-rate point, less the whole fringes below.
     std::vector<simd::Lanes> lockin_fringes;
     simd::Lanes lockin_whole;
+    // Empty where nobody asked for them:
+    std::vector<simd::Lanes> phase_fringes;  ///< at the zero-rate point, less the whole ones of LaneReadings
+    std::vector<simd::Lanes> zero_rate_s;    ///< when the phase turns, from the dither's turn
 
     void resize(std::size_t wanted) {
         angle_fringes.resize(wanted);

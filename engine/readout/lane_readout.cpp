@@ -77,6 +77,10 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> pu
                 // psi at the zero-rate point, in fringes less whole ones that are added where the phase is reported.
                 const V phase = sm::fma(d, sign * walk.phase_rad, per_rad,
                                         load(drive.plain_fringes[i]) + load(turns.lockin_fringes[i]));
+                if (!angles.phase_fringes.empty()) {
+                    store(phase, angles.phase_fringes[i]);
+                    store(walk.time_s, angles.zero_rate_s[i]);
+                }
                 const CouplingPhase coupling = coupling_phase_at(d, own, drive, i, lane, walk.time_s);
                 const V true_sine = sm::fnma(d, walk.cosine, coupling.sine, sign * walk.sine * coupling.cosine);
                 const V true_cosine = sm::fma(d, sign * walk.sine, coupling.sine, walk.cosine * coupling.cosine);
@@ -245,6 +249,10 @@ void LaneReadout::read(const gyro::LaneDrive& drive, const gyro::LaneTurns& turn
     if (times_) {
         readings.zero_rate_s.resize(drive.turns);
         readings.count.resize(drive.turns);
+    }
+    if (truth_) {
+        angles.phase_fringes.resize(drive.turns);
+        angles.zero_rate_s.resize(drive.turns);
     }
     const bool reversed =
         wanted_ == Wanted::pulses

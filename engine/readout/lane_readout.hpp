@@ -37,6 +37,8 @@ class LaneReadout {
     /// From now on readings hold the times of the zero-rate points and the counter, too. Not where only the phase is
     /// wanted.
     void keep_times() { times_ = true; }
+    /// From now on angles hold the true phase and the true times of the zero-rate points, too.
+    void keep_truth() { truth_ = true; }
 
     /// Reads every `stride`-th turn of the piece, from the first; rows of turns in between are left as they are. With
     /// pulses, every turn is read. Throws RunError where the phase does not reverse near a turn.
@@ -48,6 +50,7 @@ class LaneReadout {
     Electronics electronics_;
     Wanted wanted_;
     bool times_ = false;
+    bool truth_ = false;
     ReadoutConstants constants_;
     std::vector<PulseTables> pulses_;  // at one phase of the coupling, or where that varies at PulseTables::phases
 };

@@ -65,6 +65,10 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> ta
             // psi at the zero-rate point, in fringes less whole ones that are added where the phase is reported.
             const V phase = sm::fma(d, sign * walk.phase_rad, per_rad,
                                     load(drive.plain_fringes[i]) + load(turns.lockin_fringes[i]));
+            if (!angles.phase_fringes.empty()) {
+                store(phase, angles.phase_fringes[i]);
+                store(walk.time_s, angles.zero_rate_s[i]);
+            }
             const CouplingPhase coupling = coupling_phase_at(d, own, drive, i, lane, walk.time_s);
             const V true_sine = sm::fnma(d, walk.cosine, coupling.sine, sign * walk.sine * coupling.cosine);
             const V true_cosine = sm::fma(d, sign * walk.sine, coupling.sine, walk.cosine * coupling.cosine);

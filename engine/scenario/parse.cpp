@@ -9,12 +9,12 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <utility>
 
 #include "engine/core/error.hpp"
+#include "engine/core/waiting.hpp"
 #include "engine/effects/effect.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/check.hpp"
@@ -514,12 +514,17 @@ Scenario parse_file(const std::filesystem::path& path, std::span<const std::stri
     if (std::filesystem::is_directory(path, ignored)) {
         throw InputError(fmt::format("{}: is a directory; a scenario is a TOML file", path.string()));
     }
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+    const Descriptor file = open_to_read(path);
+    if (!file.valid()) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
     std::string text(largest + 1, '\0');
-    file.read(text.data(), static_cast<std::streamsize>(text.size()));
-    if (file.bad()) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
-    text.resize(static_cast<std::size_t>(file.gcount()));
+    std::size_t filled = 0;
+    while (filled < text.size()) {
+        const ssize_t got = read_some(file.get(), text.data() + filled, text.size() - filled);
+        if (got < 0) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+        if (got == 0) break;
+        filled += static_cast<std::size_t>(got);
+    }
+    text.resize(filled);
     if (text.size() > largest)
         throw InputError(fmt::format("{}: is larger than 16 MiB: not a scenario", path.string()));
     return parse_string(text, path.string(), settings, rules);

@@ -217,7 +217,37 @@ std::vector<T> Dataset::read_rows(std::uint64_t first_row, std::uint64_t n_rows)
 }
 
 template <Element T>
-Dataset Group::make_dataset(const std::string& name, const Shape& shape, const Label& label, Space space) {
+std::vector<T> Dataset::read_block(std::uint64_t first_row, std::uint64_t n_rows, std::uint64_t first_column,
+                                   std::uint64_t n_columns) const {
+    const Lock lock;
+    return read_selection<T>(select(first_row, n_rows, first_column, n_columns));
+}
+
+namespace {
+
+/// Chunks of so many rows, compressed where the library can: bytes of one place in the numbers stand together.
+void store_in_chunks(hid_t creation, std::vector<hsize_t> extent, std::uint64_t rows) {
+    if (size_of({extent.begin(), extent.end()}) == 0) return;
+    extent[0] = std::clamp<hsize_t>(rows, 1, extent[0]);
+    H5Pset_chunk(creation, static_cast<int>(extent.size()), extent.data());
+    if (H5Zfilter_avail(H5Z_FILTER_DEFLATE) <= 0) return;
+    constexpr unsigned fastest = 1;
+    H5Pset_shuffle(creation);
+    H5Pset_deflate(creation, fastest);
+}
+
+/// Chunks go to the disk at once, so that a full one shows where they are written.
+Id without_cache() {
+    Id access(H5Pcreate(H5P_DATASET_ACCESS));
+    H5Pset_chunk_cache(access.get(), 0, 0, H5D_CHUNK_CACHE_W0_DEFAULT);
+    return access;
+}
+
+}  // namespace
+
+template <Element T>
+Dataset Group::make_dataset(const std::string& name, const Shape& shape, const Label& label, Space space,
+                            std::uint64_t chunk_rows) {
     const Lock lock;
     const std::string path = child_path(name);
     if (shape.empty() || shape.size() > 2) throw std::invalid_argument(path + ": a dataset has 1 or 2 dimensions");
@@ -226,6 +256,8 @@ Dataset Group::make_dataset(const std::string& name, const Shape& shape, const L
     const Id creation(H5Pcreate(H5P_DATASET_CREATE));
     H5Pset_obj_track_times(creation.get(), false);
     if (space == Space::at_once) H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_EARLY);
+    if (space == Space::in_chunks) store_in_chunks(creation.get(), extent, chunk_rows);
+    const Id access = space == Space::in_chunks ? without_cache() : Id(H5Pcreate(H5P_DATASET_ACCESS));
     if constexpr (std::same_as<T, double>) {
         const double nan = std::numeric_limits<double>::quiet_NaN();
         H5Pset_fill_value(creation.get(), H5T_NATIVE_DOUBLE, &nan);
@@ -233,7 +265,7 @@ Dataset Group::make_dataset(const std::string& name, const Shape& shape, const L
     const Id links(H5Pcreate(H5P_LINK_CREATE));
     H5Pset_create_intermediate_group(links.get(), true);
     const auto create = [&](hid_t type) {
-        return H5Dcreate2(id().get(), name.c_str(), type, file_space.get(), links.get(), creation.get(), H5P_DEFAULT);
+        return H5Dcreate2(id().get(), name.c_str(), type, file_space.get(), links.get(), creation.get(), access.get());
     };
     Id made;
     if constexpr (std::same_as<T, std::string>)
@@ -253,6 +285,12 @@ Dataset Group::create_dataset(const std::string& name, const Shape& shape, const
 }
 
 template <Element T>
+Dataset Group::create_chunked(const std::string& name, const Shape& shape, std::uint64_t chunk_rows,
+                              const Label& label) {
+    return make_dataset<T>(name, shape, label, Space::in_chunks, chunk_rows);
+}
+
+template <Element T>
 Dataset Group::write(const std::string& name, std::span<const T> values, const Shape& shape, const Label& label) {
     Dataset dataset = make_dataset<T>(name, shape, label, Space::on_writing);
     dataset.write(values);
@@ -264,16 +302,18 @@ Dataset Group::write(const std::string& name, std::span<const T> values, const L
     return write(name, values, Shape{values.size()}, label);
 }
 
-#define RINGLOCK_INSTANTIATE(T)                                                                       \
-    template void Dataset::write<T>(std::span<const T>);                                              \
-    template void Dataset::write_rows<T>(std::uint64_t, std::uint64_t, std::span<const T>);           \
-    template void Dataset::write_block<T>(std::uint64_t, std::uint64_t, std::uint64_t, std::uint64_t, \
-                                          std::span<const T>);                                        \
-    template bool Dataset::holds<T>() const;                                                          \
-    template std::vector<T> Dataset::read<T>() const;                                                 \
-    template std::vector<T> Dataset::read_rows<T>(std::uint64_t, std::uint64_t) const;                \
-    template Dataset Group::create_dataset<T>(const std::string&, const Shape&, const Label&);        \
-    template Dataset Group::write<T>(const std::string&, std::span<const T>, const Label&);           \
+#define RINGLOCK_INSTANTIATE(T)                                                                                       \
+    template void Dataset::write<T>(std::span<const T>);                                                              \
+    template void Dataset::write_rows<T>(std::uint64_t, std::uint64_t, std::span<const T>);                           \
+    template void Dataset::write_block<T>(std::uint64_t, std::uint64_t, std::uint64_t, std::uint64_t,                 \
+                                          std::span<const T>);                                                        \
+    template bool Dataset::holds<T>() const;                                                                          \
+    template std::vector<T> Dataset::read<T>() const;                                                                 \
+    template std::vector<T> Dataset::read_rows<T>(std::uint64_t, std::uint64_t) const;                                \
+    template std::vector<T> Dataset::read_block<T>(std::uint64_t, std::uint64_t, std::uint64_t, std::uint64_t) const; \
+    template Dataset Group::create_dataset<T>(const std::string&, const Shape&, const Label&);                        \
+    template Dataset Group::create_chunked<T>(const std::string&, const Shape&, std::uint64_t, const Label&);         \
+    template Dataset Group::write<T>(const std::string&, std::span<const T>, const Label&);                           \
     template Dataset Group::write<T>(const std::string&, std::span<const T>, const Shape&, const Label&);
 RINGLOCK_INSTANTIATE(double)
 RINGLOCK_INSTANTIATE(std::int64_t)

@@ -116,6 +116,10 @@ class Dataset : public Node {
     std::vector<T> read() const;
     template <Element T>
     std::vector<T> read_rows(std::uint64_t first_row, std::uint64_t n_rows) const;
+    /// The part that write_block() writes.
+    template <Element T>
+    std::vector<T> read_block(std::uint64_t first_row, std::uint64_t n_rows, std::uint64_t first_column,
+                              std::uint64_t n_columns) const;
 
    private:
     friend class Group;
@@ -151,6 +155,10 @@ class Group : public Node {
     /// NaN, 0 or "".
     template <Element T>
     Dataset create_dataset(const std::string& name, const Shape& shape, const Label& label);
+    /// Creates a dataset that is stored in compressed chunks of so many rows. Write whole chunks, and once: each goes
+    /// to the disk as it is written, and is compressed anew where it is written again.
+    template <Element T>
+    Dataset create_chunked(const std::string& name, const Shape& shape, std::uint64_t chunk_rows, const Label& label);
     /// Creates a dataset and writes it; of rank 1 where no shape is given.
     template <Element T>
     Dataset write(const std::string& name, std::span<const T> values, const Label& label);
@@ -165,9 +173,10 @@ class Group : public Node {
     Group(Id id, std::string file, std::string path);
 
    private:
-    enum class Space { at_once, on_writing };
+    enum class Space { at_once, on_writing, in_chunks };
     template <Element T>
-    Dataset make_dataset(const std::string& name, const Shape& shape, const Label& label, Space space);
+    Dataset make_dataset(const std::string& name, const Shape& shape, const Label& label, Space space,
+                         std::uint64_t chunk_rows = 0);
     std::string child_path(const std::string& name) const;
     Id open(const std::string& name, bool want_group) const;
 };

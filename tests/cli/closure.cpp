@@ -2,7 +2,10 @@
 #include <gmock/gmock.h>
 #include <stdlib.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
 
 #include "tests/cli/program.hpp"
 
@@ -20,6 +23,26 @@ class ClosureProgram : public ProgramTest {
         write("s.toml", "[ensemble]\nduration_s = 8\ngyros = 1\ndither_asymmetry_sd_ratio = 0\n");
         ASSERT_EQ(run({"record", "s.toml", "-o", "r.h5"}).status, 0);
     }
+    /// Every file of found/, once somebody has changed it or has put one of his own in its place, is kept.
+    void expect_others_kept() const {
+        std::set<std::string> names;
+        for (const auto& entry : std::filesystem::directory_iterator(directory_ / "found")) {
+            names.insert(entry.path().filename().string());
+        }
+        EXPECT_TRUE(names.contains("report.md") && names.contains("closed.toml")) << testing::PrintToString(names);
+        for (const std::string& name : names) {
+            const std::string own = read("found/" + name);
+            for (const std::string& theirs : {std::string("a note of mine\n"), "# changed\n" + own}) {
+                write("found/" + name, theirs);
+                const Outcome r = run({"closure", "r.h5", "-o", "found"});
+                EXPECT_EQ(r.status, 2) << name;
+                EXPECT_THAT(r.err, HasSubstr("found: " + name + " would be replaced")) << name;
+                EXPECT_EQ(r.out, "") << "it was computed before it was refused";
+                EXPECT_EQ(read("found/" + name), theirs);
+            }
+            write("found/" + name, own);
+        }
+    }
     bool has(const std::string& name) const { return std::filesystem::exists(directory_ / name); }
 };
 
@@ -34,6 +57,10 @@ TEST_F(ClosureProgram, LeavesAReport) {
                             HasSubstr("Allan deviation"), HasSubstr("`closed.toml`")));
     for (const char* file : {"closed.toml", "closure.h5"}) EXPECT_TRUE(has(std::string("found/") + file)) << file;
     EXPECT_EQ(run({"validate", "found/closed.toml"}).status, 0);
+    // What it wrote itself it replaces, whatever the figures and their order.
+    EXPECT_EQ(run({"closure", "r.h5", "-o", "found", "-q"}).status, 0);
+    EXPECT_EQ(nlohmann::json::parse(read("found/closure.json")), printed);
+    expect_others_kept();
     // Without a folder nothing is simulated and nothing written.
     const Outcome alone = run({"closure", "r.h5", "--json"});
     EXPECT_EQ(alone.status, 0) << alone.err;

@@ -80,7 +80,7 @@ TEST_F(RecordProgram, ImportsText) {
     expect_refused({"import", "r.csv"}, HasSubstr("output"));
     expect_refused({"import", "r.csv", "-o", "no/r.h5"}, HasSubstr("no/r.h5"));
     const std::string before = read("r.csv");
-    expect_refused({"import", "r.csv", "-o", "r.csv"}, HasSubstr("move it away"));
+    expect_refused({"import", "r.csv", "-o", "r.csv"}, HasSubstr("are the same file"));
     EXPECT_EQ(read("r.csv"), before);
 }
 
@@ -106,7 +106,7 @@ TEST_F(RecordProgram, RecordsAGyroOfAScenario) {
 TEST_F(RecordProgram, RefusesRecordsThatCannotBe) {
     write("s.toml", "[ensemble]\nduration_s = 3.5\ngyros = 4\n");
     expect_refused({"record", "s.toml"}, HasSubstr("output"));
-    expect_refused({"record", "s.toml", "-o", "s.toml"}, HasSubstr("move it away"));
+    expect_refused({"record", "s.toml", "-o", "s.toml"}, HasSubstr("are the same file"));
     expect_refused({"record", "s.toml", "-o", "no/r.h5"}, HasSubstr("no/r.h5"));
     expect_refused({"record", "s.toml", "-o", "r.h5", "--gyro", "4"}, HasSubstr("0 to 3"));
     expect_refused({"record", "s.toml", "-o", "r.h5", "--gyro", "-1"}, HasSubstr("--gyro"));

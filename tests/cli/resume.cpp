@@ -251,7 +251,8 @@ TEST_F(Resumed, ShardsMakeTheSameFileInAnyOrder) {
     std::mt19937 random(5);
     for (const char* const scenario : {with_records, design}) {
         write_reference(scenario);
-        for (const int count : {1, 3, 7, 16}) {
+        const std::vector<int> counts = scenario == with_records ? std::vector{1, 3, 7, 16} : std::vector{3};
+        for (const int count : counts) {
             SCOPED_TRACE(count);
             std::vector<std::string> shards;
             for (int number = 1; number <= count; ++number) {

@@ -51,16 +51,18 @@ TEST(AtomicFile, AnOlderResultStaysUntilCommit) {
     EXPECT_NO_THROW(File::open(directory / "out.h5"));
 }
 
-TEST(AtomicFile, TwoWritersOfOneTargetDoNotMeet) {
+TEST(AtomicFile, OfTwoWritersOfOneTargetTheFirstWinsAndNothingIsLost) {
     const test::TemporaryDirectory directory;
     AtomicFile first(directory / "out.h5");
     AtomicFile second(directory / "out.h5");
     first.file().set_attribute("writer", 1);
     second.file().set_attribute("writer", 2);
     first.commit();
-    second.commit();
-    EXPECT_EQ(File::open(directory / "out.h5").int_attribute("writer"), 2);
-    EXPECT_EQ(directory.entries(), 1);
+    EXPECT_THAT(message_of<RunError>([&] { second.commit(); }),
+                AllOf(HasSubstr("out.h5: somebody has made it"), HasSubstr("it is kept"), HasSubstr(".ringlock-1")));
+    EXPECT_EQ(File::open(directory / "out.h5").int_attribute("writer"), 1);
+    EXPECT_EQ(File::open(directory / "out.h5.ringlock-1").int_attribute("writer"), 2);
+    EXPECT_EQ(directory.entries(), 2);
 }
 
 TEST(AtomicFile, FollowsASymbolicLink) {

@@ -71,8 +71,8 @@ class Disk : public test::ProgramTest {
 
 TEST_F(Disk, ThatIsFullForAWhileMakesTheRunWait) {
     for (const char* const what : {"records", "statistics"}) {
-        for (const int error : {ENOSPC, EIO, EDQUOT}) {
-            for (const int skip : {0, 1, 3}) {
+        for (const int error : {ENOSPC, EIO}) {
+            for (const int skip : {0, 3}) {
                 SCOPED_TRACE(std::string(what) + " " + std::to_string(error) + " " + std::to_string(skip));
                 const Outcome r = run(command(what), with(fault("write", error, ".part.partial", skip, 1)));
                 EXPECT_EQ(r.status, 0) << r.err;

@@ -1,5 +1,11 @@
 // Blocks of gyros where tables must be made anew, and where one gyro cannot be simulated.
+#include <cstdint>
 #include <cstdio>
+#include <memory>
+#include <numeric>
+#include <set>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "engine/core/error.hpp"
@@ -202,22 +208,73 @@ TEST(Ensemble, TellsNoTurnTwiceWhereABlockBeginsAgain) {
         void finish(const ensemble::BlockResult& /*result*/) override {}
     };
     const std::vector<scenario::Arm> arms{scenario::parse_arm("uncompensated")};
-    std::int64_t gyros_told = 0;
-    std::int64_t turns_told = 0;
-    const ensemble::Monitor monitor{{}, [&](std::int64_t gyros, std::int64_t turns) {
-                                        EXPECT_GE(turns, 0);
-                                        gyros_told += gyros;
-                                        turns_told += turns;
-                                    }};
+    struct Told final : ensemble::Observer {
+        void stage(const std::string& /*name*/) override {}
+        void plan(std::span<const ensemble::PlannedBlock> blocks, int /*threads*/) override {
+            planned.assign(blocks.begin(), blocks.end());
+        }
+        void enter(std::size_t block, ensemble::BlockStage stage) override {
+            EXPECT_EQ(block, 0);
+            stages.push_back(stage);
+        }
+        void advance(std::size_t block, std::int64_t more_gyros, std::int64_t more_turns, bool tables) override {
+            EXPECT_EQ(block, 0);
+            EXPECT_GE(more_turns, 0);
+            gyros += more_gyros;
+            turns += more_turns;
+            tabulated.push_back(tables);
+        }
+        std::vector<ensemble::PlannedBlock> planned;
+        std::vector<ensemble::BlockStage> stages;
+        std::vector<bool> tabulated;  // of each call
+        std::int64_t gyros = 0;
+        std::int64_t turns = 0;
+    } told;
     const std::string message = message_of<RunError>([&] {
         const ensemble::Job job{&scenario, arms, 0, 3,
                                 [](std::int64_t, std::size_t) { return std::make_unique<Nothing>(); }};
-        ensemble::run({&job, 1}, 1, monitor);
+        ensemble::run({&job, 1}, 1, {.observer = &told});
     });
     EXPECT_THAT(message, testing::HasSubstr("1 of 3 gyros"));
-    EXPECT_EQ(gyros_told, 2);
-    EXPECT_EQ(turns_told, 2 * ensemble::Schedule(scenario).turns() + 128);
+    EXPECT_EQ(told.gyros, 2);
+    EXPECT_EQ(told.turns, 2 * ensemble::Schedule(scenario).turns() + 128);
     EXPECT_EQ(ensemble::expected_turns(scenario, arms), 3 * ensemble::Schedule(scenario).turns());
+    ASSERT_EQ(told.planned.size(), 1);
+    EXPECT_EQ(told.planned[0].gyros, 3);
+    EXPECT_EQ(told.planned[0].turns, 3 * ensemble::Schedule(scenario).turns());
+    using enum ensemble::BlockStage;
+    EXPECT_THAT(told.stages, testing::ElementsAre(set_up, turns, over));
+}
+
+TEST(Ensemble, TakesPointsInAnOrderInWhichAFewStandForAll) {
+    struct Nothing final : ensemble::BlockSink {
+        void cycles(std::size_t /*arm*/, std::span<const simd::LaneCounts> /*counts*/) override {}
+        void finish(const ensemble::BlockResult& /*result*/) override {}
+    };
+    auto scenario = quiet();
+    scenario.ensemble.gyros = 1;
+    scenario.ensemble.duration_s = 0.1;
+    scenario.output.sample_interval_s = 0.1;
+    const std::vector<scenario::Arm> arms{scenario::parse_arm("ideal")};
+    for (const std::size_t points : {2, 3, 7, 40, 60}) {
+        std::vector<double> places;  // of the points in the design, from 0 to 1, in the order in which they begin
+        std::vector<ensemble::Job> jobs;
+        for (std::size_t point = 0; point < points; ++point) {
+            const auto make_sink = [&, point](std::int64_t, std::size_t) {
+                places.push_back((static_cast<double>(point) + 0.5) / static_cast<double>(points));
+                return std::make_unique<Nothing>();
+            };
+            jobs.push_back({&scenario, arms, 0, 1, make_sink});
+        }
+        ensemble::run(jobs, 1, {});
+        ASSERT_EQ(places.size(), points);
+        EXPECT_EQ(std::set<double>(places.begin(), places.end()).size(), points) << "each once";
+        constexpr std::size_t few = 6;
+        for (std::size_t i = 0; i + few <= points; ++i) {
+            const auto at = places.begin() + static_cast<std::ptrdiff_t>(i);
+            EXPECT_NEAR(std::accumulate(at, at + few, 0.0) / few, 0.5, 0.2) << points << " points, from " << i;
+        }
+    }
 }
 
 TEST(Ensemble, CountsTheTurnsOfTheLongestRun) {

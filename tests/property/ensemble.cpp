@@ -7,6 +7,7 @@
 
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/schedule.hpp"
+#include "engine/scenario/check.hpp"
 #include "engine/scenario/render.hpp"
 #include "engine/simd/target.hpp"
 #include "tests/property/random_scenario.hpp"
@@ -63,6 +64,26 @@ TEST(EnsembleProperty, AnArmDoesNotKnowWhichOthersAreRun) {
                 << to_toml(part);
         }
     }
+}
+
+TEST(EnsembleProperty, AGyroWhoseAmplitudeWandersDoesNotKnowTheOthersOfItsBlock) {
+    RandomScenarios random(9);
+    int tried = 0;
+    for (int i = 0; i < scenarios / 2; ++i) {
+        Scenario scenario = random.next();
+        scenario.ensemble.dither_amplitude_sd_relative = 0.01;
+        scenario.dither.amplitude_wander_relative_rt_s = random.uniform(1e-5, 1e-3);
+        scenario.dither.amplitude_drift_relative_per_h = random.uniform(-0.1, 0.1);
+        if (!scenario::check(scenario).empty()) continue;
+        ++tried;
+        const auto total = total_gyros(scenario);
+        test::GyroRecords records(scenario, static_cast<std::size_t>(total));
+        records.run(0, total, 1);
+        for (std::int64_t g = 0; g < total; ++g) {
+            EXPECT_EQ(records[g].counts, simulate(scenario, g).counts) << g << "\n" << to_toml(scenario);
+        }
+    }
+    EXPECT_GE(tried, 3);
 }
 
 TEST(EnsembleProperty, ARunIsItsGyrosInAnyPartsAndOnAnyThreads) {

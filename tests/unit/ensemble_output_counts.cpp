@@ -61,6 +61,23 @@ TEST(OutputCounts, AreTheAngleToHalfACount) {
     }
 }
 
+TEST(OutputCounts, OfEveryTurnAreThoseOfTheMinimaAndMore) {
+    const Piece piece = random_piece(63, 1e8, 703);
+    std::vector<simd::LaneCounts> minima, turns;
+    ensemble::output_counts(piece.angles, &piece.errors, 63, minima);
+    ensemble::output_counts(piece.angles, &piece.errors, 63, turns, 1);
+    ASSERT_EQ(turns.size(), 63U);
+    for (std::size_t i = 0; i < 63; ++i) {
+        for (std::size_t g = 0; g < lanes; ++g) {
+            if (i % 2 == 0) {
+                EXPECT_EQ(turns[i][g], minima[i / 2][g]);
+            }
+            const long double off = static_cast<long double>(turns[i][g]) - exact_counts(piece, true, i, g);
+            ASSERT_LE(std::abs(off), 0.5L + 1e-5L);
+        }
+    }
+}
+
 TEST(OutputCounts, WrapRoundAndKeepDifferences) {
     // 2^31 fringes are 2^63 counts. What was counted beyond comes round from the other end.
     Piece piece = random_piece(64, 1.0, 702);

@@ -62,7 +62,10 @@ inline std::string unit_of_name(const std::string& name) {
 }
 
 /// Tables of the page; rows that name ARM count once for each arm.
-inline Entries page(const std::filesystem::path& path, const std::vector<std::string>& arms) {
+///
+/// \param title  of the part of the page that counts; empty: all of it
+inline Entries page(const std::filesystem::path& path, const std::vector<std::string>& arms,
+                    const std::string& title = "") {
     std::ifstream in(path);
     EXPECT_TRUE(in) << path;
     Entries out;
@@ -70,7 +73,10 @@ inline Entries page(const std::filesystem::path& path, const std::vector<std::st
     const auto add = [&](const std::string& name, const Entry& entry) {
         EXPECT_TRUE(out.emplace(name, entry).second) << "stands twice: " << name;
     };
+    bool counts = title.empty();
     for (std::string line; std::getline(in, line);) {
+        if (!title.empty() && line.starts_with("# ")) counts = line == "# " + title;
+        if (!counts) continue;
         if (!line.starts_with('|')) {
             header.clear();
             continue;

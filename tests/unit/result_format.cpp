@@ -14,6 +14,8 @@
 #include <string_view>
 #include <vector>
 
+#include "analysis/study/replay.hpp"
+#include "analysis/study/replay_file.hpp"
 #include "analysis/study/result_file.hpp"
 #include "tests/unit/format_page.hpp"
 #include "tests/unit/result_support.hpp"
@@ -42,6 +44,8 @@ std::map<hsize_t, std::string> extents(const Study& study) {
 }
 
 constexpr const char* the_page = RINGLOCK_SOURCE_DIR "/results/FORMAT.md";
+constexpr const char* of_results = "The result file of `ringlock run`";
+constexpr const char* of_replays = "The file of `ringlock replay`";
 
 std::vector<std::string> names_of(const std::vector<scenario::Arm>& arms) {
     std::vector<std::string> names;
@@ -57,7 +61,7 @@ TEST_F(ResultFile, HoldsWhatThePageSays) {
     write(path_, scenario);
     const Entries file = walk(path_, extents(Study(scenario)));
     EXPECT_GT(file.size(), 80U);
-    compare(page(the_page, names_of(scenario.arms)), file);
+    compare(page(the_page, names_of(scenario.arms), of_results), file);
     EXPECT_EQ(left(), std::set<std::string>{"out.h5"});
 }
 
@@ -65,7 +69,7 @@ TEST_F(ResultFile, HoldsNoAngleRecordWhereNoneIsWanted) {
     scenario::Scenario scenario = small(false);
     scenario.ensemble.gyros = 5;  // no number that stands for anything else
     write(path_, scenario);
-    Entries expected = page(the_page, names_of(scenario.arms));
+    Entries expected = page(the_page, names_of(scenario.arms), of_results);
     EXPECT_EQ(expected.erase("/arms/uncompensated/rate_error_closed_form_deg_h"), 1U) << "there is quantum noise";
     for (const scenario::Arm& arm : scenario.arms) EXPECT_EQ(expected.erase("/arms/" + arm.name + "/angle_arcsec"), 1U);
     // Neither `ideal` nor `noise_injected` is among the arms.
@@ -107,7 +111,7 @@ Entries page_of_design(const scenario::Scenario& scenario, const std::map<std::s
     const std::string section = section_on_designs();
     const auto says = [&](const char* text) { EXPECT_NE(section.find(text), std::string::npos) << text; };
     Entries out;
-    for (const auto& [name, entry] : page(the_page, names_of(scenario.arms))) {
+    for (const auto& [name, entry] : page(the_page, names_of(scenario.arms), of_results)) {
         const std::size_t at = name.find(" @");
         const std::string object = name.substr(0, at);
         const std::string attribute = at == std::string::npos ? "" : name.substr(at + 2);
@@ -208,6 +212,53 @@ TEST_F(ResultFile, OfADesignEndsWithNothingWhereAPointHasFewerAveragingTimes) {
     for (std::size_t i = 0; i < deviations.size(); ++i) {
         EXPECT_EQ(std::isnan(deviations[i]), i / taus < 3 && i % taus >= fewer) << i;
     }
+}
+
+// Replays.
+
+/// Replays a gyro of the result, and writes the file.
+void replay(const std::filesystem::path& result, const std::string& arm, const std::filesystem::path& out) {
+    const Experiment experiment = read_result(result);
+    const auto& arms = experiment.scenario.arms;
+    GyroOfResult of{result, experiment};
+    of.arm = static_cast<std::size_t>(
+        std::find_if(arms.begin(), arms.end(), [&](const auto& a) { return a.name == arm; }) - arms.begin());
+    of.gyro = 1;
+    StoredGyro stored(of);
+    GyroReplay replay(of.study().scenario, arms.at(of.arm), of.gyro);
+    const GyroReplay::Range range = replay.turns_between(-0.5, 30.0);
+    ReplayWriter writer(out, of, replay, range);
+    const ReplayFigures figures =
+        replay.run(range, writer, [&](std::int64_t i, double angle) { stored.check_sample(i, angle); }, {});
+    writer.finish(figures, stored.has_record(), store::collect_provenance({}, 1, result.string()));
+}
+
+TEST_F(ResultFile, AReplayHoldsWhatThePageSays) {
+    scenario::Scenario scenario = small(true);
+    scenario.ensemble.settle_s = 1.0;
+    scenario.readout.model = scenario::ReadoutModel::instrument;
+    write(path_, scenario);
+    const std::filesystem::path out = directory_ / "replay.h5";
+    replay(path_, "noise_injected+compensated", out);
+    const Entries expected = page(the_page, {}, of_replays);
+    EXPECT_GT(expected.size(), 60U);
+    const auto turns = store::File::open(out).dataset("turns/time_s").shape().at(0);
+    EXPECT_GT(turns, 7000U);
+    compare(expected, walk(out, {{turns, "turns"}, {readout::kept_pulses, "pulses"}}));
+    EXPECT_EQ(left(), (std::set<std::string>{"out.h5", "replay.h5"}));
+}
+
+TEST_F(ResultFile, AReplayHoldsNoPulsesWhereNoneAreTimed) {
+    scenario::Scenario scenario = small(false);
+    scenario.readout.model = scenario::ReadoutModel::latched;
+    write(path_, scenario);
+    const std::filesystem::path out = directory_ / "replay.h5";
+    replay(path_, "uncompensated", out);
+    Entries expected = page(the_page, {}, of_replays);
+    EXPECT_EQ(expected.erase("/readings/pulses_before_s"), 1U);
+    EXPECT_EQ(expected.erase("/readings/pulses_after_s"), 1U);
+    const auto turns = store::File::open(out).dataset("turns/time_s").shape().at(0);
+    compare(expected, walk(out, {{turns, "turns"}}));
 }
 
 }  // namespace

@@ -1,11 +1,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <span>
 #include <thread>
+#include <vector>
 
 #include "engine/core/error.hpp"
 #include "engine/store/hdf5.hpp"
@@ -102,6 +107,41 @@ TEST_F(StoreHdf5, RowsWrittenInAnyOrderFillAPreallocatedDataset) {
     EXPECT_THAT(angle.read_rows<double>(0, 2), ElementsAre(1.0, 2.0, 3.0, 4.0));
     EXPECT_THAT(angle.read_rows<double>(3, 1), ElementsAre(7.0, 8.0));
     EXPECT_TRUE(std::isnan(angle.read<double>()[4])) << "a row that was never written must not look like data";
+}
+
+TEST_F(StoreHdf5, ChunkedDatasetsAreWrittenPieceByPieceAndAreSmall) {
+    constexpr std::uint64_t rows = 100'003;
+    std::vector<double> all(rows);
+    for (std::uint64_t i = 0; i < rows; ++i) all[i] = static_cast<double>(i % 1000);
+    const File file = round_trip([&](File& f) {
+        Dataset column = f.create_chunked<double>("column", {rows}, 4096, {"s", "times"});
+        for (std::uint64_t row = 0; row < rows; row += 4096) {
+            const std::uint64_t n = std::min<std::uint64_t>(4096, rows - row);
+            column.write_rows<double>(row, n, std::span<const double>(all).subspan(row, n));
+        }
+        f.create_chunked<std::int64_t>("wide", {3, 2}, 4096, {"1", "fewer rows than a chunk"})
+            .write_rows<std::int64_t>(0, 3, std::vector<std::int64_t>{1, 2, 3, 4, 5, 6});
+        f.create_chunked<std::int8_t>("none", {0}, 4096, {"1", "no rows"});
+        f.create_chunked<double>("unwritten", {5}, 2, {"1", "nothing"});
+    });
+    EXPECT_EQ(file.dataset("column").read<double>(), all);
+    EXPECT_EQ(file.dataset("column").unit(), "s");
+    EXPECT_THAT(file.dataset("wide").read<std::int64_t>(), ElementsAre(1, 2, 3, 4, 5, 6));
+    EXPECT_THAT(file.dataset("none").read<std::int8_t>(), ElementsAre());
+    for (const double value : file.dataset("unwritten").read<double>()) EXPECT_TRUE(std::isnan(value));
+    EXPECT_LT(std::filesystem::file_size(path_), rows * sizeof(double) / 4);
+}
+
+TEST_F(StoreHdf5, BlocksOfADatasetAreRead) {
+    const File file = round_trip([](File& f) {
+        f.write("table", std::span<const double>(std::vector{1.0, 2.0, 3.0, 4.0, 5.0, 6.0}), {2, 3}, {"1", "numbers"});
+    });
+    const Dataset table = file.dataset("table");
+    EXPECT_THAT(table.read_block<double>(1, 1, 1, 2), ElementsAre(5.0, 6.0));
+    EXPECT_THAT(table.read_block<double>(0, 2, 0, 1), ElementsAre(1.0, 4.0));
+    EXPECT_THAT(table.read_block<double>(0, 1, 3, 0), ElementsAre());
+    EXPECT_THAT(message_of<InputError>([&] { table.read_block<double>(0, 1, 2, 2); }), HasSubstr("3 columns"));
+    EXPECT_THAT(message_of<InputError>([&] { table.read_block<double>(2, 1, 0, 1); }), HasSubstr("2 rows"));
 }
 
 TEST_F(StoreHdf5, EmptyDatasetsComeBack) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "analysis/closure/report/folder.hpp"
+#include "analysis/closure/report/seal.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
@@ -176,13 +178,14 @@ void write_predictive(store::File& h5, const Predictive& predictive) {
 
 void write_closure(const std::filesystem::path& folder, const std::string& source, const record::Record& record,
                    const Closure& closure, const Predictive& predictive) {
+    check_folder(folder);  // again: the computation may have taken hours
     std::error_code failed;
     std::filesystem::create_directories(folder, failed);
-    if (failed || !std::filesystem::is_directory(folder)) {
+    if (failed) {
         throw InputError(
-            fmt::format("{}: the folder for the closed loop's files cannot be made ({}); give another with "
-                        "-o",
-                        folder.string(), failed ? failed.message() : "a file of that name is there"));
+            fmt::format("{}: the folder for the closed loop's files cannot be made ({}); give another "
+                        "with -o",
+                        folder.string(), failed.message()));
     }
     store::AtomicFile file(folder / "closure.h5");
     store::File& h5 = file.file();
@@ -234,7 +237,7 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
                     name_of(closure.verdict));
     const std::string rendered = scenario::to_toml(closed);
     write_text(folder / "closure.json", object.dump(2) + "\n");
-    write_text(folder / "closed.toml", head + "\n" + rendered);
+    write_text(folder / "closed.toml", sealed(head + "\n" + rendered, Comment::toml));
     file.commit();
 }
 

@@ -1,0 +1,92 @@
+#include "analysis/closure/report/folder.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <exception>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "analysis/closure/report/seal.hpp"
+#include "analysis/record/record.hpp"
+#include "engine/core/error.hpp"
+
+namespace ringlock::closure {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array<std::string_view, 8> names = {"report.md", "allan.svg",   "spectrum.svg", "folded.svg",
+                                                   "steps.svg", "closed.toml", "closure.h5",   "closure.json"};
+
+std::string text_of(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// Whether it is the object of to_json(), as it is written.
+bool is_closure_json(const std::string& text) {
+    const auto object = nlohmann::json::parse(text, nullptr, false);
+    if (!object.is_object()) return false;
+    for (const char* const key : {"verdict", "base", "steps", "predictive"}) {
+        if (!object.contains(key)) return false;
+    }
+    return object.dump(2) + "\n" == text;
+}
+
+bool is_ours(const fs::path& path) {
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) return false;
+    if (path.extension() == ".json") return is_closure_json(text_of(path));
+    if (path.extension() != ".h5") return is_sealed(text_of(path));
+    try {
+        return record::hdf5_format(path.string()) == "rlg-closure";
+    } catch (const InputError&) {
+        return false;
+    }
+}
+
+/// Why nothing can be written into the folder, or made where it is to be.
+std::string why_not(fs::path folder) {
+    std::error_code error;
+    folder = fs::absolute(folder, error);
+    while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
+    if (!fs::is_directory(folder, error)) return fmt::format("{} is there and no folder", folder.string());
+    if (access(folder.c_str(), W_OK | X_OK) == 0) return "";
+    return fmt::format("{}: {}", folder.string(), std::generic_category().message(errno));
+}
+
+}  // namespace
+
+std::vector<fs::path> files_of(const fs::path& folder) {
+    std::vector<fs::path> files;
+    for (const std::string_view name : names) files.push_back(folder / name);
+    return files;
+}
+
+void check_folder(const fs::path& folder) {
+    if (const std::string why = why_not(folder); !why.empty()) {
+        throw InputError(
+            fmt::format("{}: the closed loop's files cannot be written there: {}; give another folder with -o",
+                        folder.string(), why));
+    }
+    std::string others;
+    for (const fs::path& file : files_of(folder)) {
+        std::error_code error;
+        if (fs::symlink_status(file, error).type() == fs::file_type::not_found || is_ours(file)) continue;
+        others += (others.empty() ? "" : ", ") + file.filename().string();
+    }
+    if (others.empty()) return;
+    throw InputError(
+        fmt::format("{}: {} would be replaced, which ringlock closure has not written, or which somebody has changed "
+                    "since; it is kept. Give another folder with -o, or move it away",
+                    folder.string(), others));
+}
+
+}  // namespace ringlock::closure

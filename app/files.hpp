@@ -1,0 +1,23 @@
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+/// The files that a command line names.
+namespace ringlock::app {
+
+/// A file of the command line.
+struct NamedFile {
+    enum class Use { input, output };
+
+    std::string argument;  ///< what names it, as in "--plot"
+    std::filesystem::path path;
+    Use use;
+};
+
+/// Refuses a command that would write over what it reads, or over what it has written itself: an output must be
+/// another file than every input and every other output, by whatever name, symbolic or hard link. Empty paths, and
+/// "-" as input, are no files. Throws InputError.
+void refuse_same_files(const std::vector<NamedFile>& files);
+
+}  // namespace ringlock::app
