@@ -10,7 +10,7 @@ namespace ringlock::ensemble {
 namespace {
 
 constexpr double least_measured_s = 2.0;
-constexpr double longest_look_back_s = 30.0;
+constexpr double longest_look_back_s = 5.0;
 constexpr double between_looks_s = 0.1;
 constexpr double agreement = std::numbers::sqrt2;
 constexpr double rounding_s = 1.0;  ///< estimates that differ by no more agree

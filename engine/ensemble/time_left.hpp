@@ -19,8 +19,8 @@ namespace ringlock::ensemble {
 ///
 /// Rates weight what was measured by the time since the turns began, so that a slow start is forgotten in proportion as
 /// the run goes on. An estimate is given once it can be trusted: when turns have gone on for some seconds, and what it
-/// would have said at any time in the last half of these (at most the last half minute) agrees with what is known now
-/// within a factor of the root of 2.
+/// would have said at any time in the last half of these (at most the last 5 s) agrees with what is known now within a
+/// factor of the root of 2. To look back further hides more on a machine with other work and makes no time better.
 ///
 /// Times are seconds of any clock that does not go back.
 class TimeLeft {
