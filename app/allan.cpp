@@ -26,7 +26,7 @@
 namespace ringlock::app {
 namespace {
 
-struct Arguments {
+struct AllanArguments {
     std::string data;
     double rate_hz = 0.0;
     std::string kind;
@@ -125,7 +125,7 @@ std::vector<std::int64_t> factors_for(const TauChoice& choice, allan::Estimator 
     return choice.list;
 }
 
-void check_rate(const Arguments& a, const record::SeriesInfo& series) {
+void check_rate(const AllanArguments& a, const record::SeriesInfo& series) {
     if (!series.rate_hz) return;
     if (std::abs(*series.rate_hz - a.rate_hz) > 1e-9 * a.rate_hz) {
         throw InputError(
@@ -144,7 +144,7 @@ struct Request {
     double scale() const { return unit != nullptr ? unit->to_arcsec : 1.0; }
 };
 
-Request checked(const Arguments& a) {
+Request checked(const AllanArguments& a) {
     Request out{parse_kind(a.kind), nullptr, parse_deviations(a.dev), {}, {}};
     out.unit = parse_unit(a.unit, out.kind);
     if (!(a.rate_hz > 0.0) || !std::isfinite(a.rate_hz)) {
@@ -170,7 +170,7 @@ Request checked(const Arguments& a) {
     return out;
 }
 
-void check_size(const Arguments& a, allan::Kind kind, std::int64_t points, std::size_t data) {
+void check_size(const AllanArguments& a, allan::Kind kind, std::int64_t points, std::size_t data) {
     if (points >= 3) return;
     throw InputError(
         fmt::format("{}: {} data; a deviation needs at least {}", a.data, data, kind == allan::Kind::phase ? 3 : 2));
@@ -185,7 +185,7 @@ void fit_longest(const allan::Phase& phase, AllanOutput& out) {
     if (!phase.whole()) out.noise_stretch = longest->size();
 }
 
-void from_record(const Arguments& a, const Request& request, AllanOutput& out) {
+void from_record(const AllanArguments& a, const Request& request, AllanOutput& out) {
     record::Series series = record::read_series(request.series);
     check_rate(a, series);
     const allan::Phase phase =
@@ -216,7 +216,7 @@ void from_record(const Arguments& a, const Request& request, AllanOutput& out) {
     if (request.unit != nullptr) fit_longest(phase, out);
 }
 
-void from_stream(const Arguments& a, const Request& request, AllanOutput& out) {
+void from_stream(const AllanArguments& a, const Request& request, AllanOutput& out) {
     std::vector<allan::RunningDeviation> running;
     for (const allan::Estimator e : request.estimators) {
         running.emplace_back(request.kind, out.tau0_s, e, request.scale());
@@ -251,7 +251,7 @@ void from_stream(const Arguments& a, const Request& request, AllanOutput& out) {
     if (every > 1) out.noise_thinning = every;
 }
 
-void run(const Arguments& a) {
+void run(const AllanArguments& a) {
     const Request request = checked(a);
     refuse_same_files({{"DATA", a.data, NamedFile::Use::input}, {"--plot", a.plot, NamedFile::Use::output}});
     const std::unique_ptr<AtomicPath> figure = claim_figure(a.plot);
@@ -270,7 +270,7 @@ void run(const Arguments& a) {
 }  // namespace
 
 void add_allan(CLI::App& root) {
-    auto a = std::make_shared<Arguments>();
+    auto a = std::make_shared<AllanArguments>();
     CLI::App* sub =
         root.add_subcommand("allan", "Allan deviation with intervals, and gyro noise coefficients, of a data file");
     sub->add_option("DATA", a->data, "Text, HDF5 or rlg-record; - for text from standard input")->required();

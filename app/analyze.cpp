@@ -15,7 +15,7 @@
 #include "analysis/allan/estimator.hpp"
 #include "analysis/report/plot.hpp"
 #include "analysis/study/family.hpp"
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
 #include "app/files.hpp"
@@ -26,7 +26,7 @@
 namespace ringlock::app {
 namespace {
 
-struct Arguments {
+struct AnalyzeArguments {
     std::string file;
     std::string plot;
     std::string dev;
@@ -107,7 +107,7 @@ void add_asked(const std::string& file, const study::Experiment& experiment, std
     for (std::size_t i = 0; i < family.size(); ++i) summary.arms[i].asked = family[i].front().points;
 }
 
-void analyze(const Arguments& arguments) {
+void analyze(const AnalyzeArguments& arguments) {
     refuse_same_files(
         {{"OUT.h5", arguments.file, NamedFile::Use::input}, {"--plot", arguments.plot, NamedFile::Use::output}});
     const std::unique_ptr<AtomicPath> figure = claim_figure(arguments.plot);
@@ -144,7 +144,7 @@ void analyze(const Arguments& arguments) {
 void add_analyze(CLI::App& root) {
     CLI::App* command =
         root.add_subcommand("analyze", "Compare the arms of a result: Allan deviation, noise, rate error");
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<AnalyzeArguments>();
     command->add_option("OUT.h5", arguments->file, "result of ringlock run")->required();
     command->add_option("--dev", arguments->dev,
                         "also these deviations of the angle records, comma between: " + known_deviations());

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "analysis/study/cost.hpp"
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "app/arguments.hpp"
 #include "app/output.hpp"
 #include "app/run_text.hpp"

@@ -12,7 +12,7 @@
 
 #include "analysis/parts/folder.hpp"
 #include "analysis/parts/shard.hpp"
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
 #include "app/files.hpp"
@@ -27,7 +27,7 @@ namespace ringlock::app {
 
 namespace {
 
-struct Arguments {
+struct MergeArguments {
     std::string out;
     std::vector<std::string> shards;
     std::string threads = "0";
@@ -36,7 +36,7 @@ struct Arguments {
     bool quiet = false;
 };
 
-std::vector<std::filesystem::path> files_of(const Arguments& arguments) {
+std::vector<std::filesystem::path> files_of(const MergeArguments& arguments) {
     std::vector<std::filesystem::path> files(arguments.shards.begin(), arguments.shards.end());
     if (files.empty()) files = parts::shard_files(arguments.out);
     if (files.empty()) {
@@ -54,7 +54,7 @@ std::string list_of(const std::vector<parts::Shard>& shards) {
     return fmt::format("{}", fmt::join(names, " "));
 }
 
-void merge(const Arguments& arguments, std::span<const char* const> command_line) {
+void merge(const MergeArguments& arguments, std::span<const char* const> command_line) {
     const int threads = thread_count(arguments.threads);
     const std::vector<std::filesystem::path> files = files_of(arguments);
     parts::ShardSet shards(files);
@@ -104,7 +104,7 @@ void merge(const Arguments& arguments, std::span<const char* const> command_line
 
 void add_merge(CLI::App& root, std::span<const char* const> command_line) {
     CLI::App* command = root.add_subcommand("merge", "Make one result of the shards of a run (run --shard)");
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<MergeArguments>();
     command->add_option("OUT.h5", arguments->out, "result file: what one run would have written")->required();
     command->add_option("SHARD", arguments->shards, "the shards (default: all OUT.h5.shard-I-of-N)");
     command->add_flag("--missing", arguments->missing, "print the shards that must be run (again), and end");

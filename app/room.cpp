@@ -24,17 +24,22 @@ void check_room(const std::filesystem::path& out, const Needs& needs, bool quiet
     std::error_code unknown;
     const auto folder = out.has_parent_path() ? out.parent_path() : std::filesystem::path(".");
     const std::filesystem::space_info disk = std::filesystem::space(folder, unknown);
-    if (!unknown && needs.disk_bytes > disk.available) {
+    const std::uint64_t disk_bytes = needs.disk_bytes();
+    if (!unknown && disk_bytes > disk.available) {
         throw InputError(
-            fmt::format("{}: about {:.2g} GB of the disk would be taken, and {:.2g} GB are free; {}or give "
+            fmt::format("{}: about {:.2g} GB of the disk would be taken, and {:.2g} GB are free; {}, or give "
                         "a place on another disk with -o",
-                        out.string(), in_gb(needs.disk_bytes), in_gb(disk.available),
-                        needs.less_disk.empty() ? "" : needs.less_disk + ", "));
+                        out.string(), in_gb(disk_bytes), in_gb(disk.available), needs.less_disk));
     }
+    if (quiet) return;
     constexpr std::uint64_t worth_telling = 1'000'000'000;
-    if (quiet || needs.memory_bytes < worth_telling) return;
-    tell(fmt::format("{}: about {:.2g} GB of memory will be taken, of {:.2g} GB that are free\n", out.string(),
-                     in_gb(needs.memory_bytes), in_gb(memory)));
+    const auto announce = [&](std::uint64_t bytes, std::uint64_t free, const char* what) {
+        if (bytes < worth_telling) return;
+        tell(fmt::format("{}: about {:.2g} GB of {} will be taken, of {:.2g} GB that are free\n", out.string(),
+                         in_gb(bytes), what, in_gb(free)));
+    };
+    announce(needs.memory_bytes, memory, "memory");
+    if (!unknown) announce(disk_bytes, disk.available, "the disk");
 }
 
 }  // namespace ringlock::app

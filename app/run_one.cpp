@@ -23,7 +23,7 @@
 #include "analysis/parts/manifest.hpp"
 #include "analysis/parts/shard.hpp"
 #include "analysis/report/plot.hpp"
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "analysis/study/room.hpp"
 #include "app/arguments.hpp"
 #include "app/files.hpp"
@@ -48,17 +48,18 @@ parts::Beginning beginning_of(const RunArguments& arguments) {
     return arguments.discard ? parts::Beginning::discard : parts::Beginning::refuse;
 }
 
-/// What the run takes, and what would make it less.
+/// Memory and disk of the run, and how it could do with less.
 Needs needs_of(const scenario::Scenario& scenario, int threads, bool checkpoints, std::int64_t shards) {
-    const study::Room room = study::expected_room(scenario, threads);
-    // Samples are kept twice while the result is made of what is finished.
-    const std::uint64_t disk_bytes = room.disk_bytes * (checkpoints ? 2 : 1) / static_cast<std::uint64_t>(shards);
+    // Samples are stored twice while the result is made from the checkpoints.
+    const auto disk_bytes = [=] {
+        return study::expected_disk_bytes(scenario) * (checkpoints ? 2 : 1) / static_cast<std::uint64_t>(shards);
+    };
     std::string less_disk = "run fewer gyros at a time";
     if (scenario.output.angle_record) {
         less_disk = "set output.angle_record = false";
         if (checkpoints && shards == 1) less_disk += ", or give --checkpoint-every never, which takes half of it";
     }
-    return {room.memory_bytes, disk_bytes,
+    return {study::expected_memory_bytes(scenario, threads), disk_bytes,
             "run fewer gyros at a time (ensemble.gyros, stop.most_gyros, design.points), or fewer arms", less_disk};
 }
 

@@ -26,13 +26,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct StatusArguments {
     std::string out;
     bool json = false;
 };
 
 /// One output: the whole run, or a shard of it.
-struct Line {
+struct StatusLine {
     std::string name;
     std::string state;  ///< "finished", "running", "interrupted"
     std::string holder;
@@ -55,10 +55,10 @@ std::int64_t gyros_in(const fs::path& folder) {
     return finished ? finished->gyros() : 0;
 }
 
-std::optional<Line> line_of(const fs::path& output, const std::string& name) {
+std::optional<StatusLine> line_of(const fs::path& output, const std::string& name) {
     const fs::path folder = parts::folder_of(output);
     std::error_code unknown;
-    Line line{name, "", "", 0, {}, parts::read_status(folder)};
+    StatusLine line{name, "", "", 0, {}, parts::read_status(folder)};
     if (line.status) line.of_gyros = line.status->of_gyros;
     line.holder = parts::holder(folder);
     if (!line.holder.empty()) {
@@ -81,8 +81,8 @@ std::optional<Line> line_of(const fs::path& output, const std::string& name) {
     return line;
 }
 
-std::vector<Line> lines_of(const fs::path& out) {
-    std::vector<Line> lines;
+std::vector<StatusLine> lines_of(const fs::path& out) {
+    std::vector<StatusLine> lines;
     const auto add = [&](const fs::path& output, const std::string& name) {
         if (auto line = line_of(output, name)) lines.push_back(*line);
     };
@@ -97,7 +97,7 @@ std::vector<Line> lines_of(const fs::path& out) {
     return lines;
 }
 
-std::string text_of(const Line& line) {
+std::string text_of(const StatusLine& line) {
     std::string text = fmt::format("{}: {}", line.name, line.state);
     if (!line.holder.empty()) text += fmt::format(" by {}", line.holder);
     if (line.of_gyros) {
@@ -116,7 +116,7 @@ std::string text_of(const Line& line) {
     return text + "\n";
 }
 
-nlohmann::ordered_json json_of(const Line& line) {
+nlohmann::ordered_json json_of(const StatusLine& line) {
     nlohmann::ordered_json json{{"name", line.name},   {"state", line.state},  {"process", nullptr},
                                 {"gyros", line.gyros}, {"of_gyros", nullptr},  {"turns_per_s", nullptr},
                                 {"left_s", nullptr},   {"last_block", nullptr}};
@@ -130,14 +130,14 @@ nlohmann::ordered_json json_of(const Line& line) {
     return json;
 }
 
-void tell_status(const Arguments& arguments) {
-    const std::vector<Line> lines = lines_of(arguments.out);
+void tell_status(const StatusArguments& arguments) {
+    const std::vector<StatusLine> lines = lines_of(arguments.out);
     if (!arguments.json) {
-        for (const Line& line : lines) put(text_of(line));
+        for (const StatusLine& line : lines) put(text_of(line));
         return;
     }
     auto outputs = nlohmann::ordered_json::array();
-    for (const Line& line : lines) outputs.push_back(json_of(line));
+    for (const StatusLine& line : lines) outputs.push_back(json_of(line));
     put(nlohmann::ordered_json{{"outputs", outputs}}.dump() + "\n");
 }
 
@@ -146,7 +146,7 @@ void tell_status(const Arguments& arguments) {
 void add_status(CLI::App& root) {
     CLI::App* command =
         root.add_subcommand("status", "Tell how far a run, its shards or what was left of it is, from any terminal");
-    auto arguments = std::make_shared<Arguments>();
+    auto arguments = std::make_shared<StatusArguments>();
     command->add_option("OUT.h5", arguments->out, "the result that is, or will be, written")->required();
     command->add_flag("--json", arguments->json, "print one JSON object instead of lines");
     command->callback([arguments] { tell_status(*arguments); });

@@ -6,7 +6,7 @@
 
 #include "analysis/record/probe.hpp"
 #include "analysis/record/record.hpp"
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
 #include "app/output.hpp"

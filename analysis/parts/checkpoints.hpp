@@ -21,23 +21,23 @@
 
 namespace ringlock::parts {
 
-/// Keeps the finished blocks of a run in its folder: written beside, brought to the disk and renamed, so that whatever
-/// ends the process leaves whole files only.
+/// Writes the finished blocks of a run into its folder. Each file is written under a temporary name, synced to the disk
+/// and then renamed, so that a process that ends at any moment leaves complete files only.
 ///
-/// Where the disk refuses, the run is told so and waits; finished blocks stay in memory, and are written when there is
-/// room again. A folder that is gone ends the run after some seconds. Only the time since the start of the process is
+/// Where the disk refuses a write, the run reports it and waits; finished blocks stay in memory until they can be
+/// written. A folder that is gone ends the run after some seconds. Only the time since the start of the process is
 /// used, so that the clock of the machine may be set.
 class Checkpoints final : public study::Store {
    public:
     struct Options {
         double every_s = 30.0;            ///< 0: every block by itself
-        std::optional<Shard> shard = {};  ///< what is simulated of the run; else all
+        std::optional<Shard> shard = {};  ///< the part of the run to simulate; empty: all of it
         std::int64_t of_gyros = 0;        ///< of which write_status() tells
     };
 
     /// Reads what the folder holds. Files that are damaged are told of and put aside: their gyros are simulated again.
     Checkpoints(const Folder& folder, const study::Experiment& plan, Options options, Tell tell);
-    /// Stops; what is not kept by then is lost.
+    /// Ends the writing. Blocks that are not written by then are lost.
     ~Checkpoints() override;
 
     std::vector<study::Stretch> take_up(std::span<study::Study> points, std::int64_t first, std::int64_t last) override;

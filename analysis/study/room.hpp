@@ -3,17 +3,15 @@
 
 #include "engine/scenario/scenario.hpp"
 
+/// What a run of a scenario takes with all points of its design; with a stopping rule, at most. Known from the scenario
+/// alone. Both throw InputError where complaints() are about the design.
 namespace ringlock::study {
 
-/// What a run takes.
-struct Room {
-    std::uint64_t memory_bytes = 0;
-    std::uint64_t disk_bytes = 0;
-};
+/// Memory on so many threads; docs/commands.md says how well it is met.
+std::uint64_t expected_memory_bytes(const scenario::Scenario& scenario, int threads);
 
-/// What a run of the scenario takes with all points of its design; with a stopping rule, at most. Known from the
-/// scenario alone: nothing of that size is taken to find out. docs/commands.md says how well the memory is met.
-/// Throws InputError where complaints() are about the design.
-Room expected_room(const scenario::Scenario& scenario, int threads);
+/// Size of the result. To be asked where the memory suffices: the points of the design are planned for it, each with
+/// one gyro.
+std::uint64_t expected_disk_bytes(const scenario::Scenario& scenario);
 
 }  // namespace ringlock::study

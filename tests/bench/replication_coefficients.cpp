@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "analysis/study/summary.hpp"
 #include "engine/gyro/theory.hpp"
 #include "tests/bench/page.hpp"

@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -83,13 +82,6 @@ class DesignCommand : public test::ProgramTest {
         EXPECT_EQ(r.out, "") << arguments[0];
         EXPECT_THAT(r.err, AllOf(StartsWith("ringlock: error: "), message)) << arguments[0];
         EXPECT_EQ(left(), before) << arguments[0];
-    }
-    bool has_h5diff() const { return std::system("h5diff --version >/dev/null 2>&1") == 0; }
-    /// Exit status of h5diff with these parts of the files left out.
-    int h5diff(const std::string& a, const std::string& b, const std::vector<std::string>& without) const {
-        std::string command = "cd '" + directory_.string() + "' && h5diff -q";
-        for (const std::string& part : without) command += " --exclude-path " + part;
-        return std::system((command + " " + a + " " + b).c_str());
     }
 };
 

@@ -81,6 +81,9 @@ TEST_F(RecordProgram, ImportsText) {
     expect_refused({"import", "r.csv", "-o", "no/r.h5"}, HasSubstr("no/r.h5"));
     const std::string before = read("r.csv");
     expect_refused({"import", "r.csv", "-o", "r.csv"}, HasSubstr("are the same file"));
+    write("notes.csv", "mine");
+    expect_refused({"import", "r.csv", "-o", "notes.csv"}, HasSubstr("move it away"));
+    EXPECT_EQ(read("notes.csv"), "mine");
     EXPECT_EQ(read("r.csv"), before);
 }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "analysis/study/experiment.hpp"
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "engine/core/error.hpp"
 #include "engine/scenario/parse.hpp"
 #include "tests/support/temporary_directory.hpp"

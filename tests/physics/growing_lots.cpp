@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "analysis/study/experiment.hpp"
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "analysis/study/sensitivity.hpp"
 #include "engine/core/error.hpp"
 #include "engine/ensemble/draw.hpp"

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <string>
 
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "analysis/study/summary.hpp"
 #include "engine/scenario/parse.hpp"
 #include "tests/support/gyro_records.hpp"

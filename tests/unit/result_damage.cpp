@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "analysis/study/family.hpp"
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "engine/core/error.hpp"
 #include "tests/unit/result_support.hpp"
 

@@ -13,7 +13,7 @@
 #include "analysis/allan/allan.hpp"
 #include "analysis/allan/estimator.hpp"
 #include "analysis/study/family.hpp"
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "engine/core/error.hpp"
 #include "engine/store/hdf5.hpp"
 #include "tests/unit/result_support.hpp"

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "analysis/study/replay.hpp"
-#include "analysis/study/replay_file.hpp"
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/replay_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "tests/unit/format_page.hpp"
 #include "tests/unit/result_support.hpp"
 

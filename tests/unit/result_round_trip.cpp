@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "engine/scenario/parse.hpp"
 #include "tests/unit/result_support.hpp"
 

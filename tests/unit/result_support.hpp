@@ -8,7 +8,7 @@
 #include <set>
 #include <string>
 
-#include "analysis/study/result_file.hpp"
+#include "analysis/study/result/result_file.hpp"
 #include "engine/core/error.hpp"
 
 /// Result files of a small study for the tests of the format.

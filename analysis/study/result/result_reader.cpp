@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/study/columns.hpp"
-#include "analysis/study/result_file.hpp"
-#include "analysis/study/result_layout.hpp"
+#include "analysis/study/result/columns.hpp"
+#include "analysis/study/result/result_file.hpp"
+#include "analysis/study/result/result_layout.hpp"
 #include "engine/core/error.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/scenario/parse.hpp"

@@ -6,9 +6,9 @@
 #include <system_error>
 #include <type_traits>
 
-#include "analysis/study/columns.hpp"
-#include "analysis/study/result_file.hpp"
-#include "analysis/study/result_layout.hpp"
+#include "analysis/study/result/columns.hpp"
+#include "analysis/study/result/result_file.hpp"
+#include "analysis/study/result/result_layout.hpp"
 #include "engine/core/error.hpp"
 #include "engine/scenario/keys/schema.hpp"
 #include "engine/scenario/parse.hpp"

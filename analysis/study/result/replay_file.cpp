@@ -1,4 +1,4 @@
-#include "analysis/study/replay_file.hpp"
+#include "analysis/study/result/replay_file.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -12,9 +12,9 @@
 #include <system_error>
 #include <utility>
 
-#include "analysis/study/columns.hpp"
-#include "analysis/study/result_file.hpp"
-#include "analysis/study/result_layout.hpp"
+#include "analysis/study/result/columns.hpp"
+#include "analysis/study/result/result_file.hpp"
+#include "analysis/study/result/result_layout.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/version.hpp"
 #include "engine/scenario/render.hpp"
