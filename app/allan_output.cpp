@@ -43,7 +43,7 @@ struct Line {
     noise::Coefficient noise::NoiseFit::*member;
 };
 
-constexpr std::array<Line, 5> lines = {{
+constexpr std::array<Line, 5> table_lines = {{
     {"quantization_arcsec", "angle white noise Q", "arcsec", &noise::NoiseFit::quantization_arcsec},
     {"arw_deg_rt_h", "angle random walk N", "deg/sqrt(h)", &noise::NoiseFit::arw_deg_rt_h},
     {"bias_instability_deg_h", "bias instability B", "deg/h", &noise::NoiseFit::bias_instability_deg_h},
@@ -110,7 +110,7 @@ std::string allan_json(const AllanOutput& out) {
     if (out.noise) {
         Json noise = Json::object();
         Json limits = Json::object();
-        for (const Line& line : lines) {
+        for (const Line& line : table_lines) {
             const noise::Coefficient& c = (*out.noise).*line.member;
             const bool shown = out.noise->described && c.resolved;
             noise[line.key] =
@@ -173,7 +173,7 @@ std::string allan_text(const AllanOutput& out) {
         return text;
     }
     text += "\nGyro coefficients (68.27 % interval; limits 95 %)\n";
-    for (const Line& line : lines) {
+    for (const Line& line : table_lines) {
         const noise::Coefficient& c = (*out.noise).*line.member;
         if (c.resolved) {
             text += fmt::format("  {:<20} {:>11.5g}  ({:.5g} to {:.5g}) {}\n", line.name, *c.value, *c.lo, *c.hi,

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "app/command.hpp"
+#include "app/failure.hpp"
 #include "app/output.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
@@ -17,13 +18,9 @@
 
 namespace {
 
-constexpr int done = 0;
-constexpr int run_failed = 1;
-constexpr int input_wrong = 2;
-
-int complain(int status, std::string_view what) {
-    ringlock::app::tell(fmt::format("ringlock: error: {}\n", what));
-    return status;
+int cannot_be_written() {
+    return ringlock::app::tell_failure(
+        std::make_exception_ptr(ringlock::RunError("standard output cannot be written")));
 }
 
 /// A mistyped command is named; CLI11 would only say that one is missing.
@@ -72,24 +69,16 @@ int main(int argc, char** argv) {
         const ringlock::InterruptGuard guard;
         refuse_unknown_command(root, argc, argv);
         root.parse(argc, argv);
-        return done;
+        return app::done;
     } catch (const CLI::ParseError& error) {
-        if (root.exit(error) != 0) return input_wrong;
-        return std::cout.flush() ? done : complain(run_failed, "standard output cannot be written");  // help, version
-    } catch (const ringlock::InputError& error) {
-        return complain(input_wrong, error.what());
-    } catch (const ringlock::RunError& error) {
-        return complain(run_failed, error.what());
-    } catch (const ringlock::Interrupted& interrupted) {
-        app::tell(interrupted.says_more() ? fmt::format("ringlock: {}\n", interrupted.what())
-                                          : std::string(ringlock::farewell()));
-    } catch (const std::bad_alloc&) {
-        return complain(run_failed, "out of memory; run fewer gyros at a time, or store fewer samples");
-    } catch (const std::exception& error) {
-        return complain(run_failed, error.what());
+        if (root.exit(error) != 0) return app::input_wrong;
+        return std::cout.flush() ? app::done : cannot_be_written();  // help, version
+    } catch (...) {
+        const int status = app::tell_failure(std::current_exception());
+        if (status <= app::ended_by_signal) return status;
     }
     // End by the signal itself, as shells and batch systems expect of a program that was interrupted.
     std::signal(ringlock::interrupt_signal(), SIG_DFL);
     std::raise(ringlock::interrupt_signal());
-    return run_failed;
+    return app::run_failed;
 }

@@ -10,6 +10,8 @@
 #include "app/batch.hpp"
 #include "app/command.hpp"
 #include "app/output.hpp"
+#include "app/ranks.hpp"
+#include "app/run_member.hpp"
 #include "app/run_one.hpp"
 #include "app/study_output.hpp"
 #include "engine/core/error.hpp"
@@ -38,13 +40,25 @@ void run(const RunArguments& arguments, std::span<const char* const> command_lin
     if (!arguments.print_schema.empty()) return print_schema(arguments.print_schema);
     if (arguments.scenarios.empty())
         throw InputError("run: give a scenario file, or --print-schema for an example of one");
-    if (is_batch(arguments)) return run_batch(arguments, command_line);
+    if (is_batch(arguments)) {
+        return with_ranks([&](const Ranks& ranks) {
+            if (ranks.leader)
+                throw InputError("run: a batch is not for several processes of mpirun; start one for each scenario");
+            if (!ranks.member) run_batch(arguments, command_line);
+            if (ranks.member) ranks.member->next_order();
+        });
+    }
     const std::string& scenario = arguments.scenarios.front();
-    run_one(arguments, scenario, output_of(arguments), command_line,
-            [&](const auto& experiment, const auto& summaries, const auto& provenance) {
-                put(arguments.json ? experiment_json(experiment, summaries, provenance)
-                                   : experiment_text(experiment, summaries, provenance));
-            });
+    with_ranks([&](const Ranks& ranks) {
+        if (ranks.member) {
+            return run_member(arguments, scenario, output_of(arguments), *ranks.member, threads_of(arguments, ranks));
+        }
+        const auto print = [&](const auto& experiment, const auto& summaries, const auto& provenance) {
+            put(arguments.json ? experiment_json(experiment, summaries, provenance)
+                               : experiment_text(experiment, summaries, provenance));
+        };
+        run_one(arguments, scenario, output_of(arguments), command_line, print, ranks);
+    });
 }
 
 }  // namespace

@@ -1,7 +1,9 @@
 #include "app/run_one.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <cstdint>
@@ -15,6 +17,7 @@
 #include <span>
 #include <string>
 #include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -29,14 +32,13 @@
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/room.hpp"
-#include "app/run_text.hpp"
+#include "app/session.hpp"
 #include "app/study_output.hpp"
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/core/version.hpp"
 #include "engine/ensemble/progress.hpp"
-#include "engine/simd/lanes.hpp"
 #include "engine/simd/target.hpp"
 
 namespace ringlock::app {
@@ -63,156 +65,16 @@ Needs needs_of(const scenario::Scenario& scenario, int threads, bool checkpoints
             "run fewer gyros at a time (ensemble.gyros, stop.most_gyros, design.points), or fewer arms", less_disk};
 }
 
-/// Seconds between checkpoints; nothing where there are to be none.
-std::optional<double> checkpoint_interval_s(const std::string& asked) {
-    if (asked == "never") return std::nullopt;
-    double seconds = 0.0;
-    const auto [end, error] = std::from_chars(asked.data(), asked.data() + asked.size(), seconds);
-    if (error != std::errc() || end != asked.data() + asked.size() || !(seconds >= 0.0 && seconds <= 86400.0)) {
-        throw InputError(fmt::format("--checkpoint-every {}: must be seconds between 0 and 86400, or never", asked));
-    }
-    return seconds;
-}
-
-/// Turns that stretches of an experiment will count.
-std::int64_t turns_of(const study::Experiment& plan, std::span<const study::Stretch> stretches) {
-    std::int64_t turns = 0;
-    for (const study::Stretch& stretch : stretches) {
-        const study::Study& point = plan.points[stretch.study];
-        const std::int64_t all = ensemble::expected_turns(point.scenario, point.scenario.arms);
-        turns += all / static_cast<std::int64_t>(point.gyros.size()) * (stretch.last - stretch.first);
-    }
-    return turns;
-}
-
-std::int64_t gyros_of(std::span<const study::Stretch> stretches) {
-    std::int64_t gyros = 0;
-    for (const study::Stretch& stretch : stretches) gyros += stretch.last - stretch.first;
-    return gyros;
-}
-
-void say(const std::string& line) { tell(fmt::format("ringlock: {}\n", line)); }
-
-/// What is simulated, and where it goes.
-struct Task {
-    std::string scenario_file;
-    study::Experiment plan;
-    std::filesystem::path result;
-    std::filesystem::path target;  ///< result or shard
-    std::optional<parts::Shard> shard;
-    int threads = 1;
-    bool quiet = false;
-
-    bool grows() const { return scenario::asks(plan.scenario.stop); }
-};
-
-/// Gyros that will be finished at the end; of a lot that grows, at most.
-std::int64_t gyros_of(const Task& task) {
-    if (task.grows()) return task.plan.scenario.stop.most_gyros * static_cast<std::int64_t>(task.plan.points.size());
-    if (!task.shard) return task.plan.gyros();
-    std::vector<std::int64_t> gyros;
-    for (const study::Study& point : task.plan.points) gyros.push_back(static_cast<std::int64_t>(point.gyros.size()));
-    return gyros_of(parts::stretches_of(*task.shard, gyros));
-}
-
-/// A run that keeps what is finished.
-class Session {
-   public:
-    Session(Task task, double every_s, parts::Beginning beginning)
-        : task_(std::move(task)),
-          folder_(task_.target, parts::manifest_of(task_.plan.scenario, task_.shard), beginning, say),
-          all_gyros_(gyros_of(task_)),
-          checkpoints_(folder_, task_.plan, options(every_s), say),
-          progress_(all_gyros_, progress_options()) {
-        const std::int64_t before = checkpoints_.gyros_before();
-        if (before > 0) say(fmt::format("resumed: {} of {} are finished", before, gyros_text(all_gyros_)));
-        checkpoints_.begin([this] { return progress_.pace(); });
-    }
-
-    std::int64_t all_gyros() const { return all_gyros_; }
-
-    /// Does the work, and tells what is left of it where that does not end well.
-    template <class Work>
-    void keep_whatever_happens(Work&& work) {
-        try {
-            work();
-        } catch (const Interrupted&) {
-            const bool all = checkpoints_.keep_what_can_be();
-            throw Interrupted(after("interrupted", all));
-        } catch (const RunError& error) {
-            const bool all = checkpoints_.keep_what_can_be();
-            if (checkpoints_.gyros() == 0) throw;
-            throw RunError(after(error.what(), all));
-        }
-    }
-
-    Task& task() { return task_; }
-    parts::Folder& folder() { return folder_; }
-    parts::Checkpoints& checkpoints() { return checkpoints_; }
-    ensemble::Progress& progress() { return progress_; }
-    ensemble::Monitor monitor() { return {interrupted, &progress_}; }
-
-   private:
-    parts::Checkpoints::Options options(double every_s) const {
-        parts::Checkpoints::Options options;
-        options.every_s = every_s;
-        options.shard = task_.shard;
-        options.of_gyros = all_gyros_;
-        return options;
-    }
-
-    ensemble::ProgressOptions progress_options() const {
-        ensemble::ProgressOptions options{.quiet = task_.quiet, .grows = task_.grows()};
-        options.already_done.gyros = checkpoints_.gyros_before();
-        if (task_.grows()) {
-            options.total_turns = study::expected_turns(task_.plan);
-            return options;
-        }
-        const std::vector<study::Stretch> to_do = checkpoints_.to_do();
-        const std::int64_t turns = turns_of(task_.plan, to_do);
-        const std::int64_t gyros = gyros_of(to_do);
-        // Gyros that are there count as many turns as the others: of a design they may be of other points, but the
-        // share that is shown need not be exact.
-        if (gyros > 0) options.already_done.turns = turns / gyros * options.already_done.gyros;
-        options.total_turns = turns + options.already_done.turns;
-        return options;
-    }
-
-    std::string after(const std::string& what, bool all_kept) const {
-        const std::int64_t gyros = checkpoints_.gyros();
-        std::string text = what;
-        if (gyros == 0) {
-            text += ", nothing written";
-        } else if (all_kept) {
-            text += fmt::format("; {} of {} are kept in {}: the same command with --resume goes on from there", gyros,
-                                gyros_text(all_gyros_), folder_.path().string());
-        } else {
-            text += fmt::format("; {} could not all be kept in {}: --resume goes on from what is there",
-                                gyros_text(gyros), folder_.path().string());
-        }
-        if (const auto block_s = checkpoints_.mean_block_s()) {
-            text += fmt::format("; a block of up to {} takes a thread about {}, and blocks under way are lost",
-                                gyros_text(simd::lanes), duration_text(*block_s));
-        }
-        return text;
-    }
-
-    Task task_;
-    parts::Folder folder_;
-    const std::int64_t all_gyros_;
-    parts::Checkpoints checkpoints_;
-    ensemble::Progress progress_;
-};
-
 void announce(const Task& task, std::int64_t gyros) {
     const study::Study& first = task.plan.points.front();
     const double duration_s = first.schedule.sample_interval_s * static_cast<double>(first.schedule.samples - 1);
     std::string points = task.plan.has_design() ? fmt::format("{} points, ", task.plan.points.size()) : "";
     if (task.grows()) points += "until precise, at most ";
     if (task.shard) points += fmt::format("shard {}, ", parts::to_string(*task.shard));
-    tell(fmt::format("{}: {}{} gyros x {:.6g} s, {} arms, {} threads; the result will take {} {:.1f} MB\n",
-                     task.scenario_file, points, gyros, duration_s, task.plan.scenario.arms.size(), task.threads,
-                     task.grows() ? "up to" : "about",
+    const std::string processes = task.leader ? fmt::format("{} processes x ", 1 + task.leader->members()) : "";
+    tell(fmt::format("{}: {}{} gyros x {:.6g} s, {} arms, {}{} threads; the result will take {} {:.1f} MB\n",
+                     task.scenario_file, points, gyros, duration_s, task.plan.scenario.arms.size(), processes,
+                     task.threads, task.grows() ? "up to" : "about",
                      static_cast<double>(study::expected_size_bytes(task.plan)) * 1e-6));
 }
 
@@ -323,6 +185,7 @@ void run_shard(const RunArguments& arguments, Task task, double every_s, Outcome
                 return checkpoints.keeper(point, first, gyros);
             },
             session.monitor());
+        checkpoints.collect(plan.points, 0, std::numeric_limits<std::int64_t>::max());
         session.progress().finish();
         checkpoints.keep_all();
         check_interrupt();
@@ -345,7 +208,12 @@ bool is_shard_of(const std::filesystem::path& file, const parts::Manifest& manif
     return store::is_part(file) && parts::differences(parts::read_manifest(file), manifest).empty();
 }
 
-void refuse_what_does_not_go_together(const RunArguments& arguments, const scenario::Scenario& scenario) {
+void refuse_what_does_not_go_together(const RunArguments& arguments, const scenario::Scenario& scenario,
+                                      const Ranks& ranks) {
+    if (ranks.leader && arguments.checkpoint_every == "never") {
+        throw InputError(
+            "--checkpoint-every never: the processes of mpirun hand on what they finish as checkpoints; give seconds");
+    }
     if (arguments.shard.empty()) return;
     if (scenario::asks(scenario.stop)) {
         throw InputError(
@@ -363,6 +231,36 @@ void refuse_what_does_not_go_together(const RunArguments& arguments, const scena
 
 }  // namespace
 
+std::optional<double> checkpoint_interval_s(const RunArguments& arguments) {
+    const std::string& asked = arguments.checkpoint_every;
+    if (asked == "never") return std::nullopt;
+    double seconds = 0.0;
+    const auto [end, error] = std::from_chars(asked.data(), asked.data() + asked.size(), seconds);
+    if (error != std::errc() || end != asked.data() + asked.size() || !(seconds >= 0.0 && seconds <= 86400.0)) {
+        throw InputError(fmt::format("--checkpoint-every {}: must be seconds between 0 and 86400, or never", asked));
+    }
+    return seconds;
+}
+
+std::optional<parts::Shard> shard_of(const RunArguments& arguments) {
+    if (arguments.shard.empty()) return std::nullopt;
+    return parts::parse_shard(arguments.shard);
+}
+
+std::filesystem::path target_of(const RunArguments& arguments, const std::filesystem::path& result) {
+    const std::optional<parts::Shard> shard = shard_of(arguments);
+    return shard ? parts::shard_file(result, *shard) : result;
+}
+
+int threads_of(const RunArguments& arguments, const Ranks& ranks) {
+    const int asked = thread_count(arguments.threads);
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    // A launcher that binds its processes to cores has divided these already.
+    const bool are_divided = static_cast<long>(std::thread::hardware_concurrency()) < cores;
+    if (arguments.threads != "0" || are_divided) return asked;
+    return std::max(1, asked / ranks.of_this_machine);
+}
+
 bool is_finished(const std::filesystem::path& result, const study::Experiment& plan) {
     // A run that was interrupted before it could remove what it kept is finished; one that was to replace a result of
     // another program is not.
@@ -371,21 +269,24 @@ bool is_finished(const std::filesystem::path& result, const study::Experiment& p
 }
 
 bool run_one(const RunArguments& arguments, const std::string& scenario_file, const std::filesystem::path& result,
-             std::span<const char* const> command_line, const OnOutcome& on_outcome) {
-    const int threads = thread_count(arguments.threads);
-    const std::optional<double> every_s = checkpoint_interval_s(arguments.checkpoint_every);
-    std::optional<parts::Shard> shard;
-    if (!arguments.shard.empty()) shard = parts::parse_shard(arguments.shard);
+             std::span<const char* const> command_line, const OnOutcome& on_outcome, const Ranks& ranks) {
+    const int threads = threads_of(arguments, ranks);
+    const std::optional<double> every_s = checkpoint_interval_s(arguments);
+    const std::optional<parts::Shard> shard = shard_of(arguments);
     const scenario::Scenario scenario = load_scenario(scenario_file, arguments.changes);
-    refuse_what_does_not_go_together(arguments, scenario);
-    const std::filesystem::path target = shard ? parts::shard_file(result, *shard) : result;
+    refuse_what_does_not_go_together(arguments, scenario, ranks);
+    const std::filesystem::path target = target_of(arguments, result);
     refuse_same_files({{"SCENARIO", scenario_file, NamedFile::Use::input},
                        {"-o", target, NamedFile::Use::output},
                        {"--plot", arguments.plot, NamedFile::Use::output}});
-    check_room(target, needs_of(scenario, threads, every_s.has_value(), shard ? shard->count : 1), arguments.quiet);
+    Needs needs = needs_of(scenario, threads, every_s.has_value(), shard ? shard->count : 1);
+    needs.memory_bytes *= static_cast<std::uint64_t>(ranks.of_this_machine);
+    check_room(target, needs, arguments.quiet);
 
     Outcome outcome(arguments, store::collect_provenance(command_line, threads, scenario_file), on_outcome);
-    Task task{scenario_file, study::Experiment(scenario), result, target, shard, threads, arguments.quiet};
+    if (ranks.leader) ranks.leader->use(threads);
+    Task task{scenario_file,  study::Experiment(scenario), result, target, shard, threads, ranks.leader,
+              arguments.quiet};
     const parts::Manifest manifest = parts::manifest_of(scenario, shard);
     const bool is_there = shard ? is_shard_of(task.target, manifest) : is_finished(result, task.plan);
     if (arguments.resume && is_there) {

@@ -52,6 +52,12 @@ int sync(const fs::path& path, int flags) {
     return error;
 }
 
+std::vector<std::int64_t> gyros_of(const study::Experiment& plan) {
+    std::vector<std::int64_t> gyros;
+    for (const study::Study& point : plan.points) gyros.push_back(static_cast<std::int64_t>(point.gyros.size()));
+    return gyros;
+}
+
 }  // namespace
 
 /// One block while it is simulated. Samples go to a file at once, so that memory does not grow with the record.
@@ -106,10 +112,8 @@ Checkpoints::Checkpoints(const Folder& folder, const study::Experiment& plan, Op
       options_(std::move(options)),
       tell_(std::move(tell)),
       samples_(plan.scenario.output.angle_record),
+      gyros_of_points_(gyros_of(plan)),
       finished_(manifest_) {
-    for (const study::Study& point : plan.points) {
-        gyros_of_points_.push_back(static_cast<std::int64_t>(point.gyros.size()));
-    }
     for (const fs::path& file : folder.files()) {
         try {
             finished_.add_file(file);
@@ -123,6 +127,17 @@ Checkpoints::Checkpoints(const Folder& folder, const study::Experiment& plan, Op
     seconds_before_ = finished_.wall_s();
     gyros_before_ = gyros_ = finished_.gyros();
 }
+
+Checkpoints::Checkpoints(const fs::path& folder, const Manifest& manifest, const Member& member,
+                         const study::Experiment& plan, Options options, Tell tell)
+    : path_(folder),
+      prefix_(fmt::format("rank-{}-", member.rank())),
+      manifest_(manifest),
+      options_(std::move(options)),
+      tell_(std::move(tell)),
+      samples_(plan.scenario.output.angle_record),
+      gyros_of_points_(gyros_of(plan)),
+      finished_(manifest_) {}
 
 void Checkpoints::begin(std::function<ensemble::Progress::Pace()> pace) {
     pace_ = std::move(pace);
@@ -140,8 +155,33 @@ Checkpoints::~Checkpoints() {
 
 std::vector<study::Stretch> Checkpoints::take_up(std::span<study::Study> points, std::int64_t first,
                                                  std::int64_t last) {
-    const std::vector<study::Stretch> gaps = finished_.take_up(points, first, last);
-    return options_.shard ? within(gaps, gyros_of_points_, *options_.shard) : gaps;
+    std::vector<study::Stretch> gaps = finished_.take_up(points, first, last);
+    if (options_.shard) gaps = within(gaps, gyros_of_points_, *options_.shard);
+    if (options_.leader) {
+        options_.leader->give({to_json(manifest_), static_cast<std::int64_t>(points.front().gyros.size()), gaps});
+    }
+    return gaps;
+}
+
+void Checkpoints::collect(std::span<study::Study> points, std::int64_t first, std::int64_t last) {
+    if (!options_.leader) return;
+    keep_all();
+    const std::vector<fs::path> files = options_.leader->wait_for_reports();
+    {
+        const std::lock_guard one(keeping_);
+        const std::lock_guard lock(mutex_);
+        const std::vector<fs::path> known = finished_.files();
+        for (const fs::path& file : files) {
+            if (!std::binary_search(known.begin(), known.end(), file)) finished_.add_file(file);
+        }
+    }
+    std::vector<study::Stretch> gaps = finished_.take_up(points, first, last);
+    if (options_.shard) gaps = within(gaps, gyros_of_points_, *options_.shard);
+    if (gaps.empty()) return;
+    throw RunError(
+        fmt::format("{}: {} gyros from gyro {} on were simulated by another process, but are in no file that "
+                    "it has reported",
+                    path_.string(), gaps.front().last - gaps.front().first, gaps.front().first));
 }
 
 std::vector<study::Stretch> Checkpoints::to_do() const {
@@ -270,7 +310,7 @@ fs::path Checkpoints::next_file() {
     const std::lock_guard lock(mutex_);
     fs::path file;
     do {
-        file = path_ / fmt::format("{:06}{}", ++numbers_, part_suffix);
+        file = path_ / fmt::format("{}{:06}{}", prefix_, ++numbers_, part_suffix);
     } while (fs::exists(file));
     return file;
 }
@@ -320,7 +360,7 @@ void Checkpoints::work(const std::stop_token& stop) {
         } catch (const std::exception&) {
             // Interrupted, or asked to end: whoever ended the run keeps what can be kept.
         }
-        if (shown == Clock::time_point::min() || Clock::now() - shown >= longest_without_status) {
+        if (pace_ && (shown == Clock::time_point::min() || Clock::now() - shown >= longest_without_status)) {
             tell_status();
             shown = Clock::now();
         }

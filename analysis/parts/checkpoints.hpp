@@ -16,6 +16,7 @@
 
 #include "analysis/parts/folder.hpp"
 #include "analysis/parts/part_files.hpp"
+#include "analysis/parts/team.hpp"
 #include "analysis/study/experiment.hpp"
 #include "engine/ensemble/progress.hpp"
 
@@ -33,18 +34,24 @@ class Checkpoints final : public study::Store {
         double every_s = 30.0;            ///< 0: every block by itself
         std::optional<Shard> shard = {};  ///< the part of the run to simulate; empty: all of it
         std::int64_t of_gyros = 0;        ///< of which write_status() tells
+        Leader* leader = nullptr;         ///< of the processes that simulate the run together; null: there is one
     };
 
     /// Reads what the folder holds. Files that are damaged are told of and put aside: their gyros are simulated again.
     Checkpoints(const Folder& folder, const study::Experiment& plan, Options options, Tell tell);
+    /// Those of a member, which reads nothing and writes into the folder of the leader.
+    Checkpoints(const std::filesystem::path& folder, const Manifest& manifest, const Member& member,
+                const study::Experiment& plan, Options options, Tell tell);
     /// Ends the writing. Blocks that are not written by then are lost.
     ~Checkpoints() override;
 
     std::vector<study::Stretch> take_up(std::span<study::Study> points, std::int64_t first, std::int64_t last) override;
     std::unique_ptr<study::BlockKeeper> keeper(std::size_t point, std::int64_t first_gyro, std::size_t gyros) override;
+    void collect(std::span<study::Study> points, std::int64_t first, std::int64_t last) override;
     double hours_before() const override { return seconds_before_ / 3600.0; }
 
-    /// Begins to keep what is finished, and to tell how far it is. Before the first block is simulated.
+    /// Begins to keep what is finished and, where a pace is given, to tell how far it is. Before the first block is
+    /// simulated.
     void begin(std::function<ensemble::Progress::Pace()> pace);
 
     /// What this process has to simulate, of an experiment that does not grow.
@@ -87,6 +94,7 @@ class Checkpoints final : public study::Store {
 
     const std::filesystem::path path_;
     const std::string who_;
+    const std::string prefix_;  ///< of the names of files, so that no two processes choose the same
     const Manifest manifest_;
     const Options options_;
     const Tell tell_;

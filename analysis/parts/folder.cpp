@@ -89,7 +89,7 @@ std::vector<Shard> shards_begun(const fs::path& output) {
         const std::size_t of = name.find("-of-");
         if (of == std::string::npos) continue;
         try {
-            found.push_back(parse_shard(name.replace(of, 4, "/")));
+            found.push_back(parse_shard(fmt::format("{}/{}", name.substr(0, of), name.substr(of + 4))));
         } catch (const InputError&) {
             continue;  // a file with a similar name, not of ours
         }

@@ -132,9 +132,7 @@ std::vector<study::Stretch> FinishedGyros::gaps(std::span<const std::int64_t> gy
 }
 
 void FinishedGyros::each_record(const store::OnRecord& on_record) const {
-    std::set<std::filesystem::path> files;
-    for (const auto& [name, block] : blocks_) files.insert(block.file);
-    for (const auto& file : files) {
+    for (const auto& file : files()) {
         const auto from_here = [&](const BlockName& name) {
             const auto known = blocks_.find(name);
             return known != blocks_.end() && known->second.file == file;
@@ -157,6 +155,12 @@ std::int64_t FinishedGyros::gyros() const {
     std::int64_t sum = 0;
     for (const auto& [name, block] : blocks_) sum += block.gyros;
     return sum;
+}
+
+std::vector<std::filesystem::path> FinishedGyros::files() const {
+    std::set<std::filesystem::path> files;
+    for (const auto& [name, block] : blocks_) files.insert(block.file);
+    return {files.begin(), files.end()};
 }
 
 }  // namespace ringlock::parts

@@ -53,7 +53,8 @@ class FinishedGyros {
     /// Calls back with every record of the blocks, samples first.
     void each_record(const store::OnRecord& on_record) const;
 
-    std::int64_t gyros() const;  ///< finished, of all points
+    std::int64_t gyros() const;                        ///< finished, of all points
+    std::vector<std::filesystem::path> files() const;  ///< that have them, sorted
     std::int64_t blocks() const { return static_cast<std::int64_t>(blocks_.size()); }
     double wall_s() const { return wall_s_; }  ///< longest time that a file says was spent
 

@@ -127,6 +127,7 @@ class NoStore final : public Store {
     std::unique_ptr<BlockKeeper> keeper(std::size_t point, std::int64_t first_gyro, std::size_t gyros) override {
         return make_keeper_(point, first_gyro, gyros);
     }
+    void collect(std::span<Study>, std::int64_t, std::int64_t) override {}
     double hours_before() const override { return 0.0; }
 
    private:
@@ -143,6 +144,7 @@ Experiment run(Experiment experiment, int threads, Store& store, const ensemble:
     const auto simulate = [&](std::int64_t first, std::int64_t last) {
         const std::vector<Stretch> stretches = store.take_up(experiment.points, first, last);
         run(experiment.points, stretches, threads, make_keeper, monitor);
+        store.collect(experiment.points, first, last);
     };
     const scenario::Stop stop = experiment.scenario.stop;
     if (!scenario::asks(stop)) {

@@ -47,6 +47,9 @@ class Store {
     virtual std::vector<Stretch> take_up(std::span<Study> points, std::int64_t first, std::int64_t last) = 0;
     /// A keeper of what is about to be simulated.
     virtual std::unique_ptr<BlockKeeper> keeper(std::size_t point, std::int64_t first_gyro, std::size_t gyros) = 0;
+    /// All that was missing of gyros [first, last) is simulated. Where other processes have simulated some of it, puts
+    /// these gyros into the points.
+    virtual void collect(std::span<Study> points, std::int64_t first, std::int64_t last) = 0;
     /// Wall time that was spent on what is kept [h].
     virtual double hours_before() const = 0;
 };

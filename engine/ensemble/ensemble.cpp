@@ -1,16 +1,17 @@
 #include "engine/ensemble/ensemble.hpp"
 
 #include <fmt/format.h>
-#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <mutex>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -167,6 +168,23 @@ std::int64_t turns_of_gyro(const scenario::Scenario& scenario, std::span<const s
     return trajectories * Schedule(scenario).turns();
 }
 
+/// The blocks of a simulation that no other process shares, one after the other.
+class OwnBlocks final : public BlockSource {
+   public:
+    explicit OwnBlocks(int threads) : threads_(threads) {}
+    int threads() const override { return threads_; }
+    void begin(std::size_t blocks) override { blocks_ = blocks; }
+    std::optional<std::size_t> next() override {
+        const std::size_t block = next_++;
+        return block < blocks_ ? std::optional(block) : std::nullopt;
+    }
+
+   private:
+    int threads_;
+    std::size_t blocks_ = 0;
+    std::atomic<std::size_t> next_ = 0;
+};
+
 void tell_plan(std::span<const Job> jobs, std::span<const Block> blocks, int threads, const Monitor& monitor) {
     if (!monitor.observer) return;
     std::vector<std::int64_t> turns;
@@ -186,15 +204,18 @@ void run(std::span<const Job> jobs, int threads, const Monitor& monitor) {
     std::int64_t all = 0;
     for (const Job& job : jobs) all += job.last - job.first;
     if (all == 0) return;
+    OwnBlocks own(threads);
+    BlockSource& source = monitor.blocks ? *monitor.blocks : own;
     std::vector<Block> blocks;
-    const std::int64_t size = block_size(all, threads);
+    const std::int64_t size = block_size(all, source.threads());
     for (std::size_t job = 0; job < jobs.size(); ++job) {
         for (std::int64_t gyro = jobs[job].first; gyro < jobs[job].last; gyro += size) {
             blocks.push_back({job, gyro, std::min(size, jobs[job].last - gyro)});
         }
     }
     if (jobs.size() > 1) blocks = spread(blocks);
-    tell_plan(jobs, blocks, threads, monitor);
+    tell_plan(jobs, blocks, source.threads(), monitor);
+    source.begin(blocks.size());
     Failures failures;
     const auto simulate_gyros = [&](const Job& job, std::int64_t gyro, std::int64_t gyros, BlockProgress& progress) {
         const auto sink = job.make_sink(gyro, static_cast<std::size_t>(gyros));
@@ -224,15 +245,23 @@ void run(std::span<const Job> jobs, int threads, const Monitor& monitor) {
     const oneapi::tbb::global_control control(oneapi::tbb::global_control::max_allowed_parallelism,
                                               static_cast<std::size_t>(threads));
     oneapi::tbb::task_arena arena(threads);
+    std::atomic<bool> stopped = false;
+    const auto simulate_blocks = [&](int) {
+        try {
+            while (!stopped) {
+                const std::optional<std::size_t> block = source.next();
+                if (!block) return;
+                simulate_block(*block);
+            }
+        } catch (...) {
+            stopped = true;
+            throw;
+        }
+    };
     arena.execute([&] {
         // Its own context: cancelling this loop must not cancel a loop of the caller around it.
         oneapi::tbb::task_group_context context(oneapi::tbb::task_group_context::isolated);
-        oneapi::tbb::parallel_for(
-            oneapi::tbb::blocked_range<std::size_t>(0, blocks.size(), 1),
-            [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
-                for (std::size_t i = range.begin(); i != range.end(); ++i) simulate_block(i);
-            },
-            oneapi::tbb::simple_partitioner(), context);
+        oneapi::tbb::parallel_for(0, threads, simulate_blocks, oneapi::tbb::simple_partitioner(), context);
     });
     failures.report(jobs, all);
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/ensemble/block_source.hpp"
 #include "engine/ensemble/observer.hpp"
 #include "engine/gyro/setup.hpp"
 #include "engine/scenario/arm.hpp"
@@ -41,10 +42,11 @@ class BlockSink {
 /// Makes the sink of a block; called from the thread that simulates it.
 using SinkFactory = std::function<std::unique_ptr<BlockSink>(std::int64_t first_gyro, std::size_t gyros)>;
 
-/// What a simulation asks and tells while it runs; both may be empty, and are called from any thread.
+/// What a simulation asks and tells while it runs. All may be empty, are called from any thread, and outlive it.
 struct Monitor {
     std::function<bool()> cancelled = {};  ///< true stops the simulation with Interrupted
-    Observer* observer = nullptr;          ///< outlives the simulation
+    Observer* observer = nullptr;
+    BlockSource* blocks = nullptr;  ///< where other processes simulate the same jobs: which blocks this one takes
 };
 
 /// Turns that the whole ensemble will count. A scenario without complaints (scenario/check.hpp) has no more than 64
@@ -64,8 +66,9 @@ struct Job {
 /// Simulates the gyros of all jobs on `threads` threads of oneTBB, in blocks of at most simd::lanes, none of two jobs.
 ///
 /// What a gyro does depends on its scenario and number, never on block, thread or other jobs: results are the same for
-/// any number of threads. Gyros that fail do not stop the others; their failures are reported together in one RunError
-/// at the end. What a sink throws stops all and is passed on; cancellation stops all and throws Interrupted.
+/// any number of threads and of processes that share the blocks (Monitor::blocks). Gyros that fail do not stop the
+/// others; their failures are reported together in one RunError at the end. What a sink throws stops all and is passed
+/// on; cancellation stops all and throws Interrupted.
 void run(std::span<const Job> jobs, int threads, const Monitor& monitor);
 
 }  // namespace ringlock::ensemble

@@ -46,7 +46,9 @@ class ProgramTest : public testing::Test {
 
     /// Starts the program with the test's directory as its own.
     pid_t start(const Arguments& arguments, const Prepare& prepare = {}) const {
-        std::vector<char*> argv{const_cast<char*>("ringlock")};
+        std::vector<char*> argv;
+        for (const std::string& word : launcher_) argv.push_back(const_cast<char*>(word.c_str()));
+        argv.push_back(const_cast<char*>(launcher_.empty() ? "ringlock" : RINGLOCK_PROGRAM));
         for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
         argv.push_back(nullptr);
         const std::string out = (streams_ / "out").string();
@@ -58,7 +60,7 @@ class ProgramTest : public testing::Test {
         dup2(open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), STDOUT_FILENO);
         dup2(open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), STDERR_FILENO);
         if (prepare) prepare();
-        execv(RINGLOCK_PROGRAM, argv.data());
+        execvp(launcher_.empty() ? RINGLOCK_PROGRAM : argv.front(), argv.data());
         _exit(126);
     }
     Outcome finish(pid_t child) const {
@@ -112,6 +114,7 @@ class ProgramTest : public testing::Test {
 
     std::filesystem::path directory_;
     std::filesystem::path streams_;
+    Arguments launcher_;  ///< what starts the program, as `mpirun -n 2` does; empty: the test itself
 };
 
 }  // namespace ringlock::test

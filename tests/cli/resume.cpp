@@ -15,59 +15,23 @@
 #include <vector>
 
 #include "tests/cli/program.hpp"
+#include "tests/cli/scenarios.hpp"
 
 // Runs that are interrupted, divided and put together again: the file is the one that an undisturbed run writes.
 namespace ringlock {
 namespace {
 
 using nlohmann::json;
+using test::design;
+using test::growing;
 using test::Outcome;
+using test::statistics_only;
+using test::with_records;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 namespace fs = std::filesystem;
-
-/// Six blocks of gyros, all ways of sharing a trajectory, with angle records.
-constexpr const char* with_records = R"([ensemble]
-gyros = 90
-duration_s = 20.0
-[arms]
-names = ["ideal", "uncompensated", "noise_injected", "noise_injected+compensated"]
-)";
-
-/// The same without records.
-constexpr const char* statistics_only = R"([ensemble]
-gyros = 90
-duration_s = 20.0
-[output]
-angle_record = false
-)";
-
-/// Points of unequal cost.
-constexpr const char* design = R"([ensemble]
-gyros = 20
-duration_s = 20.0
-[output]
-angle_record = false
-[design]
-kind = "list"
-[[design.vary]]
-key = "dither.frequency_hz"
-values = [80.0, 124.0, 400.0]
-)";
-
-/// A lot that grows to 64 gyros or so.
-constexpr const char* growing = R"([ensemble]
-duration_s = 30.0
-[arms]
-names = ["noise_injected"]
-[output]
-angle_record = false
-[stop]
-arw_relative = 0.02
-most_gyros = 256
-)";
 
 class Resumed : public test::ProgramTest {
    protected:

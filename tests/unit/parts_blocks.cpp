@@ -49,6 +49,7 @@ class InMemory final : public study::Store {
         };
         return std::make_unique<Keeper>(*this);
     }
+    void collect(std::span<study::Study>, std::int64_t, std::int64_t) override {}
     double hours_before() const override { return 0.0; }
 
    private:

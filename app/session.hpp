@@ -1,0 +1,80 @@
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "analysis/parts/checkpoints.hpp"
+#include "analysis/parts/folder.hpp"
+#include "analysis/parts/manifest.hpp"
+#include "analysis/parts/team.hpp"
+#include "analysis/study/experiment.hpp"
+#include "engine/core/error.hpp"
+#include "engine/core/interrupt.hpp"
+#include "engine/ensemble/progress.hpp"
+
+namespace ringlock::app {
+
+/// What is simulated, and where it goes.
+struct Task {
+    std::string scenario_file;
+    study::Experiment plan;
+    std::filesystem::path result;
+    std::filesystem::path target;  ///< result or shard
+    std::optional<parts::Shard> shard;
+    int threads = 1;                  ///< of this process
+    parts::Leader* leader = nullptr;  ///< where several processes simulate it
+    bool quiet = false;
+
+    bool grows() const { return scenario::asks(plan.scenario.stop); }
+};
+
+/// Gyros that will be finished at the end; of a lot that grows, at most.
+std::int64_t gyros_of(const Task& task);
+
+/// What people are told of a run beside its progress.
+void say(const std::string& line);
+
+/// A run that keeps what is finished.
+class Session {
+   public:
+    Session(Task task, double every_s, parts::Beginning beginning);
+    ~Session();
+    Session(const Session&) = delete;
+    Session& operator=(const Session&) = delete;
+
+    /// Does the work. Where that does not end well, keeps what is finished and says in the error what is left.
+    template <class Work>
+    void keep_whatever_happens(Work&& work) {
+        try {
+            work();
+        } catch (const Interrupted&) {
+            const bool all = checkpoints_.keep_what_can_be();
+            throw Interrupted(after("interrupted", all));
+        } catch (const RunError& error) {
+            const bool all = checkpoints_.keep_what_can_be();
+            if (checkpoints_.gyros() == 0) throw;
+            throw RunError(after(error.what(), all));
+        }
+    }
+
+    std::int64_t all_gyros() const { return all_gyros_; }
+    Task& task() { return task_; }
+    parts::Folder& folder() { return folder_; }
+    parts::Checkpoints& checkpoints() { return checkpoints_; }
+    ensemble::Progress& progress() { return progress_; }
+    ensemble::Monitor monitor() { return {interrupted, &progress_, task_.leader}; }
+
+   private:
+    parts::Checkpoints::Options options(double every_s) const;
+    ensemble::ProgressOptions progress_options() const;
+    std::string after(const std::string& what, bool all_kept) const;
+
+    Task task_;
+    parts::Folder folder_;
+    const std::int64_t all_gyros_;
+    parts::Checkpoints checkpoints_;
+    ensemble::Progress progress_;
+};
+
+}  // namespace ringlock::app
