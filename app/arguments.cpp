@@ -143,4 +143,12 @@ std::vector<AveragingTime> parse_averaging_times(std::string_view option, const 
     return out;
 }
 
+double duration_s(std::string_view option, const std::string& text) {
+    const auto time = averaging_time(text);
+    if (!time || !time->time_s || !(*time->time_s > 0.0)) {
+        throw InputError(fmt::format("{} '{}': must be a time with its unit, as 90s, 20min or 2h", option, text));
+    }
+    return *time->time_s;
+}
+
 }  // namespace ringlock::app

@@ -51,4 +51,7 @@ struct AveragingTime {
 /// Numbers with a unit are times (100s, 2min, 1h), those without are averaging factors. Throws InputError.
 std::vector<AveragingTime> parse_averaging_times(std::string_view option, const std::string& list);
 
+/// Seconds of a time with a unit, as in 90s, 20min, 2h. Throws InputError.
+double duration_s(std::string_view option, const std::string& text);
+
 }  // namespace ringlock::app

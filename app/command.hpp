@@ -20,6 +20,7 @@ void add_record(CLI::App& root);
 void add_devices(CLI::App& root);
 void add_merge(CLI::App& root, std::span<const char* const> command_line);
 void add_status(CLI::App& root);
+void add_submit(CLI::App& root);
 /// `command_line` as for add_run().
 void add_replay(CLI::App& root, std::span<const char* const> command_line);
 /// Commands of the contract that are not built yet: they say so.

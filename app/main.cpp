@@ -63,6 +63,7 @@ int main(int argc, char** argv) {
     app::add_devices(root);
     app::add_merge(root, {argv, static_cast<std::size_t>(argc)});
     app::add_status(root);
+    app::add_submit(root);
     app::add_replay(root, {argv, static_cast<std::size_t>(argc)});
     app::add_planned(root);
     try {

@@ -86,6 +86,11 @@ ensemble::ProgressOptions Session::progress_options() const {
     return options;
 }
 
+void Session::fail(const std::string& what) {
+    const bool all = checkpoints_.keep_what_can_be();
+    throw RunError(checkpoints_.gyros() == 0 ? what : after(what, all));
+}
+
 std::string Session::after(const std::string& what, bool all_kept) const {
     const std::int64_t gyros = checkpoints_.gyros();
     std::string text = what;

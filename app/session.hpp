@@ -52,9 +52,10 @@ class Session {
             const bool all = checkpoints_.keep_what_can_be();
             throw Interrupted(after("interrupted", all));
         } catch (const RunError& error) {
-            const bool all = checkpoints_.keep_what_can_be();
-            if (checkpoints_.gyros() == 0) throw;
-            throw RunError(after(error.what(), all));
+            fail(error.what());
+        } catch (const InputError& error) {
+            // A file that was there when the run began, as those of its checkpoints, cannot be read any more.
+            fail(error.what());
         }
     }
 
@@ -69,6 +70,7 @@ class Session {
     parts::Checkpoints::Options options(double every_s) const;
     ensemble::ProgressOptions progress_options() const;
     std::string after(const std::string& what, bool all_kept) const;
+    [[noreturn]] void fail(const std::string& what);
 
     Task task_;
     parts::Folder folder_;

@@ -1,0 +1,33 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace ringlock::app {
+
+/// A run as an array of Slurm jobs, one for each shard, and a merge that depends on them.
+struct SlurmJobs {
+    std::string program;  ///< these three are absolute paths
+    std::string scenario;
+    std::string result;
+    std::vector<std::string> options;  ///< of `ringlock run`, beyond those of its shard
+    std::string note;                  ///< a comment: how the shards were sized
+    std::int64_t shards = 1;
+    int threads = 1;                   ///< of a shard
+    std::int64_t memory_mb = 0;        ///< of a shard
+    std::int64_t shard_limit_min = 0;  ///< after which Slurm ends a shard
+    std::int64_t merge_limit_min = 0;  ///< after which it ends the merge
+};
+
+/// Times that shards are submitted before the merge gives up.
+inline constexpr int slurm_tries = 3;
+
+/// The word as a POSIX shell reads it back, whatever is in it.
+std::string shell_quoted(const std::string& word);
+
+/// A script for bash: run by hand it submits the shards and the merge; as a job of Slurm it does what it is told. The
+/// merge waits for the shards however they end (`afterany`; one that depends on `afterok` waits for ever once a shard
+/// has failed), looks for what is missing, and submits that and itself again.
+std::string slurm_script(const SlurmJobs& jobs);
+
+}  // namespace ringlock::app
