@@ -78,7 +78,7 @@ void merge(const MergeArguments& arguments, std::span<const char* const> command
     whole.shard.reset();
     parts::Folder lock(arguments.out, whole, parts::Beginning::refuse, [](const auto&) {});
 
-    study::predict_noise(plan.points, threads, nullptr);
+    study::predict_noise(plan.points, threads, {interrupted});
     shards.finished().take_up(plan.points, 0, std::numeric_limits<std::int64_t>::max());
     store::Provenance provenance = store::collect_provenance(command_line, threads, "");
     provenance.wall_s = shards.wall_s();

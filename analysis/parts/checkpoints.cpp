@@ -381,7 +381,7 @@ void Checkpoints::tell_status() {
     status.left_s = pace.left_s;
     {
         const std::lock_guard lock(mutex_);
-        status.gyros = gyros_;
+        status.gyros = options_.leader ? gyros_before_ + pace.gyros : gyros_;
         status.last_block = last_block_;
     }
     write_status(path_, status);

@@ -137,7 +137,7 @@ class NoStore final : public Store {
 }  // namespace
 
 Experiment run(Experiment experiment, int threads, Store& store, const ensemble::Monitor& monitor) {
-    predict_noise(experiment.points, threads, monitor.observer);
+    predict_noise(experiment.points, threads, monitor);
     const MakeKeeper make_keeper = [&](std::size_t point, std::int64_t first_gyro, std::size_t gyros) {
         return store.keeper(point, first_gyro, gyros);
     };

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -18,6 +17,7 @@
 #include "analysis/allan/octave_deviation.hpp"
 #include "analysis/allan/octave_stream.hpp"
 #include "analysis/study/angle_counts.hpp"
+#include "engine/ensemble/arena.hpp"
 #include "engine/ensemble/closed_form.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/output_counts.hpp"
@@ -326,18 +326,19 @@ void extend(Study& study, std::int64_t gyros) {
     for (ArmStatistics& arm : study.arms) arm.gyros.resize(static_cast<std::size_t>(gyros));
 }
 
-void predict_noise(std::span<Study> studies, int threads, ensemble::Observer* observer) {
+void predict_noise(std::span<Study> studies, int threads, const ensemble::Monitor& monitor) {
     const auto predictions = std::count_if(studies.begin(), studies.end(), awaits_prediction);
     if (predictions == 0) return;
     std::atomic<std::int64_t> done = 0;
     const auto tell = [&](std::int64_t predicted) {
-        if (observer) observer->stage(fmt::format("predicting what noise does, {}/{}", predicted, predictions));
+        if (monitor.observer)
+            monitor.observer->stage(fmt::format("predicting what noise does, {}/{}", predicted, predictions));
     };
     tell(0);
-    oneapi::tbb::task_arena arena(threads);
-    arena.execute([&] {
+    ensemble::on_threads(threads, [&] {
         oneapi::tbb::parallel_for(std::size_t{0}, studies.size(), [&](std::size_t i) {
             if (!awaits_prediction(studies[i])) return;
+            if (monitor.cancelled && monitor.cancelled()) throw Interrupted();
             predict_noise(studies[i]);
             tell(++done);
         });
@@ -361,7 +362,7 @@ void run(std::span<Study> studies, std::span<const Stretch> stretches, int threa
 }
 
 Study run(Study study, int threads, const OnSamples& on_samples, const ensemble::Monitor& monitor) {
-    predict_noise({&study, 1}, threads, monitor.observer);
+    predict_noise({&study, 1}, threads, monitor);
     const Stretch all{0, 0, ensemble::total_gyros(study.scenario)};
     run({&study, 1}, {&all, 1}, threads, hand_on(on_samples), monitor);
     return study;

@@ -141,9 +141,9 @@ Study run(Study study, int threads, const OnSamples& on_samples = nullptr, const
 void run(std::span<Study> studies, std::span<const Stretch> stretches, int threads, const MakeKeeper& make_keeper,
          const ensemble::Monitor& monitor);
 
-/// predict_noise() of several studies on that many threads: some seconds each for the noise of a drive. An observer is
-/// told of it as a stage.
-void predict_noise(std::span<Study> studies, int threads, ensemble::Observer* observer);
+/// predict_noise() of several studies on that many threads: some seconds each for the noise of a drive, during which
+/// nobody asks whether they are cancelled. The observer is told of it as a stage. Throws Interrupted.
+void predict_noise(std::span<Study> studies, int threads, const ensemble::Monitor& monitor);
 
 /// Makes room for more gyros: what is there stays as it is in a study of so many. Without a sweep only.
 void extend(Study& study, std::int64_t gyros);

@@ -1,9 +1,9 @@
 #include "engine/ensemble/ensemble.hpp"
 
 #include <fmt/format.h>
-#include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
+#include <oneapi/tbb/partitioner.h>
+#include <oneapi/tbb/task_group.h>
 
 #include <algorithm>
 #include <atomic>
@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "engine/core/error.hpp"
+#include "engine/ensemble/arena.hpp"
 #include "engine/ensemble/block.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/trajectory_kind.hpp"
@@ -241,10 +242,6 @@ void run(std::span<const Job> jobs, int threads, const Monitor& monitor) {
         }
         progress.enter(BlockStage::over);
     };
-    // An arena alone gets no more workers than there are cores; asked for more threads, give more.
-    const oneapi::tbb::global_control control(oneapi::tbb::global_control::max_allowed_parallelism,
-                                              static_cast<std::size_t>(threads));
-    oneapi::tbb::task_arena arena(threads);
     std::atomic<bool> stopped = false;
     const auto simulate_blocks = [&](int) {
         try {
@@ -258,7 +255,7 @@ void run(std::span<const Job> jobs, int threads, const Monitor& monitor) {
             throw;
         }
     };
-    arena.execute([&] {
+    on_threads(threads, [&] {
         // Its own context: cancelling this loop must not cancel a loop of the caller around it.
         oneapi::tbb::task_group_context context(oneapi::tbb::task_group_context::isolated);
         oneapi::tbb::parallel_for(0, threads, simulate_blocks, oneapi::tbb::simple_partitioner(), context);

@@ -145,8 +145,8 @@ void Progress::update() {
 Progress::Pace Progress::pace() {
     const std::lock_guard lock(mutex_);
     read_clock();
-    if (!stage_.empty()) return {time_left_.turns_per_s(now_s()), std::nullopt};
-    return {time_left_.turns_per_s(now_s()), time_left_.seconds(now_s())};
+    if (!stage_.empty()) return {gyros_, time_left_.turns_per_s(now_s()), std::nullopt};
+    return {gyros_, time_left_.turns_per_s(now_s()), time_left_.seconds(now_s())};
 }
 
 void Progress::show(bool last) {

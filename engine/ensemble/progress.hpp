@@ -55,6 +55,7 @@ class Progress final : public Observer {
 
     /// What is known of the speed now, shown or not.
     struct Pace {
+        std::int64_t gyros = 0;        ///< finished in this run, by all its processes
         double turns_per_s = 0.0;      ///< 0: no turn was gone through yet
         std::optional<double> left_s;  ///< nothing until it can be trusted
     };

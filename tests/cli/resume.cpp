@@ -206,6 +206,38 @@ TEST_F(Resumed, StatusTellsHowFarItIs) {
     EXPECT_THAT(run({"status", "out.h5"}).out, HasSubstr("out.h5: finished"));
 }
 
+TEST_F(Resumed, AnyNumberOfThreadsWritesTheSameFile) {
+    if (!has_h5diff()) GTEST_SKIP() << "h5diff (hdf5-tools) is missing";
+    for (const char* const scenario : {with_records, design, growing}) {
+        write_reference(scenario);
+        for (const char* const threads : {"2", "8"}) {
+            fs::remove(directory_ / "out.h5");
+            const Outcome outcome = run({"run", "s.toml", "-o", "out.h5", "--threads", threads});
+            ASSERT_EQ(outcome.status, 0) << outcome.err;
+            EXPECT_THAT(outcome.err, Not(HasSubstr("TBB")));
+            expect_reference("out.h5");
+        }
+    }
+}
+
+TEST_F(Resumed, AKillCostsNoMoreThanTheLastInterval) {
+    // So many turns that the run is far from its end when the first count of finished gyros is there.
+    write("s.toml", "[ensemble]\ngyros = 4000\nduration_s = 400.0\n[output]\nangle_record = false\n");
+    const pid_t child = start({"run", "s.toml", "-o", "out.h5", "--checkpoint-every", "1"});
+    const auto finished = [&]() -> std::int64_t {
+        const json status = json::parse(read("out.h5.parts/status.json"), nullptr, false);
+        return status.is_object() ? status.value("gyros", std::int64_t{0}) : 0;
+    };
+    ASSERT_TRUE(soon([&] { return finished() > 0; }));
+    const std::int64_t before = finished();
+    // The interval, and time for a busy machine to write.
+    std::this_thread::sleep_for(std::chrono::seconds(4));
+    kill(child, SIGKILL);
+    EXPECT_EQ(finish(child).signal, SIGKILL) << "the run was through before it could be killed";
+    const json status = json::parse(run({"status", "out.h5", "--json"}).out);
+    EXPECT_GE(status["outputs"][0]["gyros"].get<std::int64_t>(), before);
+}
+
 TEST_F(Resumed, ShardsMakeTheSameFileInAnyOrder) {
     std::mt19937 random(5);
     for (const char* const scenario : {with_records, design}) {
