@@ -1,9 +1,14 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
+#include <string>
 
+#include "analysis/parts/manifest.hpp"
+#include "analysis/parts/part_files.hpp"
 #include "analysis/record/probe.hpp"
 #include "analysis/record/record.hpp"
 #include "analysis/study/result/result_file.hpp"
@@ -11,7 +16,9 @@
 #include "app/command.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
+#include "app/run_text.hpp"
 #include "engine/core/error.hpp"
+#include "engine/store/part_file.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -26,11 +33,27 @@ void validate_record(const std::string& path) {
     put(fmt::format("{}: a valid record: {}{}\n", path, record_text(record), to_close ? "" : too_short));
 }
 
+/// A shard, or finished gyros that an interrupted run has kept: each record passes its checksum, and each block fits.
+void validate_part(const std::string& path) {
+    const parts::Manifest of = parts::read_manifest(path);
+    parts::FinishedGyros finished(of);
+    finished.add_file(path);
+    study::Experiment plan(of.scenario);
+    if (scenario::asks(of.scenario.stop)) {
+        for (study::Study& point : plan.points) study::extend(point, of.scenario.stop.most_gyros);
+    }
+    finished.take_up(plan.points, 0, std::numeric_limits<std::int64_t>::max());
+    const std::string what = of.shard ? fmt::format("shard {}", parts::to_string(*of.shard)) : "checkpoint";
+    put(fmt::format("{}: a valid {}: {} of a run by ringlock {} ({})\n", path, what, gyros_text(finished.gyros()),
+                    of.program_version, of.git_hash));
+}
+
 void validate(const std::string& path, const Changes& changes) {
     const std::filesystem::path extension = std::filesystem::path(path).extension();
     if (!changes.settings.empty() && extension != ".toml") {
         throw InputError(fmt::format("--set: {} is no scenario (.toml), and only keys of these can be set", path));
     }
+    if (store::is_part(path)) return validate_part(path);
     if (record::is_hdf5(path) || extension == ".h5" || extension == ".hdf5") {
         const std::string format = record::hdf5_format(path);
         if (format == "rlg-record") return validate_record(path);
@@ -63,13 +86,13 @@ void validate(const std::string& path, const Changes& changes) {
 }  // namespace
 
 void add_validate(CLI::App& root) {
-    CLI::App* command = root.add_subcommand("validate", "Say what is wrong in a scenario, record or result, and where");
+    CLI::App* command = root.add_subcommand("validate", "Say what is wrong in a scenario, record, result or shard, and where");
     struct Arguments {
         std::string file;
         Changes changes;
     };
     auto arguments = std::make_shared<Arguments>();
-    command->add_option("FILE", arguments->file, "scenario (.toml), record (HDF5 or text) or result")->required();
+    command->add_option("FILE", arguments->file, "scenario (.toml), record (HDF5 or text), result, shard or checkpoint")->required();
     add_settings(*command, arguments->changes);
     command->callback([arguments] { validate(arguments->file, arguments->changes); });
 }

@@ -199,7 +199,7 @@ void add_turns(const ensemble::GyroBlock& block, std::int64_t first_turn, double
     }
 }
 
-/// How many rows a record has, and what its samples are made of.
+/// The number of rows of a record, and the points and channels from which its samples are computed.
 struct Extent {
     bool samples = false;
     double rows = 0.0;  ///< of the record
@@ -320,7 +320,7 @@ Room expected_room(const Scenario& asked, std::int64_t gyro) {
         return {static_cast<std::uint64_t>(of_program + of_turn * extent.rows),
                 static_cast<std::uint64_t>(of_turn * extent.rows)};
     }
-    // Stages make new samples of the old ones beside them, and may add a witness for each axis.
+    // Each stage computes new samples while the old ones still exist, and may add a witness channel for each axis.
     const double source_bytes = real * extent.source_rows;
     const double made_bytes = extent.stages.empty() ? 0.0 : source_bytes + real * most_witnesses * extent.rows;
     return {static_cast<std::uint64_t>(of_program + source_bytes + made_bytes),

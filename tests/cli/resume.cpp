@@ -325,6 +325,7 @@ TEST_F(Resumed, ADamagedShardIsNeverMerged) {
     write("s.toml", statistics_only);
     ASSERT_EQ(run({"run", "s.toml", "-o", "out.h5", "--shard", "1/1"}).status, 0);
     const std::string whole = read("out.h5.shard-1-of-1");
+    EXPECT_THAT(run({"validate", "out.h5.shard-1-of-1"}).out, HasSubstr("a valid shard 1/1: 90 gyros"));
     std::mt19937_64 random(11);
     for (int trial = 0; trial < 40; ++trial) {
         std::string damaged = whole;
@@ -337,6 +338,7 @@ TEST_F(Resumed, ADamagedShardIsNeverMerged) {
         write("out.h5.shard-1-of-1", damaged);
         const Outcome r = run({"merge", "out.h5"});
         EXPECT_EQ(r.status, 2) << trial;
+        EXPECT_EQ(run({"validate", "out.h5.shard-1-of-1"}).status, 2) << trial;
         EXPECT_THAT(r.err, HasSubstr("out.h5.shard-1-of-1"));
         EXPECT_FALSE(fs::exists(directory_ / "out.h5"));
     }

@@ -520,8 +520,8 @@ TEST(ValidatedRuns, AScaleFactorErrorUnderAFastProfile) {
     }
 }
 
-TEST(ValidatedRuns, CornersOfTheSchemaAreRefusedOrRun) { corners_are_refused_or_run(0, 75); }
-TEST(ValidatedRuns, MoreCornersOfTheSchemaAreRefusedOrRun) { corners_are_refused_or_run(75, 150); }
+TEST(ValidatedRuns, CornersOfTheSchemaAreRefusedOrRun) { corners_are_refused_or_run(0, 25); }
+TEST(LongValidatedRuns, MoreCornersOfTheSchemaAreRefusedOrRun) { corners_are_refused_or_run(25, 150); }
 TEST(LongValidatedRuns, CornersOfTheSchemaAreRefusedOrRun) { corners_are_refused_or_run(1000, 3000); }
 
 }  // namespace
