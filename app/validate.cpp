@@ -86,13 +86,15 @@ void validate(const std::string& path, const Changes& changes) {
 }  // namespace
 
 void add_validate(CLI::App& root) {
-    CLI::App* command = root.add_subcommand("validate", "Say what is wrong in a scenario, record, result or shard, and where");
+    CLI::App* command =
+        root.add_subcommand("validate", "Say what is wrong in a scenario, record, result or shard, and where");
     struct Arguments {
         std::string file;
         Changes changes;
     };
     auto arguments = std::make_shared<Arguments>();
-    command->add_option("FILE", arguments->file, "scenario (.toml), record (HDF5 or text), result, shard or checkpoint")->required();
+    command->add_option("FILE", arguments->file, "scenario (.toml), record (HDF5 or text), result, shard or checkpoint")
+        ->required();
     add_settings(*command, arguments->changes);
     command->callback([arguments] { validate(arguments->file, arguments->changes); });
 }
