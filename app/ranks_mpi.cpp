@@ -156,7 +156,7 @@ class Service {
    protected:
     /// A message, in the thread that serves.
     virtual void take(const Message& message) = 0;
-    /// What has to be done now and then, in the thread that serves.
+    /// Periodic work of the thread that serves, called between messages.
     virtual void in_passing() {}
 
     World& world() { return world_; }

@@ -12,11 +12,11 @@ struct Needs {
     std::uint64_t memory_bytes = 0;
     std::function<std::uint64_t()> disk_bytes;  ///< where the output is; asked where the memory suffices
     std::string less_memory;                    ///< what to do where memory does not suffice, as in "take fewer gyros"
-    std::string less_disk;                      ///< likewise the disk, beside another place for the output
+    std::string less_disk;  ///< advice where the disk does not suffice, besides writing the output elsewhere
 };
 
-/// Refuses what the memory that is free or the disk of the output cannot hold; unless quiet, tells of what
-/// is above 1 GB. Throws InputError.
+/// Throws InputError if the command needs more than the free memory or the free space on the disk of the output.
+/// Reports an estimate above 1 GB unless `quiet` is set.
 void check_room(const std::filesystem::path& out, const Needs& needs, bool quiet);
 
 }  // namespace ringlock::app

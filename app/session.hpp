@@ -15,7 +15,7 @@
 
 namespace ringlock::app {
 
-/// What is simulated, and where it goes.
+/// A run: the experiment to simulate and the file to write.
 struct Task {
     std::string scenario_file;
     study::Experiment plan;
@@ -32,10 +32,10 @@ struct Task {
 /// Gyros that will be finished at the end; of a lot that grows, at most.
 std::int64_t gyros_of(const Task& task);
 
-/// What people are told of a run beside its progress.
+/// Prints a message about the run on standard error.
 void say(const std::string& line);
 
-/// A run that keeps what is finished.
+/// A run with checkpoints: its folder, their writer, and its progress display.
 class Session {
    public:
     Session(Task task, double every_s, parts::Beginning beginning);

@@ -155,8 +155,7 @@ Checkpoints::~Checkpoints() {
 
 std::vector<study::Stretch> Checkpoints::take_up(std::span<study::Study> points, std::int64_t first,
                                                  std::int64_t last) {
-    std::vector<study::Stretch> gaps = finished_.take_up(points, first, last);
-    if (options_.shard) gaps = within(gaps, gyros_of_points_, *options_.shard);
+    const std::vector<study::Stretch> gaps = of_shard(finished_.take_up(points, first, last));
     if (options_.leader) {
         options_.leader->give({to_json(manifest_), static_cast<std::int64_t>(points.front().gyros.size()), gaps});
     }
@@ -175,8 +174,7 @@ void Checkpoints::collect(std::span<study::Study> points, std::int64_t first, st
             if (!std::binary_search(known.begin(), known.end(), file)) finished_.add_file(file);
         }
     }
-    std::vector<study::Stretch> gaps = finished_.take_up(points, first, last);
-    if (options_.shard) gaps = within(gaps, gyros_of_points_, *options_.shard);
+    const std::vector<study::Stretch> gaps = of_shard(finished_.take_up(points, first, last));
     if (gaps.empty()) return;
     throw RunError(
         fmt::format("{}: {} gyros from gyro {} on were simulated by another process, but are in no file that "
@@ -185,7 +183,10 @@ void Checkpoints::collect(std::span<study::Study> points, std::int64_t first, st
 }
 
 std::vector<study::Stretch> Checkpoints::to_do() const {
-    const auto gaps = finished_.gaps(gyros_of_points_, 0, std::numeric_limits<std::int64_t>::max());
+    return of_shard(finished_.gaps(gyros_of_points_, 0, std::numeric_limits<std::int64_t>::max()));
+}
+
+std::vector<study::Stretch> Checkpoints::of_shard(std::vector<study::Stretch> gaps) const {
     return options_.shard ? within(gaps, gyros_of_points_, *options_.shard) : gaps;
 }
 

@@ -50,8 +50,8 @@ class Checkpoints final : public study::Store {
     void collect(std::span<study::Study> points, std::int64_t first, std::int64_t last) override;
     double hours_before() const override { return seconds_before_ / 3600.0; }
 
-    /// Begins to keep what is finished and, where a pace is given, to tell how far it is. Before the first block is
-    /// simulated.
+    /// Starts the thread that writes finished blocks and, where a pace is given, the status file. Call it before the
+    /// first block is simulated.
     void begin(std::function<ensemble::Progress::Pace()> pace);
 
     /// What this process has to simulate, of an experiment that does not grow.
@@ -83,6 +83,8 @@ class Checkpoints final : public study::Store {
         std::filesystem::path file;
     };
 
+    /// Those of the missing gyros that belong to this run: all, or those of its shard.
+    std::vector<study::Stretch> of_shard(std::vector<study::Stretch> gaps) const;
     void take(Waiting waiting, double block_s);
     void keep_blocks(std::vector<Waiting>& blocks);
     void settle(const std::filesystem::path& partial, const std::filesystem::path& file);
