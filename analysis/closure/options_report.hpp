@@ -11,14 +11,6 @@ struct ReportOptions {
     /// A wander of the dither's amplitude from one turn to the next that is smaller than this share of the readout's
     /// noise is not seen there, and the scenario has none [1].
     double least_wander = 0.05;
-    /// White noise of the angle of samples below this is none, and the readout of the scenario is ideal [arcsec].
-    double least_angle_noise_arcsec = 1e-6;
-    /// Samples have no fringes of their own: those of the scenario are of a size that makes the white noise of the
-    /// angle this noise of the phase, which is normal to a thousandth [rad].
-    double phase_noise_rad = 0.05;
-    /// Fringes between two turns of a scenario of samples, enough for the phase to run free between them.
-    double fringes_between_turns = 200.0;
-
     /// Effort: turns that are simulated in all.
     std::int64_t most_turns = 4'000'000;
     /// Simulations, however long they last, unless fewer are asked for; and most of them: the lowest and the highest of

@@ -141,6 +141,35 @@ struct SampleLineOptions {
     double declared_drift_cycles = 128.0;
 };
 
+/// Kicks of the lock-in at the turns of the declared dither (samples/fit/turn_pattern).
+struct SampleTurnOptions {
+    /// With more turns in a sample their number is as good as the same in all.
+    double most_turns_a_row = 40.0;
+    /// The turns are looked for where the squares of the innovations have a line at their alias with less than this p,
+    /// and belong to the base where that gains more [nats].
+    double seen_p = 1e-3;
+    double least_gain = 6.0;
+    /// A line of fewer cycles over twice the record is a noise that changes.
+    std::size_t fewest_cycles = 16;
+    /// Times by which the turns of a noisy drive are late, rms [s]: the likeliest is taken.
+    std::array<double, 4> late_s = {0.0, 5e-6, 15e-6, 45e-6};
+    double most_late_turns = 0.2;  ///< in turns; beyond, nothing is left of the pattern
+    /// Rows of the response of the innovations to one reading's error, and most rows of a sum in which its distribution
+    /// shows.
+    std::size_t response_rows = 4000;
+    std::size_t longest_sum = 1000;
+    /// Share of the white rate's variance that comes in kicks: the likeliest is taken. The rest is quantum noise.
+    std::array<double, 9> shares = {0.4, 0.7, 0.85, 0.93, 0.97, 0.985, 0.993, 0.997, 0.999};
+};
+
+/// What a declared reader accounts for (samples/fit/declared_reader).
+struct SampleReaderOptions {
+    /// Harmonics of the dither at which a line may be what the reader leaves.
+    int harmonics = 5;
+    /// Such a line has at most so many times the declared residue, which is that of a steady dither.
+    double residue_margin = 1.5;
+};
+
 /// Candidates by score tests (samples/screen).
 struct SampleScreenOptions {
     /// Scores of slow rates are weakened by how much more the sums of stretches move than white innovations would:
@@ -344,6 +373,8 @@ struct SampleOptions {
     SampleRecordOptions record = {};
     SampleFitOptions fit = {};
     SampleLineOptions lines = {};
+    SampleTurnOptions turns = {};
+    SampleReaderOptions reader = {};
     SampleScreenOptions screen = {};
     SampleContestOptions contest = {};
     SampleResidualOptions residual = {};

@@ -33,8 +33,7 @@ Scenario with_trajectory(Scenario scenario, std::int64_t gyro) {
     if (gyro < 0 || gyro >= gyros) {
         throw InputError(fmt::format("gyro {}: the scenario has the gyros 0 to {}", gyro, gyros - 1));
     }
-    const bool noisy = scenario.record.trajectory == scenario::RecordTrajectory::noise_injected;
-    scenario.arms = scenario::parse_arms({noisy ? "noise_injected" : "uncompensated"});
+    scenario.arms = {scenario.record.trajectory};
     const auto complaints = scenario::check(scenario);
     if (!complaints.empty()) {
         throw InputError(
@@ -95,47 +94,6 @@ record::Track temperature(const Scenario& s, double start_s, double end_s) {
     }
     return track;
 }
-
-/// The stripped angle at turns, linear between them, as increments.
-class Sampler {
-   public:
-    Sampler(double rate_hz, double start_s) : start_s_(start_s) {
-        samples_.kind = record::SampleKind::angle_increment_arcsec;
-        samples_.rate_hz = rate_hz;
-        samples_.t0_s = start_s + 1.0 / rate_hz;
-    }
-
-    /// Angle in arcsec, less one that is the same for all turns.
-    void add(double time_s, double angle_arcsec) {
-        while (begun_) {
-            const double at_s = start_s_ + static_cast<double>(next_) / samples_.rate_hz;
-            if (at_s > time_s) break;
-            const double share = std::max(0.0, (at_s - time_s_) / (time_s - time_s_));
-            const double angle = angle_ + share * (angle_arcsec - angle_);
-            if (next_ > 0) samples_.values.push_back(angle - last_);
-            last_ = angle;
-            ++next_;
-        }
-        begun_ = true;
-        time_s_ = time_s;
-        angle_ = angle_arcsec;
-    }
-    void reserve(std::size_t samples) { samples_.values.reserve(samples); }
-    /// Increments begun and ended so far.
-    std::size_t size() const { return samples_.values.size(); }
-    record::Samples finish(std::size_t wanted) {
-        samples_.values.resize(std::min(wanted, samples_.values.size()));
-        return std::move(samples_);
-    }
-
-   private:
-    record::Samples samples_;
-    double start_s_;
-    bool begun_ = false;
-    double time_s_ = 0.0, angle_ = 0.0;  // of the last turn
-    std::int64_t next_ = 0;              // boundary between samples
-    double last_ = 0.0;                  // angle at the boundary before
-};
 
 /// What an effect does to the samples.
 struct Stage {
@@ -254,8 +212,12 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
     const Extent extent = extent_of(s, gyro);
     const bool samples = extent.samples;
     const double cycles = s.ensemble.duration_s * s.dither.frequency_hz;
-    ensemble::GyroBlock block(s, s.arms, gyro, 1, ensemble::Detail::hardware);
     const ensemble::Schedule schedule(s);
+    const std::int64_t settle_turns = schedule.settle_turns();
+    std::optional<ensemble::ReaderPlan> plan;
+    if (samples) plan = {extent.source_hz, settle_turns};
+    ensemble::GyroBlock block(s, s.arms, gyro, 1, samples ? ensemble::Detail::output : ensemble::Detail::hardware,
+                              plan);
 
     std::int64_t turn = 0;
     const auto advance = [&](std::int64_t until, const auto& use) {
@@ -267,35 +229,43 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
             turn += static_cast<std::int64_t>(turns);
         }
     };
-    const std::int64_t settle_turns = schedule.settle_turns();
     advance(settle_turns, [](std::int64_t, std::size_t) {});
 
     record::Record out;
     out.title = fmt::format("gyro {} of seed {}, {}", gyro, s.ensemble.seed, s.arms.front().name);
     out.instrument = "simulated ring laser gyro";
     out.source = fmt::format("ringlock {} record", version());
-    const double start_s = block.turn_time_s(settle_turns, 0);
+    // A reader is not fit for use at once: the record begins once it is.
+    const std::int64_t warm_up = samples ? block.reader(0, 0).warm_up_outputs() : 0;
+    const double start_s =
+        block.turn_time_s(settle_turns, 0) + (samples ? static_cast<double>(warm_up) / extent.source_hz : 0.0);
     const std::int64_t turns = std::max<std::int64_t>(2, std::llround(2.0 * cycles)) + 1;
-    const double end_s = block.turn_time_s(settle_turns + turns - 1, 0);
+    const double end_s = samples ? start_s + s.ensemble.duration_s : block.turn_time_s(settle_turns + turns - 1, 0);
     out.declared = declared(s, start_s, end_s);
     if (samples) {
         const Stages& stages = extent.stages;
-        Sampler sampler(extent.source_hz, start_s);
         const auto wanted = static_cast<std::size_t>(std::floor(extent.rows + 1e-9));
         const auto taken = stages.empty() ? wanted : static_cast<std::size_t>(extent.source_rows);
-        const auto sample = [&](std::int64_t first, std::size_t n) {
-            const readout::LaneAngles& angles = block.angles(0);
-            for (std::size_t i = 0; i < n; ++i) {
-                const double fringes = angles.angle_whole[i][0] + angles.angle_fringes[i][0];
-                sampler.add(block.turn_time_s(first + static_cast<std::int64_t>(i), 0),
-                            s.gyro.scale_factor_arcsec * fringes);
+        record::Samples taking;
+        taking.rate_hz = extent.source_hz;
+        taking.t0_s = start_s + 1.0 / extent.source_hz;
+        taking.values.reserve(taken);
+        std::optional<double> last_arcsec;
+        const auto sample = [&](std::int64_t, std::size_t) {
+            const reader::Reader& reader = block.reader(0, 0);
+            std::int64_t number = reader.first_output();
+            for (const double angle_arcsec : reader.angles_arcsec()) {
+                if (number++ < warm_up) continue;
+                if (last_arcsec && taking.values.size() < taken) taking.values.push_back(angle_arcsec - *last_arcsec);
+                last_arcsec = angle_arcsec;
             }
         };
-        sampler.reserve(taken + 64);
-        // A few turns more, for the end of the last sample to lie between two of them.
-        advance(settle_turns + turns + 4, sample);
-        while (!stages.empty() && sampler.size() < taken) advance(turn + 2, sample);
-        out.samples = sampler.finish(taken);
+        while (taking.values.size() < taken) advance(turn + static_cast<std::int64_t>(piece_turns), sample);
+        out.samples = std::move(taking);
+        const reader::Reader& reader = block.reader(0, 0);
+        out.reader =
+            record::DeclaredReader{s.reader, reader.stripper().delay_s(), reader.stripper().residue_relative()};
+        out.reader->settings.latch_hz = reader::Reader::latch_hz(s.reader, extent.source_hz);
         if (!stages.empty()) apply(stages, s.record.rate_hz, start_s, wanted, *out.samples);
     } else {
         const bool clocked = s.readout.model != scenario::ReadoutModel::ideal && s.readout.clock_hz > 0.0;

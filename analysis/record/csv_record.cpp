@@ -103,8 +103,22 @@ class CsvReader {
                 record_.declared.*declared.field = number(key, value);
                 return;
             }
+            if (key.starts_with("reader.") && reader_attribute(key, value)) return;
             record_.ignored.push_back(fmt::format("line {}: {}", number_, shown(key)));
         }
+    }
+
+    bool reader_attribute(const std::string& key, const std::string& value) {
+        const std::string name = key.substr(std::string_view("reader.").size());
+        DeclaredReader reader = record_.reader.value_or(DeclaredReader{});
+        std::string wrong;
+        const bool word =
+            std::any_of(reader_words.begin(), reader_words.end(), [&](const char* known) { return name == known; });
+        const bool known = word ? set_reader_word(reader, name, value, wrong)
+                                : set_reader_number(reader, name, number(key, value), wrong);
+        if (!wrong.empty()) fail(fmt::format("{} {}", shown(key), wrong));
+        if (known) record_.reader = reader;
+        return known;
     }
 
     double number(std::string_view key, std::string_view text) const {

@@ -209,6 +209,19 @@ Track read_track(const store::Group& group, const TrackName& names, std::vector<
     return track;
 }
 
+DeclaredReader read_reader(const store::Group& group, std::vector<std::string>& ignored) {
+    DeclaredReader reader;
+    for (const std::string& name : group.attribute_names()) {
+        std::string wrong;
+        const bool known = is_one_of(reader_words, name)
+                               ? set_reader_word(reader, name, text(group, name.c_str()), wrong)
+                               : set_reader_number(reader, name, group.double_attribute(name.c_str()), wrong);
+        if (!known) ignored.push_back(fmt::format("attribute {} of {}", name, group.path()));
+        if (!wrong.empty()) fail(group, fmt::format("attribute {} {}", name, wrong));
+    }
+    return reader;
+}
+
 Record read_groups(const store::File& file) {
     check_format(file);
     Record record;
@@ -231,7 +244,8 @@ Record read_groups(const store::File& file) {
     for (const TrackName& names : track_names) {
         if (file.has(names.group)) record.*names.field = read_track(file.group(names.group), names, record.ignored);
     }
-    constexpr std::array groups = {"declared", "turns", "samples", "environment", "reference"};
+    if (file.has("reader")) record.reader = read_reader(file.group("reader"), record.ignored);
+    constexpr std::array groups = {"declared", "reader", "turns", "samples", "environment", "reference"};
     note_ignored(
         file, [&](const std::string& name) { return is_one_of(groups, name); }, record.ignored);
     return record;
@@ -336,6 +350,15 @@ void RecordWriter::write(const Record& record) {
     }
     if (record.turns) write_turns(file.create_group("turns"), *record.turns);
     if (record.samples) write_samples(file.create_group("samples"), *record.samples);
+    if (record.reader) {
+        store::Group group = file.create_group("reader");
+        DeclaredReader reader = *record.reader;
+        group.set_attribute("stripping",
+                            reader::stripping_names.at(static_cast<std::size_t>(reader.settings.stripping)));
+        group.set_attribute("fraction", reader::fraction_names.at(static_cast<std::size_t>(reader.settings.fraction)));
+        group.set_attribute("fir_order", reader.settings.fir_order);
+        for (const ReaderName& name : reader_names) group.set_attribute(name.name, name.field(reader));
+    }
     for (const TrackName& names : track_names) {
         const Track& track = record.*names.field;
         if (track.time_s.empty() && track.value.empty()) continue;

@@ -34,6 +34,31 @@ inline constexpr std::array<DeclaredName, 8> declared_names = {
      {"readout_noise_rad", &Declared::readout_noise_rad},
      {"input_rate_deg_h", &Declared::input_rate_deg_h}}};
 
+/// Numbers of /reader, by their names in the section [reader] of a scenario, and two that follow from these. The order
+/// of the filter, a whole number, the stripping and the fraction, words, are apart.
+struct ReaderName {
+    const char* name;
+    double& (*field)(DeclaredReader&);
+};
+inline constexpr std::array<ReaderName, 9> reader_names = {
+    {{"latch_hz", [](DeclaredReader& r) -> double& { return r.settings.latch_hz; }},
+     {"reference_gain_error_relative",
+      [](DeclaredReader& r) -> double& { return r.settings.reference_gain_error_relative; }},
+     {"reference_delay_s", [](DeclaredReader& r) -> double& { return r.settings.reference_delay_s; }},
+     {"reference_noise_arcsec", [](DeclaredReader& r) -> double& { return r.settings.reference_noise_arcsec; }},
+     {"reference_learning_s", [](DeclaredReader& r) -> double& { return r.settings.reference_learning_s; }},
+     {"fir_cutoff_hz", [](DeclaredReader& r) -> double& { return r.settings.fir_cutoff_hz; }},
+     {"notch_bandwidth_hz", [](DeclaredReader& r) -> double& { return r.settings.notch_bandwidth_hz; }},
+     {"delay_s", [](DeclaredReader& r) -> double& { return r.delay_s; }},
+     {"residue_relative", [](DeclaredReader& r) -> double& { return r.residue_relative; }}}};
+
+inline constexpr std::array reader_words = {"stripping", "fraction"};
+
+/// The reader's attribute of that name set from a text or a number; false where there is no such attribute. `wrong`
+/// says what is wrong with the value, where something is.
+bool set_reader_word(DeclaredReader& reader, const std::string& name, const std::string& word, std::string& wrong);
+bool set_reader_number(DeclaredReader& reader, const std::string& name, double value, std::string& wrong);
+
 /// The optional texts at the root.
 struct TextName {
     const char* name;

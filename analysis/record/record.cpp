@@ -1,10 +1,12 @@
 #include "analysis/record/record.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -23,6 +25,55 @@ double Track::at(double time) const {
     const auto i = static_cast<std::size_t>(after - time_s.begin());
     const double share = (time - time_s[i - 1]) / (time_s[i] - time_s[i - 1]);
     return value[i - 1] + share * (value[i] - value[i - 1]);
+}
+
+namespace {
+
+template <class Value, class Names>
+void set_word(Value& value, const Names& names, const std::string& word, std::string& wrong) {
+    const auto found = std::find(names.begin(), names.end(), word);
+    if (found == names.end()) {
+        wrong = fmt::format("is \"{}\"; must be one of {}", word, fmt::join(names, ", "));
+        return;
+    }
+    value = static_cast<Value>(found - names.begin());
+}
+
+}  // namespace
+
+bool set_reader_word(DeclaredReader& reader, const std::string& name, const std::string& word, std::string& wrong) {
+    if (name == "stripping") {
+        set_word(reader.settings.stripping, reader::stripping_names, word, wrong);
+    } else if (name == "fraction") {
+        set_word(reader.settings.fraction, reader::fraction_names, word, wrong);
+    } else {
+        return false;
+    }
+    return true;
+}
+
+bool set_reader_number(DeclaredReader& reader, const std::string& name, double value, std::string& wrong) {
+    constexpr double largest = 1e6;
+    const bool gain = name == "reference_gain_error_relative";
+    const auto refuse = [&](const char* allowed) { wrong = fmt::format("is {}; must be {}", value, allowed); };
+    if (name == "fir_order") {
+        if (!(value >= 0.0 && value <= largest) || value != std::nearbyint(value)) {
+            refuse("a whole number that is not negative");
+        } else {
+            reader.settings.fir_order = static_cast<std::int64_t>(value);
+        }
+        return true;
+    }
+    for (const ReaderName& known : reader_names) {
+        if (name != known.name) continue;
+        if (!(std::abs(value) <= largest) || (value < 0.0 && !gain)) {
+            refuse(gain ? "a finite number" : "a finite number that is not negative");
+        } else {
+            known.field(reader) = value;
+        }
+        return true;
+    }
+    return false;
 }
 
 const char* name_of(SampleKind kind) {

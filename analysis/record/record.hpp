@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/reader/settings.hpp"
 #include "engine/store/atomic_file.hpp"
 
 /// Measured data from files.
@@ -20,6 +21,13 @@ struct Declared {
     std::optional<double> clock_hz;
     std::optional<double> readout_noise_rad;
     std::optional<double> input_rate_deg_h;
+};
+
+/// The reader that took samples, as far as it is known: its settings and what follows from them.
+struct DeclaredReader {
+    reader::Settings settings;
+    double delay_s = 0.0;           ///< by which the samples lag behind a steady rotation
+    double residue_relative = 0.0;  ///< amplitude of a steady dither that is left over that of the dither
 };
 
 /// Consecutive zero-rate points, one row each.
@@ -68,8 +76,9 @@ struct Record {
     Declared declared;
     std::optional<Turns> turns;
     std::optional<Samples> samples;
-    Track temperature_c;     ///< /environment
-    Track input_rate_deg_h;  ///< /reference
+    std::optional<DeclaredReader> reader;  ///< of the samples
+    Track temperature_c;                   ///< /environment
+    Track input_rate_deg_h;                ///< /reference
     /// Of a file: names that no record has, such as "/turns/note". They were left aside and are never written.
     std::vector<std::string> ignored;
 };

@@ -172,6 +172,7 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
             V phase_rad, lockin_rad;
             if (!walk_to_dither_turn(d, side, inverse_angle, sine, cosine, phase_rad, lockin_rad)) return false;
             const V turn_fringes = sm::fma(d, sign * phase_rad, per_rad, load(readings.phase_fringes[i]));
+            if (errors.middles && !has_before) store(error, errors.middle_fringes[i]);
             if (has_before) {
                 const auto scaled = [&](V amplitude) HWY_ATTR {
                     return hn::Max(hn::Min((amplitude - centre) * inverse, one), hn::Neg(one));
@@ -205,7 +206,13 @@ bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const
                 const sm::Complex<V> unit{one, zero};
                 const sm::Complex<V> e0{last_cosine, hn::Neg(last_sine)};
                 const sm::Complex<V> e1{hn::Neg(cosine), sine};
-                const sm::Complex<V> q = sm::mul(d, sm::mul_add(d, z_begin, e0, unit), sm::mul_add(d, z_end, e1, unit));
+                const sm::Complex<V> beginning = sm::mul_add(d, z_begin, e0, unit);
+                const sm::Complex<V> q = sm::mul(d, beginning, sm::mul_add(d, z_end, e1, unit));
+                if (errors.middles) {
+                    const V bent = sm::arg(d, beginning.re, beginning.im) * hn::Set(d, 0.3183098861837907);
+                    store(sm::fnma(d, sign, bent + begin.shift, error) + (error_whole - told_whole),
+                          errors.middle_fringes[i]);
+                }
                 const V gain = sm::fma(d, strong ? sm::arg(d, q.re, q.im) : sm::arg_right(d, q.re, q.im),
                                        hn::Set(d, 0.3183098861837907), begin.shift + end.shift);
                 // Whole fringes are put apart at every turn: bits must not depend on where a piece ends.
@@ -406,7 +413,7 @@ void Exact::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
 void Exact::observe(const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row,
                     LaneErrors& errors) {
     if (first_row == 0) {
-        errors.fringes.resize(readings.turns);
+        errors.resize(readings.turns);
         errors.whole = state_.error_whole;
     }
     if (first_row == last_row) return;

@@ -91,6 +91,7 @@ void observe_lanes(std::size_t lanes, const readout::Electronics& electronics, c
             // Phase and instant of the turn take a pulse on either side and one more; without these nothing is told.
             const auto enough = hn::And(fewest >= one, most >= one + one);
             const V half_kick = hn::IfThenElseZero(enough, half * per_rad * sign * (after - before));
+            if (errors.middles) store(error + (error_whole - told_whole), errors.middle_fringes[i]);
             const V here = error + half_kick;
             store(here + (error_whole - told_whole), errors.fringes[i]);
             error = here + half_kick;
@@ -128,7 +129,7 @@ Extrapolated::Extrapolated(const Calibration& calibration, const readout::Electr
 }
 
 void Extrapolated::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
-    errors.fringes.resize(readings.turns);
+    errors.resize(readings.turns);
     errors.whole = state_.error_whole;
     if (readings.turns == 0) return;
     if (readings.pulses.empty()) throw RunError("compensated_extrapolated: the readings have no pulses");

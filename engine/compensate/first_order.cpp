@@ -47,6 +47,7 @@ void observe_lanes(std::size_t lanes, const readout::LaneReadings& readings, Fir
                 return hn::IfThenElseZero(a > zero, projection / hn::Sqrt(hn::Max(a, tiny) * size2));
             };
             Average* const sides = average + (minimum ? 0 : 2);
+            if (errors.middles) store(error + after_last, errors.middle_fringes[i]);
             error = error + (after_last + half_kick(sides[0], load(readings.accel_before_rad_s2[i])));
             after_last = half_kick(sides[1], load(readings.accel_after_rad_s2[i]));
             store(error, errors.fringes[i]);
@@ -77,7 +78,7 @@ FirstOrder::FirstOrder(const Calibration& calibration, double factor) : lanes_(c
 }
 
 void FirstOrder::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
-    errors.fringes.resize(readings.turns);
+    errors.resize(readings.turns);
     HWY_DYNAMIC_DISPATCH(observe_lanes)(lanes_, readings, state_, errors);
 }
 

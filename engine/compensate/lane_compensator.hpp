@@ -28,6 +28,15 @@ struct Calibration {
 struct LaneErrors {
     std::vector<simd::Lanes> fringes;  ///< [turns], less ...
     simd::Lanes whole;                 ///< ... these whole fringes
+    /// [turns] up to the middle of the half cycle that ends at the turn, less `whole`: what the angle between the turns
+    /// is to be corrected by, because the lock-in acts next to the turns alone. Filled where `middles` asks for it.
+    std::vector<simd::Lanes> middle_fringes;
+    bool middles = false;
+
+    void resize(std::size_t turns) {
+        fringes.resize(turns);
+        middle_fringes.resize(middles ? turns : 0);
+    }
 };
 
 /// Computes the lock-in error of a block of gyros from the readings at the zero-rate points, online.

@@ -78,6 +78,10 @@ void observe_lanes(std::size_t lanes, const readout::LaneReadings& readings, Two
             const V before_scale = inverse_root(sides[0], load(readings.accel_before_rad_s2[i]));
             const V after_scale = inverse_root(sides[1], load(readings.accel_after_rad_s2[i]));
             const V unit[2] = {minimum ? sum : difference, minimum ? difference : sum};
+            if (errors.middles) {
+                const V middle = sm::fma(d, b[0], after_last[0], sm::fma(d, b[1], after_last[1], error));
+                store(middle + (error_whole - told_whole), errors.middle_fringes[i]);
+            }
             V gained[2];
             for (std::size_t k = 0; k < 2; ++k) {
                 gained[k] = sm::fma(d, unit[k], before_scale, after_last[k]);
@@ -174,7 +178,7 @@ TwoTrain::TwoTrain(const Calibration& calibration) : lanes_(calibration.lanes) {
 }
 
 void TwoTrain::observe(const readout::LaneReadings& readings, LaneErrors& errors) {
-    errors.fringes.resize(readings.turns);
+    errors.resize(readings.turns);
     HWY_DYNAMIC_DISPATCH(observe_lanes)(lanes_, readings, state_, errors);
 }
 

@@ -174,6 +174,7 @@ void LaneDither::finish_drive(gyro::LaneDrive& drive) {
             turned_before_fringes_[lane] = turned_fringes;
         }
     }
+    drive.late_s.assign(late_s_.begin(), late_s_.begin() + static_cast<std::ptrdiff_t>(drive.turns));
     if (!amplitudes_change_) return;
     for (std::size_t i = 0; i <= drive.turns; ++i) {
         const simd::Lanes& from = i == 0 ? before_rad_ : deviation_rad_[i - 1];

@@ -37,6 +37,7 @@ struct Listener {
     compensate::LaneErrors errors;
     std::vector<simd::LaneCounts> counts;
     std::vector<simd::LaneCounts> turn_counts;  ///< at maxima, too, where asked for
+    std::vector<reader::Reader> readers;        ///< of each gyro, where asked for
 };
 
 scenario::InjectedNoise noise_of(const scenario::Scenario& scenario, TrajectoryKind kind) {
@@ -140,7 +141,7 @@ class Branch {
    public:
     Branch(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms,
            const std::vector<gyro::Setup>& setups, const random::LaneIdentities& who, TrajectoryKind kind,
-           bool phases_vary, Detail detail)
+           bool phases_vary, Detail detail, const std::optional<ReaderPlan>& readers)
         : kind_(kind),
           devices_(make_devices(setups, kind)),
           dither_(make_dither(scenario, devices_, who, kind)),
@@ -148,7 +149,7 @@ class Branch {
           true_(detail == Detail::truth) {
         for (std::size_t i = 0; i < arms.size(); ++i) {
             if (kind_of(arms[i]) != kind) continue;
-            listeners_.push_back({i, make_compensator(scenario, devices_, arms[i], kind), {}, {}, {}});
+            listeners_.push_back({i, make_compensator(scenario, devices_, arms[i], kind), {}, {}, {}, {}});
             const auto& compensator = listeners_.back().compensator;
             compensated_ = compensated_ || compensator != nullptr;
             samples_wanted_ = samples_wanted_ || (compensator && compensator->wants_samples());
@@ -166,6 +167,7 @@ class Branch {
                          phases_vary);
         if (detailed_) readout_->keep_times();
         if (true_) readout_->keep_truth();
+        if (readers) attach_readers(scenario, setups, who, electronics, *readers);
         interpolated_ = electronics.interpolate;
         if (scenario.readout.ellipse_correction) ellipse_.emplace(devices_.size());
         if (instrument && scenario.readout.phase_from == scenario::PhaseFrom::detectors_and_pulses) {
@@ -195,6 +197,7 @@ class Branch {
             output_counts(angles_, errors, turns, listener.counts);
             if (true_) output_counts(angles_, errors, turns, listener.turn_counts, 1);
         }
+        if (latch_) read_ticks(turns, noise.count_errors);
     }
 
     std::int64_t tables_made() const {
@@ -229,6 +232,47 @@ class Branch {
     }
 
    private:
+    void attach_readers(const scenario::Scenario& scenario, const std::vector<gyro::Setup>& setups,
+                        const random::LaneIdentities& who, const readout::Electronics& electronics,
+                        const ReaderPlan& plan) {
+        const reader::Settings& settings = scenario.reader;
+        latch_.emplace(devices_, reader::Reader::latch_hz(settings, plan.output_hz), plan.first_turn);
+        turns_.middles = true;
+        for (Listener& listener : listeners_) {
+            listener.errors.middles = true;
+            for (std::size_t lane = 0; lane < setups.size(); ++lane) {
+                const gyro::Setup& setup = setups[lane];
+                listener.readers.emplace_back(
+                    settings, plan.output_hz,
+                    reader::Source{setup.scale_factor_arcsec, setup.dither_frequency_hz, setup.ellipse, electronics,
+                                   random::Identity{who.seed, who.gyro[lane]}});
+            }
+        }
+        if (listeners_.front().readers.front().stripper().wants_crossings()) {
+            latch_->want_crossings(settings.reference_delay_s);
+        }
+    }
+
+    void read_ticks(std::size_t turns, std::span<const simd::Lanes> count_errors) {
+        latch_->read(drive_, turns_);
+        std::vector<double> correction_fringes;
+        std::vector<double> missed;
+        for (std::size_t lane = 0; lane < devices_.size(); ++lane) {
+            missed.clear();
+            for (const simd::Lanes& row : count_errors) missed.push_back(row[lane]);
+            for (Listener& listener : listeners_) {
+                correction_fringes.clear();
+                if (listener.compensator) {
+                    for (std::size_t i = 0; i < turns; ++i) {
+                        correction_fringes.push_back(listener.errors.whole[lane] +
+                                                     listener.errors.middle_fringes[i][lane]);
+                    }
+                }
+                listener.readers[lane].read(latch_->instants(lane), correction_fringes, missed);
+            }
+        }
+    }
+
     /// Half cycles' amplitudes are means of their turns': from a turn to the next but one the amplitude changes by
     /// twice what it does from half cycle to half cycle.
     void add_changes() {
@@ -251,6 +295,7 @@ class Branch {
     std::vector<Listener> listeners_;
     std::optional<readout::EllipseCorrection> ellipse_;
     std::optional<readout::FractionRecovery> recovery_;
+    std::optional<reader::Latch> latch_;
     bool interpolated_ = false;
     bool compensated_ = false;
     bool every_turn_ = false;
@@ -304,14 +349,14 @@ random::LaneIdentities identities(const scenario::Scenario& scenario, std::int64
 
 struct GyroBlock::State {
     State(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
-          std::vector<gyro::Setup> drawn, Detail detail)
+          std::vector<gyro::Setup> drawn, Detail detail, const std::optional<ReaderPlan>& readers)
         : setups(std::move(drawn)),
           who(identities(scenario, first_gyro, setups.size())),
           missed_counts(setups, who),
           coupling(scenario, setups) {
         for (const TrajectoryKind kind :
              {TrajectoryKind::ideal, TrajectoryKind::plain, TrajectoryKind::noise_injected}) {
-            Branch branch(scenario, arms, setups, who, kind, coupling.phases_vary(), detail);
+            Branch branch(scenario, arms, setups, who, kind, coupling.phases_vary(), detail, readers);
             if (branch.empty()) continue;
             every_turn = every_turn || branch.every_turn();
             branches.push_back(std::move(branch));
@@ -417,11 +462,11 @@ std::vector<gyro::Setup> drawn(const scenario::Scenario& scenario, std::int64_t 
 }  // namespace
 
 GyroBlock::GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
-                     std::size_t gyros, Detail detail)
-    : GyroBlock(scenario, arms, first_gyro, drawn(scenario, first_gyro, gyros), detail) {}
+                     std::size_t gyros, Detail detail, const std::optional<ReaderPlan>& readers)
+    : GyroBlock(scenario, arms, first_gyro, drawn(scenario, first_gyro, gyros), detail, readers) {}
 GyroBlock::GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
-                     std::vector<gyro::Setup> setups, Detail detail)
-    : state_(std::make_unique<State>(scenario, arms, first_gyro, std::move(setups), detail)) {}
+                     std::vector<gyro::Setup> setups, Detail detail, const std::optional<ReaderPlan>& readers)
+    : state_(std::make_unique<State>(scenario, arms, first_gyro, std::move(setups), detail, readers)) {}
 GyroBlock::GyroBlock(GyroBlock&&) noexcept = default;
 GyroBlock& GyroBlock::operator=(GyroBlock&&) noexcept = default;
 GyroBlock::~GyroBlock() = default;
@@ -477,6 +522,10 @@ const gyro::LaneDrive& GyroBlock::drive(std::size_t arm) const { return state_->
 
 std::span<const simd::LaneCounts> GyroBlock::turn_counts(std::size_t arm) const {
     return state_->branch_of(arm).listener(arm)->turn_counts;
+}
+
+const reader::Reader& GyroBlock::reader(std::size_t arm, std::size_t lane) const {
+    return state_->branch_of(arm).listener(arm)->readers[lane];
 }
 
 const std::vector<gyro::Setup>& GyroBlock::setups() const { return state_->setups; }

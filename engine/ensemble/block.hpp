@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "engine/ensemble/schedule.hpp"
 #include "engine/gyro/lane_drive.hpp"
 #include "engine/gyro/setup.hpp"
+#include "engine/reader/reader.hpp"
 #include "engine/readout/lane_readings.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/scenario.hpp"
@@ -22,6 +24,12 @@ enum class Detail {
     truth,     ///< also what is true of every turn, and the arms' output there
 };
 
+/// Readers attached to all gyros and arms of a block.
+struct ReaderPlan {
+    double output_hz = 0.0;       ///< at which stripped angles are put out
+    std::int64_t first_turn = 0;  ///< with which tick 0 falls together, a minimum
+};
+
 /// Consecutive gyros of a study, at most simd::lanes, taken through all its arms at once, piece after piece. What a
 /// gyro does depends on the scenario and its own number, never on the block that it is in.
 ///
@@ -31,10 +39,11 @@ class GyroBlock {
    public:
     /// Throws RunError where a trajectory cannot be followed, as do the functions below.
     GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
-              std::size_t gyros, Detail detail = Detail::output);
+              std::size_t gyros, Detail detail = Detail::output, const std::optional<ReaderPlan>& readers = {});
     /// The same with parameters of the caller's in place of those that the study would draw.
     GyroBlock(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first_gyro,
-              std::vector<gyro::Setup> setups, Detail detail = Detail::output);
+              std::vector<gyro::Setup> setups, Detail detail = Detail::output,
+              const std::optional<ReaderPlan>& readers = {});
     GyroBlock(GyroBlock&&) noexcept;
     GyroBlock& operator=(GyroBlock&&) noexcept;
     ~GyroBlock();
@@ -70,6 +79,9 @@ class GyroBlock {
     const gyro::LaneDrive& drive(std::size_t arm) const;
     /// counts() at every turn of the piece, maxima included; of Detail::truth only.
     std::span<const simd::LaneCounts> turn_counts(std::size_t arm) const;
+
+    /// The reader of an arm, which has read the piece; only where readers were asked for.
+    const reader::Reader& reader(std::size_t arm, std::size_t lane) const;
 
     const std::vector<gyro::Setup>& setups() const;
     /// Physical trajectories that lock-in acts on.

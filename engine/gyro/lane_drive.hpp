@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/gyro/device.hpp"
 #include "engine/simd/lanes.hpp"
 
 namespace ringlock::gyro {
@@ -27,6 +28,7 @@ struct LaneDrive {
     std::vector<simd::Lanes> amplitude_change_rad;
     /// [turns + 1] phase of the coupling over the half cycle; empty where it is always the gyro's own.
     std::vector<simd::Lanes> coupling_phase_fringes;
+    std::vector<simd::Lanes> late_s;            ///< [turns] by which a noisy drive turns late; empty where none does
     std::vector<simd::Lanes> rotation_fringes;  ///< [turns] rotation of the case since turn 0 of the run, less ...
     std::vector<simd::Lanes> rotation_whole;    ///< [turns] ... these whole fringes
 
@@ -46,15 +48,36 @@ struct LaneDrive {
     int direction(std::size_t i) const { return (first_turn + static_cast<std::int64_t>(i)) % 2 == 0 ? 1 : -1; }
 };
 
+/// Half cycle `row` of the piece, which ends at turn `row`, as the gyro in that lane goes through it.
+inline HalfCycle half_cycle_of(const Device& device, const LaneDrive& drive, std::size_t row, std::size_t lane) {
+    HalfCycle half = device.half_cycle(-static_cast<double>(drive.direction(row)), drive.amplitude_rad[row][lane]);
+    half.rate_rad_s = drive.rate_rad_s[row][lane];
+    if (drive.amplitudes_change) half.amplitude_change_rad = drive.amplitude_change_rad[row][lane];
+    return half;
+}
+
+/// The coupling over that half cycle.
+inline Coupling coupling_of(const Device& device, const LaneDrive& drive, std::size_t row, std::size_t lane) {
+    Coupling coupling = device.coupling;
+    if (drive.phases_vary) coupling = coupling.moved_to(units::two_pi * drive.coupling_phase_fringes[row][lane]);
+    coupling.b_rad_s = drive.b_rad_s[row][lane];
+    return coupling;
+}
+
 /// What the phase does at these turns of the dither.
 struct LaneTurns {
     /// [turns] of psi + coupling phase, that of the half cycle that ends at the turn.
     std::vector<simd::Lanes> cosine;
     std::vector<simd::Lanes> sine;
     std::vector<simd::Lanes> lockin_fringes;  ///< [turns] phase that the lock-in has added, beyond `lockin_whole`
-    simd::Lanes lockin_whole;                 ///< whole fringes that the lock-in had added when the piece began
+    /// [turns] the same up to the middle of the half cycle that begins at the turn, in the frame in which fast motion
+    /// is rotation, for the phase between turns. Filled where `middles` asks for it and the propagator knows them.
+    std::vector<simd::Lanes> lockin_middle_fringes;
+    bool middles = false;
+    simd::Lanes lockin_whole;  ///< whole fringes that the lock-in had added when the piece began
 
     void resize(std::size_t turns) {
+        lockin_middle_fringes.resize(middles ? turns : 0);
         cosine.resize(turns);
         sine.resize(turns);
         lockin_fringes.resize(turns);

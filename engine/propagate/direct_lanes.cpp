@@ -332,21 +332,16 @@ void DirectLanes::step(const gyro::LaneDrive& drive, gyro::LaneTurns* turns) {
     if (turns != nullptr) {
         turns->resize(drive.turns);
         turns->lockin_whole = whole_;
+        // Nothing is known of the frame of the turn map.
+        for (simd::Lanes& row : turns->lockin_middle_fringes) {
+            std::fill(std::begin(row.values), std::end(row.values), std::nan(""));
+        }
     }
     for (std::size_t i = 0; i < drive.turns; ++i) {
         for (std::size_t lane = 0; lane < devices_.size(); ++lane) {
             Stretch& stretch = stretches_[lane];
-            stretch.half = devices_[lane].half_cycle(drive.direction(i), drive.amplitude_rad[i + 1][lane]);
-            stretch.half.rate_rad_s = drive.rate_rad_s[i + 1][lane];
-            if (drive.amplitudes_change) {
-                stretch.half.amplitude_change_rad = drive.amplitude_change_rad[i + 1][lane];
-            }
-            stretch.coupling = devices_[lane].coupling;
-            if (drive.phases_vary) {
-                const double phase_rad = units::two_pi * drive.coupling_phase_fringes[i + 1][lane];
-                stretch.coupling = stretch.coupling.moved_to(phase_rad);
-            }
-            stretch.coupling.b_rad_s = drive.b_rad_s[i + 1][lane];
+            stretch.half = gyro::half_cycle_of(devices_[lane], drive, i + 1, lane);
+            stretch.coupling = gyro::coupling_of(devices_[lane], drive, i + 1, lane);
             stretch.start_fringes = drive.plain_fringes[i][lane] + lockin_fringes_[lane];
             stretch.end_s = stretch.half.duration_s;
         }

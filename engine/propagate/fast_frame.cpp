@@ -1,30 +1,47 @@
 #include "engine/propagate/fast_frame.hpp"
 
+#include <algorithm>
 #include <cmath>
+
+#include "engine/gyro/fast_motion.hpp"
 
 namespace ringlock::propagate {
 
 namespace {
 
 /// Terms of the asymptotic series, and Taylor terms in w (t' - t) that its derivatives need.
-constexpr std::size_t frame_terms = 10;
-using Series = std::array<double, frame_terms>;
-using ComplexSeries = std::array<std::complex<double>, frame_terms>;
+constexpr std::size_t most_terms = 10;
+using Series = std::array<double, most_terms>;
+using ComplexSeries = std::array<std::complex<double>, most_terms>;
+
+/// Terms of the asymptotic series that exceed the tolerance: the n-th is some n! (acceleration/(2 rate^2))^n of the
+/// first, which is the coupling over the rate.
+std::size_t terms_for(double tolerance_rad, double beat, double adiabaticity) {
+    double term = beat;
+    std::size_t n = 1;
+    while (n < most_terms && term > tolerance_rad) term *= 0.5 * static_cast<double>(n++) / adiabaticity;
+    return n;
+}
 
 }  // namespace
 
-FastFrame::FastFrame(const gyro::HalfCycle& half, const gyro::Coupling& coupling, double t_s) {
+FastFrame::FastFrame(const gyro::HalfCycle& half, const gyro::Coupling& coupling, double t_s, double tolerance_rad) {
     using Complex = std::complex<double>;
     const double w = half.angular_frequency_rad_s();
     Series g{};
     Series b{};
     double factor = 1.0;
     double doubled = 1.0;
-    for (std::size_t n = 0; n < frame_terms; ++n) {
+    double last_sine = 0.0;
+    for (std::size_t n = 0; n < most_terms; ++n) {
         const double quarter = 0.5 * units::pi * static_cast<double>(n);  // each derivative turns by it
-        g[n] = half.amplitude_rad * w *
-               (half.sign * factor * std::sin(w * t_s + quarter) +
-                half.harmonic_ratio * doubled * std::sin(2.0 * w * t_s + half.harmonic_phase_rad + quarter));
+        const double sine = factor * std::sin(w * t_s + quarter);
+        const double grown_rad = half.amplitude_change_rad * (w * t_s / units::pi - 0.5);
+        g[n] = w * (half.sign *
+                        ((half.amplitude_rad + grown_rad) * sine + half.amplitude_change_rad / units::pi * last_sine) +
+                    half.amplitude_rad * half.harmonic_ratio * doubled *
+                        std::sin(2.0 * w * t_s + half.harmonic_phase_rad + quarter));
+        last_sine = sine;
         b[n] = coupling.b_rad_s * half.sign * coupling.turn_asymmetry * factor * std::cos(w * t_s + quarter);
         factor /= static_cast<double>(n + 1);
         doubled *= 2.0 / static_cast<double>(n + 1);
@@ -32,22 +49,33 @@ FastFrame::FastFrame(const gyro::HalfCycle& half, const gyro::Coupling& coupling
     g[0] += half.rate_rad_s;
     b[0] += coupling.b_rad_s;
 
+    std::size_t terms = most_terms;
+    if (tolerance_rad > 0.0) {
+        const double beat = std::abs(b[0] / g[0]) * (1.0 + std::abs(coupling.second_ratio));
+        terms = terms_for(tolerance_rad, beat, g[0] * g[0] / gyro::greatest_acceleration_rad_s2(half));
+        // The k-th harmonic goes as the k-th power of the beat, or, of a second harmonic, of its root.
+        const double power = coupling.second_ratio == 0.0 ? beat : std::sqrt(beat);
+        harmonics_ = std::clamp<std::size_t>(
+            static_cast<std::size_t>(std::ceil(std::log(tolerance_rad) / std::log(std::min(power, 0.5)))), 2,
+            most_harmonics);
+    }
+
     // Fourier coefficients of the coupling: sin theta + ratio sin(2 theta + f).
     const Complex first(0.0, -0.5);
     const Complex second = coupling.second_ratio * first * std::polar(1.0, coupling.second_from_first_rad());
     const std::array<Complex, 3> coefficient{Complex{}, first, second};
 
     // slope[k]: coefficient of d phi/d theta - 1. Each pass makes one more order right and uses up one Taylor term.
-    std::array<ComplexSeries, harmonics + 1> slope{};
-    for (std::size_t pass = 0; pass < frame_terms; ++pass) {
-        const std::size_t kept = frame_terms - pass;
-        std::array<ComplexSeries, harmonics + 1> next{};
-        for (std::size_t k = 1; k <= harmonics; ++k) {
+    std::array<ComplexSeries, most_harmonics + 1> slope{};
+    for (std::size_t pass = 0; pass < terms; ++pass) {
+        const std::size_t kept = terms - pass;
+        std::array<ComplexSeries, most_harmonics + 1> next{};
+        for (std::size_t k = 1; k <= harmonics_; ++k) {
             ComplexSeries coupled{};  // coefficient of F (1 + slope)
             if (k <= 2) coupled[0] = coefficient[k];
             for (int m = -2; m <= 2; ++m) {
                 const int from = static_cast<int>(k) - m;
-                if (m == 0 || from == 0 || std::abs(from) > static_cast<int>(harmonics)) continue;
+                if (m == 0 || from == 0 || std::abs(from) > static_cast<int>(harmonics_)) continue;
                 const Complex weight = m > 0 ? coefficient[m] : std::conj(coefficient[-m]);
                 const ComplexSeries& source = slope[static_cast<std::size_t>(std::abs(from))];
                 for (std::size_t n = 0; n < kept; ++n) {
@@ -58,21 +86,35 @@ FastFrame::FastFrame(const gyro::HalfCycle& half, const gyro::Coupling& coupling
             for (std::size_t n = 0; n < kept; ++n) {
                 Complex right{};
                 for (std::size_t j = 0; j <= n; ++j) right -= b[j] * coupled[n - j];
-                if (n + 1 < frame_terms) right -= per_order * static_cast<double>(n + 1) * slope[k][n + 1];
+                if (n + 1 < terms) right -= per_order * static_cast<double>(n + 1) * slope[k][n + 1];
                 for (std::size_t j = 1; j <= n; ++j) right -= g[j] * next[k][n - j];
                 next[k][n] = right / g[0];
             }
         }
         slope = next;
     }
-    for (std::size_t k = 1; k <= harmonics; ++k) p_[k] = slope[k][0] / Complex(0.0, static_cast<double>(k));
+    for (std::size_t k = 1; k <= harmonics_; ++k) p_[k] = slope[k][0] / Complex(0.0, static_cast<double>(k));
+    const Complex mean = coefficient[1] * std::conj(slope[1][0]) + coefficient[2] * std::conj(slope[2][0]);
+    rate_beyond_drive_rad_s_ = 2.0 * b[0] * mean.real();
 }
 
 double FastFrame::correction_rad(double theta_rad) const {
     const std::complex<double> w = std::polar(1.0, theta_rad);
     std::complex<double> sum;
-    for (std::size_t k = harmonics; k >= 1; --k) sum = sum * w + p_[k];
+    for (std::size_t k = harmonics_; k >= 1; --k) sum = sum * w + p_[k];
     return 2.0 * (sum * w).real();
+}
+
+double FastFrame::theta_rad(double phi_rad) const {
+    // The correction's slope is the coupling over the rate, a quarter at most: each pass gains as many digits again.
+    double theta = phi_rad;
+    for (int pass = 0; pass < 60; ++pass) {
+        const double next = phi_rad - correction_rad(theta);
+        const double moved = std::abs(next - theta);
+        theta = next;
+        if (moved < 1e-13) break;
+    }
+    return theta;
 }
 
 }  // namespace ringlock::propagate

@@ -80,6 +80,7 @@ void step(const PhaseTables& tables, const gyro::LaneDrive& drive, std::size_t f
         before[g] = scaled(d, tables, drive, 0, lane);
         if (turns != nullptr) hn::Store(hn::Load(d, state.whole.data() + lane), d, turns->lockin_whole.data() + lane);
     }
+    const bool middles = turns != nullptr && turns->middles;
     for (std::size_t i = 0; i < drive.turns; ++i) {
         const double direction = drive.direction(i);
         const PhaseTables::Part& begin = tables.part(direction, 0);
@@ -110,6 +111,7 @@ void step(const PhaseTables& tables, const gyro::LaneDrive& drive, std::size_t f
             before[g] = scaled(d, tables, drive, i + 1, lane);
             const V constant = coefficient(d, begin[0], lane, before[g]).re;
             lockin[g] = lockin[g] + (constant + waves(d, begin, lane, before[g], sine, cosine));
+            if (middles) hn::Store(lockin[g], d, turns->lockin_middle_fringes[i].data() + lane);
         }
     }
     for (std::size_t g = 0; g < group; ++g) {

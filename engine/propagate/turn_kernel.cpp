@@ -48,6 +48,7 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
             hn::Store(hn::Load(d, state.whole.data() + lane), d, turns->lockin_whole.data() + lane);
         }
     }
+    const bool middles = turns_wanted && turns->middles;
     const bool changing = tables.changing();
     const bool both = changing || !tables.symmetric();
     for (std::size_t i = 0; i < drive.turns; ++i) {
@@ -114,6 +115,9 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
             const V carry = sm::nearest(d, before_turn);
             whole[g] = whole[g] + carry;
             lockin[g] = sm::fma(d, sign, gain, before_turn - carry);
+            if constexpr (turns_wanted) {
+                if (middles) hn::Store(whole[g] + lockin[g], d, turns->lockin_middle_fringes[i].data() + lane);
+            }
             shift_before[g] = next.shift;
             re_before[g] = next.z_re;
             im_before[g] = next.z_im;

@@ -33,6 +33,8 @@ enum class Purpose : std::uint64_t {
     design_scrambling = 19,
     design_strata = 20,
     sensitivity_bootstrap = 21,
+    latched_detectors = 22,
+    dither_reference = 23,
 };
 
 /// Who draws: the study's seed and the gyro's number.

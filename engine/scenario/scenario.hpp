@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/gyro/resonator.hpp"
+#include "engine/reader/settings.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/design.hpp"
 
@@ -152,14 +153,13 @@ struct Specification {
 bool asks(const Specification& specification);
 
 enum class RecordKind { turns, samples };
-enum class RecordTrajectory { uncompensated, noise_injected };
 
 /// What `ringlock record` writes of a gyro.
 struct RecordSettings {
     RecordKind kind = RecordKind::turns;
-    RecordTrajectory trajectory = RecordTrajectory::noise_injected;
-    double rate_hz = 100.0;               ///< of samples
-    double temperature_interval_s = 1.0;  ///< between rows of the temperature, where it changes
+    Arm trajectory = parse_arm("noise_injected");  ///< of samples any arm, of turns one without compensator
+    double rate_hz = 100.0;                        ///< of samples
+    double temperature_interval_s = 1.0;           ///< between rows of the temperature, where it changes
     bool operator==(const RecordSettings&) const = default;
 };
 
@@ -205,6 +205,7 @@ struct Scenario {
     Design design;  ///< empty: the scenario itself is the only point of the study
     Stop stop;      ///< where it asks(), it sets the number of gyros
     RecordSettings record;
+    reader::Settings reader;  ///< of records of samples
     bool operator==(const Scenario&) const = default;
 };
 

@@ -33,7 +33,7 @@ Scenario short_run() {
 
 Scenario plain_run() {
     Scenario s = short_run();
-    s.record.trajectory = scenario::RecordTrajectory::uncompensated;
+    s.record.trajectory = scenario::parse_arm("uncompensated");
     return s;
 }
 
@@ -51,8 +51,7 @@ std::int64_t quarter(double sine, double cosine) {
 TEST(SimulatedRecord, EveryReadoutGivesARecordWithoutFault) {
     for (const auto model :
          {scenario::ReadoutModel::ideal, scenario::ReadoutModel::latched, scenario::ReadoutModel::instrument}) {
-        for (const auto trajectory :
-             {scenario::RecordTrajectory::uncompensated, scenario::RecordTrajectory::noise_injected}) {
+        for (const auto trajectory : {scenario::parse_arm("uncompensated"), scenario::parse_arm("noise_injected")}) {
             Scenario s = short_run();
             s.readout.model = model;
             s.record.trajectory = trajectory;

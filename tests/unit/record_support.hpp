@@ -67,6 +67,7 @@ inline record::Record full_record() {
     for (const char* name : {"accel_x", "accel_y", "accel_z", "temperature_c"}) {
         r.samples->witnesses[name] = plain_samples(40, record::SampleKind::angle_increment_arcsec, 7).values;
     }
+    r.reader = record::DeclaredReader{};
     r.temperature_c = {{0.0, 0.3, 1.0}, {20.0, 20.5, 21.0}};
     r.input_rate_deg_h = {{0.0, 1.0}, {15.0, 16.0}};
     return r;

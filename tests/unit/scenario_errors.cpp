@@ -243,7 +243,8 @@ TEST(ScenarioText, ReportsEveryProblemInTheOrderOfTheFile) {
         "s.toml:3:9: key \"ensemble.gyros\" = 0: must be between 1 and 10000000 (a study needs a gyro, and each one's "
         "results are kept)\n"
         "s.toml:4:2: section [nowhere]: unknown section; sections are: gyro, dither, noise_injection, readout, "
-        "calibration, input, environment, ensemble, propagation, output, specification, record, arms, design, stop, "
+        "calibration, input, environment, ensemble, propagation, output, specification, record, reader, arms, design, "
+        "stop, "
         "effects\n"
         "s.toml:6:16: key \"dither.frequency_hz\" = \"x\": must be a number between 1 and 100000, not a string");
 }

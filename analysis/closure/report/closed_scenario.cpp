@@ -11,6 +11,7 @@
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
+#include "engine/scenario/check.hpp"
 
 namespace ringlock::closure {
 
@@ -57,8 +58,7 @@ void take_device_of_turns(const record::Record& record, const Closure& closure, 
     const auto& time_s = record.turns->time_s;
     scenario.ensemble.duration_s = std::max(10.0, time_s.back() - time_s.front());
     scenario.record.kind = scenario::RecordKind::turns;
-    scenario.record.trajectory =
-        noisy ? scenario::RecordTrajectory::noise_injected : scenario::RecordTrajectory::uncompensated;
+    scenario.record.trajectory = noisy ? scenario::parse_arm("noise_injected") : scenario::parse_arm("uncompensated");
     scenario.arms = noisy ? scenario::parse_arms({"ideal", "noise_injected", "noise_injected+compensated",
                                                   "noise_injected+compensated_exact"})
                           : scenario::parse_arms({"ideal", "uncompensated", "compensated", "compensated_exact"});
@@ -75,38 +75,38 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
         *value_in(scenario, OnSamples::resolution, effects::Role::sampled) = 0.25 * scale_factor_arcsec;
     }
     double step_arcsec = *value_in(scenario, OnSamples::resolution, effects::Role::sampled);
-    double readings_hz = samples.rate_hz;
     for (const Step& step : closure.steps) {
-        const OnSamples as = on_samples(*step.effect);
-        if (as != OnSamples::resolution && as != OnSamples::transport) continue;
-        const std::string_view parameter = parameter_of(*step.effect, effects::Role::sampled).name;
-        if (as == OnSamples::resolution) step_arcsec = estimated(step.parameters, parameter, 0.0);
-        if (as == OnSamples::transport) readings_hz = estimated(step.parameters, parameter, readings_hz);
+        if (on_samples(*step.effect) != OnSamples::resolution) continue;
+        step_arcsec = estimated(step.parameters, parameter_of(*step.effect, effects::Role::sampled).name, 0.0);
     }
-    // What is fitted as white noise of the angle has that of the steps in it.
+    // What is fitted as white noise of the angle has that of the steps in it. A reader's reference brings the rest in.
     const double white = estimated(closure.base, "white_angle_arcsec", 0.0);
     const double rounding = closure.rounding_in_noise ? step_arcsec * step_arcsec / 12.0 : 0.0;
-    const double angle_arcsec = std::sqrt(std::max(0.0, white * white - rounding));
-    constexpr double noise_rad = options.report.phase_noise_rad;
-    if (angle_arcsec > options.report.least_angle_noise_arcsec) {
-        scenario.gyro.scale_factor_arcsec = std::clamp(units::two_pi * angle_arcsec / noise_rad, 1e-3, 1e3);
-        scenario.readout.detector_noise_relative = units::two_pi * angle_arcsec / scenario.gyro.scale_factor_arcsec;
-    } else {
-        scenario.readout.model = scenario::ReadoutModel::ideal;
-        scenario.gyro.scale_factor_arcsec = scale_factor_arcsec;
+    scenario.reader.reference_noise_arcsec = std::min(1e6, std::sqrt(std::max(0.0, white * white - rounding)));
+    const reader::Settings plain = scenario.reader;
+    if (record.reader) {
+        scenario.reader = record.reader->settings;
+        if (scenario.reader.fraction == reader::Fraction::ideal) {
+            scenario.reader.reference_noise_arcsec = plain.reference_noise_arcsec;
+        }
     }
-    // A turn at every reading, so that none is interpolated and each has an error of its own.
-    const double halves = std::max(1.0, std::ceil(2.0 / readings_hz));
-    scenario.dither.frequency_hz = 0.5 * halves * readings_hz;
-    scenario.dither.peak_rate_deg_s = 0.5 * options.report.fringes_between_turns * scenario.gyro.scale_factor_arcsec *
-                                      units::two_pi * scenario.dither.frequency_hz / units::deg_h_per_deg_s;
+    // Nothing in samples tells these apart from a placeholder: what is declared stands, or else the standard gyro.
+    scenario.gyro.scale_factor_arcsec = scale_factor_arcsec;
+    scenario.dither.frequency_hz = record.declared.dither_frequency_hz.value_or(scenario.dither.frequency_hz);
+    scenario.dither.peak_rate_deg_s = record.declared.dither_peak_rate_deg_s.value_or(scenario.dither.peak_rate_deg_s);
     const std::size_t increments =
         samples.size() - (samples.kind == record::SampleKind::angle_increment_arcsec ? 0 : 1);
     scenario.ensemble.duration_s = static_cast<double>(increments) / samples.rate_hz;
     scenario.record.kind = scenario::RecordKind::samples;
     scenario.record.rate_hz = samples.rate_hz;
-    scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
+    scenario.record.trajectory = scenario::parse_arm("uncompensated");
     scenario.arms = scenario::parse_arms({"ideal", "uncompensated"});
+    // A declared reader that no scenario can have, beside a source of another rate say, is left out.
+    for (const scenario::Complaint& complaint : scenario::check(scenario)) {
+        for (const std::string& key : complaint.keys) {
+            if (key.starts_with("reader.")) scenario.reader = plain;
+        }
+    }
 }
 
 }  // namespace

@@ -493,7 +493,7 @@ Predictive check_predictive(const record::Record& record, const Closure& closure
         const int wanted =
             std::clamp(affordable, std::min(options.report.fewest_simulations, simulations), simulations);
         Closure swinging = closure;
-        if (turns && closed.record.trajectory == scenario::RecordTrajectory::uncompensated) {
+        if (turns && closed.record.trajectory == scenario::parse_arm("uncompensated")) {
             const double peak_deg_s = swinging_deg_s(record, closure, *turns, std::clamp(affordable / 20, 1, 4));
             for (Estimate& e : swinging.base) {
                 if (e.name == "dither_peak_rate_deg_s") e.value = peak_deg_s;

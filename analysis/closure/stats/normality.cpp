@@ -17,7 +17,7 @@ namespace {
 struct Excess {
     double kurtosis, z;
 };
-Excess excess_of(std::span<const double> values) {
+Excess excess_of(std::span<const double> values, double expected = 0.0) {
     const auto count = static_cast<double>(values.size());
     double second = 0.0;
     double fourth = 0.0;
@@ -27,7 +27,7 @@ Excess excess_of(std::span<const double> values) {
     const double mean = -6.0 / (count + 1.0);
     const double variance =
         24.0 * count * (count - 2.0) * (count - 3.0) / ((count + 1.0) * (count + 1.0) * (count + 3.0) * (count + 5.0));
-    const double x = (kurtosis - mean) / std::sqrt(variance);
+    const double x = (kurtosis - expected - mean) / std::sqrt(variance);
     const double skew = 6.0 * (count * count - 5.0 * count + 2.0) / ((count + 7.0) * (count + 9.0)) *
                         std::sqrt(6.0 * (count + 3.0) * (count + 5.0) / (count * (count - 2.0) * (count - 3.0)));
     const double a = 6.0 + 8.0 / skew * (2.0 / skew + std::sqrt(1.0 + 4.0 / (skew * skew)));
@@ -51,7 +51,8 @@ bool is_of_even_density(const std::vector<double>& innovations, const Rows& rows
 }
 
 std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovations, const Rows& rows,
-                                           std::size_t shortest, std::size_t shortest_bounded) {
+                                           std::size_t shortest, std::size_t shortest_bounded,
+                                           const std::function<double(std::size_t)>& expected_excess) {
     const StatsOptions::Normality& of = options.stats.normality;
     const std::size_t n = innovations.size();
     double least = 1.0;
@@ -71,7 +72,7 @@ std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovation
             if (all) sums.push_back(sum);
         }
         if (sums.size() < of.fewest_sums) break;
-        const auto [kurtosis, z] = excess_of(sums);
+        const auto [kurtosis, z] = excess_of(sums, expected_excess ? expected_excess(m) : 0.0);
         const double p = chi2_tail(z * z, 1);
         tried += 1.0;
         if (m < shortest_bounded && kurtosis < 0.0) continue;

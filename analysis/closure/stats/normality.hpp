@@ -1,5 +1,6 @@
 #pragma once
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -10,9 +11,12 @@
 namespace ringlock::closure {
 
 /// Fourth moments of sums of `shortest` innovations and of longer ones: what is normal stays so. Sums of fewer than
-/// `shortest_bounded` may have less: a noise of even density, say, which is no structure. None where there are too few.
+/// `shortest_bounded` may have less: a noise of even density, say, which is no structure.
+/// `expected_excess`: kurtosis beyond 3 that sums of so many have by the model; 0 where it is empty. None where there
+/// are too few.
 std::optional<ResidualTest> fourth_moments(const std::vector<double>& innovations, const Rows& rows,
-                                           std::size_t shortest, std::size_t shortest_bounded = 1);
+                                           std::size_t shortest, std::size_t shortest_bounded = 1,
+                                           const std::function<double(std::size_t)>& expected_excess = {});
 
 /// Whether they are, beyond doubt, flatter than normal ones, as injected noise between bounds is.
 bool is_of_even_density(std::span<const double> innovations);

@@ -215,12 +215,43 @@ std::vector<Section> base_sections() {
          "What `ringlock record` writes of one gyro over ensemble.duration_s.",
          {
              key(RINGLOCK_KEY(record, kind), none,
-                 "turns: every zero-rate point as the electronics have it; samples: increments of the stripped angle."),
-             key(RINGLOCK_KEY(record, trajectory), none, "With or without noise on the dither."),
-             key(RINGLOCK_KEY(record, rate_hz), between(1e-3, 1e6, "faster than any output"),
-                 "Samples a second; the angle is known at turns and interpolated linearly between them."),
+                 "turns: every zero-rate point as the electronics have it; samples: increments of the angle that the "
+                 "reader puts out."),
+             key(RINGLOCK_KEY(record, trajectory), none, "The arm that is recorded; of turns one without compensator."),
+             key(RINGLOCK_KEY(record, rate_hz), between(1e-3, 1e6, "faster than any output"), "Samples a second."),
              key(RINGLOCK_KEY(record, temperature_interval_s), between(1e-3, 1e6, "a thermometer is slow"),
                  "Time between rows of the temperature, where that changes."),
+         }},
+        {"reader",
+         "What latches the angle for a record of samples and takes the dither out of it. Without this section the "
+         "phase is known exactly at every tick and the dither is subtracted without error (docs/reader.md).",
+         {
+             key(RINGLOCK_KEY(reader, latch_hz), zero_or(1e-3, 1e6, "faster than any counter is read"),
+                 "Rate of the clock that latches the count; a whole multiple of the rate of the samples, which are "
+                 "every so many ticks. 0: that rate."),
+             key(RINGLOCK_KEY(reader, fraction), none,
+                 "ideal: the phase itself; detectors: the counted quarter fringe and the quadrature detectors, with "
+                 "their noise, ellipse and converter; none: whole quarter fringes."),
+             key(RINGLOCK_KEY(reader, stripping), none,
+                 "none: the dither stays in; whole_cycle: counts are latched once a dither cycle and resampled; "
+                 "reference: a measured dither angle is subtracted; fir: a low-pass filter of linear phase; notch: an "
+                 "adaptive canceller of the dither's frequency; reference+fir: both."),
+             key(RINGLOCK_KEY(reader, reference_gain_error_relative),
+                 between(-0.5, 0.5, "a reference that is off by half is none"),
+                 "Error of the measured dither angle, relative."),
+             key(RINGLOCK_KEY(reader, reference_delay_s), between(0.0, 1e-2, "a quarter of a slow dither's cycle"),
+                 "Delay of the measured dither angle."),
+             key(RINGLOCK_KEY(reader, reference_noise_arcsec), between(0.0, 1e6, "far more than the dither itself"),
+                 "Rms noise of the measured dither angle, independent from tick to tick."),
+             key(RINGLOCK_KEY(reader, reference_learning_s), between(0.0, 1e6, "a record is shorter"),
+                 "Time constant with which gain and delay of the reference are learnt. 0: they are taken as 1 and 0."),
+             key(RINGLOCK_KEY(reader, fir_order), zero_or_whole(2, 100'000, "a longer filter forgets nothing"),
+                 "Order of the low-pass filter, its taps less one; even. It delays by half of it. 0: four cycles of "
+                 "the dither."),
+             key(RINGLOCK_KEY(reader, fir_cutoff_hz), zero_or(1e-3, 1e6, "the latching rate is at most 1e6 Hz"),
+                 "Frequency at which the low-pass filter's response is about one half. 0: a quarter of the dither's."),
+             key(RINGLOCK_KEY(reader, notch_bandwidth_hz), above(0.0, 1e5, "a notch has a width"),
+                 "Bandwidth of the adaptive canceller between the points of half the power."),
          }},
         {"arms",
          "What is done to the gyros; all arms share their random numbers gyro by gyro.",

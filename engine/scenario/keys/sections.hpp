@@ -24,7 +24,12 @@ inline std::vector<std::string> words_of(LotDistribution) {
     return {"none", "normal", "uniform", "lognormal", "triangular"};
 }
 inline std::vector<std::string> words_of(RecordKind) { return {"turns", "samples"}; }
-inline std::vector<std::string> words_of(RecordTrajectory) { return {"uncompensated", "noise_injected"}; }
+inline std::vector<std::string> words_of(reader::Stripping) {
+    return {reader::stripping_names.begin(), reader::stripping_names.end()};
+}
+inline std::vector<std::string> words_of(reader::Fraction) {
+    return {reader::fraction_names.begin(), reader::fraction_names.end()};
+}
 
 template <class Number>
 Bounds between(Number min, Number max, std::string why) {
@@ -62,6 +67,11 @@ Key key(std::string section, std::string name, Access access, Bounds bounds, std
                 if (words[i] == std::get<std::string>(v)) access(s) = static_cast<Field>(i);
             }
         };
+    } else if constexpr (std::is_same_v<Field, Arm>) {
+        k.type = Type::word;
+        k.words = arm_names();
+        k.get = [access](const Scenario& s) -> Value { return access(s).name; };
+        k.set = [access](Scenario& s, const Value& v) { access(s) = parse_arm(std::get<std::string>(v)); };
     } else if constexpr (std::is_same_v<Field, std::string>) {
         k.type = Type::text;
         k.get = [access](const Scenario& s) -> Value { return access(s); };

@@ -27,6 +27,7 @@ std::span<const Rule> noise_rules();     ///< injected noise and the drive that 
 std::span<const Rule> lockin_rules();    ///< what effects leave of the lock-in
 std::span<const Rule> readout_rules();   ///< readout models and the instrument's electronics
 std::span<const Rule> output_rules();    ///< samples, averaging times and the specification
+std::span<const Rule> record_rules();    ///< records and their reader
 
 double peak_rate_deg_h(const Scenario& scenario);
 

@@ -22,7 +22,7 @@ inline void inject(scenario::Scenario& scenario, double noise_rad) {
     if (noise_rad > 0.0) {
         scenario.noise_injection.turn_phase_rms_rad = noise_rad;
     } else {
-        scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
+        scenario.record.trajectory = scenario::parse_arm("uncompensated");
     }
 }
 

@@ -137,7 +137,7 @@ TEST_F(LongPredictively, WhatTheModelLacksShows) {
 
 TEST_F(LongPredictively, InputAndTemperatureAreThoseOfTheRecord) {
     scenario::Scenario scenario = plain_gyro(6000, 10);
-    scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
+    scenario.record.trajectory = scenario::parse_arm("uncompensated");
     scenario.input.profile_time_s = {0.0, 8.0, 8.5, 15.0, 15.5, 1000.0};
     scenario.input.profile_rate_deg_h = {300.0, 300.0, -300.0, -300.0, 600.0, 600.0};
     scenario.environment.temperature_swing_k = 2.0;
@@ -257,7 +257,7 @@ TEST_F(LongPredictively, PIsAsRareAsItSays) {
         std::map<std::string, int> rare;
         for (std::uint64_t seed = 200; seed < 260; ++seed) {
             scenario::Scenario scenario = plain_gyro(4000, seed);
-            if (!injected) scenario.record.trajectory = scenario::RecordTrajectory::uncompensated;
+            if (!injected) scenario.record.trajectory = scenario::parse_arm("uncompensated");
             const record::Record record = instrument::simulate_record(scenario);
             const Predictive predictive = check_predictive(record, ringlock::closure::fit_turns(record, {}));
             ASSERT_EQ(predictive.statistics.size(), 4U);

@@ -144,9 +144,15 @@ void SampleFit::fit_columns(bool held) {
 void SampleFit::finish() {
     innovations_ = filter_->apply(rest_);
     log_likelihood_ = 0.0;
+    double variance = 0.0;
+    double count = 0.0;
     for (std::size_t i = 0; i < innovations_.size(); ++i) {
-        if ((*rows_)[i]) log_likelihood_ -= 0.5 * innovations_[i] * innovations_[i] + std::log(sd(i));
+        if (!(*rows_)[i]) continue;
+        log_likelihood_ -= 0.5 * innovations_[i] * innovations_[i] + std::log(sd(i));
+        variance += sd(i) * sd(i);
+        count += 1.0;
     }
+    typical_sd_ = count > 0.0 ? std::sqrt(variance / count) : sd(innovations_.size() / 2);
 }
 
 double SampleFit::gain_over(const SampleFit& other) const {

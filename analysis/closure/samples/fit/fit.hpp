@@ -67,6 +67,8 @@ class SampleFit {
     /// Over their standard deviations, all rows.
     const std::vector<double>& innovations() const { return innovations_; }
     double sd(std::size_t row) const { return filter_->sd(row); }
+    /// Root mean square of these over the rows that count.
+    double typical_sd() const { return typical_sd_; }
     double log_likelihood() const { return log_likelihood_; }
     /// Of the log-likelihood over that of another model of the same rows. Where both are resampled, rows that are
     /// settled to their digits say how exactly the source's times are known, and nothing of the effects: they are left
@@ -147,6 +149,7 @@ class SampleFit {
     std::vector<double> innovations_;
     std::vector<std::vector<double>> whitened_;  ///< columns
     double log_likelihood_ = 0.0;
+    double typical_sd_ = 0.0;
     Eigen::MatrixXd covariance_;
     Rows settled_;
     Rows telling_;

@@ -56,11 +56,11 @@ void SampleLoop::take_lattice(Closure& closure) {
         if (rounded_.drawn()) closure.heldout_before = score(*now_.fit).error;
         return;
     }
-    lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
+    lattice_ = find_lattice(chosen_increments(), now_.fit->typical_sd());
     const effects::Effect* effect = first_that_shows(OnSamples::resolution);
     if (lattice_.step_arcsec == 0.0 || effect == nullptr) return;
     const double step = lattice_.step_arcsec;
-    const double sd = now_.fit->sd(series_.size() / 2);
+    const double sd = now_.fit->typical_sd();
     // Steps add step^2/12 to the variance.
     if (step * step / 12.0 < options.samples.loop.negligible_steps * sd * sd) {
         closure.notes.push_back(fmt::format(

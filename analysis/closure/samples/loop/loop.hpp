@@ -8,6 +8,7 @@
 
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decide/rows.hpp"
+#include "analysis/closure/samples/fit/declared_reader.hpp"
 #include "analysis/closure/samples/fit/figures.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/closure/samples/fit/repeats_and_witness.hpp"
@@ -27,7 +28,7 @@ class SampleLoop {
     explicit SampleLoop(const record::Record& record, const Monitor& monitor = {})
         : record_(record),
           monitor_(monitor),
-          series_(prepare_samples(record)),
+          series_(prepared(record)),
           rounded_(series_),
           chosen_(training_rows(series_.size())) {}
 
@@ -35,6 +36,12 @@ class SampleLoop {
     Closure fit(const std::vector<ActiveEffect>& effects);
 
    private:
+    static SampleSeries prepared(const record::Record& record) {
+        SampleSeries series = prepare_samples(record);
+        series.count_noise_arcsec = closure::count_noise_arcsec(record);
+        series.whole_cycles = record.reader && record.reader->settings.stripping == reader::Stripping::whole_cycle;
+        return series;
+    }
     /// The model as it has grown, with what was added.
     struct State {
         std::shared_ptr<SampleFit> fit;
@@ -56,6 +63,7 @@ class SampleLoop {
     }
     std::vector<double> chosen_increments() const;
     Rows all_rows() const;
+    std::shared_ptr<SampleFit> fit_base(Closure& closure) const;
     void begin(Closure& closure);
     void close(Closure& closure);
     void take_known(const std::vector<ActiveEffect>& effects, Closure& closure);

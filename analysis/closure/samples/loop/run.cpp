@@ -10,9 +10,11 @@
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decide/verdict.hpp"
 #include "analysis/closure/options.hpp"
+#include "analysis/closure/samples/fit/declared_reader.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/fit/motion.hpp"
 #include "analysis/closure/samples/fit/steps.hpp"
+#include "analysis/closure/samples/fit/turn_pattern.hpp"
 #include "analysis/closure/samples/loop/loop.hpp"
 #include "analysis/closure/samples/screen/known.hpp"
 
@@ -28,6 +30,30 @@ Rows SampleLoop::all_rows() const {
     std::fill_n(all.begin(), std::min(options.samples.loop.remembered_lags * lags, most), 0);
     std::fill_n(all.rbegin(), std::min(lags, most), 0);
     return all;
+}
+
+/// The base model: the turns of the declared dither, where the record shows them, belong to it.
+std::shared_ptr<SampleFit> SampleLoop::fit_base(Closure& closure) const {
+    if (const auto filtered = filtered_rows(record_)) {
+        SampleModel model;
+        model.noise.kicks = filtered;
+        model.noise.kick_share = 1.0;
+        model.noise.turn_hz = series_.rate_hz;
+        return std::make_shared<SampleFit>(series_, std::move(model), rows_);
+    }
+    auto fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
+    const auto pattern = find_turn_pattern(*fit, record_.declared);
+    if (!pattern) return fit;
+    SampleModel model;
+    take_turn_pattern(*pattern, model.noise);
+    fit = std::make_shared<SampleFit>(series_, std::move(model), rows_);
+    const std::string note = fmt::format(
+        "the white noise of the rate comes in kicks at the turns of the dither, {:.7g} a second: {:.4g} in a sample",
+        pattern->turn_hz, pattern->turn_hz * series_.interval_s);
+    if (std::find(closure.notes.begin(), closure.notes.end(), note) == closure.notes.end()) {
+        closure.notes.push_back(note);
+    }
+    return fit;
 }
 
 void SampleLoop::begin(Closure& closure) {
@@ -54,7 +80,7 @@ void SampleLoop::begin(Closure& closure) {
     }
     now_ = {};
     next_id_ = 0;
-    now_.fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
+    now_.fit = fit_base(closure);
     closure.heldout_before = score_of(*now_.fit, reported_, 0.0).error;
     if (disturbed_.rows.empty()) disturbed_ = find_disturbed(*now_.fit, whole_);
     if (disturbed_.share >= options.samples.loop.most_disturbed) disturbed_.rows.assign(disturbed_.rows.size(), 0);
@@ -64,7 +90,7 @@ void SampleLoop::begin(Closure& closure) {
             if (!disturbed_.rows[i]) continue;
             rows_[i] = reported_[i] = whole_[i] = 0;
         }
-        now_.fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
+        now_.fit = fit_base(closure);
         closure.notes.push_back(fmt::format(
             "{:.1f} % of the record is disturbed, up to {:.3g} times the usual variance, most at {:.6g} s; nothing is "
             "fitted to it, held-out errors leave it out ({:.6g} arcsec before with it)",
@@ -103,6 +129,10 @@ void SampleLoop::finish(Closure& closure) {
     for (std::size_t k = 0; k < now_.added.size(); ++k) {
         Step& step = closure.steps.emplace_back(std::move(now_.added[k].step));
         if (step.parameters.empty()) step.parameters = std::move(figures.steps[k]);
+        std::string why;
+        if (!accounted_by_reader(step, record_, why)) continue;
+        closure.steps.pop_back();
+        closure.notes.push_back(std::move(why));
     }
     for (auto* notes : {&now_.notes, &figures.notes}) {
         for (std::string& note : *notes) closure.notes.push_back(std::move(note));
@@ -181,7 +211,7 @@ void SampleLoop::take_known(const std::vector<ActiveEffect>& effects, Closure& c
     now_.added = std::move(known.added);
     for (AddedEffect& added : now_.added) {
         if (on_samples(added.effect()) != OnSamples::resolution) continue;
-        lattice_ = find_lattice(chosen_increments(), now_.fit->sd(series_.size() / 2));
+        lattice_ = find_lattice(chosen_increments(), now_.fit->typical_sd());
         used_step_ = lattice_.printed_arcsec;
         added.step.parameters.push_back(step_of_lattice(added.effect()));
     }
@@ -205,11 +235,17 @@ Closure SampleLoop::fit(const std::vector<ActiveEffect>& effects) {
 }
 
 Closure close_samples(const record::Record& record, const Monitor& monitor) {
-    return SampleLoop(record, monitor).run();
+    std::string note;
+    const record::Record summed = summed_for_reader(record, note);
+    Closure closure = SampleLoop(summed, monitor).run();
+    if (!note.empty()) closure.notes.insert(closure.notes.begin(), std::move(note));
+    return closure;
 }
 
 Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects) {
-    return SampleLoop(record).fit(effects);
+    std::string note;
+    const record::Record summed = summed_for_reader(record, note);
+    return SampleLoop(summed).fit(effects);
 }
 
 }  // namespace ringlock::closure

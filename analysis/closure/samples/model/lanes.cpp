@@ -85,6 +85,7 @@ class Lanes {
             gain_[i] = A::set(0.0);
         }
         floor_ = from([](const SampleStates& s) { return s.floor; });
+        kick_ = from([](const SampleStates& s) { return s.kick; });
         ratio_ = from([](const SampleStates& s) { return s.ratio; });
         place_ = from([](const SampleStates& s) { return s.first_place; });
         for (std::size_t k = 0; k < A::lanes(); ++k) {
@@ -98,6 +99,9 @@ class Lanes {
             step_states();
         } else {
             step_row();
+            if constexpr (D >= 2) {
+                if (of_->kicks) kick(row);
+            }
         }
         V e = A::set(angle);
         for (int i = 0; i < D; ++i) {
@@ -177,6 +181,15 @@ class Lanes {
         }
     }
 
+    /// Kicks at the turns next to the end of the row.
+    void kick(std::size_t row) {
+        const KickRows& kicks = *of_->kicks;
+        p_[0][0] = A::mul_add(kick_, A::set(kicks.variance[row]), p_[0][0]);
+        p_[0][1] = A::mul_add(kick_, A::set(kicks.covariance[row]), p_[0][1]);
+        p_[1][0] = p_[0][1];
+        p_[1][1] = A::mul_add(kick_, A::set(kicks.carried[row]), p_[1][1]);
+    }
+
     void step_states() {
         Line next;
         for (int i = 0; i < D; ++i) {
@@ -215,7 +228,7 @@ class Lanes {
         for (int i = 0; i < D; ++i) {
             for (int j = 0; j < D; ++j) p_[i][j] = A::neg_mul_add(gain_[i], ph[j], p_[i][j]);
         }
-        if (!of_->resampled && !of_->swings) settle(last);
+        if (!of_->resampled && !of_->swings && !of_->kicks) settle(last);
     }
 
     /// Whether gains have stopped changing: each, since those of slow rates settle long after the variance has.
@@ -237,7 +250,7 @@ class Lanes {
     const SampleStates* of_ = nullptr;  ///< what all have in common
     std::array<Line, D> p_, q_, f_;
     Line h_, x_, gain_;
-    V floor_, ratio_, place_;
+    V floor_, kick_, ratio_, place_;
     V variance_;
     std::array<double, most_lanes> ticks_{};
     std::array<Swing, most_lanes> swing_{};

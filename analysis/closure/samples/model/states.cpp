@@ -14,6 +14,12 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
     count = 1;
     f[0][0] = 1.0;
     q[0][0] = noise.rate_arcsec_rt_s * noise.rate_arcsec_rt_s * dt;
+    if (noise.kicks && !resampled) {
+        kick = noise.kick_variance();
+        kicks = noise.kicks;
+        q[0][0] = std::max(0.0, q[0][0] - kick * noise.turn_hz * dt);
+        f[0][count++] = 1.0;
+    }
     Matrix& p = start;
     if (noise.walk_arcsec2_s3 > 0.0) {
         f[0][count] = dt;
@@ -101,8 +107,8 @@ bool SampleStates::is_like(const SampleStates& other) const {
         return std::equal(h.begin(), h.end(), other.h.begin(),
                           [](double a, double b) { return (a == 0.0) == (b == 0.0); });
     };
-    return count == other.count && resampled == other.resampled && swings == other.swings && nonzero == other.nonzero &&
-           same_zeros();
+    return count == other.count && resampled == other.resampled && kicks == other.kicks && swings == other.swings &&
+           nonzero == other.nonzero && same_zeros();
 }
 
 }  // namespace ringlock::closure

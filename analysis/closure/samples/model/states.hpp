@@ -1,9 +1,17 @@
 #pragma once
 #include <array>
+#include <memory>
 #include <type_traits>
 #include <vector>
 
 namespace ringlock::closure {
+
+/// Kicks of the lock-in, by the rows of a record. A kick goes to the row in which its turn falls, or, of a turn near
+/// the end of a row, to that row and the next: variance of the first part, of the second one, and their covariance,
+/// over that of a whole kick, summed over the turns that are next to the row's end.
+struct KickRows {
+    std::vector<double> variance, carried, covariance;
+};
 
 /// What is random in a record of samples; angles in arcsec.
 struct SampleNoise {
@@ -14,6 +22,13 @@ struct SampleNoise {
         double time_s, variance_arcsec2_s2;
     };
     std::vector<Term> terms = {};  ///< Gauss-Markov rates
+    /// Share of the white rate's variance that comes in kicks at the turns of the dither, so many a second; null: none.
+    double kick_share = 0.0;
+    double turn_hz = 0.0;
+    double kick_excess = 0.0;  ///< kurtosis of a kick beyond 3
+    std::shared_ptr<const KickRows> kicks = {};
+    /// Variance of a kick [arcsec^2].
+    double kick_variance() const { return kick_share * rate_arcsec_rt_s * rate_arcsec_rt_s / turn_hz; }
     /// An angle that is a second-order autoregression.
     struct Resonance {
         double arcsec, hz, width_hz;
@@ -49,6 +64,9 @@ struct SampleStates {
 
     int count = 0;
     bool resampled = false;
+    /// Variance of a kick; what is carried to the next row is the state after the angle.
+    double kick = 0.0;
+    std::shared_ptr<const KickRows> kicks;
     bool swings = false;
     double swing_by_row = 0.0, swing_cos = 0.0, swing_sin = 0.0;
     double floor = 0.0;  ///< variance of the measurement itself

@@ -8,6 +8,7 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/line_search.hpp"
 #include "analysis/closure/samples/fit/repeats_and_witness.hpp"
+#include "analysis/closure/samples/fit/turn_pattern.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
 #include "analysis/closure/samples/residual/views.hpp"
 #include "analysis/closure/stats/normality.hpp"
@@ -112,10 +113,15 @@ void test_size(const SampleFit& fit, Views& views) {
 
 void test_distribution(const SampleFit& fit, double lattice_arcsec, Views& views) {
     const auto& e = fit.innovations();
-    const std::size_t n = e.size();
     // Steps that are not small are no normal noise; sums of them are.
-    const bool steps = lattice_arcsec > options.samples.residual.coarse_lattice * fit.sd(n / 2);
-    if (const auto test = fourth_moments(e, fit.telling(), steps ? 16 : 1)) views.push_back({*test});
+    const bool steps = lattice_arcsec > options.samples.residual.coarse_lattice * fit.typical_sd();
+    // Between two readings of a whole cycle two kicks have come, which are flatter than normal; sums of many are
+    // normal.
+    const std::size_t bounded = fit.series().whole_cycles ? 16 : 1;
+    if (const auto test = fourth_moments(e, fit.telling(), steps ? 16 : 1, bounded,
+                                         [&](std::size_t length) { return expected_excess(fit, length); })) {
+        views.push_back({*test});
+    }
     if (lattice_arcsec == 0.0) {
         // No two values of so many digits are the same by chance, the largest least of all.
         const auto& x = fit.series().increment;

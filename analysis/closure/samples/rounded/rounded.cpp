@@ -29,7 +29,7 @@ void RoundedSamples::restore() {
 
 bool RoundedSamples::show(const SampleFit& fit, double step_arcsec) {
     if (!(step_arcsec > 0.0) || fit.model().noise.from_hz > 0.0) return false;
-    const double sd = fit.sd(fit.series().size() / 2);
+    const double sd = fit.typical_sd();
     return rounding_shows(step_arcsec, std::sqrt(std::max(0.0, sd * sd - variance_of_steps(step_arcsec))));
 }
 

@@ -1,0 +1,26 @@
+#pragma once
+#include <memory>
+#include <string>
+
+#include "analysis/closure/closure.hpp"
+#include "analysis/closure/samples/model/states.hpp"
+#include "analysis/record/record.hpp"
+
+/// What a declared reader does to the samples, none of which is an effect that the model lacks.
+namespace ringlock::closure {
+
+/// The record as the loop reads it. A low-pass filter passes nothing that is faster than its length: samples are summed
+/// until one lasts as long, and neighbours alone have the filter in common. `note` says so where it was done.
+record::Record summed_for_reader(const record::Record& record, std::string& note);
+
+/// How a low-pass filter divides white rate noise between a row and the next; null where the reader has none.
+std::shared_ptr<const KickRows> filtered_rows(const record::Record& record);
+
+/// Rms of the uniform error that a count of quarter fringes leaves in each reading [arcsec]; 0 where none is declared.
+double count_noise_arcsec(const record::Record& record);
+
+/// Whether the reader accounts for the step: what it leaves of the dither, or samples that it takes once a cycle of the
+/// dither. `why` says so.
+bool accounted_by_reader(const Step& step, const record::Record& record, std::string& why);
+
+}  // namespace ringlock::closure

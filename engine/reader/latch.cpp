@@ -1,0 +1,121 @@
+#include "engine/reader/latch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/units.hpp"
+#include "engine/propagate/between_turns.hpp"
+
+namespace ringlock::reader {
+
+Latch::Latch(std::span<const gyro::Device> devices, double latch_hz, std::int64_t first_turn)
+    : first_turn_(first_turn) {
+    for (const gyro::Device& device : devices) {
+        lanes_.push_back({device, {latch_hz, device.positive_duration_s, device.negative_duration_s}, 0, {}, {}});
+    }
+}
+
+void Latch::read(const gyro::LaneDrive& drive, const gyro::LaneTurns& turns) {
+    const std::size_t last = drive.turns - 1;
+    for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
+        lanes_[lane].instants.clear();
+        for (std::size_t row = begun_ ? 0 : 1; row < drive.turns; ++row) read_half_cycle(drive, turns, row, lane);
+        lanes_[lane].last = {drive.plain_fringes[last][lane],
+                             drive.rotation_fringes[last][lane],
+                             drive.rotation_whole[last][lane],
+                             turns.lockin_fringes[last][lane],
+                             turns.lockin_middle_fringes[last][lane],
+                             turns.lockin_whole[lane],
+                             drive.late_s.empty() ? 0.0 : drive.late_s[last][lane]};
+    }
+    begun_ = true;
+}
+
+void Latch::read_half_cycle(const gyro::LaneDrive& drive, const gyro::LaneTurns& turns, std::size_t row,
+                            std::size_t lane) {
+    Lane& own = lanes_[lane];
+    const gyro::Device& device = own.device;
+    // Turns are counted from the one at tick 0.
+    const std::int64_t begins = drive.first_turn + static_cast<std::int64_t>(row) - 1 - first_turn_;
+    const bool rises = begins % 2 == 0;
+    const double duration_s = rises ? device.positive_duration_s : device.negative_duration_s;
+    const double end_late_s = drive.late_s.empty() ? 0.0 : drive.late_s[row][lane];
+    const auto before_end = [&](std::int64_t tick) {
+        return own.clock.after_turn_s(tick, begins) < duration_s + end_late_s;
+    };
+    // Where the clock is slow most half cycles have no tick.
+    const bool ticks = begins >= 0 && before_end(own.next_tick);
+    if (begins < 0 || (!ticks && !(crossings_ && rises))) return;
+
+    Turn start = own.last;
+    if (row > 0) {
+        start = {drive.plain_fringes[row - 1][lane],
+                 drive.rotation_fringes[row - 1][lane],
+                 drive.rotation_whole[row - 1][lane],
+                 turns.lockin_fringes[row - 1][lane],
+                 turns.lockin_middle_fringes[row - 1][lane],
+                 turns.lockin_whole[lane],
+                 drive.late_s.empty() ? 0.0 : drive.late_s[row - 1][lane]};
+    }
+    const double carried = start.lockin_whole - turns.lockin_whole[lane];  // by the piece before
+    const propagate::PassedHalfCycle passed{gyro::half_cycle_of(device, drive, row, lane),
+                                            gyro::coupling_of(device, drive, row, lane),
+                                            start.plain_fringes,
+                                            start.lockin_fringes + carried,
+                                            turns.lockin_fringes[row][lane],
+                                            start.middle_fringes + carried};
+    const gyro::HalfCycle& half = passed.half;
+    const double swing = 2.0 * device.dither_amplitude_rad / units::two_pi;
+    const double swing_whole = rises ? 0.0 : std::nearbyint(swing);
+    const double dither_at_turn = start.plain_fringes - start.rotation_fringes -
+                                  device.initial_phase_rad / units::two_pi + swing_whole - 0.5 * swing;
+    // A noisy drive turns late; between two of its turns its motion is that between nominal turns, as long in all.
+    const double slower = 1.0 + (end_late_s - start.late_s) / duration_s;
+    const auto place = [&](double after_turn_s) {
+        return std::clamp((after_turn_s - start.late_s) / slower, 0.0, duration_s);
+    };
+    const auto dither_fringes = [&](double after_turn_s) {
+        return dither_at_turn +
+               (half.plain_phase_rad(place(after_turn_s)) - half.rate_rad_s * after_turn_s) / units::two_pi;
+    };
+    const auto dither_rate_hz = [&](double after_turn_s) {
+        return (half.drive_rate_rad_s(place(after_turn_s)) / slower - half.rate_rad_s) / units::two_pi;
+    };
+    const double begins_s = own.clock.time_s(0) - own.clock.after_turn_s(0, begins);
+    const auto instant_at = [&](double after_turn_s) {
+        const double t_s = place(after_turn_s);
+        Instant instant;
+        instant.row = row;
+        instant.time_s = begins_s + after_turn_s;
+        instant.whole_fringes = start.rotation_whole + turns.lockin_whole[lane] + swing_whole;
+        instant.fringes = start.plain_fringes + propagate::lockin_between_turns_fringes(passed, t_s) +
+                          half.plain_phase_rad(t_s) / units::two_pi;
+        instant.dither_fringes = dither_fringes(after_turn_s);
+        instant.dither_ahead_fringes = dither_rate_hz(after_turn_s) / half.angular_frequency_rad_s();
+        return instant;
+    };
+
+    bool crossing_due = crossings_ && rises;
+    double crossing_s = 0.0;
+    if (crossing_due) {
+        crossing_s = 0.5 * duration_s + start.late_s;
+        for (int pass = 0; pass < 8; ++pass) crossing_s -= dither_fringes(crossing_s) / dither_rate_hz(crossing_s);
+        crossing_s += delay_s_;
+    }
+    const auto cross = [&] {
+        own.instants.push_back(instant_at(crossing_s));
+        own.instants.back().crossing = true;
+        own.instants.back().tick = own.next_tick;
+        crossing_due = false;
+    };
+    for (; before_end(own.next_tick); ++own.next_tick) {
+        const double at_s = own.clock.after_turn_s(own.next_tick, begins);
+        if (crossing_due && crossing_s < at_s) cross();
+        own.instants.push_back(instant_at(at_s));
+        own.instants.back().tick = own.next_tick;
+        own.instants.back().time_s = own.clock.time_s(own.next_tick);
+    }
+    if (crossing_due) cross();
+}
+
+}  // namespace ringlock::reader

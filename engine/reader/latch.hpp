@@ -1,0 +1,65 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/gyro/device.hpp"
+#include "engine/gyro/lane_drive.hpp"
+#include "engine/reader/tick_clock.hpp"
+
+namespace ringlock::reader {
+
+/// An instant at which a gyro is read, and what is true of it there.
+struct Instant {
+    bool crossing = false;              ///< an upward zero crossing of the measured dither; otherwise a tick
+    std::int64_t tick = 0;              ///< number of the tick; of a crossing that of the tick after it
+    double time_s = 0.0;                ///< since tick 0
+    std::size_t row = 0;                ///< half cycle of the piece, which ends at turn `row`
+    double whole_fringes = 0.0;         ///< optical phase since the start: whole fringes, and ...
+    double fringes = 0.0;               ///< ... the rest, within a few thousand
+    double dither_fringes = 0.0;        ///< angle of the dither about its mean
+    double dither_ahead_fringes = 0.0;  ///< its rate over its angular frequency: the same a quarter of a cycle later
+};
+
+/// Finds the phase of a block of gyros at the ticks of a clock that is not tied to the dither.
+class Latch {
+   public:
+    /// Tick 0 falls together with turn `first_turn` of the run, a minimum.
+    Latch(std::span<const gyro::Device> devices, double latch_hz, std::int64_t first_turn);
+
+    /// Zero crossings of the measured dither are wanted, which is late by that.
+    void want_crossings(double delay_s) {
+        crossings_ = true;
+        delay_s_ = delay_s;
+    }
+
+    /// The instants of the next piece, in the order of time: for each gyro those before the last of its turns.
+    /// `turns` with the phases in the middles of half cycles, as far as the propagator knows them.
+    void read(const gyro::LaneDrive& drive, const gyro::LaneTurns& turns);
+
+    const std::vector<Instant>& instants(std::size_t lane) const { return lanes_[lane].instants; }
+
+   private:
+    struct Turn {
+        double plain_fringes = 0.0, rotation_fringes = 0.0, rotation_whole = 0.0;
+        double lockin_fringes = 0.0, middle_fringes = 0.0, lockin_whole = 0.0;
+        double late_s = 0.0;
+    };
+    struct Lane {
+        gyro::Device device;
+        TickClock clock;
+        std::int64_t next_tick = 0;
+        Turn last;  ///< last turn of the piece before
+        std::vector<Instant> instants;
+    };
+
+    void read_half_cycle(const gyro::LaneDrive& drive, const gyro::LaneTurns& turns, std::size_t row, std::size_t lane);
+
+    std::vector<Lane> lanes_;
+    std::int64_t first_turn_;
+    bool crossings_ = false;
+    double delay_s_ = 0.0;
+    bool begun_ = false;
+};
+
+}  // namespace ringlock::reader

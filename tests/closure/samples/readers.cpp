@@ -1,0 +1,109 @@
+// Records of simulated readers without any effect: the loop finds nothing that the reader or the turns do not account
+// for.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "analysis/closure/closure.hpp"
+#include "analysis/closure/samples/fit/declared_reader.hpp"
+#include "analysis/closure/samples/fit/turn_pattern.hpp"
+#include "analysis/instrument/simulate.hpp"
+#include "engine/scenario/devices.hpp"
+#include "engine/scenario/parse.hpp"
+
+namespace ringlock::closure {
+namespace {
+
+using reader::Stripping;
+
+scenario::Scenario samples_at(double rate_hz, double duration_s) {
+    scenario::Scenario s;
+    s.ensemble.gyros = 1;
+    s.ensemble.duration_s = duration_s;
+    s.record.kind = scenario::RecordKind::samples;
+    s.record.rate_hz = rate_hz;
+    return s;
+}
+
+std::string effects_of(const Closure& closure) {
+    std::string names;
+    for (const Step& step : closure.steps) names += step.name() + " ";
+    return names + (closure.unexplained ? closure.unexplained->detail : "");
+}
+
+// The default scenario: 2.49 turns in a sample, so that two of them or three share the kicks of a sample.
+TEST(SampleReaders, KicksBelongToTheTurnsOfTheDither) {
+    const record::Record record = instrument::simulate_record(samples_at(100.0, 200.0));
+    SampleSeries series = prepare_samples(record);
+    const Rows rows(series.size(), 1);
+    const SampleFit base(series, SampleModel{}, rows);
+    const auto pattern = find_turn_pattern(base, record.declared);
+    ASSERT_TRUE(pattern.has_value());
+    EXPECT_NEAR(pattern->turn_hz, 2.0 * *record.declared.dither_frequency_hz, 2e-3);
+    // Tick 0 falls on a turn.
+    EXPECT_NEAR(std::remainder(pattern->place, 1.0), 0.0, 0.05);
+    EXPECT_GT(pattern->share, 0.9);
+    double turns = 0.0;
+    for (std::size_t i = 0; i < series.size(); ++i) turns += pattern->kicks->variance[i] + pattern->kicks->carried[i];
+    EXPECT_NEAR(turns, pattern->turn_hz * 200.0, 0.02 * turns);
+    SampleModel model;
+    take_turn_pattern(*pattern, model.noise);
+    const SampleFit with(series, std::move(model), rows);
+    EXPECT_GT(with.gain_over(base), 100.0);
+}
+
+TEST(SampleReaders, WithoutADeclaredDitherThereIsNoPattern) {
+    record::Record record = instrument::simulate_record(samples_at(100.0, 100.0));
+    record.declared.dither_frequency_hz.reset();
+    const SampleSeries series = prepare_samples(record);
+    const Rows rows(series.size(), 1);
+    EXPECT_FALSE(find_turn_pattern(SampleFit(series, SampleModel{}, rows), record.declared).has_value());
+}
+
+TEST(SampleReaders, ARecordWithoutEffectMissesNothing) {
+    for (const double rate_hz : {10.0, 100.0}) {
+        const Closure closure = close_loop(instrument::simulate_record(samples_at(rate_hz, 200.0)));
+        EXPECT_EQ(closure.verdict, Verdict::nothing_missing) << rate_hz << " Hz: " << effects_of(closure);
+    }
+}
+
+TEST(SampleReaders, WholeCyclesAndFiltersAreNoEffects) {
+    for (const Stripping stripping : {Stripping::whole_cycle, Stripping::reference_fir}) {
+        scenario::Scenario s = samples_at(100.0, 100.0);
+        s.reader.stripping = stripping;
+        s.reader.fraction = reader::Fraction::detectors;
+        if (stripping == Stripping::reference_fir) s.reader.latch_hz = 1000.0;
+        const Closure closure = close_loop(instrument::simulate_record(s));
+        EXPECT_EQ(closure.verdict, Verdict::nothing_missing)
+            << reader::stripping_names.at(static_cast<std::size_t>(stripping)) << ": " << effects_of(closure);
+    }
+}
+
+TEST(SampleReaders, ADitherThatWasLeftIsNamed) {
+    scenario::Scenario s = samples_at(100.0, 60.0);
+    s.reader.stripping = Stripping::none;
+    s.reader.fraction = reader::Fraction::detectors;
+    s.record.trajectory = scenario::parse_arm("ideal");
+    // Unequal half cycles would make harmonics, lines of their own.
+    s.ensemble.dither_asymmetry_sd_ratio = 0.0;
+    const Closure closure = close_loop(instrument::simulate_record(s));
+    ASSERT_FALSE(closure.steps.empty());
+    for (const Step& step : closure.steps) EXPECT_EQ(step.name(), "dither_residue") << effects_of(closure);
+}
+
+// White rate noise through a filter of the length of an interval: all of its variance stays in a row and the next.
+TEST(SampleReaders, AFilterDividesARowsNoiseWithTheNext) {
+    scenario::Scenario s = samples_at(25.0, 50.0);
+    s.reader.stripping = Stripping::fir;
+    s.reader.latch_hz = 1000.0;
+    const record::Record record = instrument::simulate_record(s);
+    const auto rows = filtered_rows(record);
+    ASSERT_NE(rows, nullptr);
+    const double total = rows->variance[0] + rows->carried[0] + 2.0 * rows->covariance[0];
+    EXPECT_NEAR(total, 1.0, 1e-9);
+    EXPECT_GT(rows->covariance[0], 0.01);
+}
+
+}  // namespace
+}  // namespace ringlock::closure
