@@ -51,7 +51,7 @@ std::int64_t quarter(double sine, double cosine) {
 TEST(SimulatedRecord, EveryReadoutGivesARecordWithoutFault) {
     for (const auto model :
          {scenario::ReadoutModel::ideal, scenario::ReadoutModel::latched, scenario::ReadoutModel::instrument}) {
-        for (const auto trajectory : {scenario::parse_arm("uncompensated"), scenario::parse_arm("noise_injected")}) {
+        for (const auto& trajectory : {scenario::parse_arm("uncompensated"), scenario::parse_arm("noise_injected")}) {
             Scenario s = short_run();
             s.readout.model = model;
             s.record.trajectory = trajectory;
