@@ -164,7 +164,7 @@ struct SampleTurnOptions {
 
 /// What a declared reader accounts for (samples/fit/declared_reader).
 struct SampleReaderOptions {
-    /// Harmonics of the dither at which a line may be what the reader leaves.
+    /// Lines at the dither and at so many of its harmonics can be residues of the reader.
     int harmonics = 5;
     /// Such a line has at most so many times the declared residue, which is that of a steady dither.
     double residue_margin = 1.5;

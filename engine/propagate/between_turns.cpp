@@ -95,8 +95,8 @@ double lockin_between_turns_fringes(const PassedHalfCycle& passed, double t_s) {
         const double psi = units::two_pi * (passed.plain_start_fringes + lockin) + turned_rad;
         return lockin + integrated_rad(half, passed.coupling, side.end, psi, t_s) / units::two_pi;
     }
-    // The turn map counts half of the half cycle's plain phase up to the middle; where the halves are unlike, what is
-    // missing stands in the lock-in's phase there.
+    // The turn map counts half of the half cycle's plain phase up to the middle. Where the halves are unlike, the
+    // lock-in's phase in the middle contains the difference.
     const double unlike_rad = half.plain_phase_rad(0.5 * half.duration_s) - 0.5 * half.plain_phase_total_rad();
     const double in_frame_rad =
         units::two_pi * passed.lockin_middle_fringes - unlike_rad + rotated_rad(half, passed.coupling, side);

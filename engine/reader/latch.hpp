@@ -9,7 +9,7 @@
 
 namespace ringlock::reader {
 
-/// An instant at which a gyro is read, and what is true of it there.
+/// An instant at which a gyro is read, and its true phase and dither angle there.
 struct Instant {
     bool crossing = false;              ///< an upward zero crossing of the measured dither; otherwise a tick
     std::int64_t tick = 0;              ///< number of the tick; of a crossing that of the tick after it

@@ -4,7 +4,7 @@
 
 namespace ringlock::reader {
 
-/// A measured dither angle is subtracted, and what is left of the dither goes through a low-pass filter, which can be
+/// A measured dither angle is subtracted, and a low-pass filter attenuates the residual dither. The filter can be
 /// shorter than without the subtraction.
 class ReferenceFir final : public Stripper {
    public:

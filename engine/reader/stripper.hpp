@@ -31,7 +31,7 @@ class Stripper {
     virtual double delay_s() const = 0;
     /// Amplitude of a steady dither that is left in the output over that of the dither, once learnt.
     virtual double residue_relative() const = 0;
-    /// Ticks before this time [s] are not fit for use: filters fill, and what is learnt has not been learnt yet.
+    /// Ticks before this time [s] are not fit for use: filters are not full, and gains are not learnt yet.
     virtual double warm_up_s() const = 0;
 };
 

@@ -79,7 +79,8 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
         if (on_samples(*step.effect) != OnSamples::resolution) continue;
         step_arcsec = estimated(step.parameters, parameter_of(*step.effect, effects::Role::sampled).name, 0.0);
     }
-    // What is fitted as white noise of the angle has that of the steps in it. A reader's reference brings the rest in.
+    // The fitted white noise of the angle includes the rounding noise of the steps. The remainder becomes the noise of
+    // the reader's reference, which is white as well.
     const double white = estimated(closure.base, "white_angle_arcsec", 0.0);
     const double rounding = closure.rounding_in_noise ? step_arcsec * step_arcsec / 12.0 : 0.0;
     scenario.reader.reference_noise_arcsec = std::min(1e6, std::sqrt(std::max(0.0, white * white - rounding)));
@@ -90,7 +91,8 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
             scenario.reader.reference_noise_arcsec = plain.reference_noise_arcsec;
         }
     }
-    // Nothing in samples tells these apart from a placeholder: what is declared stands, or else the standard gyro.
+    // Samples do not determine these constants. The declared values are kept; where none are declared, those of the
+    // standard gyro are placeholders.
     scenario.gyro.scale_factor_arcsec = scale_factor_arcsec;
     scenario.dither.frequency_hz = record.declared.dither_frequency_hz.value_or(scenario.dither.frequency_hz);
     scenario.dither.peak_rate_deg_s = record.declared.dither_peak_rate_deg_s.value_or(scenario.dither.peak_rate_deg_s);
@@ -101,7 +103,8 @@ void take_device_of_samples(const record::Record& record, const Closure& closure
     scenario.record.rate_hz = samples.rate_hz;
     scenario.record.trajectory = scenario::parse_arm("uncompensated");
     scenario.arms = scenario::parse_arms({"ideal", "uncompensated"});
-    // A declared reader that no scenario can have, beside a source of another rate say, is left out.
+    // The declared reader is dropped where it breaks a rule of scenarios, for example because its latching rate is no
+    // multiple of the rate that the samples were found to be resampled from.
     for (const scenario::Complaint& complaint : scenario::check(scenario)) {
         for (const std::string& key : complaint.keys) {
             if (key.starts_with("reader.")) scenario.reader = plain;

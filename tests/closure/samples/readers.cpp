@@ -105,5 +105,17 @@ TEST(SampleReaders, AFilterDividesARowsNoiseWithTheNext) {
     EXPECT_GT(rows->covariance[0], 0.01);
 }
 
+// A damaged file can declare a filter of 2e12 taps.
+TEST(SampleReaders, AFilterLongerThanTheRecordIsLeftOut) {
+    record::Record record = instrument::simulate_record(samples_at(25.0, 50.0));
+    record.reader->settings.stripping = Stripping::fir;
+    record.reader->settings.latch_hz = 1e6;
+    record.reader->delay_s = 1e6;
+    std::string note;
+    EXPECT_EQ(summed_for_reader(record, note).samples->size(), record.samples->size());
+    EXPECT_TRUE(note.empty());
+    EXPECT_EQ(filtered_rows(record), nullptr);
+}
+
 }  // namespace
 }  // namespace ringlock::closure

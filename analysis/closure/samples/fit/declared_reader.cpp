@@ -62,7 +62,9 @@ record::Record summed_for_reader(const record::Record& record, std::string& note
         return record;
     }
     const record::Samples& samples = *record.samples;
-    const double length_s = static_cast<double>(order_of(record) + 1) / record.reader->settings.latch_hz;
+    const double length_s = 2.0 * record.reader->delay_s + 1.0 / record.reader->settings.latch_hz;
+    const auto rows_at_most = static_cast<double>(samples.size());
+    if (length_s * samples.rate_hz > rows_at_most) return record;
     const auto each = static_cast<std::size_t>(std::ceil(length_s * samples.rate_hz - 1e-9));
     if (each <= 1 || samples.size() / each < record::fewest_samples_to_close) return record;
     record::Record summed = record;
@@ -85,13 +87,16 @@ record::Record summed_for_reader(const record::Record& record, std::string& note
 std::shared_ptr<const KickRows> filtered_rows(const record::Record& record) {
     if (!filters(record)) return nullptr;
     const reader::Settings& settings = record.reader->settings;
+    const double tick_s = 1.0 / settings.latch_hz;
+    const double interval_s = 1.0 / record.samples->rate_hz;
+    const double length_s = 2.0 * record.reader->delay_s + tick_s;
+    // A filter that is longer than a row is not modelled; a damaged file may declare one of any length.
+    if (length_s > interval_s * (1.0 + 1e-9)) return nullptr;
     reader::Settings own = settings;
     own.stripping = Stripping::fir;
     own.fir_order = static_cast<std::int64_t>(order_of(record));
     // The response to a step, tick by tick.
     const auto filter = reader::make_stripper(own, settings.latch_hz, *record.declared.dither_frequency_hz);
-    const double tick_s = 1.0 / settings.latch_hz;
-    const double interval_s = 1.0 / record.samples->rate_hz;
     const std::size_t taps = order_of(record) + 1;
     double squares = 0.0;
     double left = 0.0;
@@ -103,8 +108,6 @@ std::shared_ptr<const KickRows> filtered_rows(const record::Record& record) {
         left += (1.0 - come) * (1.0 - come) * tick_s;
         both += come * (1.0 - come) * tick_s;
     }
-    const double length_s = static_cast<double>(taps) * tick_s;
-    if (length_s > interval_s * (1.0 + 1e-9)) return nullptr;
     const std::size_t rows = record.samples->size();
     KickRows divided;
     divided.variance.assign(rows, (interval_s - length_s + squares) / interval_s);
@@ -143,7 +146,7 @@ bool accounted_by_reader(const Step& step, const record::Record& record, std::st
     if (as != OnSamples::angle_line || stripping == Stripping::none) return false;
     const double amplitude_arcsec = value_of(step, effects::Role::sampled);
     const double hz = value_of(step, effects::Role::frequency);
-    // The residue of a steady dither, with what the reference's own noise leaves of it while gain and delay are learnt.
+    // The residue of a steady dither. While gain and delay of a reference are learnt, its noise leaves some dither too.
     double most =
         options.samples.reader.residue_margin * record.reader->residue_relative * dither_arcsec(record.declared) +
         lockin_line_arcsec(record.declared);

@@ -6,7 +6,7 @@
 #include "analysis/closure/samples/model/states.hpp"
 #include "analysis/record/record.hpp"
 
-/// What a declared reader does to the samples, none of which is an effect that the model lacks.
+/// Properties of samples that follow from the declared reader and are no effects that the model lacks.
 namespace ringlock::closure {
 
 /// The record as the loop reads it. A low-pass filter passes nothing that is faster than its length: samples are summed
@@ -19,8 +19,8 @@ std::shared_ptr<const KickRows> filtered_rows(const record::Record& record);
 /// Rms of the uniform error that a count of quarter fringes leaves in each reading [arcsec]; 0 where none is declared.
 double count_noise_arcsec(const record::Record& record);
 
-/// Whether the reader accounts for the step: what it leaves of the dither, or samples that it takes once a cycle of the
-/// dither. `why` says so.
+/// Whether the step follows from the declared reader: a line within its residue of the dither, or samples interpolated
+/// from whole cycles of it. `why` says so.
 bool accounted_by_reader(const Step& step, const record::Record& record, std::string& why);
 
 }  // namespace ringlock::closure

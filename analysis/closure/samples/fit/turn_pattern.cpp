@@ -267,13 +267,13 @@ void take_turn_pattern(const TurnPattern& pattern, SampleNoise& noise) {
 
 namespace {
 
-/// Fourth powers of what one random part of the model adds to sums of innovations, from its course in the increments.
-double fourth_powers(const SampleFit& fit, const std::vector<double>& course, std::size_t length) {
+/// Sum of the fourth powers of the response of sums of innovations to one disturbance, given as increments.
+double fourth_powers(const SampleFit& fit, const std::vector<double>& disturbance, std::size_t length) {
     const std::size_t n = fit.innovations().size();
     const std::size_t reach = std::min(n, options.samples.turns.response_rows);
     std::vector<double> increments(reach, 0.0);
     const std::size_t at = reach / 2;
-    for (std::size_t i = 0; i < course.size() && at + i < reach; ++i) increments[at + i] = course[i];
+    for (std::size_t i = 0; i < disturbance.size() && at + i < reach; ++i) increments[at + i] = disturbance[i];
     const std::vector<double> response = fit.filter().apply(increments);
     double sum = 0.0;
     double running = 0.0;

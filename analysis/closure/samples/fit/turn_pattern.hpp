@@ -29,8 +29,8 @@ std::optional<TurnPattern> find_turn_pattern(const SampleFit& base, const record
 /// The model's noise with the pattern.
 void take_turn_pattern(const TurnPattern& pattern, SampleNoise& noise);
 
-/// Excess kurtosis of sums of `length` innovations by what is not normal in the base model: kicks, each A sin(phase) of
-/// excess -3/2, and counts, whose error is uniform and has -6/5.
+/// Excess kurtosis of sums of `length` innovations that the base model predicts. Two of its noises are not normal: a
+/// kick follows the arcsine law, of excess -3/2, and the error of a count is uniform, of excess -6/5.
 double expected_excess(const SampleFit& fit, std::size_t length);
 
 }  // namespace ringlock::closure

@@ -64,7 +64,7 @@ struct SampleStates {
 
     int count = 0;
     bool resampled = false;
-    /// Variance of a kick; what is carried to the next row is the state after the angle.
+    /// Variance of a kick. The part of a kick that belongs to the next row is the second state, after the angle.
     double kick = 0.0;
     std::shared_ptr<const KickRows> kicks;
     bool swings = false;
