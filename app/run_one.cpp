@@ -165,7 +165,7 @@ void run_whole(const RunArguments& arguments, Task task, double every_s, Outcome
                 writer.write_samples(samples);
             });
         });
-        session.folder().remove();
+        session.remove_folder();
     });
     outcome.fail_if_not_told();
 }
@@ -192,7 +192,7 @@ void run_shard(const RunArguments& arguments, Task task, double every_s, Outcome
         outcome.spent(plan, 3600.0 * checkpoints.hours_before());
         parts::write_shard(claim.partial(), session.folder().manifest(), checkpoints.finished(), outcome.wall_s());
         claim.commit();
-        session.folder().remove();
+        session.remove_folder();
     });
     const std::string file = claim.target().string();
     const std::string shard = parts::to_string(*session.task().shard);

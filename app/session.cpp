@@ -57,6 +57,7 @@ Session::Session(Task task, double every_s, parts::Beginning beginning)
 }
 
 Session::~Session() {
+    checkpoints_.end();  // its thread reads the progress, which is destroyed first
     if (task_.leader) task_.leader->tell(nullptr);
 }
 

@@ -59,9 +59,16 @@ class Session {
         }
     }
 
+    /// Removes the folder of a run whose result is written. Nothing is kept from here on: a checkpoint or a status
+    /// that is written while the folder is emptied would stay behind.
+    void remove_folder() {
+        checkpoints_.end();
+        folder_.remove();
+    }
+
     std::int64_t all_gyros() const { return all_gyros_; }
     Task& task() { return task_; }
-    parts::Folder& folder() { return folder_; }
+    const parts::Folder& folder() const { return folder_; }
     parts::Checkpoints& checkpoints() { return checkpoints_; }
     ensemble::Progress& progress() { return progress_; }
     ensemble::Monitor monitor() { return {interrupted, &progress_, task_.leader}; }

@@ -144,10 +144,14 @@ void Checkpoints::begin(std::function<ensemble::Progress::Pace()> pace) {
     worker_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
-Checkpoints::~Checkpoints() {
+void Checkpoints::end() noexcept {
     patient_ = false;
     worker_.request_stop();
     if (worker_.joinable()) worker_.join();
+}
+
+Checkpoints::~Checkpoints() {
+    end();
     for (const Waiting& block : waiting_) {
         if (!block.partial.empty()) unlink(block.partial.c_str());
     }
@@ -221,9 +225,7 @@ void Checkpoints::take(Waiting waiting, double block_s) {
 }
 
 bool Checkpoints::keep_what_can_be() noexcept try {
-    patient_ = false;
-    worker_.request_stop();
-    if (worker_.joinable()) worker_.join();
+    end();
     const HoldEnd until_it_is_kept;
     keep_all();
     return true;

@@ -54,6 +54,9 @@ class Checkpoints final : public study::Store {
     /// first block is simulated.
     void begin(std::function<ensemble::Progress::Pace()> pace);
 
+    /// Ends that thread, and waits for it. What is not written by then stays in memory.
+    void end() noexcept;
+
     /// What this process has to simulate, of an experiment that does not grow.
     std::vector<study::Stretch> to_do() const;
 

@@ -168,6 +168,19 @@ TEST_F(Disk, AClockThatIsSetBackChangesNothing) {
     }
 }
 
+// The thread that writes checkpoints has ended before the folder of a finished run is removed: here it would have time
+// to write the last blocks into the emptied folder.
+TEST_F(Disk, ThatRemovesSlowlyLeavesNoFolder) {
+    for (const char* const what : {"records", "statistics"}) {
+        const Outcome r = run({"run", std::string(what) + ".toml", "-o", "out.h5", "--checkpoint-every", "0.2"}, [] {
+            setenv("LD_PRELOAD", RINGLOCK_DISK_FAULTS, 1);
+            setenv("RINGLOCK_SLOW_RMDIR_MS", "700", 1);
+        });
+        EXPECT_EQ(r.status, 0) << r.err;
+        expect_right(what);
+    }
+}
+
 TEST_F(Disk, PartsThatRotAreToldOfAndSimulatedAgain) {
     for (const char* const what : {"records", "statistics"}) {
         for (const bool cut : {false, true}) {

@@ -3,7 +3,8 @@
 // RINGLOCK_FAULTS is a list of CALL:ERRNO:PART:SKIP:COUNT, separated by semicolons. CALL is write (pwrite as well),
 // fsync, open, mkdir or rename; the call fails where the path of the file contains PART, after SKIP such calls that
 // succeed, COUNT times (0: for ever). PART may be A!B: the path contains A and not B. RINGLOCK_CLOCK_BACK_S sets the
-// clock of the day back by so many seconds after its hundredth reading.
+// clock of the day back by so many seconds after its hundredth reading. RINGLOCK_SLOW_RMDIR_MS makes rmdir take so
+// many milliseconds.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -142,6 +143,14 @@ int open64(const char* path, int flags, ...) {
 int mkdir(const char* path, mode_t mode) noexcept {
     static auto* real = next<int(const char*, mode_t)>("mkdir");
     return fails(fault("mkdir", path)) ? -1 : real(path, mode);
+}
+
+int rmdir(const char* path) noexcept {
+    static auto* real = next<int(const char*)>("rmdir");
+    if (const char* ms = std::getenv("RINGLOCK_SLOW_RMDIR_MS")) {
+        usleep(1000 * static_cast<useconds_t>(std::atol(ms)));
+    }
+    return real(path);
 }
 
 int rename(const char* from, const char* to) noexcept {
