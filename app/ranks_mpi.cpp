@@ -39,6 +39,9 @@ using Clock = std::chrono::steady_clock;
 using Bytes = std::vector<std::byte>;
 
 constexpr int leader_rank = 0;
+/// Sleep of the thread that makes calls of MPI where there is nothing to do. Each waking takes a core from the
+/// simulation for some ten microseconds; a request for blocks, of which a run has some dozens, waits as long at most.
+constexpr auto pause = 10ms;
 
 /// What a message is.
 enum Tag : int { order_tag = 1, end_tag, events_tag, report_tag };
@@ -515,7 +518,7 @@ void with_ranks(const std::function<void(const Ranks&)>& work) {
         if (world.rank() == leader_rank) {
             MpiLeader leader(world);
             ranks.leader = &leader;
-            failure = serve(leader, 1ms, [&] { work(ranks); });
+            failure = serve(leader, pause, [&] { work(ranks); });
             const int status = failure ? tell_failure(failure) : done;
             if (!leader.members_wait()) world.abort(status);
             leader.end_members(status);
@@ -523,7 +526,7 @@ void with_ranks(const std::function<void(const Ranks&)>& work) {
         } else {
             MpiMember member(world);
             ranks.member = &member;
-            failure = serve(member, 10ms, [&] { work(ranks); });
+            failure = serve(member, pause, [&] { work(ranks); });
             if (failure) {
                 const int status = tell_failure(failure);
                 if (!member.is_over()) world.abort(status);
