@@ -4,12 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <memory>
 #include <string>
-#include <string_view>
 
 #include "analysis/allan/running_deviation.hpp"
 #include "analysis/noise/fit.hpp"
@@ -17,6 +15,7 @@
 #include "analysis/report/plot.hpp"
 #include "app/allan_figure.hpp"
 #include "app/allan_output.hpp"
+#include "app/angle_units.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
 #include "app/files.hpp"
@@ -42,19 +41,6 @@ struct AllanArguments {
     bool json = false;
 };
 
-struct Unit {
-    std::string_view name;
-    bool is_rate;
-    double to_arcsec;  ///< or to arcsec/s = deg/h
-};
-
-constexpr std::array<Unit, 6> units_known = {{{"arcsec", false, 1.0},
-                                              {"deg", false, 3600.0},
-                                              {"rad", false, 648000.0 / 3.141592653589793238462643},
-                                              {"deg/h", true, 1.0},
-                                              {"deg/s", true, 3600.0},
-                                              {"rad/s", true, 648000.0 / 3.141592653589793238462643}}};
-
 allan::Kind parse_kind(const std::string& kind) {
     if (kind == "phase") return allan::Kind::phase;
     if (kind == "increment") return allan::Kind::increment;
@@ -67,20 +53,8 @@ allan::Kind parse_kind(const std::string& kind) {
                     found));
 }
 
-const Unit* parse_unit(const std::string& unit, allan::Kind kind) {
-    if (unit.empty()) return nullptr;
-    for (const Unit& u : units_known) {
-        if (u.name != unit) continue;
-        if (u.is_rate != (kind == allan::Kind::rate)) {
-            throw InputError(fmt::format("--unit {} is a unit of {}, but --kind says {}; allowed are {}", unit,
-                                         u.is_rate ? "rate" : "angle", u.is_rate ? "angle" : "rate",
-                                         u.is_rate ? "arcsec, deg, rad" : "deg/h, deg/s, rad/s"));
-        }
-        return &u;
-    }
-    throw InputError(fmt::format(
-        "--unit '{}' is not known; allowed are arcsec, deg, rad (phase, increment) and deg/h, deg/s, rad/s (rate)",
-        unit));
+const AngleUnit* parse_unit(const std::string& unit, allan::Kind kind) {
+    return unit.empty() ? nullptr : &angle_unit(unit, kind == allan::Kind::rate);
 }
 
 allan::Bias parse_bias(const std::string& bias) {
@@ -136,7 +110,7 @@ void check_rate(const AllanArguments& a, const record::SeriesInfo& series) {
 /// The command line, checked.
 struct Request {
     allan::Kind kind;
-    const Unit* unit;
+    const AngleUnit* unit;
     std::vector<allan::Estimator> estimators;
     TauChoice taus;
     record::SeriesRequest series;

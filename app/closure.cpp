@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/closure/report/closed_scenario.hpp"
 #include "analysis/closure/report/folder.hpp"
 #include "analysis/closure/report/report.hpp"
 #include "analysis/record/record.hpp"
@@ -108,6 +109,7 @@ void add_closure(CLI::App& root) {
             throw InputError(fmt::format("{}: {}", arguments->record, error.what()));
         }
         nlohmann::json json = closure::to_json(closure);
+        json["closed"] = closure::to_json(closure::closed_scenario(record, closure));
         std::string text = closure::to_text(closure);
         std::exception_ptr not_written;
         if (!arguments->out.empty()) {
@@ -118,7 +120,7 @@ void add_closure(CLI::App& root) {
             text += "\n" + closure::to_text(predictive);
             try {
                 closure::write_closure(arguments->out, name, record, closure, predictive);
-                report::write_closure_page(arguments->out, name, closure, predictive);
+                report::write_closure_page(arguments->out, name, record, closure, predictive);
             } catch (const Interrupted&) {
                 throw;
             } catch (...) {

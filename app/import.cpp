@@ -1,31 +1,134 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <charconv>
+#include <cmath>
 #include <memory>
+#include <string>
+#include <vector>
 
+#include "analysis/record/mapped_columns.hpp"
 #include "analysis/record/record.hpp"
+#include "app/angle_units.hpp"
 #include "app/command.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
+#include "engine/core/error.hpp"
 
 namespace ringlock::app {
 
+namespace {
+
+struct ImportArguments {
+    std::string data;
+    std::string out;
+    std::vector<std::string> columns;
+    std::string unit;
+    double rate_hz = 0.0;
+    std::string time;
+    std::vector<std::string> declared;
+};
+
+/// "NAME=QUANTITY" in its two parts; the name itself may hold equals signs.
+record::MappedColumn parse_column(const std::string& text) {
+    const std::size_t equals = text.rfind('=');
+    if (equals == std::string::npos || equals == 0) {
+        throw InputError(
+            fmt::format("--column {}: must be NAME=QUANTITY, such as gyro_x=rate or 2=angle_increment_arcsec", text));
+    }
+    return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+record::MappedLog parse_log(const ImportArguments& arguments) {
+    record::MappedLog log;
+    log.path = arguments.data;
+    for (const std::string& column : arguments.columns) log.columns.push_back(parse_column(column));
+    if (!(arguments.rate_hz > 0.0) || !std::isfinite(arguments.rate_hz)) {
+        throw InputError(fmt::format("--rate {}: with --column, give the number of samples a second, above zero",
+                                     arguments.rate_hz));
+    }
+    log.rate_hz = arguments.rate_hz;
+    if (!arguments.time.empty()) log.time = arguments.time;
+    bool needs_unit = false;
+    bool of_rate = false;
+    for (const record::MappedColumn& mapped : log.columns) {
+        needs_unit |= record::has_unit(mapped.quantity);
+        of_rate |= record::is_rate(mapped.quantity);
+    }
+    if (!needs_unit) {
+        if (arguments.unit.empty()) return log;
+        throw InputError(fmt::format("--unit {}: no column of --column has a unit", arguments.unit));
+    }
+    if (arguments.unit.empty()) {
+        throw InputError(fmt::format("--unit is missing: say in which unit the {} are; allowed are {}",
+                                     of_rate ? "rates" : "angles",
+                                     of_rate ? "deg/h, deg/s, rad/s" : "arcsec, deg, rad"));
+    }
+    log.to_arcsec = angle_unit(arguments.unit, of_rate).to_arcsec;
+    return log;
+}
+
+void take_declared(const std::vector<std::string>& declared, record::Record& record) {
+    for (const std::string& text : declared) {
+        const std::size_t equals = text.find('=');
+        double value = 0.0;
+        const char* const end = text.data() + text.size();
+        const auto parsed = std::from_chars(text.data() + std::min(equals, text.size() - 1) + 1, end, value);
+        if (equals == std::string::npos || parsed.ec != std::errc() || parsed.ptr != end || !std::isfinite(value)) {
+            throw InputError(fmt::format("--declare {}: must be KEY=NUMBER, such as dither_frequency_hz=400", text));
+        }
+        record::declare(record, text.substr(0, equals), value);
+    }
+}
+
+record::Record read(const ImportArguments& arguments) {
+    if (!arguments.columns.empty()) return read_mapped(parse_log(arguments));
+    for (const auto& [option, given] : {std::pair{"--unit", !arguments.unit.empty()},
+                                        {"--rate", arguments.rate_hz != 0.0},
+                                        {"--time", !arguments.time.empty()}}) {
+        if (!given) continue;
+        throw InputError(fmt::format(
+            "{}: needs --column NAME=QUANTITY; without it the file itself says what its columns are", option));
+    }
+    return record::read_record(arguments.data);
+}
+
+}  // namespace
+
 void add_import(CLI::App& root) {
-    struct Arguments {
-        std::string data;
-        std::string out;
-    };
-    CLI::App* command = root.add_subcommand("import", "Turn measured data in the text form into an rlg-record in HDF5");
-    auto arguments = std::make_shared<Arguments>();
-    command->add_option("DATA.csv", arguments->data, "samples as text: lines \"# key = value\", header, rows")
+    CLI::App* command = root.add_subcommand("import", "Turn measured data into an rlg-record in HDF5");
+    auto arguments = std::make_shared<ImportArguments>();
+    command
+        ->add_option("DATA", arguments->data,
+                     "samples as text with lines \"# key = value\", a header and rows; with --column a log of any "
+                     "layout, as ringlock allan reads them")
         ->required();
     command->add_option("-o,--output", arguments->out, "record to write (.h5)")->required();
+    command
+        ->add_option("--column", arguments->columns,
+                     "NAME=QUANTITY: a column, by name, number or dataset, and what it becomes: rate, "
+                     "angle_increment_arcsec, angle_arcsec, quarter_count, accel_x, accel_y, accel_z, temperature_c; "
+                     "may be given several times")
+        ->take_all()
+        ->allow_extra_args(false);
+    command->add_option("--unit", arguments->unit,
+                        "unit of the gyro's column: arcsec, deg, rad of an angle; deg/h, deg/s, rad/s of a rate");
+    command->add_option("--rate", arguments->rate_hz, "samples a second [Hz]");
+    command->add_option("--time", arguments->time, "column of the times of the samples [s]: rows left out are told of");
+    command
+        ->add_option("--declare", arguments->declared,
+                     "KEY=NUMBER: a constant of the gyro as /declared has it, such as scale_factor_arcsec=0.6 or "
+                     "dither_frequency_hz=400; may be given several times")
+        ->take_all()
+        ->allow_extra_args(false);
     command->callback([arguments] {
         refuse_same_files(
             {{"DATA", arguments->data, NamedFile::Use::input}, {"-o", arguments->out, NamedFile::Use::output}});
         record::RecordWriter writer(arguments->out);
-        const record::Record record = record::read_record(arguments->data);
+        record::Record record = read(*arguments);
+        take_declared(arguments->declared, record);
+        refuse_errors(arguments->data, record);
         tell_warnings(arguments->data, record);
         writer.write(record);
         put(fmt::format("{}: {}\n", arguments->out, record_text(record)));

@@ -38,10 +38,17 @@ struct Residual {
     std::vector<std::uint8_t> reported;  ///< 1: held out, used for the report only
 };
 
+/// A part of a record, by the record's clock.
+struct TimeSpan {
+    double from_s = 0.0;
+    double to_s = 0.0;
+};
+
 /// What a record says of the model.
 struct Closure {
     Verdict verdict = Verdict::nothing_missing;
     std::vector<Estimate> base;
+    std::vector<Estimate> base_alone;  ///< of the base model without the steps; empty where there are none
     std::vector<Step> steps;
     std::string unit;  ///< of the errors: rad or arcsec
     double heldout_before = 0.0;
@@ -55,6 +62,8 @@ struct Closure {
     double level = 0.0;                  ///< probability of any false alarm
     double mean_input_rate_deg_h = 0.0;  ///< known input, of which the bias is free
     bool rounding_in_noise = true;       ///< of samples: the white noise of the angle has that of its steps in it
+    std::vector<TimeSpan> disturbed;     ///< stretches that the fit and the tests leave out
+    double disturbed_share = 0.0;        ///< of the samples, that lie in them
     Residual residual;
 };
 

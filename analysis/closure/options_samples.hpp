@@ -80,6 +80,12 @@ struct SampleFitOptions {
     /// What a witness leaves of a motion is no slower than this share of the motion's centre frequency: at next to
     /// nothing hertz it would be a random walk of the rate, which would then not be looked for.
     double slowest_of_motion = 0.2;
+    /// Aliases of a line that are listed, those at frequencies that gyros are dithered at before others [Hz]; two
+    /// within `same_alias` are one [of the rate of the readings].
+    std::size_t aliases_listed = 4;
+    double slowest_dither_hz = 100.0;
+    double fastest_dither_hz = 1000.0;
+    double same_alias = 1e-6;
     /// A resonance at half the rate of the record that is narrower than this share of the rate is a line, and no part
     /// of a motion.
     double narrowest_at_half_rate = 0.1;
@@ -245,6 +251,8 @@ struct SampleContestOptions {
     double lost_of_jumps = 0.1;
     /// Sources of a resampled record are the same within this [of the record's rate].
     double same_source = 1e-3;
+    /// Sources faster than this are not told from others that leave the same pattern [of the record's rate].
+    double told_up_to = 2.0;
 };
 
 /// Residual tests (samples/residual).

@@ -113,8 +113,7 @@ bool is_hdf5(const std::string& path) {
     return false;
 }
 
-Record read_record(const std::string& path) {
-    Record record = is_hdf5(path) ? read_hdf5_record(path) : read_csv_record(path);
+void refuse_errors(const std::string& path, const Record& record) {
     constexpr std::size_t most = 20;
     std::string report;
     std::size_t errors = 0;
@@ -125,6 +124,11 @@ Record read_record(const std::string& path) {
     }
     if (errors > most) report += fmt::format("\n{}: and {} more", path, errors - most);
     if (errors > 0) throw InputError(report);
+}
+
+Record read_record(const std::string& path) {
+    Record record = is_hdf5(path) ? read_hdf5_record(path) : read_csv_record(path);
+    refuse_errors(path, record);
     return record;
 }
 

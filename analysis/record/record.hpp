@@ -127,4 +127,7 @@ struct Finding {
 /// and column: the first place, and how many there are.
 std::vector<Finding> check(const Record& record);
 
+/// Throws InputError with the findings that are errors, `path` before each; does nothing where there are none.
+void refuse_errors(const std::string& path, const Record& record);
+
 }  // namespace ringlock::record

@@ -3,13 +3,17 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <set>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "analysis/closure/report/closed_scenario.hpp"
+#include "analysis/closure/report/folder.hpp"
 #include "analysis/closure/report/report.hpp"
 #include "analysis/closure/report/seal.hpp"
 #include "analysis/closure/stats/p_values.hpp"
+#include "analysis/report/closure_figures.hpp"
 #include "analysis/report/plot.hpp"
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
@@ -22,7 +26,6 @@ namespace {
 using closure::Closure;
 using closure::Estimate;
 using closure::Predictive;
-using closure::PredictiveStatistic;
 using closure::Step;
 
 /// What a cell of a table may hold.
@@ -37,102 +40,6 @@ std::string value_text(const Estimate& e) {
     if (!std::isfinite(e.value)) return "not known";
     if (!std::isfinite(e.sd)) return fmt::format("{:.6g}", e.value);
     return fmt::format("{:.6g} ± {:.2g}", e.value, e.sd);
-}
-
-const PredictiveStatistic* find(const Predictive& predictive, std::string_view name) {
-    for (const PredictiveStatistic& statistic : predictive.statistics) {
-        if (statistic.name == name && !statistic.x.empty()) return &statistic;
-    }
-    return nullptr;
-}
-
-/// A figure of the page: its file, what it says, and what is drawn.
-struct Picture {
-    std::string file;
-    std::string caption;
-    Figure figure;
-};
-
-/// Measured values over the lowest and the highest of the simulations.
-void add_band(const PredictiveStatistic& statistic, const std::string& what, int simulations, Figure& figure) {
-    figure.curves.push_back({.label = "measured" + what, .x = statistic.x, .y = statistic.measured});
-    figure.curves.push_back({.label = fmt::format("{} simulations, lowest to highest{}", simulations, what),
-                             .x = statistic.x,
-                             .y = statistic.lowest,
-                             .lo = statistic.lowest,
-                             .hi = statistic.highest,
-                             .style = Curve::Style::band});
-}
-
-std::vector<Picture> pictures(const std::string& source, const Closure& closure, const Predictive& predictive) {
-    std::vector<Picture> all;
-    const auto logarithmic = [&](const char* name, const char* file, const char* title, const char* y_label) {
-        const PredictiveStatistic* statistic = find(predictive, name);
-        if (statistic == nullptr) return;
-        Picture picture;
-        picture.file = file;
-        picture.caption = fmt::format(
-            "{}: circles are the record, the band is what simulations of the closed model show. Circles outside of it "
-            "are what the\nmodel lacks. Stretches that were left out as disturbed are in the circles, not in the "
-            "model.",
-            title);
-        picture.figure = {.title = fmt::format("{} of {}", title, source),
-                          .x_label = fmt::format("{} [{}]", statistic->x_name, statistic->x_unit),
-                          .y_label = y_label,
-                          .log_x = true,
-                          .log_y = true};
-        add_band(*statistic, "", predictive.simulations, picture.figure);
-        all.push_back(std::move(picture));
-    };
-    logarithmic("allan_deviation", "allan.svg", "Allan deviation", "Allan deviation [deg/h]");
-    logarithmic("spectrum", "spectrum.svg", "Spectrum of the rate", "root of the power density [deg/h/√Hz]");
-    Picture folded{
-        .file = "folded.svg",
-        .caption =
-            "What the gyro gains across a turn, by the phase at which it turns: the kick of lock-in. Markers "
-            "are the record, bands\nwhat simulations of the closed model show.",
-        .figure = {.title = fmt::format("What {} gains across its turns, by their phase", source),
-                   .x_label = "phase at the turn [rad]",
-                   .y_label = "gain less its mean [mrad of phase]"}};
-    for (const auto& [name, what] : {std::pair{"folded_minima", ", minima"}, std::pair{"folded_maxima", ", maxima"}}) {
-        const PredictiveStatistic* statistic = find(predictive, name);
-        if (statistic == nullptr) continue;
-        PredictiveStatistic in_mrad = *statistic;
-        for (auto* values : {&in_mrad.measured, &in_mrad.lowest, &in_mrad.highest}) {
-            for (double& value : *values) value *= 1e3;
-        }
-        add_band(in_mrad, what, predictive.simulations, folded.figure);
-    }
-    if (!folded.figure.curves.empty()) all.push_back(std::move(folded));
-
-    Picture steps{.file = "steps.svg",
-                  .caption =
-                      "Held-out one-step error of the base model and after each effect; dashed: what the noise "
-                      "of the last model alone\nwould leave. An effect that shows otherwise than in the next reading, "
-                      "as in which values come at all, leaves the error where it was.",
-                  .figure = {.title = fmt::format("Held-out error of {}, step by step", source),
-                             .x_label = "effects in the model",
-                             .y_label = fmt::format("rms one-step error [{}]", closure.unit),
-                             .log_y = true,
-                             .whole_x = true}};
-    Curve error{.label = "held-out error", .x = {0.0}, .y = {closure.heldout_before}, .style = Curve::Style::line};
-    steps.figure.curves.push_back({.label = "0: base model", .x = {0.0}, .y = {closure.heldout_before}});
-    for (std::size_t k = 0; k < closure.steps.size(); ++k) {
-        const auto number = static_cast<double>(k + 1);
-        const double after = closure.steps[k].heldout_error_after;
-        error.x.push_back(number);
-        error.y.push_back(after);
-        steps.figure.curves.push_back(
-            {.label = fmt::format("{}: {}", k + 1, closure.steps[k].effect->name()), .x = {number}, .y = {after}});
-    }
-    const double last = std::max<double>(1.0, static_cast<double>(closure.steps.size()));
-    if (error.x.size() > 1) steps.figure.curves.push_back(std::move(error));
-    steps.figure.curves.push_back({.label = "noise floor",
-                                   .x = {0.0, last},
-                                   .y = {closure.noise_floor, closure.noise_floor},
-                                   .style = Curve::Style::dashed});
-    all.push_back(std::move(steps));
-    return all;
 }
 
 void add_steps(const Closure& closure, std::string& page) {
@@ -164,11 +71,32 @@ void add_steps(const Closure& closure, std::string& page) {
             "Effects that only stood in for one of these were dropped again: the first row does not begin at the base "
             "model.\n\n";
     }
+    page += "What to do about each:\n\n";
+    for (const Step& step : closure.steps) {
+        page += fmt::format("- `{}`: {}\n", step.effect->name(), step.effect->advice());
+    }
+    page += "\n";
     for (const Step& step : closure.steps) {
         if (step.confounded_with.empty()) continue;
         page += fmt::format("This record cannot tell `{}` from `{}`. What would: {}.\n\n", step.effect->name(),
                             fmt::join(closure::names_of(step.confounded_with), "`, `"), step.experiment);
     }
+}
+
+void add_closed(const closure::ClosedScenario& closed, std::string& page) {
+    const std::vector<std::string> placeholders = closed.placeholders();
+    if (placeholders.empty() && closed.not_held.empty()) return;
+    page += "## How far closed.toml goes\n\n";
+    if (!placeholders.empty()) {
+        page += fmt::format(
+            "The record neither declares nor determines {} of its values. Those of the standard gyro stand in their "
+            "place: `{}`.\n\n",
+            placeholders.size(), fmt::join(placeholders, "`, `"));
+    }
+    if (closed.not_held.empty()) return;
+    page += "A scenario cannot hold all that was found. It is without:\n\n";
+    for (const std::string& finding : closed.not_held) page += fmt::format("- {}\n", cell(finding));
+    page += "\n";
 }
 
 void add_predictive(const Predictive& predictive, std::string& page) {
@@ -197,8 +125,8 @@ void add_predictive(const Predictive& predictive, std::string& page) {
 
 }  // namespace
 
-void write_closure_page(const std::filesystem::path& folder, const std::string& source, const Closure& closure,
-                        const Predictive& predictive) {
+void write_closure_page(const std::filesystem::path& folder, const std::string& source, const record::Record& record,
+                        const Closure& closure, const Predictive& predictive) {
     std::string page = fmt::format("# What was found in {}\n\n**{}.**\n\n", source, closure::verdict_sentence(closure));
     page += fmt::format(
         "A gyro without anything beyond its base equation foretells the next reading to {:.6g} {} rms, the model found "
@@ -212,17 +140,23 @@ void write_closure_page(const std::filesystem::path& folder, const std::string& 
         "|\n|---|---|\n";
     for (const Estimate& e : closure.base) page += fmt::format("| `{}` | {} |\n", e.name, cell(value_text(e)));
     page += "\n";
+    add_closed(closure::closed_scenario(record, closure), page);
     add_predictive(predictive, page);
 
     std::string problem;
-    for (const Picture& picture : pictures(source, closure, predictive)) {
+    std::set<std::filesystem::path> drawn;
+    for (const Picture& picture : closure_pictures(source, record, closure, predictive)) {
         try {
             const std::string figure = draw_svg(picture.figure, (folder / picture.file).string());
             write_text(folder / picture.file, closure::sealed(figure, closure::Comment::markup));
+            drawn.insert(folder / picture.file);
             page += fmt::format("![{}]({})\n\n{}\n\n", picture.figure.title, picture.file, picture.caption);
         } catch (const RunError& error) {
             problem = error.what();
         }
+    }
+    for (const std::filesystem::path& file : closure::files_of(folder)) {
+        if (file.extension() == ".svg" && !drawn.contains(file)) std::filesystem::remove(file);
     }
     if (!problem.empty()) page += fmt::format("Figures are missing: {}\n\n", problem);
 

@@ -70,6 +70,10 @@ class CaseMotion final : public Effect {
     std::string_view summary() const override {
         return "Rotation of the case that an accelerometer sees as well; in records of samples only.";
     }
+    std::string_view advice() const override {
+        return "Mount the gyro on a quieter pier, or subtract the motion that the accelerometers see; record the "
+               "witnesses at the rate of the gyro.";
+    }
     std::string_view equation() const override {
         return "angle = a resonance driven by white noise, a second-order autoregression of that centre, width and "
                "rms; "

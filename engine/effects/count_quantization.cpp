@@ -36,6 +36,10 @@ class CountQuantization final : public Effect {
     std::string_view summary() const override {
         return "Samples of the angle in whole steps; in records of samples only.";
     }
+    std::string_view advice() const override {
+        return "Read a finer count, or average over longer samples: the error of a step falls with the averaging time, "
+               "the random walk by its root.";
+    }
     std::string_view equation() const override {
         return "angle = floor(angle/step) step at the end of each sample. Where the angle moves by a step or more from "
                "sample to "

@@ -16,6 +16,10 @@ class DitherAsymmetry final : public Effect {
         return "Half cycles of unequal strength, beside what ensemble.dither_asymmetry_sd_ratio spreads over the "
                "gyros.";
     }
+    std::string_view advice() const override {
+        return "Check the spring and the drive of the dither for a bias, and let the compensator take the acceleration "
+               "of each half cycle by itself.";
+    }
     std::string_view equation() const override {
         return "Peak rate Omega_D (1 + ratio) in positive and Omega_D (1 - ratio) in negative half cycles; the "
                "stronger are "

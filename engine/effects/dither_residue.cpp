@@ -55,6 +55,10 @@ class DitherResidue final : public Effect {
     std::string_view summary() const override {
         return "Dither that was not stripped whole, at its frequency or its alias; in records of samples only.";
     }
+    std::string_view advice() const override {
+        return "Learn gain and delay of the dither reference anew, or lengthen the filter that strips the dither; the "
+               "line is no rotation of the base.";
+    }
     std::string_view equation() const override {
         return "angle = A sin(2 pi (f t + d t^2/2 + d_2 t^3/6 + ...)), t from the middle of the record: what an error "
                "of gain or delay of the dither's pick-off leaves (Killpatrick, IEEE Spectrum 4(10), 44, 1967), as the "

@@ -15,6 +15,10 @@ class DitherSecondHarmonic final : public Effect {
    public:
     std::string_view name() const override { return "dither_second_harmonic"; }
     std::string_view summary() const override { return "The dither rate has a second harmonic."; }
+    std::string_view advice() const override {
+        return "Measure the motion of the block with its pickup over a cycle: a second harmonic comes from the drive "
+               "or a spring that is not linear.";
+    }
     std::string_view equation() const override {
         return "g = C rate + A w (s sin(w t) + ratio sin(2 w t + phase)), t from each turn of the dither on, s = +1 in "
                "positive "

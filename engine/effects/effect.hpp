@@ -185,6 +185,8 @@ class Effect {
     virtual std::string_view name() const = 0;
     virtual std::string_view summary() const = 0;   ///< one line
     virtual std::string_view equation() const = 0;  ///< plain text, with its source
+    /// What to do on the test bench where the effect was found: one or two sentences.
+    virtual std::string_view advice() const = 0;
     virtual std::span<const Parameter> parameters() const = 0;
     /// True where these values do something.
     virtual bool active(const Values& values) const = 0;

@@ -15,6 +15,10 @@ class LockinTurnAsymmetry final : public Effect {
     std::string_view summary() const override {
         return "The lock-in threshold differs between the turns of the dither.";
     }
+    std::string_view advice() const override {
+        return "Let the compensator take a threshold of its own for minima and maxima, and look for a bending of the "
+               "block at the ends of the swing.";
+    }
     std::string_view equation() const override {
         return "Threshold Omega_L (1 + ratio cos(w t)), t from a minimum of the phase on: where the dither bends the "
                "path of the "

@@ -14,6 +14,10 @@ class MissedCounts final : public Effect {
    public:
     std::string_view name() const override { return "missed_counts"; }
     std::string_view summary() const override { return "The up/down counter misses pulses of the quarter fringes."; }
+    std::string_view advice() const override {
+        return "Compare the count with the phase of the detectors at each turn: a repair by the quadrature takes whole "
+               "quarter fringes off; check the bandwidth of the counter at the peak rate.";
+    }
     std::string_view equation() const override {
         return "At each turn, with that probability, the count has fallen behind by one quarter fringe in the "
                "direction "

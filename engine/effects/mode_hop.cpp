@@ -25,6 +25,10 @@ class ModeHop final : public Effect {
         return "The laser hops to another longitudinal mode: bias, threshold and phase of the coupling step at one "
                "time.";
     }
+    std::string_view advice() const override {
+        return "Look at the path-length control and the temperature at this time: its range ended there, or a reset "
+               "was due.";
+    }
     std::string_view equation() const override {
         return "For t >= time: rate = step, threshold Omega_L (1 + threshold_ratio), coupling b F(psi + phase), since "
                "backscatter depends on wavelength and path (Aronowitz, \"Fundamentals of the Ring Laser Gyro\", in "

@@ -56,6 +56,10 @@ class QuantumNoise final : public Effect {
         return "White rate noise of spontaneous emission, independent of the phase at the turns: the floor under every "
                "arm.";
     }
+    std::string_view advice() const override {
+        return "Raise the power of the laser or lower the losses: no dither and no compensation lowers this noise; it "
+               "is the floor of every arm.";
+    }
     std::string_view equation() const override {
         return "The angle gained in an interval dt is normal with variance N^2 dt and independent from interval to "
                "interval "

@@ -18,6 +18,10 @@ class ReadoutEllipse final : public Effect {
     std::string_view summary() const override {
         return "The quadrature detectors trace an ellipse in place of a circle.";
     }
+    std::string_view advice() const override {
+        return "Fit the ellipse of the detectors before the phase is taken from them, and correct gains, offsets and "
+               "their phase.";
+    }
     std::string_view equation() const override {
         return "sin = (1 + gain) sin(psi) + offset_sin, cos = cos(psi + orthogonality) + offset_cos (Heydemann, "
                "Applied "

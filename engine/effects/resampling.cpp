@@ -54,6 +54,9 @@ class Resampling final : public Effect {
     std::string_view summary() const override {
         return "Samples taken at another rate than the record's; in records of samples only.";
     }
+    std::string_view advice() const override {
+        return "Record at the rate of the source, without interpolation between its samples and the record.";
+    }
     std::string_view equation() const override {
         return "The angle at the ends of the record's samples is linear between those of samples taken at from_hz: "
                "white "

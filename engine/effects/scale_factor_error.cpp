@@ -14,6 +14,10 @@ class ScaleFactorError final : public Effect {
    public:
     std::string_view name() const override { return "scale_factor_error"; }
     std::string_view summary() const override { return "The gyro puts out more angle than it is turned by."; }
+    std::string_view advice() const override {
+        return "Calibrate the scale factor on a rate table at several rates of either sign; its error follows the "
+               "input of the record alone.";
+    }
     /// The light counts C (1 + relative) for C. Of the input that leaves relative times its angle. Of the dither it
     /// makes every swing longer by the same factor, which is a dither of another amplitude and nothing else: at the
     /// minima of the dither angle, where the output is taken, the whole of it has come back.

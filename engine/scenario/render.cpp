@@ -74,7 +74,9 @@ std::string commented_element(const Section& section) {
     return out;
 }
 
-std::string write(const Scenario& scenario, bool commented) {
+using Remarks = std::map<std::string, std::string>;
+
+std::string write(const Scenario& scenario, bool commented, const Remarks& remarks = {}) {
     std::string out;
     if (!scenario.device.empty()) out += fmt::format("device = \"{}\"\n", scenario.device);
     for (const Section& section : schema()) {
@@ -88,6 +90,8 @@ std::string write(const Scenario& scenario, bool commented) {
         out += fmt::format("[{}]\n", section.name);
         for (const Key& key : section.keys) {
             if (commented) out += comment(fmt::format("{} {}", key.doc, allowed_sentence(key)));
+            const auto remark = remarks.find(fmt::format("{}.{}", section.name, key.name));
+            if (remark != remarks.end()) out += toml_comment(remark->second);
             out += fmt::format("{} = {}\n", key.name, to_toml(key.get(scenario)));
         }
     }
@@ -126,7 +130,18 @@ nlohmann::ordered_json json_of(const Value& value) { return std::visit(JsonWrite
 
 }  // namespace
 
+std::string toml_comment(std::string_view text) {
+    std::string printable;
+    for (const char c : text) {
+        const auto byte = static_cast<unsigned char>(c);
+        printable += byte < 0x20 || byte == 0x7f ? fmt::format("\\x{:02x}", byte) : std::string(1, c);
+    }
+    return comment(printable);
+}
+
 std::string to_toml(const Scenario& scenario) { return write(scenario, false); }
+
+std::string to_toml(const Scenario& scenario, const Remarks& remarks) { return write(scenario, false, remarks); }
 
 std::string schema_text() {
     return comment("Every key of a ringlock scenario at its default. A scenario needs to name only what differs.") +

@@ -44,6 +44,60 @@ TEST_F(RecordProgram, ValidatesBothForms) {
     EXPECT_THAT(r.err, AllOf(HasSubstr("warning"), HasSubstr("line 2: sensor")));
 }
 
+// A log of any layout: a column of rates in deg/s becomes increments in arcsec, witnesses stay as they are.
+TEST_F(RecordProgram, ImportsColumnsOfALog) {
+    write("log.csv", "t,gyro x,acc,n\n0.0,0.5,1.0,7\n0.01,-0.25,2.0,9\n0.02,1.0,3.0,8\n");
+    Outcome r = run({"import", "log.csv", "-o", "r.h5", "--column", "gyro x=rate", "--column", "acc=accel_z", "--unit",
+                     "deg/s", "--rate", "100", "--time", "t", "--declare", "dither_frequency_hz=400", "--declare",
+                     "scale_factor_arcsec=0.6"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.out, HasSubstr("3 angle increments at 100 Hz"));
+    record::Record record = record::read_record((directory_ / "r.h5").string());
+    ASSERT_TRUE(record.samples);
+    EXPECT_THAT(record.samples->values, testing::ElementsAre(18.0, -9.0, 36.0));
+    EXPECT_THAT(record.samples->witnesses.at("accel_z"), testing::ElementsAre(1.0, 2.0, 3.0));
+    EXPECT_EQ(record.declared.dither_frequency_hz, 400.0);
+    EXPECT_EQ(record.declared.scale_factor_arcsec, 0.6);
+
+    r = run({"import", "log.csv", "-o", "r.h5", "--column", "4=quarter_count", "--rate", "100"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    record = record::read_record((directory_ / "r.h5").string());
+    EXPECT_EQ(record.samples->kind, record::SampleKind::quarter_count);
+    EXPECT_THAT(record.samples->counts, testing::ElementsAre(7, 9, 8));
+
+    r = run({"import", "log.csv", "-o", "r.h5", "--column", "gyro x=angle_arcsec", "--unit", "deg", "--rate", "100"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    record = record::read_record((directory_ / "r.h5").string());
+    EXPECT_THAT(record.samples->values, testing::ElementsAre(1800.0, -900.0, 3600.0));
+}
+
+TEST_F(RecordProgram, SaysWhyColumnsCannotBeImported) {
+    write("log.csv", "t,gyro,acc,n\n0.0,0.5,1.0,7.5\n0.01,nan,2.0,9\n0.03,1.0,3.0,8\n");
+    const auto refused = [&](Arguments more, const testing::Matcher<std::string>& message) {
+        Arguments all{"import", "log.csv", "-o", "o.h5"};
+        all.insert(all.end(), more.begin(), more.end());
+        expect_refused(all, message);
+    };
+    refused({"--column", "gyro", "--rate", "100"}, HasSubstr("must be NAME=QUANTITY"));
+    refused({"--column", "gyro=speed", "--rate", "100"}, AllOf(HasSubstr("gyro=speed"), HasSubstr("quarter_count")));
+    refused({"--column", "gyro=rate", "--rate", "100"}, AllOf(HasSubstr("--unit is missing"), HasSubstr("deg/s")));
+    refused({"--column", "gyro=rate", "--rate", "100", "--unit", "arcsec"}, HasSubstr("is a unit of angles"));
+    refused({"--column", "gyro=rate", "--unit", "deg/s"}, HasSubstr("--rate 0"));
+    refused({"--column", "gyro=rate", "--unit", "deg/s", "--rate", "100"},
+            AllOf(HasSubstr("column gyro: 1 of 3 values are missing"), HasSubstr("sample 2")));
+    refused({"--column", "acc=accel_x", "--rate", "100"}, HasSubstr("no column becomes samples"));
+    refused({"--column", "acc=rate", "--column", "n=angle_arcsec", "--unit", "deg/s", "--rate", "100"},
+            HasSubstr("are all samples"));
+    refused({"--column", "n=quarter_count", "--rate", "100"}, HasSubstr("holds 7.5"));
+    refused({"--column", "acc=rate", "--unit", "deg/s", "--rate", "100", "--time", "t"},
+            HasSubstr("1 of 4 values are missing"));
+    refused({"--rate", "100"}, HasSubstr("--rate: needs --column"));
+    refused({"--column", "acc=rate", "--unit", "deg/s", "--rate", "100", "--declare", "colour=3"},
+            AllOf(HasSubstr("--declare colour"), HasSubstr("dither_frequency_hz")));
+    refused({"--column", "acc=rate", "--unit", "deg/s", "--rate", "100", "--declare", "dither_frequency_hz"},
+            HasSubstr("must be KEY=NUMBER"));
+}
+
 TEST_F(RecordProgram, SaysWhatIsWrongAndWhere) {
     record::Record damaged = full_record();
     damaged.turns->sine[5] = std::nan("");

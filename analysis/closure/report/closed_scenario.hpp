@@ -1,16 +1,34 @@
 #pragma once
+#include <map>
+#include <string>
+#include <vector>
+
 #include "analysis/closure/closure.hpp"
 #include "engine/scenario/scenario.hpp"
 
 namespace ringlock::closure {
 
 /// The closed model as a scenario for `ringlock run` and `ringlock record`: the device as fitted, with the effects that
-/// were added. Times count from the start of the record.
-///
-/// Of a record of samples lock-in is no part of the model: what it leaves is in the white noises that were fitted. The
-/// dither then turns at the samples, and the white noise of the angle is that of the detectors, with a scale factor
-/// that makes it small beside a fringe.
-scenario::Scenario closed_scenario(const record::Record& record, const Closure& closure);
+/// were added. Times count from the start of the record. The scenario obeys all rules of scenarios.
+struct ClosedScenario {
+    scenario::Scenario scenario;
+    /// Where values come from, by "section.key": fitted with its standard error, declared by the record, or a
+    /// placeholder, which the record neither declares nor determines.
+    std::map<std::string, std::string> remarks;
+    /// Findings that no scenario can hold, each a sentence.
+    std::vector<std::string> not_held;
+
+    /// Keys whose values are placeholders.
+    std::vector<std::string> placeholders() const;
+};
+
+/// In a scenario of a record of samples the lock-in threshold is zero: the fitted white noises contain the random walk
+/// that the lock-in makes. The white noise of the angle becomes noise of the reader's reference.
+ClosedScenario closed_scenario(const record::Record& record, const Closure& closure);
+
+/// The text of closed.toml.
+/// \param source  name of the record
+std::string to_toml(const ClosedScenario& closed, const std::string& source, Verdict verdict);
 
 /// When the record begins [s], on its own clock.
 double start_of(const record::Record& record);

@@ -22,8 +22,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<std::string_view, 8> names = {"report.md", "allan.svg",   "spectrum.svg", "folded.svg",
-                                                   "steps.svg", "closed.toml", "closure.h5",   "closure.json"};
+constexpr std::array<std::string_view, 13> names = {
+    "report.md",  "record.svg", "allan.svg",  "spectrum.svg", "folded.svg", "steps.svg",   "line-1.svg",
+    "line-2.svg", "line-3.svg", "line-4.svg", "closed.toml",  "closure.h5", "closure.json"};
 
 std::string text_of(const fs::path& path) {
     std::ifstream file(path, std::ios::binary);

@@ -246,22 +246,53 @@ class TurnSight {
 /// The same for samples.
 class SampleSight {
    public:
-    explicit SampleSight(const record::Record& record) : measured_(prepare_samples(record)) {}
+    SampleSight(const record::Record& record, const std::vector<TimeSpan>& disturbed)
+        : measured_(prepare_samples(record)), left_out_(measured_.size(), 0) {
+        // A row is in a stretch where its middle is.
+        for (std::size_t i = 0; i < left_out_.size(); ++i) {
+            const double middle_s = measured_.time_s[i] - 0.5 * measured_.interval_s;
+            for (const TimeSpan& span : disturbed) {
+                if (middle_s > span.from_s && middle_s < span.to_s) left_out_[i] = 1;
+            }
+        }
+    }
 
+    /// Disturbed stretches are left out of simulations as of the record: their rows get the mean of the others.
     Curves look(std::vector<double> increment_arcsec) const {
-        increment_arcsec.resize(std::min(increment_arcsec.size(), measured_.size()));
-        const auto& input = measured_.input_rate_deg_h;
-        for (std::size_t i = 0; i < increment_arcsec.size() && !input.empty(); ++i) {
-            increment_arcsec[i] -= input[i] * measured_.interval_s;
+        std::vector<double> increment = less_input(std::move(increment_arcsec));
+        double sum = 0.0;
+        double count = 0.0;
+        for (std::size_t i = 0; i < increment.size(); ++i) {
+            if (left_out_[i]) continue;
+            sum += increment[i];
+            count += 1.0;
+        }
+        for (std::size_t i = 0; i < increment.size(); ++i) {
+            if (left_out_[i]) increment[i] = sum / std::max(count, 1.0);
         }
         Curves curves;
-        add_rate_curves(increment_arcsec, measured_.interval_s, curves);
+        add_rate_curves(increment, measured_.interval_s, curves);
+        return curves;
+    }
+    Curves look_at_whole(std::vector<double> increment_arcsec) const {
+        Curves curves;
+        add_rate_curves(less_input(std::move(increment_arcsec)), measured_.interval_s, curves);
         return curves;
     }
     const SampleSeries& measured() const { return measured_; }
 
    private:
+    std::vector<double> less_input(std::vector<double> increment_arcsec) const {
+        increment_arcsec.resize(std::min(increment_arcsec.size(), measured_.size()));
+        const auto& input = measured_.input_rate_deg_h;
+        for (std::size_t i = 0; i < increment_arcsec.size() && !input.empty(); ++i) {
+            increment_arcsec[i] -= input[i] * measured_.interval_s;
+        }
+        return increment_arcsec;
+    }
+
     SampleSeries measured_;
+    Rows left_out_;
 };
 
 bool changes(const record::Track& track) {
@@ -296,7 +327,7 @@ double rate_at(const effects::ChangeOver& change, const record::Track& temperatu
 
 /// The closed scenario over the record's own length, input and temperature.
 scenario::Scenario replica(const record::Record& record, const Closure& closure, const SampleSight* samples) {
-    scenario::Scenario s = closed_scenario(record, closure);
+    scenario::Scenario s = closed_scenario(record, closure).scenario;
     s.ensemble.gyros = 1;
     if (record.turns) {
         s.ensemble.duration_s = 0.5 * static_cast<double>(record.turns->size() - 1) / s.dither.frequency_hz;
@@ -399,6 +430,21 @@ void rank(const std::vector<std::vector<double>>& curves, PredictiveStatistic& s
     statistic.p_value_all = static_cast<double>(1 + as_large) / static_cast<double>(records);
 }
 
+/// Mean over simulations of statistic k, point by point; of its logarithm where it is positive.
+std::vector<double> mean_of(const std::vector<Curves>& all, std::size_t k, std::size_t points, bool positive) {
+    std::vector<double> mean(points, undefined);
+    for (std::size_t j = 0; j < points; ++j) {
+        double sum = 0.0;
+        for (const Curves& curves : all) {
+            const double y = j < curves[k].y.size() ? curves[k].y[j] : undefined;
+            sum += positive ? std::log(y) : y;
+        }
+        sum /= static_cast<double>(all.size());
+        mean[j] = positive ? std::exp(sum) : sum;
+    }
+    return mean;
+}
+
 /// The closed model with every parameter as uncertain as it is: drawn about its estimate, each by itself.
 ///
 /// What is positive is drawn by its logarithm, with half of itself for a standard error at most: those of variances
@@ -481,7 +527,7 @@ Predictive check_predictive(const record::Record& record, const Closure& closure
             turns.emplace(record, closure);
             all.push_back(turns->look(*record.turns));
         } else {
-            samples.emplace(record);
+            samples.emplace(record, closure.disturbed);
             all.push_back(samples->look(samples->measured().increment));
         }
         const TurnSight* turn_sight = turns ? &*turns : nullptr;
@@ -507,6 +553,15 @@ Predictive check_predictive(const record::Record& record, const Closure& closure
             out.notes.push_back(fmt::format("{} simulations and not {}, as the record is long: no p below {:.2g}",
                                             wanted, simulations, 1.0 / (wanted + 1.0)));
         }
+        Curves whole;
+        if (samples && !closure.disturbed.empty()) whole = samples->look_at_whole(samples->measured().increment);
+        std::vector<Curves> base;
+        if (!closure.base_alone.empty()) {
+            Closure alone = closure;
+            alone.base = closure.base_alone;
+            alone.steps.clear();
+            base = simulate(record, alone, std::min(wanted, options.report.base_simulations), turn_sight, sample_sight);
+        }
         std::vector<PredictiveStatistic> statistics = blank(record.turns.has_value());
         for (std::size_t k = 0; k < statistics.size(); ++k) {
             PredictiveStatistic& statistic = statistics[k];
@@ -519,6 +574,11 @@ Predictive check_predictive(const record::Record& record, const Closure& closure
             statistic.x.assign(all[0][k].x.begin(), all[0][k].x.begin() + static_cast<std::ptrdiff_t>(points));
             statistic.measured = values.front();
             rank(values, statistic);
+            if (!whole.empty()) {
+                const std::vector<double>& y = whole[k].y;
+                statistic.measured_whole.assign(y.begin(), y.begin() + static_cast<std::ptrdiff_t>(points));
+            }
+            if (!base.empty()) statistic.base = mean_of(base, k, points, statistic.positive);
         }
         out.statistics = std::move(statistics);
     } catch (const InputError& error) {

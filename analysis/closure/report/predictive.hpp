@@ -19,10 +19,14 @@ struct PredictiveStatistic {
     std::vector<double> x = {};
     std::vector<double> measured = {};
     std::vector<double> lowest = {}, highest = {};  ///< of the simulations
-    std::vector<double> p_value = {};               ///< of each point by itself, both sides
-    double p_value_all = 1.0;                       ///< of the largest deviation over the points
-    double largest = 0.0;                           ///< that deviation, in standard deviations of the simulations
-    std::size_t at = 0;                             ///< point where it is
+    /// Of the record with the stretches that the fit left out as disturbed; empty where there are none. All other
+    /// curves are without them.
+    std::vector<double> measured_whole = {};
+    std::vector<double> base = {};     ///< mean of simulations of the base model alone; empty where nothing was added
+    std::vector<double> p_value = {};  ///< of each point by itself, both sides
+    double p_value_all = 1.0;          ///< of the largest deviation over the points
+    double largest = 0.0;              ///< that deviation, in standard deviations of the simulations
+    std::size_t at = 0;                ///< point where it is
 };
 
 struct Predictive {

@@ -11,7 +11,6 @@
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
-#include "engine/scenario/render.hpp"
 #include "engine/store/atomic_file.hpp"
 
 namespace ringlock::closure {
@@ -79,6 +78,10 @@ nlohmann::json to_json(const Closure& closure) {
     object["family_wise_level"] = closure.level;
     object["notes"] = closure.notes;
     return object;
+}
+
+nlohmann::json to_json(const ClosedScenario& closed) {
+    return {{"placeholders", closed.placeholders()}, {"not_held", closed.not_held}};
 }
 
 std::string verdict_sentence(const Closure& closure) {
@@ -170,6 +173,13 @@ void write_predictive(store::File& h5, const Predictive& predictive) {
         group.write("measured", statistic.measured, {statistic.unit, "of the record"});
         group.write("lowest", statistic.lowest, {statistic.unit, "of the simulations of the closed model"});
         group.write("highest", statistic.highest, {statistic.unit, "of the simulations of the closed model"});
+        if (!statistic.measured_whole.empty()) {
+            group.write("measured_whole", statistic.measured_whole,
+                        {statistic.unit, "of the record with its disturbed stretches"});
+        }
+        if (!statistic.base.empty()) {
+            group.write("base", statistic.base, {statistic.unit, "mean of simulations of the base model alone"});
+        }
         group.write("p_value", statistic.p_value, {"1", "of the point by itself, both sides"});
     }
 }
@@ -229,15 +239,12 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
     scores.write("heldout_error", errors, {closure.unit, "rms one-step prediction error of the held-out part"});
     scores.write("heldout_log_score_gain", gains, {"1", "over the step before"});
     write_predictive(h5, predictive);
+    const ClosedScenario closed = closed_scenario(record, closure);
     json object = to_json(closure);
     object["predictive"] = to_json(predictive);
-    const scenario::Scenario closed = closed_scenario(record, closure);
-    std::string head =
-        fmt::format("# What was found in {}: {}.\n# The device as fitted, with the effects that were added.\n", source,
-                    name_of(closure.verdict));
-    const std::string rendered = scenario::to_toml(closed);
+    object["closed"] = to_json(closed);
     write_text(folder / "closure.json", object.dump(2) + "\n");
-    write_text(folder / "closed.toml", sealed(head + "\n" + rendered, Comment::toml));
+    write_text(folder / "closed.toml", sealed(to_toml(closed, source, closure.verdict), Comment::toml));
     file.commit();
 }
 

@@ -13,6 +13,8 @@ namespace ringlock::closure {
 nlohmann::json to_json(const Closure& closure);
 /// What stands at its key "predictive" where the check was made.
 nlohmann::json to_json(const Predictive& predictive);
+/// What stands at its key "closed".
+nlohmann::json to_json(const ClosedScenario& closed);
 
 /// The same for people.
 std::string to_text(const Closure& closure);

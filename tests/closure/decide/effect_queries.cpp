@@ -29,6 +29,7 @@ class Added final : public Effect {
         : name_(name), parameters_(std::move(parameters)), angle_(angle) {}
     std::string_view name() const override { return name_; }
     std::string_view summary() const override { return ""; }
+    std::string_view advice() const override { return ""; }
     std::string_view equation() const override { return ""; }
     std::span<const Parameter> parameters() const override { return parameters_; }
     bool active(const Values& /*values*/) const override { return true; }

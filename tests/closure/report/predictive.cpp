@@ -92,7 +92,7 @@ TEST_F(Predictively, ARightModelMakesSuchRecords) {
     }
 
     ringlock::closure::write_closure(folder_, "r.h5", record, closure, predictive);
-    report::write_closure_page(folder_, "r.h5", closure, predictive);
+    report::write_closure_page(folder_, "r.h5", record, closure, predictive);
     const std::string page = contents(folder_ / "report.md");
     for (const char* part : {"nothing missing", "## What was added", "`lockin_threshold_deg_h`", "39 times",
                              "## What is left of the record", "closed.toml"}) {
@@ -111,7 +111,8 @@ TEST_F(Predictively, ARightModelMakesSuchRecords) {
     const store::Group allan = file.group("predictive/allan_deviation");
     EXPECT_EQ(allan.dataset("measured").read<double>(), statistic(predictive, "allan_deviation").measured);
     EXPECT_EQ(allan.dataset("highest").unit(), "deg/h");
-    EXPECT_EQ(scenario::parse_file(folder_ / "closed.toml"), ringlock::closure::closed_scenario(record, closure));
+    EXPECT_EQ(scenario::parse_file(folder_ / "closed.toml"),
+              ringlock::closure::closed_scenario(record, closure).scenario);
 }
 
 TEST_F(LongPredictively, WhatTheModelLacksShows) {
@@ -170,13 +171,49 @@ TEST_F(Predictively, SamplesBeginAtATimeOfTheirOwn) {
     closure.steps[1].parameters = {{"base_vibration", "frequency_hz", 1.25025, 0.0},
                                    {"base_vibration", "rate_deg_h", 1.0, 0.1},
                                    {"base_vibration", "phase_rad", 0.1, 0.1}};
-    const scenario::Scenario closed = ringlock::closure::closed_scenario(record, closure);
+    const scenario::Scenario closed = ringlock::closure::closed_scenario(record, closure).scenario;
     EXPECT_DOUBLE_EQ(closed.input.rate_deg_h, 3.0);
     EXPECT_NEAR(closed.effects.at("bias_step").at("time_s"), 200.0, 1e-9);
     // 1250 cycles and a quarter in a thousand seconds
     EXPECT_NEAR(closed.effects.at("base_vibration").at("phase_rad"), 0.1 + 0.5 * units::pi, 1e-9);
     EXPECT_NEAR(closed.ensemble.duration_s, 500.0, 1e-9);
     EXPECT_TRUE(scenario::check(closed).empty());
+}
+
+// The record declares the dither and no scale factor, and a second step has no place in a scenario.
+TEST(ClosedScenario, SaysWhatIsAPlaceholderAndWhatItCannotHold) {
+    record::Record record;
+    record.samples.emplace();
+    record.samples->rate_hz = 100.0;
+    record.samples->values.assign(50000, 0.0);
+    record.declared.dither_frequency_hz = 400.0;
+    record.declared.dither_peak_rate_deg_s = 100.0;
+    Closure closure;
+    closure.verdict = ringlock::closure::Verdict::closed;
+    closure.base = {{"", "mean_rate_deg_h", 3.0, 0.125}};
+    closure.steps.resize(3);
+    for (std::size_t k = 0; k < 2; ++k) {
+        const auto step = static_cast<double>(k + 1);
+        closure.steps[k].effect = effects::find("bias_step");
+        closure.steps[k].parameters = {{"bias_step", "step_deg_h", step, 0.1},
+                                       {"bias_step", "time_s", 100.0 * step, 1.0}};
+    }
+    closure.steps[2].effect = effects::find("base_vibration");
+    closure.steps[2].parameters = {{"base_vibration", "frequency_hz", 1e9, 1.0},
+                                   {"base_vibration", "rate_deg_h", 1.0, 0.1}};
+    closure.disturbed_share = 0.25;
+    const auto closed = ringlock::closure::closed_scenario(record, closure);
+    EXPECT_THAT(closed.placeholders(), testing::ElementsAre("gyro.scale_factor_arcsec"));
+    EXPECT_EQ(closed.remarks.at("dither.frequency_hz"), "Declared by the record.");
+    EXPECT_EQ(closed.remarks.at("input.rate_deg_h"), "Fitted, standard error 0.12.");
+    EXPECT_DOUBLE_EQ(closed.scenario.effects.at("bias_step").at("step_deg_h"), 1.0);
+    EXPECT_THAT(closed.not_held, testing::ElementsAre(HasSubstr("step_deg_h = 2"), HasSubstr("beyond the range"),
+                                                      HasSubstr("25 % of the record")));
+    EXPECT_TRUE(scenario::check(closed.scenario).empty());
+    const std::string text = to_toml(closed, "a\nb.h5", closure.verdict);
+    EXPECT_THAT(text, HasSubstr("# What was found in a\\x0ab.h5: closed."));
+    EXPECT_THAT(text, HasSubstr("# Placeholder: gyro.scale_factor_arcsec"));
+    EXPECT_EQ(scenario::parse_string(text, "closed.toml"), closed.scenario);
 }
 
 TEST_F(LongPredictively, SamplesTooAndTheirWhiteNoises) {
@@ -194,7 +231,7 @@ TEST_F(LongPredictively, SamplesTooAndTheirWhiteNoises) {
     const Closure closure = close_loop(record);
     const Predictive predictive = check_predictive(record, closure);
     print(predictive);
-    EXPECT_TRUE(scenario::check(ringlock::closure::closed_scenario(record, closure)).empty());
+    EXPECT_TRUE(scenario::check(ringlock::closure::closed_scenario(record, closure).scenario).empty());
     ASSERT_EQ(predictive.statistics.size(), 2U);
     for (const PredictiveStatistic& s : predictive.statistics) EXPECT_GT(s.p_value_all, 0.05) << s.name;
     for (const char* noise : {"white_angle_arcsec", "white_rate_deg_rt_h"}) {
@@ -247,7 +284,7 @@ TEST_F(Predictively, WhatCannotBeSimulatedIsANote) {
     EXPECT_THAT(predictive.notes, testing::Contains(HasSubstr("cannot be simulated")));
     EXPECT_EQ(predictive.simulations, 0);
     EXPECT_NO_THROW(ringlock::closure::write_closure(folder_, "r.h5", record, closure, predictive));
-    EXPECT_NO_THROW(report::write_closure_page(folder_, "r.h5", closure, predictive));
+    EXPECT_NO_THROW(report::write_closure_page(folder_, "r.h5", record, closure, predictive));
 }
 
 // Of 60 records 6 have a p of 0.1 or less by chance, 13 or more in one case of 250; more where two statistics go

@@ -68,6 +68,21 @@ TEST(SampleReaders, ARecordWithoutEffectMissesNothing) {
     }
 }
 
+// Beside a strong line and a step the base model's innovations do not show the turns; after these are in the model they
+// do.
+TEST(SampleReaders, TurnsAreFoundOnceStrongEffectsAreInTheModel) {
+    scenario::Scenario s = samples_at(100.0, 120.0);
+    s.effects.at("bias_step") = {{"step_deg_h", 3.0}, {"time_s", 70.0}};
+    s.effects.at("base_vibration").at("rate_deg_h") = 8.0;
+    s.effects.at("base_vibration").at("frequency_hz") = 17.3;
+    const Closure closure = close_loop(instrument::simulate_record(s));
+    EXPECT_EQ(closure.verdict, Verdict::closed) << effects_of(closure);
+    EXPECT_EQ(effects_of(closure), "base_vibration bias_step ");
+    EXPECT_TRUE(std::any_of(closure.notes.begin(), closure.notes.end(), [](const std::string& note) {
+        return note.find("comes in kicks at the turns") != std::string::npos;
+    }));
+}
+
 TEST(SampleReaders, WholeCyclesAndFiltersAreNoEffects) {
     for (const Stripping stripping : {Stripping::whole_cycle, Stripping::reference_fir}) {
         scenario::Scenario s = samples_at(100.0, 100.0);

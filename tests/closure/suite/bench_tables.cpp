@@ -137,6 +137,13 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
     missed_though_shown(Kind::pair, 2.0);
     row("effects outside the library, `unexplained` with the right place",
         count(kind(Kind::foreign, 0.0), is(Judged::right)));
+    row("closed scenarios that obey all rules and run",
+        count([](const TableRow&) { return true; }, [](const Outcome& o) { return o.closed_fault.empty(); }));
+    for (std::size_t k = 0; k < truths.size(); ++k) {
+        if (!outcomes[k] || outcomes[k]->closed_fault.empty()) continue;
+        fmt::print(stderr, "closed scenario of {} (seed {}): {}\n", truths[k].truth, truths[k].seed,
+                   outcomes[k]->closed_fault);
+    }
     const auto other = [&](bool null) {
         return [=](const TableRow& of) { return of.kind == Kind::other && (of.multiple == 0.0) == null; };
     };

@@ -375,6 +375,7 @@ Outcome judge(const SampleCase& of, const record::Record& record) {
     outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const bool foreign = !of.foreign.empty();
     compare(closure, foreign ? std::optional(of.where) : std::nullopt, of.truth, outcome);
+    outcome.closed_fault = fault_of_closed(record, closure);
     if (foreign) return outcome;
     const Closure oracle = ringlock::closure::fit_samples(record, known(of.truth));
     outcome.oracle = oracle.heldout_after;

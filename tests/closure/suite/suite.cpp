@@ -14,12 +14,15 @@
 #include <vector>
 
 #include "analysis/closure/options.hpp"
+#include "analysis/closure/report/closed_scenario.hpp"
 #include "analysis/closure/turns/loop/loop.hpp"
 #include "analysis/closure/turns/model/model.hpp"
 #include "analysis/instrument/simulate.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
 #include "engine/gyro/theory.hpp"
+#include "engine/scenario/check.hpp"
+#include "engine/scenario/parse.hpp"
 #include "tests/closure/generator/generator.hpp"
 #include "tests/closure/generator/keys.hpp"
 #include "tests/closure/generator/plain_gyro.hpp"
@@ -534,6 +537,23 @@ void compare(const Closure& closure, std::optional<Where> where, const std::vect
     }
 }
 
+std::string fault_of_closed(const record::Record& record, const Closure& closure) {
+    constexpr double longest_s = 12.0;
+    const auto closed = ringlock::closure::closed_scenario(record, closure);
+    for (const scenario::Complaint& complaint : scenario::check(closed.scenario)) return complaint.problem;
+    try {
+        const std::string text = to_toml(closed, "a record", closure.verdict);
+        if (!(scenario::parse_string(text, "closed.toml") == closed.scenario))
+            return "is read back as another scenario";
+        scenario::Scenario brief = closed.scenario;
+        brief.ensemble.duration_s = std::min(brief.ensemble.duration_s, longest_s);
+        if (scenario::check(brief).empty()) instrument::simulate_record(brief);
+    } catch (const std::exception& error) {
+        return error.what();
+    }
+    return "";
+}
+
 Outcome judge(const Case& of, const record::Record& record) {
     Outcome outcome;
     const auto start = std::chrono::steady_clock::now();
@@ -541,6 +561,7 @@ Outcome judge(const Case& of, const record::Record& record) {
     outcome.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const bool foreign = !of.foreign.empty();
     compare(closure, foreign ? std::optional(of.where) : std::nullopt, of.truth, outcome);
+    outcome.closed_fault = fault_of_closed(record, closure);
     if (foreign) return outcome;
 
     std::vector<ActiveEffect> known;

@@ -111,6 +111,7 @@ struct Outcome {
         double value, sd, standard_errors;
     };
     std::vector<Deviation> deviations;  ///< of the estimates, where the truth has been named
+    std::string closed_fault = {};      ///< what is wrong with the closed scenario; empty: nothing
 };
 
 /// What the least of these effects must add to the log-likelihood [nats] to pass the family-wise level over a library
@@ -124,5 +125,9 @@ void compare(const ringlock::closure::Closure& closure, std::optional<ringlock::
              const std::vector<Added>& truth, Outcome& outcome);
 
 Outcome judge(const Case& of, const record::Record& record);
+
+/// Why the closed scenario of a record breaks a rule of scenarios, is not read back from closed.toml as it was, or
+/// cannot be simulated for a few seconds; empty where it can.
+std::string fault_of_closed(const record::Record& record, const ringlock::closure::Closure& closure);
 
 }  // namespace ringlock::test::closure

@@ -27,6 +27,7 @@ class Hop final : public effects::Effect {
    public:
     std::string_view name() const override { return "hop"; }
     std::string_view summary() const override { return "Three steps at one time."; }
+    std::string_view advice() const override { return ""; }
     std::string_view equation() const override { return "From time_s on."; }
     std::span<const effects::Parameter> parameters() const override {
         static constexpr std::array all = {

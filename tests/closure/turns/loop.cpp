@@ -398,7 +398,7 @@ TEST(LongTurnLoop, TimesAndPhasesAreByTheRecordsClock) {
             EXPECT_LT(estimate.sd, late_s > 0.0 ? 0.5 : 0.05);
         }
         // The scenario has a clock that begins with the record.
-        const scenario::Scenario closed = ringlock::closure::closed_scenario(record, closure);
+        const scenario::Scenario closed = ringlock::closure::closed_scenario(record, closure).scenario;
         EXPECT_NEAR(closed.effects.at("bias_step").at("time_s"), 20.0, 0.5);
         EXPECT_NEAR(std::remainder(closed.effects.at("base_vibration").at("phase_rad") - phase_rad -
                                        units::two_pi * frequency_hz * (record.turns->time_s.front() - late_s),
@@ -449,7 +449,7 @@ TEST(LongTurnLoop, ClosesBackIntoTheMonteCarlo) {
     const record::Record record = instrument::simulate_record(scenario);
     const Closure closure = close_loop(record);
     print("detector_phase_offset", closure);
-    const scenario::Scenario closed = ringlock::closure::closed_scenario(record, closure);
+    const scenario::Scenario closed = ringlock::closure::closed_scenario(record, closure).scenario;
     EXPECT_TRUE(scenario::check(closed).empty());
     EXPECT_NEAR(closed.effects.at("detector_phase_offset").at("phase_rad"), 0.6, 0.1);
     EXPECT_NEAR(closed.gyro.lockin_threshold_deg_h, 300.0, 15.0);

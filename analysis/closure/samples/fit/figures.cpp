@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <numbers>
@@ -54,8 +55,44 @@ Unaliased unaliased(double hz, const SampleFit& fit, const record::Declared& dec
     return {hz};
 }
 
+/// Lines at other frequencies leave the same readings. Those that dithers have come first, the declared one before all.
+/// \param amplitude  of the line at a frequency
+std::string note_on_aliases(const Unaliased& line, const SampleFit& fit, const record::Declared& declared,
+                            const effects::Effect& effect, const std::function<std::string(double hz)>& amplitude) {
+    const double from_hz = fit.model().noise.from_hz;
+    const double readings_hz = from_hz > 0.0 ? from_hz : fit.series().rate_hz;
+    const double shown_hz = alias(line.hz, readings_hz).hz;
+    struct Other {
+        double hz;
+        int rank;
+    };
+    std::vector<Other> others;
+    const auto add = [&](double hz) {
+        if (!(hz > 0.0) || std::abs(hz - line.hz) < options.samples.fit.same_alias * readings_hz) return;
+        int rank = hz >= options.samples.fit.slowest_dither_hz && hz <= options.samples.fit.fastest_dither_hz ? 1 : 2;
+        if (declared.dither_frequency_hz) {
+            const double ratio = hz / *declared.dither_frequency_hz;
+            const double order = std::round(ratio);
+            if (std::abs(ratio - order) < options.samples.declared_dither_error * order) rank = 0;
+        }
+        others.push_back({hz, rank});
+    };
+    for (int k = 0; k * readings_hz <= options.samples.fit.fastest_dither_hz + readings_hz; ++k) {
+        add(k * readings_hz - shown_hz);
+        add(k * readings_hz + shown_hz);
+    }
+    std::sort(others.begin(), others.end(),
+              [](const Other& a, const Other& b) { return std::pair(a.rank, a.hz) < std::pair(b.rank, b.hz); });
+    if (others.size() > options.samples.fit.aliases_listed) others.resize(options.samples.fit.aliases_listed);
+    std::string list;
+    for (const Other& other : others) {
+        list += fmt::format("{}{:.6g} Hz ({})", list.empty() ? "" : ", ", other.hz, amplitude(other.hz));
+    }
+    return fmt::format("{} at {:.6g} Hz may be the alias of another line: {}", effect.name(), line.hz, list);
+}
+
 void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared& declared, double from_hz_sd,
-               std::vector<Estimate>& all) {
+               std::vector<Estimate>& all, std::vector<std::string>& notes) {
     const SampleSeries& series = fit.series();
     const auto& columns = fit.model().columns;
     const SampleColumn& column = columns[cosine];
@@ -93,6 +130,8 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
         const double gain = std::max(1e-9, 2.0 * std::abs(std::sin(units::pi * course.hz * series.interval_s)));
         all.push_back(
             estimate_of(effect, parameter_of(effect, Role::sampled).name, amplitude / gain, amplitude_sd / gain));
+        notes.push_back(note_on_aliases(real, fit, declared, effect,
+                                        [&](double) { return fmt::format("{:.3g} arcsec", amplitude / gain); }));
         return;
     }
     all.push_back(estimate_of(effect, courses[0]->name, course.hz, hz_sd));
@@ -100,6 +139,10 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     const double gain = std::sin(units::pi * course.hz * series.interval_s) / (units::pi * course.hz);
     all.push_back(estimate_of(effect, parameter_of(effect, Role::size).name, amplitude / std::abs(gain),
                               amplitude_sd / std::abs(gain)));
+    notes.push_back(note_on_aliases({course.hz}, fit, declared, effect, [&](double hz) {
+        const double integrated = std::sin(units::pi * hz * series.interval_s) / (units::pi * hz);
+        return fmt::format("{:.3g} deg/h", amplitude / std::max(std::abs(integrated), 1e-12));
+    }));
     // a cos + b sin = A sin(phase + 2 pi f (t + middle)), t from the middle
     const double middle_s = middle_of(series);
     const double turns = course.hz * middle_s;
@@ -358,7 +401,7 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<AddedEffect>& a
             const SampleColumn& column = model.columns[k];
             if (column.step != one.id || column.effect != &effect || column.name == "sine") continue;
             if (column.name == "cosine") {
-                take_line(fit, k, declared, errors.noise.from_hz, all);
+                take_line(fit, k, declared, errors.noise.from_hz, all, figures.notes);
                 continue;
             }
             all.push_back(estimate_of(effect, column.name, column.value, column.sd));

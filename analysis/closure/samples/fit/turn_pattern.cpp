@@ -265,6 +265,15 @@ void take_turn_pattern(const TurnPattern& pattern, SampleNoise& noise) {
     noise.kick_excess = of_arcsine;
 }
 
+void drop_turn_pattern(SampleNoise& noise) { copy_turn_pattern({}, noise); }
+
+void copy_turn_pattern(const SampleNoise& from, SampleNoise& to) {
+    to.kick_share = from.kick_share;
+    to.kicks = from.kicks;
+    to.turn_hz = from.turn_hz;
+    to.kick_excess = from.kick_excess;
+}
+
 namespace {
 
 /// Sum of the fourth powers of the response of sums of innovations to one disturbance, given as increments.

@@ -28,6 +28,9 @@ std::optional<TurnPattern> find_turn_pattern(const SampleFit& base, const record
 
 /// The model's noise with the pattern.
 void take_turn_pattern(const TurnPattern& pattern, SampleNoise& noise);
+/// The noise without the pattern, and with that of another.
+void drop_turn_pattern(SampleNoise& noise);
+void copy_turn_pattern(const SampleNoise& from, SampleNoise& to);
 
 /// Excess kurtosis of sums of `length` innovations that the base model predicts. Two of its noises are not normal: a
 /// kick follows the arcsine law, of excess -3/2, and the error of a count is uniform, of excess -6/5.

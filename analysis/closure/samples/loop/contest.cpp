@@ -14,6 +14,7 @@
 #include "analysis/closure/samples/fit/steps.hpp"
 #include "analysis/closure/samples/loop/rivals.hpp"
 #include "analysis/closure/stats/p_values.hpp"
+#include "engine/core/interrupt.hpp"
 
 namespace ringlock::closure {
 
@@ -70,6 +71,7 @@ class Contest {
     bool beside_each_other(const SampleCandidate& a, const SampleCandidate& b) const;
     Shared set_aside(std::vector<Shared>& all, const std::vector<Rival>& against) const;
     static Shared nearest(const std::vector<Shared>& all, const Shared& unnamed);
+    void tie_sources(SampleChoice& choice) const;
     static void tie(const CandidateSet& best, const std::vector<CandidateSet>& as_likely, SampleChoice& choice);
 
     const record::Declared& declared_;
@@ -413,6 +415,36 @@ Contest::Shared Contest::nearest(const std::vector<Shared>& all, const Shared& u
     return random == all.end() ? unnamed : *random;
 }
 
+/// Readings at k times the record's rate plus or minus the same difference leave the same pattern in the record.
+/// Whether its noise tells these rates apart is found by a fit at each. Above twice the record's rate it does not:
+/// interpolated readings that no sample lies between are not seen.
+void Contest::tie_sources(SampleChoice& choice) const {
+    const SampleScreenOptions& by = options.samples.screen;
+    const double rate_hz = series_.rate_hz;
+    const SampleModel& chosen = choice.chosen->fit->model();
+    const double from_hz = chosen.noise.from_hz;
+    const double told_up_to_hz = options.samples.contest.told_up_to * rate_hz;
+    for (int multiple = -by.most_multiple; multiple <= 2 * by.most_multiple; ++multiple) {
+        for (const double sign : {1.0, -1.0}) {
+            const double hz = sign * from_hz + multiple * rate_hz;
+            const auto same = [&](double other_hz) {
+                return std::abs(hz - other_hz) < options.samples.contest.same_source * rate_hz;
+            };
+            if (hz < by.slowest_source * rate_hz || hz > by.fastest_source * rate_hz || same(from_hz)) continue;
+            if (std::any_of(choice.other_hz.begin(), choice.other_hz.end(), same)) continue;
+            check_interrupt();
+            SampleNoise noise = chosen.noise;
+            noise.from_hz = hz;
+            noise.from_phase = sign * chosen.noise.from_phase - std::floor(sign * chosen.noise.from_phase);
+            const SampleFit other(series_, resampled_with(*now_.fit, noise), choice.chosen->fit->rows(),
+                                  SampleFit::Noise::free);
+            const bool beyond = from_hz > told_up_to_hz && hz > told_up_to_hz;
+            if (beyond || choice.chosen->fit->gain_over(other) < options.tie) choice.other_hz.push_back(hz);
+        }
+    }
+    std::sort(choice.other_hz.begin(), choice.other_hz.end());
+}
+
 SampleChoice Contest::choose() {
     const auto candidates = screened(now_, Wanted::all);
     auto all = contenders(now_, candidates);
@@ -496,17 +528,7 @@ SampleChoice Contest::choose() {
         });
         if (other != all.end()) choice.other_random = *other;
     }
-    const double from_hz = choice.chosen->fit->model().noise.from_hz;
-    for (const CandidateSet& set : as_likely) {
-        const double hz = set.members.front()->fit->model().noise.from_hz;
-        if (!shows(*choice.chosen, OnSamples::transport) || !set.has(OnSamples::transport)) continue;
-        const auto near = [&](double other_hz) {
-            return std::abs(hz - other_hz) < options.samples.contest.same_source * series_.rate_hz;
-        };
-        if (!near(from_hz) && std::none_of(choice.other_hz.begin(), choice.other_hz.end(), near)) {
-            choice.other_hz.push_back(hz);
-        }
-    }
+    if (shows(*choice.chosen, OnSamples::transport)) tie_sources(choice);
     return choice;
 }
 

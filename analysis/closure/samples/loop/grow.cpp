@@ -113,6 +113,7 @@ void SampleLoop::add_all(Closure& closure, bool random_rates) {
         if (!choice.chosen) break;
         if (!earlier_ && is_random_rate(*choice.chosen->effect)) earlier_ = now_;
         take(choice, closure);
+        find_turns_again(closure);
     }
 }
 

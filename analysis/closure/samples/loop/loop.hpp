@@ -63,7 +63,10 @@ class SampleLoop {
     }
     std::vector<double> chosen_increments() const;
     Rows all_rows() const;
+    void take_disturbed(Closure& closure) const;
     std::shared_ptr<SampleFit> fit_base(Closure& closure) const;
+    std::shared_ptr<SampleFit> with_turns(const SampleFit& fit, Closure& closure) const;
+    void find_turns_again(Closure& closure);
     void begin(Closure& closure);
     void close(Closure& closure);
     void take_known(const std::vector<ActiveEffect>& effects, Closure& closure);

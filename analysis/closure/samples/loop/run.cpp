@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,12 @@
 #include "analysis/closure/samples/screen/known.hpp"
 
 namespace ringlock::closure {
+
+namespace {
+
+constexpr std::string_view note_on_turns = "the white noise of the rate comes in kicks at the turns of the dither";
+
+}  // namespace
 
 /// All rows but those at the ends of the record for which a witness has no values at all lags. At the start more rows
 /// are left out, since a narrow motion remembers what the witness does not explain there.
@@ -42,18 +49,40 @@ std::shared_ptr<SampleFit> SampleLoop::fit_base(Closure& closure) const {
         return std::make_shared<SampleFit>(series_, std::move(model), rows_);
     }
     auto fit = std::make_shared<SampleFit>(series_, SampleModel{}, rows_);
-    const auto pattern = find_turn_pattern(*fit, record_.declared);
-    if (!pattern) return fit;
-    SampleModel model;
-    take_turn_pattern(*pattern, model.noise);
-    fit = std::make_shared<SampleFit>(series_, std::move(model), rows_);
-    const std::string note = fmt::format(
-        "the white noise of the rate comes in kicks at the turns of the dither, {:.7g} a second: {:.4g} in a sample",
-        pattern->turn_hz, pattern->turn_hz * series_.interval_s);
-    if (std::find(closure.notes.begin(), closure.notes.end(), note) == closure.notes.end()) {
-        closure.notes.push_back(note);
-    }
+    if (auto with = with_turns(*fit, closure)) return with;
     return fit;
+}
+
+/// The same model with the turns of the declared dither, where the record shows them; else null.
+std::shared_ptr<SampleFit> SampleLoop::with_turns(const SampleFit& fit, Closure& closure) const {
+    const auto pattern = find_turn_pattern(fit, record_.declared);
+    if (!pattern) return nullptr;
+    SampleModel model = fit.model();
+    take_turn_pattern(*pattern, model.noise);
+    const std::string note = fmt::format("{}, {:.7g} a second: {:.4g} in a sample", note_on_turns, pattern->turn_hz,
+                                         pattern->turn_hz * series_.interval_s);
+    std::erase_if(closure.notes, [](const std::string& other) { return other.starts_with(note_on_turns); });
+    closure.notes.push_back(note);
+    return std::make_shared<SampleFit>(series_, std::move(model), rows_);
+}
+
+/// Looks for the turns again after an effect was added: before, its contribution was part of the noise, of which the
+/// kicks then seemed a smaller share, or were not seen. The turns belong to the base model, which gets them as well.
+void SampleLoop::find_turns_again(Closure& closure) {
+    const SampleNoise& noise = now_.fit->model().noise;
+    if (noise.from_hz > 0.0 || rounded_.drawn() || filtered_rows(record_)) return;
+    std::shared_ptr<SampleFit> without = now_.fit;
+    if (noise.kicks) {
+        SampleModel model = now_.fit->model();
+        drop_turn_pattern(model.noise);
+        without = std::make_shared<SampleFit>(series_, std::move(model), rows_, SampleFit::Noise::near);
+    }
+    auto with = with_turns(*without, closure);
+    if (!with || !(with->log_likelihood() > now_.fit->log_likelihood())) return;
+    SampleModel base = base_->model();
+    copy_turn_pattern(with->model().noise, base.noise);
+    base_ = std::make_shared<SampleFit>(series_, std::move(base), rows_);
+    now_.fit = std::move(with);
 }
 
 void SampleLoop::begin(Closure& closure) {
@@ -104,12 +133,25 @@ SampleScore SampleLoop::score(const SampleFit& fit) const {
     return rounded_.drawn() ? rounded_.score_of(fit, reported_) : score_of(fit, reported_, used_step_);
 }
 
+/// Stretches that the fit leaves out, by the record's clock.
+void SampleLoop::take_disturbed(Closure& closure) const {
+    for (std::size_t i = 0; i < disturbed_.rows.size(); ++i) {
+        if (!disturbed_.rows[i]) continue;
+        if (i == 0 || !disturbed_.rows[i - 1]) {
+            closure.disturbed.push_back({series_.time_s[i] - series_.interval_s, series_.time_s[i]});
+        }
+        closure.disturbed.back().to_s = series_.time_s[i];
+        closure.disturbed_share += 1.0 / static_cast<double>(disturbed_.rows.size());
+    }
+}
+
 /// Fills in what is reported: errors on the held-out blocks, and parameters of a last fit to the whole record.
 void SampleLoop::finish(Closure& closure) {
     const SampleScore last = score(*now_.fit);
     closure.heldout_after = last.error;
     closure.noise_floor = last.floor;
     closure.log_likelihood_gain = last.log_likelihood - score(*base_).log_likelihood;
+    take_disturbed(closure);
     closure.residual.time_s = series_.time_s;
     for (std::size_t i = 0; i < series_.size(); ++i) {
         closure.residual.innovation.push_back(now_.fit->innovations()[i] * now_.fit->sd(i));
@@ -126,6 +168,7 @@ void SampleLoop::finish(Closure& closure) {
     SampleFigures figures = this->figures();
     closure.rounding_in_noise = !rounded_.drawn();
     closure.base = std::move(figures.base);
+    if (!now_.added.empty()) closure.base_alone = figures_of(*base_, {}, record_.declared).base;
     for (std::size_t k = 0; k < now_.added.size(); ++k) {
         Step& step = closure.steps.emplace_back(std::move(now_.added[k].step));
         if (step.parameters.empty()) step.parameters = std::move(figures.steps[k]);

@@ -55,6 +55,8 @@ void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& 
 /// The model of readings that were taken at that rate and interpolated, with the likeliest place of the record's start
 /// within the source's interval.
 SampleModel resampled_from(const SampleFit& now, double from_hz);
+/// The same with noises, rate and place that are known; lines are where they explain most.
+SampleModel resampled_with(const SampleFit& now, const SampleNoise& noise);
 
 /// Candidates among the effects that show on samples and that the fit does not have yet, by score tests of its
 /// residual.

@@ -178,4 +178,10 @@ SampleModel resampled_from(const SampleFit& now, double from_hz) {
     return best_placed(now, from_hz, Errors::as_they_are).model;
 }
 
+SampleModel resampled_with(const SampleFit& now, const SampleNoise& noise) {
+    SampleModel model = now.model();
+    model.noise = noise;
+    return with_lines_of_source(now, std::move(model));
+}
+
 }  // namespace ringlock::closure

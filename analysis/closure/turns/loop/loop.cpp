@@ -240,7 +240,13 @@ void TurnLoop::finish() {
     closure_.log_likelihood_gain = now_->log_likelihood() - base_log_likelihood_;
     take_residual(problem_.turns(), *now_, closure_);
     monitor_.tell("fitting the whole record");
-    take_figures(problem_.turns(), *problem_.whole().fit(now_->parameters()), closure_);
+    const TurnProblem whole = problem_.whole();
+    take_figures(problem_.turns(), *whole.fit(now_->parameters()), closure_);
+    if (!closure_.steps.empty()) {
+        Closure alone;
+        take_figures(problem_.turns(), *whole.fit({}), alone);
+        closure_.base_alone = std::move(alone.base);
+    }
     closure_.verdict = verdict_of(closure_);
 }
 
