@@ -101,6 +101,8 @@ struct SampleFitOptions {
     /// rows that count.
     std::size_t places_of_a_step = 80;
     std::size_t places_in_a_gap = 32;
+    double dither_first_share =
+        0.9;  ///< where frequency and place are searched: a larger one shows them from near only
     /// Effort: rounds in which each step is placed again with the others in the model.
     int most_step_rounds = 3;
     /// Steps of values that are smaller than this share of the standard deviation do not show in held-out errors.
@@ -166,14 +168,29 @@ struct SampleTurnOptions {
     std::size_t longest_sum = 1000;
     /// Share of the white rate's variance that comes in kicks: the likeliest is taken. The rest is quantum noise.
     std::array<double, 9> shares = {0.4, 0.7, 0.85, 0.93, 0.97, 0.985, 0.993, 0.997, 0.999};
+    /// Share of the readings' errors that is noise of the dither where the reader leaves it, and correlation of its
+    /// amplitudes from turn to turn, as that of a resonator of some Q: the likeliest are taken.
+    std::array<double, 13> dither_shares = {0.2,   0.4,   0.6,    0.8,     0.9,      0.95,    0.98,
+                                            0.995, 0.999, 0.9997, 0.99992, 0.999985, 0.999998};
+    double dither_first_share =
+        0.9;  ///< where frequency and place are searched: a larger one shows them from near only
+    /// Effort: rounds in which frequency, place, share and memory are refined, until one gains less than this [nats].
+    int dither_rounds = 8;
+    double dither_settled = 0.1;
+    double dither_place_step = 0.01;  ///< the first, in turns; each round halves it
+    std::array<double, 10> dither_memories = {0.0, 0.3, 0.6, 0.8, 0.9, 0.95, 0.97, 0.98, 0.985, 0.992};
 };
 
 /// What a declared reader accounts for (samples/fit/declared_reader).
 struct SampleReaderOptions {
     /// Lines at the dither and at so many of its harmonics can be residues of the reader.
     int harmonics = 5;
+    /// Half cycles of the dither in a sample, at least, where the reader leaves the noise of the dither.
+    double least_turns_a_row = 1.02;
     /// Such a line has at most so many times the declared residue, which is that of a steady dither.
     double residue_margin = 1.5;
+    /// A harmonic of a dither that was left in is smaller than this share of it.
+    double most_harmonic = 0.05;
 };
 
 /// Candidates by score tests (samples/screen).

@@ -7,6 +7,7 @@
 
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/samples/fit/declared_reader.hpp"
+#include "analysis/closure/samples/fit/dither_noise.hpp"
 #include "analysis/closure/samples/fit/turn_pattern.hpp"
 #include "analysis/instrument/simulate.hpp"
 #include "engine/scenario/devices.hpp"
@@ -105,6 +106,50 @@ TEST(SampleReaders, ADitherThatWasLeftIsNamed) {
     const Closure closure = close_loop(instrument::simulate_record(s));
     ASSERT_FALSE(closure.steps.empty());
     for (const Step& step : closure.steps) EXPECT_EQ(step.name(), "dither_residue") << effects_of(closure);
+}
+
+// A notch takes off the line of the dither and leaves its injected noise, which varies over a half cycle: at the turns
+// it is that of the scenario, 3 rad.
+TEST(SampleReaders, TheNoiseOfADitherThatANotchLeavesIsNoEffect) {
+    scenario::Scenario s = samples_at(100.0, 60.0);
+    s.dither.frequency_hz = 390.444;
+    s.reader.stripping = Stripping::notch;
+    s.reader.latch_hz = 2500.0;
+    s.reader.fraction = reader::Fraction::detectors;
+    s.ensemble.dither_asymmetry_sd_ratio = 0.0;
+    const record::Record record = instrument::simulate_record(s);
+    const SampleSeries series = prepare_samples(record);
+    const Rows rows(series.size(), 1);
+    const SampleFit base(series, SampleModel{}, rows);
+    const auto noise = find_dither_noise(base, record);
+    ASSERT_TRUE(noise.has_value());
+    EXPECT_NEAR(noise->turn_hz, 2.0 * 390.444, 2e-3);
+    EXPECT_GT(noise->share, 0.9);
+    EXPECT_LT(noise->memory, 0.5);
+    SampleModel model;
+    take_dither_noise(*noise, model.noise);
+    const SampleFit with(series, std::move(model), rows);
+    const double at_turns_arcsec = 3.0 * *record.declared.scale_factor_arcsec / (2.0 * std::acos(-1.0));
+    EXPECT_NEAR(with.model().noise.angle_arcsec, at_turns_arcsec, 0.05 * at_turns_arcsec);
+    const Closure closure = close_loop(record);
+    EXPECT_EQ(closure.verdict, Verdict::nothing_missing) << effects_of(closure);
+}
+
+// The dither itself is named, and its noise belongs to the base. Faster samples are summed until one lasts for a half
+// cycle.
+TEST(SampleReaders, BesideADitherThatWasLeftNothingElseIsNamed) {
+    scenario::Scenario s = samples_at(1000.0, 20.0);
+    s.reader.stripping = Stripping::none;
+    s.reader.fraction = reader::Fraction::detectors;
+    s.ensemble.dither_asymmetry_sd_ratio = 0.0;
+    const record::Record record = instrument::simulate_record(s);
+    std::string note;
+    const record::Record summed = summed_for_reader(record, note);
+    EXPECT_GE(2.0 * *record.declared.dither_frequency_hz / summed.samples->rate_hz, 1.0);
+    EXPECT_FALSE(note.empty());
+    const Closure closure = close_loop(record);
+    EXPECT_EQ(closure.verdict, Verdict::closed) << effects_of(closure);
+    EXPECT_EQ(effects_of(closure), "dither_residue ");
 }
 
 // White rate noise through a filter of the length of an interval: all of its variance stays in a row and the next.

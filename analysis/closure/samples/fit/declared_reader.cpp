@@ -28,6 +28,13 @@ std::size_t order_of(const record::Record& record) {
     return static_cast<std::size_t>(2.0 * settings.latch_hz * record.reader->delay_s + 0.5);
 }
 
+/// Whether the reader leaves the dither in the samples, or takes off its line alone.
+bool leaves_dither_noise(const record::Record& record) {
+    return record.reader && record.declared.dither_frequency_hz &&
+           (record.reader->settings.stripping == Stripping::none ||
+            record.reader->settings.stripping == Stripping::notch);
+}
+
 double value_of(const Step& step, effects::Role role) {
     const effects::Parameter* parameter = effects::first_of(*step.effect, role);
     if (parameter == nullptr) return 0.0;
@@ -55,14 +62,46 @@ double lockin_line_arcsec(const record::Declared& declared) {
     return kick2 * k / units::two_pi;
 }
 
+/// Half cycles of unequal strength or length make harmonics of the dither, which a reader without stripping leaves in
+/// the samples. As lines in the rate or in the angle they look alike.
+template <class IsAt>
+bool is_harmonic_of_dither(const Step& step, const record::Record& record, const IsAt& is_at, std::string& why) {
+    const OnSamples as = on_samples(*step.effect);
+    const double hz = value_of(step, effects::Role::frequency);
+    if (!(hz > 0.0)) return false;
+    double arcsec = value_of(step, effects::Role::sampled);
+    if (as == OnSamples::rate_line) {
+        // By the angle at the frequency that was fitted: 1 deg/h is 1 arcsec/s.
+        arcsec = value_of(step, effects::Role::size) / (units::two_pi * hz);
+    } else if (as != OnSamples::angle_line) {
+        return false;
+    }
+    const SampleReaderOptions& by = options.samples.reader;
+    const double dither_hz = *record.declared.dither_frequency_hz;
+    for (int k = 2; k <= by.harmonics; ++k) {
+        if (!is_at(hz, k * dither_hz) || arcsec > by.most_harmonic * dither_arcsec(record.declared)) continue;
+        why = fmt::format(
+            "a line of {:.3g} arcsec at {:.6g} Hz is harmonic {} of the dither, which the declared reader leaves in "
+            "the "
+            "samples",
+            arcsec, hz, k);
+        return true;
+    }
+    return false;
+}
+
 }  // namespace
 
 record::Record summed_for_reader(const record::Record& record, std::string& note) {
-    if (!filters(record) || !record.samples || record.samples->kind != record::SampleKind::angle_increment_arcsec) {
+    const bool filtered = filters(record);
+    if ((!filtered && !leaves_dither_noise(record)) || !record.samples ||
+        record.samples->kind != record::SampleKind::angle_increment_arcsec) {
         return record;
     }
     const record::Samples& samples = *record.samples;
-    const double length_s = 2.0 * record.reader->delay_s + 1.0 / record.reader->settings.latch_hz;
+    const double length_s =
+        filtered ? 2.0 * record.reader->delay_s + 1.0 / record.reader->settings.latch_hz
+                 : options.samples.reader.least_turns_a_row / (2.0 * *record.declared.dither_frequency_hz);
     const auto rows_at_most = static_cast<double>(samples.size());
     if (length_s * samples.rate_hz > rows_at_most) return record;
     const auto each = static_cast<std::size_t>(std::ceil(length_s * samples.rate_hz - 1e-9));
@@ -79,8 +118,11 @@ record::Record summed_for_reader(const record::Record& record, std::string& note
     };
     to.values = sums(samples.values, 1.0);
     for (auto& [name, values] : to.witnesses) values = sums(values, 1.0 / static_cast<double>(each));
-    note = fmt::format("samples are summed by {} to {:.6g} Hz: the declared low-pass filter passes nothing faster",
-                       each, to.rate_hz);
+    note =
+        fmt::format("samples are summed by {} to {:.6g} Hz: {}", each, to.rate_hz,
+                    filtered ? "the declared low-pass filter passes nothing faster"
+                             : "the declared reader leaves the noise of the dither, which readings in one half cycle "
+                               "have in common");
     return summed;
 }
 
@@ -143,6 +185,7 @@ bool accounted_by_reader(const Step& step, const record::Record& record, std::st
             from_hz);
         return true;
     }
+    if (leaves_dither_noise(record) && is_harmonic_of_dither(step, record, is_at, why)) return true;
     if (as != OnSamples::angle_line || stripping == Stripping::none) return false;
     const double amplitude_arcsec = value_of(step, effects::Role::sampled);
     const double hz = value_of(step, effects::Role::frequency);

@@ -10,7 +10,9 @@
 namespace ringlock::closure {
 
 /// The record as the loop reads it. A low-pass filter passes nothing that is faster than its length: samples are summed
-/// until one lasts as long, and neighbours alone have the filter in common. `note` says so where it was done.
+/// until one lasts as long, and neighbours alone have the filter in common. Where the reader leaves the noise of the
+/// dither, samples are summed until one lasts for a half cycle, whose readings have that noise in common. `note` says
+/// so where it was done.
 record::Record summed_for_reader(const record::Record& record, std::string& note);
 
 /// How a low-pass filter divides white rate noise between a row and the next; null where the reader has none.

@@ -391,6 +391,7 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<AddedEffect>& a
     std::vector<Estimate> whites = whites_of(model.noise, errors.noise);
     for (const AddedEffect& one : added) {
         auto& all = figures.steps.emplace_back();
+        figures.step_notes.emplace_back();
         const effects::Effect& effect = one.effect();
         const OnSamples as = on_samples(effect);
         if (as == OnSamples::motion) {
@@ -401,7 +402,7 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<AddedEffect>& a
             const SampleColumn& column = model.columns[k];
             if (column.step != one.id || column.effect != &effect || column.name == "sine") continue;
             if (column.name == "cosine") {
-                take_line(fit, k, declared, errors.noise.from_hz, all, figures.notes);
+                take_line(fit, k, declared, errors.noise.from_hz, all, figures.step_notes.back());
                 continue;
             }
             all.push_back(estimate_of(effect, column.name, column.value, column.sd));

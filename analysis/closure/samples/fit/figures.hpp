@@ -25,8 +25,9 @@ struct AddedEffect {
 
 struct SampleFigures {
     std::vector<Estimate> base;
-    std::vector<std::vector<Estimate>> steps;  ///< of each effect that was added
-    std::vector<std::string> notes;            ///< why some have no standard error
+    std::vector<std::vector<Estimate>> steps;          ///< of each effect that was added
+    std::vector<std::vector<std::string>> step_notes;  ///< on the parameters of each
+    std::vector<std::string> notes;                    ///< why some have no standard error
 };
 
 /// \param fit  to all rows that are to count

@@ -157,15 +157,10 @@ double kick_unit_s(const record::Declared& declared) {
 
 }  // namespace
 
-std::optional<TurnPattern> find_turn_pattern(const SampleFit& base, const record::Declared& declared) {
-    if (!declared.dither_frequency_hz) return std::nullopt;
+std::optional<SeenTurns> turns_in_squares(const SampleFit& base, const record::Declared& declared) {
     const SampleTurnOptions& by = options.samples.turns;
     const SampleSeries& series = base.series();
     const double declared_hz = 2.0 * *declared.dither_frequency_hz;
-    if (declared_hz * series.interval_s > by.most_turns_a_row) return std::nullopt;
-    if (declared.lockin_threshold_deg_h == 0.0) return std::nullopt;
-
-    // A line in the squares at the alias of the turns.
     const auto& e = base.innovations();
     double mean = 0.0;
     double count = 0.0;
@@ -200,6 +195,22 @@ std::optional<TurnPattern> find_turn_pattern(const SampleFit& base, const record
         seen_hz = hz;
     }
     if (!(power > 0.0) || of_several(std::exp(-seen_power / power), searched) > by.seen_p) return std::nullopt;
+    return SeenTurns{seen_hz, bin_hz};
+}
+
+std::optional<TurnPattern> find_turn_pattern(const SampleFit& base, const record::Declared& declared) {
+    if (!declared.dither_frequency_hz) return std::nullopt;
+    const SampleTurnOptions& by = options.samples.turns;
+    const SampleSeries& series = base.series();
+    const double declared_hz = 2.0 * *declared.dither_frequency_hz;
+    if (declared_hz * series.interval_s > by.most_turns_a_row) return std::nullopt;
+    if (declared.lockin_threshold_deg_h == 0.0) return std::nullopt;
+
+    const auto seen = turns_in_squares(base, declared);
+    if (!seen) return std::nullopt;
+    const auto& e = base.innovations();
+    const double seen_hz = seen->turn_hz;
+    const double bin_hz = seen->bin_hz;
     // Of an innovation of the base model, by its white rate.
     const double by_rate =
         std::min(1.0, std::pow(base.model().noise.rate_arcsec_rt_s / base.typical_sd(), 2) * series.interval_s);
@@ -272,6 +283,10 @@ void copy_turn_pattern(const SampleNoise& from, SampleNoise& to) {
     to.kicks = from.kicks;
     to.turn_hz = from.turn_hz;
     to.kick_excess = from.kick_excess;
+    to.dither = from.dither;
+    to.dither_share = from.dither_share;
+    to.dither_memory = from.dither_memory;
+    to.dither_learnt = from.dither_learnt;
 }
 
 namespace {
@@ -313,7 +328,9 @@ double excess_of_kicks(const SampleFit& fit, std::size_t length) {
 
 double expected_excess(const SampleFit& fit, std::size_t length) {
     double excess = excess_of_kicks(fit, length);
-    const double counted = std::min(fit.series().count_noise_arcsec, fit.model().noise.angle_arcsec);
+    const SampleNoise& noise = fit.model().noise;
+    const double of_reader = noise.dither ? std::sqrt(1.0 - noise.dither_share) : 1.0;
+    const double counted = std::min(fit.series().count_noise_arcsec, of_reader * noise.angle_arcsec);
     if (counted > 0.0 && length <= options.samples.turns.longest_sum && !(fit.model().noise.from_hz > 0.0)) {
         constexpr double of_uniform = -1.2;
         const double m = static_cast<double>(length);

@@ -19,6 +19,14 @@ struct TurnPattern {
     std::shared_ptr<const KickRows> kicks;
 };
 
+/// Turns a second at whose alias the squares of innovations have a line, and the step of the spectrum that shows it.
+struct SeenTurns {
+    double turn_hz = 0.0;
+    double bin_hz = 0.0;
+};
+/// Near the declared dither, which there must be; none where the line may be chance.
+std::optional<SeenTurns> turns_in_squares(const SampleFit& base, const record::Declared& declared);
+
 /// Finds the turns of the declared dither by the squares of the innovations of the base model; none where the record
 /// declares no dither, or where its samples do not show the turns.
 ///
@@ -28,7 +36,7 @@ std::optional<TurnPattern> find_turn_pattern(const SampleFit& base, const record
 
 /// The model's noise with the pattern.
 void take_turn_pattern(const TurnPattern& pattern, SampleNoise& noise);
-/// The noise without the pattern, and with that of another.
+/// The noise without kicks at the turns and without noise of the dither, and with those of another.
 void drop_turn_pattern(SampleNoise& noise);
 void copy_turn_pattern(const SampleNoise& from, SampleNoise& to);
 

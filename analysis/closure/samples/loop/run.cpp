@@ -12,6 +12,7 @@
 #include "analysis/closure/decide/verdict.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/declared_reader.hpp"
+#include "analysis/closure/samples/fit/dither_noise.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/fit/motion.hpp"
 #include "analysis/closure/samples/fit/steps.hpp"
@@ -23,6 +24,7 @@ namespace ringlock::closure {
 
 namespace {
 
+constexpr std::string_view note_on_dither = "the declared reader leaves the noise of the dither in the samples";
 constexpr std::string_view note_on_turns = "the white noise of the rate comes in kicks at the turns of the dither";
 
 }  // namespace
@@ -55,6 +57,14 @@ std::shared_ptr<SampleFit> SampleLoop::fit_base(Closure& closure) const {
 
 /// The same model with the turns of the declared dither, where the record shows them; else null.
 std::shared_ptr<SampleFit> SampleLoop::with_turns(const SampleFit& fit, Closure& closure) const {
+    if (const auto dither = find_dither_noise(fit, record_)) {
+        SampleModel model = fit.model();
+        take_dither_noise(*dither, model.noise);
+        std::erase_if(closure.notes, [](const std::string& other) { return other.starts_with(note_on_dither); });
+        closure.notes.push_back(fmt::format("{}: {:.0f} % of the variance of the white angle noise, at {:.7g} Hz",
+                                            note_on_dither, 100.0 * dither->share, 0.5 * dither->turn_hz));
+        return std::make_shared<SampleFit>(series_, std::move(model), rows_);
+    }
     const auto pattern = find_turn_pattern(fit, record_.declared);
     if (!pattern) return nullptr;
     SampleModel model = fit.model();
@@ -72,7 +82,7 @@ void SampleLoop::find_turns_again(Closure& closure) {
     const SampleNoise& noise = now_.fit->model().noise;
     if (noise.from_hz > 0.0 || rounded_.drawn() || filtered_rows(record_)) return;
     std::shared_ptr<SampleFit> without = now_.fit;
-    if (noise.kicks) {
+    if (noise.kicks || noise.dither) {
         SampleModel model = now_.fit->model();
         drop_turn_pattern(model.noise);
         without = std::make_shared<SampleFit>(series_, std::move(model), rows_, SampleFit::Noise::near);
@@ -173,7 +183,10 @@ void SampleLoop::finish(Closure& closure) {
         Step& step = closure.steps.emplace_back(std::move(now_.added[k].step));
         if (step.parameters.empty()) step.parameters = std::move(figures.steps[k]);
         std::string why;
-        if (!accounted_by_reader(step, record_, why)) continue;
+        if (!accounted_by_reader(step, record_, why)) {
+            closure.notes.insert(closure.notes.end(), figures.step_notes[k].begin(), figures.step_notes[k].end());
+            continue;
+        }
         closure.steps.pop_back();
         closure.notes.push_back(std::move(why));
     }

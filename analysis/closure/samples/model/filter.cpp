@@ -20,6 +20,23 @@ void SampleFilter::advance(const SampleFilter& filter, std::array<double, D>& x)
     x = next;
 }
 
+/// As the lanes do (lanes.cpp), of the states alone.
+template <int D>
+void SampleFilter::pass_turns(std::size_t row, std::array<double, D>& x, std::array<double, D>& h) const {
+    const DitherRows& rows = *states_.dither;
+    double& last = x[states_.of_dither];
+    double& next = x[states_.of_dither + 1];
+    double& learnt = x[states_.of_dither + 2];
+    for (int turn = 0; turn < rows.passed[row]; ++turn) {
+        learnt += states_.dither_learnt * (0.5 * (last + next) - learnt);
+        last = next;
+        next *= states_.dither_memory;
+    }
+    h[states_.of_dither] = rows.last[row];
+    h[states_.of_dither + 1] = rows.next[row];
+    h[states_.of_dither + 2] = rows.notched[row];
+}
+
 SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double interval_s) : states_(noise, interval_s) {
     filter_gains(states_, rows, [&](const SampleGains& row) {
         gain_.insert(gain_.end(), row.gain.begin(), row.gain.end());
@@ -92,6 +109,9 @@ std::vector<double> SampleFilter::apply(std::span<const double> increments) cons
                     h[D - 2] = 1.0 - share_[k];
                     h[D - 1] = share_[k];
                 }
+            }
+            if constexpr (D >= 4) {
+                if (states_.dither) pass_turns<D>(k, x, h);
             }
             before += increments[k];
             double e = before;

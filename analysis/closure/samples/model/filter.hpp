@@ -25,7 +25,8 @@ class SampleFilter {
                                                      std::span<const double> increments,
                                                      std::span<const std::uint8_t> rows);
 
-    /// Many filters step by step, for readings of the angle that are not known beforehand; not of a resampled record.
+    /// Many filters step by step, for readings of the angle that are not known beforehand; not of a resampled record,
+    /// nor of one with noise of the dither.
     class Many {
        public:
         /// Each begins at a reading.
@@ -47,6 +48,8 @@ class SampleFilter {
     using Terms = SampleStates::Terms;
     template <int D>
     static void advance(const SampleFilter& filter, std::array<double, D>& x);
+    template <int D>
+    void pass_turns(std::size_t row, std::array<double, D>& x, std::array<double, D>& h) const;
 
     SampleStates states_;
     std::vector<double> gain_;  ///< until they stay the same

@@ -86,6 +86,10 @@ class Lanes {
         }
         floor_ = from([](const SampleStates& s) { return s.floor; });
         kick_ = from([](const SampleStates& s) { return s.kick; });
+        memory_ = from([](const SampleStates& s) { return s.dither_memory; });
+        learnt_ = from([](const SampleStates& s) { return s.dither_learnt; });
+        renewed_ =
+            from([](const SampleStates& s) { return (1.0 - s.dither_memory * s.dither_memory) * s.dither_variance; });
         ratio_ = from([](const SampleStates& s) { return s.ratio; });
         place_ = from([](const SampleStates& s) { return s.first_place; });
         for (std::size_t k = 0; k < A::lanes(); ++k) {
@@ -101,6 +105,9 @@ class Lanes {
             step_row();
             if constexpr (D >= 2) {
                 if (of_->kicks) kick(row);
+            }
+            if constexpr (D >= 4) {
+                if (of_->dither) pass_turns(row);
             }
         }
         V e = A::set(angle);
@@ -190,6 +197,30 @@ class Lanes {
         p_[1][1] = A::mul_add(kick_, A::set(kicks.carried[row]), p_[1][1]);
     }
 
+    /// Amplitudes of the dither's noise at the turns that were passed, and how they are read.
+    void pass_turns(std::size_t row) {
+        const DitherRows& rows = *of_->dither;
+        const int u = of_->of_dither;
+        const int v = u + 1;
+        const int m = u + 2;
+        const V half = A::mul(A::set(0.5), learnt_);
+        const V kept = A::sub(A::set(1.0), learnt_);
+        const auto pass = [&](V& at_u, V& at_v, V& at_m) {
+            at_m = A::mul_add(half, A::add(at_u, at_v), A::mul(kept, at_m));
+            at_u = at_v;
+            at_v = A::mul(memory_, at_v);
+        };
+        for (int turn = 0; turn < rows.passed[row]; ++turn) {
+            pass(x_[u], x_[v], x_[m]);
+            for (int i = 0; i < D; ++i) pass(p_[i][u], p_[i][v], p_[i][m]);
+            for (int i = 0; i < D; ++i) pass(p_[u][i], p_[v][i], p_[m][i]);
+            p_[v][v] = A::add(p_[v][v], renewed_);
+        }
+        h_[u] = A::set(rows.last[row]);
+        h_[v] = A::set(rows.next[row]);
+        h_[m] = A::set(rows.notched[row]);
+    }
+
     void step_states() {
         Line next;
         for (int i = 0; i < D; ++i) {
@@ -228,7 +259,7 @@ class Lanes {
         for (int i = 0; i < D; ++i) {
             for (int j = 0; j < D; ++j) p_[i][j] = A::neg_mul_add(gain_[i], ph[j], p_[i][j]);
         }
-        if (!of_->resampled && !of_->swings && !of_->kicks) settle(last);
+        if (!of_->resampled && !of_->swings && !of_->kicks && !of_->dither) settle(last);
     }
 
     /// Whether gains have stopped changing: each, since those of slow rates settle long after the variance has.
@@ -251,6 +282,7 @@ class Lanes {
     std::array<Line, D> p_, q_, f_;
     Line h_, x_, gain_;
     V floor_, kick_, ratio_, place_;
+    V memory_, learnt_, renewed_;
     V variance_;
     std::array<double, most_lanes> ticks_{};
     std::array<Swing, most_lanes> swing_{};

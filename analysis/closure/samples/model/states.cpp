@@ -8,6 +8,29 @@
 
 namespace ringlock::closure {
 
+namespace {
+
+/// Stationary covariance of the amplitudes at the last and the next turn and of what is learnt of them.
+std::array<std::array<double, 3>, 3> covariance_of_dither(double variance, double memory, double learnt) {
+    std::array<std::array<double, 3>, 3> p{};
+    p[0][0] = p[1][1] = variance;
+    p[0][1] = p[1][0] = memory * variance;
+    if (learnt == 0.0) return p;
+    // m' = (1 - b) m + b (u + v)/2 and v' = memory v + noise: stationary of E[m u'] = E[m' v], E[m' v'] and E[m'^2].
+    const double b = learnt;
+    const double last = 0.5 * b * (1.0 + memory) * variance / (1.0 - (1.0 - b) * memory);  // E[m' u'], u' = v
+    const double with_u = last;
+    const double with_v = memory * last;
+    const double mean_square = 0.5 * variance * (1.0 + memory);
+    const double square = (b * b * mean_square + (1.0 - b) * b * (with_u + with_v)) / (1.0 - (1.0 - b) * (1.0 - b));
+    p[0][2] = p[2][0] = with_u;
+    p[1][2] = p[2][1] = with_v;
+    p[2][2] = square;
+    return p;
+}
+
+}  // namespace
+
 SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
     resampled = noise.from_hz > 0.0;
     const double dt = resampled ? 1.0 / noise.from_hz : interval_s;
@@ -59,9 +82,24 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         p[count][count + 1] = p[count + 1][count] = v * a / (1.0 + b);
         count += 2;
     }
-    const double readout = noise.angle_arcsec * noise.angle_arcsec;
+    double readout = noise.angle_arcsec * noise.angle_arcsec;
+    if (noise.dither && !resampled && count + 3 <= most) {
+        dither = noise.dither;
+        of_dither = count;
+        dither_variance = noise.dither_share * readout;
+        dither_memory = noise.dither_memory;
+        dither_learnt = noise.dither_learnt;
+        const auto stationary = covariance_of_dither(dither_variance, dither_memory, dither_learnt);
+        for (int i = 0; i < 3; ++i) {
+            f[count + i][count + i] = 1.0;
+            for (int j = 0; j < 3; ++j) p[count + i][count + j] = stationary[i][j];
+            h[count + i] = 1.0;
+        }
+        count += 3;
+    }
     // The record begins at angle zero as it was read.
     p[0][0] = readout;
+    if (dither) readout -= dither_variance;
     floor = readout;
     if (resampled) {
         const int r0 = count;
@@ -107,8 +145,8 @@ bool SampleStates::is_like(const SampleStates& other) const {
         return std::equal(h.begin(), h.end(), other.h.begin(),
                           [](double a, double b) { return (a == 0.0) == (b == 0.0); });
     };
-    return count == other.count && resampled == other.resampled && kicks == other.kicks && swings == other.swings &&
-           nonzero == other.nonzero && same_zeros();
+    return count == other.count && resampled == other.resampled && kicks == other.kicks && dither == other.dither &&
+           swings == other.swings && nonzero == other.nonzero && same_zeros();
 }
 
 }  // namespace ringlock::closure

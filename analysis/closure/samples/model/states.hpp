@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <type_traits>
 #include <vector>
@@ -11,6 +12,14 @@ namespace ringlock::closure {
 /// over that of a whole kick, summed over the turns that are next to the row's end.
 struct KickRows {
     std::vector<double> variance, carried, covariance;
+};
+
+/// Noise of the dither in readings that still have it: amplitudes a_k at the turns, linear between them in the cosine
+/// of the dither. By the rows of a record: turns passed since the row before, and the weights with which the amplitudes
+/// at the last turn and at the next, and what a notch has subtracted of them, enter the reading.
+struct DitherRows {
+    std::vector<std::uint16_t> passed;
+    std::vector<double> last, next, notched;
 };
 
 /// What is random in a record of samples; angles in arcsec.
@@ -29,6 +38,12 @@ struct SampleNoise {
     std::shared_ptr<const KickRows> kicks = {};
     /// Variance of a kick [arcsec^2].
     double kick_variance() const { return kick_share * rate_arcsec_rt_s * rate_arcsec_rt_s / turn_hz; }
+    /// Share of the variance of the readings' errors that is noise of the dither, as it is at the turns; correlation of
+    /// its amplitudes from turn to turn; share of an amplitude that a notch learns in half a cycle. Null: none.
+    double dither_share = 0.0;
+    double dither_memory = 0.0;
+    double dither_learnt = 0.0;
+    std::shared_ptr<const DitherRows> dither = {};
     /// An angle that is a second-order autoregression.
     struct Resonance {
         double arcsec, hz, width_hz;
@@ -67,6 +82,11 @@ struct SampleStates {
     /// Variance of a kick. The part of a kick that belongs to the next row is the second state, after the angle.
     double kick = 0.0;
     std::shared_ptr<const KickRows> kicks;
+    /// The dither's noise: the first of its three states, amplitudes at the last and the next turn and what is learnt
+    /// of them; their variance, memory and share that is learnt.
+    std::shared_ptr<const DitherRows> dither;
+    int of_dither = 0;
+    double dither_variance = 0.0, dither_memory = 0.0, dither_learnt = 0.0;
     bool swings = false;
     double swing_by_row = 0.0, swing_cos = 0.0, swing_sin = 0.0;
     double floor = 0.0;  ///< variance of the measurement itself
