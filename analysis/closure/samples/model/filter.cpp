@@ -110,7 +110,7 @@ std::vector<double> SampleFilter::apply(std::span<const double> increments) cons
                     h[D - 1] = share_[k];
                 }
             }
-            if constexpr (D >= 4) {
+            if constexpr (D > SampleStates::dither_states) {
                 if (states_.dither) pass_turns<D>(k, x, h);
             }
             before += increments[k];

@@ -106,7 +106,7 @@ class Lanes {
             if constexpr (D >= 2) {
                 if (of_->kicks) kick(row);
             }
-            if constexpr (D >= 4) {
+            if constexpr (D > SampleStates::dither_states) {
                 if (of_->dither) pass_turns(row);
             }
         }

@@ -83,19 +83,19 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         count += 2;
     }
     double readout = noise.angle_arcsec * noise.angle_arcsec;
-    if (noise.dither && !resampled && count + 3 <= most) {
+    if (noise.dither && !resampled && count + dither_states <= most) {
         dither = noise.dither;
         of_dither = count;
         dither_variance = noise.dither_share * readout;
         dither_memory = noise.dither_memory;
         dither_learnt = noise.dither_learnt;
         const auto stationary = covariance_of_dither(dither_variance, dither_memory, dither_learnt);
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < dither_states; ++i) {
             f[count + i][count + i] = 1.0;
-            for (int j = 0; j < 3; ++j) p[count + i][count + j] = stationary[i][j];
+            for (int j = 0; j < dither_states; ++j) p[count + i][count + j] = stationary[i][j];
             h[count + i] = 1.0;
         }
-        count += 3;
+        count += dither_states;
     }
     // The record begins at angle zero as it was read.
     p[0][0] = readout;

@@ -62,6 +62,7 @@ struct SampleNoise {
 /// of a resampled record two readings.
 struct SampleStates {
     static constexpr int most = 16;
+    static constexpr int dither_states = 3;  ///< of the noise of the dither, behind the angle
     using Vector = std::array<double, most>;
     using Matrix = std::array<Vector, most>;
     /// Which of a row of F are not zero.
