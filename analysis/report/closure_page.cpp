@@ -26,6 +26,7 @@ namespace {
 using closure::Closure;
 using closure::Estimate;
 using closure::Predictive;
+using closure::PredictiveStatistic;
 using closure::Step;
 
 /// What a cell of a table may hold.
