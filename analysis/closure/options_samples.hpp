@@ -268,7 +268,7 @@ struct SampleContestOptions {
     double lost_of_jumps = 0.1;
     /// Sources of a resampled record are the same within this [of the record's rate].
     double same_source = 1e-3;
-    /// Sources faster than this are not told from others that leave the same pattern [of the record's rate].
+    /// Sources faster than this cannot be distinguished from others that make the same pattern [of the record's rate].
     double told_up_to = 2.0;
 };
 

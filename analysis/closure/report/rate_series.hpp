@@ -5,7 +5,7 @@
 #include "analysis/closure/closure.hpp"
 #include "analysis/record/record.hpp"
 
-/// The measured rate over time and near a frequency, and what the model says of it, for the figures of a report.
+/// The measured rate over time and near a frequency, and the prediction of the model, for the figures of a report.
 namespace ringlock::closure {
 
 /// Mean rates over consecutive intervals of one length.
@@ -21,8 +21,8 @@ RateSeries rates_of(const record::Record& record);
 /// Means over as many of these as make at most `points` of them.
 RateSeries averaged(const RateSeries& rates, std::size_t points);
 
-/// What is deterministic in the model, as mean rates over the same intervals [deg/h]: mean rate or bias, known input,
-/// and the effects that add an angle, chance apart.
+/// The deterministic part of the model, as mean rates over the same intervals [deg/h]: mean rate or bias, known input,
+/// and the effects that add an angle, without their random parts.
 std::vector<double> determined_rates(const record::Record& record, const Closure& closure, const RateSeries& rates);
 
 /// A spectrum near one frequency, finer than the resolution of the record.

@@ -154,7 +154,7 @@ std::optional<DitherNoise> find_dither_noise(const SampleFit& base, const record
     if (!record.reader || !record.declared.dither_frequency_hz) return std::nullopt;
     const reader::Settings& settings = record.reader->settings;
     if (settings.stripping != Stripping::none && settings.stripping != Stripping::notch) return std::nullopt;
-    // Beside the dither itself its noise is not seen.
+    // The noise of the dither is far below the dither itself, whose line must be in the model first.
     if (settings.stripping == Stripping::none && !has_dither_line(base, *record.declared.dither_frequency_hz)) {
         return std::nullopt;
     }
@@ -190,7 +190,7 @@ std::optional<DitherNoise> find_dither_noise(const SampleFit& base, const record
     vary(&DitherNoise::memory, by.dither_memories);
     vary(&DitherNoise::share, by.dither_shares);
     best.gain = search.fitted(best).gain_over(base);
-    // The less else is in the readings, the closer they tell where the turns are and what is remembered.
+    // The smaller the other noises are, the more precisely the readings determine turns and memory.
     double place_step = by.dither_place_step;
     double hz_step = 0.1 * seen->bin_hz;
     for (int round = 0; round < by.dither_rounds; ++round) {

@@ -10,7 +10,7 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Stationary covariance of the amplitudes at the last and the next turn and of what is learnt of them.
+/// Stationary covariance of the amplitudes at the last and the next turn and of the mean that a notch learns of them.
 std::array<std::array<double, 3>, 3> covariance_of_dither(double variance, double memory, double learnt) {
     std::array<std::array<double, 3>, 3> p{};
     p[0][0] = p[1][1] = variance;

@@ -16,7 +16,7 @@ struct KickRows {
 
 /// Noise of the dither in readings that still have it: amplitudes a_k at the turns, linear between them in the cosine
 /// of the dither. By the rows of a record: turns passed since the row before, and the weights with which the amplitudes
-/// at the last turn and at the next, and what a notch has subtracted of them, enter the reading.
+/// at the last turn and at the next, and the mean that a notch has subtracted, enter the reading.
 struct DitherRows {
     std::vector<std::uint16_t> passed;
     std::vector<double> last, next, notched;
