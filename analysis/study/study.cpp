@@ -17,6 +17,7 @@
 #include "analysis/allan/octave_deviation.hpp"
 #include "analysis/allan/octave_stream.hpp"
 #include "analysis/study/angle_counts.hpp"
+#include "engine/core/error.hpp"
 #include "engine/ensemble/arena.hpp"
 #include "engine/ensemble/closed_form.hpp"
 #include "engine/ensemble/draw.hpp"
