@@ -177,8 +177,13 @@ struct SampleTurnOptions {
     /// Effort: rounds in which frequency, place, share and memory are refined, until one gains less than this [nats].
     int dither_rounds = 8;
     double dither_settled = 0.1;
-    double dither_place_step = 0.01;  ///< the first, in turns; each round halves it
+    double dither_place_step = 0.01;       ///< the first, in turns; each round halves it
+    double dither_asymmetry_step = 0.004;  ///< the same of the turn in the middle of a cycle
     std::array<double, 10> dither_memories = {0.0, 0.3, 0.6, 0.8, 0.9, 0.95, 0.97, 0.98, 0.985, 0.992};
+    /// Of the sidebands that a noisy drive makes: widths over the frequency of the dither, one over the Q of its
+    /// resonator, and rms over that of the innovations, from which fits begin.
+    std::array<double, 3> sideband_widths = {0.002, 0.01, 0.05};
+    double sideband_first_rms = 0.5;
 };
 
 /// What a declared reader accounts for (samples/fit/declared_reader).

@@ -181,6 +181,8 @@ class Branch {
     bool empty() const { return listeners_.empty(); }
     bool every_turn() const { return every_turn_; }
 
+    void follow_between_turns(const reader::CaseRotation& rotation) { latch_->follow(rotation); }
+
     void advance(std::size_t turns, std::span<const simd::Lanes> angle_arcsec, const CouplingChanges& coupling,
                  const readout::ElectronicNoise& noise) {
         dither_.next(turns, angle_arcsec, coupling.threshold_factors(), drive_, coupling.phases_rad());
@@ -313,29 +315,6 @@ class Branch {
     readout::LaneAngles angles_;
 };
 
-/// The input's profile less the mean that the gyros have for a rate.
-class Profile final : public effects::LaneRateProcess {
-   public:
-    Profile(const scenario::InputRate& input, const std::vector<gyro::Setup>& setups) : input_(input) {
-        for (const gyro::Setup& setup : setups) mean_deg_h_.push_back(setup.input_rate_deg_h);
-    }
-
-    void add_angles(const effects::LaneIntervals& intervals, std::span<simd::Lanes> angle_arcsec) override {
-        for (std::size_t i = 0; i < angle_arcsec.size(); ++i) {
-            for (std::size_t lane = 0; lane < mean_deg_h_.size(); ++lane) {
-                const double duration_s = intervals.duration_s[i][lane];
-                angle_arcsec[i][lane] +=
-                    scenario::profile_angle_arcsec(input_, intervals.start_s[i][lane], duration_s) -
-                    mean_deg_h_[lane] * duration_s;
-            }
-        }
-    }
-
-   private:
-    scenario::InputRate input_;
-    std::vector<double> mean_deg_h_;
-};
-
 random::LaneIdentities identities(const scenario::Scenario& scenario, std::int64_t first_gyro, std::size_t gyros) {
     random::LaneIdentities who;
     who.seed = scenario.ensemble.seed;
@@ -366,19 +345,42 @@ struct GyroBlock::State {
         noisy_comparators = scenario.readout.model == scenario::ReadoutModel::instrument &&
                             scenario.readout.comparator_noise_relative > 0.0;
         for (const scenario::ActiveEffect& active : scenario::active_effects(scenario)) {
-            if (active.effect->adds_angle()) processes.push_back(added_angles(active, scenario, setups));
+            if (active.effect->adds_angle()) add(angle_of(active, scenario, setups));
             if (auto process = active.effect->lane_rate_process(*active.values, who, setups.size())) {
                 processes.push_back(std::move(process));
             }
         }
         if (scenario::has_profile(scenario.input)) {
-            processes.push_back(std::make_unique<Profile>(scenario.input, setups));
+            add(angle_of_profile(scenario.input, setups));
         }
+        if (readers) follow_between_turns(scenario);
         for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
             const gyro::Device device(setups[std::min(lane, setups.size() - 1)]);
             duration_s[0][lane] = device.positive_duration_s;
             duration_s[1][lane] = device.negative_duration_s;
         }
+    }
+
+    void add(AngleOver added) {
+        processes.push_back(angles_of(added, setups.size()));
+        steady.push_back(std::move(added));
+    }
+
+    /// A reader asks between turns for what the turns know from half cycle to half cycle.
+    void follow_between_turns(const scenario::Scenario& scenario) {
+        reader::CaseRotation rotation;
+        rotation.who = who;
+        for (const auto& [effect, values] : scenario::active_effects(scenario)) {
+            rotation.white_arcsec2_s += effect->rate_noise(*values).white_deg2_h2_s;
+        }
+        if (!steady.empty()) {
+            rotation.angle_arcsec = [added = steady](std::size_t lane, double start_s, double for_s) {
+                double sum_arcsec = 0.0;
+                for (const AngleOver& angle : added) sum_arcsec += angle(lane, start_s, for_s);
+                return sum_arcsec;
+            };
+        }
+        for (Branch& branch : branches) branch.follow_between_turns(rotation);
     }
 
     double turn_time_s(std::int64_t number, std::size_t lane) const {
@@ -437,7 +439,8 @@ struct GyroBlock::State {
     std::span<const simd::Lanes> count_errors;
     std::vector<Branch> branches;
     std::vector<std::unique_ptr<effects::LaneRateProcess>> processes;
-    bool every_turn = false;  // some compensator wants the maxima, too
+    std::vector<AngleOver> steady;  ///< what those of them that have no chance in them add
+    bool every_turn = false;        // some compensator wants the maxima, too
     bool noisy_detectors = false;
     bool noisy_comparators = false;
     std::array<simd::Lanes, 2> duration_s;

@@ -1,6 +1,7 @@
 #include "engine/ensemble/changes.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "engine/ensemble/draw.hpp"
 #include "engine/gyro/device.hpp"
@@ -11,44 +12,52 @@ namespace {
 
 class AddedAngles final : public effects::LaneRateProcess {
    public:
-    AddedAngles(const scenario::ActiveEffect& active, const scenario::Scenario& scenario,
-                const std::vector<gyro::Setup>& setups)
-        : change_(active.effect->change(*active.values)),
-          scenario_(scenario),
-          setups_(setups),
-          temperature_varies_(scenario::temperature_varies(scenario.environment)) {}
+    AddedAngles(AngleOver added, std::size_t lanes) : added_(std::move(added)), lanes_(lanes) {}
 
     void add_angles(const effects::LaneIntervals& intervals, std::span<simd::Lanes> angle_arcsec) override {
-        for (std::size_t lane = 0; lane < setups_.size(); ++lane) {
-            effects::Interval at;
+        for (std::size_t lane = 0; lane < lanes_; ++lane) {
             for (std::size_t i = 0; i < angle_arcsec.size(); ++i) {
-                at.start_s = intervals.start_s[i][lane];
-                at.duration_s = intervals.duration_s[i][lane];
-                for (const int end : {0, 1}) {
-                    const double time_s = at.start_s + end * at.duration_s;
-                    at.input_rate_deg_h[end] = input_rate_at_deg_h(scenario_, setups_[lane], time_s);
-                    if (temperature_varies_) {
-                        at.temperature_change_k[end] = scenario::temperature_change_k(scenario_.environment, time_s);
-                    }
-                }
-                angle_arcsec[i][lane] += change_(at).angle_arcsec;
+                angle_arcsec[i][lane] += added_(lane, intervals.start_s[i][lane], intervals.duration_s[i][lane]);
             }
         }
     }
 
    private:
-    effects::ChangeOver change_;
-    scenario::Scenario scenario_;
-    std::vector<gyro::Setup> setups_;
-    bool temperature_varies_;
+    AngleOver added_;
+    std::size_t lanes_;
 };
 
 }  // namespace
 
-std::unique_ptr<effects::LaneRateProcess> added_angles(const scenario::ActiveEffect& active,
-                                                       const scenario::Scenario& scenario,
-                                                       const std::vector<gyro::Setup>& setups) {
-    return std::make_unique<AddedAngles>(active, scenario, setups);
+AngleOver angle_of(const scenario::ActiveEffect& active, const scenario::Scenario& scenario,
+                   const std::vector<gyro::Setup>& setups) {
+    return [change = active.effect->change(*active.values), scenario, setups,
+            temperature_varies = scenario::temperature_varies(scenario.environment)](std::size_t lane, double start_s,
+                                                                                     double duration_s) {
+        effects::Interval at;
+        at.start_s = start_s;
+        at.duration_s = duration_s;
+        for (const int end : {0, 1}) {
+            const double time_s = start_s + end * duration_s;
+            at.input_rate_deg_h[end] = input_rate_at_deg_h(scenario, setups[lane], time_s);
+            if (temperature_varies) {
+                at.temperature_change_k[end] = scenario::temperature_change_k(scenario.environment, time_s);
+            }
+        }
+        return change(at).angle_arcsec;
+    };
+}
+
+AngleOver angle_of_profile(const scenario::InputRate& input, const std::vector<gyro::Setup>& setups) {
+    std::vector<double> mean_deg_h;
+    for (const gyro::Setup& setup : setups) mean_deg_h.push_back(setup.input_rate_deg_h);
+    return [input, mean_deg_h](std::size_t lane, double start_s, double duration_s) {
+        return scenario::profile_angle_arcsec(input, start_s, duration_s) - mean_deg_h[lane] * duration_s;
+    };
+}
+
+std::unique_ptr<effects::LaneRateProcess> angles_of(AngleOver added, std::size_t lanes) {
+    return std::make_unique<AddedAngles>(std::move(added), lanes);
 }
 
 CouplingChanges::CouplingChanges(const scenario::Scenario& scenario, const std::vector<gyro::Setup>& setups)

@@ -1,6 +1,8 @@
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -13,10 +15,19 @@
 /// What effects do to a block of gyros without chance, under the scenario's temperature and input rate.
 namespace ringlock::ensemble {
 
-/// The angle that an effect adds. The effect must outlive it.
-std::unique_ptr<effects::LaneRateProcess> added_angles(const scenario::ActiveEffect& active,
-                                                       const scenario::Scenario& scenario,
-                                                       const std::vector<gyro::Setup>& setups);
+/// Rotation [arcsec] that something adds to a gyro of a block from `start_s` after the start of the run on, over
+/// `duration_s`: a pure function of these.
+using AngleOver = std::function<double(std::size_t lane, double start_s, double duration_s)>;
+
+/// What an effect adds. The effect must outlive it.
+AngleOver angle_of(const scenario::ActiveEffect& active, const scenario::Scenario& scenario,
+                   const std::vector<gyro::Setup>& setups);
+
+/// The input's profile less the mean that the gyros have for a rate.
+AngleOver angle_of_profile(const scenario::InputRate& input, const std::vector<gyro::Setup>& setups);
+
+/// The same over the half cycles of a block of `lanes` gyros.
+std::unique_ptr<effects::LaneRateProcess> angles_of(AngleOver added, std::size_t lanes);
 
 /// What all active effects do to the coupling, half cycle by half cycle. Effects whose bounds say that nothing of it
 /// changes over the run are left out.

@@ -35,6 +35,7 @@ enum class Purpose : std::uint64_t {
     sensitivity_bootstrap = 21,
     latched_detectors = 22,
     dither_reference = 23,
+    white_rate_between_turns = 24,
 };
 
 /// Who draws: the study's seed and the gyro's number.

@@ -8,6 +8,53 @@
 
 namespace ringlock::reader {
 
+namespace {
+
+/// What varying rates add within one half cycle of one gyro beyond a constant rate over it: zero at both ends.
+class Bend {
+   public:
+    Bend(const CaseRotation& rotation, std::size_t lane, double start_s, double duration_s)
+        : rotation_(rotation), lane_(lane), start_s_(start_s), duration_s_(duration_s) {
+        if (rotation.angle_arcsec) whole_arcsec_ = rotation.angle_arcsec(lane, start_s, duration_s);
+    }
+
+    /// At an instant after its start that is not before the one asked for last; `number` makes the chance of it.
+    double arcsec(double after_s, std::uint64_t number) {
+        after_s = std::clamp(after_s, 0.0, duration_s_);
+        double bend_arcsec = 0.0;
+        if (rotation_.angle_arcsec) {
+            bend_arcsec = rotation_.angle_arcsec(lane_, start_s_, after_s) - after_s / duration_s_ * whole_arcsec_;
+        }
+        return bend_arcsec + white_arcsec(after_s, number);
+    }
+
+   private:
+    /// A Brownian bridge: the angle of a white rate whose values at both turns are known.
+    double white_arcsec(double after_s, std::uint64_t number) {
+        if (rotation_.white_arcsec2_s == 0.0) return 0.0;
+        const double left_s = duration_s_ - last_s_;
+        if (left_s > 0.0) {
+            const double share = (after_s - last_s_) / left_s;
+            const double rms_arcsec = std::sqrt(rotation_.white_arcsec2_s * (after_s - last_s_) * (1.0 - share));
+            const random::Identity who{rotation_.who.seed, rotation_.who.gyro[lane_]};
+            last_arcsec_ = (1.0 - share) * last_arcsec_ +
+                           rms_arcsec * random::normal(who, random::Purpose::white_rate_between_turns, number);
+            last_s_ = after_s;
+        }
+        return last_arcsec_;
+    }
+
+    const CaseRotation& rotation_;
+    std::size_t lane_;
+    double start_s_;
+    double duration_s_;
+    double whole_arcsec_ = 0.0;
+    double last_s_ = 0.0;
+    double last_arcsec_ = 0.0;
+};
+
+}  // namespace
+
 Latch::Latch(std::span<const gyro::Device> devices, double latch_hz, std::int64_t first_turn)
     : first_turn_(first_turn) {
     for (const gyro::Device& device : devices) {
@@ -82,14 +129,18 @@ void Latch::read_half_cycle(const gyro::LaneDrive& drive, const gyro::LaneTurns&
         return (half.drive_rate_rad_s(place(after_turn_s)) / slower - half.rate_rad_s) / units::two_pi;
     };
     const double begins_s = own.clock.time_s(0) - own.clock.after_turn_s(0, begins);
-    const auto instant_at = [&](double after_turn_s) {
+    // Rates vary with the run's time between nominal turns; the record begins at turn `first_turn_`, a minimum.
+    const double period_s = device.positive_duration_s + device.negative_duration_s;
+    Bend bend(rotation_, lane, begins_s + 0.5 * static_cast<double>(first_turn_) * period_s, duration_s);
+    const auto instant_at = [&](double after_turn_s, std::uint64_t number) {
         const double t_s = place(after_turn_s);
         Instant instant;
         instant.row = row;
         instant.time_s = begins_s + after_turn_s;
         instant.whole_fringes = start.rotation_whole + turns.lockin_whole[lane] + swing_whole;
         instant.fringes = start.plain_fringes + propagate::lockin_between_turns_fringes(passed, t_s) +
-                          half.plain_phase_rad(t_s) / units::two_pi;
+                          half.plain_phase_rad(t_s) / units::two_pi +
+                          bend.arcsec(t_s, number) * device.phase_per_arcsec / units::two_pi;
         instant.dither_fringes = dither_fringes(after_turn_s);
         instant.dither_ahead_fringes = dither_rate_hz(after_turn_s) / half.angular_frequency_rad_s();
         return instant;
@@ -103,7 +154,7 @@ void Latch::read_half_cycle(const gyro::LaneDrive& drive, const gyro::LaneTurns&
         crossing_s += delay_s_;
     }
     const auto cross = [&] {
-        own.instants.push_back(instant_at(crossing_s));
+        own.instants.push_back(instant_at(crossing_s, 2 * static_cast<std::uint64_t>(begins) + 1));
         own.instants.back().crossing = true;
         own.instants.back().tick = own.next_tick;
         crossing_due = false;
@@ -111,7 +162,7 @@ void Latch::read_half_cycle(const gyro::LaneDrive& drive, const gyro::LaneTurns&
     for (; before_end(own.next_tick); ++own.next_tick) {
         const double at_s = own.clock.after_turn_s(own.next_tick, begins);
         if (crossing_due && crossing_s < at_s) cross();
-        own.instants.push_back(instant_at(at_s));
+        own.instants.push_back(instant_at(at_s, 2 * static_cast<std::uint64_t>(own.next_tick)));
         own.instants.back().tick = own.next_tick;
         own.instants.back().time_s = own.clock.time_s(own.next_tick);
     }

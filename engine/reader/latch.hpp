@@ -1,10 +1,13 @@
 #pragma once
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "engine/gyro/device.hpp"
 #include "engine/gyro/lane_drive.hpp"
+#include "engine/random/normal_lanes.hpp"
 #include "engine/reader/tick_clock.hpp"
 
 namespace ringlock::reader {
@@ -21,6 +24,18 @@ struct Instant {
     double dither_ahead_fringes = 0.0;  ///< its rate over its angular frequency: the same a quarter of a cycle later
 };
 
+/// Rates of the case that vary. The turns know what they add from turn to turn, as a constant rate over each half
+/// cycle; this is how the angle runs between them.
+struct CaseRotation {
+    /// Rotation [arcsec] of a gyro of the block from `start_s` after the start of the run on, over `duration_s`, chance
+    /// apart; empty where no rate varies.
+    std::function<double(std::size_t lane, double start_s, double duration_s)> angle_arcsec = {};
+    /// Two-sided power spectral density of the sum of all white rates [arcsec^2/s]: the variance of the angle that it
+    /// adds in a second. Random rates that remember longer than a half cycle bend nothing within one.
+    double white_arcsec2_s = 0.0;
+    random::LaneIdentities who = {};
+};
+
 /// Finds the phase of a block of gyros at the ticks of a clock that is not tied to the dither.
 class Latch {
    public:
@@ -32,6 +47,9 @@ class Latch {
         crossings_ = true;
         delay_s_ = delay_s;
     }
+
+    /// From now on the rotation of the case bends between turns, too.
+    void follow(const CaseRotation& rotation) { rotation_ = rotation; }
 
     /// The instants of the next piece, in the order of time: for each gyro those before the last of its turns.
     /// `turns` with the phases in the middles of half cycles, as far as the propagator knows them.
@@ -57,6 +75,7 @@ class Latch {
 
     std::vector<Lane> lanes_;
     std::int64_t first_turn_;
+    CaseRotation rotation_;
     bool crossings_ = false;
     double delay_s_ = 0.0;
     bool begun_ = false;

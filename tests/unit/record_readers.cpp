@@ -56,6 +56,38 @@ TEST(Readers, AReferenceWithoutErrorLeavesTheRotation) {
     EXPECT_EQ(r.reader->residue_relative, 0.0);
 }
 
+// Faster than a half cycle lasts: the turns alone, 800 a second, would show less than half of it.
+TEST(Readers, AVibrationIsReadBetweenTurnsToo) {
+    Scenario s = samples_of("noise_injected");
+    s.gyro.lockin_threshold_deg_h = 0.0;
+    s.effects["base_vibration"] = {{"rate_deg_h", 300.0}, {"frequency_hz", 411.3}, {"phase_rad", 0.4}};
+    const record::Samples samples = *simulate_record(s).samples;
+    const double w = units::two_pi * 411.3;
+    const auto angle_arcsec = [&](double time_s) { return -300.0 / w * std::cos(w * time_s + 0.4); };
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        const double end_s = samples.t0_s + static_cast<double>(i) / 997.0;
+        EXPECT_NEAR(samples.values[i], angle_arcsec(end_s) - angle_arcsec(end_s - 1.0 / 997.0), 1e-8) << i;
+    }
+}
+
+TEST(Readers, AWhiteRateIsWhiteBetweenTurnsToo) {
+    Scenario s = samples_of("noise_injected");
+    s.gyro.lockin_threshold_deg_h = 0.0;
+    s.record.rate_hz = 5003.0;
+    s.effects["quantum_noise"]["deg_rt_h"] = 0.01;
+    const record::Samples samples = *simulate_record(s).samples;
+    const auto n = static_cast<double>(samples.size());
+    double variance = 0.0;
+    double neighbours = 0.0;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        variance += samples.values[i] * samples.values[i] / n;
+        if (i > 0) neighbours += samples.values[i] * samples.values[i - 1] / n;
+    }
+    const double arcsec_rt_s = 0.01 / units::deg_rt_h_per_arcsec_rt_s;
+    EXPECT_NEAR(variance * 5003.0 / (arcsec_rt_s * arcsec_rt_s), 1.0, 4.0 * std::sqrt(2.0 / n));
+    EXPECT_NEAR(neighbours / variance, 0.0, 4.0 / std::sqrt(n));
+}
+
 TEST(Readers, WithoutStrippingTheDitherIsInTheSamples) {
     Scenario s = samples_of("uncompensated");
     s.gyro.lockin_threshold_deg_h = 0.0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/options.hpp"
@@ -62,29 +63,37 @@ double lockin_line_arcsec(const record::Declared& declared) {
     return kick2 * k / units::two_pi;
 }
 
+/// Amplitude of the line that a step added, as an angle; none where it added none. As lines in the rate or in the
+/// angle they look alike.
+std::optional<double> line_arcsec(const Step& step) {
+    const double hz = value_of(step, effects::Role::frequency);
+    if (!(hz > 0.0)) return std::nullopt;
+    switch (on_samples(*step.effect)) {
+        case OnSamples::angle_line:
+            return value_of(step, effects::Role::sampled);
+        case OnSamples::rate_line:
+            // By the angle at the frequency that was fitted: 1 deg/h is 1 arcsec/s.
+            return value_of(step, effects::Role::size) / (units::two_pi * hz);
+        default:
+            return std::nullopt;
+    }
+}
+
 /// Half cycles of unequal strength or length make harmonics of the dither, which a reader without stripping leaves in
-/// the samples. As lines in the rate or in the angle they look alike.
+/// the samples.
 template <class IsAt>
 bool is_harmonic_of_dither(const Step& step, const record::Record& record, const IsAt& is_at, std::string& why) {
-    const OnSamples as = on_samples(*step.effect);
+    const auto arcsec = line_arcsec(step);
+    if (!arcsec) return false;
     const double hz = value_of(step, effects::Role::frequency);
-    if (!(hz > 0.0)) return false;
-    double arcsec = value_of(step, effects::Role::sampled);
-    if (as == OnSamples::rate_line) {
-        // By the angle at the frequency that was fitted: 1 deg/h is 1 arcsec/s.
-        arcsec = value_of(step, effects::Role::size) / (units::two_pi * hz);
-    } else if (as != OnSamples::angle_line) {
-        return false;
-    }
     const SampleReaderOptions& by = options.samples.reader;
     const double dither_hz = *record.declared.dither_frequency_hz;
     for (int k = 2; k <= by.harmonics; ++k) {
-        if (!is_at(hz, k * dither_hz) || arcsec > by.most_harmonic * dither_arcsec(record.declared)) continue;
+        if (!is_at(hz, k * dither_hz) || *arcsec > by.most_harmonic * dither_arcsec(record.declared)) continue;
         why = fmt::format(
             "a line of {:.3g} arcsec at {:.6g} Hz is harmonic {} of the dither, which the declared reader leaves in "
-            "the "
-            "samples",
-            arcsec, hz, k);
+            "the samples",
+            *arcsec, hz, k);
         return true;
     }
     return false;
@@ -186,8 +195,8 @@ bool accounted_by_reader(const Step& step, const record::Record& record, std::st
         return true;
     }
     if (leaves_dither_noise(record) && is_harmonic_of_dither(step, record, is_at, why)) return true;
-    if (as != OnSamples::angle_line || stripping == Stripping::none) return false;
-    const double amplitude_arcsec = value_of(step, effects::Role::sampled);
+    const auto amplitude_arcsec = line_arcsec(step);
+    if (!amplitude_arcsec || stripping == Stripping::none) return false;
     const double hz = value_of(step, effects::Role::frequency);
     // The residue of a steady dither. While gain and delay of a reference are learnt, its noise leaves some dither too.
     double most =
@@ -195,10 +204,10 @@ bool accounted_by_reader(const Step& step, const record::Record& record, std::st
         lockin_line_arcsec(record.declared);
     if (record.reader->settings.reference_learning_s > 0.0) most += record.reader->settings.reference_noise_arcsec;
     for (int k = 1; k <= options.samples.reader.harmonics; ++k) {
-        if (!is_at(hz, k * dither_hz) || amplitude_arcsec > most) continue;
+        if (!is_at(hz, k * dither_hz) || *amplitude_arcsec > most) continue;
         why =
             fmt::format("a line of {:.3g} arcsec at {:.6g} Hz is within what the declared reader leaves of the dither",
-                        amplitude_arcsec, hz);
+                        *amplitude_arcsec, hz);
         return true;
     }
     return false;

@@ -17,20 +17,53 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Weights of a reading between two turns: between them the dither's amplitude is linear in the cosine of its phase.
-DitherRows rows_of(const SampleSeries& series, double turn_hz, double place, bool notched) {
+/// How the dither goes from the amplitude at one turn to that at the next.
+enum class Path {
+    cosine,    ///< amplitudes are drawn turn by turn: along a cosine from one turn's angle to the next
+    resonator  ///< a noisy drive has the amplitude of a resonator grow evenly (engine/gyro/half_cycle.hpp)
+};
+
+/// A resonator remembers; amplitudes that are drawn turn by turn do not.
+Path path_with(double memory) { return memory > 0.0 ? Path::resonator : Path::cosine; }
+
+/// 1/(2 Q) of the resonator that remembers so much from turn to turn, exp(-pi/(2 Q)).
+double damping_with(double memory) { return -std::log(memory) / units::pi; }
+
+/// Weights of a reading between two turns.
+DitherRows rows_of(const SampleSeries& series, const DitherNoise& noise, bool notched) {
     DitherRows rows;
+    const Path path = path_with(noise.memory);
+    const double damping = path == Path::resonator ? damping_with(noise.memory) : 0.0;
     double before = 0.0;
     for (std::size_t i = 0; i < series.size(); ++i) {
-        const double turns = turn_hz * series.interval_s * static_cast<double>(i + 1) + place;
-        const double last = std::floor(turns);
-        const double cosine = std::cos(units::pi * (turns - last));
-        const double sign = std::fmod(last, 2.0) == 0.0 ? 1.0 : -1.0;
+        const double turns = noise.turn_hz * series.interval_s * static_cast<double>(i + 1) + noise.place;
+        const double cycle = 2.0 * std::floor(0.5 * turns);
+        const double middle = 1.0 + noise.asymmetry;
+        const bool first = turns - cycle < middle;
+        const double last = first ? cycle : cycle + 1.0;
+        const double gone = first ? (turns - cycle) / middle : (turns - cycle - middle) / (2.0 - middle);
+        const double cosine = std::cos(units::pi * gone);
+        const double sign = first ? 1.0 : -1.0;
         rows.passed.push_back(static_cast<std::uint16_t>(last - before));
-        rows.last.push_back(0.5 * sign * (1.0 + cosine));
-        rows.next.push_back(-0.5 * sign * (1.0 - cosine));
-        rows.notched.push_back(notched ? -sign * cosine : 0.0);
         before = last;
+        if (path == Path::cosine) {
+            rows.last.push_back(0.5 * sign * (1.0 + cosine));
+            rows.next.push_back(-0.5 * sign * (1.0 - cosine));
+            rows.follower.push_back(notched ? -sign * cosine : 0.0);
+            continue;
+        }
+        const double sine = std::sin(units::pi * gone);
+        rows.last.push_back(sign * ((1.0 - gone) * cosine + sine / units::pi));
+        rows.next.push_back(sign * (gone * cosine - sine / units::pi));
+        if (notched) {
+            rows.follower.push_back(-sign * cosine);
+            continue;
+        }
+        // The quadrature at the next turn follows from that at the last and from both amplitudes.
+        const double of_next = -0.5 * damping * sign * sine * gone * noise.memory;
+        rows.last.back() -= of_next;
+        rows.next.back() += of_next;
+        rows.follower.push_back(-0.5 * damping * sign * sine * (1.0 - gone) + of_next);
     }
     return rows;
 }
@@ -39,13 +72,23 @@ class Search {
    public:
     Search(const SampleFit& base, double notch_hz) : base_(base), notch_hz_(notch_hz) {}
 
-    DitherNoise at(double turn_hz, double place) const {
+    DitherNoise at(double turn_hz, double place, double memory = 0.0, double asymmetry = 0.0) const {
         DitherNoise noise;
         noise.turn_hz = turn_hz;
-        noise.place = place - std::floor(place);
+        noise.place = place - 2.0 * std::floor(0.5 * place);
+        noise.memory = memory;
+        noise.asymmetry = asymmetry;
         noise.share = options.samples.turns.dither_first_share;
-        noise.learnt = notch_hz_ > 0.0 ? 1.0 - std::exp(-units::pi * notch_hz_ / turn_hz) : 0.0;
-        noise.rows = std::make_shared<const DitherRows>(rows_of(base_.series(), turn_hz, noise.place, notch_hz_ > 0.0));
+        if (notch_hz_ > 0.0) {
+            // Of an amplitude it learns a share in half a cycle.
+            const double learnt = 1.0 - std::exp(-units::pi * notch_hz_ / turn_hz);
+            noise.follower = {1.0 - learnt, 0.5 * learnt, 0.5 * learnt};
+        } else if (path_with(memory) == Path::resonator) {
+            // Turns of a damped resonator are late when its amplitude changes: v = -damping/2 times the changes, which
+            // are forgotten as the amplitude is.
+            noise.follower = {memory, -memory, memory};
+        }
+        noise.rows = std::make_shared<const DitherRows>(rows_of(base_.series(), noise, notch_hz_ > 0.0));
         return noise;
     }
 
@@ -66,7 +109,7 @@ class Search {
     }
 
     /// The fit of the base model with it. Later comparisons start from its white noises.
-    SampleFit fitted(const DitherNoise& noise) {
+    SampleFit fitted(DitherNoise& noise) {
         SampleModel model = base_.model();
         const auto sizes = sizes_with(noise);
         const std::vector<double> each =
@@ -74,6 +117,7 @@ class Search {
         model.noise = sizes[static_cast<std::size_t>(std::min_element(each.begin(), each.end()) - each.begin())];
         SampleFit fit(base_.series(), std::move(model), base_.rows(), SampleFit::Noise::free);
         whites_ = {fit.model().noise.angle_arcsec, fit.model().noise.rate_arcsec_rt_s};
+        noise.larger = 1.0;
         return fit;
     }
 
@@ -105,7 +149,7 @@ class Search {
         for (const Whites& white : whites) {
             SampleNoise& with = all.emplace_back(base_.model().noise);
             take_dither_noise(noise, with);
-            with.angle_arcsec = white.angle_arcsec;
+            with.angle_arcsec = noise.larger * white.angle_arcsec;
             with.rate_arcsec_rt_s = white.rate_arcsec_rt_s;
         }
         return all;
@@ -125,16 +169,19 @@ bool has_dither_line(const SampleFit& fit, double dither_hz) {
     });
 }
 
-/// The likeliest of those a step of frequency or place away, all else as it is.
-DitherNoise nearby(const Search& search, const DitherNoise& here, double hz_step, double place_step) {
+/// The likeliest of those a step of frequency, place or asymmetry away, all else as it is.
+DitherNoise nearby(const Search& search, const DitherNoise& here, double hz_step, double place_step,
+                   double asymmetry_step) {
     std::vector<DitherNoise> all;
     for (const double hz : {-1.0, 0.0, 1.0}) {
         for (const double place : {-1.0, 0.0, 1.0}) {
-            DitherNoise there = search.at(here.turn_hz + hz * hz_step,
-                                          here.place + place * place_step - hz * hz_step * search.middle_s());
-            there.share = here.share;
-            there.memory = here.memory;
-            all.push_back(std::move(there));
+            for (const double asymmetry : {-1.0, 0.0, 1.0}) {
+                DitherNoise there = search.at(here.turn_hz + hz * hz_step,
+                                              here.place + place * place_step - hz * hz_step * search.middle_s(),
+                                              here.memory, here.asymmetry + asymmetry * asymmetry_step);
+                there.share = here.share;
+                all.push_back(std::move(there));
+            }
         }
     }
     return search.best_of(std::move(all));
@@ -143,26 +190,24 @@ DitherNoise nearby(const Search& search, const DitherNoise& here, double hz_step
 }  // namespace
 
 void take_dither_noise(const DitherNoise& found, SampleNoise& noise) {
+    noise.sidebands = found.sidebands;
+    if (!found.rows) return;
     noise.dither = found.rows;
     noise.dither_share = found.share;
     noise.dither_memory = found.memory;
-    noise.dither_learnt = found.learnt;
+    noise.dither_follower = found.follower;
 }
 
-std::optional<DitherNoise> find_dither_noise(const SampleFit& base, const record::Record& record) {
-    using reader::Stripping;
-    if (!record.reader || !record.declared.dither_frequency_hz) return std::nullopt;
+namespace {
+
+/// Injected noise whose amplitudes are drawn turn by turn.
+std::optional<DitherNoise> find_noise_of_turns(const SampleFit& base, const record::Record& record) {
     const reader::Settings& settings = record.reader->settings;
-    if (settings.stripping != Stripping::none && settings.stripping != Stripping::notch) return std::nullopt;
-    // The noise of the dither is far below the dither itself, whose line must be in the model first.
-    if (settings.stripping == Stripping::none && !has_dither_line(base, *record.declared.dither_frequency_hz)) {
-        return std::nullopt;
-    }
     const auto seen = turns_in_squares(base, record.declared);
     if (!seen) return std::nullopt;
     check_interrupt();
     const SampleTurnOptions& by = options.samples.turns;
-    Search search(base, settings.stripping == Stripping::notch ? settings.notch_bandwidth_hz : 0.0);
+    Search search(base, settings.stripping == reader::Stripping::notch ? settings.notch_bandwidth_hz : 0.0);
     const auto around = [&](double centre_hz, double half_width_hz, double step_hz, double centre, double half_width,
                             double step) {
         std::vector<DitherNoise> all;
@@ -179,36 +224,90 @@ std::optional<DitherNoise> find_dither_noise(const SampleFit& base, const record
     };
     DitherNoise best = around(seen->turn_hz, 2.0 * seen->bin_hz, 0.5 * seen->bin_hz, 0.0, 0.5, 1.0 / 12.0);
     best = around(best.turn_hz, 0.4 * seen->bin_hz, 0.1 * seen->bin_hz, best.place, 0.06, 0.02);
-    const auto vary = [&](auto DitherNoise::*what, const auto& values) {
+    const auto vary_memory = [&](const auto& memories) {
         std::vector<DitherNoise> all;
-        for (const double value : values) {
-            all.push_back(best);
-            all.back().*what = value;
+        for (const double memory : memories) {
+            all.push_back(search.at(best.turn_hz, best.place, memory, best.asymmetry));
+            all.back().share = best.share;
+            // What is new at each turn is known best: with a longer memory the amplitudes are larger.
+            if (memory > 0.0 && best.memory > 0.0) {
+                all.back().larger = std::sqrt((1.0 - best.memory * best.memory) / (1.0 - memory * memory));
+            }
         }
         best = search.best_of(std::move(all));
     };
-    vary(&DitherNoise::memory, by.dither_memories);
-    vary(&DitherNoise::share, by.dither_shares);
+    const auto vary_share = [&] {
+        std::vector<DitherNoise> all;
+        for (const double share : by.dither_shares) {
+            all.push_back(best);
+            all.back().share = share;
+        }
+        best = search.best_of(std::move(all));
+    };
+    vary_memory(by.dither_memories);
+    vary_share();
     best.gain = search.fitted(best).gain_over(base);
     // The smaller the other noises are, the more precisely the readings determine turns and memory.
     double place_step = by.dither_place_step;
+    double asymmetry_step = by.dither_asymmetry_step;
     double hz_step = 0.1 * seen->bin_hz;
     for (int round = 0; round < by.dither_rounds; ++round) {
         const double before = best.gain;
-        best = nearby(search, best, hz_step, place_step);
+        best = nearby(search, best, hz_step, place_step, asymmetry_step);
         place_step *= 0.5;
+        asymmetry_step *= 0.5;
         hz_step *= 0.5;
         std::vector<double> memories{best.memory, 0.0};
-        for (const double factor : {0.5, 0.8, 1.25, 2.0}) {
+        for (const double factor : {0.5, 0.8, 0.93, 1.07, 1.25, 2.0}) {
             memories.push_back(std::max(0.0, 1.0 - factor * (1.0 - best.memory)));
         }
-        vary(&DitherNoise::memory, memories);
-        vary(&DitherNoise::share, by.dither_shares);
+        vary_memory(memories);
+        vary_share();
         best.gain = search.fitted(best).gain_over(base);
         if (!(best.gain > before + by.dither_settled)) break;
     }
     if (best.gain < by.least_gain) return std::nullopt;
     return best;
+}
+
+/// Noise of the drive: sidebands of the dither as wide as the resonance of the dithered body.
+std::optional<DitherNoise> find_sidebands(const SampleFit& base, double dither_hz) {
+    const SampleTurnOptions& by = options.samples.turns;
+    std::optional<DitherNoise> best;
+    for (const double width : by.sideband_widths) {
+        check_interrupt();
+        SampleModel model = base.model();
+        const double typical_arcsec = base.typical_sd();
+        model.noise.sidebands = {by.sideband_first_rms * typical_arcsec, dither_hz, width * dither_hz};
+        const SampleFit fit(base.series(), std::move(model), base.rows(), SampleFit::Noise::free);
+        const double gain = fit.gain_over(base);
+        const SampleNoise::Resonance& found = fit.model().noise.sidebands;
+        // Elsewhere it is not the dither's, however well it explains the record.
+        const double tolerance_hz = found.width_hz + options.samples.declared_dither_error * dither_hz;
+        if (std::abs(found.hz - dither_hz) > tolerance_hz) continue;
+        if (gain < by.least_gain || (best && gain <= best->gain)) continue;
+        best.emplace();
+        best->gain = gain;
+        best->turn_hz = 2.0 * dither_hz;
+        best->sidebands = fit.model().noise.sidebands;
+    }
+    return best;
+}
+
+}  // namespace
+
+std::optional<DitherNoise> find_dither_noise(const SampleFit& base, const record::Record& record) {
+    using reader::Stripping;
+    if (!record.reader || !record.declared.dither_frequency_hz) return std::nullopt;
+    const Stripping stripping = record.reader->settings.stripping;
+    if (stripping != Stripping::none && stripping != Stripping::notch) return std::nullopt;
+    const double dither_hz = *record.declared.dither_frequency_hz;
+    // The noise of the dither is far below the dither itself, whose line must be in the model first.
+    if (stripping == Stripping::none && !has_dither_line(base, dither_hz)) return std::nullopt;
+    auto of_turns = find_noise_of_turns(base, record);
+    auto sidebands = find_sidebands(base, dither_hz);
+    if (!of_turns || (sidebands && sidebands->gain > of_turns->gain)) return sidebands;
+    return of_turns;
 }
 
 }  // namespace ringlock::closure

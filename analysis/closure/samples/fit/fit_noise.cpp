@@ -42,6 +42,12 @@ std::vector<Free> knobs(SampleModel& model) {
         all.push_back({&resonance.hz, true, std::min(1.0, resonance.width_hz / resonance.hz)});
         all.push_back({&resonance.width_hz, true});
     }
+    if (model.noise.sidebands.width_hz > 0.0) {
+        SampleNoise::Resonance& sidebands = model.noise.sidebands;
+        all.push_back({&sidebands.arcsec, true});
+        all.push_back({&sidebands.hz, true, std::min(1.0, sidebands.width_hz / sidebands.hz)});
+        all.push_back({&sidebands.width_hz, true});
+    }
     if (model.noise.swing_hz > 0.0) {
         all.push_back({&model.noise.swing_cos, false});
         all.push_back({&model.noise.swing_sin, false});

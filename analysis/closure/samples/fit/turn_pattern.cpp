@@ -286,7 +286,8 @@ void copy_turn_pattern(const SampleNoise& from, SampleNoise& to) {
     to.dither = from.dither;
     to.dither_share = from.dither_share;
     to.dither_memory = from.dither_memory;
-    to.dither_learnt = from.dither_learnt;
+    to.dither_follower = from.dither_follower;
+    to.sidebands = from.sidebands;
 }
 
 namespace {

@@ -27,6 +27,15 @@ namespace {
 constexpr std::string_view note_on_dither = "the declared reader leaves the noise of the dither in the samples";
 constexpr std::string_view note_on_turns = "the white noise of the rate comes in kicks at the turns of the dither";
 
+std::string note_of(const DitherNoise& noise) {
+    if (!noise.rows) {
+        return fmt::format("{}: sidebands of {:.4g} arcsec rms about {:.7g} Hz, {:.3g} Hz wide", note_on_dither,
+                           noise.sidebands.arcsec, noise.sidebands.hz, noise.sidebands.width_hz);
+    }
+    return fmt::format("{}: {:.0f} % of the variance of the white angle noise, at {:.7g} Hz", note_on_dither,
+                       100.0 * noise.share, 0.5 * noise.turn_hz);
+}
+
 }  // namespace
 
 /// All rows but those at the ends of the record for which a witness has no values at all lags. At the start more rows
@@ -57,23 +66,26 @@ std::shared_ptr<SampleFit> SampleLoop::fit_base(Closure& closure) const {
 
 /// The same model with the turns of the declared dither, where the record shows them; else null.
 std::shared_ptr<SampleFit> SampleLoop::with_turns(const SampleFit& fit, Closure& closure) const {
+    for (const std::string_view own : {note_on_dither, note_on_turns}) {
+        std::erase_if(closure.notes, [own](const std::string& other) { return other.starts_with(own); });
+    }
+    std::shared_ptr<SampleFit> found;
     if (const auto dither = find_dither_noise(fit, record_)) {
         SampleModel model = fit.model();
         take_dither_noise(*dither, model.noise);
-        std::erase_if(closure.notes, [](const std::string& other) { return other.starts_with(note_on_dither); });
-        closure.notes.push_back(fmt::format("{}: {:.0f} % of the variance of the white angle noise, at {:.7g} Hz",
-                                            note_on_dither, 100.0 * dither->share, 0.5 * dither->turn_hz));
-        return std::make_shared<SampleFit>(series_, std::move(model), rows_);
+        closure.notes.push_back(note_of(*dither));
+        found = std::make_shared<SampleFit>(series_, std::move(model), rows_);
     }
-    const auto pattern = find_turn_pattern(fit, record_.declared);
-    if (!pattern) return nullptr;
-    SampleModel model = fit.model();
-    take_turn_pattern(*pattern, model.noise);
-    const std::string note = fmt::format("{}, {:.7g} a second: {:.4g} in a sample", note_on_turns, pattern->turn_hz,
-                                         pattern->turn_hz * series_.interval_s);
-    std::erase_if(closure.notes, [](const std::string& other) { return other.starts_with(note_on_turns); });
-    closure.notes.push_back(note);
-    return std::make_shared<SampleFit>(series_, std::move(model), rows_);
+    // Beside the noise of the dither the kicks may show, too.
+    const SampleFit& best = found ? *found : fit;
+    if (const auto pattern = find_turn_pattern(best, record_.declared)) {
+        SampleModel model = best.model();
+        take_turn_pattern(*pattern, model.noise);
+        closure.notes.push_back(fmt::format("{}, {:.7g} a second: {:.4g} in a sample", note_on_turns, pattern->turn_hz,
+                                            pattern->turn_hz * series_.interval_s));
+        found = std::make_shared<SampleFit>(series_, std::move(model), rows_);
+    }
+    return found;
 }
 
 /// Looks for the turns again after an effect was added: before, its contribution was part of the noise, of which the
@@ -82,7 +94,7 @@ void SampleLoop::find_turns_again(Closure& closure) {
     const SampleNoise& noise = now_.fit->model().noise;
     if (noise.from_hz > 0.0 || rounded_.drawn() || filtered_rows(record_)) return;
     std::shared_ptr<SampleFit> without = now_.fit;
-    if (noise.kicks || noise.dither) {
+    if (noise.kicks || noise.dither || noise.sidebands.arcsec > 0.0) {
         SampleModel model = now_.fit->model();
         drop_turn_pattern(model.noise);
         without = std::make_shared<SampleFit>(series_, std::move(model), rows_, SampleFit::Noise::near);

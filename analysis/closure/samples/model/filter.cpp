@@ -26,15 +26,16 @@ void SampleFilter::pass_turns(std::size_t row, std::array<double, D>& x, std::ar
     const DitherRows& rows = *states_.dither;
     double& last = x[states_.of_dither];
     double& next = x[states_.of_dither + 1];
-    double& learnt = x[states_.of_dither + 2];
+    double& follower = x[states_.of_dither + 2];
+    const auto& [kept, by_last, by_next] = states_.dither_follower;
     for (int turn = 0; turn < rows.passed[row]; ++turn) {
-        learnt += states_.dither_learnt * (0.5 * (last + next) - learnt);
+        follower = kept * follower + by_last * last + by_next * next;
         last = next;
         next *= states_.dither_memory;
     }
     h[states_.of_dither] = rows.last[row];
     h[states_.of_dither + 1] = rows.next[row];
-    h[states_.of_dither + 2] = rows.notched[row];
+    h[states_.of_dither + 2] = rows.follower[row];
 }
 
 SampleFilter::SampleFilter(const SampleNoise& noise, std::size_t rows, double interval_s) : states_(noise, interval_s) {

@@ -87,7 +87,9 @@ class Lanes {
         floor_ = from([](const SampleStates& s) { return s.floor; });
         kick_ = from([](const SampleStates& s) { return s.kick; });
         memory_ = from([](const SampleStates& s) { return s.dither_memory; });
-        learnt_ = from([](const SampleStates& s) { return s.dither_learnt; });
+        kept_ = from([](const SampleStates& s) { return s.dither_follower.kept; });
+        by_last_ = from([](const SampleStates& s) { return s.dither_follower.by_last; });
+        by_next_ = from([](const SampleStates& s) { return s.dither_follower.by_next; });
         renewed_ =
             from([](const SampleStates& s) { return (1.0 - s.dither_memory * s.dither_memory) * s.dither_variance; });
         ratio_ = from([](const SampleStates& s) { return s.ratio; });
@@ -203,10 +205,8 @@ class Lanes {
         const int u = of_->of_dither;
         const int v = u + 1;
         const int m = u + 2;
-        const V half = A::mul(A::set(0.5), learnt_);
-        const V kept = A::sub(A::set(1.0), learnt_);
         const auto pass = [&](V& at_u, V& at_v, V& at_m) {
-            at_m = A::mul_add(half, A::add(at_u, at_v), A::mul(kept, at_m));
+            at_m = A::mul_add(by_last_, at_u, A::mul_add(by_next_, at_v, A::mul(kept_, at_m)));
             at_u = at_v;
             at_v = A::mul(memory_, at_v);
         };
@@ -218,7 +218,7 @@ class Lanes {
         }
         h_[u] = A::set(rows.last[row]);
         h_[v] = A::set(rows.next[row]);
-        h_[m] = A::set(rows.notched[row]);
+        h_[m] = A::set(rows.follower[row]);
     }
 
     void step_states() {
@@ -282,7 +282,7 @@ class Lanes {
     std::array<Line, D> p_, q_, f_;
     Line h_, x_, gain_;
     V floor_, kick_, ratio_, place_;
-    V memory_, learnt_, renewed_;
+    V memory_, kept_, by_last_, by_next_, renewed_;
     V variance_;
     std::array<double, most_lanes> ticks_{};
     std::array<Swing, most_lanes> swing_{};

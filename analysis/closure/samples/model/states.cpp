@@ -10,22 +10,21 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Stationary covariance of the amplitudes at the last and the next turn and of the mean that a notch learns of them.
-std::array<std::array<double, 3>, 3> covariance_of_dither(double variance, double memory, double learnt) {
+/// Stationary covariance of the amplitudes at the last and the next turn and of what follows them.
+std::array<std::array<double, 3>, 3> covariance_of_dither(double variance, double memory,
+                                                          const DitherFollower& follower) {
     std::array<std::array<double, 3>, 3> p{};
     p[0][0] = p[1][1] = variance;
     p[0][1] = p[1][0] = memory * variance;
-    if (learnt == 0.0) return p;
-    // m' = (1 - b) m + b (u + v)/2 and v' = memory v + noise: stationary of E[m u'] = E[m' v], E[m' v'] and E[m'^2].
-    const double b = learnt;
-    const double last = 0.5 * b * (1.0 + memory) * variance / (1.0 - (1.0 - b) * memory);  // E[m' u'], u' = v
-    const double with_u = last;
-    const double with_v = memory * last;
-    const double mean_square = 0.5 * variance * (1.0 + memory);
-    const double square = (b * b * mean_square + (1.0 - b) * b * (with_u + with_v)) / (1.0 - (1.0 - b) * (1.0 - b));
+    // With u' = v and v' = memory v + noise: stationary of E[m' u'] = E[m' v], E[m' v'] = memory E[m' v] and E[m'^2].
+    const auto& [kept, by_last, by_next] = follower;
+    const double with_u = (by_last * memory + by_next) * variance / (1.0 - kept * memory);
+    const double with_v = memory * with_u;
+    const double new_square = variance * (by_last * by_last + by_next * by_next + 2.0 * memory * by_last * by_next) +
+                              2.0 * kept * (by_last * with_u + by_next * with_v);
     p[0][2] = p[2][0] = with_u;
     p[1][2] = p[2][1] = with_v;
-    p[2][2] = square;
+    p[2][2] = new_square / (1.0 - kept * kept);
     return p;
 }
 
@@ -88,8 +87,8 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         of_dither = count;
         dither_variance = noise.dither_share * readout;
         dither_memory = noise.dither_memory;
-        dither_learnt = noise.dither_learnt;
-        const auto stationary = covariance_of_dither(dither_variance, dither_memory, dither_learnt);
+        dither_follower = noise.dither_follower;
+        const auto stationary = covariance_of_dither(dither_variance, dither_memory, dither_follower);
         for (int i = 0; i < dither_states; ++i) {
             f[count + i][count + i] = 1.0;
             for (int j = 0; j < dither_states; ++j) p[count + i][count + j] = stationary[i][j];
@@ -99,6 +98,21 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
     }
     // The record begins at angle zero as it was read.
     p[0][0] = readout;
+    if (noise.sidebands.arcsec > 0.0 && !resampled && count + 2 <= most) {
+        // Two quadratures of one correlation time turn at the frequency of the dither; one of them is read.
+        const double memory = std::exp(-units::pi * noise.sidebands.width_hz * dt);
+        const double phase = units::two_pi * noise.sidebands.hz * dt;
+        const double variance = noise.sidebands.arcsec * noise.sidebands.arcsec;
+        f[count][count] = f[count + 1][count + 1] = memory * std::cos(phase);
+        f[count][count + 1] = memory * std::sin(phase);
+        f[count + 1][count] = -f[count][count + 1];
+        q[count][count] = q[count + 1][count + 1] = variance * (1.0 - memory * memory);
+        p[count][count] = p[count + 1][count + 1] = variance;
+        p[0][0] += variance;
+        p[0][count] = p[count][0] = -variance;
+        h[count] = 1.0;
+        count += 2;
+    }
     if (dither) readout -= dither_variance;
     floor = readout;
     if (resampled) {

@@ -14,12 +14,17 @@ struct KickRows {
     std::vector<double> variance, carried, covariance;
 };
 
-/// Noise of the dither in readings that still have it: amplitudes a_k at the turns, linear between them in the cosine
-/// of the dither. By the rows of a record: turns passed since the row before, and the weights with which the amplitudes
-/// at the last turn and at the next, and the mean that a notch has subtracted, enter the reading.
+/// Noise of the dither in readings that still have it, by the amplitudes at its turns. By the rows of a record: turns
+/// passed since the row before, and the weights with which the amplitudes at the last turn and at the next, and what
+/// follows the amplitudes, enter the reading.
 struct DitherRows {
     std::vector<std::uint16_t> passed;
-    std::vector<double> last, next, notched;
+    std::vector<double> last, next, follower;
+};
+
+/// What follows the amplitudes of the dither's noise from turn to turn: m' = kept m + by_last a_k + by_next a_(k+1).
+struct DitherFollower {
+    double kept = 0.0, by_last = 0.0, by_next = 0.0;
 };
 
 /// What is random in a record of samples; angles in arcsec.
@@ -39,16 +44,19 @@ struct SampleNoise {
     /// Variance of a kick [arcsec^2].
     double kick_variance() const { return kick_share * rate_arcsec_rt_s * rate_arcsec_rt_s / turn_hz; }
     /// Share of the variance of the readings' errors that is noise of the dither, as it is at the turns; correlation of
-    /// its amplitudes from turn to turn; share of an amplitude that a notch learns in half a cycle. Null: none.
+    /// its amplitudes from turn to turn. Null: none.
     double dither_share = 0.0;
     double dither_memory = 0.0;
-    double dither_learnt = 0.0;
+    DitherFollower dither_follower = {};
     std::shared_ptr<const DitherRows> dither = {};
     /// An angle that is a second-order autoregression.
     struct Resonance {
         double arcsec, hz, width_hz;
     };
     std::vector<Resonance> resonances = {};
+    /// Sidebands of the dither in the readings, where a noisy drive moves its amplitude and its phase: rms at any time,
+    /// frequency of the dither, full width at half maximum of their spectrum. 0 arcsec: none.
+    Resonance sidebands = {0.0, 0.0, 0.0};
     /// The variance of the readings' errors goes up and down at that frequency: its logarithm by cos, and by sin.
     double swing_hz = 0.0, swing_cos = 0.0, swing_sin = 0.0;
     double from_hz = 0.0;        ///< taken at that rate and interpolated; 0: not
@@ -83,11 +91,12 @@ struct SampleStates {
     /// Variance of a kick. The part of a kick that belongs to the next row is the second state, after the angle.
     double kick = 0.0;
     std::shared_ptr<const KickRows> kicks;
-    /// The dither's noise: the first of its three states, amplitudes at the last and the next turn and what is learnt
-    /// of them; their variance, memory and share that is learnt.
+    /// The dither's noise: the first of its three states, amplitudes at the last and the next turn and what follows
+    /// them; their variance and memory.
     std::shared_ptr<const DitherRows> dither;
     int of_dither = 0;
-    double dither_variance = 0.0, dither_memory = 0.0, dither_learnt = 0.0;
+    double dither_variance = 0.0, dither_memory = 0.0;
+    DitherFollower dither_follower;
     bool swings = false;
     double swing_by_row = 0.0, swing_cos = 0.0, swing_sin = 0.0;
     double floor = 0.0;  ///< variance of the measurement itself
