@@ -49,6 +49,9 @@ struct SampleFitOptions {
     double coarser_digits = 1.5;
     /// make its standard deviation larger by this factor.
     double settled_growth = 1.01;
+    /// The same factor of a row that knows little more than how far readings are off the source's straight lines, where
+    /// that is taken for larger by coarser_digits. A source whose clock jitters makes this error heavy-tailed.
+    double blurred_growth = 1.15;
     /// A column of whose squares no more than this share is left when the model's own columns have been taken out is
     /// one of them but for rounding [1]: the record cannot tell it from the model's parameters. Several columns are
     /// independent of each other where the ratio of their pivots is larger than this.

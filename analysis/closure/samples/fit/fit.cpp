@@ -113,12 +113,28 @@ void SampleFit::find_settled(SampleNoise noise) {
     settled_.assign(n, 0);
     telling_ = *rows_;
     if (!(noise.from_hz > 0.0)) return;
+    SampleNoise blurred = noise;
     noise.digits_arcsec *= by.coarser_digits;
+    blurred.blur_arcsec *= by.coarser_digits;
     const SampleFilter beside(noise, n, series_->interval_s);
+    const SampleFilter with_blur(blurred, n, series_->interval_s);
     double largest = 0.0;
     for (std::size_t i = 0; i < n; ++i) largest = std::max(largest, sd(i));
+    std::vector<std::size_t> mostly_blur;
+    std::size_t others = 0;
     for (std::size_t i = 0; i < n; ++i) {
-        if (sd(i) > by.settled_sd * largest && beside.sd(i) < by.settled_growth * sd(i)) continue;
+        if (sd(i) > by.settled_sd * largest && beside.sd(i) < by.settled_growth * sd(i)) {
+            const bool blur = with_blur.sd(i) > by.blurred_growth * sd(i);
+            if (blur) mostly_blur.push_back(i);
+            others += blur ? 0 : 1;
+            continue;
+        }
+        settled_[i] = 1;
+        telling_[i] = 0;
+    }
+    // Few rows tell mostly of the blur; where many do, it is the noise of the record.
+    if (mostly_blur.size() > others) return;
+    for (const std::size_t i : mostly_blur) {
         settled_[i] = 1;
         telling_[i] = 0;
     }
