@@ -203,6 +203,10 @@ struct SampleReaderOptions {
 
 /// Candidates by score tests (samples/screen).
 struct SampleScreenOptions {
+    /// Multiples of the beat of the input rate with the dither that are looked for, and cycles of it over the record
+    /// that it must have.
+    int beat_multiples = 4;
+    double beat_cycles = 8.0;
     /// Scores of slow rates are weakened by how much more the sums of stretches move than white innovations would:
     /// stretches of the record over `slow_parts` rows, of `slow_rows` at least, of which `slow_share` must count, and
     /// only with more than `slow_sums` of them.

@@ -9,6 +9,7 @@
 #include "analysis/closure/samples/fit/declared_reader.hpp"
 #include "analysis/closure/samples/fit/dither_noise.hpp"
 #include "analysis/closure/samples/fit/turn_pattern.hpp"
+#include "analysis/closure/samples/residual/rate_beat.hpp"
 #include "analysis/instrument/simulate.hpp"
 #include "engine/scenario/devices.hpp"
 #include "engine/scenario/parse.hpp"
@@ -150,6 +151,43 @@ TEST(SampleReaders, BesideADitherThatWasLeftNothingElseIsNamed) {
     const Closure closure = close_loop(record);
     EXPECT_EQ(closure.verdict, Verdict::closed) << effects_of(closure);
     EXPECT_EQ(effects_of(closure), "dither_residue ");
+}
+
+// A noisy drive: the amplitude of a resonator, between half cycles of unequal length.
+TEST(SampleReaders, BesideTheDitherOfANoisyDriveNothingElseIsNamed) {
+    scenario::Scenario s = samples_at(400.0, 25.0);
+    s.reader.stripping = Stripping::none;
+    s.reader.fraction = reader::Fraction::detectors;
+    s.noise_injection.model = scenario::NoiseModel::drive;
+    s.noise_injection.turn_phase_rms_rad = 10.0;
+    const record::Record record = instrument::simulate_record(s);
+    const Closure closure = close_loop(record);
+    EXPECT_EQ(closure.verdict, Verdict::closed) << effects_of(closure);
+    EXPECT_EQ(effects_of(closure), "dither_residue ");
+}
+
+// Without injected noise the kicks go on as evenly as the phase does: 30 Hz under 15 deg/h of a gyro of 0.5 arcsec.
+TEST(SampleReaders, WithoutInjectedNoiseTheBeatOfTheInputRateIsNamed) {
+    scenario::Scenario s = samples_at(100.0, 100.0);
+    s.record.trajectory = scenario::parse_arm("uncompensated");
+    const record::Record record = instrument::simulate_record(s);
+    const SampleSeries series = prepare_samples(record);
+    const Rows rows(series.size(), 1);
+    const SampleFit base(series, SampleModel{}, rows);
+    const auto beat = find_rate_beat(base, record.declared);
+    ASSERT_TRUE(beat.has_value());
+    EXPECT_NEAR(beat->hz, 15.0 / s.gyro.scale_factor_arcsec, 0.05 * beat->hz);
+    EXPECT_LT(beat->rate_deg_h, beat->most_deg_h);
+    const Closure closure = close_loop(record);
+    ASSERT_TRUE(closure.unexplained.has_value());
+    EXPECT_NE(closure.unexplained->detail.find("no noise randomises"), std::string::npos) << effects_of(closure);
+}
+
+TEST(SampleReaders, WithInjectedNoiseThereIsNoBeatOfTheInputRate) {
+    const record::Record record = instrument::simulate_record(samples_at(100.0, 100.0));
+    const SampleSeries series = prepare_samples(record);
+    const Rows rows(series.size(), 1);
+    EXPECT_FALSE(find_rate_beat(SampleFit(series, SampleModel{}, rows), record.declared).has_value());
 }
 
 // White rate noise through a filter of the length of an interval: all of its variance stays in a row and the next.

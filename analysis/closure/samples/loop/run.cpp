@@ -18,6 +18,7 @@
 #include "analysis/closure/samples/fit/steps.hpp"
 #include "analysis/closure/samples/fit/turn_pattern.hpp"
 #include "analysis/closure/samples/loop/loop.hpp"
+#include "analysis/closure/samples/residual/rate_beat.hpp"
 #include "analysis/closure/samples/screen/known.hpp"
 
 namespace ringlock::closure {
@@ -201,6 +202,12 @@ void SampleLoop::finish(Closure& closure) {
         }
         closure.steps.pop_back();
         closure.notes.push_back(std::move(why));
+    }
+    if (closure.unexplained) {
+        if (const auto beat = find_rate_beat(*base_, record_.declared)) {
+            closure.unexplained->detail +=
+                fmt::format("{}{}", closure.unexplained->detail.empty() ? "" : "; ", text_of(*beat));
+        }
     }
     for (auto* notes : {&now_.notes, &figures.notes}) {
         for (std::string& note : *notes) closure.notes.push_back(std::move(note));
