@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "analysis/closure/closure.hpp"
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/samples/fit/declared_reader.hpp"
 #include "analysis/closure/samples/fit/dither_noise.hpp"
 #include "analysis/closure/samples/fit/turn_pattern.hpp"
@@ -181,6 +182,10 @@ TEST(SampleReaders, WithoutInjectedNoiseTheBeatOfTheInputRateIsNamed) {
     const Closure closure = close_loop(record);
     ASSERT_TRUE(closure.unexplained.has_value());
     EXPECT_NE(closure.unexplained->detail.find("no noise randomises"), std::string::npos) << effects_of(closure);
+    for (const Step& step : closure.steps) {
+        EXPECT_NE(on_samples(*step.effect), OnSamples::transport);
+        EXPECT_FALSE(is_line(*step.effect)) << step.name();
+    }
 }
 
 TEST(SampleReaders, WithInjectedNoiseThereIsNoBeatOfTheInputRate) {

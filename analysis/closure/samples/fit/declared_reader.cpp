@@ -36,14 +36,6 @@ bool leaves_dither_noise(const record::Record& record) {
             record.reader->settings.stripping == Stripping::notch);
 }
 
-double value_of(const Step& step, effects::Role role) {
-    const effects::Parameter* parameter = effects::first_of(*step.effect, role);
-    if (parameter == nullptr) return 0.0;
-    const auto found = std::find_if(step.parameters.begin(), step.parameters.end(),
-                                    [&](const Estimate& estimate) { return estimate.name == parameter->name; });
-    return found != step.parameters.end() ? found->value : 0.0;
-}
-
 double alias_of(double hz, double rate_hz) { return std::abs(std::remainder(hz, rate_hz)); }
 
 double dither_arcsec(const record::Declared& declared) {

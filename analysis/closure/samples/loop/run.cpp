@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -192,22 +193,27 @@ void SampleLoop::finish(Closure& closure) {
     closure.rounding_in_noise = !rounded_.drawn();
     closure.base = std::move(figures.base);
     if (!now_.added.empty()) closure.base_alone = figures_of(*base_, {}, record_.declared).base;
+    std::optional<RateBeat> beat;
+    if (closure.unexplained) beat = find_rate_beat(*base_, record_.declared);
+    if (beat) {
+        std::string& detail = closure.unexplained->detail;
+        detail += fmt::format("{}{}", detail.empty() ? "" : "; ", text_of(*beat));
+    }
     for (std::size_t k = 0; k < now_.added.size(); ++k) {
         Step& step = closure.steps.emplace_back(std::move(now_.added[k].step));
         if (step.parameters.empty()) step.parameters = std::move(figures.steps[k]);
         std::string why;
-        if (!accounted_by_reader(step, record_, why)) {
+        if (beat && is_of_beat(step, *beat, series_, *record_.declared.dither_frequency_hz)) {
+            why = fmt::format(
+                "{} was fitted only as a placeholder for lines of the beat of the input rate, and is not "
+                "reported",
+                step.effect->name());
+        } else if (!accounted_by_reader(step, record_, why)) {
             closure.notes.insert(closure.notes.end(), figures.step_notes[k].begin(), figures.step_notes[k].end());
             continue;
         }
         closure.steps.pop_back();
         closure.notes.push_back(std::move(why));
-    }
-    if (closure.unexplained) {
-        if (const auto beat = find_rate_beat(*base_, record_.declared)) {
-            closure.unexplained->detail +=
-                fmt::format("{}{}", closure.unexplained->detail.empty() ? "" : "; ", text_of(*beat));
-        }
     }
     for (auto* notes : {&now_.notes, &figures.notes}) {
         for (std::string& note : *notes) closure.notes.push_back(std::move(note));

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <complex>
 
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/units.hpp"
@@ -58,6 +59,25 @@ std::optional<RateBeat> find_rate_beat(const SampleFit& fit, const record::Decla
         beat.most_deg_h = declared.lockin_threshold_deg_h.value_or(0.0) * std::sqrt(2.0 / (units::pi * amplitude_rad));
     }
     return beat;
+}
+
+bool is_of_beat(const Step& step, const RateBeat& beat, const SampleSeries& series, double dither_hz) {
+    const SampleScreenOptions& by = options.samples.screen;
+    const OnSamples as = on_samples(*step.effect);
+    const bool transport = as == OnSamples::transport;
+    if (!transport && as != OnSamples::rate_line && as != OnSamples::angle_line) return false;
+    const double hz = value_of(step, transport ? effects::Role::sampled : effects::Role::frequency);
+    const auto alias = [&](double of_hz) { return std::abs(std::remainder(of_hz, series.rate_hz)); };
+    // A rate that wanders takes the beat with it.
+    const double duration_s = series.interval_s * static_cast<double>(series.size());
+    const double tolerance_hz = by.beat_bins / duration_s;
+    for (int of_dither = 0; of_dither <= by.beat_dithers; ++of_dither) {
+        for (int of_beat = transport ? 0 : -by.beat_lines; of_beat <= (transport ? 0 : by.beat_lines); ++of_beat) {
+            const double line_hz = of_dither * dither_hz + of_beat * beat.hz;
+            if (line_hz != 0.0 && std::abs(alias(hz) - alias(line_hz)) < tolerance_hz) return true;
+        }
+    }
+    return false;
 }
 
 std::string text_of(const RateBeat& beat) {
