@@ -5,11 +5,16 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <condition_variable>
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "analysis/closure/report/closed_scenario.hpp"
@@ -49,30 +54,82 @@ void refuse_to_lose(const std::string& record, const std::string& model, const s
     closure::check_folder(folder);
 }
 
-/// Shows the stage of the loop and the time since it began: one line that is replaced on a terminal, a line for each
-/// stage elsewhere.
+/// Shows the stage of the loop, the time since it began, and the time left where that can be told: one line that is
+/// replaced on a terminal, a line for each stage elsewhere and one every ten seconds where shares are told.
+///
+/// How many effects a record needs, and how many models are tried for each, shows as the loop goes on: a time left is
+/// told of the last stage alone, whose parts are counted and as long as each other.
 class StageProgress {
    public:
-    explicit StageProgress(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
+    explicit StageProgress(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {
+        if (!quiet_ && terminal_) ticking_ = std::jthread([this](const std::stop_token& stop) { tick(stop); });
+    }
     ~StageProgress() {
+        if (ticking_.joinable()) {
+            ticking_.request_stop();
+            ticking_.join();
+        }
         if (shown_ && terminal_) tell("\r\033[K");
     }
     StageProgress(const StageProgress&) = delete;
     StageProgress& operator=(const StageProgress&) = delete;
 
     void show(const std::string& stage) {
-        if (quiet_) return;
-        const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start_;
-        const std::string line = fmt::format("{:4.0f} s  {}", since.count(), stage);
-        tell(terminal_ ? "\r\033[K" + line + " ..." : line + "\n");
-        shown_ = true;
+        const std::lock_guard lock(mutex_);
+        stage_ = stage;
+        first_.reset();
+        draw();
+    }
+    void show_share(double share) {
+        const std::lock_guard lock(mutex_);
+        share_ = share;
+        if (!first_) first_ = {Clock::now(), share};
+        if (terminal_ || Clock::now() - drawn_ > std::chrono::seconds(10)) draw();
     }
 
    private:
+    using Clock = std::chrono::steady_clock;
+    static double seconds(Clock::duration since) { return std::chrono::duration<double>(since).count(); }
+
+    /// Nothing before a tenth of the parts and two seconds have shown how long they take.
+    std::optional<double> left_s() const {
+        if (!first_ || share_ - first_->share < 0.1) return std::nullopt;
+        const double since_s = seconds(Clock::now() - first_->at);
+        if (since_s < 2.0) return std::nullopt;
+        return since_s * (1.0 - share_) / (share_ - first_->share);
+    }
+    void draw() {
+        if (quiet_ || stage_.empty()) return;
+        std::string line = fmt::format("{:4.0f} s  {}", seconds(Clock::now() - start_), stage_);
+        if (const auto left = left_s()) line += fmt::format(", {:.0f} %, about {:.0f} s left", 100.0 * share_, *left);
+        tell(terminal_ ? "\r\033[K" + line + " ..." : line + "\n");
+        drawn_ = Clock::now();
+        shown_ = true;
+    }
+    /// The time goes on where the loop says nothing for long.
+    void tick(const std::stop_token& stop) {
+        std::unique_lock lock(mutex_);
+        while (!stop.stop_requested()) {
+            ticked_.wait_for(lock, stop, std::chrono::seconds(1), [] { return false; });
+            if (!stop.stop_requested()) draw();
+        }
+    }
+
+    struct Share {
+        Clock::time_point at;
+        double share;
+    };
     bool quiet_;
     bool terminal_;
+    std::mutex mutex_;
+    std::condition_variable_any ticked_;
     bool shown_ = false;
-    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+    std::string stage_;
+    double share_ = 0.0;
+    std::optional<Share> first_;  ///< of the stage
+    Clock::time_point start_ = Clock::now();
+    Clock::time_point drawn_ = start_;
+    std::jthread ticking_;  ///< last, so that it finds all of the above
 };
 
 }  // namespace
@@ -101,7 +158,8 @@ void add_closure(CLI::App& root) {
         tell_warnings(arguments->record, record);
         if (!arguments->model.empty()) declare(record.declared, scenario::parse_file(arguments->model));
         StageProgress progress(arguments->quiet);
-        const closure::Monitor monitor{[&](const std::string& stage) { progress.show(stage); }};
+        const closure::Monitor monitor{[&](const std::string& stage) { progress.show(stage); },
+                                       [&](double share) { progress.show_share(share); }};
         closure::Closure closure;
         try {
             closure = closure::close_loop(record, monitor);
@@ -115,7 +173,8 @@ void add_closure(CLI::App& root) {
         if (!arguments->out.empty()) {
             const std::string name = std::filesystem::path(arguments->record).filename().string();
             monitor.tell("simulating the closed model");
-            const closure::Predictive predictive = closure::check_predictive(record, closure);
+            const closure::Predictive predictive =
+                closure::check_predictive(record, closure, closure::options.report.most_simulations, monitor);
             json["predictive"] = closure::to_json(predictive);
             text += "\n" + closure::to_text(predictive);
             try {

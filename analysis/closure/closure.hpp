@@ -71,9 +71,15 @@ struct Closure {
 struct Monitor {
     /// Called with a short description of each stage, on the thread that runs the loop; may be empty.
     std::function<void(const std::string& stage)> on_stage = {};
+    /// Called with the share of the stage that is done [0 to 1], in a stage whose parts are as long as each other and
+    /// after which next to nothing is left; on any thread, one call at a time; may be empty.
+    std::function<void(double share)> on_share = {};
 
     void tell(const std::string& stage) const {
         if (on_stage) on_stage(stage);
+    }
+    void tell_share(double share) const {
+        if (on_share) on_share(share);
     }
 };
 

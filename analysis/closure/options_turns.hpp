@@ -343,6 +343,15 @@ struct TurnOptions {
         std::size_t frequency_memory = 10;
     };
     Loop loop;
+
+    /// Memory (turns/model/side_by_side). What is found does not depend on it.
+    struct Effort {
+        /// Threads that work on a record side by side hold up to half a kilobyte a turn each: all of them together may
+        /// go through so many turns, 0.5 GB; as many as `fewest_threads` always may.
+        double turns_of_all_threads = 1e6;
+        int fewest_threads = 2;
+    };
+    Effort effort;
 };
 
 }  // namespace ringlock::closure

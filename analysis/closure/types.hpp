@@ -16,6 +16,8 @@ using Rows = std::vector<std::uint8_t>;
 struct ActiveEffect {
     const effects::Effect* effect;
     effects::Values values;
+
+    bool operator==(const ActiveEffect&) const = default;
 };
 
 /// A parameter as fitted; one of the base model where `effect` is empty. Units are part of the name.

@@ -1,7 +1,11 @@
 // ringlock closure from outside: what it prints and what it leaves.
 #include <gmock/gmock.h>
 #include <stdlib.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 
+#include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -81,6 +85,58 @@ TEST_F(ClosureProgram, RefusesAFolderThatIsAFile) {
     EXPECT_EQ(r.status, 2);
     EXPECT_THAT(r.err, HasSubstr("s.toml"));
     EXPECT_EQ(left(), (std::set<std::string>{"r.h5", "s.toml"}));
+}
+
+/// How much memory the loop takes of records of turns.
+class LongClosureMemory : public ProgramTest {
+   protected:
+    /// Peak of a process that reads a record of so long at 380 Hz with these effects, beyond what the program takes
+    /// for nothing, over the turns.
+    double bytes_per_turn(int duration_s, const std::string& effects) {
+        write("s.toml",
+              "[dither]\nfrequency_hz = 380.0\npeak_rate_deg_s = 150.0\n[ensemble]\ngyros = 1\n"
+              "dither_asymmetry_sd_ratio = 0\nduration_s = " +
+                  std::to_string(duration_s) + "\n" + effects);
+        EXPECT_EQ(run({"record", "s.toml", "-o", "r.h5"}).status, 0);
+        const double bytes = peak_bytes({"closure", "r.h5", "-q", "-o", "found"});
+        return (bytes - fixed_bytes) / (760.0 * duration_s);
+    }
+    double peak_bytes(const Arguments& arguments) {
+        const pid_t child = start(arguments);
+        int raw = 0;
+        rusage used = {};
+        wait4(child, &raw, 0, &used);
+        EXPECT_TRUE(WIFEXITED(raw) && WEXITSTATUS(raw) == 0) << contents(streams_ / "err");
+        return 1024.0 * static_cast<double>(used.ru_maxrss);
+    }
+    /// The program and its libraries take 18 MB, their tables and the threads' heaps some more.
+    static constexpr double fixed_bytes = 32e6;
+    static constexpr double most_bytes_per_turn = 2000.0;
+};
+
+TEST_F(LongClosureMemory, IsTwoKilobytesATurn) {
+    const double plain = bytes_per_turn(60, "");
+    // Where candidates are many: random rates, with others beside them.
+    const double walking = bytes_per_turn(20, "[effects.rate_random_walk]\ndeg_h_rt_h = 50.0\n");
+    std::printf("%.0f and %.0f bytes a turn\n", plain, walking);
+    EXPECT_LT(plain, most_bytes_per_turn);
+    EXPECT_LT(walking, most_bytes_per_turn);
+}
+
+TEST_F(ClosureProgram, EndsAtASignalWithNothingWritten) {
+    write("long.toml", "[ensemble]\nduration_s = 120\ngyros = 1\ndither_asymmetry_sd_ratio = 0\n");
+    ASSERT_EQ(run({"record", "long.toml", "-o", "long.h5"}).status, 0);
+    for (const int number : {SIGINT, SIGTERM}) {
+        const pid_t child = start({"closure", "long.h5", "-o", "found"});
+        ASSERT_TRUE(soon([&] { return contents(streams_ / "err").find("fitting") != std::string::npos; }));
+        kill(child, number);
+        // Not waited for, it would end by itself much later. The program gives itself 0.8 s.
+        const Outcome r = finish(child);
+        EXPECT_EQ(r.signal, number);
+        EXPECT_THAT(r.err, HasSubstr("interrupted, nothing written"));
+        EXPECT_EQ(r.out, "");
+        EXPECT_EQ(left(), (std::set<std::string>{"long.h5", "long.toml", "r.h5", "s.toml"}));
+    }
 }
 
 }  // namespace

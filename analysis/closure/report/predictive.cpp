@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <mutex>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -19,9 +21,11 @@
 #include "analysis/closure/turns/model/effect_roles.hpp"
 #include "analysis/closure/turns/model/model.hpp"
 #include "analysis/closure/turns/model/series.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 #include "analysis/instrument/simulate.hpp"
 #include "analysis/noise/spectrum.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
 #include "engine/gyro/setup.hpp"
@@ -181,13 +185,17 @@ class TurnSight {
         using Row = Eigen::Matrix<double, columns, 1>;
         const std::size_t n = steady_rad.size();
         std::array<std::array<double, fold_points>, 2> seen{};
-        std::vector<Row> shape(n + 2, Row::Zero());
-        for (std::size_t i = 0; i < n + 2; ++i) {
+        const auto shape_of = [&](std::size_t i) {
+            Row shape = Row::Zero();
             const Eigen::Index first = turns.direction[i] > 0 ? 0 : each;
             for (Eigen::Index h = 0; h < harmonics; ++h) {
-                shape[i](first + 2 * h) = std::cos(static_cast<double>(h + 1) * phase_rad[i]);
-                shape[i](first + 2 * h + 1) = std::sin(static_cast<double>(h + 1) * phase_rad[i]);
+                shape(first + 2 * h) = std::cos(static_cast<double>(h + 1) * phase_rad[i]);
+                shape(first + 2 * h + 1) = std::sin(static_cast<double>(h + 1) * phase_rad[i]);
             }
+            return shape;
+        };
+        for (std::size_t i = 0; i < n + 2; ++i) {
+            const Eigen::Index first = turns.direction[i] > 0 ? 0 : each;
             const double fringes = phase_rad[i] / units::two_pi;
             const double place = (fringes - std::floor(fringes)) * static_cast<double>(fold_points);
             seen[first == 0 ? 0 : 1][static_cast<std::size_t>(place) % fold_points] += 1.0;
@@ -196,6 +204,8 @@ class TurnSight {
         using Products = Eigen::Matrix<double, columns + 1, columns + 1>;
         Products products = Products::Zero();
         Row sums = Row::Zero();
+        Row last = shape_of(0);
+        Row now = shape_of(1);
         for (std::size_t begin = 0; begin < n; begin += stretch) {
             const std::size_t rows = std::min(stretch, n - begin);
             if (rows < 3) break;
@@ -205,8 +215,11 @@ class TurnSight {
                 const std::size_t k = begin + r;
                 // Half of a kick comes before its turn, half after it; weighted 1 : 2 : 1 as the angle is, an eighth of
                 // it is there one turn before, a half at the turn, seven eighths one turn later.
-                const Row row = sums - 0.125 * shape[k] + 0.5 * shape[k + 1] + 0.125 * shape[k + 2];
-                sums += shape[k + 1];
+                const Row next = shape_of(k + 2);
+                const Row row = sums - 0.125 * last + 0.5 * now + 0.125 * next;
+                sums += now;
+                last = now;
+                now = next;
                 const auto at = static_cast<Eigen::Index>(r);
                 block.row(at) << row.transpose(), steady_rad[k];
                 time(at) = static_cast<double>(r) - 0.5 * static_cast<double>(rows - 1);
@@ -503,21 +516,26 @@ double swinging_deg_s(const record::Record& record, Closure closure, const TurnS
 }
 
 std::vector<Curves> simulate(const record::Record& record, const Closure& closure, int simulations,
-                             const TurnSight* turns, const SampleSight* samples) {
+                             const TurnSight* turns, const SampleSight* samples, const std::function<void()>& done) {
     std::vector<Curves> all(static_cast<std::size_t>(simulations));
     tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t k) {
+        check_interrupt();
         const std::uint64_t seed = first_seed + k;
         scenario::Scenario mine = replica(record, drawn(closure, seed), samples);
         mine.ensemble.seed = seed;
         record::Record simulated = instrument::simulate_record(mine);
         all[k] = turns != nullptr ? turns->look(*simulated.turns) : samples->look(std::move(simulated.samples->values));
+        done();
     });
     return all;
 }
 
 }  // namespace
 
-Predictive check_predictive(const record::Record& record, const Closure& closure, int simulations) {
+namespace {
+
+Predictive simulated_check(const record::Record& record, const Closure& closure, const Monitor& monitor,
+                           int simulations) {
     Predictive out;
     try {
         std::optional<TurnSight> turns;
@@ -545,7 +563,15 @@ Predictive check_predictive(const record::Record& record, const Closure& closure
                 if (e.name == "dither_peak_rate_deg_s") e.value = peak_deg_s;
             }
         }
-        const std::vector<Curves> simulated = simulate(record, swinging, wanted, turn_sight, sample_sight);
+        const bool of_base = !closure.base_alone.empty();
+        const int of_base_alone = of_base ? std::min(wanted, options.report.base_simulations) : 0;
+        std::mutex counting;
+        int done = 0;
+        const auto one_more = [&] {
+            const std::lock_guard lock(counting);
+            monitor.tell_share(static_cast<double>(++done) / static_cast<double>(wanted + of_base_alone));
+        };
+        const std::vector<Curves> simulated = simulate(record, swinging, wanted, turn_sight, sample_sight, one_more);
         all.insert(all.end(), simulated.begin(), simulated.end());
         out.simulations = wanted;
         out.turns = std::llround(each) * wanted;
@@ -556,11 +582,11 @@ Predictive check_predictive(const record::Record& record, const Closure& closure
         Curves whole;
         if (samples && !closure.disturbed.empty()) whole = samples->look_at_whole(samples->measured().increment);
         std::vector<Curves> base;
-        if (!closure.base_alone.empty()) {
+        if (of_base) {
             Closure alone = closure;
             alone.base = closure.base_alone;
             alone.steps.clear();
-            base = simulate(record, alone, std::min(wanted, options.report.base_simulations), turn_sight, sample_sight);
+            base = simulate(record, alone, of_base_alone, turn_sight, sample_sight, one_more);
         }
         std::vector<PredictiveStatistic> statistics = blank(record.turns.has_value());
         for (std::size_t k = 0; k < statistics.size(); ++k) {
@@ -587,6 +613,15 @@ Predictive check_predictive(const record::Record& record, const Closure& closure
         out.notes.push_back(fmt::format("no predictive check, the closed model cannot be simulated: {}", error.what()));
     }
     return out;
+}
+
+}  // namespace
+
+Predictive check_predictive(const record::Record& record, const Closure& closure, int simulations,
+                            const Monitor& monitor) {
+    const auto check = [&] { return simulated_check(record, closure, monitor, simulations); };
+    // Each thread holds a simulated record and what is looked at in it.
+    return record.turns ? on_threads_for(record.turns->size(), check) : check();
 }
 
 }  // namespace ringlock::closure

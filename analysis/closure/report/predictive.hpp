@@ -38,8 +38,8 @@ struct Predictive {
 
 /// Simulates the closed model as often as `options.report.most_turns` last, `options.report.fewest_simulations` to
 /// `simulations` times, with the record's own input and length, and compares. What cannot be simulated is a note, and
-/// no error. Throws Interrupted.
+/// no error. Tells the monitor the share of the simulations that is done. Throws Interrupted.
 Predictive check_predictive(const record::Record& record, const Closure& closure,
-                            int simulations = options.report.most_simulations);
+                            int simulations = options.report.most_simulations, const Monitor& monitor = {});
 
 }  // namespace ringlock::closure

@@ -1,13 +1,12 @@
 #include "analysis/closure/turns/fit/fit.hpp"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
 
 #include "analysis/closure/options.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 
@@ -63,8 +62,8 @@ Regressor difference(TurnModel::Prediction with, const TurnModel::Prediction& wi
         of.series[i] = (of.series[i] - without.phase_rad[i]) / per;
         of.slope[i] = (of.slope[i] - without.frame.before_slope[i]) / per;
         of.kick[i] = (of.kick[i] - without.frame.kick_slope[i]) / per;
-        of.left[i] = (of.left[i] - without.frame.shape_left[i]) / per;
     }
+    for (std::size_t i = 0; i < of.left.size(); ++i) of.left[i] = (of.left[i] - without.frame.shape_left[i]) / per;
     return of;
 }
 
@@ -92,7 +91,7 @@ TurnFit::TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows,
     if (rows_.size() != model.series().size()) throw std::logic_error("TurnFit: not as many rows as turns");
     if (parameters_.bias_deg_h == 0.0) parameters_.bias_deg_h = model.series().mean_rate_deg_h;
     prediction_ = model_->predict(parameters_);
-    columns_ = columns(prediction_);
+    find_columns();
     if (parameters_.injected_sd_rad > 0.0) fit_nuisances();
     fit_deterministic(options.turns.fit.passes);
     fit_noise();
@@ -112,9 +111,10 @@ TurnFit::TurnFit(const TurnFit& of, TurnParameters parameters, int passes)
       effects_(of.effects_),
       needed_(of.needed_),
       nuisance_(of.nuisance_),
-      prediction_(of.prediction_),
-      columns_(of.columns_),
-      moved_(of.moved_) {
+      columns_at_(of.columns_at_),
+      moved_(of.moved_),
+      prediction_(of.ready().prediction_),
+      columns_(of.columns_) {
     if (passes > 0) fit_deterministic(passes);
     finish();
 }
@@ -174,7 +174,13 @@ bool TurnFit::place_times() {
     return moved;
 }
 
-std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& prediction) const {
+void TurnFit::find_columns() {
+    columns_.clear();  // before others take their place
+    columns_ = columns(parameters_, prediction_);
+    columns_at_ = parameters_;
+}
+
+std::vector<TurnFit::Column> TurnFit::columns(const TurnParameters& at, const TurnModel::Prediction& prediction) const {
     const std::size_t n = model_->series().size();
     std::vector<Column> all;
     std::vector<double> ones(n, 1.0);
@@ -187,7 +193,7 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
         }
         all.push_back({"", "amplitude", std::move(drift)});
     }
-    for (const AmplitudeSwing& swing : parameters_.swings) {
+    for (const AmplitudeSwing& swing : at.swings) {
         for (std::vector<double>& by : amplitude_by(swing, model_->series())) {
             all.push_back({"", "swing", std::move(by)});
         }
@@ -206,10 +212,10 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnModel::Prediction& predi
             return by(-step);  // on the edge of what can be followed
         }
     };
-    TurnParameters p = parameters_;
+    TurnParameters p = at;
     std::vector<double> rotation(n);
     const double c = units::two_pi / model_->series().setup.scale_factor_arcsec;
-    for (std::size_t i = 1; i < n; ++i) rotation[i] = rotation[i - 1] + c * prediction.intervals[i].duration_s;
+    for (std::size_t i = 1; i < n; ++i) rotation[i] = rotation[i - 1] + c * model_->interval(prediction, i).duration_s;
     all.push_back({"", "bias_deg_h", std::move(rotation)});
     all.push_back(
         {"", "lockin_threshold_deg_h", change(p, p.threshold_deg_h, 1e-3 * std::max(1.0, p.threshold_deg_h))});
@@ -261,7 +267,7 @@ void TurnFit::fit_nuisances() {
 void TurnFit::fit_deterministic(int most) {
     for (int pass = 0; pass < most; ++pass) {
         // Those of so near a point that another step gains nothing serve as well.
-        if (moved_) columns_ = columns(prediction_);
+        if (moved_) find_columns();
         moved_ = false;
         set_rest(prediction_);
         TurnParameters guess = parameters_;
@@ -306,7 +312,7 @@ TurnFit::Equations TurnFit::equations(const Whitening& whitening, bool guessed) 
 void TurnFit::follow_gains(const Whitening& whitening, Eigen::MatrixXd& x, Eigen::VectorXd& scale) const {
     const TurnNoise noise = model_->noise(parameters_);
     const std::size_t n = rows_.size();
-    oneapi::tbb::parallel_for(Eigen::Index{0}, x.cols(), [&](Eigen::Index k) {
+    side_by_side(x.cols(), [&](Eigen::Index k) {
         const Regressor& of = columns_[static_cast<std::size_t>(k)].of;
         if (of.slope.empty()) return;
         const double step = 1e-3 / scale(k);
@@ -314,10 +320,9 @@ void TurnFit::follow_gains(const Whitening& whitening, Eigen::MatrixXd& x, Eigen
             TurnFrame frame = prediction_.frame;
             std::vector<double> rest = rest_;
             of.take(value, rest, frame);
-            const Whitening there(frame, noise);
-            std::vector<double> innovations = there.apply(rest);
-            for (std::size_t i = 0; i < n; ++i) innovations[i] *= there.sd_rad()[i] / whitening.sd_rad()[i];
-            return innovations;
+            Whitening::Innovations there = Whitening::innovations(frame, noise, rest);
+            for (std::size_t i = 0; i < n; ++i) there.white[i] *= there.sd_rad[i] / whitening.sd_rad()[i];
+            return std::move(there.white);
         };
         const std::vector<double> lower = innovations_at(-step);
         const std::vector<double> upper = innovations_at(step);
@@ -458,7 +463,7 @@ void TurnFit::take(const Eigen::VectorXd& step) {
     }
 }
 
-void TurnFit::set_rest(const TurnModel::Prediction& prediction) {
+void TurnFit::set_rest(const TurnModel::Prediction& prediction) const {
     rest_.resize(model_->series().size());
     for (std::size_t i = 0; i < rest_.size(); ++i) {
         rest_[i] = model_->phase_rad()[i] - prediction.phase_rad[i];
@@ -512,7 +517,7 @@ ReadingErrors TurnFit::reading_errors() const {
     // another must be linear about the same, or one gains by that alone: long before it can be seen.
     const double readout_rad2 = parameters_.readout_sd_rad * parameters_.readout_sd_rad;
     if (parameters_.injected_sd_rad > parameters_.readout_sd_rad) return {};
-    ReadingErrors errors = whitening_->reading_errors(rest_);
+    ReadingErrors errors = ready().whitening_->reading_errors(rest_);
     const auto& left_rad2 = errors.variance_rad2;
     const double mean_rad2 =
         std::accumulate(left_rad2.begin(), left_rad2.end(), 0.0) / static_cast<double>(left_rad2.size());
@@ -521,19 +526,56 @@ ReadingErrors TurnFit::reading_errors() const {
 }
 
 void TurnFit::finish() {
-    const std::size_t n = model_->series().size();
-    if (moved_) columns_ = columns(prediction_);
+    if (moved_) find_columns();
+    whiten();
+    log_likelihood_ = -objective(parameters_, rest_);
+    if (!std::isfinite(log_likelihood_)) throw RunError("the likelihood of these phases is no number");
+    is_ready_ = true;
+}
+
+void TurnFit::whiten() const {
     set_rest(prediction_);
     whitening_ = std::make_shared<Whitening>(prediction_.frame, model_->noise(parameters_));
     innovations_ = whitening_->apply(rest_);
     sd_rad_ = whitening_->sd_rad();
-    for (std::size_t i = 0; i < n; ++i) sd_rad_[i] /= std::abs(1.0 - prediction_.frame.before_slope[i]);
-    log_likelihood_ = -objective(parameters_, rest_);
-    if (!std::isfinite(log_likelihood_)) throw RunError("the likelihood of these phases is no number");
-    // Orthonormal basis, for scores.
+    for (std::size_t i = 0; i < sd_rad_.size(); ++i) sd_rad_[i] /= std::abs(1.0 - prediction_.frame.before_slope[i]);
+}
+
+void TurnFit::put_away() const {
+    is_ready_ = false;
+    has_basis_ = false;
+    prediction_ = TurnModel::Prediction();
+    columns_.clear();
+    // An empty list in their place would leave them their memory.
+    for (std::vector<double>* of_turns : {&rest_, &innovations_, &sd_rad_}) std::vector<double>().swap(*of_turns);
+    whitening_.reset();
+    basis_.resize(0, 0);
+    model_->forget();
+}
+
+const TurnFit& TurnFit::ready() const {
+    if (is_ready_) return *this;
+    const std::lock_guard lock(getting_ready_);
+    if (is_ready_) return *this;
+    prediction_ = model_->predict(parameters_);
+    columns_ = columns(columns_at_, columns_at_ == parameters_ ? prediction_ : model_->predict(columns_at_));
+    whiten();
+    is_ready_ = true;
+    return *this;
+}
+
+/// For scores.
+const Eigen::MatrixXd& TurnFit::basis() const {
+    if (has_basis_) return basis_;
+    ready();
+    const std::lock_guard lock(making_basis_);
+    if (has_basis_) return basis_;
     Eigen::VectorXd scale;
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(whitened_columns(scale));
+    Eigen::MatrixXd own = whitened_columns(scale);
+    const Eigen::HouseholderQR<Eigen::Ref<Eigen::MatrixXd>> qr(own);  // in place
     basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(qr.rows(), scale.size());
+    has_basis_ = true;
+    return basis_;
 }
 
 Eigen::VectorXd TurnFit::counted(const Whitening& whitening, const TurnFrame& frame, const Regressor& regressor) const {
@@ -556,7 +598,7 @@ Eigen::MatrixXd TurnFit::counted(const Whitening& whitening, const TurnFrame& fr
                                  const RegressorAt& regressor, Eigen::VectorXd& norms) const {
     Eigen::MatrixXd x(static_cast<Eigen::Index>(2 * rows_.size()), static_cast<Eigen::Index>(count));
     norms.resize(x.cols());
-    oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t at) {
+    side_by_side(count, [&](std::size_t at) {
         const auto k = static_cast<Eigen::Index>(at);
         const Eigen::VectorXd column = counted(whitening, frame, regressor(at));
         norms(k) = std::max(column.norm(), 1e-300);

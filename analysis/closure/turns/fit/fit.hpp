@@ -1,10 +1,14 @@
 #pragma once
 #include <Eigen/Dense>
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <limits>
 #include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -66,18 +70,22 @@ class TurnFit {
     /// to be linear about it, and not about the phases that were read; else none.
     ReadingErrors reading_errors() const;
 
+    /// Lets go of all that is as long as the record. It is made again from the parameters, bit for bit, where something
+    /// asks for it: of many fits beside one another, those keep it that work. Not while others look at what it has.
+    void put_away() const;
+
     const TurnModel& model() const { return *model_; }
     const TurnParameters& parameters() const { return parameters_; }
-    const TurnModel::Prediction& prediction() const { return prediction_; }
+    const TurnModel::Prediction& prediction() const { return ready().prediction_; }
     /// Base parameters and those of effects, with standard errors.
-    std::vector<Estimate> estimates() const;
+    const std::vector<Estimate>& estimates() const;
     /// Of the phases that count and of the radii of the quadrature.
     double log_likelihood() const { return log_likelihood_; }
     const Rows& rows() const { return rows_; }
 
     /// Innovations of all turns over their standard deviations, and those of the phases [rad].
-    const std::vector<double>& innovations() const { return innovations_; }
-    const std::vector<double>& sd_rad() const { return sd_rad_; }
+    const std::vector<double>& innovations() const { return ready().innovations_; }
+    const std::vector<double>& sd_rad() const { return ready().sd_rad_; }
 
     /// Regression of the innovations that count on further series of phase, whitened and freed of what the model's own
     /// parameters could take of them: estimates, covariance and the chi-squared of all together.
@@ -88,6 +96,17 @@ class TurnFit {
         int rank = 0;
     };
     Score score(const std::vector<Regressor>& regressors) const;
+    /// The same of so many series, each made where it is whitened and let go of then.
+    Score score(std::size_t count, const std::function<Regressor(std::size_t)>& regressor) const;
+    /// The same of so many series that no phase moves, which go through the filter a piece at a time: for many of them.
+    /// The squares and products that the regression is of.
+    struct Products {
+        Eigen::MatrixXd squares;  ///< of the series, whitened and freed, with each other
+        Eigen::VectorXd right;    ///< with what is left
+    };
+    using Piece = std::function<void(std::size_t series, std::size_t first_turn, std::span<double> values)>;
+    Products products(std::size_t count, const Piece& piece) const;
+    Score score_pieces(std::size_t count, const Piece& piece) const { return score_of(products(count, piece)); }
     /// That regression with the noise fitted anew beside it, from the model's own, or from another that is nearer.
     struct Regression {
         double gain = 0.0;  ///< of the log-likelihood
@@ -102,7 +121,9 @@ class TurnFit {
     Eigen::VectorXd whitened(const Regressor& regressor) const;
     Eigen::VectorXd residual() const;
     /// One series whitened, and no more.
-    std::vector<double> whitened_alone(const std::vector<double>& series) const { return whitening_->apply(series); }
+    std::vector<double> whitened_alone(const std::vector<double>& series) const {
+        return ready().whitening_->apply(series);
+    }
 
     /// Twice the gain of the log-likelihood by a random effect, and its standard deviation (of the parameter of that
     /// role), all else as fitted.
@@ -114,6 +135,8 @@ class TurnFit {
 
    private:
     TurnFit(const TurnFit& of, TurnParameters parameters, int passes);  ///< with that noise
+    static Score score_of(const Products& products);
+    Score score_whitened(std::size_t count, const std::function<Eigen::VectorXd(std::size_t)>& column) const;
     struct Column {
         std::string effect, name;
         Regressor of;
@@ -149,13 +172,19 @@ class TurnFit {
     Eigen::VectorXd below(const std::vector<double>& white, double value) const;
     void hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) const;
     void take(const Eigen::VectorXd& step);
-    void set_rest(const TurnModel::Prediction& prediction);
+    void set_rest(const TurnModel::Prediction& prediction) const;
     double squares_left(const Whitening& whitening) const;
     double objective_at(const TurnModel::Prediction& prediction) const;  ///< with what is believed
     double slope_of_objective(const TurnFrame& frame, const std::vector<double>& rest, const Regressor& of,
                               double step) const;
-    std::vector<Column> columns(const TurnModel::Prediction& prediction) const;
+    /// How phases go with the parameters, at these, which foretell that.
+    std::vector<Column> columns(const TurnParameters& at, const TurnModel::Prediction& prediction) const;
+    void find_columns();
     void finish();
+    void whiten() const;
+    const TurnFit& ready() const;
+    const Eigen::MatrixXd& basis() const;
+    std::vector<Estimate> estimate() const;
     Eigen::MatrixXd whitened_columns(Eigen::VectorXd& scale) const;  ///< of norm one, scale times as long
     Eigen::MatrixXd information(Eigen::VectorXd& scale) const;       ///< of these, and what is believed
     void add_noise_estimates(std::vector<Estimate>& estimates) const;
@@ -181,16 +210,22 @@ class TurnFit {
     TurnParameters parameters_;
     Rows rows_;
     Effects effects_;
-    double needed_;                     ///< log-likelihood
-    std::vector<double> nuisance_;      ///< offset, amplitude and its drift; swings are among the parameters
-    TurnModel::Prediction prediction_;  ///< of the parameters as they are
-    std::vector<double> rest_;          ///< phases less all that is deterministic
-    std::vector<Column> columns_;
-    bool moved_ = false;  ///< far from where the columns are of
-    std::vector<double> innovations_, sd_rad_;
+    double needed_;                 ///< log-likelihood
+    std::vector<double> nuisance_;  ///< offset, amplitude and its drift; swings are among the parameters
+    TurnParameters columns_at_;     ///< whose columns these are
+    bool moved_ = false;            ///< far from where the columns are of
     double log_likelihood_ = 0.0;
-    Eigen::MatrixXd basis_;  ///< orthonormal, of the model's own whitened columns in the rows that count
-    std::shared_ptr<Whitening> whitening_;
+
+    // As long as the record; all of it follows from the above.
+    mutable TurnModel::Prediction prediction_;  ///< of the parameters as they are
+    mutable std::vector<double> rest_;          ///< phases less all that is deterministic
+    mutable std::vector<Column> columns_;
+    mutable std::vector<double> innovations_, sd_rad_;
+    mutable std::shared_ptr<Whitening> whitening_;
+    mutable Eigen::MatrixXd basis_;  ///< orthonormal, of the model's own whitened columns in the rows that count
+    mutable std::optional<std::vector<Estimate>> estimates_;
+    mutable std::atomic<bool> is_ready_ = false, has_basis_ = false;
+    mutable std::mutex getting_ready_, making_basis_, estimating_;
 };
 
 }  // namespace ringlock::closure

@@ -1,7 +1,6 @@
 // The random part of the fit: standard deviations, by the likelihood of what the deterministic part leaves.
 #include <ceres/ceres.h>
 #include <glog/logging.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <boost/math/tools/minima.hpp>
@@ -13,6 +12,7 @@
 
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/fit/fit.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::closure {
@@ -54,9 +54,9 @@ struct Innovations {
     Innovations(std::vector<double> of_white, std::vector<double> of_sd_rad)
         : white(std::move(of_white)), sd_rad(std::move(of_sd_rad)) {}
     Innovations(const TurnFrame& frame, const TurnNoise& noise, const std::vector<double>& rest) {
-        const Whitening whitening(frame, noise);
-        white = whitening.apply(rest);
-        sd_rad = whitening.sd_rad();
+        Whitening::Innovations of = Whitening::innovations(frame, noise, rest);
+        white = std::move(of.white);
+        sd_rad = std::move(of.sd_rad);
     }
 
     /// How these and the logarithms of their variances differ under another noise, in the rows that count: its square
@@ -160,6 +160,7 @@ void TurnFit::try_other_noise() {
 }
 
 std::unique_ptr<TurnFit> TurnFit::with_less_noise() const {
+    ready();
     std::unique_ptr<TurnFit> least;
     for (double TurnParameters::*own : {&TurnParameters::wander_sd_rad, &TurnParameters::injected_sd_rad}) {
         TurnParameters less = least ? least->parameters_ : parameters_;
@@ -177,23 +178,30 @@ std::unique_ptr<TurnFit> TurnFit::with_less_noise() const {
 }
 
 void TurnFit::try_from(const TurnParameters& other) {
-    const TurnParameters from = parameters_;
-    const std::vector<double> nuisance_from = nuisance_;
-    const std::vector<double> rest_from = rest_;
-    const TurnModel::Prediction prediction_from = prediction_;
-    const std::vector<Column> columns_from = columns_;
-    const bool moved_from = moved_;
     const double before = objective(parameters_, rest_);
+    const TurnParameters from = parameters_;
     parameters_ = other;
     fit_noise();
-    if (objective(parameters_, rest_) < before + options.turns.fit.summits_apart) climb();
+    if (!(objective(parameters_, rest_) < before + options.turns.fit.summits_apart)) {
+        parameters_ = from;
+        return;
+    }
+    const std::vector<double> nuisance_from = nuisance_;
+    const TurnParameters columns_from = columns_at_;
+    const TurnModel::Prediction prediction_from = prediction_;
+    const bool moved_from = moved_;
+    climb();
     if (objective(parameters_, rest_) < before) return;
     parameters_ = from;
     nuisance_ = nuisance_from;
-    rest_ = rest_from;
     prediction_ = prediction_from;
-    columns_ = columns_from;
+    set_rest(prediction_);
     moved_ = moved_from;
+    if (!(columns_at_ == columns_from)) {
+        // Where they have moved far, others are found before these are asked for.
+        if (!moved_) columns_ = columns(columns_from, model_->predict(columns_from));
+        columns_at_ = columns_from;
+    }
 }
 
 std::vector<double> TurnFit::objectives(const TurnFrame& frame, const std::vector<TurnParameters>& parameters,
@@ -288,7 +296,7 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
         constexpr double step = 1e-3;
         const Innovations here(frame, model_->noise(with(from)), rest);
         Eigen::MatrixXd derivatives(2 * rest.size(), size);
-        oneapi::tbb::parallel_for(Eigen::Index{0}, size, [&](Eigen::Index k) {
+        side_by_side(size, [&](Eigen::Index k) {
             Eigen::VectorXd at = from;
             at(k) += step;
             derivatives.col(k) = here.change(Innovations(frame, model_->noise(with(at)), rest), rows_) / step;
@@ -377,6 +385,7 @@ void TurnFit::add_noise_estimates(std::vector<Estimate>& estimates) const {
 }
 
 TurnFit::Spread TurnFit::spread(const ActiveEffect& effect, const std::string& parameter, double most) const {
+    ready();
     TurnParameters trial = parameters_;
     trial.effects.push_back(effect);
     double& deviation = trial.effects.back().values.at(parameter);

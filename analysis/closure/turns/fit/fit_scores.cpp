@@ -1,12 +1,11 @@
 // What a fit tells: parameters with their errors, and scores of what it does not have.
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/fit/fit.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -53,7 +52,14 @@ Eigen::MatrixXd TurnFit::information(Eigen::VectorXd& scale) const {
     return normal;
 }
 
-std::vector<Estimate> TurnFit::estimates() const {
+const std::vector<Estimate>& TurnFit::estimates() const {
+    const std::lock_guard lock(estimating_);
+    if (!estimates_) estimates_ = estimate();
+    return *estimates_;
+}
+
+std::vector<Estimate> TurnFit::estimate() const {
+    ready();
     Eigen::VectorXd scale;
     const Eigen::MatrixXd normal = information(scale);
     const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
@@ -100,6 +106,7 @@ std::vector<Estimate> TurnFit::estimates() const {
 
 TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors, const TurnParameters& noise) const {
     constexpr double gained = 0.01;  // of the log-likelihood, by another pass
+    ready();
     Regression regression{0.0, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(regressors.size()))};
     TurnParameters trial = noise;
     TurnFrame frame = prediction_.frame;
@@ -133,29 +140,99 @@ TurnFit::Regression TurnFit::regress(const std::vector<Regressor>& regressors, c
 }
 
 Eigen::VectorXd TurnFit::whitened(const Regressor& regressor) const {
+    const Eigen::MatrixXd& own = basis();
     Eigen::VectorXd column = counted(*whitening_, prediction_.frame, regressor);
     const double all = column.norm();
-    column -= basis_ * (basis_.transpose() * column);
+    column -= own * (own.transpose() * column);
     if (column.norm() < options.turns.fit.told_apart * all) column.setZero();
     return column;
 }
 
-Eigen::VectorXd TurnFit::residual() const { return below(innovations_, -1.0); }
+Eigen::VectorXd TurnFit::residual() const { return below(ready().innovations_, -1.0); }
 
 TurnFit::Score TurnFit::score(const std::vector<Regressor>& regressors) const {
-    const auto k = static_cast<Eigen::Index>(regressors.size());
-    const Eigen::VectorXd y = residual();
-    Eigen::MatrixXd x(y.size(), k);
-    oneapi::tbb::parallel_for(Eigen::Index{0}, k,
-                              [&](Eigen::Index j) { x.col(j) = whitened(regressors[static_cast<std::size_t>(j)]); });
+    return score_whitened(regressors.size(), [&](std::size_t k) { return whitened(regressors[k]); });
+}
+
+TurnFit::Score TurnFit::score(std::size_t count, const std::function<Regressor(std::size_t)>& regressor) const {
+    return score_whitened(count, [&](std::size_t k) { return whitened(regressor(k)); });
+}
+
+TurnFit::Score TurnFit::score_whitened(std::size_t count,
+                                       const std::function<Eigen::VectorXd(std::size_t)>& column) const {
+    basis();
+    Eigen::MatrixXd x(static_cast<Eigen::Index>(2 * rows_.size()), static_cast<Eigen::Index>(count));
+    side_by_side(count, [&](std::size_t k) { x.col(static_cast<Eigen::Index>(k)) = column(k); });
+    return score_of({x.transpose() * x, x.transpose() * residual()});
+}
+
+TurnFit::Score TurnFit::score_of(const Products& products) {
     Score score;
-    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(x.transpose() * x);
-    const Eigen::VectorXd projected = x.transpose() * y;
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition(products.squares);
     score.covariance = decomposition.pseudoInverse();
-    score.value = score.covariance * projected;
-    score.chi2 = projected.dot(score.value);
+    score.value = score.covariance * products.right;
+    score.chi2 = products.right.dot(score.value);
     score.rank = static_cast<int>(decomposition.rank());
     return score;
+}
+
+/// In two passes of the filter: the first finds what of each series is the model's own, the second is without it.
+TurnFit::Products TurnFit::products(std::size_t count, const Piece& piece) const {
+    constexpr std::size_t turns_at_once = 1024;
+    constexpr Eigen::Index columns_at_once = 24;  // of the lower triangle: parts that are as much work each
+    const Eigen::MatrixXd& own = basis();
+    const std::size_t n = rows_.size();
+    const auto series = static_cast<Eigen::Index>(count);
+    const auto turns = static_cast<Eigen::Index>(n);
+    Eigen::MatrixXd white(static_cast<Eigen::Index>(turns_at_once), series);
+    const auto each_piece = [&](const auto& work) {
+        std::vector<FilterState> states(count);
+        for (std::size_t first = 0; first < n; first += turns_at_once) {
+            const std::size_t some = std::min(turns_at_once, n - first);
+            side_by_side(count, [&](std::size_t k) {
+                double* const column = &white(0, static_cast<Eigen::Index>(k));
+                piece(k, first, {column, some});
+                whitening_->apply(first, {column, some}, states[k]);
+                for (std::size_t i = 0; i < some; ++i) {
+                    if (!rows_[first + i]) column[i] = 0.0;
+                }
+            });
+            work(static_cast<Eigen::Index>(first), white.topRows(static_cast<Eigen::Index>(some)));
+        }
+    };
+    Eigen::MatrixXd share = Eigen::MatrixXd::Zero(own.cols(), series);
+    Eigen::VectorXd all = Eigen::VectorXd::Zero(series);
+    each_piece([&](Eigen::Index first, const auto& part) {
+        share.noalias() += own.middleRows(first, part.rows()).transpose() * part;
+        all += part.colwise().squaredNorm().transpose();
+    });
+    Products found{Eigen::MatrixXd::Zero(series, series), Eigen::VectorXd::Zero(series)};
+    // Rows of |1 - before'| have nothing of the series but what is taken off with the model's own.
+    const auto below = own.bottomRows(turns);
+    Eigen::MatrixXd lower = share.transpose() * (below.transpose() * below) * share;
+    found.right = share.transpose() * (below.transpose() * residual().tail(turns)) * -1.0;
+    const Eigen::Map<const Eigen::VectorXd> innovations(innovations_.data(), turns);
+    each_piece([&](Eigen::Index first, const auto& part) {
+        const Eigen::Index some = part.rows();
+        const auto tiles = (series + columns_at_once - 1) / columns_at_once;
+        white.topRows(some).noalias() -= own.middleRows(first, some) * share;
+        side_by_side(tiles, [&](Eigen::Index tile) {
+            const Eigen::Index from = tile * columns_at_once;
+            const Eigen::Index wide = std::min(columns_at_once, series - from);
+            lower.block(from, from, series - from, wide).noalias() +=
+                white.topRows(some).rightCols(series - from).transpose() * white.topRows(some).middleCols(from, wide);
+        });
+        // Rows that do not count are nothing in the series and in what is the model's own.
+        found.right.noalias() += white.topRows(some).transpose() * innovations.segment(first, some);
+    });
+    found.squares = lower.selfadjointView<Eigen::Lower>();
+    for (Eigen::Index k = 0; k < series; ++k) {
+        if (std::sqrt(found.squares(k, k)) >= options.turns.fit.told_apart * std::sqrt(all(k))) continue;
+        found.squares.row(k).setZero();
+        found.squares.col(k).setZero();
+        found.right(k) = 0.0;
+    }
+    return found;
 }
 
 }  // namespace ringlock::closure

@@ -28,11 +28,17 @@ void linearise_again(Fitted& fitted, const Rows& rows, TurnFit::Effects effects)
     ReadingErrors known = fitted.fit->reading_errors();
     if (known.mean_rad.empty()) return;
     auto model = std::make_unique<TurnModel>(fitted.series(), fitted.joined().phase_rad, std::move(known));
+    fitted.fit->put_away();
     fitted.fit = std::make_unique<TurnFit>(*model, fitted.fit->parameters(), rows, effects);
     fitted.model = std::move(model);
 }
 
 }  // namespace
+
+TurnReading::TurnReading(const record::Record& record, const gyro::Ellipse& ellipse, bool count_again)
+    : joined(join(*record.turns, ellipse, count_again)),
+      series(prepare(record, joined)),
+      model(series, joined.phase_rad) {}
 
 /// The latest readings of a record: many candidates are fitted to one of them.
 class TurnProblem::Readings {
@@ -49,9 +55,7 @@ class TurnProblem::Readings {
             const std::lock_guard lock(mutex_);
             if (auto reading = known()) return reading;
         }
-        auto reading = std::make_shared<TurnReading>();
-        reading->joined = join(*record.turns, ellipse, count_again);
-        reading->series = prepare(record, reading->joined);
+        const auto reading = std::make_shared<const TurnReading>(record, ellipse, count_again);
         const std::lock_guard lock(mutex_);
         if (auto other = known()) return other;
         latest_.push_front({ellipse, count_again, reading});
@@ -89,19 +93,20 @@ std::shared_ptr<Fitted> TurnProblem::fit(const TurnParameters& start, TurnFit::E
         count_again |= effects::first_of(*active.effect, effects::Role::probability) != nullptr;
     }
     fitted->reading = readings_->get(*record_, setup.ellipse, count_again);
-    fitted->model = std::make_unique<TurnModel>(fitted->series(), fitted->joined().phase_rad);
+    const TurnModel& model = fitted->reading->model;
     TurnParameters parameters = start;
     const bool from_nothing = parameters.readout_sd_rad == 0.0;
     if (from_nothing) {
         parameters.readout_sd_rad = std::max(fitted->joined().readout_sd_rad, 1e-6);
         parameters.threshold_deg_h = fitted->series().setup.lockin_threshold_deg_h;
     }
-    fitted->fit = std::make_unique<TurnFit>(*fitted->model, parameters, rows_, effects, needed);
+    fitted->fit = std::make_unique<TurnFit>(model, parameters, rows_, effects, needed);
     if (from_nothing) {
         // Injected noise shows in the swings. A fit that starts without it may end at a lower maximum.
         parameters.injected_sd_rad = injected_by_swings(fitted->series());
         if (parameters.injected_sd_rad > parameters.readout_sd_rad) {
-            auto other = std::make_unique<TurnFit>(*fitted->model, parameters, rows_, effects);
+            fitted->fit->put_away();
+            auto other = std::make_unique<TurnFit>(model, parameters, rows_, effects);
             if (other->log_likelihood() > fitted->log_likelihood()) fitted->fit = std::move(other);
         }
     }

@@ -9,16 +9,19 @@
 /// A record of turns read, prepared and fitted.
 namespace ringlock::closure {
 
-/// The phases of a record, joined from count and quadrature, and the record prepared for a fit.
+/// The phases of a record, joined from count and quadrature, the record prepared for a fit, and what foretells them.
 struct TurnReading {
+    TurnReading(const record::Record& record, const gyro::Ellipse& ellipse, bool count_again);
+
     JoinedPhase joined;
     TurnSeries series;
+    TurnModel model;  ///< nothing but the scatter of the reading's errors known
 };
 
 /// A model of a record, fitted, with the reading that it was fitted to.
 struct Fitted {
     std::shared_ptr<const TurnReading> reading;
-    std::unique_ptr<TurnModel> model;
+    std::unique_ptr<TurnModel> model;  ///< where it is not the reading's
     std::unique_ptr<TurnFit> fit;
 
     const JoinedPhase& joined() const { return reading->joined; }

@@ -100,6 +100,7 @@ void CandidateFit::again_if_strong() {
 }
 
 void CandidateFit::from(const TurnParameters& start) {
+    if (best_) best_->fit->put_away();
     auto fitted = problem_.fit_or_none(start, needed_);
     if (!fitted) return;
     if (!best_ || fitted->log_likelihood() > best_->log_likelihood()) best_ = std::move(fitted);

@@ -1,7 +1,5 @@
 #include "analysis/closure/turns/loop/choice.hpp"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <memory>
 #include <utility>
@@ -10,6 +8,7 @@
 #include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/loop/candidate_fit.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 
 namespace ringlock::closure {
 
@@ -53,6 +52,7 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
         if (alone != candidates.end()) p_value = p_of_fit(*both, *alone->fitted, first);
         if (!passes(p_value) || !passes(p_of_fit(*both, *first.fitted, second))) return;
         const double merit = merit_of(gain_over(*both, *first.fitted), *both, *second.effect);
+        both->fit->put_away();
         sets.push_back({&first, {second}, both, first.merit + merit - cost_of_choice(), p_value});
     };
     std::vector<const Candidate*> firsts;
@@ -76,16 +76,17 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
         for (std::size_t b = a + 1; b < random.size(); ++b) of_random.push_back({random[a], random[b]});
     }
     std::vector<Ranking> seconds(firsts.size());
-    oneapi::tbb::parallel_for(std::size_t{0}, firsts.size() + of_random.size(), [&](std::size_t k) {
-        if (k < firsts.size()) {
-            seconds[k] = rank_candidates(problem, *firsts[k]->fitted, limits.second_of_pair, Among::not_random,
-                                         candidates.front().merit - firsts[k]->merit);
-            return;
-        }
-        RatePair& pair = of_random[k - firsts.size()];
+    // One after the other: the rankings are done side by side within, and each holds a fit of the record meanwhile.
+    for (std::size_t k = 0; k < firsts.size(); ++k) {
+        seconds[k] = rank_candidates(problem, *firsts[k]->fitted, limits.second_of_pair, Among::not_random,
+                                     candidates.front().merit - firsts[k]->merit);
+    }
+    side_by_side(of_random.size(), [&](std::size_t k) {
+        RatePair& pair = of_random[k];
         TurnParameters start = pair.first->fitted->parameters();
         start.effects.push_back(*pair.second->fitted->parameters().find(pair.second->effect->name()));
         pair.both = problem.fit_or_none(start);
+        if (pair.both) pair.both->fit->put_away();
     });
     for (std::size_t k = 0; k < firsts.size(); ++k) {
         if (seconds[k].seen_in_other_columns) continue;
@@ -122,11 +123,11 @@ std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<
         if (may_win) extended.push_back(&*likeliest);
     }
     std::vector<std::vector<CandidateSet>> found(extended.size());
-    oneapi::tbb::parallel_for(std::size_t{0}, extended.size(), [&](std::size_t k) {
+    for (std::size_t k = 0; k < extended.size(); ++k) {
         const CandidateSet& pair = *extended[k];
         const Ranking ranking =
             rank_candidates(problem, *pair.fitted, limits.third_of_triple, Among::all, best - pair.merit);
-        if (ranking.seen_in_other_columns) return;
+        if (ranking.seen_in_other_columns) continue;
         for (const Candidate& third : ranking.candidates) {
             const double merit = pair.merit + third.merit - cost_of_choice();
             if (!(merit > best - options.tie) || !passes(third.p_value)) continue;
@@ -141,7 +142,7 @@ std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<
             if (!passes(p_value) || !passes(p_given_others(pair.others.front()))) continue;
             found[k].push_back({pair.first, {pair.others.front(), third}, third.fitted, merit, p_value});
         }
-    });
+    }
     std::vector<CandidateSet> all;
     for (std::vector<CandidateSet>& some : found) {
         for (CandidateSet& set : some) {

@@ -15,6 +15,7 @@
 #include "analysis/closure/turns/loop/figures.hpp"
 #include "analysis/closure/turns/loop/rivals.hpp"
 #include "analysis/closure/turns/model/effect_roles.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 #include "analysis/closure/turns/screen/dither_amplitude.hpp"
 #include "analysis/closure/turns/screen/dither_shape.hpp"
 #include "analysis/closure/turns/screen/side_channels.hpp"
@@ -53,6 +54,12 @@ std::vector<Step> steps_of(const std::vector<ActiveEffect>& effects) {
 TurnLoop::TurnLoop(const record::Record& record, const Monitor& monitor)
     : problem_(record, training_rows(record.turns->size())), monitor_(monitor) {}
 
+/// Of the fit before nothing is kept that is as long as the record.
+void TurnLoop::go_on_with(std::shared_ptr<Fitted> fitted) {
+    if (now_ && now_ != fitted) now_->fit->put_away();
+    now_ = std::move(fitted);
+}
+
 /// Where the declared device, or the standard one, cannot have made such turns, no other model will do.
 void TurnLoop::fit_base() {
     try {
@@ -89,7 +96,7 @@ bool TurnLoop::add_amplitude(const Ranking& ranking, const Choice& choice) {
     if (!amplitude) amplitude = find_amplitude_memory(problem_, *now_);
     if (!amplitude) return false;
     if (choice.chosen != nullptr && !(amplitude->merit > choice.alternatives.front().merit - options.tie)) return false;
-    now_ = amplitude->fitted;
+    go_on_with(amplitude->fitted);
     if (closure_.steps.empty()) closure_.heldout_before = heldout(*now_->fit).error_rad;
     return true;
 }
@@ -147,7 +154,7 @@ void TurnLoop::take(const Choice& choice) {
     if (!earlier_ && choice.on_random) earlier_ = {now_, closure_.steps, step.effect};
     const HeldoutScore before = heldout(*now_->fit);
     step.note = note_on_frequency(*now_->fit, *best.fitted->fit, *best.effect);
-    now_ = best.fitted;
+    go_on_with(best.fitted);
     read_shape_again();
     drop_needless();
     const HeldoutScore after = heldout(*now_->fit);
@@ -163,9 +170,10 @@ void TurnLoop::read_shape_again() {
     for (int pass = 0; pass < options.turns.loop.shape_readings; ++pass) {
         const auto shape = shape_read_again(problem_.turns(), *now_->fit);
         if (!shape) return;
+        now_->fit->put_away();
         auto fitted = problem_.fit_or_none(*shape);
         if (!fitted) return;
-        now_ = std::move(fitted);
+        go_on_with(std::move(fitted));
     }
 }
 
@@ -183,10 +191,11 @@ void TurnLoop::drop_needless() {
         }
         TurnParameters without = now_->parameters();
         std::erase_if(without.effects, [&](const ActiveEffect& active) { return active.effect == effect; });
+        now_->fit->put_away();
         auto fitted = problem_.fit_or_none(without);
         if (!fitted) continue;
         if (!shape && passes(p_of_gain(gain_over(*now_, *fitted), *effect))) continue;
-        now_ = std::move(fitted);
+        go_on_with(std::move(fitted));
         closure_.steps.erase(closure_.steps.begin() + static_cast<std::ptrdiff_t>(k));
     }
 }
@@ -205,7 +214,7 @@ void TurnLoop::take_back_random() {
                            });
     if (!on_random || !closure_.unexplained || closure_.unexplained->where == Where::phase) return;
     const ResidualTest with_random = *closure_.unexplained;
-    now_ = earlier_->now;
+    go_on_with(earlier_->now);
     closure_.steps = std::move(earlier_->steps);
     test_residual();
     const auto same = std::find_if(closure_.tests.begin(), closure_.tests.end(),
@@ -239,6 +248,7 @@ void TurnLoop::finish() {
     }
     closure_.log_likelihood_gain = now_->log_likelihood() - base_log_likelihood_;
     take_residual(problem_.turns(), *now_, closure_);
+    now_->fit->put_away();
     monitor_.tell("fitting the whole record");
     const TurnProblem whole = problem_.whole();
     take_figures(problem_.turns(), *whole.fit(now_->parameters()), closure_);
@@ -266,7 +276,9 @@ Closure TurnLoop::run() {
     return std::move(closure_);
 }
 
-Closure close_turns(const record::Record& record, const Monitor& monitor) { return TurnLoop(record, monitor).run(); }
+Closure close_turns(const record::Record& record, const Monitor& monitor) {
+    return on_threads_for(record.turns->size(), [&] { return TurnLoop(record, monitor).run(); });
+}
 
 Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>& effects) {
     Closure closure;

@@ -20,6 +20,7 @@ class TurnLoop {
 
    private:
     void fit_base();
+    void go_on_with(std::shared_ptr<Fitted> fitted);
     bool add_one();
     bool add_amplitude(const Ranking& ranking, const Choice& choice);
     bool library_explains_most(Ranking& ranking, Choice& choice) const;

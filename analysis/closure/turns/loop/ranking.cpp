@@ -1,7 +1,5 @@
 #include "analysis/closure/turns/loop/ranking.hpp"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <limits>
 #include <optional>
@@ -12,6 +10,7 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/turns/loop/candidate_fit.hpp"
 #include "analysis/closure/turns/model/effect_roles.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 #include "analysis/closure/turns/screen/side_channels.hpp"
 
 namespace ringlock::closure {
@@ -93,7 +92,7 @@ class RankingFits {
         fit(first, nullptr);
         fit(others, random == nullptr ? nullptr : fits_[first_random].best().get());
         fit(larger, nullptr);
-        oneapi::tbb::parallel_for(std::size_t{0}, fits_.size(), [&](std::size_t k) {
+        side_by_side(fits_.size(), [&](std::size_t k) {
             if (!fits_[k].best() || merits_[k] < options.turns.loop.nearly_best * matters_) return;
             fits_[k].again_if_strong();
             judge(k);
@@ -112,7 +111,7 @@ class RankingFits {
         const TurnOptions::Loop& limits = options.turns.loop;
         const double needed =
             matters_ > limits.much_merit ? limits.far_below * matters_ : -std::numeric_limits<double>::infinity();
-        oneapi::tbb::parallel_for(std::size_t{0}, some.size(), [&](std::size_t i) {
+        side_by_side(some.size(), [&](std::size_t i) {
             const std::size_t k = some[i];
             const std::optional<std::size_t> smaller = contained_in(k);
             if (smaller && fits_[*smaller].best()) {
@@ -139,6 +138,8 @@ class RankingFits {
         const Candidate& candidate = candidates_[k];
         merits_[k] =
             other_columns_ ? promised_merit(candidate) : merit_of(gain_over(*best, now_), *best, *candidate.effect);
+        if (!other_columns_ && contained_in(k)) best->fit->estimates();  // which are asked for once all are fitted
+        best->fit->put_away();
     }
 
     const Fitted& now_;
@@ -184,6 +185,7 @@ Ranking rank_candidates(const TurnProblem& problem, const Fitted& now, std::size
         }
         candidates = worth_a_fit(std::move(candidates), options.turns.loop.worth_a_fit_p, most);
     }
+    now.fit->put_away();
     RankingFits(problem, now, candidates, ranking.seen_in_other_columns, matters).fit_all();
     std::erase_if(candidates, [](const Candidate& candidate) { return !candidate.fitted; });
     if (!ranking.seen_in_other_columns) compare_with_contained(candidates);

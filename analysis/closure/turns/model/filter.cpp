@@ -59,6 +59,13 @@ class Follower {
         }
     }
 
+    void get_state(double* state) const {
+        for (std::size_t s = 0; s < states; ++s) store(Tag{}, x_[s], &state[s]);
+    }
+    void set_state(const double* state) {
+        for (std::size_t s = 0; s < states; ++s) x_[s] = load(Tag{}, &state[s]);
+    }
+
    private:
     Row decay_, gain_s_, x_;
 };
@@ -142,11 +149,32 @@ void gains_with(const TurnFrame& frame, const FilterNoises& noises, double* gain
 
 template <std::size_t states>
 void innovations_with(const TurnFrame& frame, const FilterNoises& noises, const double* gains, const double* sd,
-                      const double* series, double* innovations) {
+                      std::size_t first, std::size_t count, double* state, const double* series, double* innovations) {
     Follower<states, One> follower(noises, 0);
+    follower.set_state(state);
     typename Follower<states, One>::Row gain;
-    for (std::size_t i = 0; i < frame.sign.size(); ++i) {
+    for (std::size_t k = 0; k < count; ++k) {
+        const std::size_t i = first + k;
         for (std::size_t s = 0; s < states; ++s) gain[s] = gains[i * states + s];
+        const double innovation = follower.innovation(series[k], frame.sign[i]);
+        innovations[k] = innovation / sd[i];
+        follower.step(gain, innovation);
+    }
+    follower.get_state(state);
+}
+
+template <std::size_t states>
+void innovations_once_with(const TurnFrame& frame, const FilterNoises& noises, const double* series,
+                           double* innovations, double* sd) {
+    Belief<states, One> belief(noises, 0);
+    Follower<states, One> follower(noises, 0);
+    typename Belief<states, One>::Row gain;
+    for (std::size_t i = 0; i < frame.sign.size(); ++i) {
+        double f = 0.0;
+        double over = 0.0;
+        belief.step(frame, i, gain, f, over);
+        for (std::size_t s = 0; s < states; ++s) gain[s] = gain[s] * over;
+        sd[i] = std::sqrt(f);
         const double innovation = follower.innovation(series[i], frame.sign[i]);
         innovations[i] = innovation / sd[i];
         follower.step(gain, innovation);
@@ -208,8 +236,15 @@ void gains(const TurnFrame& frame, const FilterNoises& noises, double* to, doubl
 }
 
 void innovations(const TurnFrame& frame, const FilterNoises& noises, const double* gains_of, const double* sd,
-                 const double* series, double* to) {
-    for_states(noises.states, [&](auto states) { innovations_with<states>(frame, noises, gains_of, sd, series, to); });
+                 std::size_t first, std::size_t count, double* state, const double* series, double* to) {
+    for_states(noises.states, [&](auto states) {
+        innovations_with<states>(frame, noises, gains_of, sd, first, count, state, series, to);
+    });
+}
+
+void innovations_once(const TurnFrame& frame, const FilterNoises& noises, const double* series, double* to,
+                      double* sd) {
+    for_states(noises.states, [&](auto states) { innovations_once_with<states>(frame, noises, series, to, sd); });
 }
 
 void likelihoods(const TurnFrame& frame, const FilterNoises& noises, const double* series, const std::uint8_t* counts,
@@ -231,6 +266,7 @@ namespace ringlock::closure {
 
 HWY_EXPORT(gains);
 HWY_EXPORT(innovations);
+HWY_EXPORT(innovations_once);
 HWY_EXPORT(likelihoods);
 
 FilterNoises::FilterNoises(std::size_t noises_given, std::size_t states_given)
@@ -244,9 +280,15 @@ void filter_gains(const TurnFrame& frame, const FilterNoises& noises, std::span<
 }
 
 void filter_innovations(const TurnFrame& frame, const FilterNoises& noises, std::span<const double> gains_of,
-                        std::span<const double> sd, std::span<const double> series, std::span<double> to) {
+                        std::span<const double> sd, std::size_t first, FilterState& state,
+                        std::span<const double> series, std::span<double> to) {
     HWY_DYNAMIC_DISPATCH(innovations)
-    (frame, noises, gains_of.data(), sd.data(), series.data(), to.data());
+    (frame, noises, gains_of.data(), sd.data(), first, series.size(), state.data(), series.data(), to.data());
+}
+
+void filter_innovations_once(const TurnFrame& frame, const FilterNoises& noises, std::span<const double> series,
+                             std::span<double> to, std::span<double> sd) {
+    HWY_DYNAMIC_DISPATCH(innovations_once)(frame, noises, series.data(), to.data(), sd.data());
 }
 
 std::vector<double> filter_likelihoods(const TurnFrame& frame, const FilterNoises& noises,

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -30,9 +31,18 @@ struct FilterNoises {
 /// standard deviations [rad].
 void filter_gains(const TurnFrame& frame, const FilterNoises& noises, std::span<double> gains, std::span<double> sd);
 
-/// Innovations of a series over their standard deviations, by these gains.
+/// What the filter believes between two turns of a series: to go on from there. Begins with nothing.
+using FilterState = std::array<double, FilterNoises::most_states>;
+
+/// Innovations of a series over their standard deviations, by these gains: from the turn `first` on, for as many as
+/// `series` and `innovations` hold. These two may be the same.
 void filter_innovations(const TurnFrame& frame, const FilterNoises& noises, std::span<const double> gains,
-                        std::span<const double> sd, std::span<const double> series, std::span<double> innovations);
+                        std::span<const double> sd, std::size_t first, FilterState& state,
+                        std::span<const double> series, std::span<double> innovations);
+
+/// The same of a whole series, and the standard deviations, without gains that are kept.
+void filter_innovations_once(const TurnFrame& frame, const FilterNoises& noises, std::span<const double> series,
+                             std::span<double> innovations, std::span<double> sd);
 
 /// Minus the log-likelihood of a series under each noise (Whitening::minus_log_likelihood).
 std::vector<double> filter_likelihoods(const TurnFrame& frame, const FilterNoises& noises,

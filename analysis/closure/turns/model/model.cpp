@@ -1,13 +1,11 @@
 #include "analysis/closure/turns/model/model.hpp"
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "analysis/closure/options.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 #include "engine/gyro/device.hpp"
@@ -127,34 +125,63 @@ std::vector<double> TurnModel::smooth(const std::vector<double>& turn_s) const {
     return smoothed;
 }
 
+namespace {
+
+/// Puts something in front of what was met lately, and lets go of what came longest ago.
+template <typename Met>
+void meet(std::deque<Met>& met, std::size_t kept, Met one) {
+    met.push_front(std::move(one));
+    if (met.size() > kept) met.pop_back();
+}
+
+}  // namespace
+
+std::shared_ptr<const KicksOverRange> TurnModel::kicks_over_input(const gyro::Setup& setup) const {
+    constexpr std::size_t kept = 16;
+    {
+        const std::lock_guard lock(meeting_);
+        const auto found =
+            std::find_if(gyros_met_.begin(), gyros_met_.end(), [&](const MetGyro& met) { return met.setup == setup; });
+        if (found != gyros_met_.end()) return found->kicks;
+    }
+    const auto [slowest, fastest] =
+        std::minmax_element(series_.input_rate_deg_h.begin(), series_.input_rate_deg_h.end());
+    const KicksOverRange::Range rate{setup.input_rate_deg_h + *slowest, setup.input_rate_deg_h + *fastest};
+    const auto shared = std::make_shared<const KicksOverRange>(setup, rate);
+    const std::lock_guard lock(meeting_);
+    meet(gyros_met_, kept, {setup, shared});
+    return shared;
+}
+
 std::shared_ptr<const TurnModel::Kicks> TurnModel::kicks(gyro::Setup setup, const Shape& shape) const {
-    constexpr std::size_t kept = 8;
+    constexpr std::size_t kept = 2;
     setup.ellipse = {};
     setup.missed_count_probability = 0.0;
     {
         const std::lock_guard lock(meeting_);
-        const auto found = std::find_if(met_.begin(), met_.end(),
-                                        [&](const Met& met) { return met.setup == setup && met.shape == shape; });
-        if (found != met_.end()) return found->kicks;
+        const auto found = std::find_if(kicks_met_.begin(), kicks_met_.end(),
+                                        [&](const MetKicks& met) { return met.setup == setup && met.shape == shape; });
+        if (found != kicks_met_.end()) return found->kicks;
     }
-    const std::vector<Coupling> stays(series_.size());
-    const auto shared = std::make_shared<const Kicks>(kicks_at(setup, series_.input_rate_deg_h, {stays, stays}, shape));
+    const auto shared = std::make_shared<const Kicks>(
+        kicks_at(*kicks_over_input(setup), setup.input_rate_deg_h, series_.input_rate_deg_h, {}, shape));
     const std::lock_guard lock(meeting_);
-    met_.push_front({setup, shape, shared});
-    if (met_.size() > kept) met_.pop_back();
+    meet(kicks_met_, kept, {setup, shape, shared});
     return shared;
 }
 
-bool TurnModel::Couplings::stay() const {
-    const auto plain = [](const Coupling& of) { return of == Coupling{}; };
-    return std::all_of(before.begin(), before.end(), plain) && std::all_of(after.begin(), after.end(), plain);
+void TurnModel::forget() const {
+    const std::lock_guard lock(meeting_);
+    kicks_met_.clear();
 }
 
 TurnModel::Couplings TurnModel::couplings(const TurnParameters& parameters) const {
-    Couplings couplings{std::vector<Coupling>(series_.size()), std::vector<Coupling>(series_.size())};
+    Couplings couplings;
     for (const ActiveEffect& active : parameters.effects) {
         const effects::Changes changes = active.effect->changes();
         if (!changes.threshold && !changes.coupling_phase) continue;
+        couplings.before.resize(series_.size());
+        couplings.after.resize(series_.size());
         const effects::ChangeOver change = active.effect->change(active.values);
         // Constant over each half cycle, as it is in its middle, but for a temperature and an input rate, which hardly
         // change from there to the turn.
@@ -169,13 +196,19 @@ TurnModel::Couplings TurnModel::couplings(const TurnParameters& parameters) cons
             add(couplings.after[i], series_.time_s[i] + to_middle_s);
         }
     }
+    const auto plain = [](const Coupling& of) { return of == Coupling{}; };
+    if (std::all_of(couplings.before.begin(), couplings.before.end(), plain) &&
+        std::all_of(couplings.after.begin(), couplings.after.end(), plain)) {
+        return {};
+    }
     return couplings;
 }
 
 TurnModel::Kicks TurnModel::kicks_at(const gyro::Setup& setup, const std::vector<double>& rate_deg_h,
                                      const Couplings& couplings, const Shape& shape) const {
     const auto [slowest, fastest] = std::minmax_element(rate_deg_h.begin(), rate_deg_h.end());
-    KicksOverRange::Range threshold{couplings.before.front().threshold, couplings.before.front().threshold};
+    const double first = couplings.before_turn(0).threshold;
+    KicksOverRange::Range threshold{first, first};
     for (const auto* side : {&couplings.before, &couplings.after}) {
         for (const Coupling& coupling : *side) {
             threshold.lowest = std::min(threshold.lowest, coupling.threshold);
@@ -183,30 +216,36 @@ TurnModel::Kicks TurnModel::kicks_at(const gyro::Setup& setup, const std::vector
         }
     }
     const KicksOverRange of(setup, {setup.input_rate_deg_h + *slowest, setup.input_rate_deg_h + *fastest}, threshold);
+    return kicks_at(of, setup.input_rate_deg_h, rate_deg_h, couplings, shape);
+}
+
+TurnModel::Kicks TurnModel::kicks_at(const KicksOverRange& of, double setup_rate_deg_h,
+                                     const std::vector<double>& rate_deg_h, const Couplings& couplings,
+                                     const Shape& shape) const {
     const auto kick_at = [&](std::size_t i, const Coupling& coupling) {
-        const TurnKicks::Weights* weights = shape ? &shape->at(i) : nullptr;
-        TurnKicks::Weights moved{};
+        TurnKicks::Weights weights{};
+        if (shape) weights = shape->at(i);
         std::complex<double> turned = turned_[i];
         if (coupling.turn != 1.0) {
             turned *= coupling.turn;
             // The weights stand in for harmonics of the phase that was read, not of the one that the coupling sees.
             std::complex<double> by = 1.0;
-            for (std::size_t k = 0; weights != nullptr && k < moved.size(); ++k) {
+            for (std::size_t k = 0; shape && k < weights.size(); ++k) {
                 by *= coupling.turn;
-                moved[k] = (*weights)[k] * by;
+                weights[k] *= by;
             }
-            if (weights != nullptr) weights = &moved;
         }
-        return of.at(series_.direction[i], turned, setup.input_rate_deg_h + rate_deg_h[i], coupling.threshold, weights);
+        return of.at(series_.direction[i], turned, setup_rate_deg_h + rate_deg_h[i], coupling.threshold,
+                     shape ? &weights : nullptr);
     };
     Kicks kicks(series_.size());
     constexpr std::size_t worth_a_task = 2048;
-    const oneapi::tbb::blocked_range<std::size_t> turns(0, kicks.size(), worth_a_task);
-    oneapi::tbb::parallel_for(turns, [&](const auto& some) {
-        for (std::size_t i = some.begin(); i < some.end(); ++i) {
-            kicks[i] = kick_at(i, couplings.after[i]);
-            if (couplings.before[i] == couplings.after[i]) continue;
-            const TurnKicks::Kick before = kick_at(i, couplings.before[i]);
+    side_by_side((kicks.size() + worth_a_task - 1) / worth_a_task, [&](std::size_t part) {
+        const std::size_t end = std::min((part + 1) * worth_a_task, kicks.size());
+        for (std::size_t i = part * worth_a_task; i < end; ++i) {
+            kicks[i] = kick_at(i, couplings.after_turn(i));
+            if (couplings.before_turn(i) == couplings.after_turn(i)) continue;
+            const TurnKicks::Kick before = kick_at(i, couplings.before_turn(i));
             kicks[i].before_rad = before.before_rad;
             kicks[i].before_slope = before.before_slope;
             kicks[i].before_curvature = before.before_curvature;
@@ -223,15 +262,14 @@ std::vector<double> TurnModel::added_rad(const Prediction& prediction, const eff
     double angle_arcsec = 0.0;
     const effects::ChangeOver change = effect.change(values);
     for (std::size_t i = 0; i < phase.size(); ++i) {
-        angle_arcsec += change(prediction.intervals[i]).angle_arcsec;
+        angle_arcsec += change(interval(prediction, i)).angle_arcsec;
         phase[i] = c * angle_arcsec;
     }
     return phase;
 }
 
-std::vector<double> TurnModel::dither_turns(const std::vector<double>& rate_deg_h,
-                                            const std::vector<Coupling>& coupling, const std::vector<double>& swing,
-                                            const gyro::Device& device) const {
+std::vector<double> TurnModel::dither_turns(const std::vector<double>& rate_deg_h, const Couplings& couplings,
+                                            const std::vector<double>& swing, const gyro::Device& device) const {
     const double c = units::two_pi / series_.setup.scale_factor_arcsec;
     const double w = units::pi / series_.interval_s;
     const double peak_rad_s = series_.amplitude_rad * w;
@@ -246,9 +284,10 @@ std::vector<double> TurnModel::dither_turns(const std::vector<double>& rate_deg_
     }
     std::vector<double> turn_s(series_.size());
     for (std::size_t i = 0; i < turn_s.size(); ++i) {
-        const std::complex<double> psi = coupling[i].turn == 1.0 ? turned_[i] : turned_[i] * coupling[i].turn;
+        const Coupling coupling = couplings.after_turn(i);
+        const std::complex<double> psi = coupling.turn == 1.0 ? turned_[i] : turned_[i] * coupling.turn;
         const double sine = psi.real() * coupling_turn.imag() + psi.imag() * coupling_turn.real();
-        const double rate_rad_s = c * rate_deg_h[i] + coupling[i].threshold * sine;
+        const double rate_rad_s = c * rate_deg_h[i] + coupling.threshold * sine;
         const bool before = series_.direction[i] * rate_rad_s > 0.0;
         const double share = rate_rad_s / (peak_rad_s * swing[before && i > 0 ? i - 1 : i] *
                                            relative[series_.direction[i] > 0][before ? 0 : 1]);
@@ -257,16 +296,12 @@ std::vector<double> TurnModel::dither_turns(const std::vector<double>& rate_deg_
     return turn_s;
 }
 
-std::vector<effects::Interval> TurnModel::intervals(const std::vector<double>& turn_s) const {
-    std::vector<effects::Interval> all(turn_s.size());
-    for (std::size_t i = 0; i < turn_s.size(); ++i) {
-        const std::size_t last = i > 0 ? i - 1 : 0;
-        all[i] = {turn_s[last],
-                  turn_s[i] - turn_s[last],
-                  {temperature_change_k(last), temperature_change_k(i)},
-                  {series_.input_rate_deg_h[last], series_.input_rate_deg_h[i]}};
-    }
-    return all;
+effects::Interval TurnModel::interval(const Prediction& prediction, std::size_t turn) const {
+    const std::size_t last = turn > 0 ? turn - 1 : 0;
+    return {prediction.dither_s[last],
+            prediction.dither_s[turn] - prediction.dither_s[last],
+            {temperature_change_k(last), temperature_change_k(turn)},
+            {series_.input_rate_deg_h[last], series_.input_rate_deg_h[turn]}};
 }
 
 std::vector<double> TurnModel::added_rates_deg_h(const TurnParameters& parameters,
@@ -294,7 +329,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     frame.sign.resize(n);
     frame.before_slope.resize(n);
     frame.kick_slope.resize(n);
-    frame.shape_left.resize(n);
+    if (parameters.shape) frame.shape_left.resize(n);
     frame.readout = series_.readout;
     prediction.phase_rad.resize(n);
     const double c = device.phase_per_arcsec;
@@ -306,10 +341,9 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     std::vector<double> swing = dither_swings(*kick_of, series_.input_rate_deg_h);
     std::vector<double> rate_deg_h(n);
     for (std::size_t i = 0; i < n; ++i) rate_deg_h[i] = parameters.bias_deg_h + series_.input_rate_deg_h[i];
-    prediction.turn_s = dither_turns(rate_deg_h, coupling.after, swing, device);
-    std::vector<double> turn_s = smooth(prediction.turn_s);
-    prediction.intervals = intervals(turn_s);
-    if (const auto added_deg_h = added_rates_deg_h(parameters, turn_s); !added_deg_h.empty()) {
+    prediction.turn_s = dither_turns(rate_deg_h, coupling, swing, device);
+    prediction.dither_s = smooth(prediction.turn_s);
+    if (const auto added_deg_h = added_rates_deg_h(parameters, prediction.dither_s); !added_deg_h.empty()) {
         double most_deg_h = 0.0;
         std::vector<double> beside_bias_deg_h = series_.input_rate_deg_h;
         for (std::size_t i = 0; i < n; ++i) {
@@ -324,11 +358,10 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
                 std::make_shared<const Kicks>(kicks_at(device_setup, beside_bias_deg_h, coupling, parameters.shape));
             swing = dither_swings(*kick_of, beside_bias_deg_h);
         }
-        prediction.turn_s = dither_turns(rate_deg_h, coupling.after, swing, device);
-        turn_s = smooth(prediction.turn_s);
-        prediction.intervals = intervals(turn_s);
+        prediction.turn_s = dither_turns(rate_deg_h, coupling, swing, device);
+        prediction.dither_s = smooth(prediction.turn_s);
     }
-    const std::vector<double> input_arcsec = series_.input_angles_arcsec(turn_s);
+    const std::vector<double> input_arcsec = series_.input_angles_arcsec(prediction.dither_s);
     std::vector<effects::ChangeOver> changes;
     for (const ActiveEffect& active : parameters.effects) {
         if (active.effect->adds_angle()) changes.push_back(active.effect->change(active.values));
@@ -348,15 +381,15 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         before_rad *= before;
         after_rad *= after;
         const std::size_t last = i > 0 ? i - 1 : 0;
-        const effects::Interval& interval = prediction.intervals[i];
-        angle_arcsec += interval.duration_s * parameters.bias_deg_h + (input_arcsec[i] - input_arcsec[last]);
-        for (const effects::ChangeOver& change : changes) angle_arcsec += change(interval).angle_arcsec;
+        const effects::Interval half_cycle = interval(prediction, i);
+        angle_arcsec += half_cycle.duration_s * parameters.bias_deg_h + (input_arcsec[i] - input_arcsec[last]);
+        for (const effects::ChangeOver& change : changes) angle_arcsec += change(half_cycle).angle_arcsec;
 
         prediction.phase_rad[i] = lockin + before_rad + c * angle_arcsec;
         lockin += before_rad + after_rad;
         frame.sign[i] = -series_.direction[i];
         frame.before_slope[i] = before * kick.before_slope;
-        frame.shape_left[i] = before * kick.before_weighted;
+        if (parameters.shape) frame.shape_left[i] = before * kick.before_weighted;
         if (!(std::abs(frame.before_slope[i]) < 1.0)) {
             throw RunError("lock-in so strong that a turn's phase does not tell the phase without it");
         }

@@ -1,11 +1,9 @@
 #include "analysis/closure/turns/model/noise_shape.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "analysis/closure/stats/normality.hpp"
-#include "analysis/closure/turns/model/phase_table.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::closure {
@@ -31,14 +29,14 @@ std::vector<double> sizes_of(std::span<const double> innovations_rad) {
     return sizes;
 }
 
-using Lefts = Eigen::Array<Complex, TurnKicks::harmonics, 1>;
+}  // namespace
 
 /// Over the phases that may be foretold.
-PhaseTable<Lefts> left_by_phase(const TurnKicks& kicks, int direction, std::span<const double> sizes_rad) {
+NoiseShape::Table NoiseShape::by_phase(const TurnKicks& kicks, int direction, std::span<const double> sizes_rad) {
     double variance = 0.0;
     for (const double size : sizes_rad) variance += size * size / static_cast<double>(sizes_rad.size());
     const double weight = 0.5 / static_cast<double>(sizes_rad.size());
-    return PhaseTable<Lefts>([&](double foretold_rad) {
+    return Table([&](double foretold_rad) {
         Lefts left = Lefts::Zero();
         for (const double size : sizes_rad) {
             for (const double v : {size, -size}) {
@@ -55,19 +53,22 @@ PhaseTable<Lefts> left_by_phase(const TurnKicks& kicks, int direction, std::span
     });
 }
 
-}  // namespace
+NoiseShape::Left NoiseShape::at(std::size_t turn) const {
+    const Lefts lefts = (is_minimum_[turn] != 0 ? at_minima_ : at_maxima_)->at(foretold_rad_[turn]);
+    Left left;
+    std::copy(lefts.begin(), lefts.end(), left.begin());
+    return left;
+}
 
 std::shared_ptr<const NoiseShape> NoiseShape::of(std::span<const double> counted_rad, const TurnKicks& kicks,
                                                  std::span<const int> direction, std::span<const double> foretold_rad) {
     if (!is_of_even_density(counted_rad)) return nullptr;
     const std::vector<double> sizes = sizes_of(counted_rad);
-    const PhaseTable<Lefts> at_minima = left_by_phase(kicks, 1, sizes);
-    const PhaseTable<Lefts> at_maxima = left_by_phase(kicks, -1, sizes);
     auto shape = std::make_shared<NoiseShape>();
-    for (std::size_t i = 0; i < foretold_rad.size(); ++i) {
-        const Lefts left = (direction[i] > 0 ? at_minima : at_maxima).at(foretold_rad[i]);
-        std::copy(left.begin(), left.end(), shape->left_.emplace_back().begin());
-    }
+    shape->at_minima_ = std::make_unique<const Table>(by_phase(kicks, 1, sizes));
+    shape->at_maxima_ = std::make_unique<const Table>(by_phase(kicks, -1, sizes));
+    for (const int way : direction) shape->is_minimum_.push_back(way > 0 ? 1 : 0);
+    shape->foretold_rad_.assign(foretold_rad.begin(), foretold_rad.end());
     return shape;
 }
 

@@ -1,12 +1,14 @@
 #pragma once
-#include <array>
+#include <Eigen/Dense>
 #include <complex>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "analysis/closure/turns/model/kicks.hpp"
+#include "analysis/closure/turns/model/phase_table.hpp"
 
 namespace ringlock::closure {
 
@@ -19,7 +21,7 @@ namespace ringlock::closure {
 ///
 ///     E[(v / s^2 - i k / (1 - before'(psi))) exp(i k psi)],     psi = foretold + v + before(psi),
 ///
-/// over the density that the innovations show. Kept for each turn, at the phase foretold for it.
+/// over the density that the innovations show. Kept over the phase, and the phase foretold for each turn.
 class NoiseShape {
    public:
     using Left = TurnKicks::Weights;  ///< of harmonics 1, 2, ..
@@ -29,10 +31,16 @@ class NoiseShape {
     static std::shared_ptr<const NoiseShape> of(std::span<const double> counted_rad, const TurnKicks& kicks,
                                                 std::span<const int> direction, std::span<const double> foretold_rad);
 
-    const Left& at(std::size_t turn) const { return left_[turn]; }
+    Left at(std::size_t turn) const;
 
    private:
-    std::vector<Left> left_;
+    using Lefts = Eigen::Array<std::complex<double>, TurnKicks::harmonics, 1>;
+    using Table = PhaseTable<Lefts>;
+    static Table by_phase(const TurnKicks& kicks, int direction, std::span<const double> sizes_rad);
+
+    std::unique_ptr<const Table> at_minima_, at_maxima_;
+    std::vector<std::uint8_t> is_minimum_;
+    std::vector<double> foretold_rad_;
 };
 
 }  // namespace ringlock::closure

@@ -1,13 +1,12 @@
 #include "analysis/closure/turns/model/whitening.hpp"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "analysis/closure/stats/gauss_markov.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 
 namespace ringlock::closure {
 
@@ -92,7 +91,7 @@ std::vector<double> Whitening::minus_log_likelihoods(const TurnFrame& frame, std
                                                      std::span<const std::uint8_t> counts) {
     constexpr std::size_t at_once = 8;  // the longest vectors
     std::vector<double> all(noises.size());
-    oneapi::tbb::parallel_for(std::size_t{0}, (noises.size() + at_once - 1) / at_once, [&](std::size_t part) {
+    side_by_side((noises.size() + at_once - 1) / at_once, [&](std::size_t part) {
         const auto some = noises.subspan(part * at_once, std::min(at_once, noises.size() - part * at_once));
         const auto found = filter_likelihoods(frame, beside(some, frame.interval_s), series, counts);
         std::copy(found.begin(), found.end(), all.begin() + static_cast<std::ptrdiff_t>(part * at_once));
@@ -102,8 +101,20 @@ std::vector<double> Whitening::minus_log_likelihoods(const TurnFrame& frame, std
 
 std::vector<double> Whitening::apply(std::span<const double> series) const {
     std::vector<double> out(series.size());
-    filter_innovations(frame_, noises_, gains_, sd_, series, out);
+    FilterState state{};
+    filter_innovations(frame_, noises_, gains_, sd_, 0, state, series, out);
     return out;
+}
+
+void Whitening::apply(std::size_t first, std::span<double> part, FilterState& state) const {
+    filter_innovations(frame_, noises_, gains_, sd_, first, state, part, part);
+}
+
+Whitening::Innovations Whitening::innovations(const TurnFrame& frame, const TurnNoise& noise,
+                                              std::span<const double> series) {
+    Innovations of{std::vector<double>(series.size()), std::vector<double>(series.size())};
+    filter_innovations_once(frame, beside({&noise, 1}, frame.interval_s), series, of.white, of.sd_rad);
+    return of;
 }
 
 ReadingErrors Whitening::reading_errors(std::span<const double> series) const {

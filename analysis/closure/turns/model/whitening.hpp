@@ -36,7 +36,8 @@ struct TurnFrame {
     std::vector<double> sign;          ///< -1 at minima, 1 at maxima
     std::vector<double> before_slope;  ///< derivative of what the lock-in adds before the turn to its phase
     std::vector<double> kick_slope;    ///< of all that it adds at the turn
-    std::vector<double> shape_left;    ///< what |1 - before'| leaves of injected noise that is not normal (NoiseShape)
+    std::vector<double> shape_left;    ///< what |1 - before'| leaves of injected noise that is not normal (NoiseShape);
+                                       ///< none where it is
     std::vector<double> readout;       ///< variance of v over `readout_rad2`; none: 1 at all turns
 
     double readout_at(std::size_t turn) const { return readout.empty() ? 1.0 : readout[turn]; }
@@ -71,6 +72,14 @@ class Whitening {
 
     /// Innovations over their standard deviations. Linear in `series`: columns of a regression go the same way.
     std::vector<double> apply(std::span<const double> series) const;
+    /// The same in place, of a part of a series that begins with the turn `first`; `state` is how the part before has
+    /// left it.
+    void apply(std::size_t first, std::span<double> part, FilterState& state) const;
+    /// Innovations over their standard deviations and these [rad], of one series: without what whitens a second one.
+    struct Innovations {
+        std::vector<double> white, sd_rad;
+    };
+    static Innovations innovations(const TurnFrame& frame, const TurnNoise& noise, std::span<const double> series);
     /// What all phases that leave this series tell of the reading's errors (Durbin and Koopman, "Time Series Analysis
     /// by State Space Methods", 2nd ed. 2012, section 4.5).
     ReadingErrors reading_errors(std::span<const double> series) const;

@@ -1,17 +1,17 @@
 #include "analysis/closure/turns/residual/jumps.hpp"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 
 namespace ringlock::closure {
 
@@ -63,8 +63,7 @@ Jumping placed(const TurnFit& fit, const TwoLevels& levels) {
             std::array<double, 2> chi2{};
             moved[0].jumps[k] -= step_s;
             moved[1].jumps[k] += step_s;
-            oneapi::tbb::parallel_for(std::size_t{0}, moved.size(),
-                                      [&](std::size_t i) { chi2[i] = explained(moved[i]); });
+            side_by_side(moved.size(), [&](std::size_t i) { chi2[i] = explained(moved[i]); });
             const std::size_t better = chi2[1] > chi2[0] ? 1 : 0;
             if (!(chi2[better] > best)) continue;
             best = chi2[better];
@@ -91,15 +90,19 @@ void move_jumps(const TurnFit& fit, Jumping& found) {
     const TurnOptions::Jumps& of = options.turns.jumps;
     const auto& time = fit.model().series().time_s;
     for (int pass = 0; pass < of.most_moves && !found.jumps.empty(); ++pass) {
-        std::vector<Regressor> columns{found.angle(fit)};
-        double sign = found.on > 0.5 ? 1.0 : -1.0;  // a later jump stays longer at the level before it
-        for (const double jump : found.jumps) {
-            std::vector<double> late(time.size());
-            for (std::size_t i = 0; i < time.size(); ++i) late[i] = time[i] > jump ? sign : 0.0;
-            columns.emplace_back(std::move(late));
-            sign = -sign;
-        }
-        const Eigen::VectorXd value = fit.with_noise(found.noise)->score(columns).value;
+        const std::vector<double> angle = found.angle(fit);
+        const bool begins_on = found.on > 0.5;
+        const auto piece = [&](std::size_t k, std::size_t first, std::span<double> values) {
+            if (k == 0) {
+                std::copy_n(angle.begin() + static_cast<std::ptrdiff_t>(first), values.size(), values.begin());
+                return;
+            }
+            // A later jump stays longer at the level before it.
+            const double late = begins_on == (k % 2 == 1) ? 1.0 : -1.0;
+            for (std::size_t i = 0; i < values.size(); ++i)
+                values[i] = time[first + i] > found.jumps[k - 1] ? late : 0.0;
+        };
+        const Eigen::VectorXd value = fit.with_noise(found.noise)->score_pieces(found.jumps.size() + 1, piece).value;
         const double before = found.merit;
         // A whole step goes too far where jumps are near each other.
         for (double share = 1.0; share > of.least_share_of_move && !(found.merit > before); share *= 0.5) {
@@ -127,8 +130,7 @@ Jumping without_stay(const Jumping& all, std::size_t k) {
 std::vector<std::size_t> stays_by_use(const TurnFit& fit, const Jumping& all) {
     const auto beside = fit.with_noise(all.noise);
     std::vector<double> left(all.jumps.size() - 1);
-    oneapi::tbb::parallel_for(std::size_t{0}, left.size(),
-                              [&](std::size_t k) { left[k] = beside->score({without_stay(all, k).angle(fit)}).chi2; });
+    side_by_side(left.size(), [&](std::size_t k) { left[k] = beside->score({without_stay(all, k).angle(fit)}).chi2; });
     std::vector<std::size_t> order(left.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return left[a] > left[b]; });
@@ -180,28 +182,13 @@ Jumping with_their_noise(const TurnFit& fit, Jumping found, const TurnParameters
 
 TwoLevels levels_of_stretches(const TurnFit& fit, std::size_t stretches) {
     const auto& time = fit.model().series().time_s;
-    const auto ramp_of = [&time, stretches](std::size_t k) {
-        const double length = time.back() / static_cast<double>(stretches);
-        const double start = length * static_cast<double>(k);
-        std::vector<double> ramp(time.size());
-        for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::clamp(time[i] - start, 0.0, length);
-        return ramp;
-    };
-    const Eigen::VectorXd residual = fit.residual();
-    Eigen::MatrixXd ramps(residual.size(), static_cast<Eigen::Index>(stretches));
-    oneapi::tbb::parallel_for(std::size_t{0}, stretches, [&](std::size_t k) {
-        ramps.col(static_cast<Eigen::Index>(k)) = fit.whitened(ramp_of(k));
-    });
-    // Squares in parts that are as much work each, the lower triangle of them.
-    constexpr Eigen::Index at_once = 24;
-    Eigen::MatrixXd squares(ramps.cols(), ramps.cols());
-    oneapi::tbb::parallel_for(Eigen::Index{0}, (ramps.cols() + at_once - 1) / at_once, [&](Eigen::Index part) {
-        const Eigen::Index first = part * at_once;
-        const Eigen::Index some = std::min(at_once, ramps.cols() - first);
-        squares.block(first, first, ramps.cols() - first, some).noalias() =
-            ramps.rightCols(ramps.cols() - first).transpose() * ramps.middleCols(first, some);
-    });
-    return two_levels(squares.selfadjointView<Eigen::Lower>(), ramps.transpose() * residual);
+    const double length = time.back() / static_cast<double>(stretches);
+    const auto [squares, right] =
+        fit.products(stretches, [&](std::size_t k, std::size_t first, std::span<double> ramp) {
+            const double start = length * static_cast<double>(k);
+            for (std::size_t i = 0; i < ramp.size(); ++i) ramp[i] = std::clamp(time[first + i] - start, 0.0, length);
+        });
+    return two_levels(squares, right);
 }
 
 std::vector<double> placed_jumps(const TurnFit& fit, const TwoLevels& levels) { return placed(fit, levels).angle(fit); }

@@ -1,7 +1,6 @@
 #include "analysis/closure/turns/residual/views.hpp"
 
 #include <fmt/format.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "analysis/closure/stats/normality.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "analysis/closure/stats/whiteness.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 #include "analysis/closure/turns/residual/jumps.hpp"
 #include "analysis/closure/turns/residual/size_over_phase.hpp"
 #include "engine/core/units.hpp"
@@ -40,52 +40,64 @@ double largest_of(const std::vector<double>& values) {
     return most;
 }
 
-/// Harmonic k of the phase at the turns: as kicks, or as errors of the reading; `times` such a factor at each turn.
-Columns harmonic(const TurnFit& fit, int k, bool kicks, const std::vector<double>& times) {
+constexpr std::size_t of_harmonic = 4;  // cosine and sine, at all turns and the other way round at maxima
+
+/// One column of harmonic k of the phase at the turns: as kicks, or as errors of the reading; `times(turn)` such a
+/// factor.
+template <typename Times>
+Regressor harmonic_column(const TurnFit& fit, int k, bool kicks, std::size_t column, Times&& times) {
     const auto& model = fit.model();
     const std::size_t n = model.series().size();
     const NoiseShape* shape = fit.parameters().shape.get();
     const std::vector<double> zeros(n);
-    Columns columns(4, Regressor(zeros, zeros, zeros, shape != nullptr ? zeros : std::vector<double>()));
+    Regressor of(zeros, zeros, zeros, shape != nullptr ? zeros : std::vector<double>());
     const double share = kicks ? 0.5 : 1.0;  // half a kick comes before the turn
-    double sums[4] = {};
+    double sum = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
         const double angle = k * model.phase_rad()[i];
-        const double d = model.series().direction[i];
-        const double cosine = times[i] * std::cos(angle);
-        const double sine = times[i] * std::sin(angle);
-        const double values[4] = {cosine, sine, d * cosine, d * sine};
-        const double slopes[4] = {-k * values[1], k * values[0], -k * values[3], k * values[2]};
-        for (std::size_t c = 0; c < 4; ++c) {
-            columns[c].series[i] = (kicks ? sums[c] : 0.0) + share * values[c];
-            columns[c].slope[i] = share * slopes[c];
-            columns[c].kick[i] = kicks ? slopes[c] : 0.0;
-            sums[c] += values[c];
-        }
+        const double d = column < 2 ? 1.0 : model.series().direction[i];
+        const double by = times(i);
+        const double cosine = by * std::cos(angle);
+        const double sine = by * std::sin(angle);
+        const bool is_sine = column % 2 == 1;
+        const double value = d * (is_sine ? sine : cosine);
+        const double slope = is_sine ? k * (d * cosine) : -k * (d * sine);
+        of.series[i] = (kicks ? sum : 0.0) + share * value;
+        of.slope[i] = share * slope;
+        of.kick[i] = kicks ? slope : 0.0;
+        sum += value;
         if (shape == nullptr) continue;
-        const std::complex<double> left = share * times[i] * shape->at(i)[static_cast<std::size_t>(k - 1)];
-        const double lefts[4] = {left.real(), left.imag(), d * left.real(), d * left.imag()};
-        for (std::size_t c = 0; c < 4; ++c) columns[c].left[i] = lefts[c];
+        const std::complex<double> left = share * by * shape->at(i)[static_cast<std::size_t>(k - 1)];
+        of.left[i] = d * (is_sine ? left.imag() : left.real());
     }
-    return columns;
+    return of;
+}
+
+Regressor harmonic_column(const TurnFit& fit, int k, bool kicks, std::size_t column) {
+    return harmonic_column(fit, k, kicks, column, [](std::size_t) { return 1.0; });
 }
 
 Columns harmonic(const TurnFit& fit, int k, bool kicks) {
-    return harmonic(fit, k, kicks, std::vector<double>(fit.model().series().size(), 1.0));
+    Columns columns;
+    for (std::size_t c = 0; c < of_harmonic; ++c) columns.push_back(harmonic_column(fit, k, kicks, c));
+    return columns;
 }
 
-/// Kicks whose size and place go up and down with so many periods over the record.
+constexpr std::size_t of_changing_kicks = 2 * of_harmonic;
+
+/// One column of kicks whose size and place go up and down with so many periods over the record.
+Regressor column_of_changing_kicks(const TurnFit& fit, double periods, std::size_t column) {
+    const auto n = static_cast<double>(fit.model().series().size());
+    const bool sine = column >= of_harmonic;
+    return harmonic_column(fit, 1, true, column % of_harmonic, [=](std::size_t i) {
+        const double angle = units::two_pi * periods * static_cast<double>(i) / n;
+        return sine ? std::sin(angle) : std::cos(angle);
+    });
+}
+
 Columns kicks_that_change(const TurnFit& fit, double periods) {
-    const std::size_t n = fit.model().series().size();
     Columns columns;
-    for (const bool sine : {false, true}) {
-        std::vector<double> times(n);
-        for (std::size_t i = 0; i < n; ++i) {
-            const double angle = units::two_pi * periods * static_cast<double>(i) / static_cast<double>(n);
-            times[i] = sine ? std::sin(angle) : std::cos(angle);
-        }
-        for (Regressor& column : harmonic(fit, 1, true, times)) columns.push_back(std::move(column));
-    }
+    for (std::size_t c = 0; c < of_changing_kicks; ++c) columns.push_back(column_of_changing_kicks(fit, periods, c));
     return columns;
 }
 
@@ -111,7 +123,8 @@ void test_phase(const TurnFit& fit, std::vector<TurnView>& views) {
         double cost = 0.0;
         int at = 0;
         for (int k = 1; k <= harmonics_of_phase; ++k) {
-            auto score = fit.score(harmonic(fit, k, kicks));
+            auto score =
+                fit.score(of_harmonic, [&](std::size_t column) { return harmonic_column(fit, k, kicks, column); });
             if (!kicks && k <= 2) doubt_ellipse(fit, score);
             const double p = chi2_tail(score.chi2, score.rank);
             if (at > 0 && p >= least) continue;
@@ -135,9 +148,12 @@ void test_kicks_over_time(const TurnFit& fit, std::vector<TurnView>& views) {
     constexpr std::size_t places = options.turns.residual.kick_periods;
     const auto periods_of = [](std::size_t place) { return 0.5 * static_cast<double>(place + 1); };
     std::vector<TurnFit::Score> scores(places);
-    oneapi::tbb::parallel_for(std::size_t{0}, places, [&](std::size_t place) {
-        scores[place] = fit.score(kicks_that_change(fit, periods_of(place)));
-    });
+    // One after the other, the columns of each side by side.
+    for (std::size_t place = 0; place < places; ++place) {
+        scores[place] = fit.score(of_changing_kicks, [&](std::size_t column) {
+            return column_of_changing_kicks(fit, periods_of(place), column);
+        });
+    }
     const auto most =
         std::max_element(scores.begin(), scores.end(), [](const auto& a, const auto& b) { return a.chi2 < b.chi2; });
     const TurnFit::Score& score = *most;
@@ -280,7 +296,7 @@ void test_steps(const TurnFit& fit, std::vector<TurnView>& views) {
         for (std::size_t i = 0; i < time.size(); ++i) ramp[i] = std::max(0.0, time[i] - start);
         return ramp;
     };
-    oneapi::tbb::parallel_for(std::size_t{0}, roots.size(), [&](std::size_t k) {
+    side_by_side(roots.size(), [&](std::size_t k) {
         const auto score = fit.score({ramp_of(k)});
         if (score.rank > 0 && score.covariance(0, 0) > 0.0) {
             roots[k] = score.value(0) / std::sqrt(score.covariance(0, 0));
@@ -341,7 +357,7 @@ void test_lines(const TurnFit& fit, std::vector<TurnView>& views) {
     };
     std::vector<Line> lines(drifts);
     const auto drift_of = [](std::size_t k) { return apart * (static_cast<double>(k) - drifts / 2); };
-    oneapi::tbb::parallel_for(std::size_t{0}, lines.size(), [&](std::size_t k) {
+    side_by_side(lines.size(), [&](std::size_t k) {
         const double drift = drift_of(k);
         std::vector<std::complex<double>> in(padded);
         for (std::size_t i = 0; i < n; ++i) {

@@ -1,7 +1,5 @@
 #include "analysis/closure/turns/screen/score_tests.hpp"
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/stats/p_values.hpp"
+#include "analysis/closure/turns/model/side_by_side.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 
@@ -144,7 +143,7 @@ std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Predi
     Candidate candidate{&effect, values};
     const auto consider = [&](const std::vector<double>& times) {
         std::vector<Place> found(times.size());
-        oneapi::tbb::parallel_for(std::size_t{0}, times.size(), [&](std::size_t k) { found[k] = place_at(times[k]); });
+        side_by_side(times.size(), [&](std::size_t k) { found[k] = place_at(times[k]); });
         std::vector<double> roots;
         for (std::size_t k = 0; k < times.size(); ++k) {
             roots.push_back(found[k].root);
@@ -314,7 +313,7 @@ std::vector<Candidate> screen(const TurnFit& fit) {
     const TurnModel::Prediction without = fit.model().predict(fit.parameters());
     const auto registry = effects::registry();
     std::vector<std::optional<Candidate>> found(registry.size());
-    oneapi::tbb::parallel_for(std::size_t{0}, registry.size(), [&](std::size_t k) {
+    side_by_side(registry.size(), [&](std::size_t k) {
         const Effect* effect = registry[k];
         if (fit.parameters().find(effect) != nullptr || told_by_other_columns(*effect)) return;
         try {
