@@ -1,31 +1,31 @@
 #include "analysis/closure/closure.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <chrono>
-#include <condition_variable>
 #include <exception>
 #include <filesystem>
 #include <memory>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <stop_token>
 #include <string>
-#include <thread>
+#include <system_error>
+#include <utility>
 #include <vector>
 
+#include "analysis/closure/chain.hpp"
+#include "analysis/closure/report/chain_report.hpp"
 #include "analysis/closure/report/closed_scenario.hpp"
 #include "analysis/closure/report/folder.hpp"
 #include "analysis/closure/report/report.hpp"
 #include "analysis/record/record.hpp"
+#include "analysis/report/chain_page.hpp"
 #include "analysis/report/closure_page.hpp"
 #include "app/command.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
+#include "app/stage_progress.hpp"
 #include "engine/core/error.hpp"
 #include "engine/scenario/parse.hpp"
 
@@ -44,150 +44,182 @@ void declare(record::Declared& declared, const scenario::Scenario& model) {
     fill(declared.dither_peak_rate_deg_s, model.dither.peak_rate_deg_s);
 }
 
-/// Refuses, before the work, an output folder in which somebody's file would be lost.
-void refuse_to_lose(const std::string& record, const std::string& model, const std::string& folder) {
-    std::vector<NamedFile> files{{"RECORD", record, NamedFile::Use::input}, {"--model", model, NamedFile::Use::input}};
-    for (const std::filesystem::path& file : closure::files_of(folder)) {
-        files.push_back({"-o", file, NamedFile::Use::output});
+struct ClosureArguments {
+    std::vector<std::string> records;
+    bool same_chain = false;
+    std::string model;
+    std::string out;
+    bool json = false;
+    bool quiet = false;
+};
+
+/// The folder of each record: that of -o or, of a data chain, one in it.
+std::vector<std::filesystem::path> folders_of(const ClosureArguments& arguments) {
+    if (arguments.out.empty()) return {};
+    if (!arguments.same_chain) return {arguments.out};
+    std::vector<std::filesystem::path> folders;
+    for (const std::string& name : closure::record_folders(arguments.records)) {
+        folders.push_back(std::filesystem::path(arguments.out) / name);
     }
-    refuse_same_files(files);
-    closure::check_folder(folder);
+    return folders;
 }
 
-/// Shows the stage of the loop, the time since it began, and the time left where that can be told: one line that is
-/// replaced on a terminal, a line for each stage elsewhere and one every ten seconds where shares are told.
-///
-/// How many effects a record needs, and how many models are tried for each, shows as the loop goes on: a time left is
-/// told of the last stage alone, whose parts are counted and as long as each other.
-class StageProgress {
-   public:
-    explicit StageProgress(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {
-        if (!quiet_ && terminal_) ticking_ = std::jthread([this](const std::stop_token& stop) { tick(stop); });
+/// Refuses a number of records that does not go with the options, and one record that is named twice: its noise would
+/// count as that of two.
+void refuse_other_records(const ClosureArguments& arguments) {
+    if (!arguments.same_chain && arguments.records.size() > 1) {
+        throw InputError(
+            fmt::format("closure takes one RECORD, and there are {}: {}. Name one; records of one box, which its data "
+                        "chain resamples from one source, are read together with --same-chain",
+                        arguments.records.size(), fmt::join(arguments.records, ", ")));
     }
-    ~StageProgress() {
-        if (ticking_.joinable()) {
-            ticking_.request_stop();
-            ticking_.join();
-        }
-        if (shown_ && terminal_) tell("\r\033[K");
+    if (arguments.same_chain && arguments.records.size() < 2) {
+        throw InputError(
+            fmt::format("--same-chain takes two records or more of one box, and there is one: {}. Name the others too, "
+                        "or leave --same-chain out",
+                        arguments.records.front()));
     }
-    StageProgress(const StageProgress&) = delete;
-    StageProgress& operator=(const StageProgress&) = delete;
-
-    void show(const std::string& stage) {
-        const std::lock_guard lock(mutex_);
-        stage_ = stage;
-        first_.reset();
-        draw();
-    }
-    void show_share(double share) {
-        const std::lock_guard lock(mutex_);
-        share_ = share;
-        if (!first_) first_ = {Clock::now(), share};
-        if (terminal_ || Clock::now() - drawn_ > std::chrono::seconds(10)) draw();
-    }
-
-   private:
-    using Clock = std::chrono::steady_clock;
-    static double seconds(Clock::duration since) { return std::chrono::duration<double>(since).count(); }
-
-    /// Nothing before a tenth of the parts and two seconds have shown how long they take.
-    std::optional<double> left_s() const {
-        if (!first_ || share_ - first_->share < 0.1) return std::nullopt;
-        const double since_s = seconds(Clock::now() - first_->at);
-        if (since_s < 2.0) return std::nullopt;
-        return since_s * (1.0 - share_) / (share_ - first_->share);
-    }
-    void draw() {
-        if (quiet_ || stage_.empty()) return;
-        std::string line = fmt::format("{:4.0f} s  {}", seconds(Clock::now() - start_), stage_);
-        if (const auto left = left_s()) line += fmt::format(", {:.0f} %, about {:.0f} s left", 100.0 * share_, *left);
-        tell(terminal_ ? "\r\033[K" + line + " ..." : line + "\n");
-        drawn_ = Clock::now();
-        shown_ = true;
-    }
-    /// The time goes on where the loop says nothing for long.
-    void tick(const std::stop_token& stop) {
-        std::unique_lock lock(mutex_);
-        while (!stop.stop_requested()) {
-            ticked_.wait_for(lock, stop, std::chrono::seconds(1), [] { return false; });
-            if (!stop.stop_requested()) draw();
+    for (auto one = arguments.records.begin(); one != arguments.records.end(); ++one) {
+        for (auto other = arguments.records.begin(); other != one; ++other) {
+            std::error_code none;
+            if (*one != *other && !std::filesystem::equivalent(*one, *other, none)) continue;
+            throw InputError(
+                fmt::format("RECORD {} and RECORD {} are the same file, whose noise would count twice; nothing was "
+                            "done. Name each record once",
+                            *other, *one));
         }
     }
+}
 
-    struct Share {
-        Clock::time_point at;
-        double share;
+/// Refuses, before the work, output folders in which somebody's file would be lost.
+void refuse_to_lose(const ClosureArguments& arguments) {
+    if (arguments.out.empty()) return;
+    std::vector<NamedFile> files{{"--model", arguments.model, NamedFile::Use::input}};
+    for (const std::string& record : arguments.records) files.push_back({"RECORD", record, NamedFile::Use::input});
+    const auto write = [&](const std::vector<std::filesystem::path>& outputs) {
+        for (const std::filesystem::path& file : outputs) files.push_back({"-o", file, NamedFile::Use::output});
     };
-    bool quiet_;
-    bool terminal_;
-    std::mutex mutex_;
-    std::condition_variable_any ticked_;
-    bool shown_ = false;
-    std::string stage_;
-    double share_ = 0.0;
-    std::optional<Share> first_;  ///< of the stage
-    Clock::time_point start_ = Clock::now();
-    Clock::time_point drawn_ = start_;
-    std::jthread ticking_;  ///< last, so that it finds all of the above
+    if (arguments.same_chain) write(closure::chain_files_of(arguments.out));
+    for (const std::filesystem::path& folder : folders_of(arguments)) write(closure::files_of(folder));
+    refuse_same_files(files);
+    if (arguments.same_chain) closure::check_chain_folder(arguments.out);
+    for (const std::filesystem::path& folder : folders_of(arguments)) closure::check_folder(folder);
+}
+
+record::Record record_of(const std::string& path, const ClosureArguments& arguments) {
+    record::Record record = record::read_record(path);
+    tell_warnings(path, record);
+    if (!arguments.model.empty()) declare(record.declared, scenario::parse_file(arguments.model));
+    return record;
+}
+
+/// What is printed, and why something could not be written: what was found is printed all the same.
+struct Printed {
+    nlohmann::json json;
+    std::string text;
+    std::exception_ptr not_written;
 };
+
+/// Does something that writes, and keeps why it could not.
+template <class Write>
+void attempt(std::exception_ptr& not_written, Write&& write) {
+    try {
+        write();
+    } catch (const Interrupted&) {
+        throw;
+    } catch (...) {
+        if (!not_written) not_written = std::current_exception();
+    }
+}
+
+/// The report of one record, which is written where a folder is given.
+Printed report_of(const std::string& path, const record::Record& record, const closure::Closure& closure,
+                  const std::filesystem::path& folder, const closure::Monitor& monitor) {
+    Printed printed{closure::to_json(closure), closure::to_text(closure), {}};
+    printed.json["closed"] = closure::to_json(closure::closed_scenario(record, closure));
+    if (folder.empty()) return printed;
+    const std::string name = std::filesystem::path(path).filename().string();
+    monitor.tell("simulating the closed model");
+    const closure::Predictive predictive =
+        closure::check_predictive(record, closure, closure::options.report.most_simulations, monitor);
+    printed.json["predictive"] = closure::to_json(predictive);
+    printed.text += "\n" + closure::to_text(predictive);
+    attempt(printed.not_written, [&] {
+        closure::write_closure(folder, name, record, closure, predictive);
+        report::write_closure_page(folder, name, record, closure, predictive);
+    });
+    return printed;
+}
+
+Printed close_one(const ClosureArguments& arguments, const closure::Monitor& monitor) {
+    const std::string& path = arguments.records.front();
+    const record::Record record = record_of(path, arguments);
+    closure::Closure closure;
+    try {
+        closure = closure::close_loop(record, monitor);
+    } catch (const InputError& error) {
+        throw InputError(fmt::format("{}: {}", path, error.what()));
+    }
+    return report_of(path, record, closure, arguments.out, monitor);
+}
+
+Printed close_several(const ClosureArguments& arguments, const closure::Monitor& monitor) {
+    std::vector<record::Record> records;
+    for (const std::string& path : arguments.records) records.push_back(record_of(path, arguments));
+    std::vector<closure::NamedRecord> named;
+    for (std::size_t r = 0; r < records.size(); ++r) named.push_back({arguments.records[r], &records[r]});
+    const closure::Chain chain = closure::close_chain(named, monitor);
+    Printed all{
+        {{"chain", closure::to_json(chain)}, {"records", nlohmann::json::array()}}, closure::to_text(chain), {}};
+    const std::vector<std::filesystem::path> folders = folders_of(arguments);
+    for (std::size_t r = 0; r < records.size(); ++r) {
+        const std::string& path = arguments.records[r];
+        const closure::Monitor of_record{[&](const std::string& stage) { monitor.tell(path + ": " + stage); },
+                                         [&](double share) { monitor.tell_share(share); }};
+        Printed one = report_of(path, records[r], chain.records[r].closure,
+                                folders.empty() ? std::filesystem::path() : folders[r], of_record);
+        all.json["records"].push_back(std::move(one.json));
+        all.text += fmt::format("\n{}\n{}\n{}", path, std::string(path.size(), '='), one.text);
+        if (!all.not_written) all.not_written = one.not_written;
+    }
+    if (!folders.empty() && !all.not_written) {
+        attempt(all.not_written, [&] {
+            report::write_chain_page(arguments.out, chain, closure::record_folders(arguments.records), all.json);
+        });
+    }
+    return all;
+}
 
 }  // namespace
 
 void add_closure(CLI::App& root) {
-    struct Arguments {
-        std::string record;
-        std::string model;
-        std::string out;
-        bool json = false;
-        bool quiet = false;
-    };
     CLI::App* command = root.add_subcommand("closure", "Identify the error sources in a measured record");
-    auto arguments = std::make_shared<Arguments>();
-    command->add_option("RECORD", arguments->record, "rlg-record (.h5), or samples as text")->required();
+    auto arguments = std::make_shared<ClosureArguments>();
+    command
+        ->add_option("RECORD", arguments->records,
+                     "rlg-record (.h5), or samples as text; with --same-chain two or more")
+        ->required();
+    command->add_flag("--same-chain", arguments->same_chain,
+                      "the records are of one box, whose data chain resamples all of them from one source: what they "
+                      "share is fitted once");
     command->add_option("--model", arguments->model,
                         "scenario (.toml) that supplies scale factor, threshold and dither where the record does not "
                         "declare them");
     command->add_option("-o,--output", arguments->out,
-                        "folder for report.md with its figures, closed.toml, closure.h5 and closure.json");
+                        "folder for report.md with its figures, closed.toml, closure.h5 and closure.json; with "
+                        "--same-chain each record has a folder in it");
     command->add_flag("--json", arguments->json, "one JSON object on standard output");
     command->add_flag("-q,--quiet", arguments->quiet, "no progress on standard error");
     command->callback([arguments] {
-        if (!arguments->out.empty()) refuse_to_lose(arguments->record, arguments->model, arguments->out);
-        record::Record record = record::read_record(arguments->record);
-        tell_warnings(arguments->record, record);
-        if (!arguments->model.empty()) declare(record.declared, scenario::parse_file(arguments->model));
+        refuse_other_records(*arguments);
+        refuse_to_lose(*arguments);
         StageProgress progress(arguments->quiet);
         const closure::Monitor monitor{[&](const std::string& stage) { progress.show(stage); },
                                        [&](double share) { progress.show_share(share); }};
-        closure::Closure closure;
-        try {
-            closure = closure::close_loop(record, monitor);
-        } catch (const InputError& error) {
-            throw InputError(fmt::format("{}: {}", arguments->record, error.what()));
-        }
-        nlohmann::json json = closure::to_json(closure);
-        json["closed"] = closure::to_json(closure::closed_scenario(record, closure));
-        std::string text = closure::to_text(closure);
-        std::exception_ptr not_written;
-        if (!arguments->out.empty()) {
-            const std::string name = std::filesystem::path(arguments->record).filename().string();
-            monitor.tell("simulating the closed model");
-            const closure::Predictive predictive =
-                closure::check_predictive(record, closure, closure::options.report.most_simulations, monitor);
-            json["predictive"] = closure::to_json(predictive);
-            text += "\n" + closure::to_text(predictive);
-            try {
-                closure::write_closure(arguments->out, name, record, closure, predictive);
-                report::write_closure_page(arguments->out, name, record, closure, predictive);
-            } catch (const Interrupted&) {
-                throw;
-            } catch (...) {
-                not_written = std::current_exception();  // what was found is printed all the same
-            }
-        }
-        put(arguments->json ? json.dump() + "\n" : text);
-        if (not_written) std::rethrow_exception(not_written);
+        const Printed printed =
+            arguments->same_chain ? close_several(*arguments, monitor) : close_one(*arguments, monitor);
+        put(arguments->json ? printed.json.dump() + "\n" : printed.text);
+        if (printed.not_written) std::rethrow_exception(printed.not_written);
     });
 }
 

@@ -59,6 +59,8 @@ declare -A may=(
         analysis/closure/samples/* analysis/record engine/*"
     [analysis/closure/loop]="analysis/closure analysis/closure/decide analysis/closure/turns/loop
         analysis/closure/samples/loop analysis/record"
+    [analysis/closure/chain]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/samples/* analysis/record engine/*"
     [analysis/closure/report]="analysis/closure analysis/closure/stats analysis/closure/decide
         analysis/closure/turns/model analysis/closure/samples/model analysis/instrument analysis/record
         analysis/noise analysis/allan engine/*"

@@ -1,4 +1,5 @@
 // ringlock closure from outside: what it prints and what it leaves.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <stdlib.h>
 #include <sys/resource.h>
@@ -8,8 +9,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "tests/cli/program.hpp"
 
@@ -137,6 +140,99 @@ TEST_F(ClosureProgram, EndsAtASignalWithNothingWritten) {
         EXPECT_EQ(r.out, "");
         EXPECT_EQ(left(), (std::set<std::string>{"long.h5", "long.toml", "r.h5", "s.toml"}));
     }
+}
+
+/// Records of one box: readings of 61.8 a second, on the straight lines between which are 100 samples a second.
+class ChainProgram : public ProgramTest {
+   protected:
+    void SetUp() override {
+        ProgramTest::SetUp();
+        write("x.csv", samples(100.0, 1));
+        write("y.csv", samples(100.0, 2));
+    }
+    static std::string samples(double rate_hz, unsigned seed) {
+        constexpr double from_hz = 61.8;
+        constexpr int rows = 1500;
+        std::mt19937_64 bits(seed);
+        std::normal_distribution<double> normal;
+        std::vector<double> readings;
+        double angle = 0.0;
+        for (int k = 0; k < rows; ++k) {
+            angle += 0.05 * normal(bits);
+            readings.push_back(angle + 0.3 * normal(bits));
+        }
+        const auto at = [&](int row) {
+            const double place = from_hz / rate_hz * row + 0.3;
+            const auto k = static_cast<std::size_t>(place);
+            return readings[k] + (place - static_cast<double>(k)) * (readings[k + 1] - readings[k]);
+        };
+        std::string text = fmt::format("# rate_hz = {}\nangle_increment_arcsec\n", rate_hz);
+        for (int row = 0; row < rows; ++row) text += fmt::format("{:.17g}\n", at(row + 1) - at(row));
+        return text;
+    }
+    bool has(const std::string& name) const { return std::filesystem::exists(directory_ / name); }
+};
+
+TEST_F(ChainProgram, RefusesWhatIsNoChain) {
+    const auto refused = [&](const Arguments& arguments) {
+        const Outcome r = run(arguments);
+        EXPECT_EQ(r.status, 2);
+        EXPECT_EQ(r.out, "");
+        return r.err;
+    };
+    write("fast.csv", samples(200.0, 3));
+    write("s.toml", "[ensemble]\nduration_s = 8\ngyros = 1\n");
+    ASSERT_EQ(run({"record", "s.toml", "-o", "turns.h5"}).status, 0);
+    EXPECT_THAT(refused({"closure", "x.csv", "y.csv"}), AllOf(HasSubstr("x.csv, y.csv"), HasSubstr("--same-chain")));
+    EXPECT_THAT(refused({"closure", "--same-chain", "x.csv"}), HasSubstr("two records or more"));
+    EXPECT_THAT(refused({"closure", "--same-chain", "x.csv", "./x.csv"}), HasSubstr("same file"));
+    EXPECT_THAT(refused({"closure", "--same-chain", "x.csv", "fast.csv"}),
+                AllOf(HasSubstr("fast.csv: has 200 samples a second"), HasSubstr("read this one by itself")));
+    EXPECT_THAT(refused({"closure", "--same-chain", "x.csv", "turns.h5"}), HasSubstr("turns.h5: is a record of turns"));
+    EXPECT_THAT(refused({"closure", "--same-chain", "x.csv", "missing.csv"}), HasSubstr("missing.csv"));
+    EXPECT_THAT(refused({"closure", "--same-chain", "x.csv", "y.csv", "-o", "s.toml"}), HasSubstr("s.toml"));
+    EXPECT_EQ(left(), (std::set<std::string>{"fast.csv", "s.toml", "turns.h5", "x.csv", "y.csv"}));
+}
+
+TEST_F(ChainProgram, TellsWhatTheRecordsShare) {
+    const Outcome r = run({"closure", "--same-chain", "x.csv", "y.csv", "--json", "-o", "found"});
+    ASSERT_EQ(r.status, 0) << r.err;
+    const auto printed = nlohmann::json::parse(r.out);
+    const auto& chain = printed.at("chain");
+    EXPECT_EQ(chain.at("contradicted"), false);
+    EXPECT_EQ(chain.at("tied_hz"), nlohmann::json::array());
+    EXPECT_NEAR(chain.at("from_hz").at("value"), 61.8, 1e-6);
+    EXPECT_EQ(chain.at("record_rate_hz"), 100.0);
+    EXPECT_EQ(chain.at("agreement").at("freedom"), 1);
+    EXPECT_EQ(chain.at("rates").at(0).at("sum"), 0.0);
+    ASSERT_EQ(chain.at("records").size(), 2U);
+    EXPECT_EQ(chain.at("records").at(1).at("record"), "y.csv");
+    ASSERT_EQ(printed.at("records").size(), 2U);
+    for (const auto& record : printed.at("records")) {
+        EXPECT_EQ(record.at("verdict"), "closed");
+        EXPECT_EQ(record.at("steps").at(0).at("parameters").at("from_hz"), chain.at("from_hz"));
+    }
+    EXPECT_EQ(nlohmann::json::parse(read("found/closure.json")), printed);
+    EXPECT_EQ(nlohmann::json::parse(read("found/x/closure.json")), printed.at("records").at(0));
+    EXPECT_THAT(read("found/report.md"), AllOf(HasSubstr("2 records of one data chain"), HasSubstr("(<y/report.md>)")));
+    for (const char* file : {"x/report.md", "x/closed.toml", "y/closure.h5"}) {
+        EXPECT_TRUE(has(std::string("found/") + file)) << file;
+    }
+    EXPECT_EQ(left(), (std::set<std::string>{"found", "x.csv", "y.csv"}));
+    // What it wrote itself it replaces; what somebody has changed it keeps, of the chain as of a record.
+    for (const std::string name : {"found/report.md", "found/closure.json", "found/y/report.md"}) {
+        const std::string own = read(name);
+        write(name, "# changed\n" + own);
+        const Outcome again = run({"closure", "--same-chain", "x.csv", "y.csv", "-o", "found"});
+        EXPECT_EQ(again.status, 2) << name;
+        EXPECT_THAT(again.err, HasSubstr("would be replaced")) << name;
+        EXPECT_EQ(read(name), "# changed\n" + own);
+        write(name, own);
+    }
+    const Outcome text = run({"closure", "--same-chain", "x.csv", "y.csv", "-o", "found", "-q"});
+    EXPECT_EQ(text.status, 0) << text.err;
+    EXPECT_EQ(text.err, "");
+    EXPECT_THAT(text.out, AllOf(HasSubstr("data chain of 2 records: one source of 61.8"), HasSubstr("y.csv\n=====\n")));
 }
 
 }  // namespace

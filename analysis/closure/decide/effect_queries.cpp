@@ -282,12 +282,4 @@ Estimate estimate_of(const effects::Effect& effect, std::string_view parameter, 
     return {std::string(effect.name()), std::string(parameter), value, sd};
 }
 
-double value_of(const Step& step, effects::Role role) {
-    const effects::Parameter* parameter = effects::first_of(*step.effect, role);
-    if (parameter == nullptr) return 0.0;
-    const auto found = std::find_if(step.parameters.begin(), step.parameters.end(),
-                                    [&](const Estimate& estimate) { return estimate.name == parameter->name; });
-    return found != step.parameters.end() ? found->value : 0.0;
-}
-
 }  // namespace ringlock::closure

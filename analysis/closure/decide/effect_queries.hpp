@@ -43,9 +43,6 @@ double effects_on_samples();
 bool is_slow_rate(const effects::Effect& effect);
 bool is_line(const effects::Effect& effect);
 
-/// The value that a step found for the first parameter of that role; 0 where it has none.
-double value_of(const Step& step, effects::Role role);
-
 /// A value of any parameter that shows in what an effect changes and is allowed.
 inline constexpr double probe = 1e-3;
 

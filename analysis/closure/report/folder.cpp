@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <exception>
 #include <fstream>
+#include <initializer_list>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -31,13 +34,14 @@ std::string text_of(const fs::path& path) {
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// Whether it is the object of to_json(), as it is written.
+/// Whether it is the object of to_json(), of a record or of a data chain, as it is written.
 bool is_closure_json(const std::string& text) {
     const auto object = nlohmann::json::parse(text, nullptr, false);
     if (!object.is_object()) return false;
-    for (const char* const key : {"verdict", "base", "steps", "predictive"}) {
-        if (!object.contains(key)) return false;
-    }
+    const auto has = [&](std::initializer_list<const char*> keys) {
+        return std::all_of(keys.begin(), keys.end(), [&](const char* key) { return object.contains(key); });
+    };
+    if (!has({"verdict", "base", "steps", "predictive"}) && !has({"chain", "records"})) return false;
     return object.dump(2) + "\n" == text;
 }
 
@@ -63,22 +67,14 @@ std::string why_not(fs::path folder) {
     return fmt::format("{}: {}", folder.string(), std::generic_category().message(errno));
 }
 
-}  // namespace
-
-std::vector<fs::path> files_of(const fs::path& folder) {
-    std::vector<fs::path> files;
-    for (const std::string_view name : names) files.push_back(folder / name);
-    return files;
-}
-
-void check_folder(const fs::path& folder) {
+void check_files(const fs::path& folder, const std::vector<fs::path>& files) {
     if (const std::string why = why_not(folder); !why.empty()) {
         throw InputError(
             fmt::format("{}: the closed loop's files cannot be written there: {}; give another folder with -o",
                         folder.string(), why));
     }
     std::string others;
-    for (const fs::path& file : files_of(folder)) {
+    for (const fs::path& file : files) {
         std::error_code error;
         if (fs::symlink_status(file, error).type() == fs::file_type::not_found || is_ours(file)) continue;
         others += (others.empty() ? "" : ", ") + file.filename().string();
@@ -88,6 +84,33 @@ void check_folder(const fs::path& folder) {
         fmt::format("{}: {} would be replaced, which ringlock closure has not written, or which somebody has changed "
                     "since; it is kept. Give another folder with -o, or move it away",
                     folder.string(), others));
+}
+
+}  // namespace
+
+std::vector<fs::path> files_of(const fs::path& folder) {
+    std::vector<fs::path> files;
+    for (const std::string_view name : names) files.push_back(folder / name);
+    return files;
+}
+
+std::vector<fs::path> chain_files_of(const fs::path& folder) { return {folder / "report.md", folder / "closure.json"}; }
+
+void check_folder(const fs::path& folder) { check_files(folder, files_of(folder)); }
+
+void check_chain_folder(const fs::path& folder) { check_files(folder, chain_files_of(folder)); }
+
+std::vector<std::string> record_folders(const std::vector<std::string>& records) {
+    std::set<std::string> taken;
+    for (const std::string_view name : names) taken.emplace(name);
+    std::vector<std::string> folders;
+    for (const std::string& record : records) {
+        const std::string stem = fs::path(record).stem().string();
+        std::string name = stem;
+        for (int k = 2; !taken.insert(name).second; ++k) name = fmt::format("{}-{}", stem, k);
+        folders.push_back(name);
+    }
+    return folders;
 }
 
 }  // namespace ringlock::closure

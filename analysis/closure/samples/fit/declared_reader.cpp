@@ -205,4 +205,12 @@ bool accounted_by_reader(const Step& step, const record::Record& record, std::st
     return false;
 }
 
+double value_of(const Step& step, effects::Role role) {
+    const effects::Parameter* parameter = effects::first_of(*step.effect, role);
+    if (parameter == nullptr) return 0.0;
+    const auto found = std::find_if(step.parameters.begin(), step.parameters.end(),
+                                    [&](const Estimate& estimate) { return estimate.name == parameter->name; });
+    return found != step.parameters.end() ? found->value : 0.0;
+}
+
 }  // namespace ringlock::closure

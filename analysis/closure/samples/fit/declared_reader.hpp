@@ -25,4 +25,7 @@ double count_noise_arcsec(const record::Record& record);
 /// from whole cycles of it. `why` says so.
 bool accounted_by_reader(const Step& step, const record::Record& record, std::string& why);
 
+/// The value that a step found for the first parameter of that role; 0 where it has none.
+double value_of(const Step& step, effects::Role role);
+
 }  // namespace ringlock::closure

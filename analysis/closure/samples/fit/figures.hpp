@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "analysis/closure/closure.hpp"
+#include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/record/record.hpp"
 
@@ -21,6 +22,8 @@ struct AddedEffect {
 
     AddedEffect(const effects::Effect& added, int number) : id(number) { step.effect = &added; }
     const effects::Effect& effect() const { return *step.effect; }
+    /// Whether it is that readings were taken at another rate.
+    bool is_source() const { return on_samples(effect()) == OnSamples::transport; }
 };
 
 struct SampleFigures {

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Dense>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,15 +37,21 @@ struct ResonanceOwner {
 /// What a model of the samples consists of.
 struct SampleModel {
     SampleNoise noise;
-    double flicker_deg_h = 0.0;              ///< B of the bias instability; makes the noise's terms
-    std::vector<SampleColumn> columns;       ///< the mean rate first
-    std::vector<double> motion;              ///< of the case, by its witness: taken off the increments; empty: none
-    double motion_from_hz = 0.0;             ///< what the witness does not tell of it is no slower: that is a slow rate
-    double from_shift = 0.0;                 ///< of from_hz, in tenths of a cycle over the record, while it is fitted
+    double flicker_deg_h = 0.0;         ///< B of the bias instability; makes the noise's terms
+    std::vector<SampleColumn> columns;  ///< the mean rate first
+    std::vector<double> motion;         ///< of the case, by its witness: taken off the increments; empty: none
+    double motion_from_hz = 0.0;        ///< what the witness does not tell of it is no slower: that is a slow rate
+    double from_shift = 0.0;            ///< of from_hz, in tenths of a cycle over the record, while it is fitted
+    /// Standard error of from_hz where other records tell it as well: it is held then.
+    std::optional<double> held_from_hz_sd = {};
     std::vector<ResonanceOwner> resonances;  ///< of each resonance of the noise, in their order
     bool walk = false;
     bool flicker = false;
 };
+
+/// Gives the source of a resampled record a rate that is higher by so much. Its readings stay where they are in the
+/// middle of the record, so that rate and place are told apart.
+void move_source(SampleModel& model, const SampleSeries& series, double shift_hz);
 
 /// Fitted by maximum likelihood of the innovations in the rows that count: noise by its likelihood, columns by least
 /// squares of what the filter makes of them.

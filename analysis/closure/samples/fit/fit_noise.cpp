@@ -54,7 +54,7 @@ std::vector<Free> knobs(SampleModel& model) {
     }
     if (model.noise.from_hz > 0.0) {
         all.push_back({&model.noise.from_phase, false, 1.0, true, true});
-        all.push_back({&model.from_shift, false, 1.0, true, true});
+        if (!model.held_from_hz_sd) all.push_back({&model.from_shift, false, 1.0, true, true});
         all.push_back({&model.noise.blur_arcsec, true, 1.0, true});
     }
     return all;
@@ -89,6 +89,13 @@ std::vector<SampleNoise::Term> flicker_terms(double deg_h, double shortest_s, do
         terms.push_back({t, deg_h * deg_h / units::pi * std::log(ratio)});
     }
     return terms;
+}
+
+void move_source(SampleModel& model, const SampleSeries& series, double shift_hz) {
+    const double duration_s = series.interval_s * static_cast<double>(series.size());
+    model.noise.from_hz += shift_hz;
+    model.noise.from_phase -= 0.5 * shift_hz * duration_s;
+    model.noise.from_phase -= std::floor(model.noise.from_phase);
 }
 
 /// The white noises by the variance of the rest and the covariance of neighbours, as if there were no others.
@@ -144,11 +151,7 @@ SampleModel SampleFit::at(const std::vector<double>& x) const {
         if (slow && is_motion(model.resonances[k].effect)) resonance.arcsec = 0.0;
     }
     if (model.noise.from_hz > 0.0) {
-        // About the middle of the record, so that rate and place are told apart.
-        const double shift_hz = 0.1 * model.from_shift / duration_s;
-        model.noise.from_hz += shift_hz;
-        model.noise.from_phase -= 0.5 * shift_hz * duration_s;
-        model.noise.from_phase -= std::floor(model.noise.from_phase);
+        move_source(model, *series_, 0.1 * model.from_shift / duration_s);
         model.from_shift = 0.0;
     }
     if (model.flicker) model.noise.terms = flicker_terms(model.flicker_deg_h, 4.0 * series_->interval_s, duration_s);
@@ -508,7 +511,9 @@ SampleModel SampleFit::noise_errors() const {
         *slots[i].value = sd;
     }
     const double duration_s = series_->interval_s * static_cast<double>(series_->size());
-    if (model_.noise.from_hz > 0.0) errors.noise.from_hz = 0.1 * errors.from_shift / duration_s;
+    if (model_.noise.from_hz > 0.0) {
+        errors.noise.from_hz = model_.held_from_hz_sd.value_or(0.1 * errors.from_shift / duration_s);
+    }
     return errors;
 }
 

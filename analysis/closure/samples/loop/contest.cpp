@@ -95,8 +95,8 @@ bool Contest::CandidateSet::random() const {
 }
 
 std::vector<SampleCandidate> Contest::screened(const SampleState& state, Wanted wanted) const {
-    auto candidates =
-        screen_samples(*state.fit, {declared_, series_, rows_, state.lines_hz, state.step, wanted == Wanted::slow});
+    auto candidates = screen_samples(
+        *state.fit, {declared_, series_, rows_, state.lines_hz, state.step, wanted == Wanted::slow, state.source});
     if (!state.random_rates) {
         std::erase_if(candidates, [](const SampleCandidate& c) { return is_random_rate(*c.effect); });
     }
@@ -187,7 +187,7 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
 }
 
 SampleState Contest::beside(const SampleState& state, const SampleCandidate& contender) const {
-    return {contender.fit, state.lines_hz, state.step + 1, state.random_rates};
+    return {contender.fit, state.lines_hz, state.step + 1, state.random_rates, state.source};
 }
 
 /// Probability of the gain by the first over the second alone; of the gain by both, if the first does not pass alone.
@@ -419,28 +419,19 @@ Contest::Shared Contest::nearest(const std::vector<Shared>& all, const Shared& u
 /// Whether its noise tells these rates apart is found by a fit at each. Above twice the record's rate it does not:
 /// interpolated readings that no sample lies between are not seen.
 void Contest::tie_sources(SampleChoice& choice) const {
-    const SampleScreenOptions& by = options.samples.screen;
-    const double rate_hz = series_.rate_hz;
     const SampleModel& chosen = choice.chosen->fit->model();
     const double from_hz = chosen.noise.from_hz;
-    const double told_up_to_hz = options.samples.contest.told_up_to * rate_hz;
-    for (int multiple = -by.most_multiple; multiple <= 2 * by.most_multiple; ++multiple) {
-        for (const double sign : {1.0, -1.0}) {
-            const double hz = sign * from_hz + multiple * rate_hz;
-            const auto same = [&](double other_hz) {
-                return std::abs(hz - other_hz) < options.samples.contest.same_source * rate_hz;
-            };
-            if (hz < by.slowest_source * rate_hz || hz > by.fastest_source * rate_hz || same(from_hz)) continue;
-            if (std::any_of(choice.other_hz.begin(), choice.other_hz.end(), same)) continue;
-            check_interrupt();
-            SampleNoise noise = chosen.noise;
-            noise.from_hz = hz;
-            noise.from_phase = sign * chosen.noise.from_phase - std::floor(sign * chosen.noise.from_phase);
-            const SampleFit other(series_, resampled_with(*now_.fit, noise), choice.chosen->fit->rows(),
-                                  SampleFit::Noise::free);
-            const bool beyond = from_hz > told_up_to_hz && hz > told_up_to_hz;
-            if (beyond || choice.chosen->fit->gain_over(other) < options.tie) choice.other_hz.push_back(hz);
-        }
+    const double told_up_to_hz = options.samples.contest.told_up_to * series_.rate_hz;
+    for (const SamePattern& pattern : with_same_pattern(from_hz, series_.rate_hz)) {
+        if (same_source(pattern.hz, from_hz, series_.rate_hz)) continue;
+        check_interrupt();
+        SampleNoise noise = chosen.noise;
+        noise.from_hz = pattern.hz;
+        noise.from_phase = phase_of(pattern, chosen.noise.from_phase);
+        const SampleFit other(series_, resampled_with(*now_.fit, noise), choice.chosen->fit->rows(),
+                              SampleFit::Noise::free);
+        const bool beyond = from_hz > told_up_to_hz && pattern.hz > told_up_to_hz;
+        if (beyond || choice.chosen->fit->gain_over(other) < options.tie) choice.other_hz.push_back(pattern.hz);
     }
     std::sort(choice.other_hz.begin(), choice.other_hz.end());
 }
@@ -528,7 +519,13 @@ SampleChoice Contest::choose() {
         });
         if (other != all.end()) choice.other_random = *other;
     }
-    if (shows(*choice.chosen, OnSamples::transport)) tie_sources(choice);
+    if (shows(*choice.chosen, OnSamples::transport)) {
+        if (now_.source != nullptr) {
+            choice.other_hz = now_.source->other_hz;
+        } else {
+            tie_sources(choice);
+        }
+    }
     return choice;
 }
 

@@ -18,9 +18,10 @@ bool passes_on_samples(double p_value);
 /// A model of the samples, and what may be added to it.
 struct SampleState {
     std::shared_ptr<SampleFit> fit;
-    std::vector<double> lines_hz = {};  ///< that are in the model
-    int step = 0;                       ///< that an effect added to it would be
-    bool random_rates = true;           ///< may be added
+    std::vector<double> lines_hz = {};    ///< that are in the model
+    int step = 0;                         ///< that an effect added to it would be
+    bool random_rates = true;             ///< may be added
+    const KnownSource* source = nullptr;  ///< of the record, where other records tell it
 };
 
 /// Effects that were chosen with another and are added after it, each with the effects that would explain the record as

@@ -108,7 +108,8 @@ void SampleLoop::add_all(Closure& closure, bool random_rates) {
         check_interrupt();
         monitor_.tell("searching the library");
         const SampleChoice choice = choose_on_samples(
-            record_.declared, {now_.fit, now_.lines_hz, next_id_, random_rates}, whole_, lattice_step());
+            record_.declared, {now_.fit, now_.lines_hz, next_id_, random_rates, source_ ? &*source_ : nullptr}, whole_,
+            lattice_step());
         nearest_ = choice.nearest;
         if (!choice.chosen) break;
         if (!earlier_ && is_random_rate(*choice.chosen->effect)) earlier_ = now_;

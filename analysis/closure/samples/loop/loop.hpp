@@ -17,6 +17,7 @@
 #include "analysis/closure/samples/model/series.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
 #include "analysis/closure/samples/rounded/rounded.hpp"
+#include "analysis/closure/samples/screen/screen.hpp"
 #include "analysis/record/record.hpp"
 
 namespace ringlock::closure {
@@ -25,15 +26,33 @@ namespace ringlock::closure {
 /// tests of the residual in left.cpp.
 class SampleLoop {
    public:
-    explicit SampleLoop(const record::Record& record, const Monitor& monitor = {})
+    /// \param source  that the record was resampled from, where other records tell it: no other is looked for
+    explicit SampleLoop(const record::Record& record, const Monitor& monitor = {},
+                        std::optional<KnownSource> source = {})
         : record_(record),
           monitor_(monitor),
+          source_(std::move(source)),
           series_(prepared(record)),
           rounded_(series_),
           chosen_(training_rows(series_.size())) {}
 
     Closure run();
     Closure fit(const std::vector<ActiveEffect>& effects);
+
+    // Of a loop that has run:
+    /// The model that it has ended with, in the rows that choose.
+    const SampleFit& model_fit() const { return *now_.fit; }
+    /// Log-likelihood of a model of these rows; of values in coarse steps, of what was measured.
+    double log_likelihood(const SampleFit& fit) const { return score(fit).log_likelihood; }
+    /// Whether that model has a source which is reported.
+    bool resampled() const;
+    /// Rates that explain the record as well as that source.
+    std::vector<double> other_sources_hz() const;
+    /// The rate of a source by this record alone: of all rows that are to count, fitted from a model near by.
+    Estimate source_rate(const SampleModel& from);
+    /// What is reported when the source has that rate, which is near the one found: it is held, all else is fitted
+    /// again. The residual was tested with the rate as this record alone has it, which differs by no more than chance.
+    Closure report_with(const KnownSource& source);
 
    private:
     static SampleSeries prepared(const record::Record& record) {
@@ -95,10 +114,11 @@ class SampleLoop {
 
     void find_coarse_steps(Closure& closure);
     SampleScore score(const SampleFit& fit) const;
-    SampleFigures figures();
+    SampleFigures figures_from(const SampleModel& model, const std::vector<AddedEffect>& added);
 
     const record::Record& record_;
     const Monitor monitor_;
+    const std::optional<KnownSource> source_;
     SampleSeries series_;
     RoundedSamples rounded_;
     Rows chosen_;
@@ -113,6 +133,7 @@ class SampleLoop {
     std::optional<State> earlier_;              ///< before the first random rate
     std::shared_ptr<SampleCandidate> nearest_;  ///< of the last choice, which had nothing to add
     int next_id_ = 0;                           ///< of the next effect that is added
+    Closure tested_;                            ///< what the loop has said before figures are filled in
 };
 
 /// Runs the loop on a record of samples. Throws InputError where the record does not suffice.

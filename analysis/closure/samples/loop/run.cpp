@@ -189,7 +189,7 @@ void SampleLoop::finish(Closure& closure) {
     }
     closure.mean_input_rate_deg_h = input;
     monitor_.tell("fitting the whole record");
-    SampleFigures figures = this->figures();
+    SampleFigures figures = figures_from(now_.fit->model(), now_.added);
     closure.rounding_in_noise = !rounded_.drawn();
     closure.base = std::move(figures.base);
     if (!now_.added.empty()) closure.base_alone = figures_of(*base_, {}, record_.declared).base;
@@ -200,7 +200,7 @@ void SampleLoop::finish(Closure& closure) {
         detail += fmt::format("{}{}", detail.empty() ? "" : "; ", text_of(*beat));
     }
     for (std::size_t k = 0; k < now_.added.size(); ++k) {
-        Step& step = closure.steps.emplace_back(std::move(now_.added[k].step));
+        Step& step = closure.steps.emplace_back(now_.added[k].step);
         if (step.parameters.empty()) step.parameters = std::move(figures.steps[k]);
         std::string why;
         if (beat && is_of_beat(step, *beat, series_, *record_.declared.dither_frequency_hz)) {
@@ -215,8 +215,8 @@ void SampleLoop::finish(Closure& closure) {
         closure.steps.pop_back();
         closure.notes.push_back(std::move(why));
     }
-    for (auto* notes : {&now_.notes, &figures.notes}) {
-        for (std::string& note : *notes) closure.notes.push_back(std::move(note));
+    for (const auto* notes : {&now_.notes, &figures.notes}) {
+        closure.notes.insert(closure.notes.end(), notes->begin(), notes->end());
     }
     closure.verdict = verdict_of(closure);
 }
@@ -250,11 +250,11 @@ bool SampleLoop::restore() {
 }
 
 /// Parameters and their errors, from a fit to the whole record.
-SampleFigures SampleLoop::figures() {
+SampleFigures SampleLoop::figures_from(const SampleModel& model, const std::vector<AddedEffect>& added) {
     const auto of = [&](const SampleFit& fit) {
-        return figures_of(refine_steps(refine_lines(fit, whole_), whole_), now_.added, record_.declared);
+        return figures_of(refine_steps(refine_lines(fit, whole_), whole_), added, record_.declared);
     };
-    const SampleFit whole(series_, now_.fit->model(), whole_, SampleFit::Noise::near);
+    const SampleFit whole(series_, model, whole_, SampleFit::Noise::near);
     return rounded_.drawn() ? rounded_.figures_of(whole, of) : of(whole);
 }
 
@@ -275,6 +275,38 @@ Closure SampleLoop::run() {
     }
     take_back_lines(closure);
     test_left_out(closure);
+    tested_ = closure;
+    finish(closure);
+    return closure;
+}
+
+bool SampleLoop::resampled() const {
+    return now_.fit->model().noise.from_hz > 0.0 &&
+           std::any_of(now_.added.begin(), now_.added.end(),
+                       [](const AddedEffect& added) { return added.is_source(); });
+}
+
+std::vector<double> SampleLoop::other_sources_hz() const {
+    for (const AddedEffect& added : now_.added) {
+        if (added.is_source()) return added.other_hz;
+    }
+    return {};
+}
+
+Estimate SampleLoop::source_rate(const SampleModel& from) {
+    const std::vector<AddedEffect> source{{*first_that_shows(OnSamples::transport), next_id_}};
+    return figures_from(from, source).steps.front().front();
+}
+
+Closure SampleLoop::report_with(const KnownSource& source) {
+    Closure closure = tested_;
+    SampleModel model = now_.fit->model();
+    move_source(model, series_, source.from_hz - model.noise.from_hz);
+    model.held_from_hz_sd = source.sd_hz;
+    now_.fit = std::make_shared<SampleFit>(series_, std::move(model), rows_, SampleFit::Noise::near);
+    for (AddedEffect& added : now_.added) {
+        if (added.is_source()) added.other_hz = source.other_hz;
+    }
     finish(closure);
     return closure;
 }

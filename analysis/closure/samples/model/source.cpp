@@ -70,6 +70,29 @@ std::optional<Clock> clock_of(const std::vector<double>& times, double period) {
 
 }  // namespace
 
+bool same_source(double one_hz, double other_hz, double rate_hz) {
+    return std::abs(one_hz - other_hz) < options.samples.contest.same_source * rate_hz;
+}
+
+std::vector<SamePattern> with_same_pattern(double from_hz, double rate_hz) {
+    const SampleScreenOptions& by = options.samples.screen;
+    std::vector<SamePattern> all{{from_hz, 1.0}};
+    for (int multiple = -by.most_multiple; multiple <= 2 * by.most_multiple; ++multiple) {
+        for (const double sign : {1.0, -1.0}) {
+            const double hz = sign * from_hz + multiple * rate_hz;
+            if (hz < by.slowest_source * rate_hz || hz > by.fastest_source * rate_hz) continue;
+            const bool known = std::any_of(
+                all.begin(), all.end(), [&](const SamePattern& other) { return same_source(hz, other.hz, rate_hz); });
+            if (!known) all.push_back({hz, sign});
+        }
+    }
+    return all;
+}
+
+double phase_of(const SamePattern& pattern, double from_phase) {
+    return pattern.sign * from_phase - std::floor(pattern.sign * from_phase);
+}
+
 std::optional<SampleSource> find_straight_lines(const std::vector<double>& increments, double rate_hz) {
     const SampleRecordOptions& record = options.samples.record;
     const auto [low, high] = std::minmax_element(increments.begin(), increments.end());

@@ -13,6 +13,22 @@ struct SampleSource {
     double from_phase = 0.0;  ///< of the record's begin, between two of the source's readings; of their distance
 };
 
+/// A rate at which readings leave the same pattern in a record as readings at another rate do: a multiple of the
+/// record's rate plus or minus that.
+struct SamePattern {
+    double hz = 0.0;
+    double sign = 1.0;  ///< of the other rate in it, and of the place of the record's begin
+};
+
+/// That rate itself, and all of these rates that a record may be resampled from.
+std::vector<SamePattern> with_same_pattern(double from_hz, double rate_hz);
+
+/// Whether two rates of sources are one.
+bool same_source(double one_hz, double other_hz, double rate_hz);
+
+/// The place of the record's begin, where the source of another rate leaves the same pattern.
+double phase_of(const SamePattern& pattern, double from_phase);
+
 /// The source of a record that has more than five intervals to every two of its source: neighbours on one straight
 /// line are the same, and where the angle turns between two lines says when its reading was taken. None where these are
 /// not the times of a clock, or are few, as in a record that was not resampled or whose values are coarse.

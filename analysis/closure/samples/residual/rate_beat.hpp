@@ -2,6 +2,7 @@
 #include <optional>
 #include <string>
 
+#include "analysis/closure/closure.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/record/record.hpp"
 

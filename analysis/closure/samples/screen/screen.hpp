@@ -36,6 +36,14 @@ struct SampleCandidate {
     bool passes = false;                  ///< the level of one effect, by that gain
 };
 
+/// The rate of the source that a record was resampled from, as several records of one data chain tell it together.
+struct KnownSource {
+    double from_hz = 0.0;
+    double sd_hz = 0.0;
+    double p_value = 1.0;               ///< by chance, of what it gains on this record
+    std::vector<double> other_hz = {};  ///< rates that explain these records as well
+};
+
 /// What the screening of samples needs to know of the loop.
 struct SampleContext {
     const record::Declared& declared;
@@ -44,6 +52,7 @@ struct SampleContext {
     const std::vector<double>& lines_hz;  ///< that are in the model
     int step = 0;                         ///< that a candidate would be
     bool slow = false;                    ///< slow rates only
+    const KnownSource* source = nullptr;  ///< where it is known: no other is looked for
 };
 
 /// A column of each effect of the library that is a rate of known shape over this record: in proportion to time, to the
@@ -57,6 +66,11 @@ void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& 
 SampleModel resampled_from(const SampleFit& now, double from_hz);
 /// The same with noises, rate and place that are known; lines are where they explain most.
 SampleModel resampled_with(const SampleFit& now, const SampleNoise& noise);
+/// Models of readings at that rate from which fits start, by either kind of errors that interpolation may have hidden;
+/// lines are where they explain most.
+std::vector<SampleModel> models_of_source(const SampleFit& now, double from_hz);
+/// The model of a resampled record as if its readings had been taken at its own rate: lines are where they show.
+SampleModel without_source(const SampleFit& now);
 
 /// Candidates among the effects that show on samples and that the fit does not have yet, by score tests of its
 /// residual.

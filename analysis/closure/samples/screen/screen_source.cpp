@@ -75,6 +75,13 @@ SampleModel as_of(const SampleFit& now, const SampleSource& source, Errors error
     return model;
 }
 
+/// The same where straight lines tell exactly when the readings were taken.
+SampleModel on_straight_lines(const SampleFit& now, const SampleSource& source, Errors errors) {
+    SampleModel model = as_of(now, source, errors);
+    model.noise.blur_arcsec = 1e-3 * now.sd(0);
+    return model;
+}
+
 struct Resampled {
     SampleModel model;
     double log_likelihood = 0.0;
@@ -121,10 +128,29 @@ Resampled best_placed(const SampleFit& now, double from_hz, Errors errors) {
     return best;
 }
 
+/// Candidates of a source whose rate is known: nothing is searched, and the rate is held.
+void screen_known_source(const SampleFit& now, const KnownSource& source, std::vector<SampleCandidate>& out) {
+    auto candidate = candidate_of(OnSamples::transport);
+    if (!candidate) return;
+    candidate->p_value = source.p_value;
+    candidate->parameters = 2;
+    candidate->freedom = 2;
+    candidate->noise = SampleFit::Noise::free;
+    for (SampleModel& model : models_of_source(now, source.from_hz)) {
+        model.held_from_hz_sd = source.sd_hz;
+        out.push_back(*candidate);
+        out.back().model = std::move(model);
+    }
+}
+
 }  // namespace
 
 void screen_source(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
     if (now.model().noise.from_hz > 0.0) return;
+    if (in.source != nullptr) {
+        screen_known_source(now, *in.source, out);
+        return;
+    }
     const FoundCycle cycle = find_cycle(now.innovations(), in.rows, in.series.rate_hz);
     if (!(cycle.p_value < options.level_of_effects)) return;
     auto candidate = candidate_of(OnSamples::transport);
@@ -140,10 +166,7 @@ void screen_source(const SampleFit& now, const SampleContext& in, std::vector<Sa
     };
     if (const auto source = find_straight_lines(in.series.increment, in.series.rate_hz)) {
         for (const Errors errors : {Errors::as_they_are, Errors::of_readings}) {
-            SampleModel model = as_of(now, *source, errors);
-            // Where the readings lie is known exactly.
-            model.noise.blur_arcsec = 1e-3 * now.sd(0);
-            offer(std::move(model));
+            offer(on_straight_lines(now, *source, errors));
         }
         return;
     }
@@ -176,6 +199,39 @@ void screen_source(const SampleFit& now, const SampleContext& in, std::vector<Sa
 
 SampleModel resampled_from(const SampleFit& now, double from_hz) {
     return best_placed(now, from_hz, Errors::as_they_are).model;
+}
+
+std::vector<SampleModel> models_of_source(const SampleFit& now, double from_hz) {
+    const SampleSeries& series = now.series();
+    const auto lines = find_straight_lines(series.increment, series.rate_hz);
+    std::vector<SampleModel> models;
+    for (const Errors errors : {Errors::as_they_are, Errors::of_readings}) {
+        SampleModel model;
+        if (lines && same_source(lines->from_hz, from_hz, series.rate_hz)) {
+            model = on_straight_lines(now, *lines, errors);
+            move_source(model, series, from_hz - lines->from_hz);
+        } else {
+            model = best_placed(now, from_hz, errors).model;
+        }
+        models.push_back(with_lines_of_source(now, std::move(model)));
+    }
+    return models;
+}
+
+SampleModel without_source(const SampleFit& now) {
+    SampleModel model = now.model();
+    const double rate_hz = now.series().rate_hz;
+    for (std::size_t k = 0; k + 1 < model.columns.size(); ++k) {
+        if (model.columns[k].name != "cosine") continue;
+        const LineCourse course = model.columns[k].course;
+        const Alias shown = alias(course.hz, rate_hz);
+        set_line(model, k, now.series(), course.shown_at(shown.hz, shown.folded));
+    }
+    for (SampleNoise::Resonance& resonance : model.noise.resonances) resonance.hz = alias(resonance.hz, rate_hz).hz;
+    model.noise.from_hz = model.noise.from_phase = 0.0;
+    model.noise.blur_arcsec = model.noise.digits_arcsec = 0.0;
+    model.held_from_hz_sd.reset();
+    return model;
 }
 
 SampleModel resampled_with(const SampleFit& now, const SampleNoise& noise) {

@@ -1,0 +1,88 @@
+#include "analysis/report/chain_page.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "analysis/closure/report/chain_report.hpp"
+#include "analysis/closure/report/folder.hpp"
+#include "analysis/closure/report/report.hpp"
+#include "analysis/closure/report/seal.hpp"
+#include "engine/core/atomic_path.hpp"
+
+namespace ringlock::report {
+
+namespace {
+
+/// What a cell of a table, or a link, may hold.
+std::string escaped(std::string_view text) {
+    std::string out;
+    for (const char c : text) {
+        if (c == '|' || c == '[' || c == ']') out += '\\';
+        out += c == '\n' ? ' ' : c;
+    }
+    return out;
+}
+
+void add_chain_rates(const closure::Chain& chain, std::string& page) {
+    page +=
+        "## What each record says of the source\n\nGains are those of the log-likelihood: of the likeliest rate of all "
+        "records over no source at all, and of what explains\nthe record most by itself over that rate.\n\n";
+    page +=
+        "| record | rate found alone [Hz] | own rate near the shared one [Hz] | gain over no source | gain of its own "
+        "|\n|---|---|---|---|---|\n";
+    for (const closure::ChainRecord& record : chain.records) {
+        const std::string alone = record.alone_hz ? fmt::format("{:.8g}", *record.alone_hz) : "none";
+        const std::string near =
+            record.near_shared ? fmt::format("{:.10g} ± {:.2g}", record.near_shared->hz, record.near_shared->sd_hz)
+                               : "not seen";
+        page += fmt::format("| {} | {} | {} | {:.1f} | {:.1f} |\n", escaped(record.name), alone, near,
+                            record.gain_of_shared, record.gain_alone);
+    }
+    if (chain.freedom > 0) {
+        page += fmt::format(
+            "\nThe records' own rates differ from their mean by a chi-squared of {:.3g} of {} degrees of freedom, by "
+            "chance p {}.\n",
+            chain.chi2, chain.freedom, closure::probability(chain.p_value));
+    }
+    page +=
+        "\n## Rates of the source\n\nReadings at all of these rates leave the same pattern in the records. The sum is "
+        "that of the log-likelihoods of all records, less that of\nthe likeliest rate; within 4, and above twice the "
+        "record's rate, the records do not tell it from that.\n\n| rate [Hz] | sum | of each record | told apart "
+        "|\n|---|---|---|---|\n";
+    for (const closure::ChainRate& rate : chain.rates) {
+        std::string of_records;
+        for (const double value : rate.log_likelihood) {
+            of_records += fmt::format("{}{:.1f}", of_records.empty() ? "" : ", ", value);
+        }
+        const bool likeliest = &rate == &chain.rates.front();
+        page += fmt::format("| {:.8g} | {:.1f} | {} | {} |\n", rate.hz, rate.sum, of_records,
+                            likeliest   ? ""
+                            : rate.tied ? "no"
+                                        : "yes");
+    }
+    page += "\n";
+}
+
+}  // namespace
+
+void write_chain_page(const std::filesystem::path& folder, const closure::Chain& chain,
+                      const std::vector<std::string>& folders, const nlohmann::json& object) {
+    closure::check_chain_folder(folder);  // again: the computation may have taken hours
+    std::string page = fmt::format("# What was found in {} records of one data chain\n\n**{}.**\n\n",
+                                   chain.records.size(), closure::verdict_sentence(chain));
+    const std::vector<std::string> against = closure::contradictions(chain);
+    for (const std::string& line : against) page += fmt::format("- {}\n", escaped(line));
+    if (!against.empty()) page += "\n";
+    if (chain.effect != nullptr) add_chain_rates(chain, page);
+    page += "## The records\n\n";
+    for (std::size_t r = 0; r < chain.records.size(); ++r) {
+        page += fmt::format("- [{}](<{}/report.md>): {}\n", escaped(chain.records[r].name), folders[r],
+                            escaped(closure::verdict_sentence(chain.records[r].closure)));
+    }
+    page += "\n`closure.json` has this page and those of the records for programs.\n";
+    write_text(folder / "closure.json", object.dump(2) + "\n");
+    write_text(folder / "report.md", closure::sealed(page, closure::Comment::markup));
+}
+
+}  // namespace ringlock::report
