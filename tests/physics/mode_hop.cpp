@@ -77,7 +77,8 @@ TEST(ModeHop, IsFollowedByBothPropagators) {
     }
     ASSERT_GT(time_s, 1.5 * hop_s);
     for (const scenario::ActiveEffect& active : scenario::active_effects(s)) {
-        ensemble::added_angles(active, s, setups)->add_angles({1, 0, start_s, duration_s}, angle_arcsec);
+        const auto angles = ensemble::angles_of(ensemble::angle_of(active, s, setups), setups.size());
+        angles->add_angles({1, 0, start_s, duration_s}, angle_arcsec);
     }
     propagate::DirectPropagator direct(devices, 1e-12);
     const auto map = propagate::make_turn_map(devices, {}, 1e-10);
