@@ -207,11 +207,8 @@ struct SampleScreenOptions {
     /// that it must have.
     int beat_multiples = 4;
     double beat_cycles = 8.0;
-    /// Lines that it makes: multiples of the dither and of the beat that are added, and bins of the record by which one
-    /// may be off.
-    int beat_dithers = 4;
-    int beat_lines = 8;
-    double beat_bins = 4.0;
+    /// A line beside it is one of its own unless its rate is larger than the declared device can make by this factor.
+    double beyond_beat = 2.0;
     /// Scores of slow rates are weakened by how much more the sums of stretches move than white innovations would:
     /// stretches of the record over `slow_parts` rows, of `slow_rows` at least, of which `slow_share` must count, and
     /// only with more than `slow_sums` of them.

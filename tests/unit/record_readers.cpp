@@ -60,6 +60,7 @@ TEST(Readers, AReferenceWithoutErrorLeavesTheRotation) {
 TEST(Readers, AVibrationIsReadBetweenTurnsToo) {
     Scenario s = samples_of("noise_injected");
     s.gyro.lockin_threshold_deg_h = 0.0;
+    s.input.rate_deg_h = 0.0;
     s.effects["base_vibration"] = {{"rate_deg_h", 300.0}, {"frequency_hz", 411.3}, {"phase_rad", 0.4}};
     const record::Samples samples = *simulate_record(s).samples;
     const double w = units::two_pi * 411.3;
@@ -73,6 +74,7 @@ TEST(Readers, AVibrationIsReadBetweenTurnsToo) {
 TEST(Readers, AWhiteRateIsWhiteBetweenTurnsToo) {
     Scenario s = samples_of("noise_injected");
     s.gyro.lockin_threshold_deg_h = 0.0;
+    s.input.rate_deg_h = 0.0;
     s.record.rate_hz = 5003.0;
     s.effects["quantum_noise"]["deg_rt_h"] = 0.01;
     const record::Samples samples = *simulate_record(s).samples;

@@ -169,7 +169,7 @@ TEST(SampleReaders, BesideTheDitherOfANoisyDriveNothingElseIsNamed) {
 
 // Without injected noise the kicks go on as evenly as the phase does: 30 Hz under 15 deg/h of a gyro of 0.5 arcsec.
 TEST(SampleReaders, WithoutInjectedNoiseTheBeatOfTheInputRateIsNamed) {
-    scenario::Scenario s = samples_at(100.0, 100.0);
+    scenario::Scenario s = samples_at(100.0, 40.0);
     s.record.trajectory = scenario::parse_arm("uncompensated");
     const record::Record record = instrument::simulate_record(s);
     const SampleSeries series = prepare_samples(record);

@@ -55,22 +55,6 @@ double lockin_line_arcsec(const record::Declared& declared) {
     return kick2 * k / units::two_pi;
 }
 
-/// Amplitude of the line that a step added, as an angle; none where it added none. As lines in the rate or in the
-/// angle they look alike.
-std::optional<double> line_arcsec(const Step& step) {
-    const double hz = value_of(step, effects::Role::frequency);
-    if (!(hz > 0.0)) return std::nullopt;
-    switch (on_samples(*step.effect)) {
-        case OnSamples::angle_line:
-            return value_of(step, effects::Role::sampled);
-        case OnSamples::rate_line:
-            // By the angle at the frequency that was fitted: 1 deg/h is 1 arcsec/s.
-            return value_of(step, effects::Role::size) / (units::two_pi * hz);
-        default:
-            return std::nullopt;
-    }
-}
-
 /// Half cycles of unequal strength or length make harmonics of the dither, which a reader without stripping leaves in
 /// the samples.
 template <class IsAt>
@@ -211,6 +195,20 @@ double value_of(const Step& step, effects::Role role) {
     const auto found = std::find_if(step.parameters.begin(), step.parameters.end(),
                                     [&](const Estimate& estimate) { return estimate.name == parameter->name; });
     return found != step.parameters.end() ? found->value : 0.0;
+}
+
+std::optional<double> line_arcsec(const Step& step) {
+    const double hz = value_of(step, effects::Role::frequency);
+    if (!(hz > 0.0)) return std::nullopt;
+    switch (on_samples(*step.effect)) {
+        case OnSamples::angle_line:
+            return value_of(step, effects::Role::sampled);
+        case OnSamples::rate_line:
+            // By the angle at the frequency that was fitted: 1 deg/h is 1 arcsec/s.
+            return value_of(step, effects::Role::size) / (units::two_pi * hz);
+        default:
+            return std::nullopt;
+    }
 }
 
 }  // namespace ringlock::closure

@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "analysis/closure/closure.hpp"
@@ -27,5 +28,9 @@ bool accounted_by_reader(const Step& step, const record::Record& record, std::st
 
 /// The value that a step found for the first parameter of that role; 0 where it has none.
 double value_of(const Step& step, effects::Role role);
+
+/// Amplitude of the line that a step added, as an angle [arcsec]; none where it added none. As lines in the rate or in
+/// the angle they look alike.
+std::optional<double> line_arcsec(const Step& step);
 
 }  // namespace ringlock::closure

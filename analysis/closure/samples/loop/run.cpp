@@ -203,7 +203,7 @@ void SampleLoop::finish(Closure& closure) {
         Step& step = closure.steps.emplace_back(now_.added[k].step);
         if (step.parameters.empty()) step.parameters = std::move(figures.steps[k]);
         std::string why;
-        if (beat && is_of_beat(step, *beat, series_, *record_.declared.dither_frequency_hz)) {
+        if (beat && may_be_of_beat(step, *beat)) {
             why = fmt::format(
                 "{} was fitted only as a placeholder for lines of the beat of the input rate, and is not "
                 "reported",

@@ -62,23 +62,13 @@ std::optional<RateBeat> find_rate_beat(const SampleFit& fit, const record::Decla
     return beat;
 }
 
-bool is_of_beat(const Step& step, const RateBeat& beat, const SampleSeries& series, double dither_hz) {
-    const SampleScreenOptions& by = options.samples.screen;
-    const OnSamples as = on_samples(*step.effect);
-    const bool transport = as == OnSamples::transport;
-    if (!transport && as != OnSamples::rate_line && as != OnSamples::angle_line) return false;
-    const double hz = value_of(step, transport ? effects::Role::sampled : effects::Role::frequency);
-    const auto alias = [&](double of_hz) { return std::abs(std::remainder(of_hz, series.rate_hz)); };
-    // A rate that wanders takes the beat with it.
-    const double duration_s = series.interval_s * static_cast<double>(series.size());
-    const double tolerance_hz = by.beat_bins / duration_s;
-    for (int of_dither = 0; of_dither <= by.beat_dithers; ++of_dither) {
-        for (int of_beat = transport ? 0 : -by.beat_lines; of_beat <= (transport ? 0 : by.beat_lines); ++of_beat) {
-            const double line_hz = of_dither * dither_hz + of_beat * beat.hz;
-            if (line_hz != 0.0 && std::abs(alias(hz) - alias(line_hz)) < tolerance_hz) return true;
-        }
-    }
-    return false;
+bool may_be_of_beat(const Step& step, const RateBeat& beat) {
+    if (on_samples(*step.effect) == OnSamples::transport) return true;
+    const auto arcsec = line_arcsec(step);
+    if (!arcsec) return false;
+    // 1 arcsec/s is 1 deg/h
+    const double rate_deg_h = units::two_pi * value_of(step, effects::Role::frequency) * *arcsec;
+    return beat.most_deg_h == 0.0 || rate_deg_h < options.samples.screen.beyond_beat * beat.most_deg_h;
 }
 
 std::string text_of(const RateBeat& beat) {

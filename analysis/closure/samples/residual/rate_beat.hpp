@@ -27,9 +27,9 @@ struct RateBeat {
 /// moves it as it moves the turns. None where no scale factor or no dither is declared, or where it does not show.
 std::optional<RateBeat> find_rate_beat(const SampleFit& fit, const record::Declared& declared);
 
-/// Whether a step is no effect but what the beat makes: a line at a sum of multiples of the beat and of the dither, or
-/// at its alias, or a source whose clock is the dither.
-bool is_of_beat(const Step& step, const RateBeat& beat, const SampleSeries& series, double dither_hz);
+/// Whether a step may be no effect but what the beat makes. Its multiples, those of the dither and their sums are lines
+/// that fill the band: a source of another clock, or a line, is told from them only where it is larger.
+bool may_be_of_beat(const Step& step, const RateBeat& beat);
 
 /// A sentence that names it.
 std::string text_of(const RateBeat& beat);
