@@ -26,8 +26,8 @@ struct ChainRecord {
     std::vector<double> alone_other_hz;  ///< rates that explain this record as well as that
     /// Its own rate near the shared one; none where the record does not show the source.
     std::optional<RateEstimate> near_shared;
-    /// Gains of the log-likelihood [nats]: of the shared rate over no source at all, and of what explains this record
-    /// most, another rate or none, over the shared rate.
+    /// Gains of the log-likelihood [nats]: of the shared rate over no source at all, and of the rate that explains this
+    /// record most, another rate or none, over the shared rate.
     double gain_of_shared = 0.0;
     double gain_alone = 0.0;
     std::optional<double> likeliest_hz;  ///< the rate that explains this record most; none: no source does

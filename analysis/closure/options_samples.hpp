@@ -207,7 +207,8 @@ struct SampleScreenOptions {
     /// that it must have.
     int beat_multiples = 4;
     double beat_cycles = 8.0;
-    /// A line beside it is one of its own unless its rate is larger than the declared device can make by this factor.
+    /// A line beside the beat counts as part of it unless its rate exceeds the declared device's largest by this
+    /// factor.
     double beyond_beat = 2.0;
     /// Scores of slow rates are weakened by how much more the sums of stretches move than white innovations would:
     /// stretches of the record over `slow_parts` rows, of `slow_rows` at least, of which `slow_share` must count, and

@@ -344,7 +344,7 @@ struct TurnOptions {
     };
     Loop loop;
 
-    /// Memory (turns/model/side_by_side). What is found does not depend on it.
+    /// Memory of the fits (turns/model/side_by_side). The results do not depend on it.
     struct Effort {
         /// Threads that work on a record side by side hold up to half a kilobyte a turn each: all of them together may
         /// go through so many turns, 0.5 GB; as many as `fewest_threads` always may.

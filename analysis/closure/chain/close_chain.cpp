@@ -22,7 +22,7 @@ namespace ringlock::closure {
 
 namespace {
 
-/// A source has two numbers beside what its readings are off the straight lines by: its rate and its place.
+/// A source has two numbers beside the error of its readings off the straight lines: its rate and its place.
 double p_of_source(double gain) { return chi2_tail(2.0 * gain, 2); }
 
 /// Rates that the records found, the most certain first: it stands for others of the same pattern.

@@ -9,7 +9,7 @@
 
 namespace ringlock::closure {
 
-/// One record of a chain: the loop that has run on it, and what its model makes of other rates of the source.
+/// A record of a chain: the loop that has run on it, and the likelihood of its model at other rates of the source.
 class RecordInChain {
    public:
     /// Runs the loop. Throws InputError with the record's name where the record does not suffice.
@@ -31,7 +31,7 @@ class RecordInChain {
     /// The record's own rate near one of them.
     Estimate near(std::size_t rate) { return loop_->source_rate(models_[rate]); }
 
-    /// What is reported with a source that all records share. Where the loop had another one, or none, it runs anew.
+    /// The report with a source that all records share. Where the loop had found another one, or none, it runs anew.
     Closure report_with(const KnownSource& source);
 
    private:

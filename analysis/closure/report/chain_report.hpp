@@ -8,7 +8,7 @@
 /// What several records of one data chain say together, for programs and for people.
 namespace ringlock::closure {
 
-/// What stands at the key "chain" (docs/commands.md). What is not finite is null.
+/// The object at the key "chain" (docs/commands.md). Numbers that are not finite are null.
 nlohmann::json to_json(const Chain& chain);
 
 /// What they say, in one sentence.

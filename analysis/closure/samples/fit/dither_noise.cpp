@@ -200,7 +200,7 @@ void take_dither_noise(const DitherNoise& found, SampleNoise& noise) {
 
 namespace {
 
-/// Injected noise whose amplitudes are drawn turn by turn.
+/// Injected noise by its amplitudes at the turns, drawn turn by turn or made by a resonator.
 std::optional<DitherNoise> find_noise_of_turns(const SampleFit& base, const record::Record& record) {
     const reader::Settings& settings = record.reader->settings;
     const auto seen = turns_in_squares(base, record.declared);
