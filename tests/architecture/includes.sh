@@ -121,59 +121,71 @@ if [[ ${#sources[@]} -eq 0 ]]; then
     exit 2
 fi
 
+# A few searches through all sources are far quicker than some for each.
+declare -A once hwy_begins hwy_ends from_room
+while IFS= read -r file; do once[$file]=yes; done < <(grep -lx '#pragma once' "${sources[@]}" || true)
+while IFS= read -r found; do hwy_begins[${found%:*}]="${found##*:}"; done \
+    < <(grep -Hcx 'HWY_BEFORE_NAMESPACE();' "${sources[@]}" || true)
+while IFS= read -r found; do hwy_ends[${found%:*}]="${found##*:}"; done \
+    < <(grep -Hcx 'HWY_AFTER_NAMESPACE();' "${sources[@]}" || true)
+
 for file in "${sources[@]}"; do
     case "$file" in
         *.cpp | *.cpp.in) ;;
         *-inl.hpp | engine/simd/targets.hpp) ;; # included anew for every instruction set
-        *.hpp | *.hpp.in)
-            grep -qx '#pragma once' "$file" || complain "$file: no #pragma once"
-            ;;
+        *.hpp | *.hpp.in) [[ -n ${once[$file]+found} ]] || complain "$file: no #pragma once" ;;
         *) complain "$file: sources are called .cpp and .hpp" ;;
     esac
     # A missing end leaves the rest of the source, plain functions included, to the last instruction set named.
-    if [[ $(grep -cx 'HWY_BEFORE_NAMESPACE();' "$file" || true) != $(grep -cx 'HWY_AFTER_NAMESPACE();' "$file" || true) ]]; then
+    if [[ ${hwy_begins[$file]} != "${hwy_ends[$file]}" ]]; then
         complain "$file: HWY_BEFORE_NAMESPACE without HWY_AFTER_NAMESPACE, or the other way round"
     fi
     room_of "$file"
-    from="$room"
-    if [[ -z ${may[$from]+placed} ]]; then
-        complain "$file: room '$from' has no line in the table of tests/architecture/includes.sh"
+    if [[ -z ${may[$room]+placed} ]]; then
+        complain "$file: room '$room' has no line in the table of tests/architecture/includes.sh"
         continue
     fi
-    stem="${file##*/}"
-    stem="${stem%%.*}"
-    first=yes
-
-    while IFS=: read -r line text; do
-        [[ $text =~ ^[[:space:]]*\#[[:space:]]*include[[:space:]]*([\"\<])([^\">]+)[\"\>] ]] || continue
-        mark="${BASH_REMATCH[1]}"
-        target="${BASH_REMATCH[2]}"
-        ours=no
-        case "$target" in engine/* | analysis/* | app/* | tests/*) ours=yes ;; esac
-        if [[ $mark == "<" ]]; then
-            [[ $ours == yes ]] || continue
-            complain "$file:$line: <$target> is ours and wants quotes"
-        fi
-        if [[ $ours == no || /$target/ == */./* || /$target/ == */../* ]]; then
-            complain "$file:$line: \"$target\" is not a path from the top of the repository"
-            continue
-        fi
-        if [[ ! -f $target ]]; then
-            complain "$file:$line: \"$target\" does not exist"
-            continue
-        fi
-        room_of "$target"
-        allowed "$from" "$room" || complain "$file:$line: $from must not include $room ($target)"
-        # A source's own header is its first include and has its name; the two stand in one folder. Tests have none, and
-        # a command may be called as the room it serves.
-        name="${target##*/}"
-        if [[ $first == yes && $from != tests && $file == *.cpp && ${name%.hpp} == "$stem" &&
-            ${target%%/*} == "${file%%/*}" && $target != "${file%.cpp}.hpp" ]]; then
-            complain "$file:$line: its header $target is not beside it"
-        fi
-        first=no
-    done < <(grep -nE '^[[:space:]]*#[[:space:]]*include' "$file" || true)
+    from_room[$file]="$room"
 done
+
+last=""
+while IFS=: read -r file line text; do
+    from="${from_room[$file]-}"
+    [[ -n $from ]] || continue
+    if [[ $file != "$last" ]]; then
+        last="$file"
+        first=yes
+        stem="${file##*/}"
+        stem="${stem%%.*}"
+    fi
+    [[ $text =~ ^[[:space:]]*\#[[:space:]]*include[[:space:]]*([\"\<])([^\">]+)[\"\>] ]] || continue
+    mark="${BASH_REMATCH[1]}"
+    target="${BASH_REMATCH[2]}"
+    ours=no
+    case "$target" in engine/* | analysis/* | app/* | tests/*) ours=yes ;; esac
+    if [[ $mark == "<" ]]; then
+        [[ $ours == yes ]] || continue
+        complain "$file:$line: <$target> is ours and wants quotes"
+    fi
+    if [[ $ours == no || /$target/ == */./* || /$target/ == */../* ]]; then
+        complain "$file:$line: \"$target\" is not a path from the top of the repository"
+        continue
+    fi
+    if [[ ! -f $target ]]; then
+        complain "$file:$line: \"$target\" does not exist"
+        continue
+    fi
+    room_of "$target"
+    allowed "$from" "$room" || complain "$file:$line: $from must not include $room ($target)"
+    # A source's own header is its first include and has its name; the two stand in one folder. Tests have none, and a
+    # command may be called as the room it serves.
+    name="${target##*/}"
+    if [[ $first == yes && $from != tests && $file == *.cpp && ${name%.hpp} == "$stem" &&
+        ${target%%/*} == "${file%%/*}" && $target != "${file%.cpp}.hpp" ]]; then
+        complain "$file:$line: its header $target is not beside it"
+    fi
+    first=no
+done < <(grep -HnE '^[[:space:]]*#[[:space:]]*include' "${sources[@]}" || true)
 
 if [[ $bad -ne 0 ]]; then
     echo "$bad against the rules in ${#sources[@]} files"
