@@ -418,6 +418,9 @@ struct SampleLoopOptions {
     int most_placeholders = 3;
     /// A line is not reported where its changes, or another line beside it, have more than this share of its power.
     double unsteady_line = 0.02;
+    /// Length of a record from which a motion of the case is distinguished from a line and from a random rate [s]: some
+    /// twenty correlation times of a resonance that is half a hertz wide.
+    double motion_determined_s = 30.0;
 };
 
 /// Numbers that decide what is named on a record of samples.

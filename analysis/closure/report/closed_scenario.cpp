@@ -72,7 +72,10 @@ class Filler {
         remark("ensemble.duration_s", "Length of the record.");
         take_exposure();
         for (const Step& step : closure_.steps) take(step);
-        if (!record_.turns) drop_reader_that_does_not_fit();
+        if (!record_.turns) {
+            drop_reader_that_does_not_fit();
+            drop_rate_that_no_gyro_follows();
+        }
         if (closure_.unexplained) {
             cannot_hold(fmt::format("structure that no effect of the library explains, in {}: {}",
                                     name_of(closure_.unexplained->where), closure_.unexplained->description()));
@@ -257,6 +260,24 @@ class Filler {
             cannot_hold(fmt::format("the declared reader together with what was found: {}", complaint.problem));
             return;
         }
+    }
+
+    /// In a short record whose rate changes the mean rate is hardly determined. The fitted one may be larger than any
+    /// that the dither takes through the lock-in zone.
+    void drop_rate_that_no_gyro_follows() {
+        const std::string key = "input.rate_deg_h";
+        const std::vector<scenario::Complaint> complaints = scenario::check(scenario());
+        const auto about_rate = [&](const scenario::Complaint& complaint) {
+            return std::find(complaint.keys.begin(), complaint.keys.end(), key) != complaint.keys.end();
+        };
+        const auto found = std::find_if(complaints.begin(), complaints.end(), about_rate);
+        if (found == complaints.end()) return;
+        const double rate_deg_h = record_.declared.input_rate_deg_h.value_or(0.0);
+        cannot_hold(fmt::format("the mean rate: {}", found->problem));
+        scenario().input.rate_deg_h = scenario().input.sweep_stop_deg_h = rate_deg_h;
+        remark(key, fmt::format("{}the mean rate that was fitted is none that a dithered gyro follows; the value is "
+                                "the declared input rate, or zero.",
+                                placeholder_mark));
     }
 
     /// Temperature and input, of which a scenario has a ramp and a mean.

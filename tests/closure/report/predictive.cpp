@@ -216,6 +216,22 @@ TEST(ClosedScenario, SaysWhatIsAPlaceholderAndWhatItCannotHold) {
     EXPECT_EQ(scenario::parse_string(text, "closed.toml"), closed.scenario);
 }
 
+// A short record may leave the mean rate so uncertain that the fitted one is none that the gyro follows.
+TEST(ClosedScenario, AMeanRateThatNoGyroFollowsIsAPlaceholder) {
+    record::Record record;
+    record.samples = {.rate_hz = 200.0, .values = std::vector<double>(1200, 0.01)};
+    record.declared.dither_frequency_hz = 400.0;
+    record.declared.input_rate_deg_h = 7.0;
+    Closure closure;
+    closure.verdict = Verdict::closed;
+    closure.base = {{"", "mean_rate_deg_h", 5e14, 3e14}};
+    const auto closed = ringlock::closure::closed_scenario(record, closure);
+    EXPECT_TRUE(scenario::check(closed.scenario).empty());
+    EXPECT_DOUBLE_EQ(closed.scenario.input.rate_deg_h, 7.0);
+    EXPECT_THAT(closed.placeholders(), testing::Contains("input.rate_deg_h"));
+    EXPECT_THAT(closed.not_held, testing::Contains(HasSubstr("the mean rate: the input rate of 5e+14")));
+}
+
 TEST_F(LongPredictively, SamplesTooAndTheirWhiteNoises) {
     scenario::Scenario scenario = plain_gyro(250, 9);
     scenario.gyro.lockin_threshold_deg_h = 0.0;

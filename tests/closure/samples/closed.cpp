@@ -12,6 +12,7 @@
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/closure/samples/model/series.hpp"
 #include "analysis/record/record.hpp"
+#include "engine/effects/effect.hpp"
 #include "tests/closure/generator/samples.hpp"
 #include "tests/closure/heldout.hpp"
 
@@ -270,6 +271,21 @@ TEST(SampleMotion, WhatIsLeftOfItIsNoSlowDrift) {
     };
     EXPECT_GT(gain(0.0), 100.0);
     EXPECT_LT(gain(0.3), 1.0);
+}
+
+// A motion of the case that swings a few times only looks like a line.
+TEST(SampleMotion, OfAShortRecordIsTiedToLinesAndRandomRates) {
+    for (const double duration_s : {20.0, 60.0}) {
+        SampleTruth truth = usual();
+        truth.size = static_cast<std::size_t>(duration_s * truth.rate_hz);
+        truth.accelerometers = true;
+        truth.dither_residue = {.frequency_hz = 7.3, .amplitude_arcsec = 0.5};
+        const auto found = closed(truth);
+        ASSERT_EQ(found.steps.size(), 1U) << duration_s;
+        const auto& tied = found.steps[0].confounded_with;
+        const bool with_motion = std::find(tied.begin(), tied.end(), effects::find("case_motion")) != tied.end();
+        EXPECT_EQ(with_motion, duration_s < 30.0);
+    }
 }
 
 // What a witness tells of a strong motion has the witness's own noise in it.

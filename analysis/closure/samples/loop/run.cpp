@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "analysis/closure/closure.hpp"
+#include "analysis/closure/decide/effect_queries.hpp"
+#include "analysis/closure/decide/evidence.hpp"
 #include "analysis/closure/decide/verdict.hpp"
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/declared/count_error.hpp"
@@ -51,6 +53,21 @@ std::string note_of_late(const SampleNoise::Resonance& noise) {
         "{}: {:.3g} arcsec rms of the amplitude's noise, {:.3g} Hz wide, as zero crossings have it that are measured "
         "late",
         note_on_late, noise.arcsec, noise.width_hz);
+}
+
+/// In a short record a motion of the case swings a few times only. What a witness does not explain of it then looks
+/// like a random rate, or like a line: these are tied to the motion.
+void tie_to_motion(Step& step, const SampleSeries& series) {
+    const double duration_s = series.interval_s * static_cast<double>(series.size());
+    if (series.witnesses.empty() || duration_s >= options.samples.loop.motion_determined_s) return;
+    const bool slow_line =
+        is_line(*step.effect) && value_of(step, effects::Role::frequency) < options.samples.screen.fast_hz;
+    if (!slow_line && !is_random_rate(*step.effect)) return;
+    const effects::Effect* motion = first_that_shows(OnSamples::motion);
+    auto& tied = step.confounded_with;
+    if (motion == nullptr || std::find(tied.begin(), tied.end(), motion) != tied.end()) return;
+    tied.push_back(motion);
+    step.experiment = experiment_for(*step.effect, tied);
 }
 
 }  // namespace
@@ -230,6 +247,7 @@ void SampleLoop::finish(Closure& closure) {
     for (std::size_t k = 0; k < now_.added.size(); ++k) {
         Step& step = closure.steps.emplace_back(now_.added[k].step);
         if (step.parameters.empty()) step.parameters = std::move(figures.steps[k]);
+        tie_to_motion(step, series_);
         std::string why;
         if (beat && may_be_of_beat(step, *beat)) {
             why = fmt::format(
