@@ -71,7 +71,7 @@ void find_among_samples(const study::Study& study, AveragingTime& time) {
         throw InputError(fmt::format(
             "--tau {}: shorter than a stored sample; {}. A run with this time in output.tau_s has it, from a cycle of "
             "the dither ({:.4g} s) on",
-            time.text, range(), study.schedule.cycle_s));
+            time.text, range(), study.schedule.output_s));
     }
     constexpr double rounding = 1.0 + 1e-9;  // of a duration that is no binary fraction
     if (*time.time_s > 0.5 * scenario.ensemble.duration_s * rounding) {

@@ -148,7 +148,7 @@ void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm>
         const bool settling = turn < schedule.settle_turns();
         const auto turns = static_cast<std::size_t>(schedule.piece_end(turn) - turn);
         follow([&] { block.advance(turns); });
-        for (std::size_t arm = 0; arm < arms.size() && !settling; ++arm) sink.cycles(arm, block.counts(arm));
+        for (std::size_t arm = 0; arm < arms.size() && !settling; ++arm) sink.angles(arm, block.counts(arm));
         turn += static_cast<std::int64_t>(turns);
         progress.advance(0, static_cast<std::int64_t>(turns) * counted, block.tables_made() > tables);
         tables = block.tables_made();

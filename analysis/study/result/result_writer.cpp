@@ -190,7 +190,7 @@ class ArmWriter {
         write("tau_s",
               over_points(layout::nan,
                           [&](std::size_t point, std::size_t tau) {
-                              return static_cast<double>(points[point].factors[tau]) * points[point].schedule.cycle_s;
+                              return static_cast<double>(points[point].factors[tau]) * points[point].schedule.output_s;
                           }),
               taus, {"s", "averaging times"});
         write("averaging_factor",
