@@ -134,7 +134,7 @@ class ArmStream {
           keeper_(keeper),
           wants_samples_(keeper.wants_samples()),
           angle_errors_counts_(study.angle_times_s.size()),
-          record_(study.schedule.samples, fit_samples),
+          record_((study.schedule.samples - 1) / study.schedule.samples_per_fit + 1, fit_samples),
           waiting_{number, arm, first_gyro, gyros, 0, {}} {
         for (auto& errors : angle_errors_counts_) errors.fill(std::numeric_limits<double>::quiet_NaN());
         for (const std::int64_t m : study.factors) {
@@ -149,8 +149,9 @@ class ArmStream {
         for (allan::FactorStream& stream : asked_) stream.add(counts, gyros_);
         const std::int64_t every = study_.schedule.outputs_per_sample;
         for (const simd::LaneCounts& row : counts) {
-            if (output_++ % every != 0) continue;
-            record_.add({&row, 1});
+            const std::int64_t output = output_++;
+            if (output % every != 0) continue;
+            if (output / every % study_.schedule.samples_per_fit == 0) record_.add({&row, 1});
             take_sample(row);
         }
         // Counts wrap round within hours at high rates, which may be between two samples: never within a piece.
@@ -168,8 +169,9 @@ class ArmStream {
         }
         std::sort(result.allan.begin(), result.allan.end(),
                   [](const allan::Point& a, const allan::Point& b) { return a.m < b.m; });
+        const std::int64_t samples_per_fit = study_.schedule.samples_per_fit * record_.interval();
         result.noise = noise::fit_noise(record_.phase(lane, arcsec_per_count),
-                                        study_.schedule.sample_interval_s * static_cast<double>(record_.interval()));
+                                        study_.schedule.sample_interval_s * static_cast<double>(samples_per_fit));
         result.rate_error_deg_h = rate_error_deg_h(angle_.turned(lane), study_.schedule, setup);
         result.angle_error_arcsec.reserve(angle_errors_counts_.size());
         for (std::size_t i = 0; i < angle_errors_counts_.size(); ++i) {

@@ -35,4 +35,8 @@ std::unique_ptr<Stripper> make_stripper(const Settings& settings, double latch_h
     return std::make_unique<NoStripping>();
 }
 
+std::int64_t warm_up_outputs(const Stripper& stripper, double output_hz) {
+    return static_cast<std::int64_t>(std::ceil(stripper.warm_up_s() * output_hz));
+}
+
 }  // namespace ringlock::reader
