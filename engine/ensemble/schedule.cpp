@@ -21,8 +21,9 @@ Schedule::Schedule(const scenario::Scenario& scenario) {
         1, static_cast<std::int64_t>(std::ceil(scenario::least_fit_interval_s(scenario) / sample_interval_s - slack)));
     const scenario::StudyReader reader = scenario::study_reader(scenario);
     warm_up_outputs = reader.warm_up_outputs;
+    delay_s = reader.delay_s;
     start_s = static_cast<double>(settle_cycles) * (1.0 / frequency) + static_cast<double>(warm_up_outputs) * output_s -
-              reader.delay_s;
+              delay_s;
     // Turns of a noisy drive come early or late, by far less than the cycle that is added for it.
     cycles_read = scenario::reads_arms(scenario)
                       ? 1 + static_cast<std::int64_t>(

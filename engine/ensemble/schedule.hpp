@@ -16,6 +16,7 @@ struct Schedule {
     std::int64_t outputs_per_sample;
     std::int64_t settle_cycles;    ///< of the dither, before the record
     std::int64_t warm_up_outputs;  ///< of readers, after that and before the record
+    double delay_s;                ///< by which the outputs of readers lag behind the angle
     double start_s;            ///< time of the run whose angle the record's first output is: readers' outputs are late
     std::int64_t samples;      ///< of one record, the one at time 0 included
     double sample_interval_s;  ///< outputs_per_sample outputs

@@ -1,6 +1,7 @@
 #include "engine/scenario/read_arms.hpp"
 
 #include <algorithm>
+#include <memory>
 
 #include "engine/reader/stripper.hpp"
 
@@ -10,13 +11,23 @@ bool reads_arms(const Scenario& s) { return s.reader.output_hz > 0.0; }
 
 double outputs_hz(const Scenario& s) { return reads_arms(s) ? s.reader.output_hz : s.dither.frequency_hz; }
 
+namespace {
+
+double latch_hz(const Scenario& s) { return reader::latch_hz(s.reader, s.reader.output_hz); }
+
+std::unique_ptr<reader::Stripper> stripper_of(const Scenario& s) {
+    return reader::make_stripper(s.reader, latch_hz(s), s.dither.frequency_hz);
+}
+
+}  // namespace
+
 StudyReader study_reader(const Scenario& s) {
     if (!reads_arms(s)) return {};
-    const double latch_hz = reader::latch_hz(s.reader, s.reader.output_hz);
-    const auto stripper = reader::make_stripper(s.reader, latch_hz, s.dither.frequency_hz);
-    return {latch_hz, stripper->delay_s(), stripper->residue_relative(),
-            reader::warm_up_outputs(*stripper, s.reader.output_hz)};
+    const auto stripper = stripper_of(s);
+    return {latch_hz(s), stripper->delay_s(), reader::warm_up_outputs(*stripper, s.reader.output_hz)};
 }
+
+double reader_residue_relative(const Scenario& s) { return reads_arms(s) ? stripper_of(s)->residue_relative() : 0.0; }
 
 double simulated_s(const Scenario& s) {
     const double without_warm_up_s = s.ensemble.settle_s + s.ensemble.duration_s;

@@ -17,10 +17,12 @@ double outputs_hz(const Scenario& scenario);
 struct StudyReader {
     double latch_hz = 0.0;             ///< rate of the ticks
     double delay_s = 0.0;              ///< by which outputs lag behind a steady rotation
-    double residue_relative = 0.0;     ///< amplitude of a steady dither that is left over that of the dither
     std::int64_t warm_up_outputs = 0;  ///< that are not fit for use, and before the record
 };
 StudyReader study_reader(const Scenario& scenario);
+
+/// Amplitude of a steady dither that the readers of a study leave over that of the dither; 0 without readers.
+double reader_residue_relative(const Scenario& scenario);
 
 /// Simulated time of each gyro [s]: settling, warm-up of the readers, and the record.
 double simulated_s(const Scenario& scenario);

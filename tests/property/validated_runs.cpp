@@ -23,6 +23,7 @@
 #include "engine/scenario/devices.hpp"
 #include "engine/scenario/keys/schema.hpp"
 #include "engine/scenario/parse.hpp"
+#include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -68,6 +69,7 @@ class Corners {
             if (section.name == "ensemble" || section.name == "output" || section.name == "input") continue;
             if (section.name.starts_with("effects.") || section.name.starts_with("design")) continue;
             for (const Key& key : section.keys) {
+                if (key.path() == "reader.output_hz") continue;  // by the length of the run, below
                 if (key.type != Type::arms && chance(density)) set(key, value(key));
             }
         }
@@ -276,6 +278,15 @@ class Corners {
         set("ensemble", "duration_s", duration_s);
         if (chance(0.2)) set("ensemble", "settle_s", std::min(10.0, log_uniform(0.1, 100.0) * cycle_s));
         set("output", "sample_interval_s", std::max(1.001 * cycle_s, duration_s / log_uniform(3.0, 50.0)));
+        if (chance(0.2)) draw_outputs(cycle_s);
+    }
+
+    /// Some outputs a dither cycle, or one in some cycles, and ticks that fit them more often than not.
+    void draw_outputs(double cycle_s) {
+        const double output_hz = log_uniform(0.05, 5.0) / cycle_s;
+        set("reader", "output_hz", output_hz);
+        if (chance(0.7)) set("reader", "latch_hz", static_cast<double>(below(20)) * output_hz);
+        if (chance(0.7)) set(key("reader", "stripping"), value(key("reader", "stripping")));
     }
 
     std::mt19937_64 engine_;
@@ -288,8 +299,10 @@ double fringes_one_by_one(const Scenario& s) {
     const double fringes = 2.0 * s.dither.peak_rate_deg_s * units::deg_h_per_deg_s /
                            (s.gyro.scale_factor_arcsec * units::two_pi * s.dither.frequency_hz);
     const auto gyros = static_cast<double>(s.ensemble.gyros * s.input.sweep_points);
-    const double half_cycles = 2.0 * s.dither.frequency_hz * (s.ensemble.settle_s + s.ensemble.duration_s) * gyros;
-    double all = 0.0;
+    const double simulated_s = scenario::simulated_s(s) * gyros;
+    const double half_cycles = 2.0 * s.dither.frequency_hz * simulated_s;
+    // A tick takes as long as some fringes do.
+    double all = 4.0 * scenario::study_reader(s).latch_hz * simulated_s * static_cast<double>(s.arms.size());
     const scenario::NoiseInjection& noise = s.noise_injection;
     if (noise.model == scenario::NoiseModel::drive) {
         if (noise.form == gyro::NoiseForm::white) all += 60.0 * noise.resonator_q;
@@ -314,7 +327,9 @@ double largest_error_arcsec(const Scenario& s, double duration_s, double turns) 
         rate += bounds.certain.rate_deg_h + 10.0 * bounds.rate_sd_deg_h;
     }
     const double swings = 6.0 * s.dither.peak_rate_deg_s * units::arcsec_per_deg / s.dither.frequency_hz;
-    return rate * (duration_s + 1.0 / s.dither.frequency_hz) + angle + 1e-3 * swings;
+    // A reader leaves as much as all of the dither, and adds its reference's noise, at both ends of a record.
+    const double of_reader = scenario::reads_arms(s) ? swings + 20.0 * s.reader.reference_noise_arcsec : 0.0;
+    return rate * (duration_s + 1.0 / s.dither.frequency_hz) + angle + 1e-3 * swings + of_reader;
 }
 
 /// The angles of the block's first piece are numbers.

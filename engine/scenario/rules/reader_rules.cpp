@@ -149,6 +149,19 @@ Finding outputs_can_be_counted(const Scenario& s) {
                     fringes, most_fringes)};
 }
 
+Finding warm_up_ends(const Scenario& s) {
+    if (!reads_arms(s)) return {};
+    constexpr double most_records = 10.0;
+    const double warm_up_s = static_cast<double>(study_reader(s).warm_up_outputs) / s.reader.output_hz;
+    if (warm_up_s <= most_records * s.ensemble.duration_s) return {};
+    return Complaint{{"reader.reference_learning_s", "reader.notch_bandwidth_hz", "reader.fir_order",
+                      "ensemble.duration_s", "reader.output_hz"},
+                     fmt::format("the readers of a study are simulated for {:.3g} s before they are fit for use, more "
+                                 "than {:g} times the record of {:g} s; let the reference be learnt faster, the notch "
+                                 "be wider or the filter shorter, or set a longer ensemble.duration_s",
+                                 warm_up_s, most_records, s.ensemble.duration_s)};
+}
+
 constexpr std::array all_reader_rules = {
     Rule{"The rate of the reader's ticks is a whole multiple of that of the samples, and of that at which the arms of "
          "a study are read.",
@@ -163,6 +176,7 @@ constexpr std::array all_reader_rules = {
     Rule{"The dither is taken out of the arms of a study that are read (reader.output_hz).", studies_are_stripped},
     Rule{"From an output of a study's readers to the next a gyro turns by no more than 1e9 fringes.",
          outputs_can_be_counted},
+    Rule{"The readers of a study are fit for use within ten times the duration of its record.", warm_up_ends},
 };
 
 }  // namespace
