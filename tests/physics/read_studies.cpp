@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "analysis/study/summary.hpp"
 #include "engine/core/units.hpp"
 #include "engine/scenario/check.hpp"
+#include "engine/scenario/parse.hpp"
 #include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::study {
@@ -230,6 +232,26 @@ TEST(ReadStudies, ALockedGyroIsLockedInSpiteOfADitherThatIsLeft) {
     }
     EXPECT_GT(largest_arcsec, s.gyro.scale_factor_arcsec);
     for (const SweepPoint& point : summarise(study).arms.front().sweep) EXPECT_EQ(point.locked, 4);
+}
+
+// The answer of read-by-count.toml, for fewer gyros and half of the time.
+TEST(ReadStudies, AnswerTheirScenario) {
+    Scenario s = scenario::parse_file(std::filesystem::path(RINGLOCK_SOURCE_DIR) / "scenarios" / "read-by-count.toml");
+    EXPECT_EQ(s.reader.stripping, reader::Stripping::whole_cycle);
+    s.ensemble.gyros = 8;
+    s.ensemble.duration_s = 60.0;
+    const Study study = run_checked(s);
+    const Summary summary = summarise(study);
+    expect_alike(log_walk(study.arms[1]), {std::log(0.0022), 0.0});
+    EXPECT_FALSE(summary.arms[0].arw_deg_rt_h.median);
+    EXPECT_FALSE(summary.arms[2].arw_deg_rt_h.median);
+    EXPECT_LT(summary.arms[2].arw_deg_rt_h.hi.value(), 3e-4);
+    const auto deviation = [&](double tau_s) {
+        const auto& points = summary.arms[0].allan;
+        return std::find_if(points.begin(), points.end(), [&](const auto& p) { return p.tau_s == tau_s; })->dev_deg_h;
+    };
+    EXPECT_NEAR(deviation(1.0), 0.07, 0.005);
+    EXPECT_NEAR(deviation(10.0), 0.005, 0.001);
 }
 
 }  // namespace

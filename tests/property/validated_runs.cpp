@@ -84,6 +84,7 @@ class Corners {
         }
         draw_length();
         std::shuffle(settings.begin(), settings.end(), engine_);
+        draw_outputs();
     }
 
     void shuffle() { std::shuffle(settings.begin(), settings.end(), engine_); }
@@ -278,12 +279,13 @@ class Corners {
         set("ensemble", "duration_s", duration_s);
         if (chance(0.2)) set("ensemble", "settle_s", std::min(10.0, log_uniform(0.1, 100.0) * cycle_s));
         set("output", "sample_interval_s", std::max(1.001 * cycle_s, duration_s / log_uniform(3.0, 50.0)));
-        if (chance(0.2)) draw_outputs(cycle_s);
     }
 
-    /// Some outputs a dither cycle, or one in some cycles, and ticks that fit them more often than not.
-    void draw_outputs(double cycle_s) {
-        const double output_hz = log_uniform(0.05, 5.0) / cycle_s;
+    /// Arms that are read: some outputs a dither cycle, or one in some cycles, and ticks that fit them more often than
+    /// not. Last, so that the rest of the scenario is what it is without.
+    void draw_outputs() {
+        if (!chance(0.2)) return;
+        const double output_hz = log_uniform(0.05, 5.0) * now("dither", "frequency_hz");
         set("reader", "output_hz", output_hz);
         if (chance(0.7)) set("reader", "latch_hz", static_cast<double>(below(20)) * output_hz);
         if (chance(0.7)) set(key("reader", "stripping"), value(key("reader", "stripping")));
