@@ -152,7 +152,7 @@ struct SampleLineOptions {
     double declared_drift_cycles = 128.0;
 };
 
-/// Kicks of the lock-in at the turns of the declared dither (samples/fit/turn_pattern).
+/// Kicks of the lock-in at the turns of the declared dither (samples/declared/turn_pattern).
 struct SampleTurnOptions {
     /// With more turns in a sample their number is as good as the same in all.
     double most_turns_a_row = 40.0;
@@ -189,7 +189,21 @@ struct SampleTurnOptions {
     double sideband_first_rms = 0.5;
 };
 
-/// What a declared reader accounts for (samples/fit/declared_reader).
+/// Error of counts at the zero crossings of the dither (samples/declared/count_error).
+struct SampleCountErrorOptions {
+    /// Steps of the count over the record, at least: fewer are no line.
+    double fewest_steps = 8.0;
+    /// Widths of the first harmonic from which fits begin [Hz]: the likeliest is taken.
+    std::array<double, 3> first_widths_hz = {0.03, 0.3, 3.0};
+    /// Effort: harmonics that are modelled, while each gains so much [nats]; and what all of them must gain.
+    int most_harmonics = 5;
+    double least_gain_of_harmonic = 1.0;
+    double least_gain = 6.0;
+    /// Effort: records that are simulated to see how residual tests react to counts that jump.
+    int simulated_records = 12;
+};
+
+/// What a declared reader accounts for (samples/declared/declared_reader).
 struct SampleReaderOptions {
     /// Lines at the dither and at so many of its harmonics can be residues of the reader.
     int harmonics = 5;
@@ -415,6 +429,7 @@ struct SampleOptions {
     SampleLineOptions lines = {};
     SampleTurnOptions turns = {};
     SampleReaderOptions reader = {};
+    SampleCountErrorOptions count_error = {};
     SampleScreenOptions screen = {};
     SampleContestOptions contest = {};
     SampleResidualOptions residual = {};

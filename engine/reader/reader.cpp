@@ -76,6 +76,16 @@ Latched Reader::latched(const Instant& instant, double angle_arcsec) const {
     return {instant.time_s, angle_arcsec, dither, ahead};
 }
 
+/// Noise of the measured dither moves its zero crossing, and the dither goes on meanwhile: the angle at which the count
+/// is latched is off by that noise.
+Instant Reader::moved_crossing(Instant instant) const {
+    if (!(settings_.reference_noise_arcsec > 0.0)) return instant;
+    const auto number = 2 * static_cast<std::uint64_t>(instant.time_s * source_.dither_hz);
+    const double noise = random::normal(source_.who, random::Purpose::dither_reference, number);
+    instant.fringes -= settings_.reference_noise_arcsec * noise / source_.scale_factor_arcsec;
+    return instant;
+}
+
 void Reader::read(std::span<const Instant> instants, std::span<const double> correction_fringes,
                   std::span<const double> count_errors) {
     angles_arcsec_.clear();
@@ -85,20 +95,13 @@ void Reader::read(std::span<const Instant> instants, std::span<const double> cor
         const double count_error = count_errors.empty() ? 0.0
                                    : instant.row == 0   ? last_count_error_
                                                         : count_errors[instant.row - 1];
-        double fringes = latched_fringes(instant, count_error);
-        if (!correction_fringes.empty()) fringes -= correction_fringes[instant.row];
-        const double angle_arcsec = source_.scale_factor_arcsec * fringes;
+        const double correction = correction_fringes.empty() ? 0.0 : correction_fringes[instant.row];
         if (instant.crossing) {
-            // Noise of the reference moves the crossing, and the dither goes on meanwhile.
-            const double noise_arcsec =
-                settings_.reference_noise_arcsec > 0.0
-                    ? settings_.reference_noise_arcsec *
-                          random::normal(source_.who, random::Purpose::dither_reference,
-                                         2 * static_cast<std::uint64_t>(instant.time_s * source_.dither_hz))
-                    : 0.0;
-            stripper_->take_crossing(instant.time_s, angle_arcsec - noise_arcsec);
+            const double fringes = latched_fringes(moved_crossing(instant), count_error) - correction;
+            stripper_->take_crossing(instant.time_s, source_.scale_factor_arcsec * fringes);
             continue;
         }
+        const double angle_arcsec = source_.scale_factor_arcsec * (latched_fringes(instant, count_error) - correction);
         stripper_->take(latched(instant, angle_arcsec));
         if (instant.tick % decimation_ != 0) continue;
         angles_arcsec_.push_back(stripper_->angle_arcsec());

@@ -46,6 +46,7 @@ class Reader {
    private:
     double latched_fringes(const Instant& instant, double count_error) const;
     Latched latched(const Instant& instant, double angle_arcsec) const;
+    Instant moved_crossing(Instant instant) const;
 
     Settings settings_;
     Source source_;

@@ -49,10 +49,13 @@ declare -A may=(
         engine/*"
     [analysis/closure/samples/fit]="analysis/closure analysis/closure/stats analysis/closure/decide
         analysis/closure/samples/model analysis/record engine/*"
+    [analysis/closure/samples/declared]="analysis/closure analysis/closure/stats analysis/closure/decide
+        analysis/closure/samples/model analysis/closure/samples/fit analysis/record engine/*"
     [analysis/closure/samples/screen]="analysis/closure analysis/closure/stats analysis/closure/decide
         analysis/closure/samples/model analysis/closure/samples/fit analysis/record engine/*"
     [analysis/closure/samples/residual]="analysis/closure analysis/closure/stats analysis/closure/decide
-        analysis/closure/samples/model analysis/closure/samples/fit analysis/record engine/*"
+        analysis/closure/samples/model analysis/closure/samples/fit analysis/closure/samples/declared analysis/record
+        engine/*"
     [analysis/closure/samples/rounded]="analysis/closure analysis/closure/stats analysis/closure/decide
         analysis/closure/samples/model analysis/closure/samples/fit analysis/record engine/*"
     [analysis/closure/samples/loop]="analysis/closure analysis/closure/stats analysis/closure/decide

@@ -4,10 +4,12 @@
 #include <cmath>
 #include <cstdio>
 #include <random>
+#include <vector>
 
 #include "engine/core/units.hpp"
 #include "engine/reader/fir.hpp"
 #include "engine/reader/notch.hpp"
+#include "engine/reader/reader.hpp"
 #include "engine/reader/reference.hpp"
 #include "engine/reader/stripper.hpp"
 #include "engine/reader/whole_cycle.hpp"
@@ -182,6 +184,36 @@ TEST(Strippers, AReferenceIsLearntWithItsTimeConstant) {
     }
     const double formula = 0.1 * amplitude_arcsec * std::exp(-3.0);
     EXPECT_NEAR(largest, formula, 0.1 * formula);
+}
+
+// Noise of the measured dither moves the zero crossing, and the counter has whole quarter fringes there as elsewhere.
+TEST(Strippers, CountsAtMovedCrossingsAreWhole) {
+    Settings settings = settings_of(Stripping::whole_cycle);
+    settings.fraction = Fraction::none;
+    settings.reference_noise_arcsec = 1.3;
+    constexpr double k_arcsec = 2.0;
+    Reader reader(settings, 100.0, {.scale_factor_arcsec = k_arcsec, .dither_hz = 100.0});
+    std::vector<Instant> instants;
+    for (int i = 0; i < 400; ++i) {
+        // Each tick is a cycle after a crossing, whose angle it then has.
+        Instant crossing{.crossing = true, .tick = i, .time_s = 0.01 * i, .whole_fringes = 0.0, .fringes = 0.37 * i};
+        Instant tick = crossing;
+        tick.crossing = false;
+        instants.push_back(crossing);
+        instants.push_back(tick);
+    }
+    reader.read(instants, {}, {});
+    int moved = 0;
+    double squares = 0.0;
+    for (std::size_t i = 3; i < reader.angles_arcsec().size(); ++i) {
+        const double counts = reader.angles_arcsec()[i] / (0.25 * k_arcsec);
+        EXPECT_NEAR(counts, std::nearbyint(counts), 1e-9);
+        const double off_arcsec = reader.angles_arcsec()[i] - 0.37 * k_arcsec * static_cast<double>(i - 1);
+        squares += off_arcsec * off_arcsec;
+        moved += std::abs(off_arcsec) > 0.25 * k_arcsec ? 1 : 0;
+    }
+    EXPECT_GT(moved, 100);
+    EXPECT_NEAR(std::sqrt(squares / static_cast<double>(reader.angles_arcsec().size() - 3)), 1.3, 0.2);
 }
 
 }  // namespace

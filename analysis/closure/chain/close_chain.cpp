@@ -12,7 +12,7 @@
 #include "analysis/closure/chain/shared_rate.hpp"
 #include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/options.hpp"
-#include "analysis/closure/samples/fit/declared_reader.hpp"
+#include "analysis/closure/samples/declared/declared_reader.hpp"
 #include "analysis/closure/samples/loop/contest.hpp"
 #include "analysis/closure/samples/model/source.hpp"
 #include "analysis/closure/stats/p_values.hpp"

@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "analysis/closure/samples/fit/declared_reader.hpp"
+#include "analysis/closure/samples/declared/declared_reader.hpp"
 #include "analysis/closure/samples/model/source.hpp"
 #include "analysis/closure/samples/screen/screen.hpp"
 #include "engine/core/error.hpp"

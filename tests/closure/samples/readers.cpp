@@ -4,14 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <vector>
 
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decide/effect_queries.hpp"
-#include "analysis/closure/samples/fit/declared_reader.hpp"
-#include "analysis/closure/samples/fit/dither_noise.hpp"
-#include "analysis/closure/samples/fit/turn_pattern.hpp"
+#include "analysis/closure/samples/declared/declared_reader.hpp"
+#include "analysis/closure/samples/declared/dither_noise.hpp"
+#include "analysis/closure/samples/declared/turn_pattern.hpp"
 #include "analysis/closure/samples/residual/rate_beat.hpp"
 #include "analysis/instrument/simulate.hpp"
+#include "engine/core/units.hpp"
+#include "engine/random/stream.hpp"
 #include "engine/scenario/devices.hpp"
 #include "engine/scenario/parse.hpp"
 
@@ -96,6 +100,87 @@ TEST(SampleReaders, WholeCyclesAndFiltersAreNoEffects) {
         EXPECT_EQ(closure.verdict, Verdict::nothing_missing)
             << reader::stripping_names.at(static_cast<std::size_t>(stripping)) << ": " << effects_of(closure);
     }
+}
+
+// Counts of whole quarter fringes at the zero crossings: their error follows the angle. It is a narrow line and its
+// harmonics, and jumps; noise of the measured dither blurs it.
+TEST(SampleReaders, CountsOverWholeCyclesAreNoEffects) {
+    struct Kind {
+        const char* arm;
+        double rate_hz, duration_s, jitter_arcsec;
+    };
+    for (const Kind& kind : {Kind{"noise_injected+compensated", 250.0, 40.0, 0.1},
+                             Kind{"noise_injected", 25.0, 120.0, 0.0}, Kind{"noise_injected", 25.0, 120.0, 0.3}}) {
+        scenario::Scenario s = scenario::read_device(*scenario::find_device("triangle-51mm")).scenario;
+        s.ensemble.gyros = 1;
+        s.ensemble.duration_s = kind.duration_s;
+        s.record.kind = scenario::RecordKind::samples;
+        s.record.rate_hz = kind.rate_hz;
+        s.record.trajectory = scenario::parse_arm(kind.arm);
+        s.reader.stripping = Stripping::whole_cycle;
+        s.reader.fraction = reader::Fraction::none;
+        s.reader.reference_noise_arcsec = kind.jitter_arcsec;
+        const Closure closure = close_loop(instrument::simulate_record(s));
+        EXPECT_EQ(closure.verdict, Verdict::nothing_missing)
+            << kind.arm << " at " << kind.rate_hz << " Hz: " << effects_of(closure);
+    }
+}
+
+// The filter's states have the autocovariance of the sawtooth of a phase that diffuses, within what the harmonics that
+// are left out have.
+TEST(SampleReaders, StatesOfACountsErrorAreThoseOfASawtooth) {
+    const SampleNoise::CountError error{
+        .step_arcsec = 1.0, .hz = 13.5, .width_hz = 0.2, .latch_hz = 200.0, .harmonics = 4};
+    constexpr double interval_s = 1.0 / 200.0;
+    const int lags = 60;
+    std::vector<double> of_states(lags, 0.0);
+    SampleNoise noise;
+    noise.from_hz = 200.0;
+    noise.count_error = error;
+    const SampleStates states(noise, interval_s);
+    for (int m = 1; m <= error.harmonics; ++m) {
+        const int i = 2 * m - 1;  // two states each, behind the angle
+        std::complex<double> turned = states.start[i][i];
+        const std::complex<double> turn(states.f[i][i], states.f[i][i + 1]);
+        for (int k = 0; k < lags; ++k, turned *= turn) of_states[static_cast<std::size_t>(k)] += turned.real();
+    }
+    random::NormalStream normal({1, 1}, random::Purpose::bootstrap);
+    constexpr int latches = 400000;
+    std::vector<double> sawtooth(latches);
+    double angle = 0.3;
+    // Full width 2 pi D/q^2 at half maximum.
+    const double walk = std::sqrt(error.width_hz / units::two_pi * interval_s);
+    for (double& e : sawtooth) {
+        angle += error.hz * interval_s + walk * normal();
+        e = 0.5 - (angle - std::floor(angle));
+    }
+    double left_out = 1.0 / 12.0;
+    for (int m = 1; m <= error.harmonics; ++m) left_out -= 0.5 * std::pow(error.amplitude_arcsec(m), 2);
+    for (int k = 0; k < lags; ++k) {
+        double sum = 0.0;
+        for (int i = k; i < latches; ++i) {
+            sum += sawtooth[static_cast<std::size_t>(i)] * sawtooth[static_cast<std::size_t>(i - k)];
+        }
+        EXPECT_NEAR(sum / (latches - k), of_states[static_cast<std::size_t>(k)], left_out + 0.001) << k;
+    }
+}
+
+// Of a uniform place within a step and normal jitter the mean error at each place has this first harmonic.
+TEST(SampleReaders, JitterBlursASawtooth) {
+    const SampleNoise::CountError error{.step_arcsec = 0.8, .jitter_arcsec = 0.2, .harmonics = 2};
+    random::NormalStream normal({2, 1}, random::Purpose::bootstrap);
+    constexpr int draws = 400000;
+    std::complex<double> first = 0.0;
+    std::complex<double> second = 0.0;
+    for (int i = 0; i < draws; ++i) {
+        const double place = (i + 0.5) / draws;
+        const double counted = place + error.jitter_arcsec / error.step_arcsec * normal();
+        const double off = error.step_arcsec * (0.5 - (counted - std::floor(counted)));
+        first += off * std::polar(2.0 / draws, -units::two_pi * place);
+        second += off * std::polar(2.0 / draws, -2.0 * units::two_pi * place);
+    }
+    EXPECT_NEAR(std::abs(first), error.amplitude_arcsec(1), 0.003);
+    EXPECT_NEAR(std::abs(second), error.amplitude_arcsec(2), 0.003);
 }
 
 TEST(SampleReaders, ADitherThatWasLeftIsNamed) {

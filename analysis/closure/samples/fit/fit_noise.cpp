@@ -48,6 +48,7 @@ std::vector<Free> knobs(SampleModel& model) {
         all.push_back({&sidebands.hz, true, std::min(1.0, sidebands.width_hz / sidebands.hz)});
         all.push_back({&sidebands.width_hz, true});
     }
+    if (model.noise.count_error.harmonics > 0) all.push_back({&model.noise.count_error.width_hz, true});
     if (model.noise.swing_hz > 0.0) {
         all.push_back({&model.noise.swing_cos, false});
         all.push_back({&model.noise.swing_sin, false});

@@ -94,7 +94,8 @@ void SampleLoop::take_lattice(Closure& closure) {
 void SampleLoop::find_coarse_steps(Closure& closure) {
     const bool blurred = lattice_.step_arcsec > options.samples.loop.coarser_than_printed * lattice_.printed_arcsec;
     const double step = series_.counted ? counted_step() : blurred ? 0.0 : lattice_.step_arcsec;
-    if (now_.fit->model().noise.dither || !RoundedSamples::show(*now_.fit, step)) return;
+    const SampleNoise& noise = now_.fit->model().noise;
+    if (noise.dither || noise.count_error.harmonics > 0 || !RoundedSamples::show(*now_.fit, step)) return;
     now_.fit = rounded_.begin(*now_.fit, step);
     closure.notes.push_back(
         fmt::format("steps of {:.6g} arcsec are large beside the noise, and their rounding follows the angle: what "

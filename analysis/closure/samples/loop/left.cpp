@@ -12,6 +12,7 @@
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/fit/motion.hpp"
 #include "analysis/closure/samples/loop/loop.hpp"
+#include "analysis/closure/samples/residual/simulated.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 
@@ -37,13 +38,17 @@ void SampleLoop::test_what_is_left(Closure& closure) const {
     auto views = view_samples(*now_.fit, lattice_step());
     views.push_back({test_of(find_disturbed(*now_.fit, whole_))});
     if (rounded_.drawn()) views.push_back({rounded_.test(*now_.fit)});
+    const auto count = static_cast<double>(views.size());
+    const auto may_be_chance = [count](const SampleView& view) {
+        return of_several(view.test.p_value, count) >= options.level_of_residual;
+    };
+    if (!std::all_of(views.begin(), views.end(), may_be_chance)) {
+        correct_for_counts(*now_.fit, lattice_step(), views);
+    }
     closure.tests.clear();
     for (const SampleView& view : views) closure.tests.push_back(view.test);
     closure.unexplained.reset();
-    const auto count = static_cast<double>(views.size());
-    std::erase_if(views, [&](const SampleView& view) {
-        return of_several(view.test.p_value, count) >= options.level_of_residual;
-    });
+    std::erase_if(views, may_be_chance);
     if (views.empty()) return;
     std::sort(views.begin(), views.end(),
               [](const SampleView& a, const SampleView& b) { return a.test.p_value < b.test.p_value; });

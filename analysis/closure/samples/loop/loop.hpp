@@ -8,7 +8,7 @@
 
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decide/rows.hpp"
-#include "analysis/closure/samples/fit/declared_reader.hpp"
+#include "analysis/closure/samples/declared/declared_reader.hpp"
 #include "analysis/closure/samples/fit/figures.hpp"
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/closure/samples/fit/repeats_and_witness.hpp"
@@ -59,6 +59,7 @@ class SampleLoop {
         SampleSeries series = prepare_samples(record);
         series.count_noise_arcsec = closure::count_noise_arcsec(record);
         series.whole_cycles = record.reader && record.reader->settings.stripping == reader::Stripping::whole_cycle;
+        series.cycle_counts = series.whole_cycles && record.reader->settings.fraction == reader::Fraction::none;
         return series;
     }
     /// The model as it has grown, with what was added.

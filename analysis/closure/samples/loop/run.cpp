@@ -12,12 +12,13 @@
 #include "analysis/closure/closure.hpp"
 #include "analysis/closure/decide/verdict.hpp"
 #include "analysis/closure/options.hpp"
-#include "analysis/closure/samples/fit/declared_reader.hpp"
-#include "analysis/closure/samples/fit/dither_noise.hpp"
+#include "analysis/closure/samples/declared/count_error.hpp"
+#include "analysis/closure/samples/declared/declared_reader.hpp"
+#include "analysis/closure/samples/declared/dither_noise.hpp"
+#include "analysis/closure/samples/declared/turn_pattern.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
 #include "analysis/closure/samples/fit/motion.hpp"
 #include "analysis/closure/samples/fit/steps.hpp"
-#include "analysis/closure/samples/fit/turn_pattern.hpp"
 #include "analysis/closure/samples/loop/loop.hpp"
 #include "analysis/closure/samples/residual/rate_beat.hpp"
 #include "analysis/closure/samples/screen/known.hpp"
@@ -27,6 +28,7 @@ namespace ringlock::closure {
 namespace {
 
 constexpr std::string_view note_on_dither = "the declared reader leaves the noise of the dither in the samples";
+constexpr std::string_view note_on_counts = "the declared reader counts whole quarter fringes";
 constexpr std::string_view note_on_turns = "the white noise of the rate comes in kicks at the turns of the dither";
 
 std::string note_of(const DitherNoise& noise) {
@@ -36,6 +38,11 @@ std::string note_of(const DitherNoise& noise) {
     }
     return fmt::format("{}: {:.0f} % of the variance of the white angle noise, at {:.7g} Hz", note_on_dither,
                        100.0 * noise.share, 0.5 * noise.turn_hz);
+}
+
+std::string note_of(const SampleNoise::CountError& error) {
+    return fmt::format("{} of {:.6g} arcsec: their error is noise at {:.6g} Hz, {:.3g} Hz wide, and {} harmonics",
+                       note_on_counts, error.step_arcsec, error.hz, error.width_hz, error.harmonics - 1);
 }
 
 }  // namespace
@@ -66,12 +73,16 @@ std::shared_ptr<SampleFit> SampleLoop::fit_base(Closure& closure) const {
     return fit;
 }
 
-/// The same model with the turns of the declared dither, where the record shows them; else null.
+/// The same model with the turns of the declared dither and the error of counts at its zero crossings, where the record
+/// shows them; else null. In a record that was resampled the turns do not show.
 std::shared_ptr<SampleFit> SampleLoop::with_turns(const SampleFit& fit, Closure& closure) const {
-    for (const std::string_view own : {note_on_dither, note_on_turns}) {
+    for (const std::string_view own : {note_on_counts, note_on_dither, note_on_turns}) {
         std::erase_if(closure.notes, [own](const std::string& other) { return other.starts_with(own); });
     }
-    std::shared_ptr<SampleFit> found;
+    std::shared_ptr<SampleFit> found = with_count_error(fit, record_);
+    if (found) closure.notes.push_back(note_of(found->model().noise.count_error));
+    if (fit.model().noise.from_hz > 0.0) return found;
+    if (auto with = with_interpolated_errors(found ? *found : fit, record_)) found = std::move(with);
     if (const auto dither = find_dither_noise(fit, record_)) {
         SampleModel model = fit.model();
         take_dither_noise(*dither, model.noise);
@@ -94,15 +105,20 @@ std::shared_ptr<SampleFit> SampleLoop::with_turns(const SampleFit& fit, Closure&
 /// kicks then seemed a smaller share, or were not seen. The turns belong to the base model, which gets them as well.
 void SampleLoop::find_turns_again(Closure& closure) {
     const SampleNoise& noise = now_.fit->model().noise;
-    if (noise.from_hz > 0.0 || rounded_.drawn() || filtered_rows(record_)) return;
+    if (rounded_.drawn() || filtered_rows(record_)) return;
     std::shared_ptr<SampleFit> without = now_.fit;
-    if (noise.kicks || noise.dither || noise.sidebands.arcsec > 0.0) {
+    if (noise.kicks || noise.dither || noise.sidebands.arcsec > 0.0 || noise.count_error.harmonics > 0 ||
+        noise.swing_hz > 0.0) {
         SampleModel model = now_.fit->model();
         drop_turn_pattern(model.noise);
         without = std::make_shared<SampleFit>(series_, std::move(model), rows_, SampleFit::Noise::near);
     }
+    std::vector<std::string> notes = closure.notes;
     auto with = with_turns(*without, closure);
-    if (!with || !(with->log_likelihood() > now_.fit->log_likelihood())) return;
+    if (!with || !(with->log_likelihood() > now_.fit->log_likelihood())) {
+        closure.notes = std::move(notes);
+        return;
+    }
     SampleModel base = base_->model();
     copy_turn_pattern(with->model().noise, base.noise);
     base_ = std::make_shared<SampleFit>(series_, std::move(base), rows_);

@@ -28,7 +28,33 @@ std::array<std::array<double, 3>, 3> covariance_of_dither(double variance, doubl
     return p;
 }
 
+/// A sinusoid whose phase diffuses, as two quadratures of which the first is read: variance, frequency, and full width
+/// at half maximum of its spectrum.
+struct Rotation {
+    double variance, hz, width_hz;
+};
+
+/// Harmonics of a count's error (SampleNoise::CountError). Where readings between two latched counts are interpolated,
+/// and the record does not tell when counts were latched, the mean over all places between them remains.
+std::vector<Rotation> rotations_of(const SampleNoise::CountError& error, bool resampled) {
+    std::vector<Rotation> rotations;
+    for (int m = 1; m <= error.harmonics; ++m) {
+        const double amplitude = error.amplitude_arcsec(m);
+        const double hz = std::remainder(m * error.hz, error.latch_hz);
+        const double left = resampled ? 1.0 : (2.0 + std::cos(units::two_pi * hz / error.latch_hz)) / 3.0;
+        rotations.push_back({left * 0.5 * amplitude * amplitude, hz, m * m * error.width_hz});
+    }
+    return rotations;
+}
+
 }  // namespace
+
+/// The sawtooth's, times the characteristic function of the jitter (Widrow and Kollar, "Quantization Noise", 2008,
+/// chapter 5).
+double SampleNoise::CountError::amplitude_arcsec(int harmonic) const {
+    const double jitter_rad = units::two_pi * harmonic * jitter_arcsec / step_arcsec;
+    return step_arcsec / (units::pi * harmonic) * std::exp(-0.5 * jitter_rad * jitter_rad);
+}
 
 SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
     resampled = noise.from_hz > 0.0;
@@ -98,20 +124,27 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
     }
     // The record begins at angle zero as it was read.
     p[0][0] = readout;
-    if (noise.sidebands.arcsec > 0.0 && !resampled && count + 2 <= most) {
-        // Two quadratures of one correlation time turn at the frequency of the dither; one of them is read.
-        const double memory = std::exp(-units::pi * noise.sidebands.width_hz * dt);
-        const double phase = units::two_pi * noise.sidebands.hz * dt;
-        const double variance = noise.sidebands.arcsec * noise.sidebands.arcsec;
+    std::vector<int> read = resonances;  // states that a reading adds to the angle
+    const auto add = [&](const Rotation& rotation) {
+        const double memory = std::exp(-units::pi * rotation.width_hz * dt);
+        const double phase = units::two_pi * rotation.hz * dt;
+        const double variance = rotation.variance;
         f[count][count] = f[count + 1][count + 1] = memory * std::cos(phase);
         f[count][count + 1] = memory * std::sin(phase);
         f[count + 1][count] = -f[count][count + 1];
         q[count][count] = q[count + 1][count + 1] = variance * (1.0 - memory * memory);
         p[count][count] = p[count + 1][count + 1] = variance;
         p[0][0] += variance;
-        p[0][count] = p[count][0] = -variance;
-        h[count] = 1.0;
+        if (!resampled) p[0][count] = p[count][0] = -variance;
+        read.push_back(count);
         count += 2;
+    };
+    if (noise.sidebands.arcsec > 0.0 && !resampled && count + 2 <= most) {
+        // Two quadratures of one correlation time turn at the frequency of the dither; one of them is read.
+        add({noise.sidebands.arcsec * noise.sidebands.arcsec, noise.sidebands.hz, noise.sidebands.width_hz});
+    }
+    for (const Rotation& rotation : rotations_of(noise.count_error, resampled)) {
+        if (count + 4 <= most) add(rotation);
     }
     if (dither) readout -= dither_variance;
     floor = readout;
@@ -119,17 +152,17 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         const int r0 = count;
         const int r1 = count + 1;
         f[r0][r1] = 1.0;
-        // r1 of the new tick = angle and resonance there + error; the noise of both is in q.
+        // r1 of the new tick = angle and what is read with it there + error; the noise of all is in q.
         f[r1] = f[0];
         for (int j = 0; j < count; ++j) q[r1][j] = q[0][j];
-        for (const int resonance : resonances) {
+        for (const int state : read) {
             for (int j = 0; j < count; ++j) {
-                f[r1][j] += f[resonance][j];
-                q[r1][j] += q[resonance][j];
+                f[r1][j] += f[state][j];
+                q[r1][j] += q[state][j];
             }
         }
         q[r1][r1] = q[0][0] + readout;
-        for (const int resonance : resonances) q[r1][r1] += q[resonance][resonance];
+        for (const int state : read) q[r1][r1] += q[state][state];
         for (int j = 0; j < count; ++j) q[j][r1] = q[r1][j];
         count += 2;
         p[r0][r0] = p[r1][r1] = p[0][0] + q[r1][r1];
@@ -140,7 +173,7 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         first_place = noise.from_phase;
     } else {
         h[0] = 1.0;
-        for (const int resonance : resonances) h[resonance] = 1.0;
+        for (const int state : read) h[state] = 1.0;
         swings = noise.swing_hz > 0.0;
         swing_by_row = units::two_pi * noise.swing_hz * interval_s;
         swing_cos = noise.swing_cos;

@@ -57,6 +57,20 @@ struct SampleNoise {
     /// Sidebands of the dither in the readings, where a noisy drive moves its amplitude and its phase: rms at any time,
     /// frequency of the dither, full width at half maximum of their spectrum. 0 arcsec: none.
     Resonance sidebands = {0.0, 0.0, 0.0};
+    /// Error of counts that are latched where the dither adds nothing: a sawtooth of the angle. Under a steady rate its
+    /// harmonics are lines, which the random walk of the counted angle widens: the phase of harmonic m diffuses m^2
+    /// times as fast as that of the first. All but the width follows from the declared reader and the mean rate.
+    struct CountError {
+        double step_arcsec = 0.0;  ///< of the count; 0: none
+        double hz = 0.0;           ///< steps that the counted angle passes in a second
+        double width_hz = 0.0;     ///< of the first harmonic, full width at half maximum
+        double latch_hz = 0.0;     ///< rate at which counts are latched
+        /// Rms of the angle at which a count is latched, independent from one to the next: it blurs the sawtooth.
+        double jitter_arcsec = 0.0;
+        int harmonics = 0;  ///< that are states; the others are part of the white error of the readings
+        double amplitude_arcsec(int harmonic) const;
+    };
+    CountError count_error = {};
     /// The variance of the readings' errors goes up and down at that frequency: its logarithm by cos, and by sin.
     double swing_hz = 0.0, swing_cos = 0.0, swing_sin = 0.0;
     double from_hz = 0.0;        ///< taken at that rate and interpolated; 0: not

@@ -8,7 +8,7 @@
 
 #include "analysis/closure/decide/effect_queries.hpp"
 #include "analysis/closure/options.hpp"
-#include "analysis/closure/samples/fit/declared_reader.hpp"
+#include "analysis/closure/samples/declared/declared_reader.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/units.hpp"
 

@@ -6,9 +6,10 @@
 #include <utility>
 
 #include "analysis/closure/options.hpp"
+#include "analysis/closure/samples/declared/turn_pattern.hpp"
 #include "analysis/closure/samples/fit/line_search.hpp"
 #include "analysis/closure/samples/fit/repeats_and_witness.hpp"
-#include "analysis/closure/samples/fit/turn_pattern.hpp"
+#include "analysis/closure/samples/fit/swing.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
 #include "analysis/closure/samples/residual/views.hpp"
 #include "analysis/closure/stats/normality.hpp"
@@ -18,52 +19,6 @@
 namespace ringlock::closure {
 
 namespace {
-
-/// A variance that goes up and down at a frequency.
-struct Swing {
-    double cos = 0.0, sin = 0.0;  ///< of its logarithm
-    double gain = 0.0;            ///< of the log-likelihood
-};
-
-/// Of the innovations: fitted by Newton's method.
-Swing swing_of_variance(const SampleFit& fit, double hz) {
-    const auto& e = fit.innovations();
-    const auto phase = line_phase(e.size(), fit.series().rate_hz, LineCourse::still(hz));
-    Swing swing;
-    double mean = 0.0;
-    for (int round = 0; round < 8; ++round) {
-        Eigen::Matrix3d curvature = Eigen::Matrix3d::Zero();
-        Eigen::Vector3d slope = Eigen::Vector3d::Zero();
-        swing.gain = 0.0;
-        for (std::size_t i = 0; i < e.size(); ++i) {
-            if (!fit.telling()[i]) continue;
-            const Eigen::Vector3d x(1.0, std::cos(phase[i]), std::sin(phase[i]));
-            const double log_variance = mean * x(0) + swing.cos * x(1) + swing.sin * x(2);
-            const double ratio = e[i] * e[i] * std::exp(-log_variance);
-            swing.gain += 0.5 * (e[i] * e[i] - ratio - log_variance);
-            slope += 0.5 * (ratio - 1.0) * x;
-            curvature += 0.5 * x * x.transpose();
-        }
-        const Eigen::Vector3d step = curvature.ldlt().solve(slope);
-        mean += step(0);
-        swing.cos += step(1);
-        swing.sin += step(2);
-        if (step.norm() < 1e-5) break;
-    }
-    return swing;
-}
-
-/// Gain where it is the readings' errors whose variance does: the noise fitted anew with it. An innovation has the
-/// errors of the readings before as well, and shows less.
-double gain_of_swinging_errors(const SampleFit& fit, double hz, const Swing& seen) {
-    SampleModel model = fit.model();
-    const auto phase = line_phase(1, fit.series().rate_hz, LineCourse::still(hz))[0];
-    // From the phase of the innovations to one that begins with the record.
-    model.noise.swing_hz = hz;
-    model.noise.swing_cos = seen.cos * std::cos(phase) + seen.sin * std::sin(phase);
-    model.noise.swing_sin = seen.sin * std::cos(phase) - seen.cos * std::sin(phase);
-    return SampleFit(fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near).gain_over(fit);
-}
 
 void test_size(const SampleFit& fit, Views& views) {
     const auto& e = fit.innovations();
@@ -106,7 +61,7 @@ void test_size(const SampleFit& fit, Views& views) {
     SampleView view{{Where::time, std::string(repeating_variance), cycle.p_value,
                      fmt::format("{:.6g} times a second", cycle.frequency_hz), swing.gain - cost}};
     view.refitted = [&fit, hz = cycle.frequency_hz, swing, cost](double) {
-        return gain_of_swinging_errors(fit, hz, swing) - cost;
+        return with_swinging_errors(fit, hz, swing).gain_over(fit) - cost;
     };
     views.push_back(std::move(view));
 }
@@ -122,7 +77,7 @@ void test_distribution(const SampleFit& fit, double lattice_arcsec, Views& views
                                          [&](std::size_t length) { return expected_excess(fit, length); })) {
         views.push_back({*test});
     }
-    if (lattice_arcsec == 0.0) {
+    if (lattice_arcsec == 0.0 && !fit.series().cycle_counts) {
         // No two values of so many digits are the same by chance, the largest least of all.
         const auto& x = fit.series().increment;
         const double high = *std::max_element(x.begin(), x.end());

@@ -143,6 +143,18 @@ void screen_known_source(const SampleFit& now, const KnownSource& source, std::v
     }
 }
 
+/// The rate at which a reader that is declared to count over whole cycles latches: that of the dither, as the pattern
+/// of the record shows it. None where no such reader is declared.
+std::optional<double> declared_source_hz(const SampleContext& in, double pattern_hz) {
+    if (!in.series.whole_cycles || !in.declared.dither_frequency_hz) return std::nullopt;
+    const double dither_hz = *in.declared.dither_frequency_hz;
+    const double rate_hz = in.series.rate_hz;
+    const double shown_hz = std::abs(std::remainder(dither_hz, rate_hz));
+    const double off_hz = pattern_hz - shown_hz;
+    if (std::abs(off_hz) > options.samples.declared_dither_error * dither_hz) return dither_hz;
+    return dither_hz + (std::remainder(dither_hz, rate_hz) > 0.0 ? off_hz : -off_hz);
+}
+
 }  // namespace
 
 void screen_source(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
@@ -164,6 +176,14 @@ void screen_source(const SampleFit& now, const SampleContext& in, std::vector<Sa
         out.push_back(*candidate);
         out.back().model = with_lines_of_source(now, std::move(model));
     };
+    if (const auto hz = declared_source_hz(in, cycle.frequency_hz)) {
+        if (*hz > options.samples.screen.fastest_source * in.series.rate_hz) return;
+        for (SampleModel& model : models_of_source(now, *hz)) {
+            out.push_back(*candidate);
+            out.back().model = std::move(model);
+        }
+        return;
+    }
     if (const auto source = find_straight_lines(in.series.increment, in.series.rate_hz)) {
         for (const Errors errors : {Errors::as_they_are, Errors::of_readings}) {
             offer(on_straight_lines(now, *source, errors));

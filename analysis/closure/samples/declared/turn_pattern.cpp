@@ -1,4 +1,4 @@
-#include "analysis/closure/samples/fit/turn_pattern.hpp"
+#include "analysis/closure/samples/declared/turn_pattern.hpp"
 
 #include <algorithm>
 #include <array>
@@ -95,12 +95,12 @@ double weight_at(const BlurredProfile& profile, double place, double ratio) {
     return sum / ratio;
 }
 
-constexpr std::size_t bins = 256;
-using Weights = std::array<double, bins>;
+constexpr std::size_t cycle_bins = 256;
+using Weights = std::array<double, cycle_bins>;
 
 /// Squares of the innovations by the place of the row's end between two turns.
 struct Folded {
-    std::array<double, bins> squares{}, count{};
+    std::array<double, cycle_bins> squares{}, count{};
 };
 
 Folded fold(const SampleFit& fit, double turns_a_row) {
@@ -109,7 +109,7 @@ Folded fold(const SampleFit& fit, double turns_a_row) {
     for (std::size_t i = 0; i < e.size(); ++i) {
         if (!fit.telling()[i]) continue;
         const double turns = turns_a_row * static_cast<double>(i + 1);
-        const auto bin = static_cast<std::size_t>((turns - std::floor(turns)) * bins) % bins;
+        const auto bin = static_cast<std::size_t>((turns - std::floor(turns)) * cycle_bins) % cycle_bins;
         folded.squares[bin] += e[i] * e[i];
         folded.count[bin] += 1.0;
     }
@@ -123,17 +123,17 @@ struct Placed {
 
 /// The likeliest place of the turns. `share`: of the innovations' variance that comes in kicks.
 Placed place_turns(const Folded& folded, const Weights& weights, double share) {
-    std::array<double, bins> log_variance{}, inverse{};
-    for (std::size_t b = 0; b < bins; ++b) {
+    std::array<double, cycle_bins> log_variance{}, inverse{};
+    for (std::size_t b = 0; b < cycle_bins; ++b) {
         const double variance = std::max(1e-6, 1.0 + share * (weights[b] - 1.0));
         log_variance[b] = std::log(variance);
         inverse[b] = 1.0 / variance;
     }
     Placed best;
-    for (std::size_t shift = 0; shift < bins; ++shift) {
+    for (std::size_t shift = 0; shift < cycle_bins; ++shift) {
         double gain = 0.0;
-        for (std::size_t b = 0; b < bins; ++b) {
-            const std::size_t w = (b + shift) % bins;
+        for (std::size_t b = 0; b < cycle_bins; ++b) {
+            const std::size_t w = (b + shift) % cycle_bins;
             gain += 0.5 * (folded.squares[b] * (1.0 - inverse[w]) - folded.count[b] * log_variance[w]);
         }
         if (gain > best.gain) best = {gain, shift};
@@ -225,22 +225,23 @@ std::optional<TurnPattern> find_turn_pattern(const SampleFit& base, const record
                 const double unit_turns = std::max(unit_s * hz, 1e-3);
                 const BlurredProfile profile(unit_turns, late_s * hz);
                 Weights weights;
-                for (std::size_t b = 0; b < bins; ++b) {
-                    weights[b] = weight_at(profile, (static_cast<double>(b) + 0.5) / bins, hz * series.interval_s);
+                for (std::size_t b = 0; b < cycle_bins; ++b) {
+                    weights[b] =
+                        weight_at(profile, (static_cast<double>(b) + 0.5) / cycle_bins, hz * series.interval_s);
                 }
                 for (const double share : by.shares) {
                     const Placed placed = place_turns(folded, weights, share * by_rate);
                     if (placed.gain <= best.gain) continue;
                     best.gain = placed.gain;
                     best.turn_hz = hz;
-                    best.place = static_cast<double>(placed.shift) / bins;
+                    best.place = static_cast<double>(placed.shift) / cycle_bins;
                     best.late_s = late_s;
                     best.share = share;
                 }
             }
         }
     };
-    // A cycle over the record is two bins or more.
+    // A cycle over the record is two cycle_bins or more.
     search(seen_hz, 4.0 * bin_hz, 0.5 * bin_hz);
     search(best.turn_hz, 0.5 * bin_hz, 0.06 * bin_hz);
     if (best.gain < by.least_gain) return std::nullopt;
@@ -288,6 +289,10 @@ void copy_turn_pattern(const SampleNoise& from, SampleNoise& to) {
     to.dither_memory = from.dither_memory;
     to.dither_follower = from.dither_follower;
     to.sidebands = from.sidebands;
+    to.count_error = from.count_error;
+    to.swing_hz = from.swing_hz;
+    to.swing_cos = from.swing_cos;
+    to.swing_sin = from.swing_sin;
 }
 
 namespace {

@@ -1,4 +1,4 @@
-#include "analysis/closure/samples/fit/dither_noise.hpp"
+#include "analysis/closure/samples/declared/dither_noise.hpp"
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "analysis/closure/options.hpp"
-#include "analysis/closure/samples/fit/turn_pattern.hpp"
+#include "analysis/closure/samples/declared/turn_pattern.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"
 

@@ -1,4 +1,4 @@
-#include "analysis/closure/samples/fit/declared_reader.hpp"
+#include "analysis/closure/samples/declared/declared_reader.hpp"
 
 #include <fmt/format.h>
 
