@@ -187,6 +187,9 @@ struct SampleTurnOptions {
     /// resonator, and rms over that of the innovations, from which fits begin.
     std::array<double, 3> sideband_widths = {0.002, 0.01, 0.05};
     double sideband_first_rms = 0.5;
+    /// Of the amplitude of a noisy drive over the amplitude itself: from which fits begin, and the largest.
+    double late_first_rms = 0.02;
+    double late_most_rms = 0.3;
 };
 
 /// Error of counts at the zero crossings of the dither (samples/declared/count_error).

@@ -64,6 +64,25 @@ std::shared_ptr<SampleFit> with_count_error(const SampleFit& fit, const record::
     return best->gain_over(fit) > by.least_gain ? best : nullptr;
 }
 
+std::shared_ptr<SampleFit> with_late_crossings(const SampleFit& fit, const record::Record& record) {
+    if (!fit.series().whole_cycles || !record.declared.dither_frequency_hz) return nullptr;
+    const double peak_arcsec_s = record.declared.dither_peak_rate_deg_s.value_or(0.0) * units::arcsec_per_deg;
+    const double late_arcsec = record.reader->settings.reference_delay_s * peak_arcsec_s;
+    if (!(late_arcsec > 0.0)) return nullptr;
+    const SampleTurnOptions& by = options.samples.turns;
+    std::shared_ptr<SampleFit> best;
+    for (const double width : by.sideband_widths) {
+        check_interrupt();
+        SampleModel model = fit.model();
+        model.noise.sidebands = {by.late_first_rms * late_arcsec, 0.0, width * *record.declared.dither_frequency_hz};
+        auto with = std::make_shared<SampleFit>(fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near);
+        // A larger one than the amplitude itself could make is no noise of the dither.
+        if (with->model().noise.sidebands.arcsec > by.late_most_rms * late_arcsec) continue;
+        if (!best || with->log_likelihood() > best->log_likelihood()) best = std::move(with);
+    }
+    return best && best->gain_over(fit) > by.least_gain ? best : nullptr;
+}
+
 std::shared_ptr<SampleFit> with_interpolated_errors(const SampleFit& fit, const record::Record& record) {
     const double dither_hz = record.declared.dither_frequency_hz.value_or(0.0);
     if (!fit.series().whole_cycles || !(dither_hz > 0.0) || fit.model().noise.from_hz > 0.0) return nullptr;

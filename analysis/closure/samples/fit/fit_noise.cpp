@@ -45,7 +45,9 @@ std::vector<Free> knobs(SampleModel& model) {
     if (model.noise.sidebands.width_hz > 0.0) {
         SampleNoise::Resonance& sidebands = model.noise.sidebands;
         all.push_back({&sidebands.arcsec, true});
-        all.push_back({&sidebands.hz, true, std::min(1.0, sidebands.width_hz / sidebands.hz)});
+        if (sidebands.hz > 0.0) {
+            all.push_back({&sidebands.hz, true, std::min(1.0, sidebands.width_hz / sidebands.hz)});
+        }
         all.push_back({&sidebands.width_hz, true});
     }
     if (model.noise.count_error.harmonics > 0) all.push_back({&model.noise.count_error.width_hz, true});

@@ -29,6 +29,7 @@ namespace {
 
 constexpr std::string_view note_on_dither = "the declared reader leaves the noise of the dither in the samples";
 constexpr std::string_view note_on_counts = "the declared reader counts whole quarter fringes";
+constexpr std::string_view note_on_late = "the declared reader leaves some of the noise of the dither";
 constexpr std::string_view note_on_turns = "the white noise of the rate comes in kicks at the turns of the dither";
 
 std::string note_of(const DitherNoise& noise) {
@@ -43,6 +44,13 @@ std::string note_of(const DitherNoise& noise) {
 std::string note_of(const SampleNoise::CountError& error) {
     return fmt::format("{} of {:.6g} arcsec: their error is noise at {:.6g} Hz, {:.3g} Hz wide, and {} harmonics",
                        note_on_counts, error.step_arcsec, error.hz, error.width_hz, error.harmonics - 1);
+}
+
+std::string note_of_late(const SampleNoise::Resonance& noise) {
+    return fmt::format(
+        "{}: {:.3g} arcsec rms of the amplitude's noise, {:.3g} Hz wide, as zero crossings have it that are measured "
+        "late",
+        note_on_late, noise.arcsec, noise.width_hz);
 }
 
 }  // namespace
@@ -76,11 +84,15 @@ std::shared_ptr<SampleFit> SampleLoop::fit_base(Closure& closure) const {
 /// The same model with the turns of the declared dither and the error of counts at its zero crossings, where the record
 /// shows them; else null. In a record that was resampled the turns do not show.
 std::shared_ptr<SampleFit> SampleLoop::with_turns(const SampleFit& fit, Closure& closure) const {
-    for (const std::string_view own : {note_on_counts, note_on_dither, note_on_turns}) {
+    for (const std::string_view own : {note_on_counts, note_on_late, note_on_dither, note_on_turns}) {
         std::erase_if(closure.notes, [own](const std::string& other) { return other.starts_with(own); });
     }
     std::shared_ptr<SampleFit> found = with_count_error(fit, record_);
     if (found) closure.notes.push_back(note_of(found->model().noise.count_error));
+    if (auto with = with_late_crossings(found ? *found : fit, record_)) {
+        closure.notes.push_back(note_of_late(with->model().noise.sidebands));
+        found = std::move(with);
+    }
     if (fit.model().noise.from_hz > 0.0) return found;
     if (auto with = with_interpolated_errors(found ? *found : fit, record_)) found = std::move(with);
     if (const auto dither = find_dither_noise(fit, record_)) {

@@ -139,7 +139,7 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         read.push_back(count);
         count += 2;
     };
-    if (noise.sidebands.arcsec > 0.0 && !resampled && count + 2 <= most) {
+    if (noise.sidebands.arcsec > 0.0 && count + 4 <= most) {
         // Two quadratures of one correlation time turn at the frequency of the dither; one of them is read.
         add({noise.sidebands.arcsec * noise.sidebands.arcsec, noise.sidebands.hz, noise.sidebands.width_hz});
     }
