@@ -303,8 +303,11 @@ double fringes_one_by_one(const Scenario& s) {
     const auto gyros = static_cast<double>(s.ensemble.gyros * s.input.sweep_points);
     const double simulated_s = scenario::simulated_s(s) * gyros;
     const double half_cycles = 2.0 * s.dither.frequency_hz * simulated_s;
-    // A tick takes as long as some fringes do.
-    double all = 4.0 * scenario::study_reader(s).latch_hz * simulated_s * static_cast<double>(s.arms.size());
+    // A tick takes as long as some fringes do, and a tap of a filter at each output a thousandth of one.
+    const scenario::StudyReader reader = scenario::study_reader(s);
+    const double taps = 2.0 * reader.delay_s * reader.latch_hz;
+    double all =
+        (4.0 * reader.latch_hz + 1e-3 * taps * s.reader.output_hz) * simulated_s * static_cast<double>(s.arms.size());
     const scenario::NoiseInjection& noise = s.noise_injection;
     if (noise.model == scenario::NoiseModel::drive) {
         if (noise.form == gyro::NoiseForm::white) all += 60.0 * noise.resonator_q;
