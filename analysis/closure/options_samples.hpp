@@ -248,6 +248,8 @@ struct SampleScreenOptions {
     double fast_hz = 30.0;
     /// Lines within so many cycles over the record of one that is in the model are what it left.
     double known_line_cycles = 64.0;
+    /// Lines that are so many cycles over the record apart are two.
+    double resolved_cycles = 4.0;
     /// A drift below so many cycles over the record, either way, is none.
     double least_drift_cycles = 1.0;
     /// Share of the level of output lines that goes to lines which drift anywhere, and to each of lines near the

@@ -1,6 +1,6 @@
 // Hundreds of records of uniform samples with known truth, which the closed loop reads blind.
 //
-//   bench_closure_samples FOLDER [--share S] [--only KIND] [--seed N] [--series N]
+//   bench_closure_samples FOLDER [--share S] [--only KIND] [--seed N] [--series N] [--length S] [--rate HZ]
 //
 // FOLDER gets records.csv (a row a record), deviations.csv (estimates less truth, in standard errors), confusion.csv
 // and the tables of the page: figures.md, misses.md, confusion.md, calibration.md. A share S of 0.1 makes a tenth of
@@ -26,6 +26,16 @@ using namespace ringlock::test::closure;
 constexpr double of_several[] = {5.0, 10.0, 30.0};
 constexpr double of_mixed = 6.0;
 
+/// Length, rate and dither as the command line wants them.
+void take_length(const Command& command, SampleCase& of) {
+    if (!command.length_s && !command.rate_hz) return;
+    const double length_s = command.length_s.value_or(of.duration_s());
+    of.rate_hz = command.rate_hz.value_or(of.rate_hz);
+    of.size = static_cast<std::size_t>(std::lround(length_s * of.rate_hz));
+    std::mt19937_64 random(of.seed ^ 0xd17e);
+    of.other_dither_hz = std::uniform_real_distribution<double>(110.0, 600.0)(random);
+}
+
 std::vector<SampleCase> all_cases(const Command& command) {
     const std::vector<std::string> effects = command.kept(effects_on_samples());
     std::vector<SampleCase> cases;
@@ -40,6 +50,7 @@ std::vector<SampleCase> all_cases(const Command& command) {
             if (shown) of.condition = condition;
         }
         if (of.condition == nullptr) return;
+        take_length(command, of);
         for (const std::string& effect : in) of.truth.push_back(draw_on_samples(effect, of));
         cases.push_back(std::move(of));
     };
@@ -73,10 +84,14 @@ std::vector<SampleCase> all_cases(const Command& command) {
         const double multiple = of_several[k % std::size(of_several)];
         add(Kind::several, multiple, {sized.begin(), sized.begin() + (k % 2 == 0 ? 2 : 3)});
     }
-    for (SampleCase& of : foreign_sample_cases(command.scaled(10), command.series)) cases.push_back(std::move(of));
+    for (SampleCase& of : foreign_sample_cases(command.scaled(10), command.series)) {
+        // What these add was drawn for the length that they have.
+        if (!command.length_s && !command.rate_hz) cases.push_back(std::move(of));
+    }
     std::uint64_t mixed_seed = seeds_of_series * command.series + 70000;
     std::size_t next = 0;
     for (SampleCase& of : foreign_sample_cases(command.scaled(5), command.series)) {
+        if (command.length_s || command.rate_hz) break;
         while (!shows(effects[next % effects.size()], *of.condition)) ++next;
         of.kind = of.foreign.empty() ? Kind::several : Kind::mixed;
         of.multiple = of_mixed;
@@ -100,7 +115,8 @@ int main(int argc, char** argv) {
     std::erase_if(cases, [&](const SampleCase& of) {
         return (!command.seed.empty() && std::to_string(of.seed) != command.seed) || !command.wants(of.multiple);
     });
-    Tables tables(command.folder, cases.size(), "arcsec", "30 000 samples");
+    const std::string length = cases.empty() ? "" : fmt::format("{} samples", cases.front().size);
+    Tables tables(command.folder, cases.size(), "arcsec", length.c_str());
     oneapi::tbb::parallel_for(std::size_t{0}, cases.size(), [&](std::size_t k) {
         try {
             if (cases[k].multiple > 0.0) settle(cases[k]);

@@ -240,6 +240,25 @@ TEST(SampleReaders, BesideADitherThatWasLeftNothingElseIsNamed) {
 }
 
 // A noisy drive: the amplitude of a resonator, between half cycles of unequal length.
+// At 400 samples a second the dither of 266.983 Hz shows at 133.017 Hz, and its second harmonic at 133.966 Hz.
+TEST(SampleReaders, AHarmonicAliasedNextToTheDitherIsAccountedFor) {
+    scenario::Scenario s = scenario::read_device(*scenario::find_device("triangle-51mm")).scenario;
+    s.ensemble.gyros = 1;
+    s.ensemble.duration_s = 39.0;
+    s.ensemble.seed = 24;
+    s.dither.frequency_hz = 266.983;
+    s.record.kind = scenario::RecordKind::samples;
+    s.record.rate_hz = 400.0;
+    s.reader.stripping = Stripping::none;
+    s.reader.fraction = reader::Fraction::none;
+    const Closure closure = close_loop(instrument::simulate_record(s));
+    EXPECT_EQ(closure.verdict, Verdict::closed) << effects_of(closure);
+    EXPECT_EQ(effects_of(closure), "dither_residue ");
+    EXPECT_TRUE(std::any_of(closure.notes.begin(), closure.notes.end(), [](const std::string& note) {
+        return note.find("is harmonic 2 of the dither") != std::string::npos;
+    }));
+}
+
 TEST(SampleReaders, BesideTheDitherOfANoisyDriveNothingElseIsNamed) {
     scenario::Scenario s = samples_at(400.0, 25.0);
     s.reader.stripping = Stripping::none;

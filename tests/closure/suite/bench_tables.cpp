@@ -342,6 +342,12 @@ Command command_of(int argc, char** argv, const char* program) {
             command.gyro = gyro_named(argv[++k]);
         } else if (argument == "--multiple" && followed) {
             command.multiple = std::strtod(argv[++k], nullptr);
+        } else if (argument == "--length" && followed) {
+            command.length_s = std::strtod(argv[++k], nullptr);
+            wrong = wrong || !(*command.length_s > 0.0);
+        } else if (argument == "--rate" && followed) {
+            command.rate_hz = std::strtod(argv[++k], nullptr);
+            wrong = wrong || !(*command.rate_hz > 0.0);
         } else if (argument == "--direct") {
             command.direct = true;
         } else if (argument == "--seed" && followed) {
@@ -361,7 +367,8 @@ Command command_of(int argc, char** argv, const char* program) {
     if (wrong || command.folder.empty() || !known || !(command.share > 0.0 && command.share <= most_share)) {
         fmt::print(stderr,
                    "usage: {} FOLDER [--share S] [--only null|single|pair|foreign|other|several|mixed] "
-                   "[--multiple M] [--effect E,F] [--without E,F] [--device NAME] [--direct] [--seed N] [--series N]\n",
+                   "[--multiple M] [--effect E,F] [--without E,F] [--device NAME] [--direct] [--seed N] [--series N] "
+                   "[--length S] [--rate HZ]\n",
                    program);
         std::exit(2);
     }

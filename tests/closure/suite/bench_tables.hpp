@@ -21,7 +21,9 @@ struct Command {
     std::vector<std::string> without;  ///< of the library that are not drawn
     double multiple = 0.0;             ///< of the detection limit; 0: all
     std::optional<gyro::Setup> gyro;   ///< in place of the paper's device
-    bool direct = false;               ///< all records by the integration of the equation of motion
+    /// Length of all records [s], rate of samples [Hz], and dithers of 110 to 600 Hz; none: those of the bench.
+    std::optional<double> length_s, rate_hz;
+    bool direct = false;  ///< all records by the integration of the equation of motion
 
     bool wants(Kind kind) const { return only.empty() || only == name_of(kind); }
     bool wants(double of_limit) const { return multiple == 0.0 || multiple == of_limit; }

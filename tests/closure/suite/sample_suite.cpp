@@ -30,7 +30,6 @@ namespace {
 
 constexpr auto increments = record::SampleKind::angle_increment_arcsec;
 constexpr auto angles = record::SampleKind::angle_arcsec;
-constexpr double rate_hz = 100.0;
 
 }  // namespace
 
@@ -53,15 +52,13 @@ std::string SampleCase::truth_text() const { return text_of(added()); }
 
 namespace {
 
-double duration_of(const SampleCase& of) { return static_cast<double>(of.size) / rate_hz; }
-
 SampleTruth truth_of(const SampleCase& of) {
     const SampleCondition& condition = *of.condition;
     std::mt19937_64 random(of.seed);
     const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
-    const double duration_s = duration_of(of);
+    const double duration_s = of.duration_s();
     SampleTruth truth;
-    truth.rate_hz = rate_hz;
+    truth.rate_hz = of.rate_hz;
     truth.size = of.size;
     truth.seed = of.seed;
     truth.kind = condition.kind;
@@ -70,7 +67,7 @@ SampleTruth truth_of(const SampleCase& of) {
     truth.rates.quantum_noise_deg_rt_h = condition.white_rate_deg_rt_h * between(0.7, 1.4);
     truth.accelerometers = condition.accelerometers;
     truth.count_quantization_arcsec = condition.digits_arcsec;
-    if (condition.dither_hz > 0.0) truth.declared.emplace().dither_frequency_hz = condition.dither_hz;
+    if (condition.dither_hz > 0.0) truth.declared.emplace().dither_frequency_hz = of.dither_hz();
     if (condition.warm) {
         truth.temperature.swing_k = between(0.5, 2.0);
         truth.temperature.period_s = between(0.3, 0.6) * duration_s;
@@ -179,12 +176,13 @@ Added draw_on_samples(const std::string& effect, const SampleCase& of) {
     const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
     const auto even = [&](double a, double b) { return std::exp(between(std::log(a), std::log(b))); };
     const double sign = between(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
-    const double duration_s = duration_of(of);
+    const double duration_s = of.duration_s();
     const SampleCondition& condition = *of.condition;
     if (effect == "count_quantization") return {effect, {{"step_arcsec", 0.5 * condition.white_angle_arcsec}}};
     if (effect == "dither_residue") {
         const bool declared = condition.dither_hz > 0.0;
-        const double hz = declared ? condition.dither_hz + between(-0.8, 0.8) : between(5.0, 45.0);
+        const double hz =
+            declared ? of.dither_hz() + between(-0.8, 0.8) : between(0.05 * of.rate_hz, 0.45 * of.rate_hz);
         const bool drifts = between(0.0, 1.0) < 0.5;
         const double cycles =
             sign * even(5.0, 50.0);  // that the drift makes over the record, half of them to the middle
@@ -198,8 +196,8 @@ Added draw_on_samples(const std::string& effect, const SampleCase& of) {
         double hz = 0.0;
         // Not at a simple ratio to the record's rate, of which there is little or nothing to see.
         do {
-            hz = even(0.55 * rate_hz, 3.2 * rate_hz);
-        } while (std::abs(6.0 * hz / rate_hz - std::round(6.0 * hz / rate_hz)) < 0.05);
+            hz = even(0.55 * of.rate_hz, 3.2 * of.rate_hz);
+        } while (std::abs(6.0 * hz / of.rate_hz - std::round(6.0 * hz / of.rate_hz)) < 0.05);
         return {effect, {{"from_hz", hz}}};
     }
     if (effect == "case_motion") {
@@ -219,7 +217,10 @@ Added draw_on_samples(const std::string& effect, const SampleCase& of) {
     if (effect == "bias_instability") return {effect, {{"deg_h", 1.0}}};
     if (effect == "rate_random_walk") return {effect, {{"deg_h_rt_h", 5.0}}};
     if (effect == "base_vibration") {
-        return {effect, {{"frequency_hz", even(0.3, 29.0)}, {"rate_deg_h", 1.0}, {"phase_rad", between(-3.0, 3.0)}}};
+        return {effect,
+                {{"frequency_hz", even(std::max(0.3, 3.0 / duration_s), 29.0)},
+                 {"rate_deg_h", 1.0},
+                 {"phase_rad", between(-3.0, 3.0)}}};
     }
     return {effect, {{"relative", 1e-3 * sign}}};
 }
@@ -319,7 +320,7 @@ std::vector<SampleCase> foreign_rates(std::size_t each, std::uint64_t series) {
             {"settling", {{"start_deg_h", sign * foreign.even(6.0, 60.0)}, {"constant_s", foreign.even(15.0, 75.0)}}});
         foreign.add(k % 3, Where::time,
                     {"slow_swing",
-                     {{"frequency_hz", foreign.between(1.2, 6.0) / duration_of(foreign.cases.back())},
+                     {{"frequency_hz", foreign.between(1.2, 6.0) / foreign.cases.back().duration_s()},
                       {"rate_deg_h", foreign.even(2.0, 20.0)},
                       {"phase_rad", foreign.between(-3.0, 3.0)}}});
         foreign.add(k % 2 == 0 ? 2 : 5, Where::frequency,
@@ -391,8 +392,8 @@ Outcome judge(const SampleCase& of, const record::Record& record) {
     double input = 0.0;
     if (!truth.input_profile_deg_h.empty()) {
         for (std::size_t i = 0; i < of.size; ++i) {
-            input +=
-                truth.input_profile_deg_h.at((static_cast<double>(i) + 0.5) / rate_hz) / static_cast<double>(of.size);
+            input += truth.input_profile_deg_h.at((static_cast<double>(i) + 0.5) / of.rate_hz) /
+                     static_cast<double>(of.size);
         }
     }
     // A flicker has no mean; a step of the values adds to the white noise of the angle.

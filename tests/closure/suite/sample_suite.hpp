@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,10 +33,16 @@ struct SampleCase {
     const SampleCondition* condition = nullptr;
     std::uint64_t seed = 1;
     std::size_t size = 30000;
-    ringlock::closure::Where where = {};  ///< in which foreign effects show themselves
+    double rate_hz = 100.0;
+    std::optional<double> other_dither_hz = {};  ///< where the condition declares one
+    ringlock::closure::Where where = {};         ///< in which foreign effects show themselves
 
     std::vector<Added> added() const;
     std::string truth_text() const;
+    double duration_s() const { return static_cast<double>(size) / rate_hz; }
+    double dither_hz() const {
+        return condition->dither_hz > 0.0 ? other_dither_hz.value_or(condition->dither_hz) : 0.0;
+    }
 };
 
 record::Record make(const SampleCase& of);

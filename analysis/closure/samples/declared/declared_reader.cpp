@@ -29,13 +29,6 @@ std::size_t order_of(const record::Record& record) {
     return static_cast<std::size_t>(2.0 * settings.latch_hz * record.reader->delay_s + 0.5);
 }
 
-/// Whether the reader leaves the dither in the samples, or takes off its line alone.
-bool leaves_dither_noise(const record::Record& record) {
-    return record.reader && record.declared.dither_frequency_hz &&
-           (record.reader->settings.stripping == Stripping::none ||
-            record.reader->settings.stripping == Stripping::notch);
-}
-
 double alias_of(double hz, double rate_hz) { return std::abs(std::remainder(hz, rate_hz)); }
 
 double dither_arcsec(const record::Declared& declared) {
@@ -76,6 +69,12 @@ bool is_harmonic_of_dither(const Step& step, const record::Record& record, const
 }
 
 }  // namespace
+
+bool leaves_dither_noise(const record::Record& record) {
+    return record.reader && record.declared.dither_frequency_hz &&
+           (record.reader->settings.stripping == Stripping::none ||
+            record.reader->settings.stripping == Stripping::notch);
+}
 
 record::Record summed_for_reader(const record::Record& record, std::string& note) {
     const bool filtered = filters(record);

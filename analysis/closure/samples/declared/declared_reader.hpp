@@ -16,6 +16,9 @@ namespace ringlock::closure {
 /// so where it was done.
 record::Record summed_for_reader(const record::Record& record, std::string& note);
 
+/// Whether the declared reader leaves the dither in the samples, or takes off its line alone.
+bool leaves_dither_noise(const record::Record& record);
+
 /// How a low-pass filter divides white rate noise between a row and the next; null where the reader has none.
 std::shared_ptr<const KickRows> filtered_rows(const record::Record& record);
 

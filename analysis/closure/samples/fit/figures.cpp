@@ -413,7 +413,7 @@ SampleFigures figures_of(const SampleFit& fit, const std::vector<AddedEffect>& a
             all.push_back(estimate_of(effect, parameter_of(effect, Role::deviation).name, model.flicker_deg_h,
                                       errors.flicker_deg_h));
         }
-        if (as == OnSamples::transport) take_resampling(fit, one, errors.noise.from_hz, all, figures.notes);
+        if (as == OnSamples::transport) take_resampling(fit, one, errors.noise.from_hz, all, figures.step_notes.back());
         const auto own = std::find_if(model.resonances.begin(), model.resonances.end(),
                                       [&](const ResonanceOwner& owner) { return owner.step == one.id; });
         if (own == model.resonances.end()) continue;

@@ -57,6 +57,7 @@ class SampleLoop {
    private:
     static SampleSeries prepared(const record::Record& record) {
         SampleSeries series = prepare_samples(record);
+        series.dither_left = leaves_dither_noise(record);
         series.count_noise_arcsec = closure::count_noise_arcsec(record);
         series.whole_cycles = record.reader && record.reader->settings.stripping == reader::Stripping::whole_cycle;
         series.cycle_counts = series.whole_cycles && record.reader->settings.fraction == reader::Fraction::none;

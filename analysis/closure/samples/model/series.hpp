@@ -22,6 +22,7 @@ struct SampleSeries {
     bool counted = false;              ///< by kind whole counts
     double scale_factor_arcsec = 0.0;  ///< of counts
     bool scale_factor_assumed = false;
+    bool dither_left = false;   ///< by a reader that is declared not to take it out, or its line alone
     bool whole_cycles = false;  ///< by a reader that is declared to count over whole cycles of the dither
     bool cycle_counts = false;  ///< and these counts have no fraction: values come in steps, interpolated ones apart
     double count_noise_arcsec = 0.0;  ///< rms of the uniform error of a reading, as the reader is declared

@@ -6,6 +6,7 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/samples/fit/line_search.hpp"
 #include "analysis/closure/samples/fit/lines.hpp"
+#include "analysis/closure/samples/model/source.hpp"
 #include "analysis/closure/samples/screen/parts.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 
@@ -115,6 +116,25 @@ std::optional<SampleCandidate> bent_line(const SampleFit& now, const SampleConte
     return candidate;
 }
 
+/// Width about a line of the model in which no other is looked for: what is left there is that line, which is not what
+/// the model says. Where the dither was left in the samples, its harmonics may be aliased next to each other.
+double width_of_known_hz(const SampleContext& in) {
+    const double duration_s = static_cast<double>(in.series.size()) * in.series.interval_s;
+    double width_hz = options.samples.screen.known_line_cycles / duration_s;
+    if (!in.series.dither_left || !in.declared.dither_frequency_hz) return width_hz;
+    const int harmonics = options.samples.reader.harmonics;
+    for (int k = 1; k <= harmonics; ++k) {
+        for (int other = k + 1; other <= harmonics; ++other) {
+            const double apart_hz = std::abs(alias(k * *in.declared.dither_frequency_hz, in.series.rate_hz).hz -
+                                             alias(other * *in.declared.dither_frequency_hz, in.series.rate_hz).hz);
+            if (apart_hz > options.samples.screen.resolved_cycles / duration_s) {
+                width_hz = std::min(width_hz, 0.5 * apart_hz);
+            }
+        }
+    }
+    return width_hz;
+}
+
 }  // namespace
 
 void screen_lines(const SampleFit& now, const SampleContext& in, std::vector<SampleCandidate>& out) {
@@ -124,8 +144,7 @@ void screen_lines(const SampleFit& now, const SampleContext& in, std::vector<Sam
         if (!in.rows[i]) e[i] = 0.0;
     }
     const double duration_s = static_cast<double>(in.series.size()) * in.series.interval_s;
-    // What is left beside a line that is in the model is that line, not being what the model says.
-    const double width_hz = by.known_line_cycles / duration_s;
+    const double width_hz = width_of_known_hz(in);
     const FoundLines lines = find_lines(e, in.series.rate_hz, in.lines_hz, width_hz);
     const FoundLine likeliest = lines.likeliest();
     const auto refined = [&](const FoundLine& line, bool drifts) {
