@@ -63,6 +63,12 @@ const char* compensator_name(scenario::Compensator compensator) {
     return "none";
 }
 
+/// Whether the arms of any point are read by readers.
+bool any_is_read(const Experiment& experiment) {
+    return std::any_of(experiment.points.begin(), experiment.points.end(),
+                       [](const Study& point) { return scenario::reads_arms(point.scenario); });
+}
+
 /// FigureWriter of a study: attributes of a group. In a design each is a dataset with one value a point.
 class FigureWriter {
    public:
@@ -200,7 +206,9 @@ class ArmWriter {
         write("averaging_factor",
               over_points(std::int64_t{0},
                           [&](std::size_t point, std::size_t tau) { return points[point].factors[tau]; }),
-              taus, {"1", "averaging times in outputs of the arms"});
+              taus,
+              {"1", any_is_read(experiment_) ? "averaging times in outputs of the arms"
+                                             : "averaging times in dither cycles"});
         for (const auto& column : allan_columns) {
             write(column.name, over_taus(layout::nan, [&](const allan::Point& p) { return p.*column.field; }), all,
                   {column.unit, column.description});
@@ -338,10 +346,8 @@ void write_totals(store::File& root, const Experiment& experiment, const std::ve
 
 /// The readers of the arms, where any point has them: attributes of a group, or in a design its datasets.
 void write_readers(store::File& root, const Experiment& experiment) {
+    if (!any_is_read(experiment)) return;
     const auto& points = experiment.points;
-    if (std::none_of(points.begin(), points.end(), [](const Study& p) { return scenario::reads_arms(p.scenario); })) {
-        return;
-    }
     store::Group group = root.create_group("reader");
     FigureWriter figures(group, experiment.has_design() ? &group : nullptr, points.size());
     std::vector<std::vector<ReaderFact>> facts;
