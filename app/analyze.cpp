@@ -22,6 +22,7 @@
 #include "app/output.hpp"
 #include "app/study_output.hpp"
 #include "engine/core/error.hpp"
+#include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -50,7 +51,7 @@ void need_angle_records(const std::string& file, const study::Study& study, cons
 }
 
 /// Fills in the nearest whole number of samples. Who asks for the interval between samples or for half of the duration
-/// as the scenario names them finds them, although they were rounded to whole cycles of the dither and whole samples.
+/// as the scenario names them finds them, although they were rounded to whole outputs and whole samples.
 void find_among_samples(const study::Study& study, AveragingTime& time) {
     const scenario::Scenario& scenario = study.scenario;
     const std::int64_t largest = allan::largest_factor(allan::Estimator::oadev, study.schedule.samples);
@@ -69,9 +70,11 @@ void find_among_samples(const study::Study& study, AveragingTime& time) {
     }
     if (*time.time_s < std::min(interval_s, scenario.output.sample_interval_s)) {
         throw InputError(fmt::format(
-            "--tau {}: shorter than a stored sample; {}. A run with this time in output.tau_s has it, from a cycle of "
-            "the dither ({:.4g} s) on",
-            time.text, range(), study.schedule.cycle_s));
+            "--tau {}: shorter than a stored sample; {}. A run with this time in output.tau_s has it, from {} ({:.4g} "
+            "s) "
+            "on",
+            time.text, range(), scenario::reads_arms(scenario) ? "an output of the reader" : "a cycle of the dither",
+            study.schedule.output_s));
     }
     constexpr double rounding = 1.0 + 1e-9;  // of a duration that is no binary fraction
     if (*time.time_s > 0.5 * scenario.ensemble.duration_s * rounding) {

@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "analysis/report/table.hpp"
+#include "analysis/study/reader_facts.hpp"
 #include "analysis/study/sensitivity.hpp"
 #include "app/study_output.hpp"
+#include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::app {
 
@@ -40,6 +42,24 @@ std::string wrapped(const std::string& text) {
     return lines;
 }
 
+/// The readers of the arms, where all points have the same ones.
+std::string reader_text(const study::Experiment& experiment) {
+    const scenario::Scenario& first = experiment.points.front().scenario;
+    const auto facts = study::reader_facts(first);
+    const auto same = [&](const study::Study& point) { return study::reader_facts(point.scenario) == facts; };
+    if (!scenario::reads_arms(first) || !std::all_of(experiment.points.begin(), experiment.points.end(), same)) {
+        return "";
+    }
+    const scenario::StudyReader reader = scenario::study_reader(first);
+    return wrapped(fmt::format(
+               "arms read at {:g} Hz: stripping {}, fraction {}, latched at {:g} Hz; {:.3g} s late, {:.2g} "
+               "of a steady dither left",
+               first.reader.output_hz, reader::stripping_names.at(static_cast<std::size_t>(first.reader.stripping)),
+               reader::fraction_names.at(static_cast<std::size_t>(first.reader.fraction)), reader.latch_hz,
+               reader.delay_s, scenario::reader_residue_relative(first))) +
+           "\n";
+}
+
 std::string heading(const study::Experiment& experiment, const store::Provenance& provenance) {
     const study::Study& first = experiment.points.front();
     const double duration_s = first.schedule.sample_interval_s * static_cast<double>(first.schedule.samples - 1);
@@ -48,9 +68,9 @@ std::string heading(const study::Experiment& experiment, const store::Provenance
             ? fmt::format("{} points of {} gyros", experiment.points.size(), experiment.scenario.ensemble.gyros)
             : fmt::format("{} gyros, {:.6g} s each", first.gyros.size(), duration_s);
     const auto turns = static_cast<double>(experiment.turns());
-    return fmt::format("{}: {}, seed {}\n{} turns in {:.1f} s ({:.3g} a second)\n\n", provenance.scenario_file, what,
+    return fmt::format("{}: {}, seed {}\n{} turns in {:.1f} s ({:.3g} a second)\n{}\n", provenance.scenario_file, what,
                        experiment.scenario.ensemble.seed, experiment.turns(), provenance.wall_s,
-                       turns / provenance.wall_s);
+                       turns / provenance.wall_s, reader_text(experiment));
 }
 
 std::string walk_cell(const study::Figure& arw) {

@@ -30,6 +30,7 @@
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/ensemble/progress.hpp"
+#include "engine/scenario/read_arms.hpp"
 #include "engine/simd/target.hpp"
 #include "engine/store/provenance.hpp"
 
@@ -75,6 +76,18 @@ std::size_t point_of(const ReplayArguments& arguments, const study::Experiment& 
     const std::int64_t point = whole_number("--point", *arguments.point, points, "from 1 on: " + there);
     if (point == 0) throw InputError(fmt::format("--point 0: must be a whole number from 1 on: {}", there));
     return static_cast<std::size_t>(point - 1);
+}
+
+/// A replay goes from turn to turn, where readers have no outputs.
+void need_angles_at_turns(const study::GyroOfResult& of) {
+    const scenario::Scenario& scenario = of.study().scenario;
+    if (!scenario::reads_arms(scenario)) return;
+    throw InputError(
+        fmt::format("{}: its arms were read by readers (reader.output_hz = {:g}), and a replay goes from turn to turn "
+                    "of the dither, where these have no outputs to compare with. Run its scenario with --set "
+                    "reader.output_hz=0 into another result and replay that, which has the same gyros; `ringlock "
+                    "record` writes the outputs of a reader",
+                    of.result.string(), scenario.reader.output_hz));
 }
 
 std::int64_t gyro_of(const ReplayArguments& arguments, const study::Experiment& experiment, std::size_t point) {
@@ -197,6 +210,7 @@ void run(const ReplayArguments& arguments, std::span<const char* const> command_
     study::GyroOfResult of{arguments.result, experiment};
     of.arm = arm_of(arguments, experiment);
     of.point = point_of(arguments, experiment);
+    need_angles_at_turns(of);
     of.gyro = gyro_of(arguments, experiment, of.point);
     study::StoredGyro stored(of);
     study::GyroReplay replay(of.study().scenario, experiment.scenario.arms[of.arm], of.gyro);

@@ -1,8 +1,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <variant>
 
+#include "analysis/study/reader_facts.hpp"
 #include "analysis/study/sensitivity.hpp"
 #include "app/study_output.hpp"
+#include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::app {
 
@@ -238,9 +241,18 @@ Json json_arm(const study::ArmSummary& arm) {
     return json;
 }
 
+Json json_reader(const scenario::Scenario& scenario) {
+    Json json = Json::object();
+    for (const study::ReaderFact& fact : study::reader_facts(scenario)) {
+        std::visit([&](const auto& value) { json[fact.name] = value; }, fact.value);
+    }
+    return json;
+}
+
 /// Arms, theory and pairs: what every point of a design has.
 void add_summary(Json& json, const study::Study& study, const study::Summary& summary) {
     json["sample_interval_s"] = study.schedule.sample_interval_s;
+    if (scenario::reads_arms(study.scenario)) json["reader"] = json_reader(study.scenario);
     json["turn_map_error_rad"] = number(study.turn_map_error_rad);
     json["arms"] = Json::object();
     for (const study::ArmSummary& arm : summary.arms) json["arms"][arm.name] = json_arm(arm);

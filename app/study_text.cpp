@@ -130,7 +130,7 @@ std::string scenario_times_text(const study::Study& study, const study::Summary&
     if (study.scenario.output.tau_s.empty()) return "";
     std::string text = "\nAllan deviation [deg/h], 68.27 % intervals\n";
     std::vector<std::int64_t> asked;
-    for (const double tau_s : study.scenario.output.tau_s) asked.push_back(ensemble::cycles_in(study.schedule, tau_s));
+    for (const double tau_s : study.scenario.output.tau_s) asked.push_back(ensemble::outputs_in(study.schedule, tau_s));
     std::sort(asked.begin(), asked.end());
     asked.erase(std::unique(asked.begin(), asked.end()), asked.end());
     report::Table table = deviation_table();

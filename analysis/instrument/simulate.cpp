@@ -34,6 +34,7 @@ Scenario with_trajectory(Scenario scenario, std::int64_t gyro) {
         throw InputError(fmt::format("gyro {}: the scenario has the gyros 0 to {}", gyro, gyros - 1));
     }
     scenario.arms = {scenario.record.trajectory};
+    scenario.reader.output_hz = 0.0;  // of studies; a record has a rate of its own
     const auto complaints = scenario::check(scenario);
     if (!complaints.empty()) {
         throw InputError(
@@ -265,7 +266,7 @@ record::Record simulate_record(const Scenario& asked, std::int64_t gyro) {
         const reader::Reader& reader = block.reader(0, 0);
         out.reader =
             record::DeclaredReader{s.reader, reader.stripper().delay_s(), reader.stripper().residue_relative()};
-        out.reader->settings.latch_hz = reader::Reader::latch_hz(s.reader, extent.source_hz);
+        out.reader->settings.latch_hz = reader::latch_hz(s.reader, extent.source_hz);
         if (!stages.empty()) apply(stages, s.record.rate_hz, start_s, wanted, *out.samples);
     } else {
         const bool clocked = s.readout.model != scenario::ReadoutModel::ideal && s.readout.clock_hz > 0.0;

@@ -52,7 +52,7 @@ inline double angle_arcsec(WideCounts counts, double scale_factor_arcsec) {
 ///
 /// \param turned  over the whole record
 inline double rate_error_deg_h(WideCounts turned, const ensemble::Schedule& schedule, const gyro::Setup& setup) {
-    const double duration_s = schedule.cycle_s * static_cast<double>(schedule.cycles() - 1);
+    const double duration_s = schedule.output_s * static_cast<double>(schedule.outputs() - 1);
     return angle_arcsec(turned, setup.scale_factor_arcsec) / duration_s - setup.input_rate_deg_h;
 }
 

@@ -16,6 +16,7 @@
 #include "engine/core/error.hpp"
 #include "engine/ensemble/schedule.hpp"
 #include "engine/scenario/keys/schema.hpp"
+#include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::study {
 
@@ -160,8 +161,15 @@ std::vector<Complaint> complaints_of_design(const Scenario& scenario) {
             complain(key, "Sobol' indices are of independent factors; leave the correlations out, or the indices");
         }
     }
+    const bool reads =
+        scenario::reads_arms(scenario) || std::any_of(wanted.vary.begin(), wanted.vary.end(),
+                                                      [](const Variation& v) { return v.key == "reader.output_hz"; });
     for (std::size_t i = 0; i < wanted.vary.size(); ++i) {
         const Variation& v = wanted.vary[i];
+        if (v.key.starts_with("reader.") && scenario::find_key(v.key) != nullptr && !reads) {
+            complain(key_of(i, "key"), "is of the reader, and no arm of the study is read; set reader.output_hz, too");
+            continue;
+        }
         if (const std::string why = why_not(v.key); !why.empty()) {
             complain(key_of(i, "key"), why);
             continue;
@@ -316,8 +324,8 @@ bool same_schedule(const std::vector<Axis>& axes) {
     const auto changes = [](const Axis& axis) {
         return axis.values.end() != std::adjacent_find(axis.values.begin(), axis.values.end(), std::not_equal_to<>());
     };
-    const std::array<std::string_view, 4> keys{"dither.frequency_hz", "ensemble.duration_s", "ensemble.settle_s",
-                                               "output.sample_interval_s"};
+    const std::array<std::string_view, 5> keys{"dither.frequency_hz", "ensemble.duration_s", "ensemble.settle_s",
+                                               "output.sample_interval_s", "reader.output_hz"};
     return std::none_of(axes.begin(), axes.end(), [&](const Axis& axis) {
         return std::find(keys.begin(), keys.end(), axis.key) != keys.end() && changes(axis);
     });

@@ -11,8 +11,8 @@
 namespace ringlock::study {
 
 /// Deviations of the Allan family of every arm, from the angle records of a result: every gyro by itself and then the
-/// root of the mean variance. Unlike the summary's Allan deviation, which is made of every cycle of the dither while a
-/// study runs, they begin at the sampling interval and overlap fully.
+/// root of the mean variance. Unlike the summary's Allan deviation, which is made of every output while a study runs,
+/// they begin at the sampling interval and overlap fully.
 ///
 /// \param path     result of the study
 /// \param experiment  read_result(path)

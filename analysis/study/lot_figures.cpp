@@ -28,7 +28,7 @@ std::vector<double> of_gyros(const ArmStatistics& arm, What&& what) {
 
 /// Deviations of the gyros at an averaging time that the study has.
 std::vector<double> deviations_at(const Study& study, const ArmStatistics& arm, double tau_s) {
-    const std::int64_t m = ensemble::cycles_in(study.schedule, tau_s);
+    const std::int64_t m = ensemble::outputs_in(study.schedule, tau_s);
     const auto place = std::lower_bound(study.factors.begin(), study.factors.end(), m) - study.factors.begin();
     return of_gyros(arm, [&](const GyroStatistics& g) { return g.allan[static_cast<std::size_t>(place)].dev; });
 }
@@ -60,7 +60,7 @@ std::vector<LotValues> lot_values(const Study& study, const ArmStatistics& arm) 
         figures.push_back({fmt::format("allan_deviation_{:g}_s_deg_h", tau_s), deviations_at(study, arm, tau_s)});
     }
     for (std::size_t i = 0; i < study.angle_times_s.size(); ++i) {
-        if (!study.angle_cycle(i)) continue;
+        if (!study.angle_output(i)) continue;
         figures.push_back({fmt::format("angle_error_{:g}_s_arcsec", study.angle_times_s[i]), angle_errors(arm, i)});
     }
     return figures;

@@ -41,7 +41,7 @@ std::vector<AverageScatter> scatter_of_averages(const Study& study, const ArmSta
     std::vector<AverageScatter> found;
     if (arm.gyros.size() < 2 || study.scenario.input.sweep_points > 1) return found;
     const lot::Confidence confidence = confidence_of(study.scenario);
-    const double end_s = study.schedule.cycle_s * static_cast<double>(study.schedule.cycles() - 1);
+    const double end_s = study.schedule.output_s * static_cast<double>(study.schedule.outputs() - 1);
     const auto add = [&](double after_s, auto&& rate_deg_h) {
         std::vector<double> rates;
         for (const GyroStatistics& gyro : arm.gyros) rates.push_back(rate_deg_h(gyro));
@@ -52,10 +52,10 @@ std::vector<AverageScatter> scatter_of_averages(const Study& study, const ArmSta
         found.push_back({after_s, scatter_of(squares_about_mean(rates), nu, confidence)});
     };
     for (std::size_t i = 0; i < study.angle_times_s.size(); ++i) {
-        const auto cycle = study.angle_cycle(i);
-        if (!cycle || *cycle >= study.schedule.cycles() - 1) continue;  // the whole record comes below
+        const auto output = study.angle_output(i);
+        if (!output || *output >= study.schedule.outputs() - 1) continue;  // the whole record comes below
         const double after_s = study.angle_times_s[i];
-        const double true_s = study.schedule.cycle_s * static_cast<double>(*cycle);
+        const double true_s = study.schedule.output_s * static_cast<double>(*output);
         add(after_s, [&](const GyroStatistics& g) { return g.angle_error_arcsec[i] / true_s; });  // arcsec/s: deg/h
     }
     add(end_s, [](const GyroStatistics& g) { return g.rate_error_deg_h; });

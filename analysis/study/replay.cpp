@@ -76,16 +76,16 @@ class Output {
     }
     /// Sample of the record that this turn is.
     std::optional<std::int64_t> sample() const {
-        const std::int64_t every = 2 * schedule_.cycles_per_sample;
+        const std::int64_t every = 2 * schedule_.outputs_per_sample;
         return record_turn_ >= 0 && record_turn_ % every == 0 ? std::optional(record_turn_ / every) : std::nullopt;
     }
     std::optional<double> angle_error_arcsec() const {
         if (record_turn_ < 0) return std::nullopt;
         return angle_arcsec(turned_, setup_.scale_factor_arcsec) -
-               setup_.input_rate_deg_h * schedule_.cycle_s * static_cast<double>(record_turn_ / 2);
+               setup_.input_rate_deg_h * schedule_.output_s * static_cast<double>(record_turn_ / 2);
     }
     std::optional<double> rate_error_deg_h() const {
-        if (record_turn_ / 2 + 1 < schedule_.cycles()) return std::nullopt;
+        if (record_turn_ / 2 + 1 < schedule_.outputs()) return std::nullopt;
         return study::rate_error_deg_h(turned_, schedule_, setup_);
     }
 

@@ -75,7 +75,8 @@ struct ReplayFigures {
     double left_step_rms_rad = 0.0;
 };
 
-/// A gyro of one arm of a scenario without a design, simulated from its first turn on.
+/// A gyro of one arm of a scenario without a design and without readers (reader.output_hz), simulated from its first
+/// turn on.
 class GyroReplay {
    public:
     /// `scenario` outlives the replay.

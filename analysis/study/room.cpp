@@ -7,6 +7,9 @@
 #include "analysis/study/experiment.hpp"
 #include "analysis/study/result/result_file.hpp"
 #include "analysis/study/study.hpp"
+#include "engine/ensemble/schedule.hpp"
+#include "engine/reader/latch.hpp"
+#include "engine/scenario/read_arms.hpp"
 #include "engine/simd/lanes.hpp"
 
 namespace ringlock::study {
@@ -16,6 +19,22 @@ namespace {
 constexpr std::uint64_t memory_of_program = 40'000'000;
 /// What one thread holds of an arm while it simulates a block: sums at all octaves and at most fit_samples rows.
 constexpr std::uint64_t memory_of_block = 2'000'000;
+
+/// What one thread holds of the readers of a block: the instants of a piece, of which a vector may have room for twice
+/// as many, for each trajectory, and the filters of all arms, taps and angles.
+std::uint64_t memory_of_readers(const scenario::Scenario& scenario) {
+    if (!scenario::reads_arms(scenario)) return 0;
+    constexpr double trajectories = 3.0;  // at most
+    constexpr double real = sizeof(double);
+    const scenario::StudyReader reader = scenario::study_reader(scenario);
+    const ensemble::Schedule schedule(scenario);
+    const double piece_s = 0.5 * static_cast<double>(schedule.piece_turns) / scenario.dither.frequency_hz;
+    const double instants = 2.0 * trajectories * sizeof(reader::Instant) * reader.latch_hz * piece_s;
+    const double filters = 2.0 * real * 2.0 * reader.delay_s * reader.latch_hz;
+    const double outputs = 2.0 * real * scenario.reader.output_hz * piece_s;
+    const auto arms = static_cast<double>(scenario.arms.size());
+    return static_cast<std::uint64_t>(simd::lanes * (instants + arms * (filters + outputs)));
+}
 
 /// Gyros of a point and a rate of the sweep, at most.
 std::uint64_t gyros_at_most(const scenario::Scenario& scenario) {
@@ -45,7 +64,8 @@ std::uint64_t expected_memory_bytes(const scenario::Scenario& scenario, int thre
     const std::uint64_t blocks = points * (gyros / (simd::lanes / 2) + 1);
     const std::uint64_t at_once = std::min(static_cast<std::uint64_t>(threads), blocks);
     return memory_of_program + points * expected_memory_bytes(scenario) +
-           at_once * scenario.arms.size() * memory_of_block + std::min(points, at_once) * of_summary;
+           at_once * (scenario.arms.size() * memory_of_block + memory_of_readers(scenario)) +
+           std::min(points, at_once) * of_summary;
 }
 
 std::uint64_t expected_disk_bytes(const scenario::Scenario& scenario) {

@@ -30,12 +30,12 @@ namespace {
 
 bool is_octave(std::int64_t m) { return (m & (m - 1)) == 0; }
 
-/// Octaves of the cycle, and the averaging times asked for in whole cycles.
+/// Octaves of an output, and the averaging times asked for in whole outputs.
 std::vector<std::int64_t> factors_of(const scenario::Scenario& scenario, const ensemble::Schedule& schedule) {
-    auto factors = allan::octave_factors(allan::largest_factor(allan::Estimator::oadev, schedule.cycles()));
-    for (const double tau_s : scenario.output.tau_s) factors.push_back(ensemble::cycles_in(schedule, tau_s));
+    auto factors = allan::octave_factors(allan::largest_factor(allan::Estimator::oadev, schedule.outputs()));
+    for (const double tau_s : scenario.output.tau_s) factors.push_back(ensemble::outputs_in(schedule, tau_s));
     const scenario::Specification& wanted = scenario.specification;
-    if (wanted.bias_stability_deg_h > 0.0) factors.push_back(ensemble::cycles_in(schedule, wanted.at_s));
+    if (wanted.bias_stability_deg_h > 0.0) factors.push_back(ensemble::outputs_in(schedule, wanted.at_s));
     std::sort(factors.begin(), factors.end());
     factors.erase(std::unique(factors.begin(), factors.end()), factors.end());
     return factors;
@@ -56,11 +56,11 @@ Study::Study(const scenario::Scenario& what)
     for (const scenario::Arm& arm : scenario.arms) arms.push_back({arm, std::vector<GyroStatistics>(total)});
 }
 
-std::optional<std::int64_t> Study::angle_cycle(std::size_t time) const {
-    const std::int64_t cycle = ensemble::cycles_in(schedule, angle_times_s[time]);
-    const std::int64_t last = schedule.cycles() - 1;
-    if (cycle > last + schedule.cycles_per_sample) return std::nullopt;
-    return std::min(cycle, last);
+std::optional<std::int64_t> Study::angle_output(std::size_t time) const {
+    const std::int64_t output = ensemble::outputs_in(schedule, angle_times_s[time]);
+    const std::int64_t last = schedule.outputs() - 1;
+    if (output > last + schedule.outputs_per_sample) return std::nullopt;
+    return std::min(output, last);
 }
 
 std::uint64_t expected_memory_bytes(const scenario::Scenario& scenario) {
@@ -134,7 +134,7 @@ class ArmStream {
           keeper_(keeper),
           wants_samples_(keeper.wants_samples()),
           angle_errors_counts_(study.angle_times_s.size()),
-          record_(study.schedule.samples, fit_samples),
+          record_((study.schedule.samples - 1) / study.schedule.samples_per_fit + 1, fit_samples),
           waiting_{number, arm, first_gyro, gyros, 0, {}} {
         for (auto& errors : angle_errors_counts_) errors.fill(std::numeric_limits<double>::quiet_NaN());
         for (const std::int64_t m : study.factors) {
@@ -143,14 +143,15 @@ class ArmStream {
     }
 
     void add(std::span<const simd::LaneCounts> counts) {
-        if (cycle_ == 0 && !counts.empty()) angle_.start(counts.front());
+        if (output_ == 0 && !counts.empty()) angle_.start(counts.front());
         note_angles(counts);
         octaves_.add(counts, gyros_);
         for (allan::FactorStream& stream : asked_) stream.add(counts, gyros_);
-        const std::int64_t every = study_.schedule.cycles_per_sample;
+        const std::int64_t every = study_.schedule.outputs_per_sample;
         for (const simd::LaneCounts& row : counts) {
-            if (cycle_++ % every != 0) continue;
-            record_.add({&row, 1});
+            const std::int64_t output = output_++;
+            if (output % every != 0) continue;
+            if (output / every % study_.schedule.samples_per_fit == 0) record_.add({&row, 1});
             take_sample(row);
         }
         // Counts wrap round within hours at high rates, which may be between two samples: never within a piece.
@@ -160,22 +161,23 @@ class ArmStream {
     GyroStatistics finish(std::size_t lane, const gyro::Setup& setup) const {
         const double arcsec_per_count = setup.scale_factor_arcsec / ensemble::counts_per_fringe;
         GyroStatistics result;
-        const auto octaves = allan::deviation(octaves_, lane, arcsec_per_count, study_.schedule.cycle_s);
+        const auto octaves = allan::deviation(octaves_, lane, arcsec_per_count, study_.schedule.output_s);
         result.allan.reserve(octaves.size() + asked_.size());
         result.allan.insert(result.allan.end(), octaves.begin(), octaves.end());
         for (const allan::FactorStream& stream : asked_) {
-            result.allan.push_back(allan::deviation(stream, lane, octaves, arcsec_per_count, study_.schedule.cycle_s));
+            result.allan.push_back(allan::deviation(stream, lane, octaves, arcsec_per_count, study_.schedule.output_s));
         }
         std::sort(result.allan.begin(), result.allan.end(),
                   [](const allan::Point& a, const allan::Point& b) { return a.m < b.m; });
+        const std::int64_t samples_per_fit = study_.schedule.samples_per_fit * record_.interval();
         result.noise = noise::fit_noise(record_.phase(lane, arcsec_per_count),
-                                        study_.schedule.sample_interval_s * static_cast<double>(record_.interval()));
+                                        study_.schedule.sample_interval_s * static_cast<double>(samples_per_fit));
         result.rate_error_deg_h = rate_error_deg_h(angle_.turned(lane), study_.schedule, setup);
         result.angle_error_arcsec.reserve(angle_errors_counts_.size());
         for (std::size_t i = 0; i < angle_errors_counts_.size(); ++i) {
             result.angle_error_arcsec.push_back(angle_errors_counts_[i][lane] * arcsec_per_count -
-                                                setup.input_rate_deg_h * study_.schedule.cycle_s *
-                                                    static_cast<double>(cycle_at(i)));
+                                                setup.input_rate_deg_h * study_.schedule.output_s *
+                                                    static_cast<double>(output_at(i)));
         }
         return result;
     }
@@ -197,13 +199,13 @@ class ArmStream {
     }
 
    private:
-    /// Cycle at which an angle is told; none of the record where it has none.
-    std::int64_t cycle_at(std::size_t i) const { return study_.angle_cycle(i).value_or(study_.schedule.cycles()); }
+    /// Output at which an angle is told; none of the record where it has none.
+    std::int64_t output_at(std::size_t i) const { return study_.angle_output(i).value_or(study_.schedule.outputs()); }
 
     /// Keeps angles at those times.
     void note_angles(std::span<const simd::LaneCounts> counts) {
         for (std::size_t i = 0; i < angle_errors_counts_.size(); ++i) {
-            const std::int64_t row = cycle_at(i) - cycle_;
+            const std::int64_t row = output_at(i) - output_;
             if (row < 0 || row >= static_cast<std::int64_t>(counts.size())) continue;
             angle_.turn_to(counts[static_cast<std::size_t>(row)]);
             for (std::size_t lane = 0; lane < gyros_; ++lane) {
@@ -229,7 +231,7 @@ class ArmStream {
     allan::OctaveStream octaves_;
     std::vector<allan::FactorStream> asked_;  ///< averaging times that are no octaves
     allan::BoundedRecord record_;
-    std::int64_t cycle_ = 0;
+    std::int64_t output_ = 0;
     AngleCounts angle_;
     SampledAngles waiting_;
     std::vector<std::array<WideCounts, simd::lanes>> waiting_rows_;
@@ -246,7 +248,7 @@ class BlockStatistics final : public ensemble::BlockSink {
         }
     }
 
-    void cycles(std::size_t arm, std::span<const simd::LaneCounts> counts) override { arms_[arm]->add(counts); }
+    void angles(std::size_t arm, std::span<const simd::LaneCounts> counts) override { arms_[arm]->add(counts); }
 
     void finish(const ensemble::BlockResult& result) override {
         FinishedBlock block{number_,

@@ -43,15 +43,15 @@ struct Study {
 
     scenario::Scenario scenario;
     ensemble::Schedule schedule;
-    /// Averaging factors of the Allan deviations in dither cycles: octaves, and those of output.tau_s and of the
-    /// specification; ascending.
+    /// Averaging factors of the Allan deviations in outputs of the schedule: octaves, and those of output.tau_s and of
+    /// the specification; ascending.
     std::vector<std::int64_t> factors;
     /// Times since the start of the record at which angle errors are told: dither::spread_times_s, then those asked
     /// for, then that of the specification.
     std::vector<double> angle_times_s;
-    /// Cycle at which the angle of such a time is told: the nearest one. A record of whole samples may end up to a
+    /// Output at which the angle of such a time is told: the nearest one. A record of whole samples may end up to a
     /// sample before the duration asked for; a time beyond its end by no more is told at its end. Absent beyond that.
-    std::optional<std::int64_t> angle_cycle(std::size_t time) const;
+    std::optional<std::int64_t> angle_output(std::size_t time) const;
     std::vector<gyro::Setup> gyros;  ///< parameters as drawn
     std::vector<ArmStatistics> arms;
     std::optional<dither::NoiseEffectiveness> predicted_noise;  ///< of the arm `noise_injected`, by predict_noise()
@@ -132,8 +132,8 @@ struct Stretch {
 };
 
 /// Runs a study that is planned only, and returns it with its results. Statistics are taken while it runs: Allan
-/// deviations from every cycle of the dither, noise coefficients from at most `fit_samples` of the samples; nothing
-/// grows with the simulated time but the number of octaves. Throws RunError, Interrupted.
+/// deviations from every output, noise coefficients from at most `fit_samples` of the samples; nothing grows with the
+/// simulated time but the number of octaves. Throws RunError, Interrupted.
 Study run(Study study, int threads, const OnSamples& on_samples = nullptr, const ensemble::Monitor& monitor = {});
 
 /// Simulates some gyros of several studies side by side: a gyro is to the bit what it is in any other company. The

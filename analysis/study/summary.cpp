@@ -6,6 +6,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 
 #include "analysis/noise/ensemble.hpp"
@@ -13,6 +14,7 @@
 #include "engine/ensemble/draw.hpp"
 #include "engine/gyro/theory.hpp"
 #include "engine/scenario/active_effects.hpp"
+#include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::study {
 
@@ -21,22 +23,34 @@ namespace {
 constexpr double median_level = 0.95;
 constexpr double confidence = 0.682689492137;
 
+/// Share of N^2/tau of a white rate that the Allan variance of the outputs shows at least.
+///
+/// At turns half a kick is still to come: the difference of two intervals of m cycles has 2 (2 m - 1) whole kicks, a
+/// half at either end and none between, not 4 m. A reader's filter of length L = 2 delay blurs both ends of the two
+/// intervals and the middle between them: of their 2 tau that is the variance of L/2 at either end and of L in the
+/// middle, at most.
+double share_seen(const Study& study, const allan::Point& point) {
+    if (!scenario::reads_arms(study.scenario)) return 1.0 - 0.375 / static_cast<double>(point.m);
+    return 1.0 - 2.0 * study.schedule.delay_s / point.tau_s;
+}
+
 /// 95 % limit of an angle random walk [deg/sqrt(h)] that a record does not show.
 ///
 /// The fit gives one; where it cannot (a record too short or without noise), any term is at most the whole Allan
-/// deviation, and the smallest upper chi-squared limit of these holds: N^2/tau <= sigma^2(tau)/(1 - 3/(8 m)). Angles
-/// are read at turns, where half a kick is still to come: the difference of two intervals of m cycles has 2 (2 m - 1)
-/// whole kicks, a half at either end and none between, not 4 m.
-double upper_limit(const GyroStatistics& gyro) {
+/// deviation, and the smallest upper chi-squared limit of these holds: N^2/tau <= sigma^2(tau)/share_seen().
+double upper_limit(const Study& study, const GyroStatistics& gyro) {
     if (gyro.noise.arw_deg_rt_h.hi) return *gyro.noise.arw_deg_rt_h.hi;
-    const auto known = [](const allan::Point& point) { return point.edf > 0.0; };
+    constexpr double least_seen = 0.5;
+    const auto known = [&](const allan::Point& point) {
+        return point.edf > 0.0 && share_seen(study, point) >= least_seen;
+    };
     // The least of several limits is one only where each holds with as much less doubt.
     const auto several = std::count_if(gyro.allan.begin(), gyro.allan.end(), known);
     const double doubt = 0.05 / static_cast<double>(std::max<std::int64_t>(several, 1));
     double limit = std::numeric_limits<double>::infinity();
     for (const allan::Point& point : gyro.allan) {
         if (!known(point)) continue;
-        const double seen = 1.0 - 0.375 / static_cast<double>(point.m);
+        const double seen = share_seen(study, point);
         const double hi =
             point.dev * std::sqrt(point.edf / quantile(boost::math::chi_squared(point.edf), doubt) / seen);
         limit = std::min(limit, hi * std::sqrt(point.tau_s) * units::deg_rt_h_per_arcsec_rt_s);
@@ -99,7 +113,7 @@ Models models_of(const ArmStatistics& arm) {
 
 /// Angle random walk is the ensemble's where all records together resolve it: gyros of an arm are alike, and a record
 /// too short to tell white noise from flicker by itself is not alone.
-Figure angle_random_walk(const ArmStatistics& arm, std::uint64_t seed) {
+Figure angle_random_walk(const Study& study, const ArmStatistics& arm, std::uint64_t seed) {
     Figure result;
     double evidence = 0.0;
     std::int64_t described = 0;
@@ -112,7 +126,7 @@ Figure angle_random_walk(const ArmStatistics& arm, std::uint64_t seed) {
         describe(result, random_walks_deg_rt_h(arm), seed);
     } else {
         std::vector<double> limits;
-        for (const GyroStatistics& gyro : arm.gyros) limits.push_back(upper_limit(gyro));
+        for (const GyroStatistics& gyro : arm.gyros) limits.push_back(upper_limit(study, gyro));
         result.hi = noise::quantile(limits, 0.5);
     }
     return result;
@@ -131,17 +145,28 @@ std::vector<EnsemblePoint> ensemble_allan(const ArmStatistics& arm) {
     return ensemble_points(curves);
 }
 
+/// More than the output of a locked gyro moves over a record [arcsec]: a fringe, and through a reader what that leaves
+/// of the dither, and six standard deviations of its reference's noise.
+double still_arcsec(const scenario::Scenario& s) {
+    if (!scenario::reads_arms(s)) return s.gyro.scale_factor_arcsec;
+    constexpr double sigmas_of_difference = 6.0 * std::numbers::sqrt2;
+    const double dither_arcsec =
+        s.dither.peak_rate_deg_s * units::arcsec_per_deg / (units::two_pi * s.dither.frequency_hz);
+    return s.gyro.scale_factor_arcsec + 2.0 * dither_arcsec * scenario::reader_residue_relative(s) +
+           sigmas_of_difference * s.reader.reference_noise_arcsec;
+}
+
 std::vector<SweepPoint> sweep(const Study& study, const ArmStatistics& arm) {
     std::vector<SweepPoint> points;
     if (study.scenario.input.sweep_points == 1) return points;
     const double duration_s = study.schedule.sample_interval_s * static_cast<double>(study.schedule.samples - 1);
-    const double fringe_rate_deg_h = study.scenario.gyro.scale_factor_arcsec / duration_s;
+    const double locked_below_deg_h = still_arcsec(study.scenario) / duration_s;
     const auto members = static_cast<std::size_t>(study.scenario.ensemble.gyros);
     for (std::size_t first = 0; first < arm.gyros.size(); first += members) {
         SweepPoint point;
         point.input_rate_deg_h = ensemble::input_rate_deg_h(study.scenario, static_cast<std::int64_t>(first));
         point.gyros = study.scenario.ensemble.gyros;
-        point.can_tell = std::abs(point.input_rate_deg_h) > fringe_rate_deg_h;
+        point.can_tell = std::abs(point.input_rate_deg_h) > locked_below_deg_h;
         std::vector<double> rates;
         std::vector<double> closed_form;
         for (std::size_t i = first; i < first + members; ++i) {
@@ -149,7 +174,7 @@ std::vector<SweepPoint> sweep(const Study& study, const ArmStatistics& arm) {
                 closed_form.push_back(point.input_rate_deg_h + *error);
             }
             rates.push_back(point.input_rate_deg_h + arm.gyros[i].rate_error_deg_h);
-            if (std::abs(rates.back()) < fringe_rate_deg_h) ++point.locked;
+            if (std::abs(rates.back()) < locked_below_deg_h) ++point.locked;
         }
         point.output_rate_deg_h = mean_figure(rates);
         if (closed_form.size() == members) point.closed_form_rate_deg_h = mean_figure(closed_form).mean;
@@ -234,7 +259,7 @@ void describe_random_walk(ArmSummary& out, const Study& study, const ArmStatisti
         if (!arm.arm.ideal) out.arw_reason += " (dead band and staircase are no noise)";
         return;
     }
-    out.arw_deg_rt_h = angle_random_walk(arm, seed);
+    out.arw_deg_rt_h = angle_random_walk(study, arm, seed);
     if (!out.arw_deg_rt_h.median) out.arw_reason = "its records show no white rate noise";
 }
 

@@ -42,8 +42,9 @@ struct EnsemblePoint {
 struct SweepPoint {
     double input_rate_deg_h = 0.0;
     MeanFigure output_rate_deg_h;
-    std::int64_t locked = 0;  ///< gyros whose output moved by less than a fringe over the whole record
-    bool can_tell = true;     ///< the input moves by more than a fringe, so that locked and free differ
+    /// Gyros whose output moved over the whole record by less than a fringe and what a reader leaves of the dither.
+    std::int64_t locked = 0;
+    bool can_tell = true;  ///< the input moves by more than that, so that locked and free differ
     std::int64_t gyros = 0;
     /// Mean output rate over infinite time and the gyros, without simulation; see has_closed_form().
     std::optional<double> closed_form_rate_deg_h;

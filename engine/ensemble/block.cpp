@@ -25,6 +25,7 @@
 #include "engine/readout/lane_readout.hpp"
 #include "engine/readout/missed_counts.hpp"
 #include "engine/scenario/injected_noise.hpp"
+#include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::ensemble {
 
@@ -54,8 +55,7 @@ double wander_margin_rad(const scenario::Scenario& scenario) {
     constexpr double sigmas = 6.0;
     const double largest = gyro::Device(nominal_setup(scenario)).dither_amplitude_rad *
                            (1.0 + sigmas * scenario.ensemble.dither_amplitude_sd_relative);
-    return largest * scenario::amplitude_change_relative(scenario.dither,
-                                                         scenario.ensemble.settle_s + scenario.ensemble.duration_s);
+    return largest * scenario::amplitude_change_relative(scenario.dither, scenario::simulated_s(scenario));
 }
 
 /// How far noise, drift and wander take the amplitude of a half cycle from the device's.
@@ -238,7 +238,7 @@ class Branch {
                         const random::LaneIdentities& who, const readout::Electronics& electronics,
                         const ReaderPlan& plan) {
         const reader::Settings& settings = scenario.reader;
-        latch_.emplace(devices_, reader::Reader::latch_hz(settings, plan.output_hz), plan.first_turn);
+        latch_.emplace(devices_, reader::latch_hz(settings, plan.output_hz), plan.first_turn);
         turns_.middles = true;
         for (Listener& listener : listeners_) {
             listener.errors.middles = true;

@@ -14,9 +14,8 @@ std::int64_t total_gyros(const scenario::Scenario& scenario) {
 double input_rate_deg_h(const scenario::Scenario& scenario, std::int64_t gyro) {
     if (scenario::has_profile(scenario.input)) {
         const Schedule schedule(scenario);
-        const double start_s = static_cast<double>(schedule.settle_cycles) * schedule.cycle_s;
         const double duration_s = static_cast<double>(schedule.samples - 1) * schedule.sample_interval_s;
-        return scenario::profile_angle_arcsec(scenario.input, start_s, duration_s) / duration_s;
+        return scenario::profile_angle_arcsec(scenario.input, schedule.start_s, duration_s) / duration_s;
     }
     return scenario::input_rate_deg_h(scenario.input, gyro / scenario.ensemble.gyros);
 }

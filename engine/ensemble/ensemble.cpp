@@ -20,7 +20,9 @@
 #include "engine/ensemble/arena.hpp"
 #include "engine/ensemble/block.hpp"
 #include "engine/ensemble/draw.hpp"
+#include "engine/ensemble/read_outputs.hpp"
 #include "engine/ensemble/trajectory_kind.hpp"
+#include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::ensemble {
 
@@ -139,7 +141,13 @@ class BlockProgress {
 void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first,
               std::size_t gyros, BlockSink& sink, BlockProgress& progress) {
     const Schedule schedule(scenario);
-    GyroBlock block = follow([&] { return GyroBlock(scenario, arms, first, gyros); });
+    std::optional<ReaderPlan> plan;
+    std::optional<ReadOutputs> read;
+    if (scenario::reads_arms(scenario)) {
+        plan = {scenario.reader.output_hz, schedule.settle_turns()};
+        read.emplace(schedule, arms.size(), gyros);
+    }
+    GyroBlock block = follow([&] { return GyroBlock(scenario, arms, first, gyros, Detail::output, plan); });
     const std::int64_t counted = static_cast<std::int64_t>(gyros) * block.trajectories();
     progress.enter(BlockStage::turns);
     std::int64_t tables = 0;
@@ -148,10 +156,18 @@ void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm>
         const bool settling = turn < schedule.settle_turns();
         const auto turns = static_cast<std::size_t>(schedule.piece_end(turn) - turn);
         follow([&] { block.advance(turns); });
-        for (std::size_t arm = 0; arm < arms.size() && !settling; ++arm) sink.cycles(arm, block.counts(arm));
+        if (read) read->take(block);
+        for (std::size_t arm = 0; arm < arms.size() && !settling; ++arm) {
+            sink.angles(arm, read ? read->rows(arm) : block.counts(arm));
+        }
         turn += static_cast<std::int64_t>(turns);
         progress.advance(0, static_cast<std::int64_t>(turns) * counted, block.tables_made() > tables);
         tables = block.tables_made();
+    }
+    if (read && !read->complete()) {
+        throw TrajectoryFailure{
+            "the turns of its dither come more than a cycle early, so that its reader has put out "
+            "too little; inject less noise"};
     }
     progress.enter(BlockStage::output);
     sink.finish({first, block.setups(), counted * schedule.turns(), block.tables_remade(),

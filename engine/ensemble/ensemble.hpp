@@ -32,9 +32,9 @@ struct BlockResult {
 class BlockSink {
    public:
     virtual ~BlockSink() = default;
-    /// Angle output of an arm at the next minima of the dither, one a cycle from the first turn on: [minimum][gyro] in
-    /// counts of 1/counts_per_fringe fringes that wrap round (output_counts.hpp).
-    virtual void cycles(std::size_t arm, std::span<const simd::LaneCounts> counts) = 0;
+    /// The next outputs of an arm (schedule.hpp), from the first of the record on: [output][gyro] in counts of
+    /// 1/counts_per_fringe fringes that wrap round (output_counts.hpp).
+    virtual void angles(std::size_t arm, std::span<const simd::LaneCounts> counts) = 0;
     /// The block is done.
     virtual void finish(const BlockResult& result) = 0;
 };

@@ -1,5 +1,8 @@
 #include "engine/ensemble/output_counts.hpp"
 
+#include <cmath>
+#include <cstdint>
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "engine/ensemble/output_counts.cpp"
 #include "engine/simd/targets.hpp"
@@ -46,6 +49,15 @@ void output_counts(const readout::LaneAngles& angles, const compensate::LaneErro
                    std::vector<simd::LaneCounts>& counts, std::size_t stride) {
     counts.resize((turns + stride - 1) / stride);
     HWY_DYNAMIC_DISPATCH(count)(angles, errors, turns, stride, counts);
+}
+
+std::int64_t counts_of(double fringes) {
+    // Whole fringes apart, so that many of them wrap round and do not overflow.
+    const double whole = std::nearbyint(fringes);
+    const auto coarse =
+        static_cast<std::uint64_t>(static_cast<std::int64_t>(whole)) * static_cast<std::uint64_t>(counts_per_fringe);
+    const auto fine = static_cast<std::uint64_t>(std::llround((fringes - whole) * counts_per_fringe));
+    return static_cast<std::int64_t>(coarse + fine);
 }
 
 }  // namespace ringlock::ensemble

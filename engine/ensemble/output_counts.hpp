@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <vector>
 
 #include "engine/compensate/lane_compensator.hpp"
@@ -17,5 +18,8 @@ inline constexpr double counts_per_fringe = 4294967296.0;
 /// \param stride  turns from an output to the next: 1 gives the maxima, too
 void output_counts(const readout::LaneAngles& angles, const compensate::LaneErrors* errors, std::size_t turns,
                    std::vector<simd::LaneCounts>& counts, std::size_t stride = 2);
+
+/// An angle in those counts.
+std::int64_t counts_of(double fringes);
 
 }  // namespace ringlock::ensemble

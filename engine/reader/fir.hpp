@@ -15,14 +15,18 @@ class Fir final : public Stripper {
     void take(const Latched& latched) override { take_angle(latched.angle_arcsec); }
     void take_angle(double angle_arcsec);
     double angle_arcsec() const override;
-    double delay_s() const override { return 0.5 * static_cast<double>(taps_.size() - 1) / latch_hz_; }
+    double delay_s() const override { return 0.5 * static_cast<double>(order_) / latch_hz_; }
     double residue_relative() const override;
-    double warm_up_s() const override { return static_cast<double>(taps_.size()) / latch_hz_; }
+    double warm_up_s() const override { return static_cast<double>(order_ + 1) / latch_hz_; }
 
    private:
+    std::vector<double> make_taps() const;
+
+    std::size_t order_;
+    double cutoff_hz_;
     double latch_hz_;
     double dither_hz_;
-    std::vector<double> taps_;
+    std::vector<double> taps_;    ///< made with the first angle: many filters are only asked for their delay
     std::vector<double> angles_;  ///< the last ones, oldest at next_
     std::size_t next_ = 0;
 };

@@ -110,8 +110,6 @@ void Reader::read(std::span<const Instant> instants, std::span<const double> cor
     if (!count_errors.empty()) last_count_error_ = count_errors.back();
 }
 
-std::int64_t Reader::warm_up_outputs() const {
-    return static_cast<std::int64_t>(std::ceil(stripper_->warm_up_s() * output_hz_));
-}
+std::int64_t Reader::warm_up_outputs() const { return reader::warm_up_outputs(*stripper_, output_hz_); }
 
 }  // namespace ringlock::reader

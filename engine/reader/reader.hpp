@@ -28,10 +28,6 @@ class Reader {
     /// `output_hz`: the latching rate is a whole multiple of it.
     Reader(const Settings& settings, double output_hz, const Source& source);
 
-    static double latch_hz(const Settings& settings, double output_hz) {
-        return settings.latch_hz > 0.0 ? settings.latch_hz : output_hz;
-    }
-
     /// The instants of a piece. `correction_fringes`: for the half cycle that ends at each turn of the piece, the
     /// lock-in error that a compensator takes away there; none where it is empty. `count_errors`: counts of the up/down
     /// counter less the true ones at these turns, in quarter fringes; none where it is empty.

@@ -41,4 +41,9 @@ struct Settings {
     bool operator==(const Settings&) const = default;
 };
 
+/// Rate of the ticks of a reader that puts out angles at `output_hz`.
+inline double latch_hz(const Settings& settings, double output_hz) {
+    return settings.latch_hz > 0.0 ? settings.latch_hz : output_hz;
+}
+
 }  // namespace ringlock::reader

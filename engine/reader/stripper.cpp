@@ -1,5 +1,6 @@
 #include "engine/reader/stripper.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/reader/no_stripping.hpp"
@@ -33,6 +34,11 @@ std::unique_ptr<Stripper> make_stripper(const Settings& settings, double latch_h
             return std::make_unique<ReferenceFir>(Reference(settings, latch_hz, dither_hz), fir());
     }
     return std::make_unique<NoStripping>();
+}
+
+std::int64_t warm_up_outputs(const Stripper& stripper, double output_hz) {
+    constexpr double most = 1e15;
+    return static_cast<std::int64_t>(std::min(most, std::ceil(stripper.warm_up_s() * output_hz)));
 }
 
 }  // namespace ringlock::reader

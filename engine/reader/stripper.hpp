@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <memory>
 
 #include "engine/reader/settings.hpp"
@@ -37,5 +38,8 @@ class Stripper {
 
 /// The stripper that the settings ask for. `latch_hz`: of the ticks; `dither_hz`: of the dither's drive.
 std::unique_ptr<Stripper> make_stripper(const Settings& settings, double latch_hz, double dither_hz);
+
+/// Outputs at that rate, from tick 0 on, that are not fit for use; 1e15 where there are more.
+std::int64_t warm_up_outputs(const Stripper& stripper, double output_hz);
 
 }  // namespace ringlock::reader

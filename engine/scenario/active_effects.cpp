@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/core/units.hpp"
+#include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::scenario {
 
@@ -80,7 +81,7 @@ effects::Exposure exposure(const Scenario& scenario) {
     const double ramp_k_per_h = std::abs(environment.temperature_ramp_k_per_h);
     const auto [lowest, highest] = input_range(scenario.input);
     effects::Exposure exposure;
-    exposure.duration_h = (scenario.ensemble.settle_s + scenario.ensemble.duration_s) / 3600.0;
+    exposure.duration_h = simulated_s(scenario) / 3600.0;
     exposure.temperature_change_k =
         ramp_k_per_h * exposure.duration_h + environment.temperature_swing_k + largest_change_k(environment);
     exposure.temperature_slope_k_per_h =

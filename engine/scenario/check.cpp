@@ -11,8 +11,8 @@ namespace ringlock::scenario {
 namespace {
 
 /// Complaints, and the rules in docs/scenario.md, come in this order.
-constexpr std::array groups_of_rules = {rate_rules,   run_rules,     turn_map_rules, noise_rules,
-                                        lockin_rules, readout_rules, output_rules,   record_rules};
+constexpr std::array groups_of_rules = {rate_rules,    run_rules,    turn_map_rules, noise_rules, lockin_rules,
+                                        readout_rules, output_rules, record_rules,   reader_rules};
 
 }  // namespace
 

@@ -11,6 +11,7 @@
 #include "engine/gyro/fast_motion.hpp"
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/injected_noise.hpp"
+#include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::scenario {
 
@@ -300,8 +301,7 @@ bool all_tables(const Scenario& s, Allows&& allows) {
     const double told_width = 0.01 * std::max(std::abs(lowest), std::abs(highest)) + 16.0 * s.gyro.scale_factor_arcsec;
     const double measured = varying_rate_deg_h(s) + 2.0 * told_width;
     const double told = (1.0 + s.calibration.threshold_error_relative) * 1.02;
-    const double wander_rad =
-        amplitude_rad * amplitude_change_relative(s.dither, s.ensemble.settle_s + s.ensemble.duration_s);
+    const double wander_rad = amplitude_rad * amplitude_change_relative(s.dither, simulated_s(s));
     for (const bool noisy : {false, true}) {
         if (!driven[noisy] && !inverted[noisy]) continue;
         const InjectedNoise injected = noisy ? injected_noise(s) : InjectedNoise{};
@@ -328,7 +328,7 @@ double way_to_turns_rad(const Scenario& s) {
     const auto [lowest, highest] = input_range(s.input);
     const double varies = varying_rate_deg_h(s);
     const Room room{0.0, 0.0, lowest - varies, highest + varies, 0.0, tabulated_coupling(s), true};
-    const double left = 1.0 - amplitude_change_relative(s.dither, s.ensemble.settle_s + s.ensemble.duration_s);
+    const double left = 1.0 - amplitude_change_relative(s.dither, simulated_s(s));
     double longest = 0.0;
     for (const gyro::Setup& setup : worst_setups(s, room)) {
         gyro::Device device(setup);

@@ -130,7 +130,7 @@ struct Propagation {
 
 /// What the result file holds.
 struct Output {
-    double sample_interval_s = 1.0;          ///< of the decimated angle record; rounded to whole dither cycles
+    double sample_interval_s = 1.0;          ///< of the decimated angle record; rounded to whole outputs
     bool angle_record = true;                ///< store the record of every gyro and arm, not only its statistics
     std::vector<double> angle_after_s = {};  ///< times since the start of the record at which angle errors are told
     std::vector<double> tau_s = {};          ///< averaging times at which deviations are wanted beside those of octaves
@@ -161,6 +161,12 @@ struct RecordSettings {
     double rate_hz = 100.0;                        ///< of samples
     double temperature_interval_s = 1.0;           ///< between rows of the temperature, where it changes
     bool operator==(const RecordSettings&) const = default;
+};
+
+/// What latches the angle of a record of samples, and of the arms of a study where these are read.
+struct ReaderSettings : reader::Settings {
+    double output_hz = 0.0;  ///< at which the arms of a study are read; 0: they are not
+    bool operator==(const ReaderSettings&) const = default;
 };
 
 /// Effects beyond the base equation: effect name -> parameter -> value. Holds every effect of the registry with every
@@ -205,7 +211,7 @@ struct Scenario {
     Design design;  ///< empty: the scenario itself is the only point of the study
     Stop stop;      ///< where it asks(), it sets the number of gyros
     RecordSettings record;
-    reader::Settings reader;  ///< of records of samples
+    ReaderSettings reader;
     bool operator==(const Scenario&) const = default;
 };
 

@@ -242,7 +242,7 @@ void multiply_adds(int threads) {
 /// A whole study through the engine's schedule, output left aside.
 void ensemble_run(std::int64_t gyros, int threads) {
     struct Nothing final : ensemble::BlockSink {
-        void cycles(std::size_t, std::span<const simd::LaneCounts> counts) override { last = counts.back()[0]; }
+        void angles(std::size_t, std::span<const simd::LaneCounts> counts) override { last = counts.back()[0]; }
         void finish(const ensemble::BlockResult&) override {}
         std::int64_t last = 0;
     };

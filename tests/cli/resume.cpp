@@ -25,6 +25,7 @@ using nlohmann::json;
 using test::design;
 using test::growing;
 using test::Outcome;
+using test::read_by_readers;
 using test::statistics_only;
 using test::with_records;
 using testing::AllOf;
@@ -86,7 +87,7 @@ class Resumed : public test::ProgramTest {
 };
 
 TEST_F(Resumed, AKilledRunGoesOnToTheSameFile) {
-    for (const char* const scenario : {with_records, statistics_only, design, growing}) {
+    for (const char* const scenario : {with_records, statistics_only, read_by_readers, design, growing}) {
         SCOPED_TRACE(scenario);
         write_reference(scenario);
         ASSERT_TRUE(kill_when_something_is_kept(each_block_, "out.h5"));
@@ -208,7 +209,7 @@ TEST_F(Resumed, StatusTellsHowFarItIs) {
 
 TEST_F(Resumed, AnyNumberOfThreadsWritesTheSameFile) {
     if (!has_h5diff()) GTEST_SKIP() << "h5diff (hdf5-tools) is missing";
-    for (const char* const scenario : {with_records, design, growing}) {
+    for (const char* const scenario : {with_records, read_by_readers, design, growing}) {
         write_reference(scenario);
         for (const char* const threads : {"2", "8"}) {
             fs::remove(directory_ / "out.h5");
@@ -240,7 +241,7 @@ TEST_F(Resumed, AKillCostsNoMoreThanTheLastInterval) {
 
 TEST_F(Resumed, ShardsMakeTheSameFileInAnyOrder) {
     std::mt19937 random(5);
-    for (const char* const scenario : {with_records, design}) {
+    for (const char* const scenario : {with_records, read_by_readers, design}) {
         write_reference(scenario);
         const std::vector<int> counts = scenario == with_records ? std::vector{1, 3, 7, 16} : std::vector{3};
         for (const int count : counts) {

@@ -19,6 +19,26 @@ duration_s = 20.0
 angle_record = false
 )";
 
+/// Gyros whose arms are read, of a noisy drive: outputs of the gyros of a block do not come side by side.
+inline constexpr const char* read_by_readers = R"([ensemble]
+gyros = 60
+duration_s = 10.0
+settle_s = 0.5
+[noise_injection]
+model = "drive"
+[reader]
+output_hz = 50.0
+latch_hz = 250.0
+fraction = "detectors"
+stripping = "reference+fir"
+fir_order = 20
+reference_noise_arcsec = 0.05
+[output]
+sample_interval_s = 0.1
+[arms]
+names = ["ideal", "uncompensated", "noise_injected+compensated"]
+)";
+
 /// Points of unequal cost.
 inline constexpr const char* design = R"([ensemble]
 gyros = 20

@@ -204,7 +204,7 @@ TEST(Ensemble, TellsNoTurnTwiceWhereABlockBeginsAgain) {
     scenario.input.sweep_points = 3;
     scenario.effects["bias_step"] = {{"step_deg_h", 60.0}, {"time_s", 0.8}};
     struct Nothing final : ensemble::BlockSink {
-        void cycles(std::size_t /*arm*/, std::span<const simd::LaneCounts> /*counts*/) override {}
+        void angles(std::size_t /*arm*/, std::span<const simd::LaneCounts> /*counts*/) override {}
         void finish(const ensemble::BlockResult& /*result*/) override {}
     };
     const std::vector<scenario::Arm> arms{scenario::parse_arm("uncompensated")};
@@ -248,7 +248,7 @@ TEST(Ensemble, TellsNoTurnTwiceWhereABlockBeginsAgain) {
 
 TEST(Ensemble, TakesPointsInAnOrderInWhichAFewStandForAll) {
     struct Nothing final : ensemble::BlockSink {
-        void cycles(std::size_t /*arm*/, std::span<const simd::LaneCounts> /*counts*/) override {}
+        void angles(std::size_t /*arm*/, std::span<const simd::LaneCounts> /*counts*/) override {}
         void finish(const ensemble::BlockResult& /*result*/) override {}
     };
     auto scenario = quiet();
@@ -293,7 +293,7 @@ TEST(Ensemble, CountsTheTurnsOfTheLongestRun) {
 
 TEST(Ensemble, AFailureOfTheSinkIsTheRunsNotAGyros) {
     struct Full final : ensemble::BlockSink {
-        void cycles(std::size_t /*arm*/, std::span<const simd::LaneCounts> /*counts*/) override {
+        void angles(std::size_t /*arm*/, std::span<const simd::LaneCounts> /*counts*/) override {
             throw RunError("disk full");
         }
         void finish(const ensemble::BlockResult& /*result*/) override {}

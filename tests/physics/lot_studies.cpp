@@ -75,12 +75,12 @@ TEST(LotStudies, DeviationsStandAtTheTimesAskedFor) {
     const study::Summary summary = study::summarise(study);
     EXPECT_TRUE(std::is_sorted(study.factors.begin(), study.factors.end()));
     for (const double tau_s : scenario.output.tau_s) {
-        const std::int64_t m = ensemble::cycles_in(study.schedule, tau_s);
+        const std::int64_t m = ensemble::outputs_in(study.schedule, tau_s);
         const auto place = std::find(study.factors.begin(), study.factors.end(), m);
         ASSERT_NE(place, study.factors.end()) << tau_s;
         const auto at = static_cast<std::size_t>(place - study.factors.begin());
         const study::EnsemblePoint& point = summary.arms[0].allan[at];
-        EXPECT_NEAR(point.tau_s, tau_s, 0.5 * study.schedule.cycle_s);
+        EXPECT_NEAR(point.tau_s, tau_s, 0.5 * study.schedule.output_s);
         // White rate noise: the deviation goes as 1/sqrt(tau).
         const double expected = summary.theory.arw_deg_rt_h / std::sqrt(point.tau_s / 3600.0);
         EXPECT_NEAR(point.dev_deg_h / expected, 1.0, 4.0 / std::sqrt(2.0 * point.edf)) << tau_s;
@@ -107,7 +107,7 @@ TEST(LotStudies, YieldsCountTheRecordsWithinEveryLimit) {
         for (std::size_t g = 0; g < arm.gyros.size(); ++g) {
             const auto& gyro = arm.gyros[g];
             const auto at = std::find_if(gyro.allan.begin(), gyro.allan.end(), [&](const allan::Point& p) {
-                return p.m == ensemble::cycles_in(study.schedule, 20.0);
+                return p.m == ensemble::outputs_in(study.schedule, 20.0);
             });
             const bool passes[] = {walks[g] <= 0.00225, at->dev <= 0.03, std::abs(gyro.rate_error_deg_h) <= 0.01,
                                    std::abs(gyro.angle_error_arcsec.back()) <= 0.4};
@@ -213,7 +213,7 @@ TEST(LotStudies, EffectsFollowAProfileOfTheTemperature) {
     scenario.environment.profile_temperature_k = {293.0, 297.0, 291.0};
     const study::Study study = simulated(scenario);
     // The mean of the change over [0, 40, 80, end]: 2 K, then 1 K, then -2 K.
-    const double end_s = study.schedule.cycle_s * static_cast<double>(study.schedule.cycles() - 1);
+    const double end_s = study.schedule.output_s * static_cast<double>(study.schedule.outputs() - 1);
     const double mean_k = (40.0 * 2.0 + 40.0 * 1.0 - (end_s - 80.0) * 2.0) / end_s;
     // Readings of the angle by interpolated detectors are wrong by a small part of a fringe at either end.
     const double reading_deg_h = 0.05 * scenario.gyro.scale_factor_arcsec / end_s;
@@ -268,10 +268,10 @@ TEST(LotStudies, AnAngleAtTheEndIsToldThoughTheRecordIsOfWholeSamples) {
     scenario.specification.angle_error_arcsec = 1e6;
     scenario.specification.after_s = 60.0;
     const study::Study study = simulated(scenario);
-    ASSERT_LT(study.schedule.cycle_s * static_cast<double>(study.schedule.cycles() - 1), 60.0);
+    ASSERT_LT(study.schedule.output_s * static_cast<double>(study.schedule.outputs() - 1), 60.0);
     ASSERT_EQ(study.angle_times_s.size(), 5U);
-    EXPECT_FALSE(study.angle_cycle(2)) << "100 s";
-    EXPECT_EQ(study.angle_cycle(3), study.schedule.cycles() - 1);
+    EXPECT_FALSE(study.angle_output(2)) << "100 s";
+    EXPECT_EQ(study.angle_output(3), study.schedule.outputs() - 1);
     for (const study::GyroStatistics& gyro : study.arms[0].gyros) {
         EXPECT_TRUE(std::isnan(gyro.angle_error_arcsec[2]));
         EXPECT_TRUE(std::isfinite(gyro.angle_error_arcsec[3]));

@@ -23,6 +23,7 @@
 #include "engine/scenario/devices.hpp"
 #include "engine/scenario/keys/schema.hpp"
 #include "engine/scenario/parse.hpp"
+#include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::test {
 namespace {
@@ -68,6 +69,7 @@ class Corners {
             if (section.name == "ensemble" || section.name == "output" || section.name == "input") continue;
             if (section.name.starts_with("effects.") || section.name.starts_with("design")) continue;
             for (const Key& key : section.keys) {
+                if (key.path() == "reader.output_hz") continue;  // by the length of the run, below
                 if (key.type != Type::arms && chance(density)) set(key, value(key));
             }
         }
@@ -82,6 +84,7 @@ class Corners {
         }
         draw_length();
         std::shuffle(settings.begin(), settings.end(), engine_);
+        draw_outputs();
     }
 
     void shuffle() { std::shuffle(settings.begin(), settings.end(), engine_); }
@@ -278,6 +281,16 @@ class Corners {
         set("output", "sample_interval_s", std::max(1.001 * cycle_s, duration_s / log_uniform(3.0, 50.0)));
     }
 
+    /// Arms that are read: some outputs a dither cycle, or one in some cycles, and ticks that fit them more often than
+    /// not. Last, so that the rest of the scenario is what it is without.
+    void draw_outputs() {
+        if (!chance(0.2)) return;
+        const double output_hz = log_uniform(0.05, 5.0) * now("dither", "frequency_hz");
+        set("reader", "output_hz", output_hz);
+        if (chance(0.7)) set("reader", "latch_hz", static_cast<double>(below(20)) * output_hz);
+        if (chance(0.7)) set(key("reader", "stripping"), value(key("reader", "stripping")));
+    }
+
     std::mt19937_64 engine_;
 };
 
@@ -288,8 +301,13 @@ double fringes_one_by_one(const Scenario& s) {
     const double fringes = 2.0 * s.dither.peak_rate_deg_s * units::deg_h_per_deg_s /
                            (s.gyro.scale_factor_arcsec * units::two_pi * s.dither.frequency_hz);
     const auto gyros = static_cast<double>(s.ensemble.gyros * s.input.sweep_points);
-    const double half_cycles = 2.0 * s.dither.frequency_hz * (s.ensemble.settle_s + s.ensemble.duration_s) * gyros;
-    double all = 0.0;
+    const double simulated_s = scenario::simulated_s(s) * gyros;
+    const double half_cycles = 2.0 * s.dither.frequency_hz * simulated_s;
+    // A tick takes as long as some fringes do, and a tap of a filter at each output a thousandth of one.
+    const scenario::StudyReader reader = scenario::study_reader(s);
+    const double taps = 2.0 * reader.delay_s * reader.latch_hz;
+    double all =
+        (4.0 * reader.latch_hz + 1e-3 * taps * s.reader.output_hz) * simulated_s * static_cast<double>(s.arms.size());
     const scenario::NoiseInjection& noise = s.noise_injection;
     if (noise.model == scenario::NoiseModel::drive) {
         if (noise.form == gyro::NoiseForm::white) all += 60.0 * noise.resonator_q;
@@ -314,7 +332,9 @@ double largest_error_arcsec(const Scenario& s, double duration_s, double turns) 
         rate += bounds.certain.rate_deg_h + 10.0 * bounds.rate_sd_deg_h;
     }
     const double swings = 6.0 * s.dither.peak_rate_deg_s * units::arcsec_per_deg / s.dither.frequency_hz;
-    return rate * (duration_s + 1.0 / s.dither.frequency_hz) + angle + 1e-3 * swings;
+    // A reader leaves as much as all of the dither, and adds its reference's noise, at both ends of a record.
+    const double of_reader = scenario::reads_arms(s) ? swings + 20.0 * s.reader.reference_noise_arcsec : 0.0;
+    return rate * (duration_s + 1.0 / s.dither.frequency_hz) + angle + 1e-3 * swings + of_reader;
 }
 
 /// The angles of the block's first piece are numbers.

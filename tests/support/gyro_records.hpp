@@ -41,7 +41,7 @@ class GyroRecords {
     struct Sink final : ensemble::BlockSink {
         Sink(GyroRecords& owner, std::int64_t first_gyro, std::size_t count)
             : to(owner), first(static_cast<std::size_t>(first_gyro)), gyros(count) {}
-        void cycles(std::size_t arm, std::span<const simd::LaneCounts> counts) override {
+        void angles(std::size_t arm, std::span<const simd::LaneCounts> counts) override {
             for (const simd::LaneCounts& row : counts) {
                 for (std::size_t lane = 0; lane < gyros; ++lane) {
                     to.records_[first + lane].counts[arm].push_back(row[lane]);

@@ -110,5 +110,22 @@ TEST(OutputCounts, WrapRoundAndKeepDifferences) {
     }
 }
 
+TEST(OutputCounts, OfOneAngleAreThoseOfTheAngleToHalfACount) {
+    std::mt19937_64 engine(702);
+    std::uniform_real_distribution<double> fringes(-2.1e9, 2.1e9);
+    for (int i = 0; i < 1000; ++i) {
+        const double angle = fringes(engine);
+        const long double exact = static_cast<long double>(angle) * ensemble::counts_per_fringe;
+        EXPECT_LE(std::abs(static_cast<long double>(ensemble::counts_of(angle)) - exact), 0.5L) << angle;
+    }
+    // They wrap round, and differences hold.
+    const double before = 2147483647.75;
+    const double after = 2147483649.5;
+    const auto difference = static_cast<std::uint64_t>(ensemble::counts_of(after)) -
+                            static_cast<std::uint64_t>(ensemble::counts_of(before));
+    EXPECT_LT(ensemble::counts_of(after), 0);
+    EXPECT_EQ(static_cast<double>(difference), 1.75 * ensemble::counts_per_fringe);
+}
+
 }  // namespace
 }  // namespace ringlock::test

@@ -92,7 +92,7 @@ TEST_F(ResultFile, DeviationsOfSamplesAtEveryCycleAreThoseOfTheRun) {
     write(path_, scenario);
     const Experiment experiment = read_result(path_);
     const Study& study = experiment.points.front();
-    ASSERT_EQ(study.schedule.cycles_per_sample, 1);
+    ASSERT_EQ(study.schedule.outputs_per_sample, 1);
     const Summary summary = summarise(study);
     const auto family = family_deviations(path_, experiment, 0, oadev, study.factors);
     for (std::size_t a = 0; a < family.size(); ++a) {

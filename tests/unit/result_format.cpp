@@ -47,6 +47,14 @@ constexpr const char* the_page = RINGLOCK_SOURCE_DIR "/results/FORMAT.md";
 constexpr const char* of_results = "The result file of `ringlock run`";
 constexpr const char* of_replays = "The file of `ringlock replay`";
 
+/// The page of results, for those arms; what only studies have whose arms are read is left out.
+Entries page_of_results(const std::vector<std::string>& arms) {
+    Entries entries = page(the_page, arms, of_results);
+    const auto erased = std::erase_if(entries, [](const auto& entry) { return entry.first.starts_with("/reader"); });
+    EXPECT_EQ(erased, 14U);
+    return entries;
+}
+
 std::vector<std::string> names_of(const std::vector<scenario::Arm>& arms) {
     std::vector<std::string> names;
     for (const scenario::Arm& arm : arms) names.push_back(arm.name);
@@ -61,7 +69,7 @@ TEST_F(ResultFile, HoldsWhatThePageSays) {
     write(path_, scenario);
     const Entries file = walk(path_, extents(Study(scenario)));
     EXPECT_GT(file.size(), 80U);
-    compare(page(the_page, names_of(scenario.arms), of_results), file);
+    compare(page_of_results(names_of(scenario.arms)), file);
     EXPECT_EQ(left(), std::set<std::string>{"out.h5"});
 }
 
@@ -69,7 +77,7 @@ TEST_F(ResultFile, HoldsNoAngleRecordWhereNoneIsWanted) {
     scenario::Scenario scenario = small(false);
     scenario.ensemble.gyros = 5;  // no number that stands for anything else
     write(path_, scenario);
-    Entries expected = page(the_page, names_of(scenario.arms), of_results);
+    Entries expected = page_of_results(names_of(scenario.arms));
     EXPECT_EQ(expected.erase("/arms/uncompensated/rate_error_closed_form_deg_h"), 1U) << "there is quantum noise";
     for (const scenario::Arm& arm : scenario.arms) EXPECT_EQ(expected.erase("/arms/" + arm.name + "/angle_arcsec"), 1U);
     // Neither `ideal` nor `noise_injected` is among the arms.
@@ -78,6 +86,67 @@ TEST_F(ResultFile, HoldsNoAngleRecordWhereNoneIsWanted) {
                entry.first.starts_with("/arms/noise_injected ");
     });
     compare(expected, walk(path_, extents(Study(scenario))));
+}
+
+/// Its arms are read.
+scenario::Scenario small_and_read() {
+    scenario::Scenario scenario = small(true);
+    scenario.reader.output_hz = 20.0;
+    scenario.reader.latch_hz = 100.0;
+    scenario.reader.stripping = reader::Stripping::reference_fir;
+    scenario.reader.fir_order = 20;
+    scenario.ensemble.gyros = 5;  // no number that stands for anything else
+    scenario.ensemble.duration_s = 42.0;
+    return scenario;
+}
+
+TEST_F(ResultFile, HoldsTheReaderThatThePageTells) {
+    const scenario::Scenario scenario = small_and_read();
+    write(path_, scenario);
+    Entries expected = page(the_page, names_of(scenario.arms), of_results);
+    std::erase_if(expected, [](const auto& entry) {
+        return !entry.first.starts_with("/reader") && !entry.first.starts_with("/arms/uncompensated/a");
+    });
+    EXPECT_EQ(expected.erase("/arms/uncompensated/arw_reason"), 0U);
+    const Entries file = walk(path_, extents(Study(scenario)));
+    for (const auto& [name, entry] : expected) {
+        ASSERT_TRUE(file.contains(name)) << name;
+        EXPECT_EQ(file.at(name), entry) << name;
+    }
+    const store::File result = store::File::open(path_);
+    const store::Group reader = result.group("reader");
+    EXPECT_EQ(reader.double_attribute("output_hz"), 20.0);
+    EXPECT_EQ(reader.string_attribute("stripping"), "reference+fir");
+    EXPECT_EQ(reader.int_attribute("fir_order"), 20);
+    EXPECT_DOUBLE_EQ(reader.double_attribute("delay_s"), 0.1);
+    EXPECT_EQ(reader.double_attribute("residue_relative"), 0.0);
+    EXPECT_DOUBLE_EQ(reader.double_attribute("warm_up_s"), 0.25);
+    // It is read like any other result, and sums up to the same.
+    const Summary summary = summarise(read_result(path_).points.front());
+    const Summary again = summarise(run(Study(scenario), 1));
+    ASSERT_EQ(summary.arms.size(), again.arms.size());
+    for (std::size_t i = 0; i < again.arms.size(); ++i) {
+        EXPECT_EQ(summary.arms[i].rate_error_deg_h.mean, again.arms[i].rate_error_deg_h.mean);
+        EXPECT_EQ(summary.arms[i].arw_deg_rt_h.median, again.arms[i].arw_deg_rt_h.median);
+        EXPECT_EQ(summary.arms[i].arw_deg_rt_h.hi, again.arms[i].arw_deg_rt_h.hi);
+        EXPECT_EQ(summary.arms[i].allan.front().tau_s, 0.05);
+    }
+}
+
+TEST_F(ResultFile, OfADesignHoldsTheReadersOfItsPoints) {
+    scenario::Scenario scenario = small_and_read();
+    scenario.output.angle_record = false;
+    scenario.design.kind = scenario::DesignKind::list;
+    scenario.design.vary = {{.key = "reader.output_hz", .values = {0.0, 20.0}}};
+    write(path_, scenario);
+    const store::File result = store::File::open(path_);
+    const store::Group reader = result.group("reader");
+    EXPECT_EQ(reader.dataset("output_hz").read<double>(), (std::vector<double>{0.0, 20.0}));
+    EXPECT_EQ(reader.dataset("output_hz").shape(), (store::Shape{2}));
+    EXPECT_EQ(reader.dataset("latch_hz").read<double>(), (std::vector<double>{100.0, 100.0}));
+    EXPECT_EQ(reader.dataset("warm_up_s").read<double>().front(), 0.0);
+    EXPECT_EQ(reader.dataset("stripping").read<std::string>().back(), "reference+fir");
+    EXPECT_EQ(read_result(path_).points[1].factors.size(), Experiment(scenario).points[1].factors.size());
 }
 
 /// The page's section on designs.
@@ -111,7 +180,7 @@ Entries page_of_design(const scenario::Scenario& scenario, const std::map<std::s
     const std::string section = section_on_designs();
     const auto says = [&](const char* text) { EXPECT_NE(section.find(text), std::string::npos) << text; };
     Entries out;
-    for (const auto& [name, entry] : page(the_page, names_of(scenario.arms), of_results)) {
+    for (const auto& [name, entry] : page_of_results(names_of(scenario.arms))) {
         const std::size_t at = name.find(" @");
         const std::string object = name.substr(0, at);
         const std::string attribute = at == std::string::npos ? "" : name.substr(at + 2);

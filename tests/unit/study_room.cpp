@@ -6,6 +6,7 @@
 #include "analysis/study/experiment.hpp"
 #include "analysis/study/result/result_file.hpp"
 #include "analysis/study/room.hpp"
+#include "engine/reader/latch.hpp"
 #include "engine/scenario/parse.hpp"
 
 namespace ringlock::study {
@@ -49,6 +50,16 @@ TEST(StudyRoom, TheMemoryHasRoomForTheResults) {
         const Experiment experiment = run(Experiment(scenario), 2);
         EXPECT_GE(expected_memory_bytes(scenario), bytes_of(experiment.points.front())) << text;
     }
+}
+
+TEST(StudyRoom, ReadersTakeRoom) {
+    const std::string text = "[ensemble]\ngyros = 32\nduration_s = 600\n[reader]\noutput_hz = 100\n";
+    const auto bytes = [&](const std::string& more) { return expected_memory_bytes(parsed(text + more), 2); };
+    // Instants of 64 cycles, of both trajectories of a block on each thread.
+    EXPECT_GT(bytes("latch_hz = 100000\n"), bytes("") + 2 * 2 * 16 * 51'000 * sizeof(reader::Instant));
+    // 10001 taps, and as many angles, of five arms and sixteen gyros.
+    const std::string filter = "latch_hz = 10000\nstripping = \"reference+fir\"\nfir_order = ";
+    EXPECT_GT(bytes(filter + "10000\n"), bytes(filter + "2\n") + 2 * 5 * 16 * 2 * 8 * 9'900);
 }
 
 TEST(StudyRoom, MillionsOfGyrosAndYearsAreEstimatedWithoutBeingTaken) {

@@ -253,7 +253,7 @@ class Filler {
             const bool of_reader = std::any_of(complaint.keys.begin(), complaint.keys.end(),
                                                [](const std::string& key) { return key.starts_with("reader."); });
             if (!of_reader) continue;
-            scenario().reader = plain_reader_;
+            static_cast<reader::Settings&>(scenario().reader) = plain_reader_;
             remark("reader.reference_noise_arcsec", plain_remark_);
             closed_.remarks.erase("reader.stripping");
             closed_.remarks.erase("reader.latch_hz");

@@ -247,7 +247,7 @@ ReplayWriter::ReplayWriter(const std::filesystem::path& path, const GyroOfResult
     root.set_attribute("point", static_cast<std::int64_t>(of.point) + 1);
     root.set_attribute("gyro", of.gyro);
     root.set_attribute("first_turn", range.first - schedule.settle_turns());
-    root.set_attribute("turns_per_sample", 2 * schedule.cycles_per_sample);
+    root.set_attribute("turns_per_sample", 2 * schedule.outputs_per_sample);
     root.set_attribute("scale_factor_arcsec", replay.setup().scale_factor_arcsec);
     root.write("scenario", std::vector<std::string>{scenario_text(of.experiment)},
                {"", "the full resolved scenario of the result, TOML"});

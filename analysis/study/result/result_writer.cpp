@@ -5,13 +5,17 @@
 #include <string>
 #include <system_error>
 #include <type_traits>
+#include <variant>
+#include <vector>
 
+#include "analysis/study/reader_facts.hpp"
 #include "analysis/study/result/columns.hpp"
 #include "analysis/study/result/result_file.hpp"
 #include "analysis/study/result/result_layout.hpp"
 #include "engine/core/error.hpp"
 #include "engine/scenario/keys/schema.hpp"
 #include "engine/scenario/parse.hpp"
+#include "engine/scenario/read_arms.hpp"
 #include "engine/scenario/render.hpp"
 
 namespace ringlock::study {
@@ -57,6 +61,12 @@ const char* compensator_name(scenario::Compensator compensator) {
             break;
     }
     return "none";
+}
+
+/// Whether the arms of any point are read by readers.
+bool any_is_read(const Experiment& experiment) {
+    return std::any_of(experiment.points.begin(), experiment.points.end(),
+                       [](const Study& point) { return scenario::reads_arms(point.scenario); });
 }
 
 /// FigureWriter of a study: attributes of a group. In a design each is a dataset with one value a point.
@@ -190,13 +200,15 @@ class ArmWriter {
         write("tau_s",
               over_points(layout::nan,
                           [&](std::size_t point, std::size_t tau) {
-                              return static_cast<double>(points[point].factors[tau]) * points[point].schedule.cycle_s;
+                              return static_cast<double>(points[point].factors[tau]) * points[point].schedule.output_s;
                           }),
               taus, {"s", "averaging times"});
         write("averaging_factor",
               over_points(std::int64_t{0},
                           [&](std::size_t point, std::size_t tau) { return points[point].factors[tau]; }),
-              taus, {"1", "averaging times in dither cycles"});
+              taus,
+              {"1", any_is_read(experiment_) ? "averaging times in outputs of the arms"
+                                             : "averaging times in dither cycles"});
         for (const auto& column : allan_columns) {
             write(column.name, over_taus(layout::nan, [&](const allan::Point& p) { return p.*column.field; }), all,
                   {column.unit, column.description});
@@ -330,6 +342,23 @@ void write_totals(store::File& root, const Experiment& experiment, const std::ve
                 [&](std::size_t p) { return experiment.points[p].schedule.sample_interval_s; });
     figures.set("theory_arw_deg_rt_h", "", [&](std::size_t p) { return summaries[p].theory.arw_deg_rt_h; });
     figures.set("theory_dead_band_deg_h", "", [&](std::size_t p) { return summaries[p].theory.dead_band_deg_h; });
+}
+
+/// The readers of the arms, where any point has them: attributes of a group, or in a design its datasets.
+void write_readers(store::File& root, const Experiment& experiment) {
+    if (!any_is_read(experiment)) return;
+    const auto& points = experiment.points;
+    store::Group group = root.create_group("reader");
+    FigureWriter figures(group, experiment.has_design() ? &group : nullptr, points.size());
+    std::vector<std::vector<ReaderFact>> facts;
+    for (const Study& point : points) facts.push_back(reader_facts(point.scenario));
+    for (std::size_t fact = 0; fact < facts.front().size(); ++fact) {
+        const auto set = [&]<class Value>(const Value&) {
+            figures.set(facts.front()[fact].name, "",
+                        [&](std::size_t point) { return std::get<Value>(facts[point][fact].value); });
+        };
+        std::visit(set, facts.front()[fact].value);
+    }
 }
 
 /// How the lot grew.
@@ -492,6 +521,7 @@ void ResultWriter::finish(const Experiment& experiment, const std::vector<Summar
     root.write("scenario", std::vector<std::string>{scenario::to_toml(experiment.scenario)},
                {"", "the full resolved scenario, TOML"});
     write_totals(root, experiment, summaries);
+    write_readers(root, experiment);
     if (experiment.growth) write_growth(root, *experiment.growth);
     write_pairs(root, experiment, summaries);
     store::write_provenance(root, provenance);

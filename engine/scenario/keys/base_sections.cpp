@@ -178,16 +178,16 @@ std::vector<Section> base_sections() {
         {"output",
          "What the result file holds.",
          {
-             key(RINGLOCK_KEY(output, sample_interval_s), above(0.0, 1e6, "it is rounded to whole dither cycles"),
-                 "Time between samples of the decimated angle."),
+             key(RINGLOCK_KEY(output, sample_interval_s), above(0.0, 1e6, "it is rounded to whole outputs"),
+                 "Time between samples of the decimated angle: whole dither cycles, or whole outputs of the reader."),
              key(RINGLOCK_KEY(output, angle_record), none,
                  "Store the angle record of every gyro and arm, not only its statistics."),
              key(RINGLOCK_KEY(output, angle_after_s), above(0.0, 1e9, "30 years"),
                  "Times since the start of the record at which the angle turned beyond the input's is told, beside 1, "
-                 "10 and 100 s; at the nearest whole number of dither cycles."),
+                 "10 and 100 s; at the nearest dither cycle or output of the reader."),
              key(RINGLOCK_KEY(output, tau_s), above(0.0, 1e9, "30 years"),
-                 "Averaging times at which Allan deviations are wanted beside those of octaves of the dither cycle; "
-                 "each is rounded to whole cycles."),
+                 "Averaging times at which Allan deviations are wanted beside those of octaves of the dither cycle, or "
+                 "of an output of the reader; each is rounded to whole ones."),
          }},
         {"specification",
          "What a gyro must meet over ensemble.duration_s to pass, in a sweep at every rate; 0 asks for nothing. Arms "
@@ -199,7 +199,8 @@ std::vector<Section> base_sections() {
              key(RINGLOCK_KEY(specification, bias_stability_deg_h), between(0.0, 1e6, "no gyro is worse"),
                  "Largest Allan deviation at the averaging time at_s."),
              key(RINGLOCK_KEY(specification, at_s), above(0.0, 1e9, "30 years"),
-                 "Averaging time of bias_stability_deg_h; it is rounded to whole dither cycles."),
+                 "Averaging time of bias_stability_deg_h; it is rounded to whole dither cycles or outputs of the "
+                 "reader."),
              key(RINGLOCK_KEY(specification, rate_error_deg_h), between(0.0, 1e6, "no gyro is worse"),
                  "Largest magnitude of the mean output rate less the input rate, over the whole record."),
              key(RINGLOCK_KEY(specification, scale_factor_error_ppm), between(0.0, 1e6, "all of the rate"),
@@ -223,12 +224,16 @@ std::vector<Section> base_sections() {
                  "Time between rows of the temperature, where that changes."),
          }},
         {"reader",
-         "What latches the angle for a record of samples and takes the dither out of it. Without this section the "
-         "phase is known exactly at every tick and the dither is subtracted without error (docs/reader.md).",
+         "What latches the angle for a record of samples, and for the arms of a study where output_hz asks for it, and "
+         "takes the dither out of it. Without this section the phase is known exactly at every tick and the dither is "
+         "subtracted without error (docs/reader.md).",
          {
+             key(RINGLOCK_KEY(reader, output_hz), zero_or(1e-3, 1e6, "faster than any output"),
+                 "Of `ringlock run`: rate at which every arm of every gyro is read, and of whose angles statistics are "
+                 "made. 0: the arms' angles at the turns of the dither, one a cycle, through no reader."),
              key(RINGLOCK_KEY(reader, latch_hz), zero_or(1e-3, 1e6, "faster than any counter is read"),
-                 "Rate of the clock that latches the count; a whole multiple of the rate of the samples, which are "
-                 "every so many ticks. 0: that rate."),
+                 "Rate of the clock that latches the count; a whole multiple of the rate of the samples or of "
+                 "output_hz, which are every so many ticks. 0: that rate."),
              key(RINGLOCK_KEY(reader, fraction), none,
                  "ideal: the phase itself; detectors: the counted quarter fringe and the quadrature detectors, with "
                  "their noise, ellipse and converter; none: whole quarter fringes."),

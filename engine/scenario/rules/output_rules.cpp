@@ -12,46 +12,65 @@
 
 #include "engine/core/units.hpp"
 #include "engine/scenario/active_effects.hpp"
+#include "engine/scenario/read_arms.hpp"
 #include "engine/scenario/rules/rules.hpp"
 
 namespace ringlock::scenario {
 namespace {
 
-Finding sample_holds_a_cycle(const Scenario& s) {
-    const double cycle = 1.0 / s.dither.frequency_hz;
-    if (s.output.sample_interval_s >= cycle) return {};
-    return Complaint{{"output.sample_interval_s", "dither.frequency_hz"},
-                     fmt::format("samples every {:g} s must be at least one dither cycle apart, {:.6g} s",
-                                 s.output.sample_interval_s, cycle)};
+/// What the statistics of a study take one by one.
+const char* output_name(const Scenario& s) { return reads_arms(s) ? "output of the reader" : "dither cycle"; }
+
+/// What sets the time from one to the next.
+std::string output_key(const Scenario& s) { return reads_arms(s) ? "reader.output_hz" : "dither.frequency_hz"; }
+
+Finding sample_holds_an_output(const Scenario& s) {
+    if (s.output.sample_interval_s >= 1.0 / outputs_hz(s)) return {};
+    return Complaint{{"output.sample_interval_s", output_key(s)},
+                     fmt::format("samples every {:g} s must be at least one {} apart, {:.6g} s",
+                                 s.output.sample_interval_s, output_name(s), 1.0 / outputs_hz(s))};
 }
 
+constexpr double fewest_samples = 3.0;
+
 Finding run_holds_samples(const Scenario& s) {
-    constexpr double fewest = 3.0;
-    if (s.ensemble.duration_s >= fewest * s.output.sample_interval_s) return {};
+    if (s.ensemble.duration_s >= fewest_samples * s.output.sample_interval_s) return {};
     return Complaint{
         {"ensemble.duration_s", "output.sample_interval_s"},
         fmt::format("a run of {:g} s must hold at least {:g} samples of {:g} s each (an Allan deviation needs "
                     "them)",
-                    s.ensemble.duration_s, fewest, s.output.sample_interval_s)};
+                    s.ensemble.duration_s, fewest_samples, s.output.sample_interval_s)};
 }
 
-/// Dither cycles of the longest averaging time: an Allan deviation needs two of it, and the record is of whole samples
-/// of whole cycles.
-double longest_average_cycles(const Scenario& s) {
-    const double frequency = s.dither.frequency_hz;
-    const double sample_cycles = std::max(1.0, std::round(s.output.sample_interval_s * frequency));
-    const double samples = std::floor(s.ensemble.duration_s * frequency / sample_cycles + 1e-9);
-    return std::floor(0.5 * samples * sample_cycles);
+Finding run_outlasts_the_reader(const Scenario& s) {
+    const double fit_s = least_fit_interval_s(s);
+    if (s.ensemble.duration_s >= fewest_samples * fit_s) return {};
+    return Complaint{
+        {"ensemble.duration_s", "reader.output_hz", "reader.fir_order", "reader.stripping"},
+        fmt::format("noise coefficients are fitted to samples no closer than a dither cycle and ten times the "
+                    "length of the reader's filter (docs/reader.md), here {:.4g} s, and a run of {:g} s does not hold "
+                    "{:g} of them; set a longer ensemble.duration_s or a shorter filter",
+                    fit_s, s.ensemble.duration_s, fewest_samples)};
+}
+
+/// Outputs of the longest averaging time: an Allan deviation needs two of it, and the record is of whole samples of
+/// whole outputs.
+double longest_average_outputs(const Scenario& s) {
+    const double rate_hz = outputs_hz(s);
+    const double sample_outputs = std::max(1.0, std::round(s.output.sample_interval_s * rate_hz));
+    const double samples = std::floor(s.ensemble.duration_s * rate_hz / sample_outputs + 1e-9);
+    return std::floor(0.5 * samples * sample_outputs);
 }
 
 bool has_deviation_at(const Scenario& s, double tau_s) {
-    const double cycles = std::round(tau_s * s.dither.frequency_hz);
-    return cycles >= 1.0 && cycles <= longest_average_cycles(s);
+    const double outputs = std::round(tau_s * outputs_hz(s));
+    return outputs >= 1.0 && outputs <= longest_average_outputs(s);
 }
 
 std::string deviations_text(const Scenario& s) {
-    return fmt::format("there are Allan deviations from {:.4g} s (a dither cycle) to {:.6g} s (half of the record)",
-                       1.0 / s.dither.frequency_hz, longest_average_cycles(s) / s.dither.frequency_hz);
+    return fmt::format("there are Allan deviations from {:.4g} s (a{} {}) to {:.6g} s (half of the record)",
+                       1.0 / outputs_hz(s), reads_arms(s) ? "n" : "", output_name(s),
+                       longest_average_outputs(s) / outputs_hz(s));
 }
 
 Finding averaging_times_fit(const Scenario& s) {
@@ -63,7 +82,7 @@ Finding averaging_times_fit(const Scenario& s) {
     }
     for (const double tau_s : s.output.tau_s) {
         if (has_deviation_at(s, tau_s)) continue;
-        return Complaint{{"output.tau_s", "ensemble.duration_s", "dither.frequency_hz"},
+        return Complaint{{"output.tau_s", "ensemble.duration_s", output_key(s)},
                          fmt::format("an averaging time of {:g} s is not there: {}", tau_s, deviations_text(s))};
     }
     return {};
@@ -90,13 +109,14 @@ Finding specification_can_be_met(const Scenario& s) {
                          fmt::format("an averaging time of {:g} s is not there: {}", wanted.at_s, deviations_text(s))};
     }
     constexpr double fewest_increments = 32.0;  // of a record that a random walk is fitted to, noise::Options
-    if (wanted.arw_deg_rt_h > 0.0 && s.ensemble.duration_s < fewest_increments * s.output.sample_interval_s) {
-        return Complaint{
-            {"specification.arw_deg_rt_h", "ensemble.duration_s", "output.sample_interval_s"},
-            fmt::format("no arm can show that it meets it: a random walk is fitted to {:g} samples or "
-                        "more, and the record has {:.0f}; set a longer ensemble.duration_s or a shorter "
-                        "output.sample_interval_s",
-                        fewest_increments, std::floor(s.ensemble.duration_s / s.output.sample_interval_s))};
+    const double fit_interval_s = std::max(s.output.sample_interval_s, least_fit_interval_s(s));
+    if (wanted.arw_deg_rt_h > 0.0 && s.ensemble.duration_s < fewest_increments * fit_interval_s) {
+        return Complaint{{"specification.arw_deg_rt_h", "ensemble.duration_s", "output.sample_interval_s"},
+                         fmt::format("no arm can show that it meets it: a random walk is fitted to {:g} samples or "
+                                     "more, and the record has {:.0f}; set a longer ensemble.duration_s or a shorter "
+                                     "output.sample_interval_s{}",
+                                     fewest_increments, std::floor(s.ensemble.duration_s / fit_interval_s),
+                                     reads_arms(s) ? " or filter of the reader" : "")};
     }
     if (wanted.angle_error_arcsec > 0.0 && wanted.after_s > s.ensemble.duration_s) {
         return Complaint{{"specification.after_s", "specification.angle_error_arcsec", "ensemble.duration_s"},
@@ -131,9 +151,13 @@ Finding scale_factor_has_a_sweep(const Scenario& s) {
 }
 
 constexpr std::array all_output_rules = {
-    Rule{"A sample of the output is at least one dither cycle long.", sample_holds_a_cycle},
+    Rule{"A sample of the output is at least one dither cycle long, or one output of the reader of a study.",
+         sample_holds_an_output},
     Rule{"A run holds at least three samples.", run_holds_samples},
-    Rule{"Averaging times asked for (at most 100) are between a dither cycle and half of the record.",
+    Rule{"A run whose arms are read is at least thirty times as long as the reader's filter, twice its delay.",
+         run_outlasts_the_reader},
+    Rule{"Averaging times asked for (at most 100) are between a dither cycle, or an output of the reader of a study, "
+         "and half of the record.",
          averaging_times_fit},
     Rule{"Times asked for angles (at most 100) are within the record.", angle_times_fit},
     Rule{"A specification asks for averaging and other times that the record has, for no less random walk than effects "

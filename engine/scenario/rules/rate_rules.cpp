@@ -9,6 +9,7 @@
 
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/fast_motion.hpp"
+#include "engine/scenario/read_arms.hpp"
 #include "engine/scenario/rules/rules.hpp"
 
 namespace ringlock::scenario {
@@ -18,7 +19,7 @@ Finding dither_reverses_the_rate(const Scenario& s) {
     const double asymmetry = largest_asymmetry(s);
     const double smallest =
         peak_rate_deg_h(s) * (1.0 - sigmas * s.ensemble.dither_amplitude_sd_relative) * (1.0 - asymmetry);
-    const double swing = 1.0 - amplitude_change_relative(s.dither, s.ensemble.settle_s + s.ensemble.duration_s);
+    const double swing = 1.0 - amplitude_change_relative(s.dither, simulated_s(s));
     for (const double rate : s.input.profile_rate_deg_h) {
         if (std::abs(rate) < 0.5 * smallest * swing) continue;
         return Complaint{{"input.profile_rate_deg_h", "dither.peak_rate_deg_s"},
@@ -54,7 +55,7 @@ Finding dither_reverses_effects(const Scenario& s) {
         rates.push_back({rate, keys_of(*bounds.effect)});
     }
     const double rate = certain + sigmas * random;
-    const double swing = 1.0 - amplitude_change_relative(s.dither, s.ensemble.settle_s + s.ensemble.duration_s);
+    const double swing = 1.0 - amplitude_change_relative(s.dither, simulated_s(s));
     const double smallest = peak_rate_deg_h(s) * (1.0 - sigmas * s.ensemble.dither_amplitude_sd_relative) *
                             (1.0 - largest_asymmetry(s)) * swing;
     constexpr double most = 0.9;
@@ -93,7 +94,7 @@ Finding turns_are_reached(const Scenario& s) {
 
 Finding amplitude_stays(const Scenario& s) {
     constexpr double most = 0.5;
-    const double change = amplitude_change_relative(s.dither, s.ensemble.settle_s + s.ensemble.duration_s);
+    const double change = amplitude_change_relative(s.dither, simulated_s(s));
     if (change <= most) return {};
     return Complaint{{"dither.amplitude_wander_relative_rt_s", "dither.amplitude_drift_relative_per_h",
                       "ensemble.duration_s", "ensemble.settle_s"},

@@ -27,7 +27,8 @@ std::span<const Rule> noise_rules();     ///< injected noise and the drive that 
 std::span<const Rule> lockin_rules();    ///< what effects leave of the lock-in
 std::span<const Rule> readout_rules();   ///< readout models and the instrument's electronics
 std::span<const Rule> output_rules();    ///< samples, averaging times and the specification
-std::span<const Rule> record_rules();    ///< records and their reader
+std::span<const Rule> record_rules();    ///< records
+std::span<const Rule> reader_rules();    ///< the reader of records and of studies
 
 double peak_rate_deg_h(const Scenario& scenario);
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/scenario/read_arms.hpp"
 #include "engine/scenario/rules/rules.hpp"
 
 namespace ringlock::scenario {
@@ -71,9 +72,8 @@ Finding sweep_is_not_too_large(const Scenario& s) {
 Finding turns_can_be_counted(const Scenario& s) {
     // A gyro has two trajectories at most, and twice this fits 64 bits.
     constexpr double most = 1e18;
-    const double simulated_s = s.ensemble.settle_s + s.ensemble.duration_s;
     const std::int64_t gyros = asks(s.stop) ? s.stop.most_gyros : s.ensemble.gyros;
-    const double half_cycles = static_cast<double>(gyros) * static_cast<double>(s.input.sweep_points) * simulated_s *
+    const double half_cycles = static_cast<double>(gyros) * static_cast<double>(s.input.sweep_points) * simulated_s(s) *
                                2.0 * s.dither.frequency_hz;
     if (half_cycles <= most) return {};
     return Complaint{
