@@ -223,7 +223,7 @@ TEST(ClosedScenario, AMeanRateThatNoGyroFollowsIsAPlaceholder) {
     record.declared.dither_frequency_hz = 400.0;
     record.declared.input_rate_deg_h = 7.0;
     Closure closure;
-    closure.verdict = Verdict::closed;
+    closure.verdict = ringlock::closure::Verdict::closed;
     closure.base = {{"", "mean_rate_deg_h", 5e14, 3e14}};
     const auto closed = ringlock::closure::closed_scenario(record, closure);
     EXPECT_TRUE(scenario::check(closed.scenario).empty());
