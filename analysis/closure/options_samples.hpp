@@ -190,6 +190,7 @@ struct SampleTurnOptions {
     /// Of the amplitude of a noisy drive over the amplitude itself: from which fits begin, and the largest.
     double late_first_rms = 0.02;
     double late_most_rms = 0.3;
+    double late_least_gain = 0.5;  ///< of the log-likelihood
 };
 
 /// Error of counts at the zero crossings of the dither (samples/declared/count_error).

@@ -80,7 +80,8 @@ std::shared_ptr<SampleFit> with_late_crossings(const SampleFit& fit, const recor
         if (with->model().noise.sidebands.arcsec > by.late_most_rms * late_arcsec) continue;
         if (!best || with->log_likelihood() > best->log_likelihood()) best = std::move(with);
     }
-    return best && best->gain_over(fit) > by.least_gain ? best : nullptr;
+    // A short record hardly distinguishes it from random walk, which is then uncertain: it is there where it may be.
+    return best && best->gain_over(fit) > by.late_least_gain ? best : nullptr;
 }
 
 std::shared_ptr<SampleFit> with_interpolated_errors(const SampleFit& fit, const record::Record& record) {
