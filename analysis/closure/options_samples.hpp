@@ -199,7 +199,7 @@ struct SampleCountErrorOptions {
     double fewest_steps = 8.0;
     /// Widths of the first harmonic from which fits begin [Hz]: the likeliest is taken.
     std::array<double, 3> first_widths_hz = {0.03, 0.3, 3.0};
-    /// Effort: harmonics that are modelled, while each gains so much [nats]; and what all of them must gain.
+    /// Effort: harmonics that are modelled, while each gains so much [nats]; and the least gain of all together.
     int most_harmonics = 5;
     double least_gain_of_harmonic = 1.0;
     double least_gain = 6.0;

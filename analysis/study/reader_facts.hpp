@@ -6,7 +6,7 @@
 
 #include "engine/scenario/scenario.hpp"
 
-/// What a result tells of the readers of its study.
+/// The readers of a study, as its result records them.
 namespace ringlock::study {
 
 /// A setting of the section [reader] of a scenario, or what follows from them.

@@ -13,7 +13,7 @@ bool reads_arms(const Scenario& scenario);
 /// cycle.
 double outputs_hz(const Scenario& scenario);
 
-/// What the readers of a study are. Without readers there is none of it: zeros.
+/// The readers of a study; zeros where its arms are not read.
 struct StudyReader {
     double latch_hz = 0.0;             ///< rate of the ticks
     double delay_s = 0.0;              ///< by which outputs lag behind a steady rotation

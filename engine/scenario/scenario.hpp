@@ -163,7 +163,7 @@ struct RecordSettings {
     bool operator==(const RecordSettings&) const = default;
 };
 
-/// What latches the angle of a record of samples, and of the arms of a study where these are read.
+/// The reader of a record of samples, and of the arms of a study where these are read.
 struct ReaderSettings : reader::Settings {
     double output_hz = 0.0;  ///< at which the arms of a study are read; 0: they are not
     bool operator==(const ReaderSettings&) const = default;

@@ -1,4 +1,4 @@
-// Studies whose arms are read, from outside: what the program tells of the reader, and what it refuses.
+// Studies whose arms are read, on the command line: the reader in the output, and the refusals.
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// Studies whose arms are read: what the scenario says of them, and what it refuses.
+// Studies whose arms are read: the rules of their scenarios.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -18,10 +18,10 @@
 namespace ringlock::scenario {
 namespace {
 
-/// What the statistics of a study take one by one.
+/// Times at which the statistics of a study take angles.
 const char* output_name(const Scenario& s) { return reads_arms(s) ? "output of the reader" : "dither cycle"; }
 
-/// What sets the time from one to the next.
+/// Key that sets the time from one to the next.
 std::string output_key(const Scenario& s) { return reads_arms(s) ? "reader.output_hz" : "dither.frequency_hz"; }
 
 Finding sample_holds_an_output(const Scenario& s) {

@@ -42,7 +42,7 @@ Outputs outputs_of_record(const Scenario& s) {
     return outputs;
 }
 
-/// What the scenario has a reader for: a record of samples, the arms of a study, or both.
+/// All outputs that the scenario's reader makes: of a record of samples, of the arms of a study, or of both.
 std::vector<Outputs> all_outputs(const Scenario& s) {
     std::vector<Outputs> all;
     if (s.record.kind == RecordKind::samples) all.push_back(outputs_of_record(s));
@@ -50,7 +50,7 @@ std::vector<Outputs> all_outputs(const Scenario& s) {
     return all;
 }
 
-/// What is wrong with the first of them with which something is.
+/// The complaint about the first of these outputs that breaks a rule.
 template <class Wrong>
 Finding first_of(const Scenario& s, Wrong&& wrong) {
     for (const Outputs& outputs : all_outputs(s)) {

@@ -85,7 +85,7 @@ std::vector<SampleCase> all_cases(const Command& command) {
         add(Kind::several, multiple, {sized.begin(), sized.begin() + (k % 2 == 0 ? 2 : 3)});
     }
     for (SampleCase& of : foreign_sample_cases(command.scaled(10), command.series)) {
-        // What these add was drawn for the length that they have.
+        // Their effects were drawn for the length that they have.
         if (!command.length_s && !command.rate_hz) cases.push_back(std::move(of));
     }
     std::uint64_t mixed_seed = seeds_of_series * command.series + 70000;

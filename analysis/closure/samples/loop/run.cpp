@@ -55,7 +55,7 @@ std::string note_of_late(const SampleNoise::Resonance& noise) {
         note_on_late, noise.arcsec, noise.width_hz);
 }
 
-/// In a short record a motion of the case swings a few times only. What a witness does not explain of it then looks
+/// In a short record a motion of the case swings a few times only. The part of it that no witness explains then looks
 /// like a random rate, or like a line: these are tied to the motion.
 void tie_to_motion(Step& step, const SampleSeries& series) {
     const double duration_s = series.interval_s * static_cast<double>(series.size());

@@ -152,7 +152,7 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         const int r0 = count;
         const int r1 = count + 1;
         f[r0][r1] = 1.0;
-        // r1 of the new tick = angle and what is read with it there + error; the noise of all is in q.
+        // r1 of the new tick = angle and the states read with it + error; the noise of all is in q.
         f[r1] = f[0];
         for (int j = 0; j < count; ++j) q[r1][j] = q[0][j];
         for (const int state : read) {

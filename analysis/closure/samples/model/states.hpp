@@ -55,8 +55,8 @@ struct SampleNoise {
     };
     std::vector<Resonance> resonances = {};
     /// Sidebands of the dither in the readings, where a noisy drive moves its amplitude and its phase: rms at any time,
-    /// frequency of the dither, full width at half maximum of their spectrum. 0 arcsec: none. At 0 Hz it is what a
-    /// reader at late zero crossings has of the amplitude's noise.
+    /// frequency of the dither, full width at half maximum of their spectrum. 0 arcsec: none. At 0 Hz it is the
+    /// noise of the amplitude that a reader at late zero crossings has.
     Resonance sidebands = {0.0, 0.0, 0.0};
     /// Error of counts that are latched where the dither adds nothing: a sawtooth of the angle. Under a steady rate its
     /// harmonics are lines, which the random walk of the counted angle widens: the phase of harmonic m diffuses m^2

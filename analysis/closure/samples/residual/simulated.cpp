@@ -52,7 +52,7 @@ class CountErrors {
 
 using Root = Eigen::MatrixXd;
 
-/// Of a covariance that may be singular.
+/// A root of a covariance, which may be singular.
 Root root_of(const SampleStates::Matrix& covariance, int count) {
     Eigen::MatrixXd matrix(count, count);
     for (int i = 0; i < count; ++i) {

@@ -116,8 +116,9 @@ std::optional<SampleCandidate> bent_line(const SampleFit& now, const SampleConte
     return candidate;
 }
 
-/// Width about a line of the model in which no other is looked for: what is left there is that line, which is not what
-/// the model says. Where the dither was left in the samples, its harmonics may be aliased next to each other.
+/// Width about a line of the model in which no other line is searched: the residual there belongs to that line, which
+/// may differ from its model. Where the dither was left in the samples, its harmonics may be aliased next to each
+/// other.
 double width_of_known_hz(const SampleContext& in) {
     const double duration_s = static_cast<double>(in.series.size()) * in.series.interval_s;
     double width_hz = options.samples.screen.known_line_cycles / duration_s;
