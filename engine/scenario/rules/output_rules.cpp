@@ -18,7 +18,7 @@
 namespace ringlock::scenario {
 namespace {
 
-/// Times at which the statistics of a study take angles.
+/// One step from output to output, in messages.
 const char* output_name(const Scenario& s) { return reads_arms(s) ? "output of the reader" : "dither cycle"; }
 
 /// Key that sets the time from one to the next.
