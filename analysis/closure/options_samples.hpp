@@ -225,7 +225,7 @@ struct SampleScreenOptions {
     /// that it must have.
     int beat_multiples = 4;
     double beat_cycles = 8.0;
-    /// A line beside the beat counts as part of it unless its rate exceeds the declared device's largest by this
+    /// In a record with a beat a line counts as part of it unless its rate exceeds the device's largest by this
     /// factor.
     double beyond_beat = 2.0;
     /// Scores of slow rates are weakened by how much more the sums of stretches move than white innovations would:

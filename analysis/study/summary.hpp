@@ -42,7 +42,7 @@ struct EnsemblePoint {
 struct SweepPoint {
     double input_rate_deg_h = 0.0;
     MeanFigure output_rate_deg_h;
-    /// Gyros whose output moved over the whole record by less than a fringe and what a reader leaves of the dither.
+    /// Gyros whose output moved over the whole record by less than a fringe and the residue of a reader's dither.
     std::int64_t locked = 0;
     bool can_tell = true;  ///< the input moves by more than that, so that locked and free differ
     std::int64_t gyros = 0;

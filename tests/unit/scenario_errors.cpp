@@ -9,6 +9,7 @@
 
 #include "engine/core/error.hpp"
 #include "engine/scenario/parse.hpp"
+#include "tests/support/scenario_complaint.hpp"
 
 namespace ringlock::scenario {
 namespace {
@@ -17,16 +18,6 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
-
-/// What the parser says about a text, or nothing where it accepts it.
-std::string complaint(std::string_view text) {
-    try {
-        parse_string(text, "s.toml");
-    } catch (const InputError& error) {
-        return error.what();
-    }
-    return "";
-}
 
 std::string file_complaint(const std::filesystem::path& path) {
     try {

@@ -8,6 +8,7 @@
 #include "engine/ensemble/schedule.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/read_arms.hpp"
+#include "tests/support/scenario_complaint.hpp"
 
 namespace ringlock::scenario {
 namespace {
@@ -15,15 +16,6 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
-
-std::string complaint(std::string_view text) {
-    try {
-        parse_string(text, "s.toml");
-    } catch (const InputError& error) {
-        return error.what();
-    }
-    return "";
-}
 
 constexpr const char* read = "[reader]\noutput_hz = 100\n";
 

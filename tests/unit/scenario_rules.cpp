@@ -7,6 +7,7 @@
 #include "engine/scenario/check.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/render.hpp"
+#include "tests/support/scenario_complaint.hpp"
 
 namespace ringlock::scenario {
 namespace {
@@ -14,15 +15,6 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-std::string complaint(std::string_view text) {
-    try {
-        parse_string(text, "s.toml");
-    } catch (const InputError& error) {
-        return error.what();
-    }
-    return "";
-}
 
 TEST(ScenarioRules, TheDefaultsBreakNone) {
     EXPECT_THAT(check(Scenario{}), IsEmpty());

@@ -22,7 +22,7 @@ namespace ringlock::closure {
 
 namespace {
 
-/// A source has two numbers beside the error of its readings off the straight lines: its rate and its place.
+/// A source adds two parameters, its rate and its phase, apart from the error of interpolated readings.
 double p_of_source(double gain) { return chi2_tail(2.0 * gain, 2); }
 
 /// Rates that the records found, the most certain first: it stands for others of the same pattern.

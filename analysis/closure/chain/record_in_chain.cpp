@@ -31,7 +31,7 @@ Closure RecordInChain::noted(Closure closure) const {
     return closure;
 }
 
-/// Returns the model with a source of that rate; its noise is fitted anew as for a record by itself.
+/// Returns the model with a source of that rate. Its noise is fitted again, as in a record that is closed alone.
 std::shared_ptr<SampleFit> RecordInChain::fitted_at(double hz) const {
     check_interrupt();
     const SampleFit& found = loop_->model_fit();

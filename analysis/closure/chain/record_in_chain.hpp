@@ -31,7 +31,7 @@ class RecordInChain {
     /// The record's own rate near one of them.
     Estimate near(std::size_t rate) { return loop_->source_rate(models_[rate]); }
 
-    /// The report with a source that all records share. Where the loop had found another one, or none, it runs anew.
+    /// The report with the source that all records share. The loop runs again where it had found a different source.
     Closure report_with(const KnownSource& source);
 
    private:

@@ -19,7 +19,7 @@ std::shared_ptr<SampleFit> with_count_error(const SampleFit& fit, const record::
 
 /// The same model with the noise of the dither's amplitude that zero crossings have which the measured dither shows
 /// late by the declared delay: delay times peak rate times the relative amplitude, which a resonator remembers. Null
-/// where no such reader is declared, or where the record does not show it.
+/// where no such reader is declared, or where the record speaks against it.
 std::shared_ptr<SampleFit> with_late_crossings(const SampleFit& fit, const record::Record& record);
 
 /// The same model with errors of readings whose variance goes up and down, as they do that are interpolated between

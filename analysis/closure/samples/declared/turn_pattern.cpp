@@ -241,7 +241,7 @@ std::optional<TurnPattern> find_turn_pattern(const SampleFit& base, const record
             }
         }
     };
-    // A cycle over the record is two cycle_bins or more.
+    // A cycle over the record is two bins or more.
     search(seen_hz, 4.0 * bin_hz, 0.5 * bin_hz);
     search(best.turn_hz, 0.5 * bin_hz, 0.06 * bin_hz);
     if (best.gain < by.least_gain) return std::nullopt;

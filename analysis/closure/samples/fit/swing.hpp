@@ -12,8 +12,8 @@ struct Swing {
 /// Of the innovations that count: fitted by Newton's method.
 Swing swing_of_variance(const SampleFit& fit, double hz);
 
-/// The model in which it is the readings' errors whose variance does, the noise fitted anew. An innovation has the
-/// errors of the readings before as well, and shows less.
+/// The model with errors of readings whose variance goes up and down in that way; the noise is fitted again. An
+/// innovation contains the errors of earlier readings as well, and shows less of it.
 SampleFit with_swinging_errors(const SampleFit& fit, double hz, const Swing& seen);
 
 }  // namespace ringlock::closure

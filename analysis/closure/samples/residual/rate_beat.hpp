@@ -28,7 +28,7 @@ struct RateBeat {
 std::optional<RateBeat> find_rate_beat(const SampleFit& fit, const record::Declared& declared);
 
 /// Whether a step may be no effect but what the beat makes. Its multiples, those of the dither and their sums are lines
-/// that fill the band: a source of another clock, or a line, is told from them only where it is larger.
+/// that fill the band: a source of another clock, or a line, is distinguished from them only where it is larger.
 bool may_be_of_beat(const Step& step, const RateBeat& beat);
 
 /// A sentence that names it.
