@@ -11,12 +11,15 @@
 
 #include "analysis/allan/running_deviation.hpp"
 #include "analysis/noise/fit.hpp"
+#include "analysis/quantity/declared.hpp"
+#include "analysis/quantity/scale.hpp"
+#include "analysis/quantity/unit.hpp"
 #include "analysis/record/series.hpp"
 #include "analysis/report/plot.hpp"
 #include "app/allan_figure.hpp"
 #include "app/allan_output.hpp"
-#include "app/angle_units.hpp"
 #include "app/arguments.hpp"
+#include "app/coefficient_table.hpp"
 #include "app/command.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
@@ -30,6 +33,8 @@ struct AllanArguments {
     double rate_hz = 0.0;
     std::string kind;
     std::string unit;
+    std::string scale;
+    std::string arw_unit;
     std::string column;
     std::string dev = "oadev";
     std::string tau = "octave";
@@ -53,8 +58,25 @@ allan::Kind parse_kind(const std::string& kind) {
                     found));
 }
 
-const AngleUnit* parse_unit(const std::string& unit, allan::Kind kind) {
-    return unit.empty() ? nullptr : &angle_unit(unit, kind == allan::Kind::rate);
+std::optional<quantity::Unit> parse_unit(const AllanArguments& a, allan::Kind kind) {
+    const bool is_rate = kind == allan::Kind::rate;
+    if (a.unit == "counts") return quantity::unit_of_counts(a.scale, is_rate);
+    if (a.unit.empty()) {
+        if (a.scale.empty()) return std::nullopt;
+        throw InputError(fmt::format(
+            "--scale {}: needs --unit: counts, where the scale has a unit, or the unit of the scaled numbers",
+            a.scale));
+    }
+    const quantity::Unit unit = quantity::unit_for(a.unit, is_rate, "--unit");
+    return a.scale.empty() ? unit : quantity::scaled(unit, a.scale);
+}
+
+/// The file's word for the unit of the column, or that of its name, against the command line.
+void check_unit(const AllanArguments& a, const record::SeriesInfo& series) {
+    if (a.unit.empty() || a.unit == "counts" || !a.scale.empty()) return;
+    const bool is_rate = parse_kind(a.kind) == allan::Kind::rate;
+    quantity::refuse_contradiction(a.data, series.column, std::nullopt, quantity::unit_for(a.unit, is_rate, "--unit"),
+                                   "--unit");
 }
 
 allan::Bias parse_bias(const std::string& bias) {
@@ -110,17 +132,22 @@ void check_rate(const AllanArguments& a, const record::SeriesInfo& series) {
 /// The command line, checked.
 struct Request {
     allan::Kind kind;
-    const AngleUnit* unit;
+    std::optional<quantity::Unit> unit;
+    const WalkUnit* walk_unit = nullptr;
     std::vector<allan::Estimator> estimators;
     TauChoice taus;
     record::SeriesRequest series;
 
-    double scale() const { return unit != nullptr ? unit->to_arcsec : 1.0; }
+    double scale() const { return unit ? unit->factor : 1.0; }
 };
 
 Request checked(const AllanArguments& a) {
-    Request out{parse_kind(a.kind), nullptr, parse_deviations(a.dev), {}, {}};
-    out.unit = parse_unit(a.unit, out.kind);
+    Request out{parse_kind(a.kind), {}, nullptr, parse_deviations(a.dev), {}, {}};
+    out.unit = parse_unit(a, out.kind);
+    if (!a.arw_unit.empty()) {
+        if (!out.unit) throw InputError(fmt::format("--arw-unit {}: needs --unit, the unit of the data", a.arw_unit));
+        out.walk_unit = &walk_unit(a.arw_unit, out.unit->instrument);
+    }
     if (!(a.rate_hz > 0.0) || !std::isfinite(a.rate_hz)) {
         throw InputError(fmt::format("--rate {}: must be a positive number of samples a second", a.rate_hz));
     }
@@ -162,6 +189,7 @@ void fit_longest(const allan::Phase& phase, AllanOutput& out) {
 void from_record(const AllanArguments& a, const Request& request, AllanOutput& out) {
     record::Series series = record::read_series(request.series);
     check_rate(a, series);
+    check_unit(a, series);
     const allan::Phase phase =
         series.counts.empty()
             ? allan::phase_of(series.values, request.kind, out.tau0_s, request.scale())
@@ -187,7 +215,7 @@ void from_record(const AllanArguments& a, const Request& request, AllanOutput& o
         }
         out.deviations.push_back(std::move(deviation));
     }
-    if (request.unit != nullptr) fit_longest(phase, out);
+    if (request.unit) fit_longest(phase, out);
 }
 
 void from_stream(const AllanArguments& a, const Request& request, AllanOutput& out) {
@@ -199,6 +227,7 @@ void from_stream(const AllanArguments& a, const Request& request, AllanOutput& o
         for (allan::RunningDeviation& r : running) r.add(piece);
     });
     check_rate(a, info);
+    check_unit(a, info);
     if (info.rounded) {
         throw InputError(
             fmt::format("{}: counts beyond 2^53 lose their last digits in a stream; without --stream they "
@@ -213,7 +242,7 @@ void from_stream(const AllanArguments& a, const Request& request, AllanOutput& o
     for (std::size_t k = 0; k < running.size(); ++k) {
         out.deviations.push_back({request.estimators[k], running[k].points(a.confidence), {}});
     }
-    if (request.unit == nullptr) return;
+    if (!request.unit) return;
     const std::vector<double> thin = running.front().thinned_phase();
     if (thin.empty()) {
         out.noise.emplace();
@@ -232,8 +261,11 @@ void run(const AllanArguments& a) {
     AllanOutput out;
     out.data = a.data;
     out.kind = a.kind;
-    out.input_unit = a.unit;
-    out.gyro = request.unit != nullptr;
+    if (request.unit) {
+        out.input_unit = request.unit->name;
+        out.instrument = request.unit->instrument;
+        out.walk_unit = request.walk_unit;
+    }
     out.tau0_s = 1.0 / a.rate_hz;
     out.confidence = a.confidence;
     a.stream ? from_stream(a, request, out) : from_record(a, request, out);
@@ -251,7 +283,15 @@ void add_allan(CLI::App& root) {
     sub->add_option("--rate", a->rate_hz, "Samples a second [Hz]")->required();
     sub->add_option("--kind", a->kind, "phase | increment | rate: what the numbers are (never guessed)");
     sub->add_option("--unit", a->unit,
-                    "arcsec, deg, rad (phase, increment); deg/h, deg/s, rad/s (rate); none: dimensionless");
+                    "Unit of the data. Gyro: arcsec, deg, rad (phase, increment), deg/h, deg/s, rad/s (rate); "
+                    "accelerometer: m/s, m/s^2, mg; clock: s, ns; counts, with --scale. Without it no noise "
+                    "coefficients are estimated");
+    sub->add_option("--scale", a->scale,
+                    "Size of one number of the data: with --unit counts a number and a unit (0.25arcsec), with another "
+                    "unit a plain factor");
+    sub->add_option("--arw-unit", a->arw_unit,
+                    "Also print the random walk in deg/sqrt(h), deg/h/sqrt(Hz), deg/s/sqrt(Hz), rad/s/sqrt(Hz), "
+                    "m/s/sqrt(h), m/s^2/sqrt(Hz), ug/sqrt(Hz)");
     sub->add_option("--column", a->column,
                     "Name or number (from 1) of the column, or path of an HDF5 dataset; of a two-dimensional one "
                     "'PATH[I,:]' is row I, 'PATH[:,J]' column J (from 0)");

@@ -70,10 +70,14 @@ report::Figure allan_figure(const AllanOutput& out) {
                                     [](const auto& d) { return allan::traits(d.estimator).time; });
     figure.title = fmt::format("{}, column {}", out.data, out.column);
     figure.x_label = "averaging time tau [s]";
-    figure.y_label = out.gyro ? times   ? "deviation [arcsec]"
-                                : rates ? "deviation [deg/h]"
-                                        : "deviation [deg/h; times: arcsec]"
-                              : "deviation";
+    figure.y_label = "deviation";
+    if (out.instrument) {
+        const InstrumentNames& names = names_of(*out.instrument);
+        const std::string_view rate = names.rate_unit.empty() ? "1" : names.rate_unit;
+        figure.y_label = times   ? fmt::format("deviation [{}]", names.integral_unit)
+                         : rates ? fmt::format("deviation [{}]", rate)
+                                 : fmt::format("deviation [{}; times: {}]", rate, names.integral_unit);
+    }
     figure.log_x = figure.log_y = true;
     std::vector<double> tau_s;
     for (const DeviationOutput& d : out.deviations) {

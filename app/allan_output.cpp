@@ -19,37 +19,68 @@ Json estimate(const noise::Estimate& e) {
     return {{"value", number(e.value)}, {"lo", number(e.lo)}, {"hi", number(e.hi)}};
 }
 
-Json correlated(const noise::NoiseFit& fit) {
-    if (!fit.described || !fit.correlated) return nullptr;
-    return {{"correlation_time_s", estimate(fit.correlated->correlation_time_s)},
-            {"amplitude_deg_h_rt_h", estimate(fit.correlated->amplitude_deg_h_rt_h)},
-            {"rms_rate_deg_h", estimate(fit.correlated->rms_rate_deg_h)}};
+noise::Estimate times(const noise::Estimate& e, double factor) {
+    return {factor * e.value, factor * e.lo, factor * e.hi};
 }
 
-Json sinusoids(const noise::NoiseFit& fit) {
+noise::Coefficient times(noise::Coefficient c, double factor) {
+    for (std::optional<double>* v : {&c.value, &c.lo, &c.hi}) {
+        if (*v) **v *= factor;
+    }
+    return c;
+}
+
+Json correlated(const noise::NoiseFit& fit, const InstrumentNames& names) {
+    if (!fit.described || !fit.correlated) return nullptr;
+    const noise::Estimate driving = times(fit.correlated->amplitude_deg_h_rt_h, names.driving_factor);
+    return {{"correlation_time_s", estimate(fit.correlated->correlation_time_s)},
+            {std::string(names.driving_key), estimate(driving)},
+            {std::string(names.rms_key), estimate(fit.correlated->rms_rate_deg_h)}};
+}
+
+Json sinusoids(const noise::NoiseFit& fit, const InstrumentNames& names) {
     if (!fit.described) return nullptr;
     Json list = Json::array();
     for (const noise::Sinusoid& line : fit.sinusoids) {
         list.push_back({{"frequency_hz", estimate(line.frequency_hz)},
-                        {"rate_amplitude_deg_h", estimate(line.rate_amplitude_deg_h)}});
+                        {std::string(names.amplitude_key), estimate(line.rate_amplitude_deg_h)}});
     }
     return list;
 }
 
-struct Line {
-    std::string_view key;
-    std::string_view name;
-    std::string_view unit;
-    noise::Coefficient noise::NoiseFit::*member;
-};
+/// The random walk of the fit in the unit that was asked for.
+noise::Coefficient walk_in(const WalkUnit& unit, const noise::NoiseFit& fit) {
+    for (const CoefficientName& name : names_of(unit.instrument).coefficients) {
+        if (name.member == &noise::NoiseFit::arw_deg_rt_h) {
+            return times(fit.arw_deg_rt_h, name.factor * unit.factor);
+        }
+    }
+    return {};
+}
 
-constexpr std::array<Line, 5> table_lines = {{
-    {"quantization_arcsec", "angle white noise Q", "arcsec", &noise::NoiseFit::quantization_arcsec},
-    {"arw_deg_rt_h", "angle random walk N", "deg/sqrt(h)", &noise::NoiseFit::arw_deg_rt_h},
-    {"bias_instability_deg_h", "bias instability B", "deg/h", &noise::NoiseFit::bias_instability_deg_h},
-    {"rrw_deg_h_rt_h", "rate random walk K", "(deg/h)/sqrt(h)", &noise::NoiseFit::rrw_deg_h_rt_h},
-    {"rate_ramp_deg_h_h", "rate ramp R", "(deg/h)/h", &noise::NoiseFit::rate_ramp_deg_h_h},
-}};
+Json coefficient_json(const noise::Coefficient& c, bool described) {
+    if (!described || !c.resolved) return nullptr;
+    return {{"value", number(c.value)}, {"lo", number(c.lo)}, {"hi", number(c.hi)}};
+}
+
+Json noise_json(const AllanOutput& out, Json& limits) {
+    Json noise = Json::object();
+    const InstrumentNames& names = names_of(*out.instrument);
+    for (const CoefficientName& name : names.coefficients) {
+        const std::string key(name.key);
+        const noise::Coefficient c = times((*out.noise).*name.member, name.factor);
+        noise[key] = coefficient_json(c, out.noise->described);
+        limits[key] = out.noise->described && !c.resolved ? number(c.hi) : Json(nullptr);
+    }
+    noise["correlated"] = correlated(*out.noise, names);
+    noise["sinusoidal"] = sinusoids(*out.noise, names);
+    if (out.walk_unit != nullptr) {
+        const noise::Coefficient c = walk_in(*out.walk_unit, *out.noise);
+        noise["arw_unit"] = out.walk_unit->name;
+        noise["arw"] = coefficient_json(c, out.noise->described);
+    }
+    return noise;
+}
 
 std::string_view noise_name(int alpha) {
     switch (alpha) {
@@ -73,6 +104,55 @@ std::string_view noise_name(int alpha) {
 /// A number in scientific notation, or a dash where there is none.
 std::string shown(double v, int digits) { return std::isfinite(v) ? fmt::format("{:.{}e}", v, digits) : "-"; }
 
+std::string coefficient_line(std::string_view name, const noise::Coefficient& c, std::string_view unit) {
+    if (c.resolved) {
+        return fmt::format("  {:<22} {:>11.5g}  ({:.5g} to {:.5g}) {}\n", name, *c.value, *c.lo, *c.hi, unit);
+    }
+    if (c.hi) return fmt::format("  {:<22} not resolved, < {:.3g} {}\n", name, *c.hi, unit);
+    return fmt::format("  {:<22} not resolved\n", name);
+}
+
+std::string estimate_line(std::string_view name, const noise::Estimate& e, std::string_view unit) {
+    return fmt::format("  {:<22} {:>11.5g}  ({:.5g} to {:.5g}) {}\n", name, e.value, e.lo, e.hi, unit);
+}
+
+/// The coefficients, or why they are withheld.
+std::string noise_text(const AllanOutput& out) {
+    const InstrumentNames& names = names_of(*out.instrument);
+    std::string text;
+    if (out.noise_stretch) {
+        text += fmt::format("\nCoefficients from the longest part without gaps, {} points.\n", *out.noise_stretch);
+    }
+    if (out.noise_thinning) {
+        text += fmt::format("\nCoefficients from every {}th point, which was kept.\n", *out.noise_thinning);
+    }
+    if (!out.noise->described) {
+        return text + fmt::format(
+                          "\nNoise coefficients withheld: {}.\nQ, N, B, K and R would not describe this record; find "
+                          "and remove the cause before quoting any.\n",
+                          out.noise->reason);
+    }
+    text += fmt::format("\nNoise coefficients of the {} (68.27 % interval; limits 95 %)\n", names.name);
+    for (const CoefficientName& name : names.coefficients) {
+        text += coefficient_line(name.name, times((*out.noise).*name.member, name.factor), name.unit);
+        if (out.walk_unit != nullptr && name.member == &noise::NoiseFit::arw_deg_rt_h) {
+            text += coefficient_line("", walk_in(*out.walk_unit, *out.noise), out.walk_unit->name);
+        }
+    }
+    if (out.noise->correlated) {
+        const noise::Estimate driving = times(out.noise->correlated->amplitude_deg_h_rt_h, names.driving_factor);
+        text += estimate_line("correlated noise q_c", driving, names.driving_unit);
+        text += estimate_line("  correlation time", out.noise->correlated->correlation_time_s, "s");
+        text += estimate_line("  rms", out.noise->correlated->rms_rate_deg_h, names.rate_unit);
+    }
+    for (const noise::Sinusoid& line : out.noise->sinusoids) {
+        text += estimate_line("sinusoid", line.rate_amplitude_deg_h, names.rate_unit);
+        const noise::Estimate& f = line.frequency_hz;
+        text += fmt::format("  {:<22} {:>11.8g}  ({:.8g} to {:.8g}) Hz\n", "  frequency", f.value, f.lo, f.hi);
+    }
+    return text;
+}
+
 }  // namespace
 
 std::string allan_json(const AllanOutput& out) {
@@ -82,7 +162,9 @@ std::string allan_json(const AllanOutput& out) {
     json["tau0_s"] = number(out.tau0_s);
     json["kind"] = out.kind;
     json["column"] = out.column;
-    json["unit"] = out.gyro ? Json("deg/h") : Json(nullptr);
+    const std::string_view unit = out.instrument ? names_of(*out.instrument).rate_unit : "";
+    json["unit"] = unit.empty() ? Json(nullptr) : Json(unit);
+    json["instrument"] = out.instrument ? Json(names_of(*out.instrument).name) : Json(nullptr);
     json["confidence"] = number(out.confidence);
     json["stride"] = out.streamed ? "tau/8" : "tau0";
     json["deviations"] = Json::object();
@@ -106,25 +188,17 @@ std::string allan_json(const AllanOutput& out) {
         if (!d.without_terms.empty())
             json["factors_without_terms"][std::string(allan::name(d.estimator))] = d.without_terms;
     }
+    // All keys are always there, null where there is nothing to say.
     json["noise"] = nullptr;
+    json["noise_upper_limits_95"] = nullptr;
     if (out.noise) {
-        Json noise = Json::object();
         Json limits = Json::object();
-        for (const Line& line : table_lines) {
-            const noise::Coefficient& c = (*out.noise).*line.member;
-            const bool shown = out.noise->described && c.resolved;
-            noise[line.key] =
-                shown ? Json({{"value", number(c.value)}, {"lo", number(c.lo)}, {"hi", number(c.hi)}}) : Json(nullptr);
-            limits[line.key] = out.noise->described && !c.resolved ? number(c.hi) : Json(nullptr);
-        }
-        noise["correlated"] = correlated(*out.noise);
-        noise["sinusoidal"] = sinusoids(*out.noise);
-        json["noise"] = std::move(noise);
+        json["noise"] = noise_json(out, limits);
         json["noise_upper_limits_95"] = std::move(limits);
-        json["noise_fitted_points"] = out.noise_stretch ? Json(*out.noise_stretch) : Json(nullptr);
-        json["noise_fitted_every"] = out.noise_thinning ? Json(*out.noise_thinning) : Json(nullptr);
-        json["noise_withheld"] = out.noise->described ? Json(nullptr) : Json(out.noise->reason);
     }
+    json["noise_fitted_points"] = out.noise_stretch ? Json(*out.noise_stretch) : Json(nullptr);
+    json["noise_fitted_every"] = out.noise_thinning ? Json(*out.noise_thinning) : Json(nullptr);
+    json["noise_withheld"] = out.noise && !out.noise->described ? Json(out.noise->reason) : Json(nullptr);
     return json.dump() + "\n";
 }
 
@@ -137,7 +211,12 @@ std::string allan_text(const AllanOutput& out) {
     if (out.streamed) text += "no record kept: sums with a stride of tau/8\n";
     for (const auto& [estimator, points, without_terms] : out.deviations) {
         const allan::Traits& t = allan::traits(estimator);
-        const std::string_view unit = !out.gyro ? "" : t.time ? " [arcsec]" : " [deg/h]";
+        std::string unit;
+        if (out.instrument) {
+            const InstrumentNames& names = names_of(*out.instrument);
+            unit = t.time ? names.integral_unit : names.rate_unit;
+            if (!unit.empty()) unit = fmt::format(" [{}]", unit);
+        }
         const std::string interval =
             t.has_interval ? fmt::format("{:.4g} % interval", 100.0 * out.confidence) : "no interval";
         text += fmt::format("\n{:>9} {:>12} {:>17} {:>27} {:>10} {:>10}  {}\n", "m", "tau [s]",
@@ -154,50 +233,7 @@ std::string allan_text(const AllanOutput& out) {
             text += "the record is too short for a term\n";
         }
     }
-    if (!out.noise) {
-        text += "\nNo gyro coefficients: say the unit of the data with --unit to have them.\n";
-        return text;
-    }
-    if (out.noise_stretch) {
-        text += fmt::format("\nCoefficients from the longest part without gaps, {} points.\n", *out.noise_stretch);
-    }
-    if (out.noise_thinning) {
-        text += fmt::format("\nCoefficients from every {}th point, which was kept.\n", *out.noise_thinning);
-    }
-    if (!out.noise->described) {
-        text += fmt::format(
-            "\nGyro coefficients withheld: {}.\nQ, N, B, K and R would not describe this record; find and remove the "
-            "cause "
-            "before quoting any.\n",
-            out.noise->reason);
-        return text;
-    }
-    text += "\nGyro coefficients (68.27 % interval; limits 95 %)\n";
-    for (const Line& line : table_lines) {
-        const noise::Coefficient& c = (*out.noise).*line.member;
-        if (c.resolved) {
-            text += fmt::format("  {:<20} {:>11.5g}  ({:.5g} to {:.5g}) {}\n", line.name, *c.value, *c.lo, *c.hi,
-                                line.unit);
-        } else if (c.hi) {
-            text += fmt::format("  {:<20} not resolved, < {:.3g} {}\n", line.name, *c.hi, line.unit);
-        } else {
-            text += fmt::format("  {:<20} not resolved\n", line.name);
-        }
-    }
-    const auto add = [&](const std::string& name, const noise::Estimate& e, const char* unit) {
-        text += fmt::format("  {:<20} {:>11.5g}  ({:.5g} to {:.5g}) {}\n", name, e.value, e.lo, e.hi, unit);
-    };
-    if (out.noise->correlated) {
-        add("correlated noise q_c", out.noise->correlated->amplitude_deg_h_rt_h, "(deg/h)/sqrt(h)");
-        add("  correlation time", out.noise->correlated->correlation_time_s, "s");
-        add("  rms rate", out.noise->correlated->rms_rate_deg_h, "deg/h");
-    }
-    for (const noise::Sinusoid& line : out.noise->sinusoids) {
-        add("sinusoidal rate", line.rate_amplitude_deg_h, "deg/h");
-        const noise::Estimate& f = line.frequency_hz;
-        text += fmt::format("  {:<20} {:>11.8g}  ({:.8g} to {:.8g}) Hz\n", "  frequency", f.value, f.lo, f.hi);
-    }
-    return text;
+    return text + (out.noise ? noise_text(out) : "\nNo noise coefficients: say the unit of the data with --unit.\n");
 }
 
 }  // namespace ringlock::app

@@ -6,6 +6,8 @@
 
 #include "analysis/allan/allan.hpp"
 #include "analysis/noise/fit.hpp"
+#include "analysis/quantity/unit.hpp"
+#include "app/coefficient_table.hpp"
 
 namespace ringlock::app {
 
@@ -21,11 +23,13 @@ struct AllanOutput {
     std::string data;
     std::string column;
     std::string kind;
-    std::string input_unit;   ///< empty: dimensionless
-    bool gyro = false;        ///< the input has a unit: deviations in deg/h (time errors in arcsec), noise fitted
-    std::size_t n = 0;        ///< data used
-    std::size_t missing = 0;  ///< data that are missing among them
-    bool streamed = false;    ///< sums with a stride of tau/8
+    std::string input_unit;  ///< empty: dimensionless
+    /// Where the input has a unit: decides the units of the deviations and of the noise coefficients.
+    std::optional<quantity::Instrument> instrument;
+    const WalkUnit* walk_unit = nullptr;  ///< of the random walk, where another than the usual one is asked for
+    std::size_t n = 0;                    ///< data used
+    std::size_t missing = 0;              ///< data that are missing among them
+    bool streamed = false;                ///< sums with a stride of tau/8
     double tau0_s = 0.0;
     double confidence = 0.0;
     std::vector<DeviationOutput> deviations;

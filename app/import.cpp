@@ -7,9 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "analysis/quantity/scale.hpp"
+#include "analysis/quantity/unit.hpp"
 #include "analysis/record/mapped_columns.hpp"
 #include "analysis/record/record.hpp"
-#include "app/angle_units.hpp"
 #include "app/command.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
@@ -25,6 +26,7 @@ struct ImportArguments {
     std::string out;
     std::vector<std::string> columns;
     std::string unit;
+    std::string scale;
     double rate_hz = 0.0;
     std::string time;
     std::vector<std::string> declared;
@@ -38,6 +40,16 @@ record::MappedColumn parse_column(const std::string& text) {
             fmt::format("--column {}: must be NAME=QUANTITY, such as gyro_x=rate or 2=angle_increment_arcsec", text));
     }
     return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+quantity::Unit gyro_unit(const ImportArguments& arguments, bool of_rate) {
+    if (arguments.unit == "counts") return quantity::unit_of_counts(arguments.scale, of_rate);
+    const quantity::Unit unit = quantity::unit_for(arguments.unit, of_rate, "--unit");
+    if (unit.instrument != quantity::Instrument::gyro) {
+        throw InputError(fmt::format("--unit {}: samples of a record are those of a gyro, in a unit such as {}",
+                                     arguments.unit, of_rate ? "deg/h or rad/s" : "arcsec or deg"));
+    }
+    return arguments.scale.empty() ? unit : quantity::scaled(unit, arguments.scale);
 }
 
 record::MappedLog parse_log(const ImportArguments& arguments) {
@@ -61,11 +73,10 @@ record::MappedLog parse_log(const ImportArguments& arguments) {
         throw InputError(fmt::format("--unit {}: no column of --column has a unit", arguments.unit));
     }
     if (arguments.unit.empty()) {
-        throw InputError(fmt::format("--unit is missing: say in which unit the {} are; allowed are {}",
-                                     of_rate ? "rates" : "angles",
-                                     of_rate ? "deg/h, deg/s, rad/s" : "arcsec, deg, rad"));
+        throw InputError(fmt::format("--unit is missing: say in which unit the {} are, such as {}",
+                                     of_rate ? "rates" : "angles", of_rate ? "deg/h or rad/s" : "arcsec or deg"));
     }
-    log.to_arcsec = angle_unit(arguments.unit, of_rate).to_arcsec;
+    log.to_arcsec = gyro_unit(arguments, of_rate).factor;
     return log;
 }
 
@@ -85,6 +96,7 @@ void take_declared(const std::vector<std::string>& declared, record::Record& rec
 record::Record read(const ImportArguments& arguments) {
     if (!arguments.columns.empty()) return read_mapped(parse_log(arguments));
     for (const auto& [option, given] : {std::pair{"--unit", !arguments.unit.empty()},
+                                        {"--scale", !arguments.scale.empty()},
                                         {"--rate", arguments.rate_hz != 0.0},
                                         {"--time", !arguments.time.empty()}}) {
         if (!given) continue;
@@ -113,7 +125,11 @@ void add_import(CLI::App& root) {
         ->take_all()
         ->allow_extra_args(false);
     command->add_option("--unit", arguments->unit,
-                        "unit of the gyro's column: arcsec, deg, rad of an angle; deg/h, deg/s, rad/s of a rate");
+                        "unit of the gyro's column: arcsec, deg, rad of an angle; deg/h, deg/s, rad/s of a rate; "
+                        "counts, with --scale");
+    command->add_option("--scale", arguments->scale,
+                        "size of one number of the gyro's column: with --unit counts a number and a unit "
+                        "(0.25arcsec), with another unit a plain factor");
     command->add_option("--rate", arguments->rate_hz, "samples a second [Hz]");
     command->add_option("--time", arguments->time, "column of the times of the samples [s]: rows left out are told of");
     command

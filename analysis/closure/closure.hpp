@@ -64,6 +64,7 @@ struct Closure {
     bool rounding_in_noise = true;       ///< of samples: the white noise of the angle has that of its steps in it
     std::vector<TimeSpan> disturbed;     ///< stretches that the fit and the tests leave out
     double disturbed_share = 0.0;        ///< of the samples, that lie in them
+    std::vector<TimeSpan> gaps;          ///< spans whose samples are missing
     Residual residual;
 };
 

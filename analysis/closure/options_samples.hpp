@@ -38,6 +38,12 @@ struct SampleRecordOptions {
     /// Half of the length over which a temperature's slope is taken is the record over this. Over single rows the noise
     /// that smoothing leaves would be a good part of the slope.
     std::size_t slope_parts = 200;
+    /// Rows on either side of a gap whose mean is put in the place of the missing increments, and rows behind it that
+    /// count for nothing until the filter has found the angle again.
+    std::size_t rows_around_gap = 25;
+    std::size_t rows_behind_gap = 20;
+    /// Largest share of the samples that may be missing.
+    double most_missing = 0.5;
 };
 
 /// Fits (samples/fit).

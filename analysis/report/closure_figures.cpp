@@ -64,6 +64,21 @@ Curve vertical(std::string label, double x, double low, double high) {
     return {.label = std::move(label), .x = {x, x}, .y = {low, high}, .style = Curve::Style::line};
 }
 
+/// Points whose averaging time overlaps one of the spans.
+Curve points_within(const closure::RateSeries& rates, const std::vector<closure::TimeSpan>& spans) {
+    Curve curve;
+    for (std::size_t i = 0; i < rates.time_s.size(); ++i) {
+        const bool is = std::any_of(spans.begin(), spans.end(), [&](const closure::TimeSpan& span) {
+            return rates.time_s[i] + 0.5 * rates.interval_s > span.from_s &&
+                   rates.time_s[i] - 0.5 * rates.interval_s < span.to_s;
+        });
+        if (!is) continue;
+        curve.x.push_back(rates.time_s[i]);
+        curve.y.push_back(rates.rate_deg_h[i]);
+    }
+    return curve;
+}
+
 Picture over_time(const std::string& source, const record::Record& record, const Closure& closure) {
     const closure::RateSeries rates = averaged(closure::rates_of(record), closure::options.report.points_over_time);
     Picture picture{
@@ -83,17 +98,12 @@ Picture over_time(const std::string& source, const record::Record& record, const
         if (!std::isfinite(time_s)) continue;
         curves.push_back(vertical(fmt::format("{} at {:.6g} s", step.effect->name(), time_s), time_s, *low, *high));
     }
-    Curve disturbed{.label = "disturbed, left out of the fit"};
-    for (std::size_t i = 0; i < rates.time_s.size(); ++i) {
-        const bool is = std::any_of(closure.disturbed.begin(), closure.disturbed.end(), [&](const auto& span) {
-            return rates.time_s[i] + 0.5 * rates.interval_s > span.from_s &&
-                   rates.time_s[i] - 0.5 * rates.interval_s < span.to_s;
-        });
-        if (!is) continue;
-        disturbed.x.push_back(rates.time_s[i]);
-        disturbed.y.push_back(rates.rate_deg_h[i]);
+    for (const auto& [label, spans] : {std::pair{"disturbed, left out of the fit", &closure.disturbed},
+                                       std::pair{"missing, filled in, left out of the fit", &closure.gaps}}) {
+        Curve within = points_within(rates, *spans);
+        within.label = label;
+        if (!within.x.empty()) curves.push_back(std::move(within));
     }
-    if (!disturbed.x.empty()) curves.push_back(std::move(disturbed));
     curves.push_back({.label = "model, deterministic part",
                       .x = rates.time_s,
                       .y = determined_rates(record, closure, rates),

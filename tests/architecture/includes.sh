@@ -27,6 +27,7 @@ declare -A may=(
     [analysis/noise]="analysis/allan analysis/allan/sums engine/core engine/random"
     [analysis/lot]="engine/core"
     [analysis/design]="engine/core engine/random"
+    [analysis/quantity]="engine/core"
     [analysis/record]="analysis/allan analysis/allan/sums analysis/noise engine/core engine/reader engine/store"
     [analysis/instrument]="analysis/record engine/*"
     [analysis/study]="analysis/allan analysis/allan/sums analysis/design analysis/lot analysis/noise engine/*"

@@ -259,18 +259,21 @@ class TurnSight {
 /// The same for samples.
 class SampleSight {
    public:
-    SampleSight(const record::Record& record, const std::vector<TimeSpan>& disturbed)
+    SampleSight(const record::Record& record, const Closure& closure)
         : measured_(prepare_samples(record)), left_out_(measured_.size(), 0) {
         // A row is in a stretch where its middle is.
         for (std::size_t i = 0; i < left_out_.size(); ++i) {
             const double middle_s = measured_.time_s[i] - 0.5 * measured_.interval_s;
-            for (const TimeSpan& span : disturbed) {
-                if (middle_s > span.from_s && middle_s < span.to_s) left_out_[i] = 1;
+            for (const std::vector<TimeSpan>* spans : {&closure.disturbed, &closure.gaps}) {
+                for (const TimeSpan& span : *spans) {
+                    if (middle_s > span.from_s && middle_s < span.to_s) left_out_[i] = 1;
+                }
             }
         }
     }
 
-    /// Disturbed stretches are left out of simulations as of the record: their rows get the mean of the others.
+    /// Disturbed stretches and gaps are left out of simulations as of the record: their rows get the mean of the
+    /// others.
     Curves look(std::vector<double> increment_arcsec) const {
         std::vector<double> increment = less_input(std::move(increment_arcsec));
         double sum = 0.0;
@@ -545,7 +548,7 @@ Predictive simulated_check(const record::Record& record, const Closure& closure,
             turns.emplace(record, closure);
             all.push_back(turns->look(*record.turns));
         } else {
-            samples.emplace(record, closure.disturbed);
+            samples.emplace(record, closure);
             all.push_back(samples->look(samples->measured().increment));
         }
         const TurnSight* turn_sight = turns ? &*turns : nullptr;

@@ -75,6 +75,10 @@ nlohmann::json to_json(const Closure& closure) {
                                    {"p_value", number(test.p_value)},
                                    {"detail", test.detail}});
     }
+    object["gaps"] = json::array();
+    for (const TimeSpan& gap : closure.gaps) {
+        object["gaps"].push_back({{"from_s", number(gap.from_s)}, {"to_s", number(gap.to_s)}});
+    }
     object["family_wise_level"] = closure.level;
     object["notes"] = closure.notes;
     return object;

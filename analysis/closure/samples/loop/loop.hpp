@@ -85,6 +85,7 @@ class SampleLoop {
     std::vector<double> chosen_increments() const;
     Rows all_rows() const;
     void take_disturbed(Closure& closure) const;
+    void take_gaps(Closure& closure) const;
     std::shared_ptr<SampleFit> fit_base(Closure& closure) const;
     std::shared_ptr<SampleFit> with_turns(const SampleFit& fit, Closure& closure) const;
     void find_turns_again(Closure& closure);

@@ -22,6 +22,7 @@
 #include "analysis/closure/samples/fit/motion.hpp"
 #include "analysis/closure/samples/fit/steps.hpp"
 #include "analysis/closure/samples/loop/loop.hpp"
+#include "analysis/closure/samples/model/gaps.hpp"
 #include "analysis/closure/samples/residual/rate_beat.hpp"
 #include "analysis/closure/samples/screen/known.hpp"
 
@@ -72,10 +73,14 @@ void tie_to_motion(Step& step, const SampleSeries& series) {
 
 }  // namespace
 
-/// All rows but those at the ends of the record for which a witness has no values at all lags. At the start more rows
-/// are left out, since a narrow motion remembers what the witness does not explain there.
+/// All rows but those at gaps, and those at the ends of the record for which a witness has no values at all lags. At
+/// the start more rows are left out, since a narrow motion remembers what the witness does not explain there.
 Rows SampleLoop::all_rows() const {
     Rows all(series_.size(), 1);
+    if (!series_.missing.empty()) {
+        const Rows gaps = rows_about_gaps(series_.missing);
+        for (std::size_t i = 0; i < all.size(); ++i) all[i] = gaps[i] ? 0 : 1;
+    }
     if (series_.witnesses.empty()) return all;
     const auto lags = static_cast<std::size_t>(witness_lags(series_.rate_hz));
     const std::size_t most = all.size() / options.samples.loop.edge_parts;
@@ -214,6 +219,27 @@ void SampleLoop::take_disturbed(Closure& closure) const {
     }
 }
 
+/// Spans of the record whose samples are missing, and a note.
+void SampleLoop::take_gaps(Closure& closure) const {
+    if (series_.missing.empty()) return;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < series_.missing.size(); ++i) {
+        if (!series_.missing[i]) continue;
+        ++count;
+        if (i == 0 || !series_.missing[i - 1]) {
+            closure.gaps.push_back({series_.time_s[i] - series_.interval_s, series_.time_s[i]});
+        }
+        closure.gaps.back().to_s = series_.time_s[i];
+    }
+    const Rows all = rows_about_gaps(series_.missing);
+    const auto left_out = std::count(all.begin(), all.end(), 1);
+    closure.notes.push_back(fmt::format(
+        "{} samples are missing in {} gap{}, the first at {:.6g} s; with the rows behind {} that find the angle again "
+        "{} of {} rows count for nothing",
+        count, closure.gaps.size(), closure.gaps.size() == 1 ? "" : "s", closure.gaps.front().from_s,
+        closure.gaps.size() == 1 ? "it" : "them", left_out, all.size()));
+}
+
 /// Fills in what is reported: errors on the held-out blocks, and parameters of a last fit to the whole record.
 void SampleLoop::finish(Closure& closure) {
     const SampleScore last = score(*now_.fit);
@@ -221,6 +247,7 @@ void SampleLoop::finish(Closure& closure) {
     closure.noise_floor = last.floor;
     closure.log_likelihood_gain = last.log_likelihood - score(*base_).log_likelihood;
     take_disturbed(closure);
+    take_gaps(closure);
     closure.residual.time_s = series_.time_s;
     for (std::size_t i = 0; i < series_.size(); ++i) {
         closure.residual.innovation.push_back(now_.fit->innovations()[i] * now_.fit->sd(i));

@@ -7,6 +7,7 @@
 #include <complex>
 
 #include "analysis/closure/options.hpp"
+#include "analysis/closure/samples/model/gaps.hpp"
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
@@ -16,8 +17,10 @@ namespace ringlock::closure {
 
 namespace {
 
+/// Whether two of the values that are there differ.
 bool changes(const std::vector<double>& values) {
-    return std::any_of(values.begin(), values.end(), [&](double v) { return v != values.front(); });
+    const auto first = std::find_if(values.begin(), values.end(), [](double v) { return !std::isnan(v); });
+    return std::any_of(first, values.end(), [&](double v) { return !std::isnan(v) && v != *first; });
 }
 
 /// Greatest common divisor of numbers that are known to `tolerance`.
@@ -112,6 +115,55 @@ std::vector<double> slopes(const std::vector<double>& values) {
     return all;
 }
 
+/// Increments of the samples, NaN where one of those that they are made of is missing.
+void take_increments(const record::Record& record, SampleSeries& series) {
+    const record::Samples& samples = *record.samples;
+    if (samples.kind == record::SampleKind::angle_increment_arcsec) {
+        series.increment = samples.values;
+        return;
+    }
+    series.counted = samples.kind == record::SampleKind::quarter_count;
+    const scenario::Scenario standard;
+    series.scale_factor_assumed = series.counted && !record.declared.scale_factor_arcsec;
+    series.scale_factor_arcsec = record.declared.scale_factor_arcsec.value_or(standard.gyro.scale_factor_arcsec);
+    for (std::size_t k = 1; k < samples.size(); ++k) {
+        series.increment.push_back(series.counted ? 0.25 * series.scale_factor_arcsec *
+                                                        static_cast<double>(samples.counts[k] - samples.counts[k - 1])
+                                                  : samples.values[k] - samples.values[k - 1]);
+    }
+}
+
+/// Fills the gaps and marks their rows. Of angles the rotation during a gap is known, of increments it is lost.
+void take_gaps(const record::Samples& samples, SampleSeries& series) {
+    Rows missing(series.size(), 0);
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < missing.size(); ++i) {
+        missing[i] = std::isnan(series.increment[i]) ? 1 : 0;
+        count += missing[i];
+    }
+    for (auto& [name, values] : series.witnesses) {
+        for (std::size_t i = 0; i < missing.size(); ++i) {
+            if (std::isnan(values[i])) missing[i] = 1;
+        }
+        bridge_gaps(values);
+    }
+    bridge_gaps(series.temperature_change_k);
+    if (static_cast<double>(count) > options.samples.record.most_missing * static_cast<double>(missing.size())) {
+        throw InputError(
+            fmt::format("/samples: {} of {} increments are missing; the closed loop needs half of them. Cut the record "
+                        "to a part with fewer gaps",
+                        count, missing.size()));
+    }
+    if (count > 0 && samples.kind == record::SampleKind::angle_arcsec) {
+        std::vector<double> angle = samples.values;
+        bridge_gaps(angle);
+        for (std::size_t i = 0; i < series.size(); ++i) series.increment[i] = angle[i + 1] - angle[i];
+    } else if (count > 0) {
+        fill_gaps(series.increment);
+    }
+    if (std::find(missing.begin(), missing.end(), 1) != missing.end()) series.missing = std::move(missing);
+}
+
 }  // namespace
 
 SampleSeries prepare_samples(const record::Record& record) {
@@ -120,28 +172,13 @@ SampleSeries prepare_samples(const record::Record& record) {
     SampleSeries series;
     series.rate_hz = samples.rate_hz;
     series.interval_s = 1.0 / samples.rate_hz;
-    std::size_t first = 0;
-    if (samples.kind == record::SampleKind::angle_increment_arcsec) {
-        series.increment = samples.values;
-    } else {
-        series.counted = samples.kind == record::SampleKind::quarter_count;
-        const scenario::Scenario standard;
-        series.scale_factor_assumed = series.counted && !record.declared.scale_factor_arcsec;
-        series.scale_factor_arcsec = record.declared.scale_factor_arcsec.value_or(standard.gyro.scale_factor_arcsec);
-        first = 1;
-        for (std::size_t k = 1; k < samples.size(); ++k) {
-            series.increment.push_back(series.counted
-                                           ? 0.25 * series.scale_factor_arcsec *
-                                                 static_cast<double>(samples.counts[k] - samples.counts[k - 1])
-                                           : samples.values[k] - samples.values[k - 1]);
-        }
-    }
+    take_increments(record, series);
+    const std::size_t first = samples.size() - series.increment.size();
     const std::size_t n = series.increment.size();
     if (samples.size() < record::fewest_samples_to_close) {
         throw InputError(fmt::format("/samples: {} of them are too few for the closed loop; at least {} are needed",
                                      samples.size(), record::fewest_samples_to_close));
     }
-    if (!changes(series.increment)) throw InputError("/samples: they never change; there is nothing to fit");
     for (std::size_t i = 0; i < n; ++i) {
         series.time_s.push_back(samples.t0_s + static_cast<double>(i + first) * series.interval_s);
     }
@@ -154,6 +191,8 @@ SampleSeries prepare_samples(const record::Record& record) {
             series.witnesses.emplace_back(name, std::move(cut));
         }
     }
+    take_gaps(samples, series);
+    if (!changes(series.increment)) throw InputError("/samples: they never change; there is nothing to fit");
     if (series.temperature_change_k.empty() && !record.temperature_c.empty() && changes(record.temperature_c.value)) {
         for (const double t : series.time_s) series.temperature_change_k.push_back(record.temperature_c.at(t));
     }

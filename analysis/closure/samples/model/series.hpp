@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/closure/types.hpp"
 #include "analysis/record/record.hpp"
 
 namespace ringlock::closure {
@@ -13,6 +14,8 @@ struct SampleSeries {
     double interval_s = 0.0;
     std::vector<double> time_s;                                          ///< at the end of each increment
     std::vector<double> increment;                                       ///< [arcsec]
+    Rows missing;                                                        ///< 1 where the record has a gap, which was
+                                                                         ///< filled; empty where it has none
     std::vector<std::pair<std::string, std::vector<double>>> witnesses;  ///< accelerations that change
     std::vector<double> temperature_change_k;                            ///< since the start; empty where there is none
     std::vector<double> temperature_slope_k_per_s;                       ///< of that; empty where there is none
@@ -30,7 +33,8 @@ struct SampleSeries {
     std::size_t size() const { return increment.size(); }
 };
 
-/// Throws InputError where the record has too few samples or none that change.
+/// Throws InputError where the record has too few samples, none that change or too many that are missing. Samples that
+/// are missing are filled in and marked.
 SampleSeries prepare_samples(const record::Record& record);
 
 /// Steps that values come in.
