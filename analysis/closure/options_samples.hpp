@@ -307,6 +307,9 @@ struct SampleContestOptions {
     /// The course of jumps is searched stretch by stretch and loses a part of what they explain: a random rate must
     /// explain more than jumps by a tie, and by this share of its own merit.
     double lost_of_jumps = 0.1;
+    /// Length of a record from which a trend is distinguished from a random rate that does not pass by itself [s]. In
+    /// five seconds a random walk shows no more than one slow move.
+    double trend_determined_s = 30.0;
     /// Sources of a resampled record are the same within this [of the record's rate].
     double same_source = 1e-3;
     /// Sources faster than this cannot be distinguished from others that make the same pattern [of the record's rate].

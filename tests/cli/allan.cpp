@@ -226,7 +226,7 @@ TEST_F(AllanCommand, KindsAndUnitsAgree) {
         EXPECT_GT(a["noise_upper_limits_95"][key], 0.0) << key;
     }
     const Outcome text = run(write(increments) + " --rate 2 --kind increment --unit arcsec");
-    EXPECT_THAT(text.out, HasSubstr("bias instability B   not resolved, < "));
+    EXPECT_THAT(text.out, HasSubstr("bias instability B     not resolved, < "));
     EXPECT_THAT(text.out, HasSubstr("oadev [deg/h]"));
 }
 
@@ -253,7 +253,14 @@ TEST_F(AllanCommand, WrongInputEndsWithTwoAndSaysWhy) {
     expect(data + " --rate 10 --kind freq", "'freq'");
     expect(data + " --rate 20 --kind rate", "contradicts --rate 20");
     expect(data + " --rate 0 --kind rate", "positive");
-    expect(data + " --rate 10 --kind rate --unit arcsec", "deg/h, deg/s, rad/s");
+    expect(data + " --rate 10 --kind rate --unit arcsec", "deg/h, arcsec/s");
+    expect(data + " --rate 10 --kind rate --unit counts", "needs --scale");
+    expect(data + " --rate 10 --kind rate --unit counts --scale 2", "needs its unit");
+    expect(data + " --rate 10 --kind rate --scale 2", "needs --unit");
+    expect(data + " --rate 10 --kind rate --unit dps --scale 0", "positive");
+    expect(data + " --rate 10 --kind rate --arw-unit 'deg/sqrt(h)'", "needs --unit");
+    expect(data + " --rate 10 --kind rate --unit dps --arw-unit furlong", "deg/s/sqrt(Hz)");
+    expect(data + " --rate 10 --kind rate --unit mg --arw-unit 'deg/sqrt(h)'", "accelerometer");
     expect(data + " --rate 10 --kind rate --unit furlong", "'furlong'");
     expect(data + " --rate 10 --kind rate --dev oadev,pdev", "'pdev' is not known; there are adev, oadev, mdev");
     expect(data + " --rate 10 --kind rate --bias maybe", "--bias");
@@ -264,6 +271,43 @@ TEST_F(AllanCommand, WrongInputEndsWithTwoAndSaysWhy) {
     expect(data + " --kind rate", "--rate");
     expect("absent.txt --rate 10 --kind rate", "absent.txt");
     expect(write({1}) + " --rate 10 --kind rate", "at least 2");
+}
+
+// One record in the units of each instrument: the numbers differ by the factors of docs/units.md alone.
+TEST_F(AllanCommand, InstrumentsHaveUnitsOfTheirOwn) {
+    const std::string data = write(test::simulate_angle({.n = 0.3}, 4000, 0.5, 7));
+    const auto json_of = [&](const std::string& options) {
+        return nlohmann::json::parse(run(data + " --rate 2 --kind phase --json " + options).out);
+    };
+    const auto gyro = json_of("--unit arcsec --arw-unit 'deg/h/sqrt(Hz)'");
+    const double n_deg_rt_h = gyro["noise"]["arw_deg_rt_h"]["value"];
+    EXPECT_EQ(gyro["instrument"], "gyro");
+    EXPECT_EQ(gyro["noise"]["arw_unit"], "deg/h/sqrt(Hz)");
+    EXPECT_DOUBLE_EQ(gyro["noise"]["arw"]["value"], 60.0 * n_deg_rt_h);
+    const auto accelerometer = json_of("--unit m/s --arw-unit 'm/s^2/sqrt(Hz)'");
+    EXPECT_EQ(accelerometer["unit"], "m/s^2");
+    EXPECT_NEAR(accelerometer["noise"]["vrw_m_s_rt_h"]["value"], 3600.0 * n_deg_rt_h, 1e-9);
+    EXPECT_NEAR(accelerometer["noise"]["arw"]["value"], 60.0 * n_deg_rt_h, 1e-9);
+    const auto clock = json_of("--unit s");
+    EXPECT_TRUE(clock["unit"].is_null());
+    EXPECT_EQ(clock["instrument"], "clock");
+    EXPECT_NEAR(clock["noise"]["white_frequency_rt_s"]["value"], 60.0 * n_deg_rt_h, 1e-9);
+    // The estimator does not depend on the unit.
+    const auto nanoseconds = json_of("--unit ns");
+    EXPECT_NEAR(nanoseconds["noise"]["white_frequency_rt_s"]["value"].get<double>() * 1e9, 60.0 * n_deg_rt_h, 1e-6);
+    const auto counts = json_of("--unit counts --scale 2.5arcsec");
+    EXPECT_NEAR(counts["noise"]["arw_deg_rt_h"]["value"], 2.5 * n_deg_rt_h, 1e-9);
+}
+
+TEST_F(AllanCommand, TheUnitOfAColumnMustAgree) {
+    const auto path = directory_ / "named.csv";
+    std::ofstream(path) << "rate_deg_h,w_rad_s\n1,2\n2,1\n1,3\n3,1\n";
+    const std::string data = "'" + path.string() + "' --rate 10 --kind rate --tau 1";
+    EXPECT_EQ(run(data + " --column rate_deg_h --unit deg/h").status, 0);
+    const Outcome r = run(data + " --column w_rad_s --unit deg/s");
+    EXPECT_EQ(r.status, 2);
+    EXPECT_THAT(r.err, HasSubstr("w_rad_s"));
+    EXPECT_THAT(r.err, HasSubstr("contradicts --unit deg/s"));
 }
 
 // Rows and columns of a table are what they are in a file of their own, streamed or not.

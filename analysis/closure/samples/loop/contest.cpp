@@ -59,6 +59,8 @@ class Contest {
     Shared fitted(const SampleState& state, SampleCandidate candidate) const;
     Shared judged(const SampleState& state, SampleCandidate candidate, SampleFit fit) const;
     Shared placed(Shared first, const SampleModel& all) const;
+    void add_weak_random(const std::vector<SampleCandidate>& candidates, const std::vector<Shared>& all, double least,
+                         std::vector<CandidateSet>& as_likely) const;
     std::vector<Shared> contenders(const SampleState& state, std::vector<SampleCandidate> candidates) const;
     SampleState beside(const SampleState& state, const SampleCandidate& contender) const;
     std::vector<CandidateSet> sets(const std::vector<Shared>& all,
@@ -323,6 +325,22 @@ double Contest::bar(const CandidateSet& set, const std::vector<Rival>& rivals, s
     return most;
 }
 
+/// Adds a random rate that does not pass by itself to what is as likely as a trend. In a short record the two differ by
+/// little: a random walk of which the record shows no more than one slow move passes as a trend first.
+void Contest::add_weak_random(const std::vector<SampleCandidate>& candidates, const std::vector<Shared>& all,
+                              double least, std::vector<CandidateSet>& as_likely) const {
+    const double duration_s = series_.interval_s * static_cast<double>(series_.size());
+    if (duration_s >= options.samples.contest.trend_determined_s) return;
+    for (const SampleCandidate& candidate : candidates) {
+        if (!is_random_rate(*candidate.effect)) continue;
+        const bool known =
+            std::any_of(all.begin(), all.end(), [&](const Shared& c) { return c->effect == candidate.effect; });
+        if (known) continue;
+        const Shared weak = fitted(now_, candidate);
+        if (weak->merit > least) as_likely.push_back({{weak}, weak->merit, weak->p_value});
+    }
+}
+
 /// True if one of two effects of different kinds still improves the fit when the other is present. Two such effects are
 /// not alternatives, even if their merit is equal.
 bool Contest::beside_each_other(const SampleCandidate& a, const SampleCandidate& b) const {
@@ -492,6 +510,7 @@ SampleChoice Contest::choose() {
         const bool tied_random = set.members.size() == 1 && set.random() && set.merit > least_random;
         if (set.merit > least || tied_random) as_likely.push_back(set);
     }
+    if (slow) add_weak_random(candidates, all, least_random, as_likely);
     SampleChoice choice;
     // Of several, what most of those as likely have in them.
     std::ptrdiff_t most = -1;
