@@ -134,8 +134,13 @@ void screen_noises(const SampleFit& now, const SampleContext& in, std::vector<Sa
             }
             slow.push_back(std::move(rate));
         }
-        const auto score = now.score(slow);
-        if (chi2_tail(score.chi2, score.rank) > options.samples.screen.random_rate_p) return;
+        const auto moves = [&](const std::vector<std::vector<double>>& cosines) {
+            const auto score = now.score(cosines);
+            return chi2_tail(score.chi2, score.rank) <= options.samples.screen.random_rate_p;
+        };
+        // Of a random walk a short record shows one slow move at most, the first cosine.
+        const bool is_short = duration_s < options.samples.contest.trend_determined_s;
+        if (!moves(slow) && !(is_short && moves({slow.front()}))) return;
     }
     if (!now.model().walk) {
         SampleModel model = now.model();
