@@ -1,7 +1,7 @@
 // Hundreds of records with known truth, which the closed loop reads blind.
 //
 //   bench_closure FOLDER [--share S] [--only KIND] [--multiple M] [--effect E,F] [--without E,F] [--device NAME]
-//                 [--direct] [--seed N] [--series N]
+//                 [--direct] [--seed N] [--series N] [--length S]
 //
 // FOLDER gets records.csv (a row a record), deviations.csv (estimates less truth, in standard errors), confusion.csv
 // and the tables of the page: figures.md, misses.md, confusion.md, calibration.md. A share S of 0.1 makes a tenth of
@@ -9,7 +9,8 @@
 // kinds that no other has. --effect and --without say which effects of the library are drawn, --multiple at which
 // multiple of their detection limits, --device whose constants stand in place of the paper's in nulls, single effects
 // and pairs, --direct that all records are by the integration of the equation of motion. A share above 1 makes more
-// records of a kind. tools/closure puts the tables into the page.
+// records of a kind, --length records of S seconds in place of 16 000 turns, but none with effects that the library
+// does not have. tools/closure puts the tables into the page.
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
@@ -45,6 +46,12 @@ bool shows(const std::string& effect, const Condition& condition) {
     return effect != "scale_factor_error" || condition.moving;
 }
 
+void take_length(const Command& command, Case& of) {
+    if (!command.length_s) return;
+    of.turns =
+        static_cast<std::size_t>(std::lround(static_cast<double>(of.turns) * *command.length_s / duration_s(of)));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -63,6 +70,7 @@ int main(int argc, char** argv) {
         for (std::size_t k = 0; k < command.scaled(520); ++k) {
             Case of{.kind = Kind::null, .truth = {}, .condition = &conditions[k % conditions.size()]};
             of.gyro = command.gyro;
+            take_length(command, of);
             add(std::move(of));
         }
     }
@@ -79,6 +87,7 @@ int main(int argc, char** argv) {
                     while (!shows(effect, *condition)) condition = &conditions[turn++ % conditions.size()];
                     Case of{.kind = Kind::single, .truth = {}, .multiple = multiple, .condition = condition};
                     of.gyro = command.gyro;
+                    take_length(command, of);
                     pick(effect, multiple, of);
                     add(std::move(of));
                 }
@@ -92,6 +101,7 @@ int main(int argc, char** argv) {
                 if (!shows(effects[a], condition) || !shows(effects[b], condition)) continue;
                 Case of{.kind = Kind::pair, .truth = {}, .multiple = 2.0, .condition = &condition};
                 of.gyro = command.gyro;
+                take_length(command, of);
                 pick(effects[a], 2.0, of);
                 pick(effects[b], 2.0, of);
                 add(std::move(of));
@@ -102,6 +112,7 @@ int main(int argc, char** argv) {
     const auto another = [&](Kind kind, double multiple, std::initializer_list<std::string> in) {
         Case of{.kind = kind, .truth = {}, .multiple = multiple, .condition = &other_gyro};
         of.seed = first_seed + cases.size();
+        take_length(command, of);
         const double length_s = duration_s(of);
         for (const std::string& effect : in) {
             of.truth.push_back(
@@ -132,10 +143,10 @@ int main(int argc, char** argv) {
             }
         }
     }
-    if (command.wants(Kind::foreign)) {
+    if (command.wants(Kind::foreign) && !command.length_s) {
         for (Case& of : foreign_cases(command.scaled(12), command.series)) cases.push_back(std::move(of));
     }
-    if (command.wants(Kind::mixed)) {
+    if (command.wants(Kind::mixed) && !command.length_s) {
         std::size_t next = 0;
         std::uint64_t seed = seeds_of_series * command.series + 70000;
         for (Case& of : foreign_cases(command.scaled(6), command.series)) {
@@ -154,7 +165,8 @@ int main(int argc, char** argv) {
     });
     // Neighbours by the same way of making: the generator takes several records at a time.
     std::stable_sort(cases.begin(), cases.end(), [](const Case& a, const Case& b) { return a.direct > b.direct; });
-    Tables tables(command.folder, cases.size(), "rad", "16 000 turns");
+    const std::string length = command.length_s ? fmt::format("{:g} s", *command.length_s) : "16 000 turns";
+    Tables tables(command.folder, cases.size(), "rad", length.c_str());
     constexpr std::size_t together = 8;
     oneapi::tbb::parallel_for(std::size_t{0}, (cases.size() + together - 1) / together, [&](std::size_t group) {
         const std::size_t first = group * together;
