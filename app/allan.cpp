@@ -8,6 +8,7 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "analysis/allan/running_deviation.hpp"
 #include "analysis/noise/fit.hpp"
@@ -17,12 +18,14 @@
 #include "analysis/record/series.hpp"
 #include "analysis/report/plot.hpp"
 #include "app/allan_figure.hpp"
+#include "app/allan_noise.hpp"
 #include "app/allan_output.hpp"
 #include "app/arguments.hpp"
 #include "app/coefficient_table.hpp"
 #include "app/command.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
+#include "app/text_arguments.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::app {
@@ -41,7 +44,9 @@ struct AllanArguments {
     double confidence = allan::Options{}.confidence;
     std::string bias = "published";
     std::string time;
+    TextArguments text;
     std::string plot;
+    bool follow_links = false;
     bool stream = false;
     bool json = false;
 };
@@ -75,7 +80,7 @@ std::optional<quantity::Unit> parse_unit(const AllanArguments& a, allan::Kind ki
 void check_unit(const AllanArguments& a, const record::SeriesInfo& series) {
     if (a.unit.empty() || a.unit == "counts" || !a.scale.empty()) return;
     const bool is_rate = parse_kind(a.kind) == allan::Kind::rate;
-    quantity::refuse_contradiction(a.data, series.column, std::nullopt, quantity::unit_for(a.unit, is_rate, "--unit"),
+    quantity::refuse_contradiction(a.data, series.column, series.unit, quantity::unit_for(a.unit, is_rate, "--unit"),
                                    "--unit");
 }
 
@@ -158,7 +163,13 @@ Request checked(const AllanArguments& a) {
     const auto named = [](const std::string& name) {
         return name.empty() ? std::nullopt : std::optional<std::string>(name);
     };
-    out.series = {.path = a.data, .column = named(a.column), .time = named(a.time), .rate_hz = a.rate_hz};
+    out.series = {.path = a.data,
+                  .column = named(a.column),
+                  .time = named(a.time),
+                  .rate_hz = a.rate_hz,
+                  .follow_links = a.follow_links};
+    out.series.time_unit = time_unit_of(a.text, out.series.time.has_value());
+    out.series.text = text_options(a.text);
     if (!a.stream) return out;
     if (out.taus.word != "octave") {
         throw InputError(fmt::format("--tau {}: a record that is not kept (--stream) has octaves only", a.tau));
@@ -177,15 +188,6 @@ void check_size(const AllanArguments& a, allan::Kind kind, std::int64_t points, 
         fmt::format("{}: {} data; a deviation needs at least {}", a.data, data, kind == allan::Kind::phase ? 3 : 2));
 }
 
-/// The noise of the longest part without gaps.
-void fit_longest(const allan::Phase& phase, AllanOutput& out) {
-    const auto longest =
-        std::max_element(phase.stretches.begin(), phase.stretches.end(),
-                         [](const allan::Stretch& l, const allan::Stretch& r) { return l.size() < r.size(); });
-    out.noise = noise::fit_noise(std::span(phase.x).subspan(longest->begin, longest->size()), out.tau0_s);
-    if (!phase.whole()) out.noise_stretch = longest->size();
-}
-
 void from_record(const AllanArguments& a, const Request& request, AllanOutput& out) {
     record::Series series = record::read_series(request.series);
     check_rate(a, series);
@@ -199,6 +201,7 @@ void from_record(const AllanArguments& a, const Request& request, AllanOutput& o
     out.n = series.n - series.missing;
     const auto points = static_cast<std::int64_t>(phase.x.size());
     check_size(a, request.kind, points, out.n);
+    std::vector<double> values = request.unit ? std::move(series.values) : std::vector<double>();
     series = {};
     for (const allan::Estimator estimator : request.estimators) {
         const std::vector<std::int64_t> factors = factors_for(request.taus, estimator, points);
@@ -215,7 +218,7 @@ void from_record(const AllanArguments& a, const Request& request, AllanOutput& o
         }
         out.deviations.push_back(std::move(deviation));
     }
-    if (request.unit) fit_longest(phase, out);
+    if (request.unit) search_and_fit(std::move(values), phase, request.kind, request.scale(), out);
 }
 
 void from_stream(const AllanArguments& a, const Request& request, AllanOutput& out) {
@@ -279,7 +282,10 @@ void add_allan(CLI::App& root) {
     auto a = std::make_shared<AllanArguments>();
     CLI::App* sub =
         root.add_subcommand("allan", "Allan deviation with intervals, and gyro noise coefficients, of a data file");
-    sub->add_option("DATA", a->data, "Text, HDF5 or rlg-record; - for text from standard input")->required();
+    sub->add_option("DATA", a->data,
+                    "Text, packed or not, HDF5 or rlg-record; - for text from standard input. Example: ringlock allan "
+                    "log.csv --rate 200 --kind rate --unit rad/s --column gx --time t --time-unit ns")
+        ->required();
     sub->add_option("--rate", a->rate_hz, "Samples a second [Hz]")->required();
     sub->add_option("--kind", a->kind, "phase | increment | rate: what the numbers are (never guessed)");
     sub->add_option("--unit", a->unit,
@@ -296,7 +302,9 @@ void add_allan(CLI::App& root) {
                     "Name or number (from 1) of the column, or path of an HDF5 dataset; of a two-dimensional one "
                     "'PATH[I,:]' is row I, 'PATH[:,J]' column J (from 0)");
     sub->add_option("--time", a->time,
-                    "Column or dataset, named alike, of the times of the samples [s]: rows left out become gaps");
+                    "Column or dataset, named alike, of the times of the samples: rows left out become gaps; of text "
+                    "two columns, as in sec,nsec or date,time");
+    add_text_options(*sub, a->text);
     sub->add_option("--dev", a->dev, "Deviations, comma between: " + known_deviations())->capture_default_str();
     sub->add_option("--tau", a->tau, "octave | decade | all | averaging factors M,M,...")->capture_default_str();
     sub->add_option("--confidence", a->confidence, "Level of the intervals of the deviation")->capture_default_str();
@@ -304,6 +312,7 @@ void add_allan(CLI::App& root) {
                     "published | exact | raw: by what the variances of the total family are divided (docs/allan.md)")
         ->check(CLI::IsMember({"published", "exact", "raw"}))
         ->capture_default_str();
+    add_follow_links(*sub, a->follow_links);
     sub->add_flag("--stream", a->stream, "Keep no record: octaves of oadev and ohdev in little memory");
     sub->add_option("--plot", a->plot, "also draw the figure into this SVG file");
     sub->add_flag("--json", a->json, "One JSON object on standard output");

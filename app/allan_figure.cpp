@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "analysis/noise/allan_variance.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -68,7 +69,7 @@ report::Figure allan_figure(const AllanOutput& out) {
                                    [](const auto& d) { return allan::traits(d.estimator).time; });
     const bool rates = std::none_of(out.deviations.begin(), out.deviations.end(),
                                     [](const auto& d) { return allan::traits(d.estimator).time; });
-    figure.title = fmt::format("{}, column {}", out.data, out.column);
+    figure.title = fmt::format("{}, column {}", printable(out.data), printable(out.column));
     figure.x_label = "averaging time tau [s]";
     figure.y_label = "deviation";
     if (out.instrument) {

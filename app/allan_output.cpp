@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string_view>
+
+#include "engine/core/json_text.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -56,6 +59,18 @@ noise::Coefficient walk_in(const WalkUnit& unit, const noise::NoiseFit& fit) {
         }
     }
     return {};
+}
+
+/// Rows count data from 1.
+Json finding_json(const findings::Finding& found, double tau0_s) {
+    Json json = {{"kind", findings::name_of(found.kind)},
+                 {"row", found.row + 1},
+                 {"rows", found.length},
+                 {"time_s", number(static_cast<double>(found.row) * tau0_s)},
+                 {"size", number(found.size)},
+                 {"size_sigma", found.kind == findings::Kind::wrap ? Json(nullptr) : number(found.size_sigma)}};
+    if (found.kind == findings::Kind::jump) json["of"] = found.of_angle ? "angle" : "rate";
+    return json;
 }
 
 Json coefficient_json(const noise::Coefficient& c, bool described) {
@@ -114,6 +129,43 @@ std::string coefficient_line(std::string_view name, const noise::Coefficient& c,
 
 std::string estimate_line(std::string_view name, const noise::Estimate& e, std::string_view unit) {
     return fmt::format("  {:<22} {:>11.5g}  ({:.5g} to {:.5g}) {}\n", name, e.value, e.lo, e.hi, unit);
+}
+
+std::string finding_line(const findings::Finding& found, const AllanOutput& out) {
+    const std::string row = fmt::format("  row {:<9} {:<9}", found.row + 1, findings::name_of(found.kind));
+    switch (found.kind) {
+        case findings::Kind::outlier:
+            return fmt::format("{} off by {:.4g} {}, {:.3g} standard errors\n", row, found.size, out.input_unit,
+                               found.size_sigma);
+        case findings::Kind::jump: {
+            const std::string per = !found.of_angle && out.kind == "phase" ? "/s" : "";
+            return fmt::format("{} of the {} by {:.4g} {}{} at {:.6g} s, {:.3g} standard errors\n", row,
+                               found.of_angle ? "angle" : "rate", found.size, out.input_unit, per,
+                               static_cast<double>(found.row) * out.tau0_s, found.size_sigma);
+        }
+        case findings::Kind::variance:
+            return fmt::format("{} of {} data is {:.3g} times that of the rest\n", row, found.length, found.size);
+        case findings::Kind::wrap:
+            return fmt::format("{} by {:.10g} {}\n", row, found.size, out.input_unit);
+        case findings::Kind::repeated:
+            return fmt::format("{} {} times {:.6g}\n", row, found.length, found.size);
+        case findings::Kind::clipped:
+            break;
+    }
+    return fmt::format("{} {} data at {:.6g}, an end of their range\n", row, found.length, found.size);
+}
+
+/// What the record has beside noise, the first of each kind where there are many.
+std::string findings_text(const AllanOutput& out) {
+    if (out.findings.empty()) return "";
+    constexpr std::size_t most = 20;
+    std::string text = "\nFound in the data (rows counted from 1; missing data count):\n";
+    for (std::size_t i = 0; i < std::min(most, out.findings.size()); ++i) text += finding_line(out.findings[i], out);
+    if (out.findings.size() > most) text += fmt::format("  and {} more\n", out.findings.size() - most);
+    text +=
+        "The coefficients are estimated without outliers, jumps and wraps; the deviations are of the data as they "
+        "are.\n";
+    return text;
 }
 
 /// The coefficients, or why they are withheld.
@@ -188,6 +240,8 @@ std::string allan_json(const AllanOutput& out) {
         if (!d.without_terms.empty())
             json["factors_without_terms"][std::string(allan::name(d.estimator))] = d.without_terms;
     }
+    json["findings"] = Json::array();
+    for (const findings::Finding& found : out.findings) json["findings"].push_back(finding_json(found, out.tau0_s));
     // All keys are always there, null where there is nothing to say.
     json["noise"] = nullptr;
     json["noise_upper_limits_95"] = nullptr;
@@ -199,12 +253,13 @@ std::string allan_json(const AllanOutput& out) {
     json["noise_fitted_points"] = out.noise_stretch ? Json(*out.noise_stretch) : Json(nullptr);
     json["noise_fitted_every"] = out.noise_thinning ? Json(*out.noise_thinning) : Json(nullptr);
     json["noise_withheld"] = out.noise && !out.noise->described ? Json(out.noise->reason) : Json(nullptr);
-    return json.dump() + "\n";
+    return json_text(json) + "\n";
 }
 
 std::string allan_text(const AllanOutput& out) {
-    std::string text = fmt::format("{}, column {}: {} data ({}{}{}), tau0 = {:.6g} s\n", out.data, out.column, out.n,
-                                   out.kind, out.input_unit.empty() ? "" : ", ", out.input_unit, out.tau0_s);
+    std::string text =
+        fmt::format("{}, column {}: {} data ({}{}{}), tau0 = {:.6g} s\n", printable(out.data), printable(out.column),
+                    out.n, out.kind, out.input_unit.empty() ? "" : ", ", out.input_unit, out.tau0_s);
     if (out.missing > 0) {
         text += fmt::format("{} data are missing: terms that need them are left out\n", out.missing);
     }
@@ -233,6 +288,7 @@ std::string allan_text(const AllanOutput& out) {
             text += "the record is too short for a term\n";
         }
     }
+    text += findings_text(out);
     return text + (out.noise ? noise_text(out) : "\nNo noise coefficients: say the unit of the data with --unit.\n");
 }
 

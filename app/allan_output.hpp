@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "analysis/allan/allan.hpp"
+#include "analysis/findings/finding.hpp"
 #include "analysis/noise/fit.hpp"
 #include "analysis/quantity/unit.hpp"
 #include "app/coefficient_table.hpp"
@@ -33,6 +34,7 @@ struct AllanOutput {
     double tau0_s = 0.0;
     double confidence = 0.0;
     std::vector<DeviationOutput> deviations;
+    std::vector<findings::Finding> findings;  ///< by row, counted from 0; sizes in the unit of the data
     std::optional<noise::NoiseFit> noise;
     std::optional<std::size_t>
         noise_stretch;  ///< points of the part without gaps that was fitted, where there are gaps

@@ -18,10 +18,12 @@
 #include "analysis/study/result/result_file.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/failure.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/study_output.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::app {
@@ -47,7 +49,7 @@ void need_angle_records(const std::string& file, const study::Study& study, cons
     throw InputError(fmt::format(
         "{}: --tau needs the angle records, which were not stored (output.angle_record = false). Run the scenario "
         "anew with output.tau_s = [{}], which is computed while the study runs, or with output.angle_record = true",
-        file, times));
+        printable(file), times));
 }
 
 /// Fills in the nearest whole number of samples. Who asks for the interval between samples or for half of the duration
@@ -110,35 +112,59 @@ void add_asked(const std::string& file, const study::Experiment& experiment, std
     for (std::size_t i = 0; i < family.size(); ++i) summary.arms[i].asked = family[i].front().points;
 }
 
+/// All that is asked for of a result, summed up.
+struct Analysis {
+    std::vector<study::Summary> summaries;
+    std::vector<AveragingTime> asked;
+};
+
+Analysis evaluate(const AnalyzeArguments& arguments, const study::Experiment& experiment) {
+    const auto estimators = arguments.dev.empty() ? std::vector<allan::Estimator>{} : parse_deviations(arguments.dev);
+    Analysis out;
+    if (arguments.tau) out.asked = parse_averaging_times("--tau", *arguments.tau);
+    // Points with angle records have one schedule.
+    out.asked = averaging_times(arguments.file, experiment.points.front(), std::move(out.asked));
+    out.summaries = study::summarise(experiment);
+    for (std::size_t point = 0; point < out.summaries.size(); ++point) {
+        if (!estimators.empty()) {
+            auto family = study::family_deviations(arguments.file, experiment, point, estimators);
+            for (std::size_t i = 0; i < family.size(); ++i) {
+                out.summaries[point].arms[i].family = std::move(family[i]);
+            }
+        }
+        add_asked(arguments.file, experiment, point, out.asked, out.summaries[point]);
+    }
+    return out;
+}
+
+std::string text_of(const study::Experiment& experiment, const Analysis& analysis,
+                    const store::Provenance& provenance) {
+    std::string text = experiment_text(experiment, analysis.summaries, provenance);
+    for (std::size_t point = 0; point < analysis.summaries.size(); ++point) {
+        const study::Summary& summary = analysis.summaries[point];
+        std::string more;
+        // The text of a study has its deviations already.
+        if (experiment.has_design()) more += family_text(summary);
+        if (!analysis.asked.empty()) more += asked_text(experiment.points[point], summary, analysis.asked);
+        if (experiment.has_design() && !more.empty()) text += fmt::format("\nPoint {}:", point + 1);
+        text += more;
+    }
+    return text;
+}
+
 void analyze(const AnalyzeArguments& arguments) {
     refuse_same_files(
         {{"OUT.h5", arguments.file, NamedFile::Use::input}, {"--plot", arguments.plot, NamedFile::Use::output}});
     const std::unique_ptr<AtomicPath> figure = claim_figure(arguments.plot);
-    const auto estimators = arguments.dev.empty() ? std::vector<allan::Estimator>{} : parse_deviations(arguments.dev);
-    auto asked = arguments.tau ? parse_averaging_times("--tau", *arguments.tau) : std::vector<AveragingTime>{};
-    const study::Experiment experiment = study::read_result(arguments.file);
-    // Points with angle records have one schedule.
-    asked = averaging_times(arguments.file, experiment.points.front(), std::move(asked));
-    const store::Provenance provenance = study::read_provenance(arguments.file);
-    std::vector<study::Summary> summaries = study::summarise(experiment);
-    for (std::size_t point = 0; point < summaries.size(); ++point) {
-        if (!estimators.empty()) {
-            auto family = study::family_deviations(arguments.file, experiment, point, estimators);
-            for (std::size_t i = 0; i < family.size(); ++i) summaries[point].arms[i].family = std::move(family[i]);
-        }
-        add_asked(arguments.file, experiment, point, asked, summaries[point]);
-    }
-    if (figure) report::write_svg(*figure, experiment_figure(experiment, summaries));
-    if (arguments.json) return put(experiment_json(experiment, summaries, provenance));
-    std::string text = experiment_text(experiment, summaries, provenance);
-    for (std::size_t point = 0; point < summaries.size(); ++point) {
-        std::string more;
-        // The text of a study has its deviations already.
-        if (experiment.has_design()) more += family_text(summaries[point]);
-        if (!asked.empty()) more += asked_text(experiment.points[point], summaries[point], asked);
-        if (experiment.has_design() && !more.empty()) text += fmt::format("\nPoint {}:", point + 1);
-        text += more;
-    }
+    std::string text;
+    name_file_of_failure(arguments.file, [&] {
+        const study::Experiment experiment = study::read_result(arguments.file);
+        const store::Provenance provenance = study::read_provenance(arguments.file);
+        const Analysis analysis = evaluate(arguments, experiment);
+        if (figure) report::write_svg(*figure, experiment_figure(experiment, analysis.summaries));
+        text = arguments.json ? experiment_json(experiment, analysis.summaries, provenance)
+                              : text_of(experiment, analysis, provenance);
+    });
     put(text);
 }
 

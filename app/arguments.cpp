@@ -143,6 +143,12 @@ std::vector<AveragingTime> parse_averaging_times(std::string_view option, const 
     return out;
 }
 
+void add_follow_links(CLI::App& command, bool& follow) {
+    command.add_flag("--follow-links", follow,
+                     "also read other files that an HDF5 file leads to: by external links, raw data outside of it or "
+                     "virtual datasets; without it only the file that was named is read");
+}
+
 double duration_s(std::string_view option, const std::string& text) {
     const auto time = averaging_time(text);
     if (!time || !time->time_s || !(*time->time_s > 0.0)) {

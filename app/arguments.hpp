@@ -29,6 +29,9 @@ struct Changes {
 /// Adds --set.
 void add_settings(CLI::App& command, Changes& changes);
 
+/// Adds --follow-links.
+void add_follow_links(CLI::App& command, bool& follow);
+
 /// The scenario of the file with these changes.
 scenario::Scenario load_scenario(const std::string& file, const Changes& changes);
 

@@ -24,6 +24,8 @@
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
+#include "engine/core/json_text.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::app {
 
@@ -72,7 +74,7 @@ class Batch {
             const auto [there, fresh] = names.emplace(result, scenario);
             if (!fresh) {
                 throw InputError(fmt::format("{} and {}: would both be written into {}; run them into two folders",
-                                             there->second, scenario, result.string()));
+                                             printable(there->second), printable(scenario), printable(result)));
             }
             Entry& entry = entries_.emplace_back();
             entry.scenario = scenario;
@@ -81,7 +83,7 @@ class Batch {
         std::error_code error;
         fs::create_directories(folder_, error);
         if (error) {
-            throw InputError(fmt::format("{}: cannot be made: {}", folder_.string(), error.message()));
+            throw InputError(fmt::format("{}: cannot be made: {}", printable(folder_), error.message()));
         }
     }
 
@@ -137,7 +139,7 @@ class Batch {
             throw InputError(
                 fmt::format("{}: the results will take {:.1f} GB, and the disk has {:.1f} GB; run fewer, or "
                             "set output.angle_record=false with --set",
-                            folder_.string(), static_cast<double>(bytes + largest) * 1e-9,
+                            printable(folder_), static_cast<double>(bytes + largest) * 1e-9,
                             static_cast<double>(space.available) * 1e-9));
         }
         if (!arguments_.quiet) {
@@ -164,8 +166,8 @@ class Batch {
         Entry& entry = entries_[i];
         if (!arguments_.quiet) {
             const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - start_;
-            tell(fmt::format("batch: {} of {}, {}; {} gone, about {} left\n", i + 1, entries_.size(), entry.scenario,
-                             duration_text(gone.count()), duration_text(expected_left_s())));
+            tell(fmt::format("batch: {} of {}, {}; {} gone, about {} left\n", i + 1, entries_.size(),
+                             printable(entry.scenario), duration_text(gone.count()), duration_text(expected_left_s())));
         }
         RunArguments one = arguments_;
         one.out = entry.result.string();
@@ -197,7 +199,7 @@ class Batch {
         } catch (const Interrupted&) {
             throw;
         } catch (const std::bad_alloc&) {
-            fail(fmt::format("{}: out of memory", entry.scenario));
+            fail(fmt::format("{}: out of memory", printable(entry.scenario)));
         } catch (const std::exception& error) {
             fail(error.what());
         }
@@ -223,22 +225,24 @@ class Batch {
         return {{"runs", runs}};
     }
 
-    void write_summary() const { write_text(folder_ / "batch.json", json().dump(2) + "\n"); }
+    void write_summary() const { write_text(folder_ / "batch.json", json_text(json(), 2) + "\n"); }
 
     void finish() const {
         write_summary();
-        if (arguments_.json) return put(json().dump() + "\n");
+        if (arguments_.json) return put(json_text(json()) + "\n");
         std::size_t scenario_width = 8;
-        for (const Entry& entry : entries_) scenario_width = std::max(scenario_width, entry.scenario.size());
+        for (const Entry& entry : entries_) {
+            scenario_width = std::max(scenario_width, printable(entry.scenario).size());
+        };
         std::string text = fmt::format("{:<{}}  {:<15}  {:>10}  {:>12}  {}\n", "scenario", scenario_width, "state",
                                        "gyros", "time", "result");
         for (const Entry& entry : entries_) {
             const bool has_result = entry.state == State::done || entry.state == State::finished_before;
             const std::string first_line = entry.error.substr(0, entry.error.find('\n'));
-            text += fmt::format("{:<{}}  {:<15}  {:>10}  {:>12}  {}\n", entry.scenario, scenario_width,
+            text += fmt::format("{:<{}}  {:<15}  {:>10}  {:>12}  {}\n", printable(entry.scenario), scenario_width,
                                 name_of(entry.state), entry.gyros,
                                 entry.state == State::done ? duration_text(entry.wall_s) : "",
-                                has_result ? entry.result.string() : first_line);
+                                has_result ? printable(entry.result) : first_line);
         }
         put(text);
     }

@@ -4,6 +4,7 @@
 #include <malloc.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstddef>
 #include <exception>
 #include <filesystem>
@@ -23,12 +24,15 @@
 #include "analysis/record/record.hpp"
 #include "analysis/report/chain_page.hpp"
 #include "analysis/report/closure_page.hpp"
+#include "app/arguments.hpp"
 #include "app/command.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
 #include "app/stage_progress.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/json_text.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/scenario/parse.hpp"
 
 namespace ringlock::app {
@@ -51,6 +55,7 @@ struct ClosureArguments {
     bool same_chain = false;
     std::string model;
     std::string out;
+    bool follow_links = false;
     bool json = false;
     bool quiet = false;
 };
@@ -109,7 +114,8 @@ void refuse_to_lose(const ClosureArguments& arguments) {
 }
 
 record::Record record_of(const std::string& path, const ClosureArguments& arguments) {
-    record::Record record = record::read_record(path);
+    record::Record record =
+        record::read_record(path, arguments.follow_links ? store::Links::follow : store::Links::refuse);
     tell_warnings(path, record);
     if (!arguments.model.empty()) declare(record.declared, scenario::parse_file(arguments.model));
     return record;
@@ -152,7 +158,7 @@ Printed report_of(const std::string& path, const record::Record& record, const c
     Printed printed{closure::to_json(closure), closure::to_text(closure), {}};
     printed.json["closed"] = closure::to_json(closure::closed_scenario(record, closure));
     if (folder.empty()) return printed;
-    const std::string name = std::filesystem::path(path).filename().string();
+    const std::string name = printable(std::filesystem::path(path).filename());
     monitor.tell("simulating the closed model");
     const closure::Predictive predictive =
         closure::check_predictive(record, closure, closure::options.report.most_simulations, monitor);
@@ -173,7 +179,7 @@ Printed close_one(const ClosureArguments& arguments, const closure::Monitor& mon
     try {
         closure = closure::close_loop(record, monitor);
     } catch (const InputError& error) {
-        throw InputError(fmt::format("{}: {}", path, error.what()));
+        throw InputError(fmt::format("{}: {}", printable(path), error.what()));
     }
     return report_of(path, record, closure, arguments.out, monitor);
 }
@@ -182,19 +188,20 @@ Printed close_several(const ClosureArguments& arguments, const closure::Monitor&
     std::vector<record::Record> records;
     for (const std::string& path : arguments.records) records.push_back(record_of(path, arguments));
     std::vector<closure::NamedRecord> named;
-    for (std::size_t r = 0; r < records.size(); ++r) named.push_back({arguments.records[r], &records[r]});
+    for (std::size_t r = 0; r < records.size(); ++r) named.push_back({printable(arguments.records[r]), &records[r]});
     const closure::Chain chain = closure::close_chain(named, monitor);
     Printed all{
         {{"chain", closure::to_json(chain)}, {"records", nlohmann::json::array()}}, closure::to_text(chain), {}};
     const std::vector<std::filesystem::path> folders = folders_of(arguments);
     for (std::size_t r = 0; r < records.size(); ++r) {
         const std::string& path = arguments.records[r];
-        const closure::Monitor of_record{[&](const std::string& stage) { monitor.tell(path + ": " + stage); },
-                                         [&](double share) { monitor.tell_share(share); }};
+        const closure::Monitor of_record{
+            [&](const std::string& stage) { monitor.tell(printable(path) + ": " + stage); },
+            [&](double share) { monitor.tell_share(share); }};
         Printed one = report_of(path, records[r], chain.records[r].closure,
                                 folders.empty() ? std::filesystem::path() : folders[r], of_record);
         all.json["records"].push_back(std::move(one.json));
-        all.text += fmt::format("\n{}\n{}\n{}", path, std::string(path.size(), '='), one.text);
+        all.text += fmt::format("\n{}\n{}\n{}", printable(path), std::string(path.size(), '='), one.text);
         if (!all.not_written) all.not_written = one.not_written;
     }
     if (!folders.empty() && !all.not_written) {
@@ -223,6 +230,7 @@ void add_closure(CLI::App& root) {
     command->add_option("-o,--output", arguments->out,
                         "folder for report.md with its figures, closed.toml, closure.h5 and closure.json; with "
                         "--same-chain each record has a folder in it");
+    add_follow_links(*command, arguments->follow_links);
     command->add_flag("--json", arguments->json, "one JSON object on standard output");
     command->add_flag("-q,--quiet", arguments->quiet, "no progress on standard error");
     command->callback([arguments] {
@@ -233,7 +241,7 @@ void add_closure(CLI::App& root) {
                                        [&](double share) { progress.show_share(share); }};
         const Printed printed =
             arguments->same_chain ? close_several(*arguments, monitor) : close_one(*arguments, monitor);
-        put(arguments->json ? printed.json.dump() + "\n" : printed.text);
+        put(arguments->json ? json_text(printed.json) + "\n" : printed.text);
         if (printed.not_written) std::rethrow_exception(printed.not_written);
     });
 }

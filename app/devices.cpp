@@ -10,6 +10,7 @@
 
 #include "app/command.hpp"
 #include "app/output.hpp"
+#include "engine/core/json_text.hpp"
 #include "engine/core/units.hpp"
 #include "engine/gyro/theory.hpp"
 #include "engine/scenario/active_effects.hpp"
@@ -93,7 +94,7 @@ void add_devices(CLI::App& root) {
     command->callback([json] {
         std::vector<scenario::NamedDevice> devices;
         for (const scenario::DeviceFile& file : scenario::device_files()) devices.push_back(read_device(file));
-        put(*json ? json_of(devices).dump(2) + "\n" : table_of(devices));
+        put(*json ? json_text(json_of(devices), 2) + "\n" : table_of(devices));
     });
 }
 

@@ -11,6 +11,7 @@
 #include "analysis/study/reader_facts.hpp"
 #include "analysis/study/sensitivity.hpp"
 #include "app/study_output.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::app {
@@ -68,9 +69,9 @@ std::string heading(const study::Experiment& experiment, const store::Provenance
             ? fmt::format("{} points of {} gyros", experiment.points.size(), experiment.scenario.ensemble.gyros)
             : fmt::format("{} gyros, {:.6g} s each", first.gyros.size(), duration_s);
     const auto turns = static_cast<double>(experiment.turns());
-    return fmt::format("{}: {}, seed {}\n{} turns in {:.1f} s ({:.3g} a second)\n{}\n", provenance.scenario_file, what,
-                       experiment.scenario.ensemble.seed, experiment.turns(), provenance.wall_s,
-                       turns / provenance.wall_s, reader_text(experiment));
+    return fmt::format("{}: {}, seed {}\n{} turns in {:.1f} s ({:.3g} a second)\n{}\n",
+                       printable(provenance.scenario_file), what, experiment.scenario.ensemble.seed, experiment.turns(),
+                       provenance.wall_s, turns / provenance.wall_s, reader_text(experiment));
 }
 
 std::string walk_cell(const study::Figure& arw) {
@@ -230,9 +231,9 @@ std::string experiment_text(const study::Experiment& experiment, const std::vect
                             const store::Provenance& provenance) {
     std::string growth;
     if (experiment.growth) {
-        growth =
-            wrapped(fmt::format("stopped at {} gyros: {}", experiment.growth->looks.back(), experiment.growth->why)) +
-            "\n\n";
+        growth = wrapped(fmt::format("stopped at {} gyros: {}", experiment.growth->looks.back(),
+                                     printable(experiment.growth->why))) +
+                 "\n\n";
     }
     return heading(experiment, provenance) + growth +
            (experiment.has_design() ? design_text(experiment, summaries)

@@ -9,6 +9,7 @@
 #include "app/output.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::app {
 
@@ -20,6 +21,25 @@ int complain(int status, std::string_view what) {
 }
 
 }  // namespace
+
+void name_file_of_failure(const std::string& file, const std::function<void()>& work) {
+    try {
+        work();
+    } catch (const InputError&) {
+        throw;
+    } catch (const RunError&) {
+        throw;
+    } catch (const Interrupted&) {
+        throw;
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& error) {
+        throw InputError(
+            fmt::format("{}: holds a value that cannot be evaluated ({}); it is damaged, or was written by "
+                        "another program",
+                        printable(file), printable(error.what())));
+    }
+}
 
 int tell_failure(const std::exception_ptr& failure) {
     try {

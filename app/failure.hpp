@@ -1,5 +1,7 @@
 #pragma once
 #include <exception>
+#include <functional>
+#include <string>
 
 namespace ringlock::app {
 
@@ -12,6 +14,10 @@ inline constexpr int ended_by_signal = 128;  ///< and more: the number of the si
 struct EndQuietly {
     int status = run_failed;
 };
+
+/// Does something with what a file holds. What is thrown by a library, which does not know the file, becomes an
+/// InputError that names it: a value in it is beyond what can be evaluated.
+void name_file_of_failure(const std::string& file, const std::function<void()>& work);
 
 /// Tells on standard error what went wrong, and returns the exit status for it.
 int tell_failure(const std::exception_ptr& failure);

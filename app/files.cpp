@@ -7,6 +7,7 @@
 
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -41,7 +42,7 @@ void refuse_same_files(const std::vector<NamedFile>& files) {
             if (!is_file(*one) || !is_file(*other) || !are_same(one->path, other->path)) continue;
             throw InputError(
                 fmt::format("{} {} and {} {} are the same file, which would be {}; nothing was done. Name another file",
-                            other->argument, other->path.string(), one->argument, one->path.string(),
+                            other->argument, printable(other->path), one->argument, printable(one->path),
                             one->use == other->use ? "written twice" : "read and written over"));
         }
     }

@@ -11,11 +11,14 @@
 #include "analysis/quantity/unit.hpp"
 #include "analysis/record/mapped_columns.hpp"
 #include "analysis/record/record.hpp"
+#include "app/arguments.hpp"
 #include "app/command.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
+#include "app/text_arguments.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::app {
 
@@ -29,7 +32,9 @@ struct ImportArguments {
     std::string scale;
     double rate_hz = 0.0;
     std::string time;
+    TextArguments text;
     std::vector<std::string> declared;
+    bool follow_links = false;
 };
 
 /// "NAME=QUANTITY" in its two parts; the name itself may hold equals signs.
@@ -55,6 +60,7 @@ quantity::Unit gyro_unit(const ImportArguments& arguments, bool of_rate) {
 record::MappedLog parse_log(const ImportArguments& arguments) {
     record::MappedLog log;
     log.path = arguments.data;
+    log.follow_links = arguments.follow_links;
     for (const std::string& column : arguments.columns) log.columns.push_back(parse_column(column));
     if (!(arguments.rate_hz > 0.0) || !std::isfinite(arguments.rate_hz)) {
         throw InputError(fmt::format("--rate {}: with --column, give the number of samples a second, above zero",
@@ -62,6 +68,8 @@ record::MappedLog parse_log(const ImportArguments& arguments) {
     }
     log.rate_hz = arguments.rate_hz;
     if (!arguments.time.empty()) log.time = arguments.time;
+    log.time_unit = time_unit_of(arguments.text, log.time.has_value());
+    log.text = text_options(arguments.text);
     bool needs_unit = false;
     bool of_rate = false;
     for (const record::MappedColumn& mapped : log.columns) {
@@ -98,12 +106,16 @@ record::Record read(const ImportArguments& arguments) {
     for (const auto& [option, given] : {std::pair{"--unit", !arguments.unit.empty()},
                                         {"--scale", !arguments.scale.empty()},
                                         {"--rate", arguments.rate_hz != 0.0},
-                                        {"--time", !arguments.time.empty()}}) {
+                                        {"--time", !arguments.time.empty()},
+                                        {"--time-unit", !arguments.text.time_unit.empty()},
+                                        {"--header", !arguments.text.header.empty()},
+                                        {"--skip", !arguments.text.skip.empty()},
+                                        {"--delimiter", !arguments.text.delimiter.empty()}}) {
         if (!given) continue;
         throw InputError(fmt::format(
             "{}: needs --column NAME=QUANTITY; without it the file itself says what its columns are", option));
     }
-    return record::read_record(arguments.data);
+    return record::read_record(arguments.data, arguments.follow_links ? store::Links::follow : store::Links::refuse);
 }
 
 }  // namespace
@@ -114,7 +126,8 @@ void add_import(CLI::App& root) {
     command
         ->add_option("DATA", arguments->data,
                      "samples as text with lines \"# key = value\", a header and rows; with --column a log of any "
-                     "layout, as ringlock allan reads them")
+                     "layout, as ringlock allan reads them. Example: ringlock import log.csv -o log.h5 --column "
+                     "gx=rate --unit deg/s --rate 200 --time t --time-unit ms")
         ->required();
     command->add_option("-o,--output", arguments->out, "record to write (.h5)")->required();
     command
@@ -131,7 +144,11 @@ void add_import(CLI::App& root) {
                         "size of one number of the gyro's column: with --unit counts a number and a unit "
                         "(0.25arcsec), with another unit a plain factor");
     command->add_option("--rate", arguments->rate_hz, "samples a second [Hz]");
-    command->add_option("--time", arguments->time, "column of the times of the samples [s]: rows left out are told of");
+    add_follow_links(*command, arguments->follow_links);
+    command->add_option("--time", arguments->time,
+                        "column of the times of the samples, or two, as in sec,nsec: samples whose rows are left out "
+                        "are missing in the record");
+    add_text_options(*command, arguments->text);
     command
         ->add_option("--declare", arguments->declared,
                      "KEY=NUMBER: a constant of the gyro as /declared has it, such as scale_factor_arcsec=0.6 or "
@@ -147,7 +164,7 @@ void add_import(CLI::App& root) {
         refuse_errors(arguments->data, record);
         tell_warnings(arguments->data, record);
         writer.write(record);
-        put(fmt::format("{}: {}\n", arguments->out, record_text(record)));
+        put(fmt::format("{}: {}\n", printable(arguments->out), record_text(record)));
     });
 }
 

@@ -14,6 +14,7 @@
 #include "app/output.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/core/version.hpp"
 
 namespace {
@@ -31,8 +32,8 @@ void refuse_unknown_command(const CLI::App& root, int argc, char** argv) {
         if (command->get_name() == argv[1]) return;
         known += (known.empty() ? "" : ", ") + command->get_name();
     }
-    throw ringlock::InputError(
-        fmt::format("\"{}\" is no command; there are {}; ringlock --help says what they do", argv[1], known));
+    throw ringlock::InputError(fmt::format("\"{}\" is no command; there are {}; ringlock --help says what they do",
+                                           ringlock::printable(argv[1]), known));
 }
 
 }  // namespace
@@ -40,6 +41,7 @@ void refuse_unknown_command(const CLI::App& root, int argc, char** argv) {
 int main(int argc, char** argv) {
     namespace app = ringlock::app;
     app::hold_standard_streams();
+    app::remember_arguments({argv, static_cast<std::size_t>(argc)});
     // A file that outgrows its limit (ulimit -f) is an error of writing, told and cleaned up after like a full disk.
     std::signal(SIGXFSZ, SIG_IGN);
     CLI::App root{
@@ -50,7 +52,7 @@ int main(int argc, char** argv) {
     root.set_version_flag("--version", fmt::format("ringlock {} ({})", ringlock::version(), ringlock::git_hash()));
     root.require_subcommand(1);
     root.failure_message([](const CLI::App*, const CLI::Error& error) {
-        return fmt::format("ringlock: error: {}; --help says what there is\n", error.what());
+        return fmt::format("ringlock: error: {}; --help says what there is\n", ringlock::printable(error.what()));
     });
     root.footer("Exit status: 0 done; 1 the run failed; 2 the input or the command line is wrong.");
     app::add_run(root, {argv, static_cast<std::size_t>(argc)});

@@ -21,6 +21,7 @@
 #include "app/study_output.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/simd/target.hpp"
 
 namespace ringlock::app {
@@ -96,7 +97,7 @@ void merge(const MergeArguments& arguments, std::span<const char* const> command
     check_interrupt();
     writer.finish(plan, summaries, provenance);
     if (!arguments.quiet) {
-        tell(fmt::format("result: {} of {} shards, which can be removed\n", writer.path().string(), files.size()));
+        tell(fmt::format("result: {} of {} shards, which can be removed\n", printable(writer.path()), files.size()));
     }
 }
 

@@ -4,29 +4,60 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/core/waiting.hpp"
 
 namespace ringlock::app {
 
+namespace {
+
+/// Arguments of the command line that would break the lines of a message.
+std::vector<std::string> broken_arguments;
+
+/// A message in which nothing controls the terminal. Newlines are ours, unless they are those of an argument.
+std::string safe(std::string_view message) {
+    std::string text(message);
+    for (const std::string& argument : broken_arguments) {
+        const std::string shown = printable(argument);
+        for (std::size_t at = 0; (at = text.find(argument, at)) != std::string::npos; at += shown.size()) {
+            text.replace(at, argument.size(), shown);
+        }
+    }
+    return without_controls(text);
+}
+
+}  // namespace
+
+void remember_arguments(std::span<const char* const> arguments) {
+    for (const std::string_view argument : arguments.subspan(std::min<std::size_t>(1, arguments.size()))) {
+        if (argument.find_first_of("\n\t") != std::string_view::npos) broken_arguments.emplace_back(argument);
+    }
+}
+
 void put(std::string_view text) {
-    const int error = write_all(STDOUT_FILENO, text);
+    const int error = write_all(STDOUT_FILENO, safe(text));
     if (error == 0) return;
     throw RunError(fmt::format("standard output cannot be written: {}", std::generic_category().message(error)));
 }
 
-void tell(std::string_view text) {
+void draw_over(std::string_view text) {
     if (std::fwrite(text.data(), 1, text.size(), stderr) != text.size()) std::clearerr(stderr);
 }
+
+void tell(std::string_view text) { draw_over(safe(text)); }
 
 std::unique_ptr<AtomicPath> claim_figure(const std::filesystem::path& path) {
     if (path.empty()) return nullptr;
     if (path.extension() != ".svg") {
-        throw InputError(fmt::format("--plot {}: the name of a figure must end in .svg", path.string()));
+        throw InputError(fmt::format("--plot {}: the name of a figure must end in .svg", printable(path)));
     }
     return std::make_unique<AtomicPath>(path);
 }

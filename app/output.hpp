@@ -1,18 +1,27 @@
 #pragma once
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string_view>
 
 #include "engine/core/atomic_path.hpp"
 
 namespace ringlock::app {
 
-/// Writes to standard output, at once. Throws RunError where it cannot be written (a full disk, say): results that
-/// nobody can read are no success. Throws Interrupted where the user asks to stop while it is written.
+/// Keeps the command line, whose words may hold newlines, so that put() and tell() show these as "\x0a".
+void remember_arguments(std::span<const char* const> arguments);
+
+/// Writes to standard output, at once; what would control a terminal is written out, see printable(). Throws RunError
+/// where it cannot be written (a full disk, say): results that nobody can read are no success. Throws Interrupted where
+/// the user asks to stop while it is written.
 void put(std::string_view text);
 
-/// Writes to standard error what people may want to know. What nobody can read changes nothing about the run.
+/// Writes to standard error what people may want to know, likewise. What nobody can read changes nothing about the run.
 void tell(std::string_view text);
+
+/// Writes to standard error what controls the terminal: a line that is drawn anew. Foreign text in it has gone through
+/// printable().
+void draw_over(std::string_view text);
 
 /// Claims the figure of --plot, so that it is known before a run, not after it, that it cannot be written; no name is
 /// none. It must end in .svg: a figure replaces the file it finds. Throws InputError.

@@ -15,6 +15,7 @@
 #include "app/output.hpp"
 #include "app/record_output.hpp"
 #include "app/room.hpp"
+#include "engine/core/json_text.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -56,7 +57,7 @@ void run(const RecordArguments& arguments) {
         json["rate_hz"] = record.samples->rate_hz;
         json["duration_s"] = static_cast<double>(record.samples->size()) / record.samples->rate_hz;
     }
-    put(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+    put(json_text(json, 2) + "\n");
 }
 
 }  // namespace

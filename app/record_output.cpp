@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cmath>
 #include <string_view>
 #include <vector>
 
 #include "app/output.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -39,6 +42,9 @@ std::string record_text(const record::Record& record) {
         std::vector<std::string> names;
         for (const auto& witness : samples.witnesses) names.push_back(witness.first);
         if (!names.empty()) text += fmt::format(" with {}", fmt::join(names, ", "));
+        const auto missing =
+            std::count_if(samples.values.begin(), samples.values.end(), [](double v) { return std::isnan(v); });
+        if (missing > 0) text += fmt::format(", {} of them missing", missing);
         parts.push_back(text);
     }
     if (!record.temperature_c.empty()) parts.emplace_back("a temperature");
@@ -49,7 +55,7 @@ std::string record_text(const record::Record& record) {
 void tell_warnings(const std::string& path, const record::Record& record) {
     for (const record::Finding& finding : record::check(record)) {
         if (finding.severity != record::Severity::warning) continue;
-        tell(fmt::format("ringlock: warning: {}: {}: {}\n", path, finding.where, finding.what));
+        tell(fmt::format("ringlock: warning: {}: {}: {}\n", printable(path), printable(finding.where), finding.what));
     }
 }
 

@@ -29,6 +29,8 @@
 #include "app/room.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
+#include "engine/core/json_text.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/ensemble/progress.hpp"
 #include "engine/scenario/read_arms.hpp"
 #include "engine/simd/target.hpp"
@@ -87,7 +89,7 @@ void need_angles_at_turns(const study::GyroOfResult& of) {
                     "of the dither, where these have no outputs to compare with. Run its scenario with --set "
                     "reader.output_hz=0 into another result and replay that, which has the same gyros; `ringlock "
                     "record` writes the outputs of a reader",
-                    of.result.string(), scenario.reader.output_hz));
+                    printable(of.result), scenario.reader.output_hz));
 }
 
 std::int64_t gyro_of(const ReplayArguments& arguments, const study::Experiment& experiment, std::size_t point) {
@@ -200,7 +202,7 @@ std::string in_json(const Told& told, const store::Provenance& provenance) {
         {"samples_compared", told.compared ? figures.samples : 0},
         {"samples", told.replay.schedule().samples},
         {"wall_s", provenance.wall_s}};
-    return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    return json_text(json, 2) + "\n";
 }
 
 void run(const ReplayArguments& arguments, std::span<const char* const> command_line) {
@@ -245,7 +247,7 @@ void run(const ReplayArguments& arguments, std::span<const char* const> command_
     } else if (!arguments.quiet) {
         put(in_words(told));
     }
-    if (!arguments.quiet) tell(fmt::format("replay: {}\n", writer.path().string()));
+    if (!arguments.quiet) tell(fmt::format("replay: {}\n", printable(writer.path())));
 }
 
 }  // namespace

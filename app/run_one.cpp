@@ -37,6 +37,8 @@
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
+#include "engine/core/json_text.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/core/version.hpp"
 #include "engine/ensemble/progress.hpp"
 #include "engine/simd/target.hpp"
@@ -110,7 +112,7 @@ class Outcome {
         check_interrupt();
         writer.finish(experiment, summaries, provenance_);
         if (figure_) report::write_svg(*figure_, experiment_figure(experiment, summaries));
-        if (!arguments_.quiet) tell(fmt::format("result: {}\n", writer.path().string()));
+        if (!arguments_.quiet) tell(fmt::format("result: {}\n", printable(writer.path())));
     }
 
     /// A table that cannot be printed must not cost the result, but is a failure when that is safe.
@@ -197,10 +199,10 @@ void run_shard(const RunArguments& arguments, Task task, double every_s, Outcome
     const std::string file = claim.target().string();
     const std::string shard = parts::to_string(*session.task().shard);
     if (arguments.json) {
-        put(nlohmann::ordered_json{{"shard", shard}, {"gyros", session.all_gyros()}, {"file", file}}.dump() + "\n");
+        put(json_text(nlohmann::ordered_json{{"shard", shard}, {"gyros", session.all_gyros()}, {"file", file}}) + "\n");
     } else if (!arguments.quiet) {
-        tell(fmt::format("shard {}: {}; ringlock merge {} makes the result of all shards\n", shard, file,
-                         session.task().result.string()));
+        tell(fmt::format("shard {}: {}; ringlock merge {} makes the result of all shards\n", shard, printable(file),
+                         printable(session.task().result)));
     }
 }
 
@@ -292,7 +294,7 @@ bool run_one(const RunArguments& arguments, const std::string& scenario_file, co
     if (arguments.resume && is_there) {
         // Whatever a run kept beside its result is of no use any more.
         parts::Folder(task.target, manifest, parts::Beginning::resume, say).remove();
-        tell(fmt::format("{}: is finished; there is nothing to resume\n", task.target.string()));
+        tell(fmt::format("{}: is finished; there is nothing to resume\n", printable(task.target)));
         return false;
     }
     std::error_code unknown;
@@ -300,7 +302,7 @@ bool run_one(const RunArguments& arguments, const std::string& scenario_file, co
         throw InputError(
             fmt::format("{}: the file is there and is no shard of this run; it is kept. Give another name "
                         "with -o, or remove it",
-                        task.target.string()));
+                        printable(task.target)));
     }
     if (shard) {
         run_shard(arguments, std::move(task), *every_s, std::move(outcome));

@@ -9,6 +9,7 @@
 #include "analysis/parts/shard.hpp"
 #include "app/output.hpp"
 #include "app/run_text.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/simd/lanes.hpp"
 
 namespace ringlock::app {
@@ -99,16 +100,16 @@ std::string Session::after(const std::string& what, bool all_kept) const {
         return text + fmt::format(
                           "; what its {} processes had finished is kept in {}: the same command with --resume "
                           "goes on from there",
-                          1 + task_.leader->members(), folder_.path().string());
+                          1 + task_.leader->members(), printable(folder_.path()));
     }
     if (gyros == 0) {
         text += ", nothing written";
     } else if (all_kept) {
         text += fmt::format("; {} of {} are kept in {}: the same command with --resume goes on from there", gyros,
-                            gyros_text(all_gyros_), folder_.path().string());
+                            gyros_text(all_gyros_), printable(folder_.path()));
     } else {
         text += fmt::format("; {} could not all be kept in {}: --resume goes on from what is there", gyros_text(gyros),
-                            folder_.path().string());
+                            printable(folder_.path()));
     }
     if (const auto block_s = checkpoints_.mean_block_s()) {
         text += fmt::format("; a block of up to {} takes a thread about {}, and blocks under way are lost",

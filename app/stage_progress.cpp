@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "app/output.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::app {
 
@@ -22,7 +23,7 @@ StageProgress::~StageProgress() {
         ticking_.request_stop();
         ticking_.join();
     }
-    if (shown_ && terminal_) tell("\r\033[K");
+    if (shown_ && terminal_) draw_over("\r\033[K");
 }
 
 void StageProgress::show(const std::string& stage) {
@@ -51,7 +52,7 @@ void StageProgress::draw() {
     if (quiet_ || stage_.empty()) return;
     std::string line = fmt::format("{:4.0f} s  {}", seconds(Clock::now() - start_), stage_);
     if (const auto left = left_s()) line += fmt::format(", {:.0f} %, about {:.0f} s left", 100.0 * share_, *left);
-    tell(terminal_ ? "\r\033[K" + line + " ..." : line + "\n");
+    draw_over(terminal_ ? "\r\033[K" + printable(line) + " ..." : printable(line) + "\n");
     drawn_ = Clock::now();
     shown_ = true;
 }

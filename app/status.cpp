@@ -19,6 +19,8 @@
 #include "app/output.hpp"
 #include "app/run_text.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/json_text.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::app {
 
@@ -91,15 +93,15 @@ std::vector<StatusLine> lines_of(const fs::path& out) {
         add(parts::shard_file(out, shard), "shard " + parts::to_string(shard));
     }
     if (lines.empty()) {
-        throw InputError(
-            fmt::format("{}: there is no result of that name, no run that writes it and no shard of it", out.string()));
+        throw InputError(fmt::format("{}: there is no result of that name, no run that writes it and no shard of it",
+                                     printable(out)));
     }
     return lines;
 }
 
 std::string text_of(const StatusLine& line) {
-    std::string text = fmt::format("{}: {}", line.name, line.state);
-    if (!line.holder.empty()) text += fmt::format(" by {}", line.holder);
+    std::string text = fmt::format("{}: {}", printable(line.name), line.state);
+    if (!line.holder.empty()) text += fmt::format(" by {}", printable(line.holder));
     if (line.of_gyros) {
         text += fmt::format(", {} of {}", line.gyros, gyros_text(*line.of_gyros));
     } else if (line.gyros > 0) {
@@ -110,7 +112,7 @@ std::string text_of(const StatusLine& line) {
         text += line.status->left_s ? fmt::format(", {} left", duration_text(*line.status->left_s)) : "";
     }
     if (line.state != "finished" && line.status && !line.status->last_block.empty()) {
-        text += fmt::format("; last block: {}", line.status->last_block);
+        text += fmt::format("; last block: {}", printable(line.status->last_block));
     }
     if (line.state == "interrupted") text += "; run --resume goes on";
     return text + "\n";
@@ -138,7 +140,7 @@ void tell_status(const StatusArguments& arguments) {
     }
     auto outputs = nlohmann::ordered_json::array();
     for (const StatusLine& line : lines) outputs.push_back(json_of(line));
-    put(nlohmann::ordered_json{{"outputs", outputs}}.dump() + "\n");
+    put(json_text(nlohmann::ordered_json{{"outputs", outputs}}) + "\n");
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include "analysis/study/reader_facts.hpp"
 #include "analysis/study/sensitivity.hpp"
 #include "app/study_output.hpp"
+#include "engine/core/json_text.hpp"
 #include "engine/scenario/read_arms.hpp"
 
 namespace ringlock::app {
@@ -342,7 +343,7 @@ std::string experiment_json(const study::Experiment& experiment, const std::vect
     } else {
         add_summary(json, experiment.points.front(), summaries.front());
     }
-    return json.dump(2) + "\n";
+    return json_text(json, 2) + "\n";
 }
 
 }  // namespace ringlock::app

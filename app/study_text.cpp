@@ -5,6 +5,7 @@
 
 #include "analysis/report/table.hpp"
 #include "app/study_output.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/ensemble/schedule.hpp"
 
 namespace ringlock::app {
@@ -218,7 +219,7 @@ std::string noise_text(const study::ArmSummary& arm) {
                        fmt::format("{:.3g}", predicted.angle_spread[i].arcsec),
                        optional_cell(seen.angle_spread[i].arcsec)});
     }
-    std::string notes = predicted.reason.empty() ? "" : fmt::format("({})\n", predicted.reason);
+    std::string notes = predicted.reason.empty() ? "" : fmt::format("({})\n", printable(predicted.reason));
     const std::string& why = arm.noise_effectiveness->not_randomised;
     if (!why.empty()) notes += fmt::format("warning: the injected noise does not randomise the turns: {}\n", why);
     return "\n" + table.text() + notes;

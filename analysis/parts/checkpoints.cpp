@@ -20,6 +20,7 @@
 #include "analysis/parts/status.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/core/system_text.hpp"
 
 namespace ringlock::parts {
@@ -120,7 +121,7 @@ Checkpoints::Checkpoints(const Folder& folder, const study::Experiment& plan, Op
         } catch (const InputError& error) {
             const fs::path aside = file.string() + ".damaged";
             tell_(fmt::format("{}; it is put aside as {}, and its gyros are simulated again", error.what(),
-                              aside.filename().string()));
+                              printable(aside.filename())));
             fs::rename(file, aside);
         }
     }
@@ -183,7 +184,7 @@ void Checkpoints::collect(std::span<study::Study> points, std::int64_t first, st
     throw RunError(
         fmt::format("{}: {} gyros from gyro {} on were simulated by another process, but are in no file that "
                     "it has reported",
-                    path_.string(), gaps.front().last - gaps.front().first, gaps.front().first));
+                    printable(path_), gaps.front().last - gaps.front().first, gaps.front().first));
 }
 
 std::vector<study::Stretch> Checkpoints::to_do() const {
@@ -284,7 +285,7 @@ void Checkpoints::keep_blocks(std::vector<Waiting>& blocks) {
 /// Brings a complete file to the disk and gives it its name, which is free.
 void Checkpoints::settle(const fs::path& partial, const fs::path& file) {
     while (const int error = sync(partial, O_RDONLY)) {
-        wait_out(fmt::format("{}: cannot be brought to the disk: {}", partial.string(), system_text(error)), error);
+        wait_out(fmt::format("{}: cannot be brought to the disk: {}", printable(partial), system_text(error)), error);
         // What the system could not write it may take for written from now on: only a copy is sure to be written.
         const fs::path copy = partial.string() + std::string(partial_suffix);
         try {
@@ -303,7 +304,7 @@ void Checkpoints::settle(const fs::path& partial, const fs::path& file) {
     }
     while (std::rename(partial.c_str(), file.c_str()) != 0) {
         const int error = errno;
-        wait_out(fmt::format("{}: cannot be named: {}", file.string(), system_text(error)), error);
+        wait_out(fmt::format("{}: cannot be named: {}", printable(file), system_text(error)), error);
     }
     // Some file systems cannot sync a folder; the name is in force all the same.
     sync(path_, O_RDONLY | O_DIRECTORY);
@@ -333,7 +334,7 @@ void Checkpoints::wait_out(const std::string& problem, int error) {
         } else if (!gone_) {
             gone_ = now;
         } else if (now - *gone_ > longest_without_folder) {
-            throw RunError(fmt::format("{}: the folder is gone", path_.string()));
+            throw RunError(fmt::format("{}: the folder is gone", printable(path_)));
         }
         if (!told_ || now - *told_ > between_complaints) {
             told_ = now;

@@ -19,6 +19,7 @@
 #include "analysis/parts/status.hpp"
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/core/system_text.hpp"
 
 namespace ringlock::parts {
@@ -131,7 +132,7 @@ Folder::Folder(const fs::path& output, const Manifest& manifest, Beginning begin
             throw InputError(
                 fmt::format("{}: holds finished gyros of a run of {} that was interrupted; go on with "
                             "--resume, or begin anew with --discard",
-                            path_.string(), output.string()));
+                            printable(path_), printable(output)));
         }
         if (beginning == Beginning::discard) {
             for (const fs::path& file : found) fs::remove(file);
@@ -151,7 +152,7 @@ Folder::Folder(const fs::path& output, const Manifest& manifest, Beginning begin
                     fmt::format("{}: holds finished gyros of another run, which cannot be resumed by this "
                                 "one; they differ in\n  {}\nRun what was run before, or begin anew with "
                                 "--discard",
-                                path_.string(), fmt::join(other, "\n  ")));
+                                printable(path_), fmt::join(other, "\n  ")));
             }
         }
         clear(tell);
@@ -177,28 +178,28 @@ void Folder::lock_or_refuse() {
                 throw InputError(
                     fmt::format("{}: cannot be made: {}; it keeps what is finished of a run. Name an output "
                                 "in a folder that can be written",
-                                path_.string(), system_text(errno)));
+                                printable(path_), system_text(errno)));
             }
             const std::vector<fs::path> there = contents(path_);
             if (!fs::is_directory(path_) || !std::all_of(there.begin(), there.end(), is_of_run)) {
                 throw InputError(fmt::format("{}: is there and is no folder of a run; it is kept. Name another output",
-                                             path_.string()));
+                                             printable(path_)));
             }
         }
         const int fd = open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
         if (fd < 0) {
             if (errno == ENOENT) continue;  // whoever held it has just removed it
-            throw InputError(fmt::format("{}: cannot be made: {}", lock.string(), system_text(errno)));
+            throw InputError(fmt::format("{}: cannot be made: {}", printable(lock), system_text(errno)));
         }
         if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
             const int error = errno;
             close(fd);
             if (error == EWOULDBLOCK) {
                 throw InputError(fmt::format("{}: is being written by {}; wait for it, or name another output with -o",
-                                             output_.string(), first_line(lock)));
+                                             printable(output_), first_line(lock)));
             }
             throw InputError(fmt::format("{}: cannot be locked: {}; name an output on a file system with locks",
-                                         lock.string(), system_text(error)));
+                                         printable(lock), system_text(error)));
         }
         if (has_name(fd, lock)) {
             lock_fd_ = fd;
@@ -212,7 +213,7 @@ void Folder::lock_or_refuse() {
         const int error = errno;
         remove();
         close(lock_fd_);
-        throw RunError(fmt::format("{}: cannot be written: {}", lock.string(), system_text(error)));
+        throw RunError(fmt::format("{}: cannot be written: {}", printable(lock), system_text(error)));
     }
 }
 
@@ -220,7 +221,7 @@ void Folder::clear(const Tell& tell) const {
     for (const fs::path& file : contents(path_)) {
         if (!file.filename().string().ends_with(partial_suffix)) continue;
         fs::remove(file);
-        tell(fmt::format("removed {}, which an interrupted run left unfinished", file.string()));
+        tell(fmt::format("removed {}, which an interrupted run left unfinished", printable(file)));
     }
 }
 

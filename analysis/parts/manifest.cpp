@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/error.hpp"
+#include "engine/core/json_text.hpp"
 #include "engine/core/version.hpp"
 #include "engine/scenario/differences.hpp"
 #include "engine/scenario/parse.hpp"
@@ -55,7 +56,7 @@ std::string to_json(const Manifest& manifest) {
                                 {"shard", nullptr},
                                 {"scenario", scenario::to_toml(manifest.scenario)}};
     if (manifest.shard) json["shard"] = to_string(*manifest.shard);
-    return json.dump(2) + "\n";
+    return json_text(json, 2) + "\n";
 }
 
 Manifest parse_manifest(std::string_view text, std::string_view from) try {
@@ -63,7 +64,7 @@ Manifest parse_manifest(std::string_view text, std::string_view from) try {
     if (json.at("format") != format_name) throw InputError(fmt::format("{}: is no part of a run of ringlock", from));
     if (json.at("format_version") != format_version) {
         throw InputError(fmt::format("{}: is of another version of ringlock (format {}, here {})", from,
-                                     json.at("format_version").dump(), format_version));
+                                     json_text(json.at("format_version")), format_version));
     }
     Manifest manifest;
     manifest.program_version = json.at("program_version");

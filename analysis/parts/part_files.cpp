@@ -9,6 +9,7 @@
 
 #include "analysis/parts/archive.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::parts {
 
@@ -32,17 +33,17 @@ std::string_view as_text(std::span<const std::byte> content) {
 Manifest read_manifest(const std::filesystem::path& file) {
     std::optional<Manifest> manifest;
     store::read_part(file, [&](store::RecordKind kind, std::span<const std::byte> content) {
-        if (kind == manifest_record) manifest = parse_manifest(as_text(content), file.string());
+        if (kind == manifest_record) manifest = parse_manifest(as_text(content), printable(file));
         return false;
     });
-    if (!manifest) throw InputError(fmt::format("{}: says not of which run it is", file.string()));
+    if (!manifest) throw InputError(fmt::format("{}: says not of which run it is", printable(file)));
     return *manifest;
 }
 
 double FinishedGyros::add_file(const std::filesystem::path& file) {
     const Manifest of = read_manifest(file);
     const std::vector<std::string> other = differences(of, manifest_);
-    if (!other.empty()) throw InputError(fmt::format("{}: is of another run: {}", file.string(), other.front()));
+    if (!other.empty()) throw InputError(fmt::format("{}: is of another run: {}", printable(file), other.front()));
     std::vector<std::pair<BlockName, std::int64_t>> found;
     double spent_s = 0.0;
     store::read_part(file, [&](store::RecordKind kind, std::span<const std::byte> content) {

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/simd/lanes.hpp"
 
 namespace ringlock::parts {
@@ -92,20 +93,20 @@ ShardSet::ShardSet(std::span<const std::filesystem::path> files)
     const std::vector<std::string> other = differences(manifest_, manifest_of(manifest_.scenario, {}));
     if (!other.empty()) {
         throw InputError(fmt::format("{}: was run by another program: {}; merge with that one, or run the shards again",
-                                     files.front().string(), fmt::join(other, "; ")));
+                                     printable(files.front()), fmt::join(other, "; ")));
     }
     for (const std::filesystem::path& file : files) {
         const Manifest manifest = read_manifest(file);
         if (!manifest.shard || manifest.shard->count != manifest_.shard.value_or(Shard{}).count) {
-            throw InputError(fmt::format("{}: is {}; all must be shards of one division, as {} is ({})", file.string(),
-                                         manifest.shard ? "shard " + to_string(*manifest.shard) : "no shard",
-                                         files.front().string(),
-                                         manifest_.shard ? to_string(*manifest_.shard) : "no shard"));
+            throw InputError(
+                fmt::format("{}: is {}; all must be shards of one division, as {} is ({})", printable(file),
+                            manifest.shard ? "shard " + to_string(*manifest.shard) : "no shard",
+                            printable(files.front()), manifest_.shard ? to_string(*manifest_.shard) : "no shard"));
         }
         const std::vector<std::string> unlike = differences(manifest_, manifest);
         if (!unlike.empty()) {
-            throw InputError(fmt::format("{}: is of another run than {}; they differ in\n  {}", file.string(),
-                                         files.front().string(), fmt::join(unlike, "\n  ")));
+            throw InputError(fmt::format("{}: is of another run than {}; they differ in\n  {}", printable(file),
+                                         printable(files.front()), fmt::join(unlike, "\n  ")));
         }
         wall_s_ += finished_.add_file(file);
     }

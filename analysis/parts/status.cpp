@@ -9,6 +9,8 @@
 
 #include "analysis/parts/folder.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/json_text.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/core/system_text.hpp"
 
 namespace ringlock::parts {
@@ -19,10 +21,10 @@ void replace_text(const std::filesystem::path& file, const std::string& text) {
     std::ofstream out(partial, std::ios::binary);
     out << text;
     out.close();
-    if (!out) throw RunError(fmt::format("{}: cannot be written: {}", file.string(), system_text(errno)));
+    if (!out) throw RunError(fmt::format("{}: cannot be written: {}", printable(file), system_text(errno)));
     std::error_code error;
     std::filesystem::rename(partial, file, error);
-    if (error) throw RunError(fmt::format("{}: cannot be named: {}", file.string(), error.message()));
+    if (error) throw RunError(fmt::format("{}: cannot be named: {}", printable(file), error.message()));
 }
 
 void write_status(const std::filesystem::path& folder, const Status& status) {
@@ -32,7 +34,7 @@ void write_status(const std::filesystem::path& folder, const Status& status) {
         {"left_s", nullptr},         {"last_block", status.last_block}};
     if (status.left_s) json["left_s"] = *status.left_s;
     try {
-        replace_text(folder / status_name, json.dump(2) + "\n");
+        replace_text(folder / status_name, json_text(json, 2) + "\n");
     } catch (const RunError&) {
         return;
     }

@@ -47,6 +47,7 @@ class Checker {
         for (const std::string& name : record_.ignored) {
             warn(name, "means nothing in a record and is left aside");
         }
+        check_gaps();
         return std::move(findings_);
     }
 
@@ -100,6 +101,50 @@ class Checker {
                 values[i], largest);
         });
         return bad.count == 0 && huge.count == 0;
+    }
+
+    /// As finite(), of samples, of which some may be missing: NaN. `there`: those that are not.
+    bool finite_or_missing(const std::string& column, std::span<const double> values, double largest,
+                           std::vector<double>& there) {
+        Tally missing;
+        std::size_t stretches = 0;
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            if (!std::isnan(values[i])) {
+                there.push_back(values[i]);
+                continue;
+            }
+            if (i == 0 || !std::isnan(values[i - 1])) ++stretches;
+            missing.note(i);
+        }
+        if (missing.count > 0) {
+            const bool too_many = 2 * missing.count > values.size();
+            findings_.push_back(
+                {row(column, missing.first),
+                 fmt::format("{} of {} samples are missing (NaN), in {} {}, of which this is the first{}",
+                             missing.count, values.size(), stretches, stretches == 1 ? "stretch" : "stretches",
+                             too_many ? "; a record must have at least half of them: cut it where they are" : ""),
+                 too_many ? Severity::error : Severity::warning});
+            if (too_many) return false;
+        }
+        std::vector<double> finite_values(values.begin(), values.end());
+        for (double& value : finite_values) value = std::isnan(value) ? 0.0 : value;
+        return finite(column, finite_values, largest);
+    }
+
+    /// Where a text leaves samples out, by its lines.
+    void check_gaps() {
+        constexpr std::size_t most = 20;
+        const std::string column = record_.samples ? name_of(record_.samples->kind) : "";
+        for (std::size_t i = 0; i < record_.gaps.size() && i < most; ++i) {
+            const Gap& gap = record_.gaps[i];
+            warn(fmt::format("/samples/{}, line {}", column, gap.line),
+                 fmt::format("{} {} missing between {} and {} (rows {} to {}, counted from 0)", gap.samples,
+                             gap.samples == 1 ? "sample is" : "samples are", gap.from, gap.to, gap.first,
+                             gap.first + gap.samples - 1));
+        }
+        if (record_.gaps.size() > most) {
+            warn(fmt::format("/samples/{}", column), fmt::format("has {} such gaps in all", record_.gaps.size()));
+        }
     }
 
     bool in_order(const std::string& column, std::span<const double> time_s) {
@@ -401,11 +446,13 @@ class Checker {
         }
         const std::size_t n = s.size();
         if (n == 0) error(column, "has no rows");
-        const bool all_finite = counted || finite(column, s.values, largest_reading);
+        std::vector<double> there;
+        const bool all_finite = counted || finite_or_missing(column, s.values, largest_reading, there);
         for (const auto& [name, values] : s.witnesses) {
             const std::string witness = fmt::format("/samples/{}", name);
             same_length(witness, values.size(), column, n);
-            finite(witness, values);
+            std::vector<double> ignored;
+            finite_or_missing(witness, values, std::numeric_limits<double>::infinity(), ignored);
             const bool known = std::any_of(witness_names.begin(), witness_names.end(),
                                            [&, &called = name](const char* one) { return called == one; });
             if (!known) warn(witness, "is no witness that a record has; it is left aside");
@@ -414,10 +461,10 @@ class Checker {
         constexpr std::size_t enough = 3;
         const bool stuck =
             counted ? std::all_of(s.counts.begin(), s.counts.end(), [&](auto v) { return v == s.counts.front(); })
-                    : std::all_of(s.values.begin(), s.values.end(), [&](auto v) { return v == s.values.front(); });
+                    : std::all_of(there.begin(), there.end(), [&](auto v) { return v == there.front(); });
         if (stuck && n >= enough) {
             warn(column, fmt::format("is {} in every row; did the gyro run?",
-                                     counted ? static_cast<double>(s.counts.front()) : s.values.front()));
+                                     counted ? static_cast<double>(s.counts.front()) : there.front()));
             return;
         }
         check_steps(s, column);
@@ -437,10 +484,15 @@ class Checker {
                                ? static_cast<double>(s.counts[i]) - static_cast<double>(s.counts[i - 1])
                                : s.values[i] - s.values[i - 1]);
         }
-        const double middle = median(gain);
+        // NaN beside a sample that is missing.
+        const auto there = [](std::vector<double> values) {
+            std::erase_if(values, [](double value) { return std::isnan(value); });
+            return values;
+        };
+        const double middle = median(there(gain));
         std::vector<double> off(gain.size());
         for (std::size_t i = 0; i < gain.size(); ++i) off[i] = std::abs(gain[i] - middle);
-        const double usual = median(off);
+        const double usual = median(there(off));
         if (!(usual > 0.0) || !std::isfinite(usual)) return;
         constexpr double far = 1000.0;
         Tally jumps;

@@ -6,15 +6,16 @@
 #include <filesystem>
 #include <limits>
 
-#include "analysis/record/probe.hpp"
 #include "analysis/record/readers.hpp"
+#include "analysis/text/words.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::record {
 namespace {
 
 [[noreturn]] void fail(const store::Node& node, const std::string& what) {
-    throw InputError(fmt::format("{}: {}: {}", node.file(), node.path(), what));
+    throw InputError(fmt::format("{}: {}: {}", printable(node.file()), printable(node.path()), what));
 }
 
 std::string shape_text(const store::Shape& shape) {
@@ -96,7 +97,7 @@ void check_format(const store::File& file) {
     const std::string format = text(file, "format");
     if (format != format_name) {
         fail(file,
-             fmt::format("format is \"{}\", must be \"{}\"{}", format, format_name,
+             fmt::format("format is \"{}\", must be \"{}\"{}", text::shown(format), format_name,
                          format == "ringlock-result" ? "; this is a result, which `ringlock analyze` reads" : ""));
     }
     const std::optional<double> version = number(file, "format_version");
@@ -248,6 +249,11 @@ Record read_groups(const store::File& file) {
     constexpr std::array groups = {"declared", "reader", "turns", "samples", "environment", "reference"};
     note_ignored(
         file, [&](const std::string& name) { return is_one_of(groups, name); }, record.ignored);
+    constexpr std::size_t most_ignored = 20;
+    if (const std::size_t all = record.ignored.size(); all > most_ignored + 1) {
+        record.ignored.resize(most_ignored);
+        record.ignored.push_back(fmt::format("each of {} more names", all - most_ignored));
+    }
     return record;
 }
 
@@ -295,18 +301,16 @@ void write_samples(store::Group group, const Samples& samples) {
 
 }  // namespace
 
-Record read_hdf5_record(const std::string& path) {
-    try_reading(path, [&] { read_groups(store::File::open(path)); });
-    return read_groups(store::File::open(path));
+Record read_hdf5_record(const std::string& path, store::Links links) {
+    return store::guarded(path, links,
+                          [](const store::GuardedPath& guarded) { return read_groups(store::File::open(guarded)); });
 }
 
-std::string hdf5_format(const std::string& path) {
-    const auto read = [&] {
-        const store::File file = store::File::open(path);
+std::string hdf5_format(const std::string& path, store::Links links) {
+    return store::guarded(path, links, [](const store::GuardedPath& guarded) {
+        const store::File file = store::File::open(guarded);
         return file.has_attribute("format") ? text(file, "format") : std::string();
-    };
-    try_reading(path, [&] { read(); });
-    return read();
+    });
 }
 
 namespace {

@@ -3,81 +3,23 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <optional>
+#include <type_traits>
+#include <vector>
 
-#include "analysis/record/hdf5_choice.hpp"
-#include "analysis/record/probe.hpp"
+#include "analysis/record/array_choice.hpp"
+#include "analysis/record/array_column.hpp"
+#include "analysis/record/hdf5_contents.hpp"
+#include "analysis/record/hdf5_handle.hpp"
 #include "analysis/record/readers.hpp"
+#include "analysis/text/words.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
+#include "engine/store/hdf5.hpp"
+#include "engine/store/storage.hpp"
 
 namespace ringlock::record {
 namespace {
-
-/// Owns one HDF5 identifier.
-class Handle {
-   public:
-    Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
-    Handle(const Handle&) = delete;
-    Handle& operator=(const Handle&) = delete;
-    ~Handle() {
-        if (id_ >= 0) close_(id_);
-    }
-    operator hid_t() const { return id_; }
-    bool valid() const { return id_ >= 0; }
-
-   private:
-    hid_t id_;
-    herr_t (*close_)(hid_t);
-};
-
-/// Keeps the library from printing its error stack; ours says what a user can act on.
-class QuietErrors {
-   public:
-    QuietErrors() {
-        // At exit the library would print that objects of a damaged file do not close.
-        [[maybe_unused]] static const herr_t left_at_exit = H5dont_atexit();
-        H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
-        H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-    }
-    QuietErrors(const QuietErrors&) = delete;
-    QuietErrors& operator=(const QuietErrors&) = delete;
-    ~QuietErrors() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
-
-   private:
-    H5E_auto2_t function_ = nullptr;
-    void* data_ = nullptr;
-};
-
-constexpr int most_dimensions = 2;
-
-/// Sides of a dataset of one or two dimensions; else nothing.
-std::optional<std::vector<std::uint64_t>> sides_of(hid_t dataset) {
-    const Handle space(H5Dget_space(dataset), H5Sclose);
-    const int dimensions = H5Sget_simple_extent_ndims(space);
-    if (dimensions < 1 || dimensions > most_dimensions) return std::nullopt;
-    hsize_t sides[most_dimensions] = {};
-    if (H5Sget_simple_extent_dims(space, sides, nullptr) < 0) return std::nullopt;
-    return std::vector<std::uint64_t>(sides, sides + dimensions);
-}
-
-herr_t collect(hid_t root, const char* name, const H5O_info_t* info, void* into) {
-    if (info->type != H5O_TYPE_DATASET) return 0;
-    const Handle dataset(H5Dopen2(root, name, H5P_DEFAULT), H5Dclose);
-    if (!dataset.valid()) return 0;
-    const Handle type(H5Dget_type(dataset), H5Tclose);
-    const H5T_class_t kind = H5Tget_class(type);
-    const auto sides = sides_of(dataset);
-    if (sides && (kind == H5T_FLOAT || kind == H5T_INTEGER)) {
-        static_cast<std::vector<Dataset>*>(into)->push_back({fmt::format("/{}", name), *sides});
-    }
-    return 0;
-}
-
-std::vector<Dataset> datasets_in(hid_t file) {
-    std::vector<Dataset> found;
-    H5Ovisit2(file, H5_INDEX_NAME, H5_ITER_INC, collect, &found, H5O_INFO_BASIC);
-    return found;
-}
 
 std::optional<double> rate_of(hid_t file, const std::string& path, const std::string& object) {
     if (H5Aexists_by_name(file, object.c_str(), "rate_hz", H5P_DEFAULT) <= 0) return std::nullopt;
@@ -86,11 +28,12 @@ std::optional<double> rate_of(hid_t file, const std::string& path, const std::st
     double rate = 0.0;
     if (!attribute.valid() || H5Sget_simple_extent_npoints(space) != 1 ||
         H5Aread(attribute, H5T_NATIVE_DOUBLE, &rate) < 0) {
-        throw InputError(fmt::format("{}: attribute rate_hz of {} is not a number", path, object));
+        throw InputError(
+            fmt::format("{}: attribute rate_hz of {} is not a number", printable(path), printable(object)));
     }
     if (!(rate > 0.0) || !std::isfinite(rate)) {
-        throw InputError(
-            fmt::format("{}: attribute rate_hz of {} is {}: must be a positive number", path, object, rate));
+        throw InputError(fmt::format("{}: attribute rate_hz of {} is {}: must be a positive number", printable(path),
+                                     printable(object), rate));
     }
     return rate;
 }
@@ -127,153 +70,180 @@ hid_t open_for_pieces(hid_t file, const std::string& name) {
 }
 
 template <class T>
-hid_t memory_type() {
+hid_t memory_number() {
     if constexpr (std::is_same_v<T, double>) return H5T_NATIVE_DOUBLE;
     if constexpr (std::is_same_v<T, std::int64_t>) return H5T_NATIVE_INT64;
     if constexpr (std::is_same_v<T, std::uint64_t>) return H5T_NATIVE_UINT64;
 }
 
-/// One series of a dataset, read piece by piece.
-class Column {
+/// One series of a dataset or of a field of its records, read piece by piece.
+class Hdf5Column final : public ArrayColumn {
    public:
-    Column(hid_t file, const std::string& path, const Slice& slice)
+    Hdf5Column(hid_t file, const std::string& path, const Slice& slice)
         : path_(path),
           slice_(slice),
-          dataset_(open_for_pieces(file, slice.path), H5Dclose),
-          type_(H5Dget_type(dataset_), H5Tclose),
-          space_(H5Dget_space(dataset_), H5Sclose) {
-        const auto sides = dataset_.valid() ? sides_of(dataset_) : std::nullopt;
-        if (!sides) throw InputError(fmt::format("{}: cannot be opened; is the file damaged?", label()));
-        dimensions_ = static_cast<int>(sides->size());
-        length_ = sides->at(static_cast<std::size_t>(slice.along));
-        // The library copies by this size, be it damaged, and from beyond what it has unpacked.
-        const std::size_t most_bytes = is_whole() ? sizeof(std::int64_t) : sizeof(long double);
-        if (H5Tget_size(type_) > most_bytes) {
-            throw InputError(fmt::format("{}: holds {} of {} bytes each; allowed are up to {}. Is the file damaged?",
-                                         label(), is_whole() ? "integers" : "numbers", H5Tget_size(type_), most_bytes));
+          dataset_(open_for_pieces(file, slice.of.dataset), H5Dclose),
+          type_(dataset_.valid() ? type_of_values(dataset_, slice.of) : H5I_INVALID_HID, H5Tclose),
+          space_(dataset_.valid() ? H5Dget_space(dataset_) : H5I_INVALID_HID, H5Sclose) {
+        if (!type_.valid() || !space_.valid()) {
+            throw InputError(fmt::format("{}: cannot be opened; is the file damaged?", label()));
         }
-        if (length_ == 0) throw InputError(fmt::format("{}: is empty", label()));
-        // Reading it would give zeros, as many as it says. Of a virtual dataset the library does not know.
-        const Handle creation(H5Dget_create_plist(dataset_), H5Pclose);
-        if (H5Pget_layout(creation) != H5D_VIRTUAL && H5Dget_storage_size(dataset_) == 0) {
+        const store::Storage storage = store::check_storage(dataset_, path, slice.of.dataset);
+        is_plain_ = storage.is_plain && slice.of.field.empty();
+        dimensions_ = H5Sget_simple_extent_ndims(space_);
+        hsize_t sides[most_dimensions] = {};
+        if (dimensions_ < 1 || dimensions_ > most_dimensions || H5Sget_simple_extent_dims(space_, sides, nullptr) < 0) {
+            throw InputError(fmt::format("{}: cannot be read; is the file damaged?", label()));
+        }
+        along_ = slice.of.field_is_array ? 0 : slice.along;
+        length_ = sides[along_];
+        if (!storage.is_written) {
             throw InputError(
                 fmt::format("{}: was never written, although it has room for {} values", label(), length_));
         }
-    }
-
-    hsize_t length() const { return length_; }
-    bool is_whole() const { return H5Tget_class(type_) == H5T_INTEGER; }
-    bool is_signed() const { return H5Tget_sign(type_) != H5T_SGN_NONE; }
-
-    std::string label() const { return fmt::format("{}: dataset {}", path_, slice_.name()); }
-    std::string place(std::size_t element) const {
-        return fmt::format("{}, element {} (counted from 0)", label(), element);
-    }
-
-    /// Elements from `first` on, as many as there is room for.
-    template <class T>
-    void read(hsize_t first, std::span<T> into) const {
-        hsize_t start[most_dimensions] = {0, 0};
-        hsize_t count[most_dimensions] = {1, 1};
-        start[1 - slice_.along] = slice_.at;
-        start[slice_.along] = first;
-        count[slice_.along] = into.size();
-        const Handle memory(H5Screate_simple(dimensions_, count, nullptr), H5Sclose);
-        if (H5Sselect_hyperslab(space_, H5S_SELECT_SET, start, nullptr, count, nullptr) < 0 ||
-            H5Dread(dataset_, memory_type<T>(), memory, space_, H5P_DEFAULT, into.data()) < 0) {
-            throw InputError(
-                fmt::format("{}: elements {} to {} cannot be read as numbers; is the file damaged, or "
-                            "packed by a filter that is not installed?",
-                            label(), first, first + into.size() - 1));
+        const std::size_t most_bytes = kind() == Kind::real ? sizeof(long double) : sizeof(std::int64_t);
+        if (H5Tget_size(type_) > most_bytes) {
+            throw InputError(fmt::format("{}: holds {} of {} bytes each; allowed are up to {}. Is the file damaged?",
+                                         label(), kind() == Kind::real ? "numbers" : "integers", H5Tget_size(type_),
+                                         most_bytes));
         }
     }
 
+    std::uint64_t length() const override { return length_; }
+    Kind kind() const override {
+        if (H5Tget_class(type_) == H5T_FLOAT) return Kind::real;
+        return H5Tget_sign(type_) == H5T_SGN_NONE ? Kind::whole_unsigned : Kind::whole;
+    }
+    std::string name() const override { return slice_.name(); }
+    std::string label() const override {
+        return fmt::format("{}: dataset {}", printable(path_), printable(slice_.name()));
+    }
+    void read(std::uint64_t first, std::span<double> into) override { read_numbers(first, into); }
+    void read(std::uint64_t first, std::span<std::int64_t> into) override { read_numbers(first, into); }
+    void read(std::uint64_t first, std::span<std::uint64_t> into) override { read_numbers(first, into); }
+
    private:
+    /// Type of the numbers: that of an enumeration is its integer, that of an array its element.
+    static hid_t type_of_values(hid_t dataset, const Dataset& of) {
+        hid_t type = H5Dget_type(dataset);
+        const auto step = [&](hid_t next) {
+            H5Tclose(type);
+            type = next;
+        };
+        for (const std::string& name : of.field) {
+            const int member = H5Tget_class(type) == H5T_COMPOUND ? H5Tget_member_index(type, name.c_str()) : -1;
+            step(member < 0 ? H5I_INVALID_HID : H5Tget_member_type(type, static_cast<unsigned>(member)));
+            if (type < 0) return type;
+        }
+        if (H5Tget_class(type) == H5T_ARRAY) step(H5Tget_super(type));
+        if (H5Tget_class(type) == H5T_ENUM) step(H5Tget_super(type));
+        return type;
+    }
+
+    template <class T>
+    void read_numbers(std::uint64_t first, std::span<T> into) {
+        constexpr std::uint64_t small = std::uint64_t{1} << 17;
+        if (is_plain_ && length_ > small && store::is_trial()) {
+            store::note_left_out();
+            std::fill(into.begin(), into.end(), T{});
+            return;
+        }
+        if (slice_.of.field_is_array) return read_of_arrays(first, into);
+        const Handle memory_type(type_of_field(slice_.of.field, memory_number<T>(), 0), H5Tclose);
+        read_block(first, into.size(), memory_type, into.data());
+    }
+
+    /// The records hold whole rows, of which one number each is wanted.
+    template <class T>
+    void read_of_arrays(std::uint64_t first, std::span<T> into) {
+        const auto side = static_cast<std::size_t>(slice_.of.sides[1]);
+        constexpr std::size_t at_once = std::size_t{1} << 20;
+        const std::size_t rows = std::max<std::size_t>(1, at_once / side);
+        const Handle memory_type(type_of_field(slice_.of.field, memory_number<T>(), side), H5Tclose);
+        std::vector<T> block(std::min(rows, into.size()) * side);
+        for (std::size_t done = 0; done < into.size(); done += rows) {
+            const std::size_t now = std::min(rows, into.size() - done);
+            read_block(first + done, now, memory_type, block.data());
+            for (std::size_t i = 0; i < now; ++i) into[done + i] = block[i * side + slice_.at];
+        }
+    }
+
+    void read_block(std::uint64_t first, std::size_t size, hid_t memory_type, void* into) const {
+        hsize_t start[most_dimensions] = {0, 0};
+        hsize_t count[most_dimensions] = {1, 1};
+        if (dimensions_ == most_dimensions) start[1 - along_] = slice_.at;
+        start[along_] = first;
+        count[along_] = size;
+        static_cast<void>(store::refused_link());  // of an earlier call
+        const Handle memory(H5Screate_simple(dimensions_, count, nullptr), H5Sclose);
+        if (H5Sselect_hyperslab(space_, H5S_SELECT_SET, start, nullptr, count, nullptr) < 0 ||
+            H5Dread(dataset_, memory_type, memory, space_, H5P_DEFAULT, into) < 0) {
+            throw InputError(
+                fmt::format("{}: elements {} to {} cannot be read as numbers; is the file damaged, or "
+                            "packed by a filter that is not installed?",
+                            label(), first, first + size - 1));
+        }
+        // Of a virtual dataset the library reads zeros where it does not find the source.
+        if (const std::string why = store::refused_link(); !why.empty()) {
+            throw InputError(
+                fmt::format("{}: elements {} to {}: {}, which is not read", label(), first, first + size - 1, why));
+        }
+    }
+
     std::string path_;
     Slice slice_;
     Handle dataset_;
     Handle type_;
     Handle space_;
+    bool is_plain_ = false;
     int dimensions_ = 0;
+    int along_ = 0;
     hsize_t length_ = 0;
 };
 
-void hand_on(double value, const Column& column, std::size_t element, SeriesRows& rows) {
-    if (std::isnan(value)) {
-        rows.missing();
-    } else if (std::isfinite(value)) {
-        rows.value(value);
-    } else {
-        throw InputError(fmt::format("{} is {}; every value must be finite; where it is not known, write NaN",
-                                     column.place(element), value));
-    }
-}
-
-void hand_on(std::int64_t value, const Column&, std::size_t, SeriesRows& rows) { rows.count(value); }
-
-void hand_on(std::uint64_t value, const Column& column, std::size_t element, SeriesRows& rows) {
-    constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();
-    if (value > static_cast<std::uint64_t>(largest)) {
-        throw InputError(
-            fmt::format("{} is {}; allowed are counts up to {}. Subtract a constant; where it was a "
-                        "negative number, write signed integers",
-                        column.place(element), value, largest));
-    }
-    rows.count(static_cast<std::int64_t>(value));
-}
-
-template <class T>
-void read_rows(const Column& column, const Column* time, SeriesRows& rows) {
-    std::vector<T> values(SeriesRows::longest);
-    std::vector<double> times_s(time != nullptr ? SeriesRows::longest : 0);
-    for (hsize_t first = 0; first < column.length(); first += SeriesRows::longest) {
-        const auto count = static_cast<std::size_t>(std::min<hsize_t>(SeriesRows::longest, column.length() - first));
-        column.read(first, std::span<T>(values.data(), count));
-        if (time != nullptr) time->read(first, std::span<double>(times_s.data(), count));
-        for (std::size_t i = 0; i < count; ++i) {
-            if (time != nullptr) rows.time(times_s[i], first + i);
-            hand_on(values[i], column, first + i, rows);
+/// In its own words: the attribute unit or units.
+std::optional<std::string> unit_of(const store::File& file, const Dataset& of) {
+    if (!of.field.empty()) return std::nullopt;
+    const store::Dataset dataset = file.dataset(of.dataset);
+    for (const char* name : {"unit", "units"}) {
+        if (!dataset.has_attribute(name)) continue;
+        try {
+            return std::string(text::trimmed(dataset.string_attribute(name)));
+        } catch (const InputError&) {
+            continue;  // no text: not a unit
         }
     }
+    return std::nullopt;
 }
 
-void read_rows(const Column& column, const Column* time, SeriesRows& rows) {
-    if (!column.is_whole()) return read_rows<double>(column, time, rows);
-    if (column.is_signed()) return read_rows<std::int64_t>(column, time, rows);
-    return read_rows<std::uint64_t>(column, time, rows);
-}
-
-SeriesInfo stream_file(const SeriesRequest& request, const TakePiece& take) {
-    const QuietErrors quiet;
+SeriesInfo stream_hdf5_file(const store::GuardedPath& guarded, const SeriesRequest& request, const TakePiece& take) {
+    const store::File opened = store::File::open(guarded);
+    const hid_t file = opened.library_id();
     const std::string& path = request.path;
-    const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
-    if (!file.valid())
-        throw InputError(fmt::format("{}: is not a readable HDF5 file (damaged, or open for writing)", path));
-    const Choice choice = choose_datasets(request, datasets_in(file));
-    const Column column(file, path, choice.column);
-    std::optional<Column> time;
-    SeriesRows rows(take);
-    if (choice.time) {
-        time.emplace(file, path, *choice.time);
-        if (time->length() != column.length()) {
-            throw InputError(fmt::format("{} has {} elements, {} has {}; must be as many times as values",
-                                         time->label(), time->length(), choice.column.name(), column.length()));
-        }
-        rows.set_grid(TimeGrid(request.rate_hz, [&time](std::size_t element) { return time->place(element); }));
+    std::vector<std::string> asked;
+    for (const auto& name : {request.column, request.time}) {
+        if (name) asked.push_back(*name);
     }
-    const std::optional<double> rate_hz = rate_above(file, path, choice.column.path);
-    read_rows(column, time ? &*time : nullptr, rows);
-    SeriesInfo info = rows.finish();
-    info.column = choice.column.name();
+    const Choice choice = choose_datasets(request, hdf5_contents(file, path, asked));
+    Hdf5Column column(file, path, choice.column);
+    std::optional<Hdf5Column> time;
+    if (choice.time) time.emplace(file, path, *choice.time);
+    const std::optional<double> rate_hz = rate_above(file, path, choice.column.of.dataset);
+    const std::optional<std::string> unit = unit_of(opened, choice.column.of);
+    SeriesInfo info = stream_column(request, column, time ? &*time : nullptr, take);
     info.rate_hz = rate_hz;
+    info.unit = unit;
     return info;
 }
 
 }  // namespace
 
 SeriesInfo stream_hdf5_series(const SeriesRequest& request, const TakePiece& take) {
-    try_reading(request.path, [&] { stream_file(request, [](const SeriesPiece&) {}); });
-    return stream_file(request, take);
+    const auto links = request.follow_links ? store::Links::follow : store::Links::refuse;
+    return store::guarded(request.path, links, [&](const store::GuardedPath& guarded) {
+        const TakePiece nowhere = [](const SeriesPiece&) {};
+        return stream_hdf5_file(guarded, request, store::is_trial() ? nowhere : take);
+    });
 }
 
 }  // namespace ringlock::record

@@ -8,7 +8,7 @@
 
 #include "analysis/record/readers.hpp"
 #include "analysis/record/series.hpp"
-#include "analysis/record/text_lines.hpp"
+#include "analysis/text/words.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::record {
@@ -31,12 +31,12 @@ void check_quantities(const MappedLog& log) {
     const std::vector<std::string> known = quantities_to_map();
     for (const MappedColumn& mapped : log.columns) {
         if (std::find(known.begin(), known.end(), mapped.quantity) == known.end()) {
-            throw InputError(fmt::format("--column {}={}: a column can become {}", shown(mapped.column),
-                                         shown(mapped.quantity), listed(known)));
+            throw InputError(fmt::format("--column {}={}: a column can become {}", text::shown(mapped.column),
+                                         text::shown(mapped.quantity), listed(known)));
         }
         if (!seen.insert(mapped.quantity).second) {
             throw InputError(fmt::format("--column {}={}: another column becomes {} as well; leave one out",
-                                         shown(mapped.column), mapped.quantity, mapped.quantity));
+                                         text::shown(mapped.column), mapped.quantity, mapped.quantity));
         }
         if (kind_of(mapped.quantity)) samples.push_back(mapped.quantity);
     }
@@ -46,17 +46,23 @@ void check_quantities(const MappedLog& log) {
         samples.empty() ? "no column becomes samples of the gyro" : listed(samples) + " are all samples of the gyro"));
 }
 
-Series read_column(const MappedLog& log, const MappedColumn& mapped) {
-    Series series = read_series({.path = log.path, .column = mapped.column, .time = log.time, .rate_hz = log.rate_hz});
+/// `again`: the file has been read before, and its notes given.
+Series read_column(const MappedLog& log, const MappedColumn& mapped, bool again) {
+    SeriesRequest request{.path = log.path, .column = mapped.column, .time = log.time, .rate_hz = log.rate_hz};
+    request.time_unit = log.time_unit;
+    request.follow_links = log.follow_links;
+    request.text = log.text;
+    request.text.quiet = again;
+    Series series = read_series(request);
     if (series.rate_hz && std::abs(*series.rate_hz - log.rate_hz) > 1e-9 * log.rate_hz) {
         throw InputError(
             fmt::format("{}: says rate_hz = {}, which contradicts --rate {}", log.path, *series.rate_hz, log.rate_hz));
     }
-    if (series.missing == 0) return series;
+    if (series.missing == 0 || mapped.quantity != name_of(SampleKind::quarter_count)) return series;
     const auto at = std::find_if(series.values.begin(), series.values.end(), [](double v) { return std::isnan(v); });
     throw InputError(fmt::format(
-        "{}: column {}: {} of {} values are missing, the first is sample {}; samples of a record are without gaps. Cut "
-        "the record there, or fill the gap knowingly",
+        "{}: column {}: {} of {} values are missing, the first is sample {}; counts are whole numbers, of which none "
+        "can say that it is missing. Cut the record there, or import the angle as angle_arcsec",
         log.path, series.column, series.missing, series.n, at - series.values.begin() + 1));
 }
 
@@ -64,7 +70,7 @@ std::int64_t whole(const MappedLog& log, const MappedColumn& mapped, double valu
     constexpr double largest = 9007199254740992.0;  // 2^53: whole numbers of a double
     if (value != std::nearbyint(value) || std::abs(value) > largest) {
         throw InputError(fmt::format("{}: column {}: holds {}; a count must be a whole number", log.path,
-                                     shown(mapped.column), value));
+                                     text::shown(mapped.column), value));
     }
     return static_cast<std::int64_t>(value);
 }
@@ -93,7 +99,7 @@ Record read_mapped(const MappedLog& log) {
     samples.rate_hz = log.rate_hz;
     std::optional<std::size_t> rows;
     for (const MappedColumn& mapped : log.columns) {
-        Series series = read_column(log, mapped);
+        Series series = read_column(log, mapped, rows.has_value());
         if (rows && *rows != series.n) {
             throw InputError(fmt::format("{}: column {} has {} values, another has {}; columns of a record are as long",
                                          log.path, series.column, series.n, *rows));
@@ -126,7 +132,7 @@ void declare(Record& record, const std::string& name, double value) {
         record.declared.*declared.field = value;
         return;
     }
-    throw InputError(fmt::format("--declare {}: a record can declare {}", shown(name), listed(names)));
+    throw InputError(fmt::format("--declare {}: a record can declare {}", text::shown(name), listed(names)));
 }
 
 }  // namespace ringlock::record

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "analysis/record/record.hpp"
+#include "analysis/text/options.hpp"
 
 namespace ringlock::record {
 
@@ -18,8 +19,11 @@ struct MappedLog {
     std::string path;
     std::vector<MappedColumn> columns;
     double rate_hz = 0.0;
-    double to_arcsec = 1.0;                ///< unit of the angle; of rates to arcsec/s
-    std::optional<std::string> time = {};  ///< column of the times of the samples [s]
+    double to_arcsec = 1.0;                     ///< unit of the angle; of rates to arcsec/s
+    std::optional<std::string> time = {};       ///< column of the times of the samples, as in SeriesRequest
+    std::optional<std::string> time_unit = {};  ///< likewise
+    text::Options text = {};                    ///< likewise
+    bool follow_links = false;                  ///< likewise
 };
 
 /// Quantities that a column can become: the kinds of samples, "rate" (integrated over each sample) and the witnesses.
@@ -29,8 +33,9 @@ bool is_rate(const std::string& quantity);
 /// Whether it has a unit: a count or a witness has none.
 bool has_unit(const std::string& quantity);
 
-/// Reads the columns as a record. Throws InputError, naming file and column, where none or two of them are samples, a
-/// quantity is unknown or stands twice, columns differ in length, or a value is missing.
+/// Reads the columns as a record; what is missing in a column of floats is NaN there. Throws InputError, naming file
+/// and column, where none or two of them are samples, a quantity is unknown or stands twice, columns differ in length,
+/// or a count is missing.
 Record read_mapped(const MappedLog& log);
 
 /// Sets a declared constant by its name in a record. Throws InputError where there is no such name.

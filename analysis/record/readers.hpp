@@ -4,17 +4,21 @@
 #include "analysis/record/record.hpp"
 #include "analysis/record/series.hpp"
 #include "analysis/record/series_rows.hpp"
+#include "analysis/text/words.hpp"
 
-/// The two kinds of file behind read_series and read_record.
+/// The kinds of file behind read_series and read_record.
 namespace ringlock::record {
 
-/// Both leave it to the caller that a value is there, and find a rate where there are time stamps.
+/// All leave it to the caller that a value is there, and find a rate where there are time stamps.
 SeriesInfo stream_text_series(const SeriesRequest& request, const TakePiece& take);
 SeriesInfo stream_hdf5_series(const SeriesRequest& request, const TakePiece& take);
+SeriesInfo stream_npy_series(const SeriesRequest& request, const TakePiece& take);
+SeriesInfo stream_npz_series(const SeriesRequest& request, const TakePiece& take);
+SeriesInfo stream_mat_series(const SeriesRequest& request, const TakePiece& take);
 
 /// Both leave check() to the caller. `file` is HDF5.
 Record read_csv_record(const std::string& path);
-Record read_hdf5_record(const std::string& path);
+Record read_hdf5_record(const std::string& path, store::Links links);
 
 /// Names of the witnesses that samples may have.
 inline constexpr std::array<const char*, 4> witness_names = {"accel_x", "accel_y", "accel_z", "temperature_c"};
@@ -80,7 +84,6 @@ inline constexpr std::int64_t format_version = 1;
 /// Bytes of memory that were free when it was first asked for: before the columns of a record took some of them.
 double memory_bytes();
 
-/// "a, b, c", at most the first 20.
-std::string listed(const std::vector<std::string>& names);
+using text::listed;
 
 }  // namespace ringlock::record

@@ -15,6 +15,7 @@
 #include "analysis/record/readers.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/free_memory.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::record {
 
@@ -96,13 +97,13 @@ double memory_bytes() {
 bool is_hdf5(const std::string& path) {
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored)) {
-        throw InputError(fmt::format("{}: is a directory, must be a data file", path));
+        throw InputError(fmt::format("{}: is a directory, must be a data file", printable(path)));
     }
     // A pipe must be opened and read once only, and is always text.
     if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored)) return false;
     constexpr std::array<unsigned char, 8> signature = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
-    if (!file) throw InputError(fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
+    if (!file) throw InputError(fmt::format("{}: cannot be opened: {}", printable(path), std::strerror(errno)));
     // At the start, or behind a block of the user's of 512, 1024, ... bytes, which MATLAB writes.
     for (long at = 0; at >= 0 && at < (1L << 40); at = at == 0 ? 512 : 2 * at) {
         std::array<unsigned char, 8> head{};
@@ -120,14 +121,15 @@ void refuse_errors(const std::string& path, const Record& record) {
     for (const Finding& finding : check(record)) {
         if (finding.severity != Severity::error) continue;
         if (++errors > most) continue;
-        report += fmt::format("{}{}: {}: {}", report.empty() ? "" : "\n", path, finding.where, finding.what);
+        report += fmt::format("{}{}: {}: {}", report.empty() ? "" : "\n", printable(path), printable(finding.where),
+                              finding.what);
     }
-    if (errors > most) report += fmt::format("\n{}: and {} more", path, errors - most);
+    if (errors > most) report += fmt::format("\n{}: and {} more", printable(path), errors - most);
     if (errors > 0) throw InputError(report);
 }
 
-Record read_record(const std::string& path) {
-    Record record = is_hdf5(path) ? read_hdf5_record(path) : read_csv_record(path);
+Record read_record(const std::string& path, store::Links links) {
+    Record record = is_hdf5(path) ? read_hdf5_record(path, links) : read_csv_record(path);
     refuse_errors(path, record);
     return record;
 }

@@ -48,7 +48,7 @@ enum class SampleKind { angle_increment_arcsec, angle_arcsec, quarter_count };
 constexpr std::size_t fewest_turns_to_close = 400;
 constexpr std::size_t fewest_samples_to_close = 1000;
 
-/// Uniform samples without gaps.
+/// Uniform samples. A value of an angle or a witness that is missing is NaN; a count never is.
 struct Samples {
     double rate_hz = 0.0;
     double t0_s = 0.0;
@@ -70,6 +70,14 @@ struct Track {
     double at(double time) const;
 };
 
+/// Samples that a text with time stamps leaves out.
+struct Gap {
+    std::size_t line = 0;   ///< of the row behind it, from 1
+    std::size_t first = 0;  ///< sample that is missing first, from 0
+    std::size_t samples = 0;
+    std::string from, to;  ///< times of the rows before and behind it, with their unit
+};
+
 /// An rlg-record, version 1 (docs/record.md): turns, samples or both.
 struct Record {
     std::string title, instrument, source, licence;
@@ -81,17 +89,19 @@ struct Record {
     Track input_rate_deg_h;                ///< /reference
     /// Of a file: names that no record has, such as "/turns/note". They were left aside and are never written.
     std::vector<std::string> ignored;
+    /// Likewise, where its samples are left out; the samples hold NaN there.
+    std::vector<Gap> gaps;
 };
 
 /// Whether a file is HDF5, by its signature; a pipe is not. Throws InputError where it cannot be opened or is a folder.
 bool is_hdf5(const std::string& path);
 /// The root attribute `format` of an HDF5 file: what it is; empty where there is none.
-std::string hdf5_format(const std::string& path);
+std::string hdf5_format(const std::string& path, store::Links links = store::Links::refuse);
 
 /// Reads the HDF5 or the CSV form, told apart by their content. Throws InputError, naming file and dataset or line,
 /// where the file cannot be read, is no record, or check() finds an error. Accelerations that the file leaves out are
 /// zeros.
-Record read_record(const std::string& path);
+Record read_record(const std::string& path, store::Links links = store::Links::refuse);
 
 /// The HDF5 form of a record, which appears whole or not at all.
 class RecordWriter {
@@ -124,7 +134,8 @@ struct Finding {
 };
 
 /// Lengths, order, values that are not finite, counts that jump, turns that do not alternate, ... One finding a kind
-/// and column: the first place, and how many there are.
+/// and column: the first place, and how many there are. Samples that are missing are a warning; where more than half of
+/// a column are, an error.
 std::vector<Finding> check(const Record& record);
 
 /// Throws InputError with the findings that are errors, `path` before each; does nothing where there are none.

@@ -5,26 +5,80 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/record/container.hpp"
 #include "analysis/record/readers.hpp"
-#include "analysis/record/text_lines.hpp"
+#include "analysis/text/words.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::record {
 namespace {
 
+/// The first value that is so large that deviations, which sum squares of sums of values, would overflow.
+class LargestValue {
+   public:
+    static constexpr double limit = 1e120;
+
+    void note(std::span<const double> values) {
+        if (!is_too_large()) {
+            const auto found = std::find_if(values.begin(), values.end(), [](double v) { return std::abs(v) > limit; });
+            if (found != values.end()) {
+                value_ = *found;
+                number_ = seen_ + static_cast<std::size_t>(found - values.begin()) + 1;
+            }
+        }
+        seen_ += values.size();
+    }
+    bool is_too_large() const { return number_ > 0; }
+    double value() const { return value_; }
+    std::size_t number() const { return number_; }
+
+   private:
+    std::size_t seen_ = 0;
+    std::size_t number_ = 0;
+    double value_ = 0.0;
+};
+
+SeriesInfo stream_container(Container container, const SeriesRequest& request, const TakePiece& take) {
+    switch (container) {
+        case Container::hdf5:
+            return stream_hdf5_series(request, take);
+        case Container::npy:
+            return stream_npy_series(request, take);
+        case Container::npz:
+            return stream_npz_series(request, take);
+        case Container::mat:
+            return stream_mat_series(request, take);
+        case Container::text:
+            break;
+    }
+    return stream_text_series(request, take);
+}
+
 SeriesInfo stream_pieces(const SeriesRequest& request, const TakePiece& take) {
-    const std::string file = name_of_file(request.path);
+    const std::string file = text::name_of_file(request.path);
     if (request.time && (!(request.rate_hz > 0.0) || !std::isfinite(request.rate_hz))) {
         throw InputError(
             fmt::format("{}: time stamps need the sampling rate that they should keep, a positive number "
                         "[Hz]; found {}",
-                        file, request.rate_hz));
+                        printable(file), request.rate_hz));
     }
-    const bool hdf5 = request.path != standard_input && is_hdf5(request.path);
-    SeriesInfo info = hdf5 ? stream_hdf5_series(request, take) : stream_text_series(request, take);
+    const Container container = container_of(request.path);
+    LargestValue largest;
+    SeriesInfo info = stream_container(container, request, [&](const SeriesPiece& piece) {
+        largest.note(piece.values);
+        take(piece);
+    });
+    const char* what = container == Container::text ? "column" : "dataset";
     if (info.missing == info.n) {
-        throw InputError(fmt::format("{}: {} {}: all {} values are missing", file, hdf5 ? "dataset" : "column",
-                                     info.column, info.n));
+        throw InputError(
+            fmt::format("{}: {} {}: all {} values are missing", printable(file), what, printable(info.column), info.n));
+    }
+    if (largest.is_too_large()) {
+        throw InputError(fmt::format(
+            "{}: {} {}: value {} (counted from 1, those that are missing included) is {:g}; "
+            "values beyond {:g} have no sums of squares. Leave it out or write nan there",
+            printable(file), what, printable(info.column), largest.number(), largest.value(), LargestValue::limit));
     }
     return info;
 }
@@ -57,7 +111,7 @@ class Collector {
         throw InputError(
             fmt::format("{}: has more values than memory is free for ({} and more, those that "
                         "are missing included); cut the record into pieces",
-                        file_, values));
+                        printable(file_), values));
     }
 
     std::string file_;
@@ -66,17 +120,9 @@ class Collector {
 
 }  // namespace
 
-std::string listed(const std::vector<std::string>& names) {
-    constexpr std::size_t most = 20;
-    std::string out;
-    for (std::size_t i = 0; i < names.size() && i < most; ++i) out += fmt::format("{}{}", i > 0 ? ", " : "", names[i]);
-    if (names.size() > most) out += fmt::format(", ... ({} in all)", names.size());
-    return out;
-}
-
 Series read_series(const SeriesRequest& request) {
     Series series;
-    Collector collector(name_of_file(request.path), series);
+    Collector collector(text::name_of_file(request.path), series);
     static_cast<SeriesInfo&>(series) = stream_pieces(request, [&](const SeriesPiece& piece) { collector.take(piece); });
     return series;
 }

@@ -7,30 +7,41 @@
 #include <string>
 #include <vector>
 
+#include "analysis/text/options.hpp"
+
 /// Measured data from files.
 namespace ringlock::record {
 
 /// One column of a file, and how its rows follow each other.
 struct SeriesRequest {
-    /// Text (`#` comments; commas or white space between columns; a first row that is not all numbers is a header), the
-    /// CSV form of an rlg-record (`# key = value` lines such as rate_hz) or HDF5; "-" is text from standard input.
+    /// Text of any dialect (docs/field-data.md), packed or not, the CSV form of an rlg-record (`# key = value` lines
+    /// such as rate_hz), HDF5 (MATLAB 7.3 too), NumPy's .npy and .npz or MATLAB 5, distinguished by their content; "-"
+    /// is text from standard input.
     std::string path;
-    /// Name of the column, its number from 1, or the path of an HDF5 dataset or the end of it, with [I,:] for row I or
-    /// [:,J] for column J of a two-dimensional one, counted from 0. May be left out where there is only one beside the
-    /// time.
+    /// Name of the column, its number from 1, or the path of a dataset, array or variable, or the end of it, with [I,:]
+    /// for row I or [:,J] for column J of a two-dimensional one, counted from 0. Fields of records in a dataset are
+    /// columns: DATASET/FIELD. May be left out where there is only one beside the time.
     std::optional<std::string> column;
-    /// Likewise, a column of the times of the rows [s]. Without it rows follow each other without gaps.
+    /// Likewise, a column of the times of the rows. Of text it may be two, with a comma between: seconds and
+    /// nanoseconds, or the date and the time of day. Without it rows follow each other without gaps.
     std::optional<std::string> time;
     double rate_hz = 0.0;  ///< samples a second; needed with `time`, else of no account
+    /// Whether an HDF5 file may lead to others, by external links, raw data outside or virtual datasets.
+    bool follow_links = false;
+    /// Unit of the times, one of text::known_time_units; without it that which the header declares, ISO dates where
+    /// they stand there, else seconds.
+    std::optional<std::string> time_unit = {};
+    text::Options text = {};  ///< what is said of the dialect of a text
 };
 
 /// What is known of a series once it has been read.
 struct SeriesInfo {
-    std::string column;             ///< its name, or its number from 1 where columns have no names
-    std::optional<double> rate_hz;  ///< where the file says so
-    std::size_t n = 0;              ///< values, those that are missing included
-    std::size_t missing = 0;        ///< how many of them are
-    bool rounded = false;           ///< whole numbers of which some are beyond 2^53, where doubles lose digits
+    std::string column;                    ///< its name, or its number from 1 where columns have no names
+    std::optional<double> rate_hz;         ///< where the file says so
+    std::optional<std::string> unit = {};  ///< likewise, in its own words: of a header, or the attribute unit or units
+    std::size_t n = 0;                     ///< values, those that are missing included
+    std::size_t missing = 0;               ///< how many of them are
+    bool rounded = false;                  ///< whole numbers of which some are beyond 2^53, where doubles lose digits
 };
 
 struct Series : SeriesInfo {
@@ -40,15 +51,16 @@ struct Series : SeriesInfo {
 
 /// Reads one column of numbers.
 ///
-/// A value is missing where the text says nan or NA (in capitals or not, signed or not) or nothing between commas,
-/// where HDF5 has a NaN, and, with time stamps, where no row stands at a point of the grid of 1/rate_hz. Gaps at either
-/// end are kept. Stamps may lie a quarter of an interval off the grid, which follows a clock that runs up to 1e-3 off
-/// the rate.
+/// A value is missing where the text says so (text::missing_words, in capitals or not, signed or not) or nothing
+/// between delimiters, where HDF5 has a NaN, and, with time stamps, where no row stands at a point of the grid of
+/// 1/rate_hz. Gaps at either end are kept. Stamps may lie a quarter of an interval off the grid, which follows a clock
+/// that runs up to 1e-3 off the rate.
 ///
-/// Throws InputError, naming file, line or element, and column, where the file cannot be read, a row is ragged, a field
-/// is no number or infinite, a column of whole numbers goes beyond 64 bits, a time is missing, stands still, goes
-/// backwards or lies off the grid, stamps contradict the rate or leave out more than 1e9 values, the column is not
-/// there, all values are missing or there are more of them than memory.
+/// Throws InputError, naming file, line or element, and column, where the file cannot be read or is no text, a row is
+/// ragged, a field is no number or infinite, a column of whole numbers goes beyond 64 bits, a time is missing, stands
+/// still, goes backwards or lies off the grid, stamps contradict the rate or leave out more than 20 values for each row
+/// so far and more than 1e6, the unit of the times contradicts the header, the column is not there, all values are
+/// missing or there are more of them than memory.
 Series read_series(const SeriesRequest& request);
 Series read_series(const std::string& path, const std::optional<std::string>& column);
 

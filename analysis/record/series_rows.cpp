@@ -4,8 +4,38 @@
 
 namespace ringlock::record {
 
-void SeriesRows::time(double time_s, std::size_t row) {
-    for (std::size_t steps = grid_->steps_to(time_s, row); steps > 1; --steps) missing();
+void SeriesRows::fill(const StampedRow& at) {
+    for (std::size_t steps = grid_->steps_to(at.stamp, at.row); steps > 1; --steps) leave_out();
+}
+
+bool SeriesRows::place(const Waiting& row) {
+    stamped_ = false;
+    if (begun_) {
+        fill(stamp_);
+        return true;
+    }
+    waiting_.push_back(row);
+    waiting_.back().at = stamp_;
+    if (waiting_.size() == TimeGrid::first_rows) begin_grid();
+    return false;
+}
+
+void SeriesRows::begin_grid() {
+    std::vector<StampedRow> first;
+    for (const Waiting& row : waiting_) first.push_back(row.at);
+    grid_->begin(first);
+    begun_ = true;
+    for (const Waiting& row : waiting_) {
+        fill(row.at);
+        if (row.kind == Waiting::Kind::value) {
+            value(row.value);
+        } else if (row.kind == Waiting::Kind::count) {
+            count(row.count);
+        } else {
+            missing();
+        }
+    }
+    waiting_.clear();
 }
 
 void SeriesRows::flush() {
@@ -18,6 +48,7 @@ void SeriesRows::flush() {
 }
 
 SeriesInfo SeriesRows::finish() {
+    if (grid_ && !begun_) begin_grid();
     if (grid_) grid_->check_rate();
     if (filled_ > 0) flush();
     info_.rounded = all_whole_ && beyond_doubles_;

@@ -35,25 +35,47 @@ class SeriesRows {
 
     /// The rows have times; to be called before the first.
     void set_grid(TimeGrid grid) { grid_ = std::move(grid); }
-    /// The time of the row whose value comes next.
-    void time(double time_s, std::size_t row);
+    /// The time of the row whose value comes next: exact, as a double or as a whole number of units.
+    void time(const text::Stamp& stamp, std::size_t row) {
+        stamp_ = {stamp, row};
+        stamped_ = true;
+    }
+    void time(double time, std::size_t row) { this->time(text::Stamp::of(time), row); }
+    void time(std::int64_t time, std::size_t row) { this->time(text::Stamp{time, 0.0}, row); }
     void value(double value) {
+        if (stamped_ && !place({Waiting::Kind::value, value, 0, {}})) return;
         all_whole_ = false;
         push(value, 0);
     }
     void count(std::int64_t count) {
+        if (stamped_ && !place({Waiting::Kind::count, 0.0, count, {}})) return;
         beyond_doubles_ = beyond_doubles_ || is_beyond_doubles(count);
         push(static_cast<double>(count), count);
     }
     void missing() {
-        ++info_.missing;
-        push(std::numeric_limits<double>::quiet_NaN(), 0);
+        if (stamped_ && !place({Waiting::Kind::missing, 0.0, 0, {}})) return;
+        leave_out();
     }
 
     /// Behind the last row. Of what is returned, column and rate_hz are the reader's.
     SeriesInfo finish();
 
    private:
+    /// A row that waits until the grid is known.
+    struct Waiting {
+        enum class Kind { value, count, missing } kind;
+        double value;
+        std::int64_t count;
+        StampedRow at;
+    };
+    /// Fills what is left out before the row whose time was given; false where the row waits.
+    bool place(const Waiting& row);
+    void begin_grid();
+    void fill(const StampedRow& at);
+    void leave_out() {
+        ++info_.missing;
+        push(std::numeric_limits<double>::quiet_NaN(), 0);
+    }
     void push(double value, std::int64_t count) {
         values_[filled_] = value;
         counts_[filled_] = count;
@@ -63,6 +85,10 @@ class SeriesRows {
 
     TakePiece take_;
     std::optional<TimeGrid> grid_;
+    StampedRow stamp_;
+    bool stamped_ = false;  ///< the next row has a time
+    bool begun_ = false;    ///< the grid is known
+    std::vector<Waiting> waiting_;
     std::vector<double> values_;
     std::vector<std::int64_t> counts_;
     std::size_t filled_ = 0;

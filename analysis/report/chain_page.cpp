@@ -9,6 +9,8 @@
 #include "analysis/closure/report/report.hpp"
 #include "analysis/closure/report/seal.hpp"
 #include "engine/core/atomic_path.hpp"
+#include "engine/core/json_text.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::report {
 
@@ -20,6 +22,20 @@ std::string escaped(std::string_view text) {
     for (const char c : text) {
         if (c == '|' || c == '[' || c == ']') out += '\\';
         out += c == '\n' ? ' ' : c;
+    }
+    return out;
+}
+
+/// The name of a folder as part of an address: by RFC 3986 all but the unreserved characters as %XX.
+std::string in_address(std::string_view name) {
+    constexpr std::string_view unreserved = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~";
+    std::string out;
+    for (const char c : name) {
+        if (unreserved.find(c) != std::string_view::npos) {
+            out += c;
+        } else {
+            out += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+        }
     }
     return out;
 }
@@ -36,7 +52,7 @@ void add_chain_rates(const closure::Chain& chain, std::string& page) {
         const std::string near =
             record.near_shared ? fmt::format("{:.10g} ± {:.2g}", record.near_shared->hz, record.near_shared->sd_hz)
                                : "not seen";
-        page += fmt::format("| {} | {} | {} | {:.1f} | {:.1f} |\n", escaped(record.name), alone, near,
+        page += fmt::format("| {} | {} | {} | {:.1f} | {:.1f} |\n", markdown(record.name), alone, near,
                             record.gain_of_shared, record.gain_alone);
     }
     if (chain.freedom > 0) {
@@ -77,11 +93,11 @@ void write_chain_page(const std::filesystem::path& folder, const closure::Chain&
     if (chain.effect != nullptr) add_chain_rates(chain, page);
     page += "## The records\n\n";
     for (std::size_t r = 0; r < chain.records.size(); ++r) {
-        page += fmt::format("- [{}](<{}/report.md>): {}\n", escaped(chain.records[r].name), folders[r],
+        page += fmt::format("- [{}](<{}/report.md>): {}\n", markdown(chain.records[r].name), in_address(folders[r]),
                             escaped(closure::verdict_sentence(chain.records[r].closure)));
     }
     page += "\n`closure.json` has this page and those of the records for programs.\n";
-    write_text(folder / "closure.json", object.dump(2) + "\n");
+    write_text(folder / "closure.json", json_text(object, 2) + "\n");
     write_text(folder / "report.md", closure::sealed(page, closure::Comment::markup));
 }
 

@@ -17,6 +17,7 @@
 #include "analysis/report/plot.hpp"
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::report {
@@ -128,7 +129,8 @@ void add_predictive(const Predictive& predictive, std::string& page) {
 
 void write_closure_page(const std::filesystem::path& folder, const std::string& source, const record::Record& record,
                         const Closure& closure, const Predictive& predictive) {
-    std::string page = fmt::format("# What was found in {}\n\n**{}.**\n\n", source, closure::verdict_sentence(closure));
+    std::string page =
+        fmt::format("# What was found in {}\n\n**{}.**\n\n", markdown(source), closure::verdict_sentence(closure));
     page += fmt::format(
         "A gyro without anything beyond its base equation foretells the next reading to {:.6g} {} rms, the model found "
         "here to {:.6g} {};\nits noise alone would leave {:.6g} {}. A record with nothing to find gets another verdict "
@@ -151,7 +153,7 @@ void write_closure_page(const std::filesystem::path& folder, const std::string& 
             const std::string figure = draw_svg(picture.figure, (folder / picture.file).string());
             write_text(folder / picture.file, closure::sealed(figure, closure::Comment::markup));
             drawn.insert(folder / picture.file);
-            page += fmt::format("![{}]({})\n\n{}\n\n", picture.figure.title, picture.file, picture.caption);
+            page += fmt::format("![{}]({})\n\n{}\n\n", markdown(picture.figure.title), picture.file, picture.caption);
         } catch (const RunError& error) {
             problem = error.what();
         }

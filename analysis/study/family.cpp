@@ -10,6 +10,7 @@
 #include "analysis/allan/allan.hpp"
 #include "analysis/allan/sums/phase.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/store/hdf5.hpp"
 
 namespace ringlock::study {
@@ -18,9 +19,13 @@ namespace {
 /// The record of one gyro. Simulated records have no gaps, and the mean over the gyros wants the same points of all.
 allan::Phase phase_of_row(const store::Dataset& angles, std::size_t gyro, double interval_s) {
     const std::vector<double> record = angles.read_rows<double>(gyro, 1);
-    if (!std::all_of(record.begin(), record.end(), [](double angle) { return std::isfinite(angle); })) {
-        throw InputError(fmt::format("{}: dataset {}, row {}: holds values that are not finite: the result is damaged",
-                                     angles.file(), angles.path(), gyro));
+    // Beyond that, squares overflow.
+    constexpr double largest_arcsec = 1e100;
+    if (!std::all_of(record.begin(), record.end(), [](double angle) { return std::abs(angle) <= largest_arcsec; })) {
+        throw InputError(
+            fmt::format("{}: dataset {}, row {}: holds values that are not finite or beyond {:g} arcsec: "
+                        "the result is damaged",
+                        printable(angles.file()), printable(angles.path()), gyro, largest_arcsec));
     }
     return allan::phase_of(record, allan::Kind::phase, interval_s);
 }
@@ -52,31 +57,49 @@ std::vector<FamilyDeviation> of_arm(const store::Dataset& angles, const Rows& ro
 
 }  // namespace
 
+namespace {
+
+store::Dataset records_of(const store::File& file, const Study& study, std::size_t points, std::size_t arm) {
+    store::Dataset angles = file.group("arms").group(study.arms[arm].arm.name).dataset("angle_arcsec");
+    if (angles.shape() !=
+        store::Shape{study.gyros.size() * points, static_cast<std::uint64_t>(study.schedule.samples)}) {
+        throw InputError(
+            fmt::format("{}: dataset {} has not one row a gyro and one column a sample: the result is damaged",
+                        printable(file.file()), printable(angles.path())));
+    }
+    return angles;
+}
+
+}  // namespace
+
 std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesystem::path& path,
                                                             const Experiment& experiment, std::size_t point,
                                                             std::span<const allan::Estimator> estimators,
                                                             std::span<const std::int64_t> factors) {
-    const store::File file = store::File::open(path);
     const Study& study = experiment.points[point];
     const std::size_t gyros = study.gyros.size();  // of every point as many
     if (!study.scenario.output.angle_record) {
         throw InputError(fmt::format(
             "{}: holds no angle records, which other deviations than its own are made of; run the scenario with "
             "output.angle_record = true",
-            path.string()));
+            printable(path)));
     }
-    std::vector<std::vector<FamilyDeviation>> out;
-    for (const ArmStatistics& arm : study.arms) {
-        const store::Dataset angles = file.group("arms").group(arm.arm.name).dataset("angle_arcsec");
-        if (angles.shape() !=
-            store::Shape{gyros * experiment.points.size(), static_cast<std::uint64_t>(study.schedule.samples)}) {
-            throw InputError(
-                fmt::format("{}: dataset {} has not one row a gyro and one column a sample: the result is damaged",
-                            path.string(), angles.path()));
+    return store::guarded(path, [&](const store::GuardedPath& guarded) {
+        const store::File file = store::File::open(guarded);
+        std::vector<std::vector<FamilyDeviation>> out;
+        for (std::size_t arm = 0; arm < study.arms.size(); ++arm) {
+            const store::Dataset angles = records_of(file, study, experiment.points.size(), arm);
+            const Rows rows{point * gyros, gyros};
+            if (store::is_trial()) {  // it reads what will be read; the deviations take longer than any trial may
+                for (std::size_t row = 0; row < gyros; ++row) {
+                    static_cast<void>(angles.read_rows<double>(rows.first + row, 1));
+                }
+                continue;
+            }
+            out.push_back(of_arm(angles, rows, study.schedule.sample_interval_s, estimators, factors));
         }
-        out.push_back(of_arm(angles, {point * gyros, gyros}, study.schedule.sample_interval_s, estimators, factors));
-    }
-    return out;
+        return out;
+    });
 }
 
 }  // namespace ringlock::study

@@ -17,6 +17,7 @@
 
 #include "engine/core/error.hpp"
 #include "engine/core/notice.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock {
 namespace fs = std::filesystem;
@@ -32,10 +33,10 @@ fs::path resolve(const fs::path& target) {
     std::error_code error;
     const fs::file_status status = fs::status(resolved, error);
     if (fs::is_directory(status))
-        throw InputError(fmt::format("cannot write {}: it is a directory; name a file in it", target.string()));
+        throw InputError(fmt::format("cannot write {}: it is a directory; name a file in it", printable(target)));
     if (fs::exists(status) && !fs::is_regular_file(status))
         throw InputError(
-            fmt::format("cannot write {}: it is there and no regular file; name another", target.string()));
+            fmt::format("cannot write {}: it is there and no regular file; name another", printable(target)));
     return resolved;
 }
 
@@ -45,7 +46,7 @@ fs::path resolve(const fs::path& target) {
     if (error == ENOENT) what_to_do = "create it first (mkdir -p) or name another";
     if (error == ENAMETOOLONG) what_to_do = "choose a shorter name";
     throw InputError(
-        fmt::format("cannot write {}: directory {}: {}; {}", target.string(), directory, reason(error), what_to_do));
+        fmt::format("cannot write {}: directory {}: {}; {}", printable(target), directory, reason(error), what_to_do));
 }
 
 /// This machine as the names of partial files have it.
@@ -119,7 +120,7 @@ void remove_abandoned(const fs::path& target) {
         const pid_t process = writer_of(entry->path().filename().string(), name, this_host);
         if (process == 0 || kill(process, 0) == 0 || errno != ESRCH || !is_abandoned(entry->path())) continue;
         if (unlink(entry->path().c_str()) != 0) continue;
-        notice(fmt::format("removed {}, which a run that was killed had left", entry->path().string()));
+        notice(fmt::format("removed {}, which a run that was killed had left", printable(entry->path())));
     }
 }
 
@@ -159,7 +160,7 @@ int exchange(const fs::path& one, const fs::path& other) {
 }
 
 [[noreturn]] void fail(const fs::path& target, int error) {
-    throw RunError(fmt::format("cannot write {}: {}", target.string(), reason(error)));
+    throw RunError(fmt::format("cannot write {}: {}", printable(target), reason(error)));
 }
 
 }  // namespace
@@ -195,7 +196,7 @@ void AtomicPath::commit() {
     if (const int error = bring_to_disk(descriptor_.get()); error != 0) fail(target_, error);
     if (!has_partial()) {
         throw RunError(fmt::format("cannot write {}: somebody has removed or replaced {} while it was written",
-                                   target_.string(), partial_.string()));
+                                   printable(target_), printable(partial_)));
     }
     if (found_) keep_owner_and_mode();
     {
@@ -266,8 +267,8 @@ void AtomicPath::replace_found() {
         // As of somebody else's file in a folder like /tmp: only now is it known, and the work is done.
         const int failed = errno;
         note_written(aside);
-        throw RunError(fmt::format("cannot write {}: {}; what was to be written is in {}", target_.string(),
-                                   reason(failed), aside.string()));
+        throw RunError(fmt::format("cannot write {}: {}; what was to be written is in {}", printable(target_),
+                                   reason(failed), printable(aside)));
     }
     note_written(target_);
 }
@@ -295,9 +296,9 @@ void AtomicPath::refuse_to_replace(std::string_view what_happened) {
     const fs::path beside = settled_ ? partial_ : move_beside();
     if (!beside.empty()) note_written(beside);
     throw RunError(fmt::format("cannot write {}: somebody has {} since this run began, and it is kept; {}",
-                               target_.string(), what_happened,
+                               printable(target_), what_happened,
                                beside.empty() ? std::string("what was to be written could not be kept beside it")
-                                              : fmt::format("what was to be written is in {}", beside.string())));
+                                              : fmt::format("what was to be written is in {}", printable(beside))));
 }
 
 void write_text(const fs::path& path, std::string_view text) {

@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/printable.hpp"
+
 namespace ringlock {
 namespace {
 
@@ -18,7 +20,7 @@ std::function<void(std::string_view)> sink_in_force;
 void notice(std::string_view text) {
     const std::lock_guard lock(sink_mutex);
     if (sink_in_force) return sink_in_force(text);
-    const std::string line = fmt::format("ringlock: {}\n", text);
+    const std::string line = fmt::format("ringlock: {}\n", without_controls(text));
     if (std::fwrite(line.data(), 1, line.size(), stderr) != line.size()) std::clearerr(stderr);
 }
 

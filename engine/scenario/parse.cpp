@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/core/waiting.hpp"
 #include "engine/effects/effect.hpp"
 #include "engine/scenario/arm.hpp"
@@ -66,7 +67,7 @@ std::string name_text(std::string_view name) {
 /// Walks a parsed file, sets what is right and notes what is wrong.
 class Reader {
    public:
-    Reader(std::string_view file, const Rules& rules) : file_(file), rules_(rules) {}
+    Reader(std::string_view file, const Rules& rules) : file_(printable(file)), rules_(rules) {}
 
     /// Settings come after the file, in its place: text of each, and what it says.
     Scenario read(const toml::table& root, const std::vector<std::pair<std::string, toml::table>>& settings) {
@@ -121,7 +122,7 @@ class Reader {
         std::vector<std::string> lines;
         for (const auto& [place, text] : problems_) {
             if (!place.setting.empty()) {
-                lines.push_back(fmt::format("--set {}: {}", place.setting, text));
+                lines.push_back(fmt::format("--set {}: {}", printable(place.setting), text));
             } else if (place.where) {
                 lines.push_back(fmt::format("{}:{}:{}: {}", file_, place.where.line, place.where.column, text));
             } else {
@@ -485,7 +486,7 @@ toml::table parse_setting(const std::string& setting) {
     try {
         return toml::parse(text);
     } catch (const toml::parse_error& error) {
-        refuse(fmt::format("not valid TOML: {}", error.description()));
+        refuse(fmt::format("not valid TOML: {}", printable(std::string(error.description()))));
     }
     return {};
 }
@@ -502,8 +503,8 @@ Scenario parse_string(std::string_view text, std::string_view name, std::span<co
         root = toml::parse(text, name);
     } catch (const toml::parse_error& error) {
         const toml::source_position where = error.source().begin;
-        throw InputError(
-            fmt::format("{}:{}:{}: not valid TOML: {}", name, where.line, where.column, error.description()));
+        throw InputError(fmt::format("{}:{}:{}: not valid TOML: {}", printable(name), where.line, where.column,
+                                     printable(std::string(error.description()))));
     }
     return Reader(name, rules).read(root, set);
 }
@@ -512,21 +513,21 @@ Scenario parse_file(const std::filesystem::path& path, std::span<const std::stri
     constexpr std::size_t largest = 16 << 20;
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored)) {
-        throw InputError(fmt::format("{}: is a directory; a scenario is a TOML file", path.string()));
+        throw InputError(fmt::format("{}: is a directory; a scenario is a TOML file", printable(path)));
     }
     const Descriptor file = open_to_read(path);
-    if (!file.valid()) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+    if (!file.valid()) throw InputError(fmt::format("{}: cannot be read: {}", printable(path), std::strerror(errno)));
     std::string text(largest + 1, '\0');
     std::size_t filled = 0;
     while (filled < text.size()) {
         const ssize_t got = read_some(file.get(), text.data() + filled, text.size() - filled);
-        if (got < 0) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), std::strerror(errno)));
+        if (got < 0) throw InputError(fmt::format("{}: cannot be read: {}", printable(path), std::strerror(errno)));
         if (got == 0) break;
         filled += static_cast<std::size_t>(got);
     }
     text.resize(filled);
     if (text.size() > largest)
-        throw InputError(fmt::format("{}: is larger than 16 MiB: not a scenario", path.string()));
+        throw InputError(fmt::format("{}: is larger than 16 MiB: not a scenario", printable(path)));
     return parse_string(text, path.string(), settings, rules);
 }
 

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "engine/core/printable.hpp"
+
 namespace ringlock::scenario {
 namespace {
 
@@ -47,18 +49,14 @@ std::string format_real(double value) {
 
 std::string in_quotes(std::string_view text) {
     constexpr std::size_t longest = 60;
+    std::size_t end = std::min(longest, text.size());
+    while (end < text.size() && end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0U) == 0x80) --end;
     std::string out = "\"";
-    for (const char c : text.substr(0, longest)) {
-        if (c == '"' || c == '\\') {
-            out += '\\';
-            out += c;
-        } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
-            out += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
-        } else {
-            out += c;
-        }
+    for (const char c : text.substr(0, end)) {
+        if (c == '"' || c == '\\') out += '\\';
+        out += c;
     }
-    return out + (text.size() > longest ? "...\"" : "\"");
+    return printable(out) + (text.size() > longest ? "...\"" : "\"");
 }
 
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates) {

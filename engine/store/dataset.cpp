@@ -9,6 +9,7 @@
 
 #include "engine/store/hdf5.hpp"
 #include "engine/store/library.hpp"
+#include "engine/store/storage.hpp"
 
 namespace ringlock::store {
 
@@ -80,6 +81,14 @@ Dataset::Dataset(Id id, std::string file, std::string path) : Node(std::move(id)
     std::vector<hsize_t> extent(rank);
     H5Sget_simple_extent_dims(space.get(), extent.data(), nullptr);
     shape_.assign(extent.begin(), extent.end());
+}
+
+Dataset Dataset::opened(Id id, std::string file, std::string path) {
+    // Before the constructor asks for the extent: that of a virtual dataset may lie in other files.
+    const Storage storage = check_storage(id.get(), file, path);
+    Dataset dataset(std::move(id), std::move(file), std::move(path));
+    dataset.is_plain_ = storage.is_plain;
+    return dataset;
 }
 
 std::string Dataset::unit() const { return has_attribute("unit") ? string_attribute("unit") : ""; }
@@ -156,6 +165,12 @@ std::vector<T> Dataset::read_selection(const Selection& selection) const {
             detail::fail_input(file(), path(), fmt::format("cannot be read ({})", detail::last_error()));
     };
     if constexpr (!std::same_as<T, std::string>) {
+        constexpr std::uint64_t small = std::uint64_t{1} << 17;
+        if (is_plain_ && size_of(shape_) > small && is_trial()) {
+            note_left_out();
+            expect_memory(static_cast<double>(selection.size * sizeof(T)));
+            return std::vector<T>(selection.size);
+        }
         std::vector<T> values(selection.size);
         get(detail::Type<T>::memory(), values.data());
         return values;

@@ -1,11 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <system_error>
 #include <utility>
 
 #include "engine/store/hdf5.hpp"
 #include "engine/store/library.hpp"
+#include "engine/store/links.hpp"
 
 namespace ringlock::store {
 
@@ -69,7 +69,7 @@ Group Group::create_group(const std::string& name) {
 }
 
 Id Group::open(const std::string& name, bool want_group) const {
-    const H5O_type_t type = type_of(id().get(), name);
+    const int type = type_in_this_file(name);
     const std::string path = child_path(name);
     if (type == H5O_TYPE_UNKNOWN)
         detail::fail_input(file(), path, want_group ? "the group is missing" : "the dataset is missing");
@@ -87,22 +87,34 @@ Group Group::group(const std::string& name) const {
 
 Dataset Group::dataset(const std::string& name) const {
     const Lock lock;
-    return Dataset(open(name, false), file(), child_path(name));
+    return Dataset::opened(open(name, false), file(), child_path(name));
+}
+
+int Group::type_in_this_file(const std::string& name) const {
+    static_cast<void>(detail::refused_link());  // of an earlier call
+    const H5O_type_t type = type_of(id().get(), name);
+    if (const std::string why = detail::refused_link(); type == H5O_TYPE_UNKNOWN && !why.empty()) {
+        detail::fail_input(file(), child_path(name),
+                           fmt::format("{}, and only the file that was named is read. Give --follow-links to a command "
+                                       "that has it, or name that file",
+                                       why));
+    }
+    return type;
 }
 
 bool Group::has(const std::string& name) const {
     const Lock lock;
-    return exists(id().get(), name);
+    return name.empty() || name == "/" || type_in_this_file(name) != H5O_TYPE_UNKNOWN;
 }
 
 bool Group::has_group(const std::string& name) const {
     const Lock lock;
-    return type_of(id().get(), name) == H5O_TYPE_GROUP;
+    return type_in_this_file(name) == H5O_TYPE_GROUP;
 }
 
 bool Group::has_dataset(const std::string& name) const {
     const Lock lock;
-    return type_of(id().get(), name) == H5O_TYPE_DATASET;
+    return type_in_this_file(name) == H5O_TYPE_DATASET;
 }
 
 std::vector<std::string> Group::children() const {
@@ -127,17 +139,15 @@ File File::create(const std::filesystem::path& path, const std::filesystem::path
     return File(std::move(file), std::move(root), shown_as.string());
 }
 
-File File::open(const std::filesystem::path& path) {
+File File::open(const GuardedPath& guarded_path) {
     const Lock lock;
-    std::error_code error;
-    const auto status = std::filesystem::status(path, error);
-    if (!std::filesystem::exists(status)) detail::fail_input(path.string(), "", error.message());
-    if (!std::filesystem::is_regular_file(status)) detail::fail_input(path.string(), "", "is not a file");
+    const std::string path = guarded_path.path().string();
     Id file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, file_access().get()));
     if (!file.valid())
-        detail::fail_input(path.string(), "", fmt::format("is not a readable HDF5 file ({})", detail::last_error()));
+        detail::fail_input(path, "", fmt::format("is not a readable HDF5 file ({})", detail::last_error()));
     Id root(H5Gopen2(file.get(), "/", H5P_DEFAULT));
-    return File(std::move(file), std::move(root), path.string());
+    if (!root.valid()) detail::fail_input(path, "", "is damaged: the root group cannot be opened");
+    return File(std::move(file), std::move(root), path);
 }
 
 void File::close() {

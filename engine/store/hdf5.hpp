@@ -8,6 +8,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "engine/store/guard.hpp"
+
 /// HDF5 files with typed datasets and attributes.
 ///
 /// Every dataset carries its unit and a description. Object headers hold no times, so that equal data make equal files.
@@ -124,6 +126,7 @@ class Dataset : public Node {
    private:
     friend class Group;
     Dataset(Id id, std::string file, std::string path);
+    static Dataset opened(Id id, std::string file, std::string path);
     struct Selection;
     Selection select(std::uint64_t first_row, std::uint64_t n_rows) const;
     Selection select(std::uint64_t first_row, std::uint64_t n_rows, std::uint64_t first_column,
@@ -135,6 +138,7 @@ class Dataset : public Node {
     std::vector<T> read_selection(const Selection& selection) const;
 
     Shape shape_;
+    bool is_plain_ = false;  // one block of numbers in the file, see Storage
 };
 
 /// A group of an open file. Names may be paths below it ("arms/ideal").
@@ -145,10 +149,11 @@ class Group : public Node {
     Group group(const std::string& name) const;
     Dataset dataset(const std::string& name) const;
 
+    /// These throw InputError where the name leads to another file, see Links.
     bool has(const std::string& name) const;
     bool has_group(const std::string& name) const;
     bool has_dataset(const std::string& name) const;
-    /// Names of groups and datasets in it, sorted.
+    /// Names of what it holds, links that lead nowhere included, sorted.
     std::vector<std::string> children() const;
 
     /// Creates a dataset whose space on the disk is taken at once (a full disk shows here); rows not yet written are
@@ -179,6 +184,9 @@ class Group : public Node {
                          std::uint64_t chunk_rows = 0);
     std::string child_path(const std::string& name) const;
     Id open(const std::string& name, bool want_group) const;
+    /// Kind of the object as HDF5 numbers kinds, negative where there is none. Throws InputError where a link to it
+    /// leads to another file and is not followed. Under the lock.
+    int type_in_this_file(const std::string& name) const;
 };
 
 /// An HDF5 file and its root group.
@@ -187,8 +195,11 @@ class File : public Group {
     /// Creates the file, or empties one that is there. Errors call it `shown_as`. See AtomicFile for results.
     static File create(const std::filesystem::path& path, const std::filesystem::path& shown_as);
     static File create(const std::filesystem::path& path) { return create(path, path); }
-    /// Opens for reading.
-    static File open(const std::filesystem::path& path);
+    /// Opens for reading, within guarded().
+    static File open(const GuardedPath& guarded_path);
+
+    /// Number of the file in the HDF5 library, for readers of what this interface does not have.
+    std::int64_t library_id() const { return file_id_.get(); }
 
     /// Brings everything to the disk and closes; nothing of the file can be used after. Throws RunError where the disk
     /// refuses. The destructor closes too but cannot report.

@@ -1,11 +1,15 @@
 #include "engine/store/library.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <new>
 #include <string_view>
 #include <utility>
 
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
+#include "engine/store/links.hpp"
 
 namespace ringlock::store {
 namespace detail {
@@ -27,9 +31,24 @@ herr_t keep_first(unsigned /*n*/, const H5E_error2_t* error, void* text) {
 }  // namespace
 
 Lock::Lock() : lock_(library_mutex) {
-    [[maybe_unused]] static const herr_t left_at_exit = H5dont_atexit();
+    [[maybe_unused]] static const bool prepared = [] {
+        H5dont_atexit();  // the library would print that objects of a damaged file do not close
+        take_over_external_links();
+        return true;
+    }();
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     H5Eclear2(H5E_DEFAULT);
+}
+
+pid_t fork_with_library() {
+    std::unique_lock lock(library_mutex);  // no other thread is in the middle of a call
+    const pid_t child = fork();
+    if (child == 0) {
+        // The child's only thread has another number than the one that holds the lock, and could never free it.
+        new (&library_mutex) std::recursive_mutex;
+        lock.release();
+    }
+    return child;
 }
 
 std::string last_error() {
@@ -38,19 +57,19 @@ std::string last_error() {
     // A failed system call is told with the time and addresses of buffers; what matters is the system's own message.
     if (const auto start = text.find(system_mark); start != std::string::npos) {
         const auto message = start + system_mark.size();
-        return text.substr(message, text.find('\'', message) - message);
+        return printable(text.substr(message, text.find('\'', message) - message));
     }
-    return text.empty() ? "no reason given by HDF5" : text;
+    return text.empty() ? "no reason given by HDF5" : printable(text);
 }
 
 void fail_input(const std::string& file, const std::string& where, const std::string& problem) {
-    throw InputError(where.empty() ? fmt::format("{}: {}", file, problem)
-                                   : fmt::format("{}: {}: {}", file, where, problem));
+    throw InputError(where.empty() ? fmt::format("{}: {}", printable(file), problem)
+                                   : fmt::format("{}: {}: {}", printable(file), printable(where), problem));
 }
 
 void fail_run(const std::string& file, const std::string& where, const std::string& problem) {
     abandoned = true;
-    throw RunError(fmt::format("{}: {}: {} ({})", file, where, problem, last_error()));
+    throw RunError(fmt::format("{}: {}: {} ({})", printable(file), printable(where), problem, last_error()));
 }
 
 Id string_type() {

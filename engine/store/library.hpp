@@ -1,5 +1,6 @@
 #pragma once
 #include <hdf5.h>
+#include <sys/types.h>
 
 #include <cstdint>
 #include <mutex>
@@ -21,6 +22,9 @@ class Lock {
    private:
     std::lock_guard<std::recursive_mutex> lock_;
 };
+
+/// fork() while no thread uses the library, which the child can then use.
+pid_t fork_with_library();
 
 /// What the library or the operating system said last, in a few words.
 std::string last_error();

@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/core/system_text.hpp"
 
 namespace ringlock::store {
@@ -60,7 +61,7 @@ PartWriter::PartWriter(const std::filesystem::path& path, Open open_as, OnRefusa
     const int flags = O_WRONLY | O_CLOEXEC | O_NOFOLLOW | (open_as == Open::new_file ? O_CREAT | O_EXCL : O_TRUNC);
     while ((fd_ = ::open(path_.c_str(), flags, 0666)) < 0) {
         const int error = errno;
-        on_refusal_(fmt::format("{}: cannot be made: {}", path_.string(), system_text(error)), error);
+        on_refusal_(fmt::format("{}: cannot be made: {}", printable(path_), system_text(error)), error);
     }
     waiting_.reserve(most_waiting_bytes);
     put(std::as_bytes(std::span(magic)));
@@ -103,7 +104,7 @@ void PartWriter::drain() {
         if (now >= 0) {
             written += static_cast<std::size_t>(now);
         } else if (const int error = errno; error != EINTR) {
-            on_refusal_(fmt::format("{}: cannot be written: {}", path_.string(), system_text(error)), error);
+            on_refusal_(fmt::format("{}: cannot be written: {}", printable(path_), system_text(error)), error);
         }
     }
     waiting_.clear();
@@ -116,7 +117,8 @@ class PartReader {
     explicit PartReader(const std::filesystem::path& path) : path_(path), in_(path, std::ios::binary) {
         std::error_code unknown;
         size_ = std::filesystem::file_size(path, unknown);
-        if (!in_ || unknown) throw InputError(fmt::format("{}: cannot be read: {}", path.string(), system_text(errno)));
+        if (!in_ || unknown)
+            throw InputError(fmt::format("{}: cannot be read: {}", printable(path), system_text(errno)));
         std::array<char, magic.size()> begin;
         take(begin.data(), begin.size());
         if (begin != magic) damaged("it does not begin as checkpoints and shards of ringlock do");
@@ -151,13 +153,13 @@ class PartReader {
     void take(void* to, std::size_t bytes) {
         if (bytes > size_ - position_) damaged("it is cut off");
         if (!in_.read(static_cast<char*>(to), static_cast<std::streamsize>(bytes))) {
-            throw InputError(fmt::format("{}: cannot be read at byte {}", path_.string(), position_));
+            throw InputError(fmt::format("{}: cannot be read at byte {}", printable(path_), position_));
         }
         position_ += bytes;
     }
 
     [[noreturn]] void damaged(const std::string& how) const {
-        throw InputError(fmt::format("{}: is damaged: {}", path_.string(), how));
+        throw InputError(fmt::format("{}: is damaged: {}", printable(path_), how));
     }
 
     std::filesystem::path path_;

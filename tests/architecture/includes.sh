@@ -28,7 +28,10 @@ declare -A may=(
     [analysis/lot]="engine/core"
     [analysis/design]="engine/core engine/random"
     [analysis/quantity]="engine/core"
-    [analysis/record]="analysis/allan analysis/allan/sums analysis/noise engine/core engine/reader engine/store"
+    [analysis/text]="engine/core"
+    [analysis/record]="analysis/allan analysis/allan/sums analysis/noise analysis/text engine/core engine/reader
+        engine/store"
+    [analysis/findings]="analysis/noise engine/core"
     [analysis/instrument]="analysis/record engine/*"
     [analysis/study]="analysis/allan analysis/allan/sums analysis/design analysis/lot analysis/noise engine/*"
     [analysis/parts]="analysis/study analysis/allan analysis/noise engine/*"

@@ -130,6 +130,9 @@ if command -v git >/dev/null; then
     text_fault 1 "notes.md:1:" "// TO""DO: later"
     text_fault 1 "notes.md:1:" "FIX""ME"
     text_fault 0 "" "TODOS and fixme-not"
+    clean_tree
+    (cd "$folder" && git init -q && echo 'H5Fop''en(path);' >>analysis/report/plot.cpp)
+    expect 1 "without the guard" text.sh
     mkdir "$folder/below"
     folder="$folder/below" expect 77 "skipped" text.sh
 fi

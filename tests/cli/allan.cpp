@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
 
 #include "tests/unit/allan_support.hpp"
 
@@ -52,7 +53,14 @@ class AllanCommand : public testing::Test {
         return path.string();
     }
 
+    std::string write_text(const std::string& text) {
+        const auto path = directory_ / ("text-" + std::to_string(texts_++));
+        std::ofstream(path, std::ios::binary) << text;
+        return path.string();
+    }
+
     std::filesystem::path directory_;
+    int texts_ = 0;
 };
 
 TEST_F(AllanCommand, JsonHasTheFieldsAndPublishedFigures) {
@@ -299,6 +307,36 @@ TEST_F(AllanCommand, InstrumentsHaveUnitsOfTheirOwn) {
     EXPECT_NEAR(counts["noise"]["arw_deg_rt_h"]["value"], 2.5 * n_deg_rt_h, 1e-9);
 }
 
+// Coefficients are those of the record without what was found; the deviations are of the data as they are.
+TEST_F(AllanCommand, FaultsAreFoundBeforeCoefficientsAreClaimed) {
+    std::vector<double> values;
+    std::mt19937_64 random(9);
+    std::normal_distribution<double> noise;
+    for (int i = 0; i < 2000; ++i) values.push_back(noise(random));
+    const std::string options = " --rate 200 --kind rate --unit deg/s";
+    const auto json_of = [&] { return nlohmann::json::parse(run(write(values) + options + " --json").out); };
+    const auto clean = json_of();
+    EXPECT_EQ(clean["findings"].size(), 0U);
+    const double n = clean["noise"]["arw_deg_rt_h"]["value"];
+    values[777] += 100.0;
+    const auto glitch = json_of();
+    ASSERT_EQ(glitch["findings"].size(), 1U);
+    EXPECT_EQ(glitch["findings"][0]["kind"], "outlier");
+    EXPECT_EQ(glitch["findings"][0]["row"], 778);
+    EXPECT_NEAR(glitch["findings"][0]["size"], 100.0, 5.0);
+    EXPECT_NEAR(glitch["noise"]["arw_deg_rt_h"]["value"], n, 0.005 * n);
+    EXPECT_THAT(run(write(values) + options).out, HasSubstr("row 778       outlier"));
+    values[777] -= 100.0;
+    for (std::size_t i = 600; i < values.size(); ++i) values[i] += 2.0;
+    const auto jump = json_of();
+    ASSERT_EQ(jump["findings"].size(), 1U);
+    EXPECT_EQ(jump["findings"][0]["kind"], "jump");
+    EXPECT_EQ(jump["findings"][0]["of"], "rate");
+    EXPECT_NEAR(jump["findings"][0]["time_s"], 3.0, 0.02);
+    EXPECT_NEAR(jump["findings"][0]["size"], 2.0, 0.2);
+    EXPECT_TRUE(jump["noise"]["rrw_deg_h_rt_h"].is_null());
+}
+
 TEST_F(AllanCommand, TheUnitOfAColumnMustAgree) {
     const auto path = directory_ / "named.csv";
     std::ofstream(path) << "rate_deg_h,w_rad_s\n1,2\n2,1\n1,3\n3,1\n";
@@ -308,6 +346,57 @@ TEST_F(AllanCommand, TheUnitOfAColumnMustAgree) {
     EXPECT_EQ(r.status, 2);
     EXPECT_THAT(r.err, HasSubstr("w_rad_s"));
     EXPECT_THAT(r.err, HasSubstr("contradicts --unit deg/s"));
+}
+
+// The same numbers, as programs of the field write them.
+TEST_F(AllanCommand, LogsOfTheFieldAreRead) {
+    std::vector<double> values;
+    std::string point, comma, stamped;
+    for (int i = 0; i < 60; ++i) {
+        values.push_back((i * 37 % 101) / 64.0);  // six decimals hold it
+        const std::string text = std::to_string(values.back());
+        point += "\"" + std::to_string(i) + "\",\"" + text + "\"\n";
+        std::string with_comma = text;
+        with_comma[with_comma.find('.')] = ',';
+        comma += std::to_string(i) + ";" + with_comma + "\r\n";
+        stamped += std::to_string(1403636579758555392 + i * 5000000LL) + "," + text + "\n";
+    }
+    const auto deviation = [&](const std::string& arguments) {
+        const Outcome r = run(arguments + " --rate 200 --kind rate --tau 1,4 --json");
+        EXPECT_EQ(r.status, 0) << arguments << r.err;
+        return r.status == 0 ? nlohmann::json::parse(r.out)["deviations"].dump() : "";
+    };
+    const std::string expected = deviation(write(values));
+    EXPECT_EQ(deviation(write_text("\"t\",\"gyroADC[0]\"\n" + point) + " --column 'gyroADC[0]'"), expected);
+    EXPECT_EQ(deviation(write_text("Zeit [s];Gyro X (deg/s)\r\n" + comma) + " --column 'Gyro X'"), expected);
+    EXPECT_EQ(deviation(write_text("a;b\r\n" + comma) + " --column 2 --delimiter semicolon --header 1"), expected);
+    EXPECT_EQ(deviation(write_text("x\ny\n" + stamped) + " --column 2 --skip 2 --header no"), expected);
+    const std::string ns = write_text("t,gx\n" + stamped);
+    EXPECT_EQ(deviation(ns + " --column gx --time t --time-unit ns"), expected);
+    const auto refused = [&](const std::string& arguments, const std::string& words) {
+        const Outcome r = run(arguments + " --rate 200 --kind rate");
+        EXPECT_EQ(r.status, 2) << arguments;
+        EXPECT_EQ(r.out, "") << arguments;
+        EXPECT_THAT(r.err, HasSubstr(words)) << arguments;
+    };
+    refused(ns + " --column gx --time t", "say --time-unit ns");
+    refused(ns + " --column gx --time-unit ns", "--time-unit ns: needs --time");
+    refused(ns + " --column gx --time t --time-unit weeks",
+            "--time-unit weeks: must be one of s, ms, us, ns, mjd, iso");
+    refused(ns + " --column gy", "did you mean 'gx'");
+    refused(ns + " --column gx --header perhaps", "--header perhaps");
+    refused(ns + " --column gx --skip -1", "--skip");
+    refused(ns + " --column gx --delimiter ab", "--delimiter ab");
+    refused(write_text("PAR1 and more"), "is a Parquet table");
+    const Outcome noted = run(write_text(",0,1\n0,0.5,1.5\n1,0.25,1.25\n2,0.5,1.5\n3,0.25,1.5\n") +
+                              " --column 3 --rate 200 --kind rate --tau 1 --json");
+    EXPECT_THAT(noted.err, HasSubstr("ringlock: note: "));
+    EXPECT_THAT(noted.err, HasSubstr("line 1 is taken for the header"));
+    EXPECT_EQ(nlohmann::json::parse(noted.out)["n"], 4);
+    const Outcome named = run(write_text(",0,1,2\n0,0.5,1.5,2.5\n1,0.25,1.25,2.5\n2,0.5,1.5,1.5\n") +
+                              " --column 2 --rate 200 --kind rate --tau 1");
+    EXPECT_THAT(named.err, HasSubstr("2 is taken for the name of column 4, not for the number of column 2"));
+    refused(write_text("Name,Value\nfoo,bar\n") + " --column Value", "holds no data");
 }
 
 // Rows and columns of a table are what they are in a file of their own, streamed or not.

@@ -7,6 +7,7 @@
 
 #include "engine/store/hdf5.hpp"
 #include "tests/cli/program.hpp"
+#include "tests/support/open_file.hpp"
 
 namespace ringlock {
 namespace {
@@ -63,7 +64,7 @@ TEST_F(ReadStudy, TellsOfItsReader) {
         HasSubstr("arms read at 40 Hz: stripping whole_cycle, fraction none, latched at 40 Hz; 0.00802 s late"));
     EXPECT_THAT(run({"validate", "out.h5"}).out, HasSubstr("a valid result of 4 gyros and 2 arms"));
 
-    const store::File file = store::File::open(directory_ / "out.h5");
+    const store::File file = test::open_file(directory_ / "out.h5");
     EXPECT_EQ(file.group("arms").group("ideal").dataset("angle_arcsec").shape(), (store::Shape{4, 101}));
 }
 
@@ -74,7 +75,7 @@ TEST_F(ReadStudy, WithoutTheKeyNothingIsToldOfAReader) {
     ASSERT_EQ(r.status, 0) << r.err;
     EXPECT_FALSE(json::parse(r.out).contains("reader"));
     EXPECT_THAT(run({"analyze", "out.h5"}).out, Not(HasSubstr("arms read at")));
-    EXPECT_FALSE(store::File::open(directory_ / "out.h5").has_group("reader"));
+    EXPECT_FALSE(test::open_file(directory_ / "out.h5").has_group("reader"));
     ASSERT_EQ(run({"run", "bare.toml", "-o", "bare.h5"}).status, 0);
     if (!has_h5diff()) GTEST_SKIP() << "h5diff (hdf5-tools) is missing";
     EXPECT_EQ(h5diff("out.h5", "bare.h5", {"/provenance", "/scenario"}), 0);

@@ -5,6 +5,8 @@
 #include <sys/resource.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
 
 #include "tests/cli/program.hpp"
 #include "tests/unit/record_support.hpp"
@@ -83,19 +85,79 @@ TEST_F(RecordProgram, SaysWhyColumnsCannotBeImported) {
     refused({"--column", "gyro=rate", "--rate", "100"}, AllOf(HasSubstr("--unit is missing"), HasSubstr("deg/s")));
     refused({"--column", "gyro=rate", "--rate", "100", "--unit", "arcsec"}, HasSubstr("is a unit of angles"));
     refused({"--column", "gyro=rate", "--unit", "deg/s"}, HasSubstr("--rate 0"));
-    refused({"--column", "gyro=rate", "--unit", "deg/s", "--rate", "100"},
-            AllOf(HasSubstr("column gyro: 1 of 3 values are missing"), HasSubstr("sample 2")));
     refused({"--column", "acc=accel_x", "--rate", "100"}, HasSubstr("no column becomes samples"));
     refused({"--column", "acc=rate", "--column", "n=angle_arcsec", "--unit", "deg/s", "--rate", "100"},
             HasSubstr("are all samples"));
     refused({"--column", "n=quarter_count", "--rate", "100"}, HasSubstr("holds 7.5"));
-    refused({"--column", "acc=rate", "--unit", "deg/s", "--rate", "100", "--time", "t"},
-            HasSubstr("1 of 4 values are missing"));
+    write("counts.csv", "t,n\n0.0,1\n0.01,2\n0.03,3\n");
+    expect_refused(
+        {"import", "counts.csv", "-o", "o.h5", "--column", "n=quarter_count", "--rate", "100", "--time", "t"},
+        AllOf(HasSubstr("column n: 1 of 4 values are missing"), HasSubstr("sample 3")));
     refused({"--rate", "100"}, HasSubstr("--rate: needs --column"));
+    refused({"--skip", "1"}, HasSubstr("--skip: needs --column"));
+    refused({"--column", "acc=rate", "--unit", "deg/s", "--rate", "100", "--time-unit", "ms"},
+            HasSubstr("--time-unit ms: needs --time"));
+    refused({"--column", "acc=rate", "--unit", "deg/s", "--rate", "100", "--time", "t", "--time-unit", "ns"},
+            HasSubstr("say --time-unit s"));
     refused({"--column", "acc=rate", "--unit", "deg/s", "--rate", "100", "--declare", "colour=3"},
             AllOf(HasSubstr("--declare colour"), HasSubstr("dither_frequency_hz")));
     refused({"--column", "acc=rate", "--unit", "deg/s", "--rate", "100", "--declare", "dither_frequency_hz"},
             HasSubstr("must be KEY=NUMBER"));
+}
+
+TEST_F(RecordProgram, ClosureLeavesGapsOut) {
+    std::mt19937_64 random(3);
+    std::normal_distribution<double> noise;
+    std::string text = "# rate_hz = 100\ntime_s,angle_increment_arcsec\n";
+    for (int i = 0; i < 2000; ++i) {
+        const std::string row = std::to_string(0.01 * i) + "," + std::to_string(noise(random)) + "\n";
+        if (i < 700 || i >= 720) text += row;
+    }
+    write("noise.csv", text);
+    const Outcome r = run({"closure", "noise.csv", "--json"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    const auto json = nlohmann::json::parse(r.out);
+    EXPECT_EQ(json["verdict"], "nothing_missing");
+    ASSERT_EQ(json["gaps"].size(), 1U);
+    EXPECT_NEAR(json["gaps"][0]["from_s"], 6.99, 1e-9);
+    EXPECT_NEAR(json["gaps"][0]["to_s"], 7.19, 1e-9);
+}
+
+// What is left out stays out: NaN in the record, counted by whoever reads it.
+TEST_F(RecordProgram, GapsStayGaps) {
+    std::string text = "# rate_hz = 100\ntime_s,angle_increment_arcsec,accel_x\n";
+    for (int i = 0; i < 1000; ++i) {
+        if (i < 700 || i >= 720) text += std::to_string(0.01 * i) + "," + std::to_string(i % 7) + ",1\n";
+    }
+    write("gap.csv", text);
+    const auto named = AllOf(HasSubstr("warning: gap.csv: /samples/angle_increment_arcsec, line 703: 20 samples are "
+                                       "missing between 6.99 s and 7.2 s"),
+                             HasSubstr("rows 700 to 719"));
+    Outcome r = run({"validate", "gap.csv"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.err, named);
+    r = run({"import", "gap.csv", "-o", "gap.h5"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.out, AllOf(HasSubstr("1000 angle increments"), HasSubstr("20 of them missing")));
+    EXPECT_THAT(r.err, named);
+    record::Record record = record::read_record((directory_ / "gap.h5").string());
+    ASSERT_EQ(record.samples->size(), 1000U);
+    EXPECT_TRUE(std::isnan(record.samples->values[700]) && std::isnan(record.samples->witnesses.at("accel_x")[719]));
+    EXPECT_EQ(record.samples->values[720], 720 % 7);
+    r = run({"import", "gap.csv", "-o", "mapped.h5", "--column", "angle_increment_arcsec=angle_increment_arcsec",
+             "--unit", "arcsec", "--rate", "100", "--time", "time_s"});
+    EXPECT_EQ(r.status, 0) << r.err;
+    EXPECT_THAT(r.out, HasSubstr("20 of them missing"));
+    record = record::read_record((directory_ / "mapped.h5").string());
+    EXPECT_TRUE(std::isnan(record.samples->values[719]) && !std::isnan(record.samples->values[720]));
+    write("counts.csv", "# rate_hz = 100\nt,quarter_count\n0,1\n0.01,2\n0.04,3\n");
+    expect_refused(
+        {"validate", "counts.csv"},
+        AllOf(HasSubstr("counts.csv:5: column quarter_count: 2 samples are missing"), HasSubstr("0.01 s and 0.04 s")));
+    write("ms.csv", "# rate_hz = 100\ntime,angle_arcsec\n0,1\n10,2\n20,3\n");
+    expect_refused({"validate", "ms.csv"}, HasSubstr("declare them in the header, as in \"time [ms]\""));
+    write("ms.csv", "# rate_hz = 100\ntime [ms];angle_arcsec\n0;1,5\n10;2,5\n20;3,5\n");
+    EXPECT_EQ(run({"validate", "ms.csv"}).status, 0);
 }
 
 TEST_F(RecordProgram, SaysWhatIsWrongAndWhere) {
@@ -106,10 +168,10 @@ TEST_F(RecordProgram, SaysWhatIsWrongAndWhere) {
     for (const Arguments& arguments : std::vector<Arguments>{{"validate", "r.h5"}, {"import", "r.h5", "-o", "o.h5"}}) {
         expect_refused(arguments, AllOf(HasSubstr("r.h5: /turns/sin, row 5"), HasSubstr("r.h5: /turns/time_s, row 9")));
     }
-    write("r.csv", "# rate_hz = 10\nangle_arcsec\n1\nnan\n");
+    write("r.csv", "# rate_hz = 10\nangle_arcsec\n1\ninf\n");
     expect_refused({"validate", "r.csv"}, AllOf(HasSubstr("r.csv:4: column angle_arcsec"), Not(HasSubstr(".toml"))));
     // What is called neither a table nor a scenario may be either.
-    write("r", "# rate_hz = 10\nangle_arcsec\n1\nnan\n");
+    write("r", "# rate_hz = 10\nangle_arcsec\n1\ninf\n");
     expect_refused({"validate", "r"},
                    AllOf(HasSubstr("r:4: column angle_arcsec"), HasSubstr("scenarios end in .toml")));
     expect_refused({"import", "r.csv", "-o", "o.h5"}, HasSubstr("r.csv:4:"));

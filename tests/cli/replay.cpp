@@ -22,6 +22,7 @@
 #include "engine/store/hdf5.hpp"
 #include "tests/cli/program.hpp"
 #include "tests/cli/result_data.hpp"
+#include "tests/support/open_file.hpp"
 
 namespace ringlock {
 namespace {
@@ -64,7 +65,7 @@ class ReplayCommand : public test::ProgramTest {
         EXPECT_EQ(r.err, "");
         return r.status == 0 ? json::parse(r.out) : json();
     }
-    store::File open(const std::string& name) const { return store::File::open(directory_ / name); }
+    store::File open(const std::string& name) const { return test::open_file(directory_ / name); }
 
     /// Samples among the turns of a replay, by its attributes alone.
     std::vector<double> decimated(const std::string& replay) const {

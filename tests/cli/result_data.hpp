@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "engine/store/hdf5.hpp"
+#include "tests/support/open_file.hpp"
 
 /// The numbers of a result file, to be compared bit by bit.
 namespace ringlock::test {
@@ -33,7 +34,7 @@ inline void collect(const store::Group& group, const std::string& path,
 /// Every dataset and attribute outside /provenance that holds numbers.
 inline std::map<std::string, std::vector<double>> data(const std::filesystem::path& path) {
     std::map<std::string, std::vector<double>> out;
-    collect(store::File::open(path), "", out);
+    collect(test::open_file(path), "", out);
     return out;
 }
 

@@ -11,6 +11,7 @@
 
 #include "engine/core/error.hpp"
 #include "tests/support/expect_throw.hpp"
+#include "tests/support/open_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::store {
@@ -29,7 +30,7 @@ TEST(AtomicFile, AppearsUnderItsNameOnCommitOnly) {
     EXPECT_FALSE(std::filesystem::exists(directory / "out.h5"));
     output.commit();
     EXPECT_EQ(directory.entries(), 1);
-    EXPECT_EQ(File::open(directory / "out.h5").dataset("angle").read<double>().at(0), 1.0);
+    EXPECT_EQ(test::open_file(directory / "out.h5").dataset("angle").read<double>().at(0), 1.0);
 }
 
 TEST(AtomicFile, WithoutCommitLeavesNothing) {
@@ -48,7 +49,7 @@ TEST(AtomicFile, AnOlderResultStaysUntilCommit) {
     { const AtomicFile output(directory / "out.h5"); }
     EXPECT_EQ(std::filesystem::file_size(directory / "out.h5"), 3);
     AtomicFile(directory / "out.h5").commit();
-    EXPECT_NO_THROW(File::open(directory / "out.h5"));
+    EXPECT_NO_THROW(test::open_file(directory / "out.h5"));
 }
 
 TEST(AtomicFile, OfTwoWritersOfOneTargetTheFirstWinsAndNothingIsLost) {
@@ -60,8 +61,8 @@ TEST(AtomicFile, OfTwoWritersOfOneTargetTheFirstWinsAndNothingIsLost) {
     first.commit();
     EXPECT_THAT(message_of<RunError>([&] { second.commit(); }),
                 AllOf(HasSubstr("out.h5: somebody has made it"), HasSubstr("it is kept"), HasSubstr(".ringlock-1")));
-    EXPECT_EQ(File::open(directory / "out.h5").int_attribute("writer"), 1);
-    EXPECT_EQ(File::open(directory / "out.h5.ringlock-1").int_attribute("writer"), 2);
+    EXPECT_EQ(test::open_file(directory / "out.h5").int_attribute("writer"), 1);
+    EXPECT_EQ(test::open_file(directory / "out.h5.ringlock-1").int_attribute("writer"), 2);
     EXPECT_EQ(directory.entries(), 2);
 }
 
@@ -71,7 +72,7 @@ TEST(AtomicFile, FollowsASymbolicLink) {
     std::filesystem::create_symlink(directory / "disk/out.h5", directory / "link.h5");
     AtomicFile(directory / "link.h5").commit();
     EXPECT_TRUE(std::filesystem::is_symlink(directory / "link.h5"));
-    EXPECT_NO_THROW(File::open(directory / "disk/out.h5"));
+    EXPECT_NO_THROW(test::open_file(directory / "disk/out.h5"));
 }
 
 TEST(AtomicFile, TargetsThatCannotBeWrittenAreRefusedAtOnce) {

@@ -11,6 +11,7 @@
 #include "analysis/study/result/result_file.hpp"
 #include "engine/core/error.hpp"
 #include "engine/scenario/parse.hpp"
+#include "tests/support/open_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock {
@@ -165,7 +166,7 @@ values = [5.0, 15.0]
         if (s.study == 1) alone.insert(alone.end(), s.angle_arcsec.begin(), s.angle_arcsec.end());
     });
     writer.finish(done, study::summarise(done), {});
-    const store::File file = store::File::open(path);
+    const store::File file = test::open_file(path);
     const auto angles = file.group("arms").group("uncompensated").dataset("angle_arcsec");
     EXPECT_EQ(angles.read_rows<double>(3, 3), alone);
 }

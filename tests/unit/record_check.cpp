@@ -99,11 +99,15 @@ TEST(RecordCheck, NamesEveryFaultWithItsPlace) {
         {[](Record& r) { r.samples->rate_hz = -5.0; }, {"/samples, attribute rate_hz", "is -5"}},
         {[](Record& r) { r.samples->rate_hz = nan; }, {"/samples, attribute rate_hz", "nan"}},
         {[](Record& r) { r.samples->t0_s = infinity; }, {"/samples, attribute t0_s"}},
-        {[](Record& r) { r.samples->values[3] = nan; }, {"/samples/angle_increment_arcsec, row 3", "nan"}},
+        {[](Record& r) { r.samples->values[3] = infinity; }, {"/samples/angle_increment_arcsec, row 3", "inf"}},
+        {[](Record& r) { std::fill_n(r.samples->values.begin() + 3, 21, nan); },
+         {"/samples/angle_increment_arcsec, row 3", "21 of 40 samples are missing", "at least half"}},
+        {[](Record& r) { r.samples->values.assign(40, nan); },
+         {"/samples/angle_increment_arcsec, row 0", "40 of 40 samples are missing"}},
         {[](Record& r) { r.samples->values.clear(); }, {"/samples/angle_increment_arcsec", "no rows"}},
         {[](Record& r) { r.samples->counts.push_back(1); }, {"/samples", "counts beside angle_increment_arcsec"}},
         {[](Record& r) { r.samples->witnesses["accel_x"].pop_back(); }, {"/samples/accel_x", "39 rows", "40"}},
-        {[](Record& r) { r.samples->witnesses["accel_y"][5] = nan; }, {"/samples/accel_y, row 5"}},
+        {[](Record& r) { r.samples->witnesses["accel_y"][5] = infinity; }, {"/samples/accel_y, row 5"}},
         {[](Record& r) { r.temperature_c.value.pop_back(); }, {"/environment/temperature_c", "2 rows", "3"}},
         {[](Record& r) { r.temperature_c.time_s[1] = 2.0; }, {"/environment/time_s, row 2", "must increase"}},
         {[](Record& r) { r.temperature_c.value[0] = nan; }, {"/environment/temperature_c, row 0"}},
@@ -127,6 +131,16 @@ TEST(RecordCheck, WarnsOfWhatMayBeSo) {
     record.samples->values.assign(40, 0.25);
     EXPECT_EQ(errors(record), "");
     EXPECT_THAT(warnings(record), AllOf(HasSubstr("/samples/angle_increment_arcsec"), HasSubstr("in every row")));
+
+    record = full_record();
+    record.samples->values[11] = record.samples->values[12] = record.samples->values[20] = nan;
+    record.samples->witnesses["accel_x"][7] = nan;
+    EXPECT_EQ(errors(record), "");
+    EXPECT_THAT(warnings(record),
+                AllOf(HasSubstr("angle_increment_arcsec, row 11 (counted from 0): 3 of 40 samples are missing"),
+                      HasSubstr("in 2 stretches"), HasSubstr("accel_x, row 7"), testing::Not(HasSubstr("glitch"))));
+    record.samples->values[13] = 1e6;
+    EXPECT_THAT(warnings(record), AllOf(HasSubstr("row 13"), HasSubstr("glitch")));
 
     record = full_record();
     record.samples->values[11] = 1e6;

@@ -16,6 +16,7 @@
 #include "analysis/study/result/result_file.hpp"
 #include "engine/core/error.hpp"
 #include "engine/store/hdf5.hpp"
+#include "tests/support/open_file.hpp"
 #include "tests/unit/result_support.hpp"
 
 namespace ringlock::study {
@@ -50,7 +51,7 @@ TEST_F(ResultFile, DeviationsAtFactorsAskedForAreThoseOfTheStoredAngles) {
     const auto family = family_deviations(path_, experiment, 0, oadev, factors);
     ASSERT_EQ(family.size(), study.arms.size());
     const double interval_s = study.schedule.sample_interval_s;
-    const store::File file = store::File::open(path_);
+    const store::File file = test::open_file(path_);
     for (std::size_t a = 0; a < family.size(); ++a) {
         const std::string name = study.arms[a].arm.name;
         ASSERT_EQ(family[a].size(), 1U) << name;

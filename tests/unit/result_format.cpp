@@ -17,6 +17,7 @@
 #include "analysis/study/replay.hpp"
 #include "analysis/study/result/replay_file.hpp"
 #include "analysis/study/result/result_file.hpp"
+#include "tests/support/open_file.hpp"
 #include "tests/unit/format_page.hpp"
 #include "tests/unit/result_support.hpp"
 
@@ -113,7 +114,7 @@ TEST_F(ResultFile, HoldsTheReaderThatThePageTells) {
         ASSERT_TRUE(file.contains(name)) << name;
         EXPECT_EQ(file.at(name), entry) << name;
     }
-    const store::File result = store::File::open(path_);
+    const store::File result = test::open_file(path_);
     const store::Group reader = result.group("reader");
     EXPECT_EQ(reader.double_attribute("output_hz"), 20.0);
     EXPECT_EQ(reader.string_attribute("stripping"), "reference+fir");
@@ -139,7 +140,7 @@ TEST_F(ResultFile, OfADesignHoldsTheReadersOfItsPoints) {
     scenario.design.kind = scenario::DesignKind::list;
     scenario.design.vary = {{.key = "reader.output_hz", .values = {0.0, 20.0}}};
     write(path_, scenario);
-    const store::File result = store::File::open(path_);
+    const store::File result = test::open_file(path_);
     const store::Group reader = result.group("reader");
     EXPECT_EQ(reader.dataset("output_hz").read<double>(), (std::vector<double>{0.0, 20.0}));
     EXPECT_EQ(reader.dataset("output_hz").shape(), (store::Shape{2}));
@@ -259,7 +260,7 @@ TEST_F(ResultFile, OfADesignEndsWithNothingWhereAPointHasFewerAveragingTimes) {
     const std::size_t taus = plan.points[1].factors.size();
     const std::size_t fewer = plan.points[0].factors.size();
     ASSERT_LT(fewer, taus);
-    const store::File file = store::File::open(path_);
+    const store::File file = test::open_file(path_);
     const store::Group allan = file.group("arms").group("uncompensated").group("allan");
     for (const char* name : {"tau_s", "ensemble_deviation_deg_h", "ensemble_edf"}) {
         const store::Dataset dataset = allan.dataset(name);
@@ -311,7 +312,7 @@ TEST_F(ResultFile, AReplayHoldsWhatThePageSays) {
     replay(path_, "noise_injected+compensated", out);
     const Entries expected = page(the_page, {}, of_replays);
     EXPECT_GT(expected.size(), 60U);
-    const auto turns = store::File::open(out).dataset("turns/time_s").shape().at(0);
+    const auto turns = test::open_file(out).dataset("turns/time_s").shape().at(0);
     EXPECT_GT(turns, 7000U);
     compare(expected, walk(out, {{turns, "turns"}, {readout::kept_pulses, "pulses"}}));
     EXPECT_EQ(left(), (std::set<std::string>{"out.h5", "replay.h5"}));
@@ -326,7 +327,7 @@ TEST_F(ResultFile, AReplayHoldsNoPulsesWhereNoneAreTimed) {
     Entries expected = page(the_page, {}, of_replays);
     EXPECT_EQ(expected.erase("/readings/pulses_before_s"), 1U);
     EXPECT_EQ(expected.erase("/readings/pulses_after_s"), 1U);
-    const auto turns = store::File::open(out).dataset("turns/time_s").shape().at(0);
+    const auto turns = test::open_file(out).dataset("turns/time_s").shape().at(0);
     compare(expected, walk(out, {{turns, "turns"}}));
 }
 

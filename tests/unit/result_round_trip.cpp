@@ -8,6 +8,7 @@
 
 #include "analysis/study/result/result_file.hpp"
 #include "engine/scenario/parse.hpp"
+#include "tests/support/open_file.hpp"
 #include "tests/unit/result_support.hpp"
 
 namespace ringlock::study {
@@ -105,7 +106,7 @@ TEST_F(ResultFile, GivesTheStudyBack) {
         EXPECT_TRUE(same(other.arms[a].sweep[1].output_rate_deg_h, one.arms[a].sweep[1].output_rate_deg_h));
     }
 
-    const store::File file = store::File::open(path_);
+    const store::File file = test::open_file(path_);
     const auto angle = file.dataset("arms/ideal/angle_arcsec").read_rows<double>(4, 1);
     EXPECT_EQ(angle, record);
     EXPECT_EQ(read_provenance(path_).wall_s, 1.5);
@@ -126,7 +127,7 @@ TEST_F(ResultFile, GivesClosedFormsBackWhereTheDriveRepeatsItself) {
     for (const ArmStatistics& arm : read().arms) {
         for (const GyroStatistics& gyro : arm.gyros) EXPECT_FALSE(gyro.rate_error_closed_form_deg_h) << arm.arm.name;
     }
-    EXPECT_FALSE(store::File::open(path_).has_dataset("arms/uncompensated/rate_error_closed_form_deg_h"));
+    EXPECT_FALSE(test::open_file(path_).has_dataset("arms/uncompensated/rate_error_closed_form_deg_h"));
 
     scenario.effects["quantum_noise"]["deg_rt_h"] = 0.0;
     const Study study = read();

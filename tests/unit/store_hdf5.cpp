@@ -15,6 +15,7 @@
 #include "engine/core/error.hpp"
 #include "engine/store/hdf5.hpp"
 #include "tests/support/expect_throw.hpp"
+#include "tests/support/open_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::store {
@@ -36,7 +37,7 @@ class StoreHdf5 : public testing::Test {
         File file = File::create(path_);
         fill(file);
         file.close();
-        return File::open(path_);
+        return test::open_file(path_);
     }
 };
 
@@ -198,26 +199,26 @@ TEST_F(StoreHdf5, ErrorsNameFileAndObject) {
 }
 
 TEST_F(StoreHdf5, FilesThatAreNotHdf5AreRefused) {
-    EXPECT_THAT(message_of<InputError>([&] { File::open(path_); }), HasSubstr("No such file"));
-    EXPECT_THAT(message_of<InputError>([&] { File::open(directory_.path()); }), HasSubstr("is not a file"));
+    EXPECT_THAT(message_of<InputError>([&] { test::open_file(path_); }), HasSubstr("No such file"));
+    EXPECT_THAT(message_of<InputError>([&] { test::open_file(directory_.path()); }), HasSubstr("is not a file"));
     std::ofstream(path_) << "tau_s,dev\n";
-    EXPECT_THAT(message_of<InputError>([&] { File::open(path_); }), HasSubstr("is not a readable HDF5 file"));
+    EXPECT_THAT(message_of<InputError>([&] { test::open_file(path_); }), HasSubstr("is not a readable HDF5 file"));
     std::ofstream(path_, std::ios::trunc).flush();
-    EXPECT_THAT(message_of<InputError>([&] { File::open(path_); }), HasSubstr("is not a readable HDF5 file"));
+    EXPECT_THAT(message_of<InputError>([&] { test::open_file(path_); }), HasSubstr("is not a readable HDF5 file"));
 }
 
 TEST_F(StoreHdf5, ATruncatedFileIsRefused) {
     round_trip([](File& f) { f.write("rate", std::vector<double>(10'000, 1.0), {"deg/h", ""}); });
     std::filesystem::resize_file(path_, 20'000);
-    EXPECT_THAT(message_of<InputError>([&] { File::open(path_); }), HasSubstr(path_.string()));
+    EXPECT_THAT(message_of<InputError>([&] { test::open_file(path_); }), HasSubstr(path_.string()));
 }
 
 TEST_F(StoreHdf5, NothingIsPrintedOnFailure) {
     testing::internal::CaptureStderr();
-    EXPECT_THROW(File::open("/dev/null"), InputError);
+    EXPECT_THROW(test::open_file("/dev/null"), InputError);
     std::thread([&] {
         std::ofstream(path_) << "not HDF5";
-        EXPECT_THROW(File::open(path_), InputError);
+        EXPECT_THROW(test::open_file(path_), InputError);
     }).join();
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }

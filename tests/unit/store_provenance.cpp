@@ -6,6 +6,7 @@
 #include "engine/core/error.hpp"
 #include "engine/core/version.hpp"
 #include "engine/store/provenance.hpp"
+#include "tests/support/open_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::store {
@@ -33,7 +34,7 @@ TEST(StoreProvenance, ComesBackFromAFile) {
     File file = File::create(directory / "a.h5");
     write_provenance(file, written);
     file.close();
-    const Provenance read = read_provenance(File::open(directory / "a.h5"));
+    const Provenance read = read_provenance(test::open_file(directory / "a.h5"));
     EXPECT_EQ(read.program_version, written.program_version);
     EXPECT_EQ(read.git_hash, written.git_hash);
     EXPECT_EQ(read.compiler, written.compiler);
@@ -69,7 +70,7 @@ TEST(StoreProvenance, OfAnEarlierProgramIsReadAsItIs) {
 TEST(StoreProvenance, AFileWithoutIsRefused) {
     const test::TemporaryDirectory directory;
     File::create(directory / "a.h5").close();
-    EXPECT_THROW(read_provenance(File::open(directory / "a.h5")), InputError);
+    EXPECT_THROW(read_provenance(test::open_file(directory / "a.h5")), InputError);
 }
 
 }  // namespace

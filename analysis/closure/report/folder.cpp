@@ -19,6 +19,8 @@
 #include "analysis/closure/report/seal.hpp"
 #include "analysis/record/record.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/json_text.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::closure {
 namespace {
@@ -42,7 +44,7 @@ bool is_closure_json(const std::string& text) {
         return std::all_of(keys.begin(), keys.end(), [&](const char* key) { return object.contains(key); });
     };
     if (!has({"verdict", "base", "steps", "predictive"}) && !has({"chain", "records"})) return false;
-    return object.dump(2) + "\n" == text;
+    return json_text(object, 2) + "\n" == text;
 }
 
 bool is_ours(const fs::path& path) {
@@ -62,28 +64,28 @@ std::string why_not(fs::path folder) {
     std::error_code error;
     folder = fs::absolute(folder, error);
     while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
-    if (!fs::is_directory(folder, error)) return fmt::format("{} is there and no folder", folder.string());
+    if (!fs::is_directory(folder, error)) return fmt::format("{} is there and no folder", printable(folder));
     if (access(folder.c_str(), W_OK | X_OK) == 0) return "";
-    return fmt::format("{}: {}", folder.string(), std::generic_category().message(errno));
+    return fmt::format("{}: {}", printable(folder), std::generic_category().message(errno));
 }
 
 void check_files(const fs::path& folder, const std::vector<fs::path>& files) {
     if (const std::string why = why_not(folder); !why.empty()) {
         throw InputError(
             fmt::format("{}: the closed loop's files cannot be written there: {}; give another folder with -o",
-                        folder.string(), why));
+                        printable(folder), why));
     }
     std::string others;
     for (const fs::path& file : files) {
         std::error_code error;
         if (fs::symlink_status(file, error).type() == fs::file_type::not_found || is_ours(file)) continue;
-        others += (others.empty() ? "" : ", ") + file.filename().string();
+        others += (others.empty() ? "" : ", ") + printable(file.filename());
     }
     if (others.empty()) return;
     throw InputError(
         fmt::format("{}: {} would be replaced, which ringlock closure has not written, or which somebody has changed "
                     "since; it is kept. Give another folder with -o, or move it away",
-                    folder.string(), others));
+                    printable(folder), others));
 }
 
 }  // namespace

@@ -11,6 +11,8 @@
 #include "analysis/closure/stats/p_values.hpp"
 #include "engine/core/atomic_path.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/json_text.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/store/atomic_file.hpp"
 
 namespace ringlock::closure {
@@ -199,7 +201,7 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
         throw InputError(
             fmt::format("{}: the folder for the closed loop's files cannot be made ({}); give another "
                         "with -o",
-                        folder.string(), failed.message()));
+                        printable(folder), failed.message()));
     }
     store::AtomicFile file(folder / "closure.h5");
     store::File& h5 = file.file();
@@ -247,7 +249,7 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
     json object = to_json(closure);
     object["predictive"] = to_json(predictive);
     object["closed"] = to_json(closed);
-    write_text(folder / "closure.json", object.dump(2) + "\n");
+    write_text(folder / "closure.json", json_text(object, 2) + "\n");
     write_text(folder / "closed.toml", sealed(to_toml(closed, source, closure.verdict), Comment::toml));
     file.commit();
 }

@@ -16,6 +16,7 @@
 #include "analysis/study/result/result_file.hpp"
 #include "analysis/study/result/result_layout.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/core/version.hpp"
 #include "engine/scenario/render.hpp"
 #include "engine/store/hdf5.hpp"
@@ -126,7 +127,7 @@ constexpr std::array pulse_columns = {
 bool same_bits(double a, double b) { return std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b); }
 
 std::string program_text(std::string_view version, std::string_view hash) {
-    return fmt::format("ringlock {} ({})", version, hash);
+    return fmt::format("ringlock {} ({})", printable(version), printable(hash));
 }
 
 std::string scenario_text(const Experiment& experiment) { return scenario::to_toml(experiment.scenario); }
@@ -137,11 +138,15 @@ std::filesystem::path keep_other_files(const std::filesystem::path& path, const 
     if (!std::filesystem::is_regular_file(path, unreachable)) return path;
     bool same = false;
     try {
-        const store::File file = store::File::open(path);
-        same = file.has_attribute("format") && file.string_attribute("format") == format_name &&
-               file.string_attribute("arm") == of.arm_name() && file.int_attribute("gyro") == of.gyro &&
-               file.int_attribute("point") == static_cast<std::int64_t>(of.point) + 1 &&
-               file.dataset("scenario").read<std::string>().at(0) == scenario_text(of.experiment);
+        same = store::guarded(path, [&](const store::GuardedPath& guarded) {
+            const store::File file = store::File::open(guarded);
+            return file.has_attribute("format") && file.string_attribute("format") == format_name &&
+                   file.string_attribute("arm") == of.arm_name() && file.int_attribute("gyro") == of.gyro &&
+                   file.int_attribute("point") == static_cast<std::int64_t>(of.point) + 1 &&
+                   file.dataset("scenario").read<std::string>().at(0) == scenario_text(of.experiment);
+        });
+    } catch (const Interrupted&) {
+        throw;
     } catch (const std::exception&) {
         // Not HDF5 or not readable: somebody's file all the same.
     }
@@ -149,7 +154,7 @@ std::filesystem::path keep_other_files(const std::filesystem::path& path, const 
         throw InputError(
             fmt::format("{}: the file is there and is not a replay of this gyro, arm and result; it is kept. Give "
                         "another name with -o, or remove it",
-                        path.string()));
+                        printable(path)));
     }
     return path;
 }
@@ -158,22 +163,40 @@ std::filesystem::path keep_other_files(const std::filesystem::path& path, const 
 
 std::string GyroOfResult::text() const {
     const std::string at = experiment.has_design() ? fmt::format("point {}, ", point + 1) : "";
-    return fmt::format("{}: {}arm {}, gyro {}", result.string(), at, arm_name(), gyro);
+    return fmt::format("{}: {}arm {}, gyro {}", printable(result), at, arm_name(), gyro);
 }
 
 StoredGyro::StoredGyro(const GyroOfResult& of)
-    : of_(of), file_(store::File::open(of.result)), provenance_(store::read_provenance(file_)) {
-    for (std::size_t point = 0; point < of.point; ++point) row_ += of.experiment.points[point].gyros.size();
-    row_ += static_cast<std::uint64_t>(of.gyro);
-    if (!of.experiment.scenario.output.angle_record) return;
-    record_ = file_.group("arms").group(of.arm_name()).dataset("angle_arcsec");
+    : of_(of), opened_(store::guarded(of.result, [&](const store::GuardedPath& guarded) {
+          Opened opened = open(of, guarded);
+          if (!opened.record || !store::is_trial()) return opened;
+          // All that check_sample() will ask for.
+          for (std::int64_t sample = 0; sample < of.study().schedule.samples; sample += at_once) {
+              static_cast<void>(read_samples(of, opened, sample));
+          }
+          return opened;
+      })) {}
+
+StoredGyro::Opened StoredGyro::open(const GyroOfResult& of, const store::GuardedPath& guarded) {
+    Opened opened{store::File::open(guarded), {}, {}, 0};
+    opened.provenance = store::read_provenance(opened.file);
+    for (std::size_t point = 0; point < of.point; ++point) opened.row += of.experiment.points[point].gyros.size();
+    opened.row += static_cast<std::uint64_t>(of.gyro);
+    if (!of.experiment.scenario.output.angle_record) return opened;
+    opened.record = opened.file.group("arms").group(of.arm_name()).dataset("angle_arcsec");
     const store::Shape wanted{static_cast<std::uint64_t>(of.experiment.gyros()),
                               static_cast<std::uint64_t>(of.study().schedule.samples)};
-    if (record_->shape() != wanted) {
+    if (opened.record->shape() != wanted) {
         throw InputError(fmt::format("{}: dataset {} has the shape [{}], [{}] is wanted: the result is damaged",
-                                     of.result.string(), record_->path(), fmt::join(record_->shape(), ", "),
-                                     fmt::join(wanted, ", ")));
+                                     printable(of.result), printable(opened.record->path()),
+                                     fmt::join(opened.record->shape(), ", "), fmt::join(wanted, ", ")));
     }
+    return opened;
+}
+
+std::vector<double> StoredGyro::read_samples(const GyroOfResult& of, const Opened& opened, std::int64_t first) {
+    const auto samples = static_cast<std::uint64_t>(std::min(at_once, of.study().schedule.samples - first));
+    return opened.record->read_block<double>(opened.row, 1, static_cast<std::uint64_t>(first), samples);
 }
 
 void StoredGyro::check(const gyro::Setup& setup) const {
@@ -185,12 +208,10 @@ void StoredGyro::check(const gyro::Setup& setup) const {
 }
 
 void StoredGyro::check_sample(std::int64_t sample, double angle_arcsec) {
-    if (!record_) return;
+    if (!opened_.record) return;
     if (const auto next = first_read_ + static_cast<std::int64_t>(read_.size()); sample >= next) {
-        constexpr std::int64_t at_once = 65536;
         first_read_ = sample;
-        const auto samples = static_cast<std::uint64_t>(std::min(at_once, of_.study().schedule.samples - sample));
-        read_ = record_->read_block<double>(row_, 1, static_cast<std::uint64_t>(sample), samples);
+        read_ = read_samples(of_, opened_, sample);
     }
     const double stored = read_[static_cast<std::size_t>(sample - first_read_)];
     if (same_bits(stored, angle_arcsec)) return;
@@ -207,7 +228,7 @@ void StoredGyro::check(const ReplayFigures& figures) const {
 }
 
 void StoredGyro::fail(const std::string& what, double stored, double replayed) const {
-    const std::string by = program_text(provenance_.program_version, provenance_.git_hash);
+    const std::string by = program_text(opened_.provenance.program_version, opened_.provenance.git_hash);
     const std::string here = program_text(version(), git_hash());
     const std::string why =
         by != here

@@ -38,7 +38,7 @@ class StoredGyro {
     /// `of` outlives it. Throws InputError where the result is damaged.
     explicit StoredGyro(const GyroOfResult& of);
 
-    bool has_record() const { return record_.has_value(); }
+    bool has_record() const { return opened_.record.has_value(); }
     /// Parameters as drawn.
     void check(const gyro::Setup& setup) const;
     /// A sample of the angle record; they come in their order. Nothing where the result has no records.
@@ -49,11 +49,20 @@ class StoredGyro {
    private:
     [[noreturn]] void fail(const std::string& what, double stored, double replayed) const;
 
+    /// The file of the result and what of it is this gyro's.
+    struct Opened {
+        store::File file;  // datasets of a file that is closed are so, too
+        store::Provenance provenance;
+        std::optional<store::Dataset> record;
+        std::uint64_t row = 0;  // of the gyro among those of all points
+    };
+    static Opened open(const GyroOfResult& of, const store::GuardedPath& guarded);
+    static constexpr std::int64_t at_once = 65536;
+    /// Samples of the record from `first` on, at most at_once.
+    static std::vector<double> read_samples(const GyroOfResult& of, const Opened& opened, std::int64_t first);
+
     const GyroOfResult& of_;
-    store::File file_;  // datasets of a file that is closed are so, too
-    store::Provenance provenance_;
-    std::optional<store::Dataset> record_;
-    std::uint64_t row_ = 0;        // of the gyro among those of all points
+    Opened opened_;
     std::int64_t first_read_ = 0;  // sample that the ones below begin with
     std::vector<double> read_;
 };

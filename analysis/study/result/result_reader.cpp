@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +14,7 @@
 #include "analysis/study/result/result_file.hpp"
 #include "analysis/study/result/result_layout.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/scenario/parse.hpp"
 
@@ -19,18 +22,48 @@ namespace ringlock::study {
 
 namespace {
 
+std::int64_t whole_or_zero(double value) { return std::isnan(value) ? 0 : static_cast<std::int64_t>(value); }
+
 std::optional<double> or_nothing(double value) { return std::isnan(value) ? std::nullopt : std::optional(value); }
+
+/// Numbers that a column may hold.
+struct Allowed {
+    double least = -1e100;  // sums of squares of all that is within stay finite
+    double most = 1e100;
+    bool nan = true;  // stands for nothing
+    const char* words = "a number up to 1e100 in size, or NaN where there is none";
+};
+constexpr Allowed finite_number{-1e100, 1e100, false, "a finite number up to 1e100 in size"};
+constexpr Allowed deviation{0.0, 1e100, true, "a number from 0 on, or NaN where there is none"};
+constexpr Allowed freedom{0.0, 1e15, true, "0 or degrees of freedom from 0.01 to 1e15, or NaN where there are none"};
+constexpr double least_freedom = 0.01;
+
+/// What is evaluated later, by functions that have no value far out, is within its range.
+void check_values(const store::Dataset& dataset, const std::vector<double>& values, const Allowed& allowed) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const double v = values[i];
+        const bool too_free = allowed.words == freedom.words && v > 0.0 && v < least_freedom;
+        if (std::isnan(v) ? allowed.nan : v >= allowed.least && v <= allowed.most && !too_free) continue;
+        throw InputError(
+            fmt::format("{}: dataset {}: element {} (counted from 0, row by row) is {}; must be {}: the "
+                        "result is damaged",
+                        printable(dataset.file()), printable(dataset.path()), i, v, allowed.words));
+    }
+}
 
 /// A dataset of the shape that the study asks for.
 template <class T = double>
-std::vector<T> read_column(const store::Group& group, const std::string& name, const store::Shape& expected) {
+std::vector<T> read_column(const store::Group& group, const std::string& name, const store::Shape& expected,
+                           const Allowed& allowed = {}) {
     const store::Dataset dataset = group.dataset(name);
     if (dataset.shape() != expected) {
         throw InputError(fmt::format("{}: dataset {} has the shape [{}], [{}] is wanted: the result is damaged",
-                                     dataset.file(), dataset.path(), fmt::join(dataset.shape(), ", "),
-                                     fmt::join(expected, ", ")));
+                                     printable(dataset.file()), printable(dataset.path()),
+                                     fmt::join(dataset.shape(), ", "), fmt::join(expected, ", ")));
     }
-    return dataset.read<T>();
+    std::vector<T> values = dataset.read<T>();
+    if constexpr (std::same_as<T, double>) check_values(dataset, values, allowed);
+    return values;
 }
 
 /// FigureReader as the writer has them: attributes of a group, or in a design datasets with one value a point.
@@ -64,7 +97,8 @@ class ArmReader {
         : group_(group), experiment_(experiment), arm_(arm), gyros_(static_cast<std::uint64_t>(experiment.gyros())) {}
 
     void read() const {
-        read_numbers(group_, "rate_error_deg_h", [](GyroStatistics& g, double v) { g.rate_error_deg_h = v; });
+        read_numbers(
+            group_, "rate_error_deg_h", [](GyroStatistics& g, double v) { g.rate_error_deg_h = v; }, finite_number);
         // Absent from results of earlier programs, too.
         if (group_.has_dataset(closed_form_column.name)) {
             read_numbers(group_, closed_form_column.name,
@@ -86,8 +120,9 @@ class ArmReader {
         }
     }
     template <class Set>
-    void read_numbers(const store::Group& group, const std::string& name, Set&& set) const {
-        each_gyro(read_column(group, name, {gyros_}), set);
+    void read_numbers(const store::Group& group, const std::string& name, Set&& set,
+                      const Allowed& allowed = {}) const {
+        each_gyro(read_column(group, name, {gyros_}, allowed), set);
     }
 
     void read_noise() const {
@@ -104,7 +139,9 @@ class ArmReader {
                          [&](GyroStatistics& g, double v) { (g.noise.*column.field).hi = or_nothing(v); });
         }
         for (const auto& column : pooling_columns) {
-            read_numbers(noise, column.name, [&](GyroStatistics& g, double v) { g.noise.pooling.*column.field = v; });
+            read_numbers(
+                noise, column.name, [&](GyroStatistics& g, double v) { g.noise.pooling.*column.field = v; },
+                finite_number);
         }
         read_numbers(noise, "red", [](GyroStatistics& g, double v) { g.noise.pooling.red = v != 0.0; });
         read_numbers(noise, "described", [](GyroStatistics& g, double v) { g.noise.described = v != 0.0; });
@@ -113,11 +150,15 @@ class ArmReader {
     void read_allan() const {
         const store::Group allan = group_.group("allan");
         const std::uint64_t taus = layout::most_taus(experiment_);
-        const auto tau = read_column(allan, "tau_s", layout::tau_shape(experiment_));
-        const auto terms = read_column(allan, "terms", layout::tau_shape(experiment_));
-        const auto alpha = read_column(allan, "alpha", {gyros_, taus});
+        const Allowed whole{-128.0, 9e15, true, "a whole number up to 9e15"};
+        const auto tau = read_column(allan, "tau_s", layout::tau_shape(experiment_), deviation);
+        const auto terms = read_column(allan, "terms", layout::tau_shape(experiment_), whole);
+        const auto alpha = read_column(allan, "alpha", {gyros_, taus}, whole);
         std::vector<std::vector<double>> columns;
-        for (const auto& column : allan_columns) columns.push_back(read_column(allan, column.name, {gyros_, taus}));
+        for (const auto& column : allan_columns) {
+            const bool is_edf = column.field == &allan::Point::edf;
+            columns.push_back(read_column(allan, column.name, {gyros_, taus}, is_edf ? freedom : deviation));
+        }
         std::size_t row = 0;
         for (std::size_t p = 0; p < experiment_.points.size(); ++p) {
             Study& study = experiment_.points[p];
@@ -130,8 +171,8 @@ class ArmReader {
                     }
                     point.m = study.factors[t];
                     point.tau_s = tau[p * taus + t];
-                    point.terms = static_cast<std::int64_t>(terms[p * taus + t]);
-                    point.alpha = static_cast<int>(alpha[row * taus + t]);
+                    point.terms = whole_or_zero(terms[p * taus + t]);
+                    point.alpha = static_cast<int>(whole_or_zero(alpha[row * taus + t]));
                 }
                 ++row;
             }
@@ -205,7 +246,7 @@ std::vector<Axis> read_axes(const store::File& file, const scenario::Scenario& s
             throw InputError(fmt::format(
                 "{}: dataset {}/{} holds {:.10g} for point {}, where the scenario's design has {:.10g}: the result is "
                 "damaged",
-                design.file(), design.path(), axis.key, axis.values[p], p + 1, drawn[p]));
+                printable(design.file()), printable(design.path()), axis.key, axis.values[p], p + 1, drawn[p]));
         }
     }
     return axes;
@@ -238,7 +279,8 @@ void read_gyros(const store::File& file, Experiment& experiment) {
     }
     const store::Group gyros = file.group("gyros");
     for (const auto& parameter : drawn_parameters) {
-        const auto values = read_column(gyros, parameter.name, {static_cast<std::uint64_t>(experiment.gyros())});
+        const auto values =
+            read_column(gyros, parameter.name, {static_cast<std::uint64_t>(experiment.gyros())}, finite_number);
         std::size_t row = 0;
         for (Study& study : experiment.points) {
             for (gyro::Setup& setup : study.gyros) setup.*parameter.field = values[row++];
@@ -248,23 +290,54 @@ void read_gyros(const store::File& file, Experiment& experiment) {
 
 }  // namespace
 
-Experiment read_result(const std::filesystem::path& path) {
-    const store::File file = store::File::open(path);
+namespace {
+
+/// Gyros and points take memory as soon as they are planned: only as many of them as the file has rows, and as many
+/// rows as it can hold.
+void check_size(const store::File& file, const scenario::Scenario& scenario, std::size_t points) {
+    const store::Dataset rows = file.group("gyros").dataset(drawn_parameters.front().name);
+    const auto wanted = static_cast<double>(points) * static_cast<double>(ensemble::total_gyros(scenario));
+    if (rows.shape().size() != 1 || static_cast<double>(rows.shape()[0]) != wanted) {
+        throw InputError(
+            fmt::format("{}: dataset {} has the shape [{}], and the scenario has {:.10g} gyros: the result "
+                        "is damaged",
+                        printable(file.file()), printable(rows.path()), fmt::join(rows.shape(), ", "), wanted));
+    }
+    const double needed = static_cast<double>(points) * static_cast<double>(expected_memory_bytes(scenario));
+    std::error_code unknown;
+    const auto there = static_cast<double>(std::filesystem::file_size(file.file(), unknown));
+    constexpr double fixed_bytes = 1e8;      // of a small result with many points
+    constexpr double greatest_ratio = 64.0;  // of what is in memory over the file, be it packed by h5repack
+    if (!unknown && needed > fixed_bytes + greatest_ratio * there) {
+        throw InputError(
+            fmt::format("{}: dataset /scenario asks for {:.10g} gyros, which the file of {:.4g} bytes "
+                        "cannot hold: the result is damaged",
+                        printable(file.file()), wanted, there));
+    }
+    store::expect_memory(2.0 * needed);
+}
+
+Experiment read_experiment(const store::File& file) {
+    const std::string& path = file.file();
     if (!layout::is_result(file)) {
         throw InputError(
             fmt::format("{}: not a ringlock result (attribute \"format\" is not \"{}\"); results are written by "
                         "ringlock run",
-                        path.string(), layout::format_name));
+                        printable(path), layout::format_name));
     }
     const std::int64_t version = file.int_attribute("format_version");
     if (version != result_format_version) {
-        throw InputError(fmt::format("{}: format_version is {}, this program reads {}", path.string(), version,
+        throw InputError(fmt::format("{}: format_version is {}, this program reads {}", printable(path), version,
                                      result_format_version));
     }
-    const auto text = file.dataset("scenario").read<std::string>();
-    if (text.size() != 1) throw InputError(fmt::format("{}: dataset /scenario must hold one text", path.string()));
-    const auto scenario = scenario::parse_string(text[0], path.string() + ":/scenario", {}, complaints);
-    Experiment experiment(scenario, read_axes(file, scenario));
+    const store::Dataset texts = file.dataset("scenario");
+    if (texts.shape() != store::Shape{1}) {
+        throw InputError(fmt::format("{}: dataset /scenario must hold one text", printable(path)));
+    }
+    const auto scenario = scenario::parse_string(texts.read<std::string>().at(0), path + ":/scenario", {}, complaints);
+    std::vector<Axis> axes = read_axes(file, scenario);
+    check_size(file, scenario, axes.empty() ? 1 : axes.front().values.size());
+    Experiment experiment(scenario, std::move(axes));
     read_counts(file, experiment);
     read_gyros(file, experiment);
     if (file.has_group("stop")) {
@@ -279,8 +352,16 @@ Experiment read_result(const std::filesystem::path& path) {
     return experiment;
 }
 
+}  // namespace
+
+Experiment read_result(const std::filesystem::path& path) {
+    return store::guarded(
+        path, [](const store::GuardedPath& guarded) { return read_experiment(store::File::open(guarded)); });
+}
+
 store::Provenance read_provenance(const std::filesystem::path& path) {
-    return store::read_provenance(store::File::open(path));
+    return store::guarded(
+        path, [](const store::GuardedPath& guarded) { return store::read_provenance(store::File::open(guarded)); });
 }
 
 }  // namespace ringlock::study

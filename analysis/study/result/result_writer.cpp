@@ -13,6 +13,7 @@
 #include "analysis/study/result/result_file.hpp"
 #include "analysis/study/result/result_layout.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 #include "engine/scenario/keys/schema.hpp"
 #include "engine/scenario/parse.hpp"
 #include "engine/scenario/read_arms.hpp"
@@ -425,7 +426,7 @@ std::filesystem::path refuse_to_lose(const std::filesystem::path& path, const Ex
         throw InputError(
             fmt::format("{}: the file is there and is not a result of this scenario and seed; it is kept. Give "
                         "another name with -o, or remove it",
-                        path.string()));
+                        printable(path)));
     }
     return path;
 }
@@ -434,8 +435,13 @@ std::filesystem::path refuse_to_lose(const std::filesystem::path& path, const Ex
 
 bool is_result_of(const std::filesystem::path& path, const Experiment& experiment) {
     try {
-        const store::File file = store::File::open(path);
-        return layout::is_result(file) && is_text_of(file.dataset("scenario").read<std::string>().at(0), experiment);
+        return store::guarded(path, [&](const store::GuardedPath& guarded) {
+            const store::File file = store::File::open(guarded);
+            return layout::is_result(file) &&
+                   is_text_of(file.dataset("scenario").read<std::string>().at(0), experiment);
+        });
+    } catch (const Interrupted&) {
+        throw;
     } catch (const std::exception&) {
         return false;  // not there, not HDF5 or not readable: at any rate not a result
     }

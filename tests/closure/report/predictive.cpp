@@ -23,6 +23,7 @@
 #include "engine/store/hdf5.hpp"
 #include "tests/closure/generator/plain_gyro.hpp"
 #include "tests/closure/generator/samples.hpp"
+#include "tests/support/open_file.hpp"
 
 namespace ringlock::test::closure {
 namespace {
@@ -107,7 +108,7 @@ TEST_F(Predictively, ARightModelMakesSuchRecords) {
     EXPECT_EQ(json.at("predictive").at("simulations"), 39);
     EXPECT_EQ(json.at("predictive").at("statistics").size(), 4U);
     EXPECT_EQ(json.at("verdict"), "nothing_missing");
-    const store::File file = store::File::open(folder_ / "closure.h5");
+    const store::File file = test::open_file(folder_ / "closure.h5");
     const store::Group allan = file.group("predictive/allan_deviation");
     EXPECT_EQ(allan.dataset("measured").read<double>(), statistic(predictive, "allan_deviation").measured);
     EXPECT_EQ(allan.dataset("highest").unit(), "deg/h");

@@ -1,0 +1,172 @@
+#include "analysis/findings/search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "analysis/findings/events.hpp"
+#include "analysis/findings/stretches.hpp"
+#include "analysis/noise/decomposition.hpp"
+#include "analysis/noise/line.hpp"
+#include "analysis/noise/spectrum.hpp"
+#include "analysis/noise/subsets.hpp"
+
+namespace ringlock::findings {
+namespace {
+
+constexpr std::size_t fewest_rates = 64;
+constexpr double significance_of_lines = 1e-3;
+
+/// Deviate whose absolute value a normal one exceeds with that probability in any of n trials.
+double threshold(double level, std::size_t n) {
+    // By bisection of the complementary error function: no closed form.
+    const double p = level / static_cast<double>(n);
+    double low = 0.0;
+    double high = 40.0;
+    for (int i = 0; i < 60; ++i) {
+        const double middle = 0.5 * (low + high);
+        (std::erfc(middle / std::sqrt(2.0)) > p ? low : high) = middle;
+    }
+    return high;
+}
+
+/// The record in the cosine basis and the noise that explains it.
+struct Noise {
+    noise::Decomposition parts;
+    std::vector<double> residual;
+    std::vector<double> variance;
+};
+
+Noise noise_of(std::span<const double> rate) {
+    Noise out{noise::decompose(noise::cosine_spectrum(rate), significance_of_lines), {}, {}};
+    out.residual = noise::residual(out.parts.noise, out.parts.five);
+    out.variance = noise::coefficient_variances(out.parts.noise, out.parts.five);
+    return out;
+}
+
+struct Best {
+    std::size_t at = 0;
+    double excess = 0.0;  ///< of the absolute deviate over its threshold
+};
+
+Best best_of(const Scan& found, double least, std::size_t from, std::size_t to) {
+    Best best;
+    for (std::size_t t = from; t < std::min(to, found.sigma.size()); ++t) {
+        const double excess = std::abs(found.sigma[t]) - least;
+        if (excess > best.excess) best = {t, excess};
+    }
+    return best;
+}
+
+class Search {
+   public:
+    Search(std::span<const double> rate, bool of_angles, const SearchOptions& options)
+        : options_(options), of_angles_(of_angles) {
+        out_.rate.assign(rate.begin(), rate.end());
+        least_outlier_ = threshold(options.outlier_level, rate.size() * (of_angles ? 2 : 1));
+        least_jump_ = threshold(options.jump_level, rate.size());
+    }
+
+    Searched run() {
+        for (int round = 0;; ++round) {
+            const Noise noise = noise_of(out_.rate);
+            if (!take_events(noise)) {
+                find_stretches(noise);
+                break;
+            }
+            const auto most = options_.most_outliers * static_cast<double>(out_.rate.size());
+            if (round < options_.most_rounds && static_cast<double>(out_.findings.size()) <= most) continue;
+            out_.ended = false;
+            break;
+        }
+        std::sort(out_.findings.begin(), out_.findings.end(),
+                  [](const Finding& a, const Finding& b) { return a.row < b.row; });
+        return std::move(out_);
+    }
+
+   private:
+    /// Takes off what is least probable; false where nothing is left that chance does not explain.
+    bool take_events(const Noise& noise) {
+        const std::size_t n = noise.residual.size() + 1;
+        const Scan pulses = scan(Event::pulse, noise.residual, noise.variance);
+        const Scan steps = scan(Event::step, noise.residual, noise.variance);
+        const Scan doublets = of_angles_ ? scan(Event::doublet, noise.residual, noise.variance) : Scan();
+        const Best pulse = best_of(pulses, least_outlier_, 0, n);
+        const Best doublet = best_of(doublets, least_outlier_, 0, n);
+        const std::size_t end = options_.end_of_jump;
+        const Best step = n > 2 * end ? best_of(steps, least_jump_, end, n - end + 1) : Best();
+        if (step.excess > std::max(pulse.excess, doublet.excess) && take_step(noise, steps, step.at)) return true;
+        if (doublet.excess > pulse.excess) return take_all(Event::doublet, doublets);
+        return pulse.excess > 0.0 && take_all(Event::pulse, pulses);
+    }
+
+    /// All events of that kind that stand out from their neighbours.
+    bool take_all(Event event, const Scan& found) {
+        constexpr std::size_t apart = 3;
+        bool any = false;
+        std::size_t last = 0;
+        const std::size_t n = found.sigma.size();
+        for (std::size_t t = 0; t < n; ++t) {
+            const double size = std::abs(found.sigma[t]);
+            if (size < least_outlier_ || (any && t < last + apart)) continue;
+            bool largest = true;
+            for (std::size_t k = t - std::min(t, apart); k < std::min(n, t + apart + 1); ++k) {
+                largest = largest && std::abs(found.sigma[k]) <= size;
+            }
+            if (!largest) continue;
+            take_off(event, t, found.size[t], out_.rate);
+            const Kind kind = event == Event::pulse && of_angles_ ? Kind::jump : Kind::outlier;
+            const std::size_t row = event == Event::doublet ? t + 1 : t;
+            out_.findings.push_back({kind, row, 1, found.size[t], size, kind == Kind::jump});
+            any = true;
+            last = t;
+        }
+        return any;
+    }
+
+    /// The noise before a step is taken off holds a part of it for a random walk, and makes it seem smaller: its place
+    /// and size are estimated again in the noise that is left without it.
+    bool take_step(const Noise& noise, const Scan& steps, std::size_t at) {
+        constexpr int estimates = 3;
+        const noise::Spectrum& spectrum = noise.parts.noise;
+        std::vector<double> without;
+        Finding found{Kind::jump, at, 1, steps.size[at], std::abs(steps.sigma[at])};
+        double gain = 0.0;
+        for (int k = 0; k < estimates; ++k) {
+            without = out_.rate;
+            take_off(Event::step, found.row, found.size, without);
+            const Noise left = noise_of(without);
+            gain = noise.parts.five.deviance - left.parts.five.deviance;
+            if (!(gain > least_jump_ * least_jump_)) return false;
+            const Scan again = scan(Event::step, noise::residual(spectrum, left.parts.five), left.variance);
+            const std::size_t end = options_.end_of_jump;
+            const Best best = best_of(again, 0.0, end, again.sigma.size() - end + 1);
+            found.row = best.at;
+            found.size = again.size[best.at];
+            found.size_sigma = std::abs(again.sigma[best.at]);
+        }
+        out_.rate = std::move(without);
+        out_.findings.push_back(found);
+        return true;
+    }
+
+    void find_stretches(const Noise& noise) {
+        const std::vector<double> white = whitened(noise.residual, noise.variance);
+        for (const Finding& stretch : stretches_of_other_variance(white, options_)) out_.findings.push_back(stretch);
+    }
+
+    const SearchOptions& options_;
+    bool of_angles_;
+    double least_outlier_ = 0.0;
+    double least_jump_ = 0.0;
+    Searched out_;
+};
+
+}  // namespace
+
+Searched search_rates(std::span<const double> rate, bool of_angles, const SearchOptions& options) {
+    if (rate.size() < fewest_rates) return {{}, {rate.begin(), rate.end()}, true};
+    return Search(rate, of_angles, options).run();
+}
+
+}  // namespace ringlock::findings

@@ -1,0 +1,181 @@
+#include "analysis/findings/values.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "engine/core/units.hpp"
+
+namespace ringlock::findings {
+namespace {
+
+/// Probability by chance below which a run or a pile is reported.
+constexpr double level = 1e-4;
+
+struct Run {
+    std::size_t from = 0;
+    std::size_t length = 0;
+};
+
+std::vector<Run> runs_of(std::span<const double> values) {
+    std::vector<Run> runs;
+    for (std::size_t i = 0; i < values.size();) {
+        std::size_t to = i + 1;
+        while (to < values.size() && values[to] == values[i]) ++to;
+        if (!std::isnan(values[i])) runs.push_back({i, to - i});
+        i = to;
+    }
+    return runs;
+}
+
+/// How often a value is followed by itself.
+struct Followers {
+    double equal = 0.0;
+    double all = 0.0;
+};
+
+/// Runs that are longer than so many neighbours would be equal by chance. How often a value is followed by itself is
+/// taken from the rest of the record, so that a run does not excuse itself. Where a third of all neighbours are equal
+/// the steps are coarser than the noise, and long runs say nothing.
+void find_repeated(std::span<const double> values, std::vector<Finding>& found) {
+    constexpr std::size_t shortest = 8;
+    const std::vector<Run> runs = runs_of(values);
+    std::map<double, Followers> followers;
+    Followers shorter;
+    for (const Run& run : runs) {
+        if (run.length >= shortest) {
+            followers[values[run.from]];
+        } else {
+            shorter.equal += static_cast<double>(run.length - 1);
+            shorter.all += static_cast<double>(run.length);
+        }
+    }
+    if (followers.empty() || 3.0 * shorter.equal > shorter.all) return;
+    const double usual = (shorter.equal + 1.0) / (shorter.all + 2.0);
+    for (const Run& run : runs) {
+        const auto of = followers.find(values[run.from]);
+        if (of == followers.end()) continue;
+        of->second.equal += static_cast<double>(run.length - 1);
+        of->second.all += static_cast<double>(run.length);
+    }
+    const double log_level = std::log(level / static_cast<double>(values.size()));
+    for (const Run& run : runs) {
+        if (run.length < shortest) continue;
+        const Followers& of = followers[values[run.from]];
+        const auto length = static_cast<double>(run.length);
+        // Of a value that hardly occurs elsewhere the share is that of all others.
+        constexpr double weight = 4.0;
+        const double share = (of.equal - (length - 1.0) + weight * usual) / (of.all - length + weight);
+        const double log_p = (length - 1.0) * std::log(share);
+        if (log_p > log_level) continue;
+        found.push_back({Kind::repeated, run.from, run.length, values[run.from], std::sqrt(-2.0 * log_p)});
+    }
+}
+
+/// At one end of the range: more values there than just inside of it, where noise has the more the nearer to its mean.
+void find_clipped(std::span<const double> values, bool upper, std::vector<Finding>& found) {
+    constexpr std::size_t fewest = 8;
+    std::vector<double> sorted;
+    for (const double v : values) {
+        if (!std::isnan(v)) sorted.push_back(upper ? -v : v);
+    }
+    if (sorted.size() < 4 * fewest) return;
+    std::sort(sorted.begin(), sorted.end());
+    const double limit = sorted.front();
+    const auto inside = std::upper_bound(sorted.begin(), sorted.end(), limit);
+    const auto at_limit = static_cast<std::size_t>(inside - sorted.begin());
+    if (at_limit < fewest || at_limit == sorted.size()) return;
+    const auto next = std::upper_bound(inside, sorted.end(), *inside);
+    const auto at_next = static_cast<double>(next - inside);
+    // Coarse steps have many at every level, the outermost ones less than those inside.
+    constexpr double by_more = 3.0;
+    if (static_cast<double>(at_limit) < by_more * (at_next + 1.0)) return;
+    const double end = upper ? -limit : limit;
+    const auto first = std::find(values.begin(), values.end(), end);
+    found.push_back({Kind::clipped, static_cast<std::size_t>(first - values.begin()), at_limit, end,
+                     std::sqrt(static_cast<double>(at_limit))});
+}
+
+std::vector<double> moduli() {
+    std::vector<double> all;
+    for (int power = 8; power <= 63; ++power) all.push_back(std::ldexp(1.0, power));
+    for (const double turn : {360.0, 360.0 * units::arcsec_per_deg, 360e3, units::two_pi}) {
+        all.push_back(turn);
+        all.push_back(0.5 * turn);
+    }
+    std::sort(all.begin(), all.end());
+    return all;
+}
+
+double median_of(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+}  // namespace
+
+std::vector<Finding> search_values(std::span<const double> values) {
+    std::vector<Finding> found;
+    find_repeated(values, found);
+    find_clipped(values, false, found);
+    find_clipped(values, true, found);
+    return found;
+}
+
+std::optional<Wraps> find_wraps(std::span<const double> values) {
+    constexpr std::size_t fewest = 16;
+    constexpr double deviations = 20.0;  // of usual steps: no noise goes so far
+    constexpr double normal = 1.4826;    // standard deviation of a normal distribution over its median size
+    std::vector<double> steps;
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        if (std::isnan(values[i])) continue;
+        low = std::min(low, values[i]);
+        high = std::max(high, values[i]);
+        if (i > 0 && !std::isnan(values[i - 1])) steps.push_back(values[i] - values[i - 1]);
+    }
+    if (steps.size() < fewest) return std::nullopt;
+    const double usual = median_of(steps);
+    std::vector<double> off;
+    for (const double step : steps) off.push_back(std::abs(step - usual));
+    const double spread = std::max(normal * median_of(off), 1e-12 * (high - low));
+    const double reach = deviations * spread;
+    // A range that is hardly larger than the steps wraps all the time, and nobody can undo that.
+    for (const double modulus : moduli()) {
+        if (high - low > modulus || high - low < 0.9 * modulus || 4.0 * reach > modulus) continue;
+        Wraps wraps{modulus, {}};
+        bool clean = true;
+        for (std::size_t i = 1; i < values.size(); ++i) {
+            const double step = values[i] - values[i - 1] - usual;
+            if (std::isnan(step) || std::abs(step) <= 0.5 * modulus) continue;
+            const double left = step + (step < 0.0 ? modulus : -modulus);
+            if (std::abs(left) <= reach) {
+                wraps.at.push_back(i);
+            } else {
+                clean = false;
+            }
+        }
+        if (!wraps.at.empty() && clean) return wraps;
+    }
+    return std::nullopt;
+}
+
+void unwrap(const Wraps& wraps, std::span<double> values) {
+    double offset = 0.0;
+    auto next = wraps.at.begin();
+    double before = values.empty() ? 0.0 : values[0];
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const double given = values[i];
+        if (next != wraps.at.end() && i == *next) {
+            offset += given < before ? wraps.modulus : -wraps.modulus;
+            ++next;
+        }
+        values[i] = given + offset;
+        if (!std::isnan(given)) before = given;
+    }
+}
+
+}  // namespace ringlock::findings

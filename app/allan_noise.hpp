@@ -1,0 +1,16 @@
+#pragma once
+#include <vector>
+
+#include "analysis/allan/sums/phase.hpp"
+#include "app/allan_output.hpp"
+
+namespace ringlock::app {
+
+/// Searches the data for faults that no noise model has, and estimates the noise of the longest part without gaps
+/// without those: outliers and jumps are taken off by their estimated sizes, wraps are undone.
+/// \param values   the data, NaN where missing
+/// \param scale    one of the data in arcsec (m/s, s), or in arcsec/s of rates
+void search_and_fit(std::vector<double> values, const allan::Phase& phase, allan::Kind kind, double scale,
+                    AllanOutput& out);
+
+}  // namespace ringlock::app
