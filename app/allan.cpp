@@ -27,6 +27,7 @@
 #include "app/output.hpp"
 #include "app/text_arguments.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -129,8 +130,8 @@ std::vector<std::int64_t> factors_for(const TauChoice& choice, allan::Estimator 
 void check_rate(const AllanArguments& a, const record::SeriesInfo& series) {
     if (!series.rate_hz) return;
     if (std::abs(*series.rate_hz - a.rate_hz) > 1e-9 * a.rate_hz) {
-        throw InputError(
-            fmt::format("{}: says rate_hz = {}, which contradicts --rate {}", a.data, *series.rate_hz, a.rate_hz));
+        throw InputError(fmt::format("{}: says rate_hz = {}, which contradicts --rate {}", printable(a.data),
+                                     *series.rate_hz, a.rate_hz));
     }
 }
 
@@ -184,8 +185,8 @@ Request checked(const AllanArguments& a) {
 
 void check_size(const AllanArguments& a, allan::Kind kind, std::int64_t points, std::size_t data) {
     if (points >= 3) return;
-    throw InputError(
-        fmt::format("{}: {} data; a deviation needs at least {}", a.data, data, kind == allan::Kind::phase ? 3 : 2));
+    throw InputError(fmt::format("{}: {} data; a deviation needs at least {}", printable(a.data), data,
+                                 kind == allan::Kind::phase ? 3 : 2));
 }
 
 void from_record(const AllanArguments& a, const Request& request, AllanOutput& out) {
@@ -235,7 +236,7 @@ void from_stream(const AllanArguments& a, const Request& request, AllanOutput& o
         throw InputError(
             fmt::format("{}: counts beyond 2^53 lose their last digits in a stream; without --stream they "
                         "are kept whole",
-                        a.data));
+                        printable(a.data)));
     }
     out.column = info.column;
     out.missing = info.missing;

@@ -82,7 +82,8 @@ record::MappedLog parse_log(const ImportArguments& arguments) {
     }
     if (arguments.unit.empty()) {
         throw InputError(fmt::format("--unit is missing: say in which unit the {} are, such as {}",
-                                     of_rate ? "rates" : "angles", of_rate ? "deg/h or rad/s" : "arcsec or deg"));
+                                     of_rate ? "rates" : "angles",
+                                     of_rate ? "deg/h, deg/s or rad/s" : "arcsec, deg or rad"));
     }
     log.to_arcsec = gyro_unit(arguments, of_rate).factor;
     return log;

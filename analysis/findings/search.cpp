@@ -70,6 +70,8 @@ class Search {
     Searched run() {
         for (int round = 0;; ++round) {
             const Noise noise = noise_of(out_.rate);
+            if (round == 0) out_.findings = disturbed_stretches(whitened(noise.residual, noise.variance), options_);
+            if (!out_.findings.empty() && round == 0) break;
             if (!take_events(noise)) {
                 find_stretches(noise);
                 break;
@@ -96,12 +98,12 @@ class Search {
         const std::size_t end = options_.end_of_jump;
         const Best step = n > 2 * end ? best_of(steps, least_jump_, end, n - end + 1) : Best();
         if (step.excess > std::max(pulse.excess, doublet.excess) && take_step(noise, steps, step.at)) return true;
-        if (doublet.excess > pulse.excess) return take_all(Event::doublet, doublets);
-        return pulse.excess > 0.0 && take_all(Event::pulse, pulses);
+        if (doublet.excess > pulse.excess) return take_all(Event::doublet, doublets, pulses);
+        return pulse.excess > 0.0 && take_all(Event::pulse, pulses, doublets);
     }
 
-    /// All events of that kind that stand out from their neighbours.
-    bool take_all(Event event, const Scan& found) {
+    /// All events of that kind that stand out from their neighbours, and more so than events of the other kind there.
+    bool take_all(Event event, const Scan& found, const Scan& rivals) {
         constexpr std::size_t apart = 3;
         bool any = false;
         std::size_t last = 0;
@@ -112,6 +114,7 @@ class Search {
             bool largest = true;
             for (std::size_t k = t - std::min(t, apart); k < std::min(n, t + apart + 1); ++k) {
                 largest = largest && std::abs(found.sigma[k]) <= size;
+                if (k < rivals.sigma.size()) largest = largest && std::abs(rivals.sigma[k]) <= size;
             }
             if (!largest) continue;
             take_off(event, t, found.size[t], out_.rate);

@@ -19,9 +19,14 @@ struct SearchOptions {
     /// A stretch of another variance has at least so many data, and a variance that differs by this factor.
     std::size_t shortest_stretch = 32;
     double least_ratio = 1.5;
+    /// Nothing else is searched for where a window of the record, of at least so many data and at most so many windows
+    /// in all, is noisier than the usual one by this ratio of variances: a vehicle that moved is no row of outliers.
+    std::size_t disturbed_window = 64;
+    std::size_t disturbed_windows = 500;
+    double disturbed_ratio = 5.0;
     /// The search ends after so many rounds, or where this share of the data has been found to be off: the noise is
     /// then not what the model holds it for.
-    int most_rounds = 30;
+    int most_rounds = 12;
     double most_outliers = 0.05;
 };
 
@@ -36,7 +41,8 @@ struct Searched {
 ///
 /// The noise is the maximum of the likelihood of all five terms of the fit, without sinusoids, so that a jump must be
 /// likelier than random walk, flicker and ramp. Events are taken off one kind after the other, the least probable
-/// first, and the noise is fitted anew. A jump must also lower the deviance of that fit by what its search costs.
+/// first, and the noise is fitted anew. A jump must also lower the deviance of that fit by what its search costs. A
+/// record with disturbed stretches is not searched further.
 /// \param rate       any unit, any offset; fewer than 64 are not searched
 /// \param of_angles  the data were angles: one that is off moves two rates
 Searched search_rates(std::span<const double> rate, bool of_angles, const SearchOptions& options = {});

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/findings/median.hpp"
+
 namespace ringlock::findings {
 namespace {
 
@@ -43,6 +45,35 @@ double deviate(double ratio, double m, double spread) {
 }
 
 }  // namespace
+
+std::vector<Finding> disturbed_stretches(const std::vector<double>& white, const SearchOptions& options) {
+    constexpr std::size_t fewest_windows = 8;
+    constexpr double median_sd = 2.33;  // of the median of m squares of normal deviates, over it, times sqrt(m)
+    const std::size_t length = std::max(options.disturbed_window, white.size() / options.disturbed_windows);
+    const std::size_t windows = white.size() / length;
+    if (windows < fewest_windows) return {};
+    std::vector<double> medians;
+    for (std::size_t w = 0; w < windows; ++w) {
+        std::vector<double> squares;
+        for (std::size_t i = w * length; i < (w + 1) * length; ++i) squares.push_back(white[i] * white[i]);
+        medians.push_back(median_of(std::move(squares)));
+    }
+    const double usual = median_of(medians);
+    std::vector<Finding> found;
+    for (std::size_t w = 0; w < windows; ++w) {
+        const double ratio = medians[w] / usual;
+        if (!(ratio > options.disturbed_ratio)) continue;
+        const double sigma = (ratio - 1.0) * std::sqrt(static_cast<double>(length)) / median_sd;
+        if (!found.empty() && found.back().row + found.back().length == w * length) {
+            found.back().length += length;
+            found.back().size = std::max(found.back().size, ratio);
+            found.back().size_sigma = std::max(found.back().size_sigma, sigma);
+        } else {
+            found.push_back({Kind::variance, w * length, length, ratio, sigma});
+        }
+    }
+    return found;
+}
 
 std::vector<Finding> stretches_of_other_variance(const std::vector<double>& white, const SearchOptions& options) {
     const std::size_t n = white.size();

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "analysis/findings/median.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::findings {
@@ -106,12 +107,6 @@ std::vector<double> moduli() {
     }
     std::sort(all.begin(), all.end());
     return all;
-}
-
-double median_of(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::quantity {
 namespace {
@@ -53,7 +54,7 @@ void refuse_contradiction(const std::string& file, const std::string& column,
     throw InputError(
         fmt::format("{}: column {} is declared to be in {}, which contradicts {} {}; correct the option, or the file "
                     "where it is wrong",
-                    file, column, declared->name, option, given.name));
+                    printable(file), printable(column), declared->name, option, given.name));
 }
 
 }  // namespace ringlock::quantity

@@ -11,6 +11,7 @@
 #include "analysis/text/numbers.hpp"
 #include "analysis/text/table.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::record {
 namespace {
@@ -61,16 +62,16 @@ class CsvReader {
             throw InputError(fmt::format(
                 "{}: holds no header row (lines read: {}); a record is lines \"# key = value\", a row with the names "
                 "of the columns and rows of numbers",
-                path_, table_.lines()));
+                printable(path_), table_.lines()));
         }
         if (samples_.size() == 0) {
-            throw InputError(fmt::format("{}: has a header and no rows of numbers below it", path_));
+            throw InputError(fmt::format("{}: has a header and no rows of numbers below it", printable(path_)));
         }
         if (!rate_given_) {
             throw InputError(
                 fmt::format("{}: says no rate; add a line \"# rate_hz = NUMBER\", samples a second, at the "
                             "top",
-                            path_));
+                            printable(path_)));
         }
         if (times_) place_rows();
         record_.samples = std::move(samples_);
@@ -78,7 +79,7 @@ class CsvReader {
     }
 
     [[noreturn]] void fail(const std::string& what) const {
-        throw InputError(fmt::format("{}:{}: {}", path_, number_, what));
+        throw InputError(fmt::format("{}:{}: {}", printable(path_), number_, what));
     }
 
     void attribute(std::string_view text) {
@@ -225,7 +226,7 @@ class CsvReader {
     /// Puts every row where its time says that it belongs, and NaN where none does.
     void place_rows() {
         const auto place = [this](std::size_t line) {
-            return fmt::format("{}:{}: column {}", path_, line, times_->name());
+            return fmt::format("{}:{}: column {}", printable(path_), line, printable(times_->name()));
         };
         TimeGrid grid(samples_.rate_hz, place, times_->unit(), TimeGrid::UnitBy::header);
         grid.begin(std::span(stamps_).first(std::min(stamps_.size(), TimeGrid::first_rows)));
@@ -254,7 +255,7 @@ class CsvReader {
             fmt::format("{}:{}: column {}: {} samples are missing between {} and {}; counts are whole numbers, of "
                         "which none can say that it is missing. Cut the record there, or write the angle as "
                         "angle_arcsec",
-                        path_, gap.line, name_of(samples_.kind), gap.samples, gap.from, gap.to));
+                        printable(path_), gap.line, name_of(samples_.kind), gap.samples, gap.from, gap.to));
     }
 
     static void spread(std::vector<double>& values, const std::vector<std::size_t>& steps) {

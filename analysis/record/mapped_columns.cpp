@@ -10,6 +10,7 @@
 #include "analysis/record/series.hpp"
 #include "analysis/text/words.hpp"
 #include "engine/core/error.hpp"
+#include "engine/core/printable.hpp"
 
 namespace ringlock::record {
 
@@ -55,21 +56,21 @@ Series read_column(const MappedLog& log, const MappedColumn& mapped, bool again)
     request.text.quiet = again;
     Series series = read_series(request);
     if (series.rate_hz && std::abs(*series.rate_hz - log.rate_hz) > 1e-9 * log.rate_hz) {
-        throw InputError(
-            fmt::format("{}: says rate_hz = {}, which contradicts --rate {}", log.path, *series.rate_hz, log.rate_hz));
+        throw InputError(fmt::format("{}: says rate_hz = {}, which contradicts --rate {}", printable(log.path),
+                                     *series.rate_hz, log.rate_hz));
     }
     if (series.missing == 0 || mapped.quantity != name_of(SampleKind::quarter_count)) return series;
     const auto at = std::find_if(series.values.begin(), series.values.end(), [](double v) { return std::isnan(v); });
     throw InputError(fmt::format(
         "{}: column {}: {} of {} values are missing, the first is sample {}; counts are whole numbers, of which none "
         "can say that it is missing. Cut the record there, or import the angle as angle_arcsec",
-        log.path, series.column, series.missing, series.n, at - series.values.begin() + 1));
+        printable(log.path), printable(series.column), series.missing, series.n, at - series.values.begin() + 1));
 }
 
 std::int64_t whole(const MappedLog& log, const MappedColumn& mapped, double value) {
     constexpr double largest = 9007199254740992.0;  // 2^53: whole numbers of a double
     if (value != std::nearbyint(value) || std::abs(value) > largest) {
-        throw InputError(fmt::format("{}: column {}: holds {}; a count must be a whole number", log.path,
+        throw InputError(fmt::format("{}: column {}: holds {}; a count must be a whole number", printable(log.path),
                                      text::shown(mapped.column), value));
     }
     return static_cast<std::int64_t>(value);
@@ -102,7 +103,7 @@ Record read_mapped(const MappedLog& log) {
         Series series = read_column(log, mapped, rows.has_value());
         if (rows && *rows != series.n) {
             throw InputError(fmt::format("{}: column {} has {} values, another has {}; columns of a record are as long",
-                                         log.path, series.column, series.n, *rows));
+                                         printable(log.path), printable(series.column), series.n, *rows));
         }
         rows = series.n;
         const auto kind = kind_of(mapped.quantity);

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "analysis/text/fields.hpp"
 #include "analysis/text/words.hpp"
 #include "engine/core/error.hpp"
 
@@ -25,6 +26,12 @@ std::size_t find_column(const Layout& layout, const std::string& asked, const st
         unquoted = unquoted.substr(1, unquoted.size() - 2);
     }
     std::vector<std::size_t> found;
+    // The first name of a header that is a comment may be asked for with the mark of comments, as "%time".
+    if (layout.has_header && unquoted.size() > 1 &&
+        std::string_view("#%").find(unquoted.front()) != std::string::npos &&
+        without_mark(unquoted) == layout.columns.front().heading) {
+        return 0;
+    }
     for (const auto part : {&Column::heading, &Column::name}) {
         for (std::size_t k = 0; found.empty() && k < layout.columns.size(); ++k) {
             if (layout.columns[k].*part != unquoted) continue;

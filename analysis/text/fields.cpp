@@ -94,6 +94,14 @@ bool Fields::divide_plain(std::string_view row) {
     }
 }
 
+/// Between delimiters `#` may belong to a word, as in "sensor #2": a comment there has white space behind its mark as
+/// well, or no delimiter behind it.
+bool Fields::begins_comment(std::string_view row, std::size_t at) const {
+    if (at >= row.size() || row[at] != '#' || (at > 0 && !is_space(row[at - 1]))) return false;
+    if (dialect_.by_space() || at == 0 || at + 1 == row.size() || is_space(row[at + 1])) return true;
+    return row.find(dialect_.delimiter, at) == std::string_view::npos;
+}
+
 void Fields::divide_quoted(std::string_view row, bool whole) {
     std::size_t at = 0;
     for (;;) {
@@ -102,7 +110,7 @@ void Fields::divide_quoted(std::string_view row, bool whole) {
             while (at < row.size() && is_space(row[at])) ++at;
             if (at == row.size()) return;
         }
-        const bool comment = !whole && at < row.size() && row[at] == '#' && (at == 0 || is_space(row[at - 1]));
+        const bool comment = !whole && begins_comment(row, at);
         if (comment && dialect_.by_space()) return;
         if (comment) {
             // Behind the last delimiter stands an empty field and the comment.
@@ -137,7 +145,7 @@ std::size_t Fields::take_quoted(std::string_view row, std::size_t at) {
     if (!closed && broken_ == 0) broken_ = fields_.size();
     const std::size_t behind = at;
     while (at < row.size() && kinds_[as_byte(row[at])] != parts) {
-        if (row[at] == '#' && at > behind && is_space(row[at - 1])) return row.size();
+        if (at > behind && begins_comment(row, at)) return row.size();
         if (!is_space(row[at]) && broken_ == 0) broken_ = fields_.size();
         ++at;
     }
@@ -147,7 +155,7 @@ std::size_t Fields::take_quoted(std::string_view row, std::size_t at) {
 std::size_t Fields::take_plain(std::string_view row, std::size_t at, bool whole) {
     const std::size_t begin = at;
     while (at < row.size() && kinds_[as_byte(row[at])] != parts) {
-        if (!whole && row[at] == '#' && at > 0 && is_space(row[at - 1])) {
+        if (!whole && at > 0 && begins_comment(row, at)) {
             fields_.push_back(trimmed(row.substr(begin, at - begin)));
             return row.size();
         }

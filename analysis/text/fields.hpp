@@ -26,8 +26,9 @@ bool is_comment(std::string_view line, const Dialect& dialect);
 std::string_view without_mark(std::string_view line);
 
 /// Divides rows. White space around a field never counts; an empty field between delimiters does. A field in double
-/// quotes may hold delimiters, and "" stands for a quote in it. `#` begins a comment at the start of a row, after white
-/// space, and nowhere in quotes.
+/// quotes may hold delimiters, and "" stands for a quote in it. `#` begins a comment at the start of a row and after
+/// white space, between delimiters only with white space on both sides or no delimiter behind it, and nowhere in
+/// quotes.
 class Fields {
    public:
     explicit Fields(Dialect dialect);
@@ -42,6 +43,7 @@ class Fields {
 
    private:
     bool divide_plain(std::string_view row);
+    bool begins_comment(std::string_view row, std::size_t at) const;
     void divide_quoted(std::string_view row, bool whole);
     std::size_t take_quoted(std::string_view row, std::size_t at);
     std::size_t take_plain(std::string_view row, std::size_t at, bool whole);

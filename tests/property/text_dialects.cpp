@@ -160,7 +160,7 @@ TEST(TextDialects, TablesComeBackAsTheyWereWritten) {
                     << seed << " column " << k << " row " << i << ": " << series.values[i] << "\n"
                     << plain;
             }
-            EXPECT_EQ(series.unit, writer.named() ? values.units[k] : "") << seed << "\n" << plain;
+            EXPECT_EQ(series.unit.value_or(""), writer.named() ? values.units[k] : "") << seed << "\n" << plain;
         }
         if (HasFailure()) break;
     }
