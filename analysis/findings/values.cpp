@@ -19,21 +19,26 @@ struct Run {
     std::size_t length = 0;
 };
 
-std::vector<Run> runs_of(std::span<const double> values) {
-    std::vector<Run> runs;
+/// Calls `visit` with every run of equal values, of one value as well; missing values are in none.
+template <class Visit>
+void for_each_run(std::span<const double> values, const Visit& visit) {
     for (std::size_t i = 0; i < values.size();) {
         std::size_t to = i + 1;
         while (to < values.size() && values[to] == values[i]) ++to;
-        if (!std::isnan(values[i])) runs.push_back({i, to - i});
+        if (!std::isnan(values[i])) visit(Run{i, to - i});
         i = to;
     }
-    return runs;
 }
 
 /// How often a value is followed by itself.
 struct Followers {
     double equal = 0.0;
     double all = 0.0;
+
+    void add(const Run& run) {
+        equal += static_cast<double>(run.length - 1);
+        all += static_cast<double>(run.length);
+    }
 };
 
 /// Runs that are longer than so many neighbours would be equal by chance. How often a value is followed by itself is
@@ -41,28 +46,22 @@ struct Followers {
 /// the steps are coarser than the noise, and long runs say nothing.
 void find_repeated(std::span<const double> values, std::vector<Finding>& found) {
     constexpr std::size_t shortest = 8;
-    const std::vector<Run> runs = runs_of(values);
-    std::map<double, Followers> followers;
+    std::vector<Run> longer;
     Followers shorter;
-    for (const Run& run : runs) {
-        if (run.length >= shortest) {
-            followers[values[run.from]];
-        } else {
-            shorter.equal += static_cast<double>(run.length - 1);
-            shorter.all += static_cast<double>(run.length);
-        }
-    }
-    if (followers.empty() || 3.0 * shorter.equal > shorter.all) return;
+    for_each_run(values, [&](const Run& run) {
+        if (run.length < shortest) return shorter.add(run);
+        longer.push_back(run);
+    });
+    if (longer.empty() || 3.0 * shorter.equal > shorter.all) return;
     const double usual = (shorter.equal + 1.0) / (shorter.all + 2.0);
-    for (const Run& run : runs) {
+    std::map<double, Followers> followers;
+    for (const Run& run : longer) followers[values[run.from]];
+    for_each_run(values, [&](const Run& run) {
         const auto of = followers.find(values[run.from]);
-        if (of == followers.end()) continue;
-        of->second.equal += static_cast<double>(run.length - 1);
-        of->second.all += static_cast<double>(run.length);
-    }
+        if (of != followers.end()) of->second.add(run);
+    });
     const double log_level = std::log(level / static_cast<double>(values.size()));
-    for (const Run& run : runs) {
-        if (run.length < shortest) continue;
+    for (const Run& run : longer) {
         const Followers& of = followers[values[run.from]];
         const auto length = static_cast<double>(run.length);
         // Of a value that hardly occurs elsewhere the share is that of all others.
@@ -74,28 +73,38 @@ void find_repeated(std::span<const double> values, std::vector<Finding>& found) 
     }
 }
 
+/// The smallest value above a limit, and how many there are of it.
+struct Level {
+    double value = std::numeric_limits<double>::infinity();
+    std::size_t count = 0;
+};
+
+/// With a sign of -1 values are turned round.
+Level next_above(std::span<const double> values, double sign, double limit) {
+    Level next;
+    for (const double v : values) {
+        const double x = sign * v;
+        if (!(x > limit) || x > next.value) continue;
+        next.count = x == next.value ? next.count + 1 : 1;
+        next.value = x;
+    }
+    return next;
+}
+
 /// At one end of the range: more values there than just inside of it, where noise has the more the nearer to its mean.
 void find_clipped(std::span<const double> values, bool upper, std::vector<Finding>& found) {
     constexpr std::size_t fewest = 8;
-    std::vector<double> sorted;
-    for (const double v : values) {
-        if (!std::isnan(v)) sorted.push_back(upper ? -v : v);
-    }
-    if (sorted.size() < 4 * fewest) return;
-    std::sort(sorted.begin(), sorted.end());
-    const double limit = sorted.front();
-    const auto inside = std::upper_bound(sorted.begin(), sorted.end(), limit);
-    const auto at_limit = static_cast<std::size_t>(inside - sorted.begin());
-    if (at_limit < fewest || at_limit == sorted.size()) return;
-    const auto next = std::upper_bound(inside, sorted.end(), *inside);
-    const auto at_next = static_cast<double>(next - inside);
+    const double sign = upper ? -1.0 : 1.0;
+    const Level limit = next_above(values, sign, -std::numeric_limits<double>::infinity());
+    if (limit.count < fewest) return;
+    const Level next = next_above(values, sign, limit.value);
     // Coarse steps have many at every level, the outermost ones less than those inside.
     constexpr double by_more = 3.0;
-    if (static_cast<double>(at_limit) < by_more * (at_next + 1.0)) return;
-    const double end = upper ? -limit : limit;
+    if (next.count == 0 || static_cast<double>(limit.count) < by_more * static_cast<double>(next.count + 1)) return;
+    const double end = sign * limit.value;
     const auto first = std::find(values.begin(), values.end(), end);
-    found.push_back({Kind::clipped, static_cast<std::size_t>(first - values.begin()), at_limit, end,
-                     std::sqrt(static_cast<double>(at_limit))});
+    found.push_back({Kind::clipped, static_cast<std::size_t>(first - values.begin()), limit.count, end,
+                     std::sqrt(static_cast<double>(limit.count))});
 }
 
 std::vector<double> moduli() {

@@ -115,7 +115,8 @@ TEST(SampleGaps, AnEffectIsFoundAroundThem) {
     ASSERT_EQ(found.steps.size(), 1u);
     EXPECT_EQ(found.verdict, closure::Verdict::closed);
     for (const closure::Estimate& e : found.steps[0].parameters) {
-        if (e.name == "amplitude_arcsec") EXPECT_NEAR(e.value, 0.2, 5.0 * e.sd);
+        if (e.name != "amplitude_arcsec") continue;
+        EXPECT_NEAR(e.value, 0.2, 5.0 * e.sd);
     }
 }
 
