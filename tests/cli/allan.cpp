@@ -377,8 +377,8 @@ TEST_F(AllanCommand, LogsOfTheFieldAreRead) {
     for (std::size_t i = 0; i < values.size(); ++i) {
         with_words += std::to_string(0.005 * static_cast<double>(i)) + ",sensor #2," + std::to_string(values[i]) + "\n";
     }
-    const std::string words = write_text(with_words);
-    EXPECT_EQ(deviation(words + " --column gx --time %time"), expected);
+    const std::string worded = write_text(with_words);
+    EXPECT_EQ(deviation(worded + " --column gx --time %time"), expected);
     const std::string ns = write_text("t,gx\n" + stamped);
     EXPECT_EQ(deviation(ns + " --column gx --time t --time-unit ns"), expected);
     const auto refused = [&](const std::string& arguments, const std::string& words) {

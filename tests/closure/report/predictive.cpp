@@ -220,7 +220,9 @@ TEST(ClosedScenario, SaysWhatIsAPlaceholderAndWhatItCannotHold) {
 // A short record may leave the mean rate so uncertain that the fitted one is none that the gyro follows.
 TEST(ClosedScenario, AMeanRateThatNoGyroFollowsIsAPlaceholder) {
     record::Record record;
-    record.samples = {.rate_hz = 200.0, .values = std::vector<double>(1200, 0.01)};
+    record.samples.emplace();
+    record.samples->rate_hz = 200.0;
+    record.samples->values.assign(1200, 0.01);
     record.declared.dither_frequency_hz = 400.0;
     record.declared.input_rate_deg_h = 7.0;
     Closure closure;
