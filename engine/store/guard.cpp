@@ -45,7 +45,7 @@ double size_of_file(const std::filesystem::path& path) {
 unsigned patience_s(double file_bytes, Links links) {
     constexpr double slowest_bytes_s = 1e6;
     constexpr double most_s = 1e6;
-    const double least_s = links == Links::follow ? 60.0 : 3.0;
+    const double least_s = links == Links::follow ? 60.0 : 2.0;
     return static_cast<unsigned>(std::min(most_s, least_s + file_bytes / slowest_bytes_s));
 }
 

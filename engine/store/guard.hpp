@@ -32,7 +32,7 @@ class GuardedPath {
 };
 
 /// Reads in a process of its own. Throws what `read` throws there; InputError, naming the file, where that process
-/// crashes, takes more time of the processor (3 s, and 1 s for each MB of the file) or more memory (200 MB above the
+/// crashes, takes more time of the processor (2 s, and 1 s for each MB of the file) or more memory (200 MB above the
 /// size of the file and what expect_memory() allows), or throws an exception of a library. `read` must not need other
 /// threads.
 void try_reading(const std::filesystem::path& path, Links links, const std::function<void(const GuardedPath&)>& read);
