@@ -162,9 +162,9 @@ std::string findings_text(const AllanOutput& out) {
     std::string text = "\nFound in the data (rows counted from 1; missing data count):\n";
     for (std::size_t i = 0; i < std::min(most, out.findings.size()); ++i) text += finding_line(out.findings[i], out);
     if (out.findings.size() > most) text += fmt::format("  and {} more\n", out.findings.size() - most);
-    text +=
-        "The coefficients are estimated without outliers, jumps and wraps; the deviations are of the data as they "
-        "are.\n";
+    const bool estimated = out.noise && out.noise->described;
+    text += fmt::format("The deviations are of the data as they are{}.\n",
+                        estimated ? ", the coefficients of them without outliers, jumps and wraps" : "");
     return text;
 }
 

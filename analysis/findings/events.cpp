@@ -26,26 +26,12 @@ std::vector<Complex> sums_over_half_turns(const std::vector<Complex>& a) {
     return out;
 }
 
-/// Sums over j = 1...n-1 of a_j cos(2 pi j t/n) for t = 0...n-1.
-std::vector<double> sums_of_cosines(const std::vector<double>& a) {
+/// Sums over j = 1...n-1 of a_j cos(2 pi j (t + shift)/n) for t = 0...n-1.
+std::vector<double> sums_of_cosines(const std::vector<double>& a, double shift) {
     const std::size_t n = a.size();
     std::vector<Complex> in(n, 0.0);
-    for (std::size_t j = 1; j < n; ++j) in[j] = a[j];
-    std::vector<Complex> sums(n);
-    Eigen::FFT<double> fft;
-    fft.SetFlag(Eigen::FFT<double>::Unscaled);
-    fft.inv(sums.data(), in.data(), static_cast<Eigen::Index>(n));
-    std::vector<double> out(n);
-    for (std::size_t t = 0; t < n; ++t) out[t] = sums[t].real();
-    return out;
-}
-
-/// Sums over j of a_j cos(2 pi j (t + 1/2)/n), t = 0...n-1: the even ones of half turns, turned by half a step.
-std::vector<double> sums_of_shifted_cosines(const std::vector<double>& a) {
-    const std::size_t n = a.size();
-    std::vector<Complex> in(n, 0.0);
-    for (std::size_t j = 1; j < n; ++j)
-        in[j] = a[j] * std::polar(1.0, pi * static_cast<double>(j) / static_cast<double>(n));
+    const double turn = 2.0 * pi * shift / static_cast<double>(n);
+    for (std::size_t j = 1; j < n; ++j) in[j] = a[j] * std::polar(1.0, turn * static_cast<double>(j));
     std::vector<Complex> sums(n);
     Eigen::FFT<double> fft;
     fft.SetFlag(Eigen::FFT<double>::Unscaled);
@@ -75,15 +61,15 @@ Scan scan_pulses(const std::vector<double>& residual, const std::vector<double>&
     const std::vector<double> numerators = pulse_numerators(residual, variance);
     std::vector<double> weight(n, 0.0);
     double total = 0.0;
-    double beside = 0.0;
+    double neighbours = 0.0;
     for (std::size_t j = 1; j < n; ++j) {
         weight[j] = 1.0 / variance[j - 1];
         total += weight[j];
-        beside += weight[j] * std::cos(pi * static_cast<double>(j) / count);
+        neighbours += weight[j] * std::cos(pi * static_cast<double>(j) / count);
     }
     // 2 cos^2 x = 1 + cos 2x, and 2 cos x cos y = cos(x - y) + cos(x + y).
-    const std::vector<double> own = sums_of_shifted_cosines(weight);
-    const std::vector<double> next = doublets ? sums_of_cosines(weight) : std::vector<double>();
+    const std::vector<double> own = sums_of_cosines(weight, 0.5);
+    const std::vector<double> next = doublets ? sums_of_cosines(weight, 0.0) : std::vector<double>();
     Scan out;
     const std::size_t places = doublets ? n - 1 : n;
     for (std::size_t t = 0; t < places; ++t) {
@@ -91,7 +77,7 @@ Scan scan_pulses(const std::vector<double>& residual, const std::vector<double>&
         double denominator = (total + own[t]) / count;
         if (doublets) {
             numerator -= numerators[t + 1];
-            denominator += (total + own[t + 1]) / count - 2.0 * (beside + next[t + 1]) / count;
+            denominator += (total + own[t + 1]) / count - 2.0 * (neighbours + next[t + 1]) / count;
         }
         const bool known = denominator > 0.0;
         out.size.push_back(known ? numerator / denominator : 0.0);
@@ -113,7 +99,7 @@ Scan scan_steps(const std::vector<double>& residual, const std::vector<double>& 
         total += weight[j];
     }
     const std::vector<Complex> sums = sums_over_half_turns(a);
-    const std::vector<double> cosines = sums_of_cosines(weight);
+    const std::vector<double> cosines = sums_of_cosines(weight, 0.0);
     Scan out;
     out.size.assign(n, 0.0);
     out.sigma.assign(n, 0.0);

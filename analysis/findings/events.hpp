@@ -2,9 +2,6 @@
 #include <cstddef>
 #include <vector>
 
-#include "analysis/noise/likelihood.hpp"
-#include "analysis/noise/spectrum.hpp"
-
 namespace ringlock::findings {
 
 /// What may happen to a series of rates at one time.

@@ -1,8 +1,5 @@
 #pragma once
 #include <cstddef>
-#include <optional>
-#include <string>
-#include <vector>
 
 /// Faults of a measured series that no noise model has: they are searched for before coefficients are estimated.
 namespace ringlock::findings {

@@ -1,8 +1,8 @@
 #include "analysis/findings/search.hpp"
 
 #include <algorithm>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
-#include <optional>
 
 #include "analysis/findings/events.hpp"
 #include "analysis/findings/stretches.hpp"
@@ -19,15 +19,7 @@ constexpr double significance_of_lines = 1e-3;
 
 /// Deviate whose absolute value a normal one exceeds with that probability in any of n trials.
 double threshold(double level, std::size_t n) {
-    // By bisection of the complementary error function: no closed form.
-    const double p = level / static_cast<double>(n);
-    double low = 0.0;
-    double high = 40.0;
-    for (int i = 0; i < 60; ++i) {
-        const double middle = 0.5 * (low + high);
-        (std::erfc(middle / std::sqrt(2.0)) > p ? low : high) = middle;
-    }
-    return high;
+    return boost::math::quantile(boost::math::complement(boost::math::normal(), 0.5 * level / static_cast<double>(n)));
 }
 
 /// The record in the cosine basis and the noise that explains it.
@@ -87,7 +79,7 @@ class Search {
     }
 
    private:
-    /// Takes off what is least probable; false where nothing is left that chance does not explain.
+    /// Takes off the least probable events; false where chance explains all that are left.
     bool take_events(const Noise& noise) {
         const std::size_t n = noise.residual.size() + 1;
         const Scan pulses = scan(Event::pulse, noise.residual, noise.variance);
@@ -132,14 +124,12 @@ class Search {
     bool take_step(const Noise& noise, const Scan& steps, std::size_t at) {
         constexpr int estimates = 3;
         const noise::Spectrum& spectrum = noise.parts.noise;
-        std::vector<double> without;
         Finding found{Kind::jump, at, 1, steps.size[at], std::abs(steps.sigma[at])};
-        double gain = 0.0;
         for (int k = 0; k < estimates; ++k) {
-            without = out_.rate;
+            std::vector<double> without = out_.rate;
             take_off(Event::step, found.row, found.size, without);
             const Noise left = noise_of(without);
-            gain = noise.parts.five.deviance - left.parts.five.deviance;
+            const double gain = noise.parts.five.deviance - left.parts.five.deviance;
             if (!(gain > least_jump_ * least_jump_)) return false;
             const Scan again = scan(Event::step, noise::residual(spectrum, left.parts.five), left.variance);
             const std::size_t end = options_.end_of_jump;
@@ -148,7 +138,7 @@ class Search {
             found.size = again.size[best.at];
             found.size_sigma = std::abs(again.sigma[best.at]);
         }
-        out_.rate = std::move(without);
+        take_off(Event::step, found.row, found.size, out_.rate);
         out_.findings.push_back(found);
         return true;
     }

@@ -7,7 +7,7 @@
 
 namespace ringlock::findings {
 
-/// Numbers that decide what is found.
+/// Thresholds and limits of the search.
 struct SearchOptions {
     /// Probability that a record of Gaussian noise has any outlier, any jump, any stretch of another variance by
     /// chance.
@@ -41,10 +41,10 @@ struct Searched {
 ///
 /// The noise is the maximum of the likelihood of all five terms of the fit, without sinusoids, so that a jump must be
 /// likelier than random walk, flicker and ramp. Events are taken off one kind after the other, the least probable
-/// first, and the noise is fitted anew. A jump must also lower the deviance of that fit by what its search costs. A
-/// record with disturbed stretches is not searched further.
-/// \param rate       any unit, any offset; fewer than 64 are not searched
-/// \param of_angles  the data were angles: one that is off moves two rates
+/// first, and the noise is fitted anew. A jump must also lower the deviance of that fit by the threshold of a search
+/// over all places. A record with disturbed stretches is not searched further. The spectrum takes a length with small
+/// prime factors: up to 2 % of the rates, at the end of the record, are not searched. \param rate       any unit, any
+/// offset; fewer than 64 are not searched \param of_angles  the data were angles: one that is off moves two rates
 Searched search_rates(std::span<const double> rate, bool of_angles, const SearchOptions& options = {});
 
 }  // namespace ringlock::findings

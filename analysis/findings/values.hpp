@@ -18,8 +18,8 @@ struct Wraps {
 };
 
 /// Wraps of the likeliest modulus: a power of two from 2^8 to 2^63, 360 deg, a turn in arcsec, mdeg or rad, or half of
-/// these. Values must lie within the modulus, each wrap must go from near one end to near the other, and what is left
-/// of its step when the modulus is taken off must be as small as the other steps. Nothing where there is none.
+/// these. Values must lie within the modulus, each wrap must go from near one end to near the other, and its step less
+/// the modulus must be as small as the other steps. Nothing where there is none.
 std::optional<Wraps> find_wraps(std::span<const double> values);
 
 /// Takes the wraps off: values go on beyond the end of the range.

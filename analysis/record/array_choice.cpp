@@ -69,7 +69,7 @@ const Dataset* named(const Asked& asked, const std::string& name, const std::vec
                                  printable(name), listed(names)));
 }
 
-/// Says why what is asked for is there and still no series.
+/// Throws InputError: the dataset that is asked for is there, but is no series of numbers; the message says why.
 void refuse_unreadable(const Asked& asked, const std::vector<Unreadable>& others) {
     const std::string plain = without_brackets(asked.name);
     for (const Unreadable& other : others) {

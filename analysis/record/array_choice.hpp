@@ -22,7 +22,7 @@ struct Dataset {
     bool is_series() const { return sides.size() == 1 || (!field_is_array && (sides[0] == 1 || sides[1] == 1)); }
 };
 
-/// What is there but cannot be read as a series, and why.
+/// Datasets that cannot be read as a series, each with the reason.
 struct Unreadable {
     std::string path;
     std::string why;  ///< a sentence about it, without subject: "holds text"

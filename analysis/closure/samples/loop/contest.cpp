@@ -325,8 +325,8 @@ double Contest::bar(const CandidateSet& set, const std::vector<Rival>& rivals, s
     return most;
 }
 
-/// Adds a random rate that does not pass by itself to what is as likely as a trend. In a short record the two differ by
-/// little: a random walk of which the record shows no more than one slow move passes as a trend first.
+/// Adds a random rate that does not pass by itself to the candidates as likely as a trend. In a short record they
+/// differ by little: a random walk of which the record shows no more than one slow move passes as a trend first.
 void Contest::add_weak_random(const std::vector<SampleCandidate>& candidates, const std::vector<Shared>& all,
                               double least, std::vector<CandidateSet>& as_likely) const {
     const double duration_s = series_.interval_s * static_cast<double>(series_.size());
