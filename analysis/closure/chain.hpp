@@ -8,7 +8,7 @@
 #include "analysis/record/record.hpp"
 
 /// Several records of one box: its data chain resamples all of them from one source clock, whose rate they tell
-/// together (docs/closure.md, "Several records of one box").
+/// together (docs/dev/closure-chain.md).
 namespace ringlock::closure {
 
 /// A rate with its standard error.

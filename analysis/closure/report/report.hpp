@@ -9,7 +9,7 @@
 
 namespace ringlock::closure {
 
-/// The JSON object of docs/closure.md. What is not finite is null.
+/// The JSON object of docs/commands.md, "closure". What is not finite is null.
 nlohmann::json to_json(const Closure& closure);
 /// What stands at its key "predictive" where the check was made.
 nlohmann::json to_json(const Predictive& predictive);

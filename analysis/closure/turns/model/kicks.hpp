@@ -13,8 +13,8 @@ namespace ringlock::closure {
 ///     psi_{n+1} - psi_n = (drive and input between the dither's turns) + after_n(psi_n) + before_{n+1}(psi_{n+1}).
 ///
 /// Exact for a dither of the setup's amplitude: from the equation of motion, with all that the setup knows of coupling
-/// and dither (docs/closure.md). Half turns go with one over the root of the phase's acceleration, which carries them
-/// to amplitudes nearby.
+/// and dither (docs/dev/closure-turns.md). Half turns go with one over the root of the phase's acceleration, which
+/// carries them to amplitudes nearby.
 class TurnKicks {
    public:
     /// None, as of a gyro without lock-in.

@@ -271,7 +271,7 @@ Accelerations accelerations(const record::Turns& turns, const TurnFit& fit, cons
     const auto [at_minima, at_maxima] = PhaseFunctions::mean_squares(take_phase(sides, valid, fit, functions, itself));
     take_phase(minima, valid, fit, functions, itself);
     take_phase(even, valid, fit, functions, itself);
-    // Of second order in the lock-in, the mean over all phases is no longer nothing (docs/closure.md):
+    // Of second order in the lock-in, the mean over all phases is no longer nothing (docs/dev/closure-turns.md):
     // accelerations come out too small on both sides.
     const double smaller = of_shape.second_order * (at_minima - at_maxima);
     const double smaller_everywhere = 2.0 * of_shape.second_order * (at_minima + at_maxima);

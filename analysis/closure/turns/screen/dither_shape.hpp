@@ -18,7 +18,7 @@ struct BlockMean {
     std::vector<std::uint8_t> counts;  ///< 1: the stretch is among the turns that count
 };
 
-/// What times and accelerations of the turns say of the dither's shape (docs/closure.md):
+/// What times and accelerations of the turns say of the dither's shape (docs/dev/closure-turns.md):
 ///   late    how late minima are against the middle between the maxima next to them, over four [s];
 ///   sides   acceleration of positive half cycles over that of negative ones, a quarter of the logarithm;
 ///   even    acceleration of all over that of a sine of that swing, the logarithm;
