@@ -13,7 +13,8 @@ struct PhaseRateTerm {
     double variance_rad2_s2;
 };
 
-/// What is random in the phase at the turns of one gyro (docs/dev/closure-turns.md). With s = -1 at minima and 1 at maxima
+/// What is random in the phase at the turns of one gyro (docs/dev/closure-turns.md). With s = -1 at minima and 1 at
+/// maxima
 ///
 ///     psi_n = a_n + before_n(psi_n) + s m_n + w_n,            z_n = psi_n + v_n,
 ///     a_{n+1} = a_n + kick_n(psi_n) + (rates over the interval),
