@@ -22,7 +22,7 @@ angle_record = false
 /// Gyros whose arms are read, of a noisy drive: outputs of the gyros of a block do not come side by side.
 inline constexpr const char* read_by_readers = R"([ensemble]
 gyros = 60
-duration_s = 10.0
+duration_s = 3.0
 settle_s = 0.5
 [noise_injection]
 model = "drive"

@@ -243,7 +243,7 @@ TEST(ExactCompensator, LeavesNextToNothingOfAHalfCycle) {
         for (const double threshold_deg_h : {30.0, 300.0, 1500.0}) {
             for (const double rate_deg_h : {0.0, 15.0, 500.0, 5000.0}) {
                 const Gyros gyros{rate_deg_h, threshold_deg_h, 0.003, 0.0};
-                const Left left = run(ideal_readout(), injected, gyros.setups(8), 4000, exact());
+                const Left left = run(ideal_readout(), injected, gyros.setups(8), 2000, exact());
                 std::printf("%s, %4.0f deg/h, threshold %4.0f: raw %.3g, left %.3g rad, gain %.3g, adding up %.2g\n",
                             injected ? "injected" : "plain   ", rate_deg_h, threshold_deg_h, left.raw_rad,
                             left.left_rad, left.gain(), left.drift_rad);
@@ -265,14 +265,14 @@ std::size_t differing(const std::vector<simd::Lanes>& a, std::size_t lane_a, con
 
 TEST(Compensators, PiecesAfterTheFirstDoNotMatter) {
     const Gyros gyros{30.0, 300.0, 0.003, 0.0};
-    const Seen seen = look(ideal_readout(), true, gyros.setups(3), 2000);
+    const Seen seen = look(ideal_readout(), true, gyros.setups(3), 700);
     for (const Make& make : {exact(), first_order(0.5)}) {
         const auto whole = make(calibration_of(seen.setups));
-        const Found reference = find(*whole, seen, {128, 1872});
-        for (const auto& pieces : std::vector<std::vector<std::size_t>>{{128}, {128, 1}, {128, 7}, {128, 64, 500}}) {
+        const Found reference = find(*whole, seen, {128, 572});
+        for (const auto& pieces : std::vector<std::vector<std::size_t>>{{128}, {128, 1}, {128, 7}, {128, 64, 300}}) {
             const auto compensator = make(calibration_of(seen.setups));
             const Found found = find(*compensator, seen, pieces);
-            for (std::size_t i = 0; i < 2000; ++i) {
+            for (std::size_t i = 0; i < 700; ++i) {
                 for (std::size_t g = 0; g < 3; ++g) {
                     // The same but for where whole fringes are put apart: one rounding, or with first order one a
                     // piece.
