@@ -1,14 +1,12 @@
 #include "app/allan_noise.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 
-#include "analysis/findings/search.hpp"
+#include "analysis/findings/clean_fit.hpp"
 #include "analysis/findings/values.hpp"
-#include "analysis/noise/fit.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -30,20 +28,6 @@ Finding in_data(Finding found, std::size_t first_row, allan::Kind kind, double s
                           (kind == allan::Kind::phase && !found.of_angle && found.kind == findings::Kind::jump);
     if (!in_rates) found.size *= tau0_s;
     return found;
-}
-
-/// Whether coefficients would describe the noise that the record has elsewhere.
-std::string withheld_because_of(const findings::Searched& searched) {
-    if (!searched.ended) {
-        return fmt::format("{} outliers and jumps were found and the search was given up", searched.findings.size());
-    }
-    const auto stretches = std::count_if(searched.findings.begin(), searched.findings.end(),
-                                         [](const Finding& f) { return f.kind == findings::Kind::variance; });
-    if (stretches > 0) {
-        return fmt::format("the noise of {} stretch{} is of another size than that of the rest", stretches,
-                           stretches == 1 ? "" : "es");
-    }
-    return "";
 }
 
 }  // namespace
@@ -68,23 +52,13 @@ void search_and_fit(std::vector<double> values, const allan::Phase& phase, allan
     const allan::Stretch& stretch = longest_of(*clean);
     const std::span<const double> angle = std::span(clean->x).subspan(stretch.begin, stretch.size());
     if (!clean->whole()) out.noise_stretch = stretch.size();
-    std::vector<double> rate;
-    for (std::size_t i = 1; i < angle.size(); ++i) rate.push_back((angle[i] - angle[i - 1]) / out.tau0_s);
-    findings::Searched searched = findings::search_rates(rate, kind == allan::Kind::phase);
-    rate = {};
-    std::vector<double> cleaned{0.0};
-    for (const double r : searched.rate) cleaned.push_back(cleaned.back() + r * out.tau0_s);
-    const bool any = std::any_of(searched.findings.begin(), searched.findings.end(),
-                                 [](const Finding& f) { return f.kind != findings::Kind::variance; });
-    out.noise = any ? noise::fit_noise(cleaned, out.tau0_s) : noise::fit_noise(angle, out.tau0_s);
-    const std::string why = withheld_because_of(searched);
-    if (!why.empty()) {
-        out.noise->described = false;
-        out.noise->reason = why;
-    }
-    for (const Finding& found : searched.findings) {
-        out.findings.push_back(in_data(found, lead + stretch.begin, kind, scale, out.tau0_s));
-    }
+    findings::CleanFit fit = findings::fit_without_events(angle, out.tau0_s, kind == allan::Kind::phase);
+    const auto shown = [&](const Finding& found) {
+        return in_data(found, lead + stretch.begin, kind, scale, out.tau0_s);
+    };
+    out.noise = std::move(fit.noise);
+    for (const Finding& found : fit.searched.findings) out.findings.push_back(shown(found));
+    if (fit.instead_of_walk) out.jump_instead_of_walk = shown(*fit.instead_of_walk);
     std::stable_sort(out.findings.begin(), out.findings.end(),
                      [](const Finding& a, const Finding& b) { return a.row < b.row; });
 }

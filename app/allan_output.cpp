@@ -191,6 +191,10 @@ std::string noise_text(const AllanOutput& out) {
             text += coefficient_line("", walk_in(*out.walk_unit, *out.noise), out.walk_unit->name);
         }
     }
+    if (out.jump_instead_of_walk) {
+        text += "    a jump explains the record as well as a random walk of the rate does:\n" +
+                finding_line(*out.jump_instead_of_walk, out);
+    }
     if (out.noise->correlated) {
         const noise::Estimate driving = times(out.noise->correlated->amplitude_deg_h_rt_h, names.driving_factor);
         text += estimate_line("correlated noise q_c", driving, names.driving_unit);
@@ -252,6 +256,8 @@ std::string allan_json(const AllanOutput& out) {
     }
     json["noise_fitted_points"] = out.noise_stretch ? Json(*out.noise_stretch) : Json(nullptr);
     json["noise_fitted_every"] = out.noise_thinning ? Json(*out.noise_thinning) : Json(nullptr);
+    json["jump_instead_of_random_walk"] =
+        out.jump_instead_of_walk ? finding_json(*out.jump_instead_of_walk, out.tau0_s) : Json(nullptr);
     json["noise_withheld"] = out.noise && !out.noise->described ? Json(out.noise->reason) : Json(nullptr);
     return json_text(json) + "\n";
 }

@@ -36,6 +36,8 @@ struct AllanOutput {
     std::vector<DeviationOutput> deviations;
     std::vector<findings::Finding> findings;  ///< by row, counted from 0; sizes in the unit of the data
     std::optional<noise::NoiseFit> noise;
+    /// A jump that explains the record as well as the rate random walk, which is not resolved then.
+    std::optional<findings::Finding> jump_instead_of_walk;
     std::optional<std::size_t>
         noise_stretch;  ///< points of the part without gaps that was fitted, where there are gaps
     std::optional<std::int64_t> noise_thinning;  ///< samples from one to the next of those that were fitted, if not all

@@ -1,11 +1,11 @@
 #include "analysis/findings/search.hpp"
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
 #include "analysis/findings/events.hpp"
 #include "analysis/findings/stretches.hpp"
+#include "analysis/findings/thresholds.hpp"
 #include "analysis/noise/decomposition.hpp"
 #include "analysis/noise/line.hpp"
 #include "analysis/noise/spectrum.hpp"
@@ -16,11 +16,6 @@ namespace {
 
 constexpr std::size_t fewest_rates = 64;
 constexpr double significance_of_lines = 1e-3;
-
-/// Deviate whose absolute value a normal one exceeds with that probability in any of n trials.
-double threshold(double level, std::size_t n) {
-    return boost::math::quantile(boost::math::complement(boost::math::normal(), 0.5 * level / static_cast<double>(n)));
-}
 
 /// The record in the cosine basis and the noise that explains it.
 struct Noise {
@@ -36,27 +31,13 @@ Noise noise_of(std::span<const double> rate) {
     return out;
 }
 
-struct Best {
-    std::size_t at = 0;
-    double excess = 0.0;  ///< of the absolute deviate over its threshold
-};
-
-Best best_of(const Scan& found, double least, std::size_t from, std::size_t to) {
-    Best best;
-    for (std::size_t t = from; t < std::min(to, found.sigma.size()); ++t) {
-        const double excess = std::abs(found.sigma[t]) - least;
-        if (excess > best.excess) best = {t, excess};
-    }
-    return best;
-}
-
 class Search {
    public:
     Search(std::span<const double> rate, bool of_angles, const SearchOptions& options)
         : options_(options), of_angles_(of_angles) {
         out_.rate.assign(rate.begin(), rate.end());
-        least_outlier_ = threshold(options.outlier_level, rate.size() * (of_angles ? 2 : 1));
-        least_jump_ = threshold(options.jump_level, rate.size());
+        least_outlier_ = normal_threshold(options.outlier_level, rate.size() * (of_angles ? 2 : 1));
+        least_jump_ = normal_threshold(options.jump_level, rate.size());
     }
 
     Searched run() {
@@ -65,6 +46,7 @@ class Search {
             if (round == 0) out_.findings = disturbed_stretches(whitened(noise.residual, noise.variance), options_);
             if (!out_.findings.empty() && round == 0) break;
             if (!take_events(noise)) {
+                take_outliers_of_tail(noise);
                 find_stretches(noise);
                 break;
             }
@@ -94,6 +76,14 @@ class Search {
         return pulse.excess > 0.0 && take_all(Event::pulse, pulses, doublets);
     }
 
+    /// Takes off the event of that rate, of the size that is found at place `at` of the scan.
+    void take_one(Event event, std::size_t rate, const Scan& found, std::size_t at) {
+        take_off(event, rate, found.size[at], out_.rate);
+        const Kind kind = event == Event::pulse && of_angles_ ? Kind::jump : Kind::outlier;
+        const std::size_t row = event == Event::doublet ? rate + 1 : rate;
+        out_.findings.push_back({kind, row, 1, found.size[at], std::abs(found.sigma[at]), kind == Kind::jump});
+    }
+
     /// All events of that kind that stand out from their neighbours, and more so than events of the other kind there.
     bool take_all(Event event, const Scan& found, const Scan& rivals) {
         constexpr std::size_t apart = 3;
@@ -109,10 +99,7 @@ class Search {
                 if (k < rivals.sigma.size()) largest = largest && std::abs(rivals.sigma[k]) <= size;
             }
             if (!largest) continue;
-            take_off(event, t, found.size[t], out_.rate);
-            const Kind kind = event == Event::pulse && of_angles_ ? Kind::jump : Kind::outlier;
-            const std::size_t row = event == Event::doublet ? t + 1 : t;
-            out_.findings.push_back({kind, row, 1, found.size[t], size, kind == Kind::jump});
+            take_one(event, t, found, t);
             any = true;
             last = t;
         }
@@ -141,6 +128,31 @@ class Search {
         take_off(Event::step, found.row, found.size, out_.rate);
         out_.findings.push_back(found);
         return true;
+    }
+
+    /// Outliers among the rates that the spectrum leaves out at the end of the record: by the spectrum of the last
+    /// rates, in the noise of all the others. Sinusoids are not in that noise: a record that has any is left as it is.
+    void take_outliers_of_tail(const Noise& noise) {
+        constexpr std::size_t shares = 8;
+        constexpr int most_rounds = 3;
+        const std::size_t n = out_.rate.size();
+        const std::size_t tail = n - noise.parts.noise.samples;
+        if (tail == 0 || !noise.parts.lines.empty()) return;
+        const std::size_t wanted = std::min(n, std::max(fewest_rates, shares * tail));
+        const std::size_t size = noise::cosine_spectrum(std::span(out_.rate).last(wanted)).samples;
+        for (int round = 0; round < most_rounds; ++round) {
+            const noise::Spectrum last = noise::cosine_spectrum(std::span(out_.rate).last(size));
+            const std::vector<double> residual = noise::residual(last, noise.parts.five);
+            const std::vector<double> variance = noise::coefficient_variances(last, noise.parts.five);
+            const Scan pulses = scan(Event::pulse, residual, variance);
+            const Scan doublets = of_angles_ ? scan(Event::doublet, residual, variance) : Scan();
+            const Best pulse = best_of(pulses, least_outlier_, size - tail, size);
+            const Best doublet = best_of(doublets, least_outlier_, size - tail, size);
+            if (pulse.excess == 0.0 && doublet.excess == 0.0) return;
+            const bool two = doublet.excess > pulse.excess;
+            const std::size_t at = two ? doublet.at : pulse.at;
+            take_one(two ? Event::doublet : Event::pulse, at + n - size, two ? doublets : pulses, at);
+        }
     }
 
     void find_stretches(const Noise& noise) {

@@ -43,8 +43,10 @@ struct Searched {
 /// likelier than random walk, flicker and ramp. Events are taken off one kind after the other, the least probable
 /// first, and the noise is fitted anew. A jump must also lower the deviance of that fit by the threshold of a search
 /// over all places. A record with disturbed stretches is not searched further. The spectrum takes a length with small
-/// prime factors: up to 2 % of the rates, at the end of the record, are not searched. \param rate       any unit, any
-/// offset; fewer than 64 are not searched \param of_angles  the data were angles: one that is off moves two rates
+/// prime factors: among the up to 2 % of the rates that it leaves out at the end of the record only outliers are
+/// searched for, and none where the record has sinusoids.
+/// \param rate       any unit, any offset; fewer than 64 are not searched
+/// \param of_angles  the data were angles: one that is off moves two rates
 Searched search_rates(std::span<const double> rate, bool of_angles, const SearchOptions& options = {});
 
 }  // namespace ringlock::findings

@@ -1,11 +1,14 @@
 #include "analysis/findings/values.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 
 #include "analysis/findings/median.hpp"
+#include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::findings {
@@ -128,43 +131,86 @@ std::vector<Finding> search_values(std::span<const double> values) {
     return found;
 }
 
+namespace {
+
+/// Range of the values and their usual step from one datum to the next.
+struct Steps {
+    double low = std::numeric_limits<double>::infinity();
+    double high = -std::numeric_limits<double>::infinity();
+    double usual = 0.0;   ///< median
+    double spread = 0.0;  ///< standard deviation of normal steps of the same median size
+    std::size_t count = 0;
+};
+
+Steps steps_of(std::span<const double> values) {
+    constexpr double normal = 1.4826;  // standard deviation of a normal distribution over its median size
+    Steps out;
+    std::vector<double> steps;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        if (std::isnan(values[i])) continue;
+        out.low = std::min(out.low, values[i]);
+        out.high = std::max(out.high, values[i]);
+        if (i > 0 && !std::isnan(values[i - 1])) steps.push_back(values[i] - values[i - 1]);
+    }
+    out.count = steps.size();
+    if (steps.empty()) return out;
+    out.usual = median_of(steps);
+    std::vector<double> off;
+    for (const double step : steps) off.push_back(std::abs(step - out.usual));
+    out.spread = std::max(normal * median_of(off), 1e-12 * (out.high - out.low));
+    return out;
+}
+
+/// Calls `visit` with every datum that has one before it and by how much its step exceeds the usual ones; across
+/// missing data, those of as many steps.
+template <class Visit>
+void for_each_excess(std::span<const double> values, double usual, const Visit& visit) {
+    std::size_t last = values.size();
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        if (std::isnan(values[i])) continue;
+        if (last < i) visit(i, values[i] - values[last] - usual * static_cast<double>(i - last));
+        last = i;
+    }
+}
+
+}  // namespace
+
 std::optional<Wraps> find_wraps(std::span<const double> values) {
     constexpr std::size_t fewest = 16;
     constexpr double deviations = 20.0;  // of usual steps: no noise goes so far
-    constexpr double normal = 1.4826;    // standard deviation of a normal distribution over its median size
-    std::vector<double> steps;
-    double low = std::numeric_limits<double>::infinity();
-    double high = -low;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-        if (std::isnan(values[i])) continue;
-        low = std::min(low, values[i]);
-        high = std::max(high, values[i]);
-        if (i > 0 && !std::isnan(values[i - 1])) steps.push_back(values[i] - values[i - 1]);
-    }
-    if (steps.size() < fewest) return std::nullopt;
-    const double usual = median_of(steps);
-    std::vector<double> off;
-    for (const double step : steps) off.push_back(std::abs(step - usual));
-    const double spread = std::max(normal * median_of(off), 1e-12 * (high - low));
-    const double reach = deviations * spread;
+    const Steps steps = steps_of(values);
+    if (steps.count < fewest) return std::nullopt;
+    const double range = steps.high - steps.low;
+    const double reach = deviations * steps.spread;
     // A range that is hardly larger than the steps wraps all the time, and nobody can undo that.
     for (const double modulus : moduli()) {
-        if (high - low > modulus || high - low < 0.9 * modulus || 4.0 * reach > modulus) continue;
+        if (range > modulus || range < 0.9 * modulus || 4.0 * reach > modulus) continue;
         Wraps wraps{modulus, {}};
         bool clean = true;
-        for (std::size_t i = 1; i < values.size(); ++i) {
-            const double step = values[i] - values[i - 1] - usual;
-            if (std::isnan(step) || std::abs(step) <= 0.5 * modulus) continue;
-            const double left = step + (step < 0.0 ? modulus : -modulus);
-            if (std::abs(left) <= reach) {
+        for_each_excess(values, steps.usual, [&](std::size_t i, double step) {
+            if (std::abs(step) <= 0.5 * modulus) return;
+            if (std::abs(step + (step < 0.0 ? modulus : -modulus)) <= reach) {
                 wraps.at.push_back(i);
             } else {
                 clean = false;
             }
-        }
+        });
         if (!wraps.at.empty() && clean) return wraps;
     }
     return std::nullopt;
+}
+
+Wraps wraps_of(double modulus, std::span<const double> values) {
+    const Steps steps = steps_of(values);
+    if (!(steps.high - steps.low <= modulus)) {
+        throw InputError(fmt::format("values from {} to {} are not within a range of {}: they do not wrap there",
+                                     steps.low, steps.high, modulus));
+    }
+    Wraps wraps{modulus, {}};
+    for_each_excess(values, steps.usual, [&](std::size_t i, double step) {
+        if (std::abs(step) > 0.5 * modulus) wraps.at.push_back(i);
+    });
+    return wraps;
 }
 
 void unwrap(const Wraps& wraps, std::span<double> values) {

@@ -22,6 +22,10 @@ struct Wraps {
 /// the modulus must be as small as the other steps. Nothing where there is none.
 std::optional<Wraps> find_wraps(std::span<const double> values);
 
+/// Wraps of a modulus that is known: at every step that exceeds the usual ones by more than half of it. Throws
+/// InputError where the values are not within a range of that size.
+Wraps wraps_of(double modulus, std::span<const double> values);
+
 /// Takes the wraps off: values go on beyond the end of the range.
 void unwrap(const Wraps& wraps, std::span<double> values);
 

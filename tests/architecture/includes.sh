@@ -31,7 +31,7 @@ declare -A may=(
     [analysis/text]="engine/core"
     [analysis/record]="analysis/allan analysis/allan/sums analysis/noise analysis/text engine/core engine/reader
         engine/store"
-    [analysis/findings]="analysis/noise engine/core"
+    [analysis/findings]="analysis/allan/sums analysis/noise engine/core"
     [analysis/instrument]="analysis/record engine/*"
     [analysis/study]="analysis/allan analysis/allan/sums analysis/design analysis/lot analysis/noise engine/*"
     [analysis/parts]="analysis/study analysis/allan analysis/noise engine/*"

@@ -5,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "analysis/findings/clean_fit.hpp"
 #include "analysis/findings/events.hpp"
 #include "analysis/findings/search.hpp"
 #include "engine/core/units.hpp"
@@ -101,6 +102,20 @@ TEST(Search, OutliersAreFoundAndTakenOff) {
     }
 }
 
+// 2003 rates have a prime number for their length: the spectrum leaves out the last of them.
+TEST(Search, OutliersAtTheEndOfAnAwkwardLengthAreFound) {
+    std::vector<double> rate = white(2003, 7);
+    rate[2001] += 12.0;
+    const Searched searched = search_rates(rate, false);
+    ASSERT_EQ(searched.findings.size(), 1U);
+    EXPECT_EQ(searched.findings[0].kind, Kind::outlier);
+    EXPECT_EQ(searched.findings[0].row, 2001U);
+    EXPECT_NEAR(searched.findings[0].size, 12.0, 4.0);
+    EXPECT_NEAR(searched.rate[2001], rate[2001] - searched.findings[0].size, 1e-12);
+    rate[2001] -= 12.0;
+    EXPECT_TRUE(search_rates(rate, false).findings.empty());
+}
+
 // An angle that is off by itself moves two rates; a step of the angle moves one.
 TEST(Search, AnglesAreOffByThemselvesOrForGood) {
     std::vector<double> rate = white(2000, 4);
@@ -124,6 +139,34 @@ TEST(Search, AJumpIsFoundWithItsSize) {
     EXPECT_EQ(searched.findings[0].kind, Kind::jump);
     EXPECT_NEAR(static_cast<double>(searched.findings[0].row), 600.0, 3.0);
     EXPECT_NEAR(searched.findings[0].size, 2.0, 0.2);  // four standard errors
+}
+
+std::vector<double> angle_of(const std::vector<double>& rate) {
+    std::vector<double> angle{0.0};
+    for (const double r : rate) angle.push_back(angle.back() + r);
+    return angle;
+}
+
+// Jumps that are too small to be found must not be called a random walk, and a random walk stays one.
+TEST(CleanFit, AJumpIsNoRandomWalk) {
+    int tied = 0;
+    for (std::uint64_t seed = 100; seed < 130; ++seed) {
+        std::vector<double> rate = white(2000, seed);
+        for (std::size_t i = 1680; i < rate.size(); ++i) rate[i] += 1.1;
+        const CleanFit fit = fit_without_events(angle_of(rate), 1.0, false);
+        EXPECT_FALSE(fit.noise.rrw_deg_h_rt_h.resolved) << seed;
+        tied += fit.instead_of_walk.has_value() ? 1 : 0;
+    }
+    EXPECT_GT(tied, 0) << "no jump was near enough to a random walk to be compared with it";
+    for (std::uint64_t seed = 200; seed < 205; ++seed) {
+        std::vector<double> rate = white(2000, seed);
+        const std::vector<double> steps = white(2000, seed + 1000);
+        double walk = 0.0;
+        for (std::size_t i = 0; i < rate.size(); ++i) rate[i] += walk += 0.15 * steps[i];
+        const CleanFit fit = fit_without_events(angle_of(rate), 1.0, false);
+        EXPECT_TRUE(fit.noise.rrw_deg_h_rt_h.resolved) << seed;
+        EXPECT_FALSE(fit.instead_of_walk.has_value()) << seed;
+    }
 }
 
 TEST(Search, AStretchOfLargerNoiseIsFound) {

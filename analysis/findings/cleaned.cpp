@@ -1,0 +1,47 @@
+#include "analysis/findings/cleaned.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace ringlock::findings {
+
+Cleaned clean(std::span<const Finding> findings, allan::Kind kind, double tau0_s, std::span<double> values) {
+    Cleaned out;
+    const auto rows_from = [&](const Finding& found) { return values.subspan(std::min(found.row, values.size())); };
+    for (const Finding& found : findings) {
+        switch (found.kind) {
+            case Kind::outlier:
+                if (found.row >= values.size()) break;
+                values[found.row] -= found.size;
+                ++out.corrected;
+                break;
+            case Kind::jump: {
+                // The first rate behind the jump leads to the datum of its row.
+                const bool grows = kind == allan::Kind::phase && !found.of_angle;
+                const bool one = kind != allan::Kind::phase && found.of_angle;
+                double gone = grows ? 0.0 : found.size;
+                for (double& value : rows_from(found)) {
+                    if (grows) gone += found.size * tau0_s;
+                    value -= gone;
+                    if (one) break;
+                }
+                ++out.jumps;
+                break;
+            }
+            case Kind::variance:
+                for (double& value : rows_from(found).first(std::min(found.length, rows_from(found).size()))) {
+                    out.left_out += std::isnan(value) ? 0 : 1;
+                    value = std::numeric_limits<double>::quiet_NaN();
+                }
+                break;
+            case Kind::wrap:
+            case Kind::repeated:
+            case Kind::clipped:
+                break;
+        }
+    }
+    return out;
+}
+
+}  // namespace ringlock::findings
