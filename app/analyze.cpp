@@ -37,7 +37,7 @@ struct AnalyzeArguments {
     bool json = false;
 };
 
-/// A result without records can only be made anew; the error says how to run it.
+/// A result without records must be simulated again; the error says how.
 void need_angle_records(const std::string& file, const study::Study& study, const std::vector<AveragingTime>& asked) {
     if (study.scenario.output.angle_record) return;
     const double interval_s = study.schedule.sample_interval_s;
@@ -52,8 +52,8 @@ void need_angle_records(const std::string& file, const study::Study& study, cons
         printable(file), times));
 }
 
-/// Fills in the nearest whole number of samples. Who asks for the interval between samples or for half of the duration
-/// as the scenario names them finds them, although they were rounded to whole outputs and whole samples.
+/// Fills in the nearest whole number of samples. The interval between samples and half of the duration are found by
+/// their values in the scenario, too, although they were rounded to whole outputs and whole samples.
 void find_among_samples(const study::Study& study, AveragingTime& time) {
     const scenario::Scenario& scenario = study.scenario;
     const std::int64_t largest = allan::largest_factor(allan::Estimator::oadev, study.schedule.samples);
@@ -112,7 +112,7 @@ void add_asked(const std::string& file, const study::Experiment& experiment, std
     for (std::size_t i = 0; i < family.size(); ++i) summary.arms[i].asked = family[i].front().points;
 }
 
-/// All that is asked for of a result, summed up.
+/// The requested figures of a result.
 struct Analysis {
     std::vector<study::Summary> summaries;
     std::vector<AveragingTime> asked;

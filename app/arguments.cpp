@@ -21,7 +21,7 @@
 namespace ringlock::app {
 namespace {
 
-/// The number at the beginning of a text, and what follows it; nothing where there is none.
+/// The number at the beginning of a text and the rest of the text; nothing where the text does not begin with a number.
 template <class T>
 std::optional<std::pair<T, std::string_view>> leading_number(std::string_view text) {
     T value{};
@@ -30,7 +30,7 @@ std::optional<std::pair<T, std::string_view>> leading_number(std::string_view te
     return std::pair{value, text.substr(static_cast<std::size_t>(end - text.data()))};
 }
 
-/// Seconds in a unit of time; 0 for what is none.
+/// Seconds in a unit of time; 0 if the text names no unit of time.
 double seconds_in(std::string_view unit) {
     if (unit == "s") return 1.0;
     if (unit == "min") return 60.0;

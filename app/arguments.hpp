@@ -9,18 +9,18 @@
 #include "analysis/allan/estimator.hpp"
 #include "engine/scenario/scenario.hpp"
 
-/// What several commands read from their line.
+/// Arguments that several commands share.
 namespace ringlock::app {
 
-/// A whole number from 0 in plain decimal digits. CLI11 would take 010 for eight and cut what is too large without a
-/// word. Throws InputError.
+/// A whole number from 0 in plain decimal digits. CLI11 would read 010 as eight and would cut a number that is too
+/// large without an error. Throws InputError.
 std::int64_t whole_number(std::string_view option, const std::string& text, std::int64_t largest,
                           std::string_view allowed);
 
 /// Threads of --threads; 0 means all cores. Throws InputError.
 int thread_count(const std::string& asked);
 
-/// What a command is told of a scenario beside its file.
+/// Changes of a scenario that the command line makes in addition to its file.
 struct Changes {
     std::vector<std::string> settings;  ///< of --set, "section.key=value"
     std::optional<std::string> seed;    ///< of --seed

@@ -33,7 +33,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Seconds that each scenario is tried for, so that the time of the batch can be told.
+/// Seconds for which each scenario is tried, so that the time of the batch can be estimated.
 constexpr double trial_s = 0.5;
 
 enum class State { waits, finished_before, done, failed };
@@ -134,7 +134,7 @@ class Batch {
         }
         std::error_code unknown;
         const fs::space_info space = fs::space(folder_, unknown);
-        // What is kept of a run while it goes on takes as much again as its result.
+        // The files that a run keeps while it goes on take as much space as its result, in addition to it.
         if (!unknown && bytes + largest > space.available) {
             throw InputError(
                 fmt::format("{}: the results will take {:.1f} GB, and the disk has {:.1f} GB; run fewer, or "
@@ -148,7 +148,7 @@ class Batch {
         }
     }
 
-    /// By the trials, corrected by what runs have taken so far.
+    /// Estimated from the trials, corrected by the time that the finished runs have taken.
     double expected_left_s() const {
         double left_s = 0.0;
         double done_s = 0.0;

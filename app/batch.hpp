@@ -9,7 +9,7 @@ namespace ringlock::app {
 bool is_batch(const RunArguments& arguments);
 
 /// Runs scenarios one after the other, each with all threads. One that fails does not stop the others; those that are
-/// finished are left out, and those that were interrupted go on. Writes batch.json beside the results after each, and
+/// finished are left out, and those that were interrupted go on. Writes batch.json next to the results after each, and
 /// prints a table at the end.
 ///
 /// Throws InputError where the command line is wrong (nothing is run then), RunError at the end where any scenario

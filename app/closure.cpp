@@ -39,7 +39,7 @@ namespace ringlock::app {
 
 namespace {
 
-/// What the record does not declare, the scenario says.
+/// The scenario supplies the values that the record does not declare.
 void declare(record::Declared& declared, const scenario::Scenario& model) {
     const auto fill = [](std::optional<double>& to, double value) {
         if (!to) to = value;
@@ -71,8 +71,8 @@ std::vector<std::filesystem::path> folders_of(const ClosureArguments& arguments)
     return folders;
 }
 
-/// Refuses a number of records that does not go with the options, and one record that is named twice: its noise would
-/// count as that of two.
+/// Refuses a number of records that the options do not allow, and one record that is named twice: its noise would count
+/// as that of two.
 void refuse_other_records(const ClosureArguments& arguments) {
     if (!arguments.same_chain && arguments.records.size() > 1) {
         throw InputError(
@@ -98,7 +98,7 @@ void refuse_other_records(const ClosureArguments& arguments) {
     }
 }
 
-/// Refuses, before the work, output folders in which somebody's file would be lost.
+/// Refuses, before the work, output folders in which another file would be lost.
 void refuse_to_lose(const ClosureArguments& arguments) {
     if (arguments.out.empty()) return;
     std::vector<NamedFile> files{{"--model", arguments.model, NamedFile::Use::input}};
@@ -121,16 +121,16 @@ record::Record record_of(const std::string& path, const ClosureArguments& argume
     return record;
 }
 
-/// What is printed, and why something could not be written: what was found is printed all the same.
+/// The printed result, and the reason if a file could not be written: the result is printed in that case too.
 struct Printed {
     nlohmann::json json;
     std::string text;
     std::exception_ptr not_written;
 };
 
-/// Before there are threads: the C library gives each of them a heap of its own, unless told otherwise, and leaves a
-/// quarter of the memory to gaps in these. Threads that share one wait for each other now and then: where records are
-/// short and threads many, they keep theirs.
+/// Before there are threads: the C library gives each of them a heap of its own, unless it is configured otherwise, and
+/// leaves a quarter of the memory to gaps in these. Threads that share one wait for each other now and then: where
+/// records are short and threads many, they keep theirs.
 void share_heap_where_long(const record::Record& record) {
 #ifdef M_ARENA_MAX
     constexpr std::size_t long_record = 50000;

@@ -8,7 +8,7 @@
 
 namespace ringlock::app {
 
-/// How one noise coefficient of an instrument is called, and what turns the value of a NoiseFit into its unit.
+/// Name of one noise coefficient of an instrument, and the factor from the value of a NoiseFit to its unit.
 struct CoefficientName {
     std::string_view key;   ///< in JSON
     std::string_view name;  ///< in the table
@@ -31,14 +31,14 @@ struct InstrumentNames {
 
 const InstrumentNames& names_of(quantity::Instrument instrument);
 
-/// A unit in which the random walk can be asked for (--arw-unit): a random walk or a spectral density.
+/// A unit that --arw-unit can request for the random walk: a random walk or a spectral density.
 struct WalkUnit {
     std::string_view name;
     quantity::Instrument instrument;
     double factor;  ///< from deg/sqrt(h), or from (m/s)/sqrt(h) of an accelerometer
 };
 
-/// Throws InputError where the instrument has no such unit; says which there are.
+/// Throws InputError where the instrument has no such unit; the message lists the units.
 const WalkUnit& walk_unit(const std::string& name, quantity::Instrument instrument);
 
 }  // namespace ringlock::app

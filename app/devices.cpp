@@ -18,7 +18,7 @@
 namespace ringlock::app {
 namespace {
 
-/// What a device's constants make of it, to first order (docs/physics.md).
+/// Figures that follow from a device's constants, to first order (docs/physics.md).
 struct DeviceFigures {
     double scale_factor_arcsec, lockin_threshold_deg_h, dither_frequency_hz, dither_peak_rate_deg_s;
     double fringes_per_half_cycle, modulation_depth_rad, kick_rad;

@@ -93,8 +93,8 @@ struct PointColumn {
     std::function<std::string(std::size_t point)> cell;
 };
 
-/// Points down: what they lead with in every table, and the columns in as many tables below each other as the page is
-/// too narrow for one.
+/// One row for each point. Every table begins with the columns `leading`; the other columns are divided among several
+/// tables, one below the other, where the page is too narrow for one.
 std::string points_table(std::size_t points, const std::vector<PointColumn>& leading,
                          const std::vector<PointColumn>& columns) {
     const std::size_t step = (points + most_rows - 1) / most_rows;
@@ -122,7 +122,7 @@ std::string points_table(std::size_t points, const std::vector<PointColumn>& lea
     return text;
 }
 
-/// Most keys that stand beside the figures; more have tables of their own.
+/// Most keys that are printed next to the figures; more keys have tables of their own.
 constexpr std::size_t most_keys_beside = 4;
 
 std::vector<PointColumn> key_columns(const study::Experiment& experiment) {

@@ -10,16 +10,16 @@ inline constexpr int run_failed = 1;
 inline constexpr int input_wrong = 2;
 inline constexpr int ended_by_signal = 128;  ///< and more: the number of the signal on top
 
-/// Ends a command with a status and no message: another process has told why.
+/// Ends a command with a status and no message: another process has printed the reason.
 struct EndQuietly {
     int status = run_failed;
 };
 
-/// Does something with what a file holds. What is thrown by a library, which does not know the file, becomes an
-/// InputError that names it: a value in it is beyond what can be evaluated.
+/// Calls `work`, which uses values of a file. An exception of a library, which does not know the file, becomes an
+/// InputError that names the file: one of its values is beyond the range that can be evaluated.
 void name_file_of_failure(const std::string& file, const std::function<void()>& work);
 
-/// Tells on standard error what went wrong, and returns the exit status for it.
+/// Writes the failure to standard error and returns the exit status for it.
 int tell_failure(const std::exception_ptr& failure);
 
 }  // namespace ringlock::app

@@ -10,13 +10,13 @@ namespace ringlock::app {
 struct NamedFile {
     enum class Use { input, output };
 
-    std::string argument;  ///< what names it, as in "--plot"
+    std::string argument;  ///< the argument that names it, as in "--plot"
     std::filesystem::path path;
     Use use;
 };
 
-/// Refuses a command that would write over what it reads, or over what it has written itself: an output must be
-/// another file than every input and every other output, by whatever name, symbolic or hard link. Empty paths, and
+/// Refuses a command that would write over its own input, or over a file that it has written itself: an output must be
+/// another file than every input and every other output, under any name, symbolic link or hard link. Empty paths, and
 /// "-" as input, are no files. Throws InputError.
 void refuse_same_files(const std::vector<NamedFile>& files);
 

@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
     namespace app = ringlock::app;
     app::hold_standard_streams();
     app::remember_arguments({argv, static_cast<std::size_t>(argc)});
-    // A file that outgrows its limit (ulimit -f) is an error of writing, told and cleaned up after like a full disk.
+    // A file that outgrows its limit (ulimit -f) is an error of writing, reported and cleaned up like a full disk.
     std::signal(SIGXFSZ, SIG_IGN);
     CLI::App root{
         "ringlock: which cure for the lock-in of a dithered ring laser gyro, when and how well.\n"

@@ -11,24 +11,24 @@ namespace ringlock::app {
 /// Keeps the command line, whose words may hold newlines, so that put() and tell() show these as "\x0a".
 void remember_arguments(std::span<const char* const> arguments);
 
-/// Writes to standard output, at once; what would control a terminal is written out, see printable(). Throws RunError
-/// where it cannot be written (a full disk, say): results that nobody can read are no success. Throws Interrupted where
-/// the user asks to stop while it is written.
+/// Writes to standard output, at once; characters that would control a terminal are escaped, see printable(). Throws
+/// RunError where it cannot be written (a full disk, say): results that nobody can read are no success. Throws
+/// Interrupted where the user asks to stop while it is written.
 void put(std::string_view text);
 
-/// Writes to standard error what people may want to know, likewise. What nobody can read changes nothing about the run.
+/// Writes information for people to standard error, escaped likewise. A failure to write it does not change the run.
 void tell(std::string_view text);
 
-/// Writes to standard error what controls the terminal: a line that is drawn anew. Foreign text in it has gone through
-/// printable().
+/// Writes to standard error a text that controls the terminal: a line that is drawn anew. Foreign text in it has gone
+/// through printable().
 void draw_over(std::string_view text);
 
-/// Claims the figure of --plot, so that it is known before a run, not after it, that it cannot be written; no name is
-/// none. It must end in .svg: a figure replaces the file it finds. Throws InputError.
+/// Claims the figure of --plot, so that it is known before a run, not after it, that it cannot be written; null for an
+/// empty path. It must end in .svg: a figure replaces the file it finds. Throws InputError.
 std::unique_ptr<AtomicPath> claim_figure(const std::filesystem::path& path);
 
-/// Opens standard streams that the caller has closed (on nothing), so that no file of ours gets their numbers and what
-/// is told ends up in it.
+/// Opens standard streams that the caller has closed (on nothing), so that no other file gets their descriptors and
+/// receives the messages.
 void hold_standard_streams();
 
 }  // namespace ringlock::app

@@ -10,7 +10,7 @@
 namespace ringlock::app {
 
 void add_planned(CLI::App& root) {
-    // Their names are reserved, but the help shows what can be used.
+    // Their names are reserved, but the help shows only commands that can be used.
     constexpr std::array planned = {"report"};
     for (const char* const name : planned) {
         CLI::App* command = root.add_subcommand(name)->group("");

@@ -15,7 +15,7 @@ struct Ranks {
 };
 
 /// Calls `work` in a process that mpirun has started together with others, or that is alone. Returns when all processes
-/// are through. Where one fails, what it throws is passed on, and the others end with the same status; a failure while
+/// have finished. Where one fails, its exception is passed on, and the others end with the same status; a failure while
 /// the others simulate ends them by a signal, after which they keep what they have finished.
 ///
 /// Throws InputError where mpirun has started several processes of a program that was built without MPI.

@@ -27,8 +27,8 @@
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
 
-/// One thread of each process, that of main(), makes all calls of MPI; the simulation runs in others, which post what
-/// they need to it. So MPI_THREAD_FUNNELED is enough, and the leader answers the members' requests for blocks while it
+/// One thread of each process, that of main(), makes all calls of MPI; the simulation runs in others, which post their
+/// requests to it. So MPI_THREAD_FUNNELED is enough, and the leader answers the members' requests for blocks while it
 /// simulates: without hardware for it, a one-sided operation waits until its target calls MPI.
 namespace ringlock::app {
 
@@ -43,7 +43,7 @@ constexpr int leader_rank = 0;
 /// simulation for some ten microseconds; a request for blocks, of which a run has some dozens, waits as long at most.
 constexpr auto pause = 10ms;
 
-/// What a message is.
+/// Kind of a message.
 enum Tag : int { order_tag = 1, end_tag, events_tag, report_tag };
 
 struct Message {
@@ -87,7 +87,7 @@ class World {
         *counter_ = value;
         MPI_Win_unlock(leader_rank, window_);
     }
-    /// Adds one to the leader's counter and returns what it was.
+    /// Adds one to the leader's counter and returns the previous value.
     std::int64_t count() {
         const std::int64_t one = 1;
         std::int64_t before = 0;
@@ -124,7 +124,7 @@ class World {
     MPI_Win window_ = MPI_WIN_NULL;
 };
 
-/// Serves the threads that simulate: what they post is done by the thread that calls serve().
+/// Serves the threads that simulate: the thread that calls serve() performs the calls that they post.
 class Service {
    public:
     explicit Service(World& world) : world_(world) {}
@@ -185,8 +185,8 @@ class Service {
     bool stopped_ = false;
 };
 
-/// Blocks by a counter that all processes share. A count is good for a chunk of blocks: large ones at first, so that
-/// the counter is asked seldom, and single blocks at the end, so that all processes end at the same time.
+/// Blocks by a counter that all processes share. A count stands for a chunk of blocks: large ones at first, so that the
+/// counter is requested seldom, and single blocks at the end, so that all processes end at the same time.
 class SharedBlocks {
    public:
     void begin(std::size_t blocks, int processes) {
@@ -218,7 +218,7 @@ class SharedBlocks {
     std::pair<std::size_t, std::size_t> mine_;
 };
 
-/// What blocks do, as numbers in a message: kind, block, and three of its own.
+/// An event of a block, as numbers in a message: kind, block, and three values that depend on the kind.
 struct Event {
     enum Kind : std::int64_t { entered, advanced };
     std::int64_t kind = entered;
@@ -370,7 +370,7 @@ class MpiLeader final : public parts::Leader, public Service {
     const int processes_;
     int threads_ = 1;
     SharedBlocks blocks_;
-    std::mutex mutex_;  ///< guards what follows
+    std::mutex mutex_;  ///< guards the members below
     std::condition_variable reported_;
     int waiting_for_ = 0;
     std::vector<std::filesystem::path> files_;
@@ -471,7 +471,7 @@ class MpiMember final : public parts::Member, public Service, private ensemble::
     const int processes_;
     SharedBlocks blocks_;
     Clock::time_point sent_ = Clock::now();
-    std::mutex mutex_;  ///< guards what follows
+    std::mutex mutex_;  ///< guards the members below
     std::condition_variable ordered_;
     std::optional<parts::Order> order_;
     std::optional<int> end_;
@@ -486,7 +486,7 @@ bool started_together() {
     return false;
 }
 
-/// Does the work in another thread while this one serves it; returns what it throws.
+/// Does the work in another thread while this one serves it; returns the exception that the work throws.
 std::exception_ptr serve(Service& service, Clock::duration pause, const std::function<void()>& work) {
     std::exception_ptr failure;
     std::thread worker([&] {

@@ -5,10 +5,10 @@
 
 namespace ringlock::app {
 
-/// One line: what a record holds.
+/// One line that summarises the content of a record.
 std::string record_text(const record::Record& record);
 
-/// Tells what is strange about a record and no error.
+/// Writes the warnings of a record: findings that are not errors.
 void tell_warnings(const std::string& path, const record::Record& record);
 
 }  // namespace ringlock::app

@@ -136,7 +136,7 @@ std::filesystem::path output_of(const ReplayArguments& arguments, const study::G
     return fmt::format("{}-{}{}-gyro-{}.h5", of.result.stem().string(), of.arm_name(), point, of.gyro);
 }
 
-/// What a replay is told of when it is done.
+/// The data from which the summary of a finished replay is made.
 struct Told {
     const study::GyroOfResult& of;
     const study::GyroReplay& replay;

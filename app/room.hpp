@@ -4,14 +4,14 @@
 #include <functional>
 #include <string>
 
-/// Memory and disk are asked about before any of either is taken.
+/// Checks memory and disk before either is used.
 namespace ringlock::app {
 
-/// What a command is about to take.
+/// Memory and disk space that a command is about to take.
 struct Needs {
     std::uint64_t memory_bytes = 0;
-    std::function<std::uint64_t()> disk_bytes;  ///< where the output is; asked where the memory suffices
-    std::string less_memory;                    ///< what to do where memory does not suffice, as in "take fewer gyros"
+    std::function<std::uint64_t()> disk_bytes;  ///< size of the output; called if the memory suffices
+    std::string less_memory;                    ///< advice where the memory does not suffice, as in "take fewer gyros"
     std::string less_disk;  ///< advice where the disk does not suffice, besides writing the output elsewhere
 };
 

@@ -7,8 +7,8 @@
 
 namespace ringlock::app {
 
-/// Simulates what the leader of a run orders, until it ends the run; finished blocks go into the leader's folder.
-/// Throws InputError where scenario or program are not the leader's.
+/// Simulates the gyros that the leader of a run orders, until the leader ends the run; finished blocks go into the
+/// leader's folder. Throws InputError where scenario or program are not the leader's.
 void run_member(const RunArguments& arguments, const std::string& scenario_file, const std::filesystem::path& result,
                 parts::Member& member, int threads);
 

@@ -115,7 +115,8 @@ class Outcome {
         if (!arguments_.quiet) tell(fmt::format("result: {}\n", printable(writer.path())));
     }
 
-    /// A table that cannot be printed must not cost the result, but is a failure when that is safe.
+    /// A table that cannot be printed must not prevent the result from being written; it is a failure once the result
+    /// is complete.
     void fail_if_not_told() const {
         if (not_told_) std::rethrow_exception(not_told_);
     }
@@ -264,8 +265,8 @@ int threads_of(const RunArguments& arguments, const Ranks& ranks) {
 }
 
 bool is_finished(const std::filesystem::path& result, const study::Experiment& plan) {
-    // A run that was interrupted before it could remove what it kept is finished; one that was to replace a result of
-    // another program is not.
+    // A run that was interrupted before it could remove its checkpoints is finished. A run that was to replace the
+    // result of another program version is not: that result is of the same study, too, but of another commit.
     return study::is_result_of(result, plan) && (parts::part_files(parts::folder_of(result)).empty() ||
                                                  study::read_provenance(result).git_hash == git_hash());
 }
@@ -292,7 +293,7 @@ bool run_one(const RunArguments& arguments, const std::string& scenario_file, co
     const parts::Manifest manifest = parts::manifest_of(scenario, shard);
     const bool is_there = shard ? is_shard_of(task.target, manifest) : is_finished(result, task.plan);
     if (arguments.resume && is_there) {
-        // Whatever a run kept beside its result is of no use any more.
+        // The checkpoints that a run kept next to its result are of no use any more.
         parts::Folder(task.target, manifest, parts::Beginning::resume, say).remove();
         tell(fmt::format("{}: is finished; there is nothing to resume\n", printable(task.target)));
         return false;

@@ -15,7 +15,7 @@
 
 namespace ringlock::app {
 
-/// What `run` is told.
+/// The arguments of `run`.
 struct RunArguments {
     std::vector<std::string> scenarios;
     std::optional<std::string> out;
@@ -31,19 +31,19 @@ struct RunArguments {
     bool quiet = false;
 };
 
-/// Seconds of --checkpoint-every; nothing where there are to be none. Throws InputError.
+/// Seconds of --checkpoint-every; nothing if no checkpoints are to be written. Throws InputError.
 std::optional<double> checkpoint_interval_s(const RunArguments& arguments);
 
-/// The shard of --shard; nothing where all of the run is asked for. Throws InputError.
+/// The shard of --shard; nothing if the whole run is requested. Throws InputError.
 std::optional<parts::Shard> shard_of(const RunArguments& arguments);
 
-/// What the run writes: the result, or a shard of it.
+/// The file that the run writes: the result, or a shard of it.
 std::filesystem::path target_of(const RunArguments& arguments, const std::filesystem::path& result);
 
 /// Threads of --threads of one process; 0 means all cores, which processes on one machine share. Throws InputError.
 int threads_of(const RunArguments& arguments, const Ranks& ranks);
 
-/// Told of the outcome of a run before its file is complete: a disk that is full cannot take that away.
+/// Called with the outcome of a run before its file is complete, so that the outcome is not lost if the disk is full.
 using OnOutcome = std::function<void(const study::Experiment& experiment, const std::vector<study::Summary>& summaries,
                                      const store::Provenance& provenance)>;
 

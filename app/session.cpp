@@ -81,7 +81,7 @@ ensemble::ProgressOptions Session::progress_options() const {
     const std::vector<study::Stretch> to_do = checkpoints_.to_do();
     const std::int64_t turns = turns_of(task_.plan, to_do);
     const std::int64_t gyros = gyros_of(to_do);
-    // Gyros that are there count as many turns as the others: of a design they may be of other points, but the
+    // Gyros that are finished count as many turns as the others. In a design they may belong to other points, but the
     // share that is shown need not be exact.
     if (gyros > 0) options.already_done.turns = turns / gyros * options.already_done.gyros;
     options.total_turns = turns + options.already_done.turns;

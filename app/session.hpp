@@ -29,7 +29,7 @@ struct Task {
     bool grows() const { return scenario::asks(plan.scenario.stop); }
 };
 
-/// Gyros that will be finished at the end; of a lot that grows, at most.
+/// Gyros that will be finished at the end; the maximum number if a stopping rule makes the lot grow.
 std::int64_t gyros_of(const Task& task);
 
 /// Prints a message about the run on standard error.
@@ -43,7 +43,7 @@ class Session {
     Session(const Session&) = delete;
     Session& operator=(const Session&) = delete;
 
-    /// Does the work. Where that does not end well, keeps what is finished and says in the error what is left.
+    /// Does the work. If it fails, keeps the finished gyros, and the error says how many are kept and where.
     template <class Work>
     void keep_whatever_happens(Work&& work) {
         try {

@@ -22,12 +22,12 @@ struct SlurmJobs {
 /// Times that shards are submitted before the merge gives up.
 inline constexpr int slurm_tries = 3;
 
-/// The word as a POSIX shell reads it back, whatever is in it.
+/// The word quoted for a POSIX shell, for any content.
 std::string shell_quoted(const std::string& word);
 
-/// A script for bash: run by hand it submits the shards and the merge; as a job of Slurm it does what it is told. The
-/// merge waits for the shards however they end (`afterany`; one that depends on `afterok` waits for ever once a shard
-/// has failed), looks for what is missing, and submits that and itself again.
+/// A script for bash: run by hand it submits the shards and the merge; as a job of Slurm it simulates one shard or
+/// merges, according to its arguments. The merge waits for the shards however they end (`afterany`; one that depends on
+/// `afterok` waits for ever once a shard has failed), looks for missing shards, and submits these and itself again.
 std::string slurm_script(const SlurmJobs& jobs);
 
 }  // namespace ringlock::app

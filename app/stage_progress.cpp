@@ -57,7 +57,7 @@ void StageProgress::draw() {
     shown_ = true;
 }
 
-/// The time goes on where the loop says nothing for long.
+/// Updates the shown time where the loop reports nothing for long.
 void StageProgress::tick(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     while (!stop.stop_requested()) {

@@ -9,11 +9,12 @@
 
 namespace ringlock::app {
 
-/// Shows the stage of the loop, the time since it began, and the time left where that can be told: one line that is
-/// replaced on a terminal, a line for each stage elsewhere and one every ten seconds where shares are told.
+/// Shows the stage of the loop, the time since it began, and the time left where it can be estimated: one line that is
+/// replaced on a terminal; elsewhere a line for each stage, and one every ten seconds where the share that is done is
+/// known.
 ///
-/// How many effects a record needs, and how many models are tried for each, shows as the loop goes on: a time left is
-/// told of the last stage alone, whose parts are counted and as long as each other.
+/// The number of effects that a record needs, and the number of models that are tried for each, are not known
+/// beforehand. A time left is therefore given for the last stage alone, whose parts are counted and take equal times.
 class StageProgress {
    public:
     explicit StageProgress(bool quiet);

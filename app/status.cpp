@@ -40,10 +40,10 @@ struct StatusLine {
     std::string holder;
     std::int64_t gyros = 0;
     std::optional<std::int64_t> of_gyros;
-    std::optional<parts::Status> status;  ///< as the process told it last
+    std::optional<parts::Status> status;  ///< as the process wrote it last
 };
 
-/// Gyros that are kept in the folder of an interrupted run; what is damaged is none.
+/// Gyros that are kept in the folder of an interrupted run; a damaged file counts no gyros.
 std::int64_t gyros_in(const fs::path& folder) {
     std::optional<parts::FinishedGyros> finished;
     for (const fs::path& file : parts::part_files(folder)) {

@@ -36,7 +36,7 @@ Json json_size(const study::SizeFigure& figure) {
     return {{"value", number(figure.value)}, {"lo", number(figure.lo)}, {"hi", number(figure.hi)}};
 }
 
-/// The line through the rates of a sweep; every field is null where there is none.
+/// The line through the rates of a sweep; every field is null if no line was fitted.
 void add_scale_factor(Json& json, const std::optional<study::ScaleFactor>& line) {
     const auto add = [&](const char* name, const auto& what) { json[name] = line ? what(*line) : Json(nullptr); };
     using Line = study::ScaleFactor;
@@ -250,7 +250,7 @@ Json json_reader(const scenario::Scenario& scenario) {
     return json;
 }
 
-/// Arms, theory and pairs: what every point of a design has.
+/// Arms, theory and pairs: the part that every point of a design has.
 void add_summary(Json& json, const study::Study& study, const study::Summary& summary) {
     json["sample_interval_s"] = study.schedule.sample_interval_s;
     if (scenario::reads_arms(study.scenario)) json["reader"] = json_reader(study.scenario);

@@ -28,7 +28,7 @@ std::string ratio_cell(double ratio) {
     return ratio < least_in_decimals ? fmt::format("{:.2g}", ratio) : fmt::format("{:.4f}", ratio);
 }
 
-/// Narrow enough for two of them beside the longest name of an arm in 100 columns.
+/// Narrow enough for two intervals next to the longest name of an arm in 100 columns.
 std::string narrow_interval(std::optional<double> lo, std::optional<double> hi) {
     return lo && hi ? fmt::format("{:.3g}..{:.3g}", *lo, *hi) : "-";
 }
@@ -80,7 +80,7 @@ std::string scatter_text(const study::Summary& summary) {
     return "\nScatter over the gyros of rates averaged from the start on [deg/h]\n" + table.text();
 }
 
-/// What theory consists of, and why arms have no random walk.
+/// The terms of the theory, and why arms have no random walk.
 std::string walk_notes(const study::Summary& summary) {
     std::string text =
         fmt::format("theory: random walk of turns at random phases {:.5g} deg/sqrt(h)", summary.theory.arw_deg_rt_h);
@@ -126,7 +126,7 @@ report::Table deviation_table() {
                           {"interval", report::Align::right}});
 }
 
-/// Deviations at the averaging times that the scenario asks for, arms down.
+/// Deviations at the averaging times that the scenario requests, one row an arm.
 std::string scenario_times_text(const study::Study& study, const study::Summary& summary) {
     if (study.scenario.output.tau_s.empty()) return "";
     std::string text = "\nAllan deviation [deg/h], 68.27 % intervals\n";
@@ -225,7 +225,7 @@ std::string noise_text(const study::ArmSummary& arm) {
     return "\n" + table.text() + notes;
 }
 
-/// What the cures take away of the injected random walk.
+/// Random walk of noise_injected over that of each other arm with injected noise: the reduction by the compensators.
 std::string reduction_text(const study::Summary& summary) {
     report::Table table({{"random walk of noise_injected over that of", report::Align::left},
                          {"ratio", report::Align::right},
@@ -249,7 +249,7 @@ std::string pairs_text(const study::Summary& summary) {
     for (const study::ArmSummary& arm : summary.arms) {
         if (arm.arw_deg_rt_h.median) names.push_back(arm.name);
     }
-    if (names.size() < 3) return "";  // one ratio is what the medians tell
+    if (names.size() < 3) return "";  // one ratio follows from the medians
     std::vector<report::Column> columns{{"random walk, gyro by gyro: row over column", report::Align::left}};
     for (std::size_t i = 0; i < names.size(); ++i)
         columns.push_back({fmt::format("({})", i + 1), report::Align::right});
@@ -381,7 +381,7 @@ std::string asked_text(const study::Study& study, const study::Summary& summary,
         interval_s, table.text());
     for (const AveragingTime& time : asked) {
         if (!time.time_s) continue;
-        // Both in the digits that the table has: what is the same in them is not worth a line.
+        // Both with the digits of the table: times that are equal in these digits need no line.
         const std::string wanted = fmt::format("{:.6g}", *time.time_s);
         const std::string found = fmt::format("{:.6g}", interval_s * static_cast<double>(time.samples));
         if (wanted == found) continue;

@@ -7,7 +7,7 @@
 
 namespace ringlock::app {
 
-/// What a command line says of a text of measured data (docs/field-data.md).
+/// Options of a command line for a text of measured data (docs/field-data.md).
 struct TextArguments {
     std::string header;     ///< of --header
     std::string skip;       ///< of --skip

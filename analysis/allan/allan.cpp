@@ -20,7 +20,7 @@
 namespace ringlock::allan {
 namespace {
 
-/// Identifies the noise at each factor; beyond the last one with enough points what was found there is kept.
+/// Identifies the noise at each factor; beyond the last factor with enough points the result of that factor is kept.
 class NoisePerFactor {
    public:
     NoisePerFactor(std::span<const double> phase, int differences)
@@ -67,7 +67,7 @@ std::vector<double> bridged(const Phase& phase) {
     return x;
 }
 
-/// A record, and what its points are cut into.
+/// A record, and the stretches into which gaps divide it.
 struct Record {
     std::span<const double> x;
     std::span<const Stretch> stretches;
@@ -127,7 +127,7 @@ std::vector<SquareMean> piece_sums(const Record& record, std::span<const std::si
     return sums;
 }
 
-/// What the family sums at each factor.
+/// The sums of squares of the estimator's family at each factor.
 std::vector<SquareMean> square_sums(const Traits& t, const Record& record, const Phase* phase,
                                     std::span<const std::size_t> m) {
     switch (t.family) {
@@ -156,7 +156,7 @@ std::vector<SquareMean> square_sums(const Traits& t, const Record& record, const
     return {};
 }
 
-/// Variance from the mean square of what the family sums.
+/// Variance from the mean square of the differences that the family sums.
 double variance_of(const Traits& t, double mean_square, std::int64_t m, double tau0_s) {
     const double tau = static_cast<double>(m) * tau0_s;
     switch (t.family) {

@@ -16,17 +16,18 @@ struct Point {
     double dev = 0.0;        ///< deviation; unit of the phase per second, of the phase for time errors
     std::int64_t terms = 0;  ///< squares in the mean (windows, for mtie and the totals of pieces)
     int alpha = 0;           ///< power-law exponent of the noise assumed for edf (0 where none could be identified)
-    double bias = 1.0;       ///< what the variance was divided by (total family)
-    double edf = 0.0;        ///< equivalent degrees of freedom; NaN with lo and hi where there are none (mtie, tierms)
-    double lo = 0.0;         ///< interval of the true deviation at the confidence asked for
+    double bias = 1.0;       ///< divisor of the variance (total family)
+    double edf = 0.0;        ///< equivalent degrees of freedom; NaN with lo and hi for estimators without interval
+                             ///< (mtie, tierms)
+    double lo = 0.0;         ///< interval of the true deviation at the requested confidence
     double hi = 0.0;
 };
 
-/// By what the variances of the total family, and the intervals with them, are divided.
+/// Divisor of the variances of the total family and of their intervals.
 enum class Bias {
     published,  ///< published_bias(): the figures of the literature and of Stable32
-    exact,      ///< Uncertainty::bias, which knows averaging factors and the length of the record; what intervals need
-                ///< to cover the truth
+    exact,      ///< Uncertainty::bias, which depends on averaging factor and length of the record; intervals need it to
+                ///< cover the truth
     none        ///< 1: the definition as it stands
 };
 
@@ -35,12 +36,12 @@ struct Options {
     Bias bias = Bias::published;
 };
 
-/// Deviations of phase at the averaging factors asked for, with intervals.
+/// Deviations of phase at the requested averaging factors, with intervals.
 ///
 /// \param phase    phase_of() a record, with or without gaps
 /// \param tau0_s   sampling interval [s], > 0
 /// \param factors  averaging factors, each 1...largest_factor(); in any order
-/// \return one point for each factor, in their order; those of which gaps leave no term are missing
+/// \return one point for each factor, in their order; factors for which gaps leave no term are missing
 ///
 /// Definitions: NIST SP1065 sections 5.2.2 to 5.2.18, as named in estimator.hpp; docs/allan.md writes them out. A term
 /// that needs a missing point is left out of the mean; the differences of rates of which a tenth at most is missing are

@@ -37,7 +37,8 @@ std::vector<double> BoundedRecord::phase(std::size_t lane, double unit_per_count
     const auto wrapped_increment = [&](std::size_t i) {
         return static_cast<std::uint64_t>(rows_[i][lane]) - static_cast<std::uint64_t>(rows_[i - 1][lane]);
     };
-    // Less the first one: the line takes away what all have in common, however often that wraps round.
+    // Less the first increment: the line removes the part that all increments share, regardless of how often it wraps
+    // round.
     const std::uint64_t first = wrapped_increment(1);
     const auto increment = [&](std::size_t i) { return static_cast<std::int64_t>(wrapped_increment(i) - first); };
     Wide total = 0;

@@ -9,7 +9,8 @@
 namespace ringlock::allan {
 
 /// Phase of up to simd::lanes gyros at few enough instants to be kept: every 2^k-th sample of a run whose length is
-/// known beforehand, for what needs a record (a fit of noise coefficients) and not its shortest averaging times.
+/// known beforehand. It serves methods that need a record (a fit of noise coefficients), but not its shortest averaging
+/// times.
 ///
 /// Phase is sampled, not averaged: differences of kept samples are whole increments of the longer interval.
 class BoundedRecord {

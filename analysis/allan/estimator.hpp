@@ -23,7 +23,7 @@ enum class Estimator {
     tierms    ///< rms time interval error (5.2.18)
 };
 
-/// What an estimator does to the phase.
+/// How an estimator uses the phase.
 enum class Family {
     difference,      ///< squares of differences of sampled phase
     modified,        ///< the same of phase averaged over tau

@@ -10,8 +10,8 @@
 
 namespace ringlock::allan {
 
-/// Running Allan sum of up to simd::lanes gyros at one averaging factor, which may be any: what OctaveStream is at
-/// octaves, and equal to it there. Counts wrap around as there; the sum is exact. Keeps some 25 rows.
+/// Running Allan sum of up to simd::lanes gyros at one averaging factor, which may be any; at octaves its sums equal
+/// those of OctaveStream. Counts wrap around as there; the sum is exact. Keeps some 25 rows.
 class FactorStream {
    public:
     /// \param m  averaging factor [samples], >= 1

@@ -10,7 +10,7 @@
 
 namespace ringlock::allan {
 // The inversion of the incomplete gamma function takes 0.3 ms at 1e8 degrees of freedom. From 1e5 on the expansion of
-// Cornish and Fisher does (Goldberg and Levine, Ann. Math. Stat. 17 (1946) 216): what it leaves out is of the order of
+// Cornish and Fisher does (Goldberg and Levine, Ann. Math. Stat. 17 (1946) 216): its error is of the order of
 // edf^(-5/2), 3e-13.
 double relative_chi_squared_quantile(double edf, double probability) {
     if (edf < 1e5) return boost::math::quantile(boost::math::chi_squared(edf), probability) / edf;

@@ -13,7 +13,7 @@
 namespace ringlock::allan {
 namespace {
 
-/// The exponent of the noise whose Allan variance goes as m^mu.
+/// The exponent of the noise whose Allan variance is proportional to m^mu.
 int exponent(double mu, int differences) {
     if (mu < -1.5) return 2;
     return std::clamp(-1 - static_cast<int>(std::lround(mu)), 2 - 2 * differences, 0);
@@ -35,11 +35,12 @@ Point stream_point(const OctaveMean& mean, int alpha, int differences, std::int6
     p.dev = std::sqrt(variance_of(mean, differences, tau0_s));
     p.terms = mean.terms;
     p.alpha = alpha;
-    // Degrees of freedom want whole strides in tau: of a factor that has none, the next smaller one with such.
+    // The degrees of freedom need a whole number of strides in tau: for other factors those of the next smaller factor
+    // with a whole number are taken.
     const std::int64_t stride = std::max<std::int64_t>(1, p.m / OctaveStream::starts_per_tau);
     const EstimatorShape shape{.differences = differences, .starts_per_tau = p.m / stride};
     const std::int64_t m = shape.starts_per_tau * stride;
-    // A record with gaps is worth one without that has as many terms.
+    // A record with gaps has the degrees of freedom of one without gaps that has as many terms.
     const std::int64_t alike = std::min(samples, 1 + m * differences + (p.terms - 1) * stride + stride - 1);
     p.edf = degrees_of_freedom(shape, p.alpha, m, alike);
     set_interval(p, confidence);

@@ -13,7 +13,7 @@ namespace ringlock::allan {
 /// \param samples    length of the record [phase samples]
 /// \param differences  2 for Allan variances; with Hadamard's (3) exponents go down to -4
 /// \return S_y(f) ~ f^alpha for each: 2 (white phase, and flicker phase, which has nearly its slope), 0 (white
-///         frequency), -1 (flicker), -2 (random walk and redder); 0 where nothing can be told
+///         frequency), -1 (flicker), -2 (random walk and redder); 0 where the slope cannot be determined
 ///
 /// The slope mu of log variance over log m at an octave is that from the octave below to the one above, one-sided at
 /// the ends; alpha = -1 - round(mu), and 2 for mu < -3/2 (NIST SP1065 section 5.5.5, table 6). Beyond n/m = 30
@@ -21,7 +21,7 @@ namespace ringlock::allan {
 /// stored records.
 std::vector<int> noise_of_octaves(const std::vector<double>& variances, std::int64_t samples, int differences = 2);
 
-/// What a stream knows of one averaging factor.
+/// Result of a stream at one averaging factor.
 struct OctaveMean {
     std::int64_t m = 0;        ///< averaging factor
     double mean_square = 0.0;  ///< of differences of the phase by m, in units of it
@@ -30,7 +30,7 @@ struct OctaveMean {
 
 /// The deviation with its interval from a sum with a stride of tau/8, of noise of that exponent.
 ///
-/// \param alpha  power-law exponent of the noise, as noise_of_octaves() has it
+/// \param alpha  power-law exponent of the noise, as returned by noise_of_octaves()
 /// The other parameters are those of octave_points().
 Point stream_point(const OctaveMean& mean, int alpha, int differences, std::int64_t samples, double tau0_s,
                    double confidence);

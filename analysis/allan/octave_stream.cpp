@@ -48,7 +48,7 @@ HWY_INLINE hn::Vec<D> second_difference(D d, const std::int64_t* last, std::size
     return (hn::Load(d, last) - middle) - (middle - hn::Load(d, last - 2 * step));
 }
 
-/// Squares of second differences that fit 32 bits with their sign, one product each. Tells whether all of them do;
+/// Squares of second differences that fit 32 bits with their sign, one product each. Returns whether all of them do;
 /// otherwise nothing is added.
 template <class D>
 HWY_INLINE bool add_narrow(D d, const std::int64_t* x, std::size_t step, std::size_t rows,
@@ -105,8 +105,8 @@ HWY_INLINE void add_wide(D d, const std::int64_t* x, std::size_t step, std::size
 }
 
 /// Adds the squares of the second differences with step `lag` rows that end at the `rows` rows from `newest` on to
-/// words[6][simd::lanes], for at least `lanes` columns. Tries the cheap way first if `narrow`; tells whether it served.
-/// The sums are the same either way.
+/// words[6][simd::lanes], for at least `lanes` columns. Tries the cheap way first if `narrow`; returns whether it
+/// sufficed. The sums are the same either way.
 bool add_squares(const std::int64_t* newest, std::size_t lag, std::size_t rows, std::size_t lanes, bool narrow,
                  std::uint64_t* words) {
     const hn::CappedTag<std::int64_t, simd::lanes> d;
@@ -169,7 +169,7 @@ double SquareSum::rounded() const {
 }
 
 void OctaveStream::finish(const Running& running, std::size_t lane, SquareSum& sum) {
-    // What products have below 32 bits sums to less than 2^64, and is known modulo 2^64.
+    // The sum of the products' parts below 32 bits is less than 2^64, and it is known modulo 2^64.
     const auto whole = [&](std::size_t kind) {
         const Wide tops = static_cast<Wide>(running.words[2 * kind + 1][lane]) << 32;
         return tops + (running.words[2 * kind][lane] - static_cast<std::uint64_t>(tops));
@@ -237,7 +237,7 @@ void OctaveStream::add(std::span<const simd::LaneCounts> counts, std::size_t lan
 std::vector<Octave> OctaveStream::octaves(std::size_t lane) const {
     if (samples_ > 0 && lane >= lanes_) throw std::out_of_range("octave stream: no such lane");
     std::vector<Octave> out;
-    std::vector<std::int64_t> handed;  // what the level below still has to hand over
+    std::vector<std::int64_t> handed;  // rows that the level below still has to hand over
     std::int64_t samples = samples_;   // of the level
     std::int64_t interval = 1;
     for (std::size_t level = 0;; ++level, interval *= 2, samples = (samples + 1) / 2) {

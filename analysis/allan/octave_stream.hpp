@@ -23,7 +23,7 @@ struct SquareSum {
     bool operator==(const SquareSum&) const = default;
 };
 
-/// What a record shows at one averaging factor: sum over `terms` starts i = 0, s, 2 s, ... of
+/// Sum of squares of a record at one averaging factor: sum over `terms` starts i = 0, s, 2 s, ... of
 /// (x_{i+2m} - 2 x_{i+m} + x_i)^2 with the stride s = max(1, m / OctaveStream::starts_per_tau).
 struct Octave {
     std::int64_t m = 0;      ///< averaging factor, a power of two
@@ -35,7 +35,7 @@ struct Octave {
 ///
 /// Phase comes as fixed-point counts that may wrap around in two's complement: only differences count. A second
 /// difference x_{i+2m} - 2 x_{i+m} + x_i must fit 64 bits. All sums are exact, so that they do not depend on the pieces
-/// that rows come in, on the gyros beside and on the instruction set. Costs about 7 KB for every octave.
+/// that rows come in, on the other gyros of the block and on the instruction set. Costs about 7 KB for every octave.
 class OctaveStream {
    public:
     /// Starts of second differences per averaging time: the stride is m / 8, or one sample below m = 8. Eight is the
@@ -60,8 +60,9 @@ class OctaveStream {
     std::vector<Octave> octaves(std::size_t lane) const;
 
    private:
-    /// A square is made of three products of 32-bit halves: low low, low high, high high. Of each product's sum the low
-    /// 64 bits are kept and, beside it, the sum of what each product has above 32 bits; together they tell it all.
+    /// A square is made of three products of 32-bit halves: low low, low high, high high. For each kind of product the
+    /// low 64 bits of the sum are kept and, next to them, the sum of each product's bits above the 32nd; together they
+    /// determine the sum.
     struct alignas(simd::alignment) Running {
         std::uint64_t words[6][simd::lanes] = {};
     };

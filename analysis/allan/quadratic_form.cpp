@@ -75,7 +75,7 @@ Matrix form_of_total(std::int64_t m, std::int64_t points) {
     return form;
 }
 
-/// What takes the line through the means of its halves from a piece.
+/// The matrix that removes from a piece the line through the means of its halves.
 Matrix without_line(std::int64_t size) {
     Row slope = Row::Zero(size);
     const std::int64_t half = size / 2;
@@ -114,7 +114,7 @@ Matrix form_of_pieces(std::int64_t m, std::int64_t samples) {
     return form;
 }
 
-/// Of frequencies, written in phase.
+/// The quadratic form of pieces of the frequency, in terms of the phase.
 Matrix form_of_frequency_pieces(std::int64_t m, std::int64_t points) {
     Matrix step = Matrix::Zero(points - 1, points);
     for (std::int64_t i = 0; i + 1 < points; ++i) {

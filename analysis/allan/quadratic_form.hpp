@@ -51,7 +51,7 @@ class WeightedSquares {
 /// \param estimator  one with an interval
 /// \param alpha      power-law exponent of the noise, alpha + 2 differences > 1
 /// \param m          averaging factor
-/// \param points     phase points, at least span_of(estimator, m); cost goes with their third power
+/// \param points     phase points, at least span_of(estimator, m); cost is proportional to their third power
 ///
 /// The estimate is x^T B x of the phase x. With B = R^T R the weights are the eigenvalues of R C R^T, C the generalised
 /// covariance of the phase: rows of R are differences, for which it is a covariance. mean() is the bias.

@@ -87,7 +87,7 @@ void RunningDeviation::take(std::span<const double> data) {
         const bool there = !std::isnan(v);
         if (kind_ == Kind::phase) {
             if (there && index_ == 0) origin_ = v;
-            // Points before the first known one have no place on the line and need none.
+            // Points before the first known one have no position on the line and need none.
             if (index_ == 0 && !there) continue;
             const ExactSum d = two_sum(v, -origin_);
             put(there ? (std::fma(-slope_, static_cast<double>(index_), d.value) + d.error) * scale_ : nan);
@@ -160,7 +160,7 @@ void RunningDeviation::process(std::size_t level) {
     for (std::size_t k = 0; k < here.sums.size(); ++k) {
         const std::size_t step = level == 0 ? std::size_t{1} << k : starts;
         const std::size_t reach = static_cast<std::size_t>(differences_) * step;
-        // Differences end at the waiting points; those that would begin before what is there are left out.
+        // Differences end at the waiting points; those that would begin before the first kept point are left out.
         const std::size_t short_of = reach - std::min(reach, here.before);
         if (here.waiting <= short_of) continue;
         DifferenceSums sums;

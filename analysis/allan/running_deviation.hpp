@@ -13,11 +13,11 @@ namespace ringlock::allan {
 ///
 /// The estimator is the overlapping one with a stride of tau/8: S_m = sum over i = 0, s, 2s, ... of the squared
 /// differences at step m, s = max(1, m/8). Memory grows with the logarithm of the record, about 5 KB for every octave.
-/// docs/allan.md has what the stride costs: next to nothing for rate noise, a factor of m/8 in degrees of freedom for
-/// white phase noise.
+/// docs/allan.md gives the cost of the stride: next to nothing for rate noise, a factor of m/8 in degrees of freedom
+/// for white phase noise.
 class RunningDeviation {
    public:
-    /// \param kind       what the samples are
+    /// \param kind       kind of the samples
     /// \param tau0_s     sampling interval [s], > 0
     /// \param estimator  Estimator::oadev or Estimator::ohdev
     /// \param scale      unit of the samples
@@ -32,8 +32,8 @@ class RunningDeviation {
     std::int64_t samples() const { return samples_; }
     std::int64_t missing() const { return missing_; }
 
-    /// Phase at few enough instants to be kept, for what needs a record (a fit of noise coefficients) and not its
-    /// shortest times: every thinning()-th point, at most 32 768; empty where a sample is missing.
+    /// Phase at few enough instants to be kept, for methods that need a record (a fit of noise coefficients), but not
+    /// its shortest times: every thinning()-th point, at most 32 768; empty where a sample is missing.
     std::vector<double> thinned_phase() const;
     std::int64_t thinning() const { return thinning_; }
 
@@ -48,7 +48,7 @@ class RunningDeviation {
         std::size_t waiting = 0;
         bool hand_on = true;        ///< whether the first waiting point goes to the next level
         std::vector<double> sums;   ///< one for each step
-        std::vector<double> rests;  ///< what rounding took from them
+        std::vector<double> rests;  ///< rounding errors of the sums
         std::vector<std::int64_t> terms;
     };
 
@@ -67,12 +67,12 @@ class RunningDeviation {
     bool skipping_ = false;  ///< a NaN is among the points
     std::int64_t samples_ = 0;
     std::int64_t missing_ = 0;
-    std::vector<double> lead_;  ///< the first samples, until they tell a line to take away
+    std::vector<double> lead_;  ///< the first samples, until they determine a line to be removed
     bool started_ = false;
     double origin_ = 0.0;
     double slope_ = 0.0;
     std::int64_t index_ = 0;  ///< of the next sample of phase
-    double phase_ = 0.0;      ///< running sum of increments or rates, and what rounding took
+    double phase_ = 0.0;      ///< running sum of increments or rates, and its rounding error
     double rest_ = 0.0;
     bool broken_ = true;  ///< the next increment begins a new origin
     std::vector<Level> levels_;

@@ -58,7 +58,7 @@ Short short_record(Estimator estimator, std::int64_t m, std::int64_t points, std
     return {few, std::max(span_of(estimator, few), steps + 1)};
 }
 
-/// What is known of an estimate on a short record.
+/// Figures of an estimate on a short record.
 struct Known {
     double degrees;
     double mean;
@@ -145,7 +145,8 @@ void set_by_ends(Uncertainty& u, const Sampled& less, const Sampled& more, std::
 Uncertainty uncertainty_of_total(Estimator estimator, int alpha, std::int64_t m, std::int64_t points,
                                  double confidence) {
     const bool reflected = traits(estimator).family == Family::total;
-    // What the ends of the record do to the total deviation fades in proportion to tau/T, and is followed down to 1/16.
+    // The effect of the record's ends on the total deviation decreases in proportion to tau/T, and is computed down to
+    // tau/T = 1/16.
     const std::int64_t longest = std::min(points, most_taus * m + 1);
     const double beyond = static_cast<double>(longest - 1) / static_cast<double>(points - 1);
     const Short little = short_record(estimator, m, longest, finest);
@@ -157,8 +158,8 @@ Uncertainty uncertainty_of_total(Estimator estimator, int alpha, std::int64_t m,
     out.edf = like * (reflected ? 1.0 + (over_plain - 1.0) * beyond : over_plain);
     out.bias = there.mean;
     if (m > finest) {
-        // From half as many samples in a tau to as many as there are: the distance goes with 1/m for phase noise, with
-        // 1/m^2 for what is smooth.
+        // Extrapolation from half of `finest` and `finest` samples in a tau to m: the error is proportional to 1/m for
+        // phase noise, and to 1/m^2 for smoother noise.
         const Short less = short_record(estimator, m, longest, finest / 2);
         const Known before = known(estimator, alpha, less, confidence);
         const double power = alpha > 0 ? 1.0 : 2.0;

@@ -5,8 +5,8 @@
 
 namespace ringlock::allan {
 
-/// What the mean of an estimate of variance is divided by, so that it is the Allan (modified Allan, Hadamard) variance:
-/// the published corrections of the total family, 1 for all others.
+/// Divisor of the mean of an estimate of variance, so that it is the Allan (modified Allan, Hadamard) variance: the
+/// published corrections of the total family, 1 for all others.
 ///
 /// \param alpha   power-law exponent of the noise
 /// \param m       averaging factor
@@ -34,8 +34,9 @@ struct Uncertainty {
 /// estimator's own quadratic form (distribution_of), on a record of the same length in tau with eight samples to a tau,
 /// wherever the statistics do not depend on the sampling. The total family has no sums over lags: the degrees of its
 /// plain counterpart (degrees_of_freedom) are multiplied by the ratio between the two quadratic forms, on records of at
-/// most sixteen tau (of the total deviation it fades with tau/T beyond), and bias follows from the forms with four and
-/// eight samples to a tau. What is worked out for a short record is kept for the next one of its kind. Thread-safe.
+/// most sixteen tau (for the total deviation it decreases in proportion to tau/T beyond), and bias follows from the
+/// forms with four and eight samples to a tau. Results for a short record are kept for the next record of its kind.
+/// Thread-safe.
 Uncertainty uncertainty_of(Estimator estimator, int alpha, std::int64_t m, std::int64_t points, double confidence);
 
 }  // namespace ringlock::allan

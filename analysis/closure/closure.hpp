@@ -24,7 +24,7 @@ struct Step {
     double heldout_log_score_gain = 0.0;
     double p_value = 1.0;
     std::vector<const effects::Effect*> confounded_with;  ///< effects that explain this record as well
-    std::string experiment;                               ///< a record that would tell them apart
+    std::string experiment;                               ///< a record that would distinguish them
     std::string note = {};                                ///< on its parameters; may be empty
 
     std::string name() const { return std::string(effect->name()); }
@@ -34,8 +34,8 @@ struct Step {
 struct Residual {
     std::vector<double> time_s;
     std::vector<double> innovation;
-    std::vector<double> sd;              ///< predicted by the model
-    std::vector<std::uint8_t> reported;  ///< 1: held out, used for the report only
+    std::vector<double> sd;              ///< standard deviation that the model predicts
+    std::vector<std::uint8_t> reported;  ///< 1 in held-out rows, 0 in training rows
 };
 
 /// A part of a record, by the record's clock.
@@ -44,7 +44,7 @@ struct TimeSpan {
     double to_s = 0.0;
 };
 
-/// What a record says of the model.
+/// Result of the closed loop on one record.
 struct Closure {
     Verdict verdict = Verdict::nothing_missing;
     std::vector<Estimate> base;
@@ -58,22 +58,22 @@ struct Closure {
     double log_likelihood_gain = 0.0;
     std::vector<ResidualTest> tests;  ///< of the final residual
     std::optional<ResidualTest> unexplained;
-    std::vector<std::string> notes;      ///< what was assumed
+    std::vector<std::string> notes;      ///< assumptions and remarks for the reader
     double level = 0.0;                  ///< probability of any false alarm
-    double mean_input_rate_deg_h = 0.0;  ///< known input, of which the bias is free
-    bool rounding_in_noise = true;       ///< of samples: the white noise of the angle has that of its steps in it
-    std::vector<TimeSpan> disturbed;     ///< stretches that the fit and the tests leave out
-    double disturbed_share = 0.0;        ///< of the samples, that lie in them
-    std::vector<TimeSpan> gaps;          ///< spans whose samples are missing
+    double mean_input_rate_deg_h = 0.0;  ///< mean of the known input, which the bias does not contain
+    bool rounding_in_noise = true;    ///< records of samples: the white noise of the angle includes the rounding noise
+    std::vector<TimeSpan> disturbed;  ///< stretches that the fit and the tests exclude
+    double disturbed_share = 0.0;     ///< share of the samples that lie in them
+    std::vector<TimeSpan> gaps;       ///< spans whose samples are missing
     Residual residual;
 };
 
-/// Follows the loop while it runs.
+/// Receives the progress of the loop.
 struct Monitor {
     /// Called with a short description of each stage, on the thread that runs the loop; may be empty.
     std::function<void(const std::string& stage)> on_stage = {};
-    /// Called with the share of the stage that is done [0 to 1], in a stage whose parts are as long as each other and
-    /// after which next to nothing is left; on any thread, one call at a time; may be empty.
+    /// Called with the completed share of a stage [0 to 1], if its parts take equal times and hardly anything follows
+    /// them; on any thread, one call at a time; may be empty.
     std::function<void(double share)> on_share = {};
 
     void tell(const std::string& stage) const {
@@ -84,8 +84,8 @@ struct Monitor {
     }
 };
 
-/// Runs the loop on the record's turns, or on its samples where it has no turns. Throws InputError where the record
-/// does not suffice, and Interrupted where a signal came (engine/core/interrupt.hpp).
+/// Runs the loop on the turns of the record, or on its samples if it has no turns. Throws InputError if the record
+/// does not suffice, and Interrupted after a signal (engine/core/interrupt.hpp).
 Closure close_loop(const record::Record& record, const Monitor& monitor = {});
 
 }  // namespace ringlock::closure

@@ -6,10 +6,10 @@
 
 #include "engine/effects/effect.hpp"
 
-/// The vocabulary that all rooms of the closed loop share: which rows count, what was estimated, where structure lies.
+/// Types that all parts of the closed loop share: rows that count, estimates, and structure of the residual.
 namespace ringlock::closure {
 
-/// Which rows of a record count: 1 or 0 each.
+/// Whether each row of a record counts: 1 or 0.
 using Rows = std::vector<std::uint8_t>;
 
 /// An effect that is in the model, with the value of each of its parameters.
@@ -28,17 +28,17 @@ struct Estimate {
     std::string text = {};  ///< a name in place of a number
 };
 
-/// The kind of structure that a residual has: what it goes with.
+/// The kind of structure of a residual: the quantity with which it varies.
 enum class Where { phase, time, frequency, temperature, rate, amplitude };
 std::string_view name_of(Where where);
 
-/// One test of the residual and how probable its outcome is by chance, the test's own searches counted.
+/// One test of the residual, with the probability of its outcome by chance; the test's own search is included in it.
 struct ResidualTest {
     Where where;
-    std::string view;  ///< what the residual was tested against
+    std::string view;  ///< the quantity or pattern that the residual was tested against
     double p_value = 1.0;
-    std::string detail;  ///< the largest of what was seen
-    double merit = 0.0;  ///< of a regression: gain of the log-likelihood less its parameters and its search
+    std::string detail;  ///< the largest deviation that was found
+    double merit = 0.0;  ///< evidence of a regression: gain of the log-likelihood less parameters and search
 
     std::string description() const;
 };

@@ -107,7 +107,7 @@ void GaussianCopula::operator()(std::span<const double> u, std::span<Probability
         double w = 0.0;
         for (std::size_t j = 0; j <= i; ++j)
             w += factor_(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * z[j];
-        // Many extremes at once can leave what a double holds.
+        // Many extremes at once can leave the range of a double.
         const double smallest = std::numeric_limits<double>::min();
         v[i] = {std::max(boost::math::cdf(standard, w), smallest),
                 std::max(boost::math::cdf(boost::math::complement(standard, w)), smallest)};

@@ -8,9 +8,9 @@
 
 namespace ringlock::design {
 
-/// What a number given as correlation is the correlation of.
+/// Quantities to which a given correlation applies.
 ///
-/// ranks: Spearman's, what the ranks of two factors over the lot correlate by. Monotone functions of the factors and
+/// ranks: Spearman's, the correlation of the ranks of two factors over the lot. Monotone functions of the factors and
 /// bounds that cut their distributions off leave it as it is.
 /// normal_scores: Pearson's correlation of the normal scores Phi^-1(F(x)), the parameter of the Gaussian copula; for
 /// two normal factors without bounds it is the usual correlation coefficient. With either the dependence is that of a

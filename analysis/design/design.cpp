@@ -104,7 +104,7 @@ void to_values(Points& points, std::span<const Factor> factors, const GaussianCo
 
 std::uint64_t point_count(const Plan& plan, std::uint64_t limit) {
     check(plan.factors);
-    // Refuses what no copula can be.
+    // Refuses correlations that no copula has.
     const GaussianCopula copula(plan.factors, plan.correlations, plan.correlation_of);
     if (!of_levels(plan.kind)) {
         if (plan.points == 0) {

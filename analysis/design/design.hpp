@@ -16,7 +16,7 @@ enum class Kind {
     sobol,            ///< sobol(), at the factors' quantiles
 };
 
-/// A design as it is asked for.
+/// A requested design.
 struct Plan {
     Kind kind = Kind::sobol;
     std::vector<Factor> factors = {};
@@ -29,23 +29,23 @@ struct Plan {
 
 /// How many points the plan has.
 ///
-/// \param limit  what the caller is willing to compute
-/// Throws InputError where the plan cannot be: what check() refuses; more points than the limit (a grid's product
-/// cannot overflow); a grid with a distribution; a list with anything but values, or with unequally many; correlations
-/// that GaussianCopula refuses, or in a grid or a list; points of a grid or a list that are given and are not what they
-/// have.
+/// \param limit  largest number of points that the caller is willing to compute
+/// Throws InputError where the plan is impossible: factors that check() refuses; more points than the limit (a grid's
+/// product cannot overflow); a grid with a distribution; a list with anything but values, or with unequally many;
+/// correlations that GaussianCopula refuses, or in a grid or a list; a number of points of a grid or a list that is
+/// given and differs from their own.
 std::uint64_t point_count(const Plan& plan, std::uint64_t limit);
 
 /// The points of the plan in the units of the factors: points x factors, in the order of the plan.
 ///
 /// The same plan gives the same points; a Sobol' sequence with more points begins with those of one with fewer. Throws
-/// InputError under the conditions of point_count(), before memory is asked for, and of room_for().
+/// InputError under the conditions of point_count(), before memory is allocated, and of room_for().
 Points make_points(const Plan& plan, std::uint64_t limit);
 
-/// Points of the unit cube at the quantiles of independent factors: what a design for sensitivity indices wants.
+/// Points of the unit cube at the quantiles of independent factors, for a design for sensitivity indices.
 ///
 /// \param unit  one dimension a factor, all coordinates above 0 and below 1
-/// Throws what check() and Marginal throw, and InputError where dimensions and factors are not equally many.
+/// Throws the exceptions of check() and Marginal, and InputError where dimensions and factors are not equally many.
 Points at_quantiles(const Points& unit, std::span<const Factor> factors);
 
 }  // namespace ringlock::design

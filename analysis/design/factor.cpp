@@ -115,7 +115,7 @@ void check_taken(const Factor& f, const Uniform& d) { check_in_order(f, d.from, 
 void check_taken(const Factor& f, const Lognormal& d) {
     check_above_zero(f, "median", d.median);
     check_above_zero(f, "sd_relative", d.sd_relative);
-    // A variance that has gone to zero, or a tail that no double holds.
+    // A variance that has gone to zero, or a tail beyond the range of a double.
     if (!(log_sd(d) > 0.0) || !std::isfinite(d.median * std::exp(farthest_sd * log_sd(d)))) {
         refuse(f, fmt::format("median = {} with sd_relative = {} is too large or too narrow to be computed with",
                               d.median, d.sd_relative));

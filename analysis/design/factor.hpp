@@ -6,8 +6,8 @@
 #include <variant>
 #include <vector>
 
-/// Designs of computer experiments and sensitivity indices. Nothing here knows what a factor means or how a point is
-/// evaluated.
+/// Designs of computer experiments and sensitivity indices. The code here does not depend on the meaning of a factor or
+/// on the evaluation of a point.
 namespace ringlock::design {
 
 /// Explicit values, in the order in which a grid or a list takes them; in a design of the unit cube all equally likely.
@@ -49,11 +49,12 @@ struct Triangular {
     double to = 1.0;    ///< above from
 };
 
-/// What an experiment varies: one quantity, known by its key. Units are those of the key.
+/// One quantity that an experiment varies, identified by its key. Units are those of the key.
 struct Factor {
     std::string key;
     std::variant<Values, Range, Normal, Uniform, Lognormal, Triangular> takes;
-    /// What the key allows, both ends included. Values and ranges must lie within; a distribution is cut off there.
+    /// Values that the key allows, both ends included. Values and ranges must lie within; a distribution is cut off
+    /// there.
     double lower = -std::numeric_limits<double>::infinity();
     double upper = std::numeric_limits<double>::infinity();
 };
@@ -75,7 +76,7 @@ double level(const Factor& factor, std::uint64_t index);
 /// less than least_share_within_bounds lies within them.
 void check(const Factor& factor);
 
-/// The same for all factors of a design; also where there is none or two have one key.
+/// The same for all factors of a design; also throws without factors and where two have the same key.
 void check(std::span<const Factor> factors);
 
 /// A probability and its complement, each exact where it is small.
@@ -88,19 +89,19 @@ struct Probability {
 /// From the unit interval to values of one factor.
 ///
 /// A distribution F is truncated at its bounds a and b. Its quantile function is x(u) = F^-1(F(a) + u (F(b) - F(a))),
-/// so that mean and standard deviation are those of the truncated distribution. Boost's quantiles are asked by the
+/// so that mean and standard deviation are those of the truncated distribution. Boost's quantiles are computed from the
 /// smaller of the two tails, so that no digits are lost in either. x(u) never decreases (but for the last digit of
 /// Boost's quantiles, where two u are neighbours) and never leaves the bounds. Levels are equally likely: u in [i/n, (i
 /// + 1)/n) is level i of n.
 class Marginal {
    public:
-    /// Throws what check() throws.
+    /// Throws the exceptions of check().
     explicit Marginal(const Factor& factor);
 
     /// \param u  above 0 and below 1; InputError otherwise
     double operator()(double u) const;
 
-    /// The same by both tails: what lies beyond 1 - 1e-16 has digits, too.
+    /// The same by both tails: probabilities beyond 1 - 1e-16 keep their digits, too.
     ///
     /// \param u  either tail above 0 and below or at 1; InputError otherwise
     double operator()(Probability u) const;

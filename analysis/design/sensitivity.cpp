@@ -22,8 +22,9 @@ constexpr double most_rounds_without_variance = 0.01;
 /// Differences of this many last digits of the largest value are rounding.
 constexpr double rounding = 8.0 * std::numeric_limits<double>::epsilon();
 
-/// What the indices are made of, one row a base point: mean of f_A and f_B, mean of their squares, and for each factor
-/// f_B d, d and d^2/2 with d = f_AB_i - f_A. All with one number taken off f, and scaled.
+/// Terms from which the indices are computed, one row a base point: mean of f_A and f_B, mean of their squares, and for
+/// each factor f_B d, d and d^2/2 with d = f_AB_i - f_A. One number is subtracted from f in all terms, and they are
+/// scaled.
 struct Terms {
     std::size_t rows = 0;
     std::size_t columns = 0;

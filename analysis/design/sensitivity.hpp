@@ -23,7 +23,7 @@ namespace ringlock::design {
 /// sobol() does not support 2 k dimensions.
 Points sensitivity_points(std::uint64_t base_points, std::uint64_t factors, std::uint64_t seed, std::uint64_t limit);
 
-/// What a model made of sensitivity_points().
+/// Results of a model at sensitivity_points().
 struct Evaluations {
     std::size_t base_points = 0;
     std::size_t factors = 0;
@@ -31,8 +31,8 @@ struct Evaluations {
     /// [evaluation][output], evaluations in the order of sensitivity_points(). A base point with a value
     /// that is not finite is left out, for that output.
     std::span<const double> values = {};
-    /// Variance that each value has of its own noise: of a Monte Carlo estimate, the square of its standard error. As
-    /// many as values and >= 0 where the value is finite, or empty: not known.
+    /// Variance of each value by its own noise: for a Monte Carlo estimate, the square of its standard error. As many
+    /// as values and >= 0 where the value is finite, or empty: not known.
     std::span<const double> noise_variance = {};
 };
 
@@ -71,7 +71,7 @@ struct OutputIndices {
     /// Mean noise variance over A and B, over the variance; absent where noise is not known or indices are absent.
     std::optional<double> noise_share;
     std::vector<FactorIndices> factors;  ///< empty where there are no indices
-    std::string absent;                  ///< why there are none; empty otherwise
+    std::string absent;                  ///< why there are no indices; empty otherwise
 };
 
 /// Of fewer base points no index is given.
@@ -89,8 +89,8 @@ inline constexpr std::size_t fewest_base_points = 16;
 ///
 /// The intervals come from a bootstrap over the base points, in which each resample has its own m and V. The bootstrap
 /// treats base points as independent. Those of a scrambled Sobol' sequence cover the cube more evenly, so that the
-/// intervals are wider than the errors of smooth models (docs/design.md has what was measured). Indices are not
-/// clipped: of factors without influence they scatter about 0, and S_i below it.
+/// intervals are wider than the errors of smooth models (docs/design.md gives measured widths). Indices are not
+/// clipped: for factors without influence they scatter about 0, and S_i below it.
 ///
 /// Noise of the evaluations that is independent between them lowers S_i by the factor 1 - noise share, and brings ST_i
 /// towards 1: ST_i (1 - share) + share, also for factors without influence. Where evaluations share their random

@@ -19,16 +19,16 @@ struct Points {
 
 /// Room for so many points, all zero.
 ///
-/// \param limit  on the number of points, what the caller is willing to compute
-/// Throws InputError, before memory is asked for, where count or dimensions is 0, there are more points than the limit,
+/// \param limit  largest number of points that the caller is willing to compute
+/// Throws InputError, before memory is allocated, where count or dimensions is 0, there are more points than the limit,
 /// or memory does not hold them.
 Points room_for(std::uint64_t count, std::uint64_t dimensions, std::uint64_t limit);
 
 /// Latin hypercube: of n points, exactly one lies in each of the n strata [i/n, (i + 1)/n) of each dimension, at random
 /// within it; the strata of the dimensions are paired at random (McKay, Beckman, Conover, Technometrics 21, 239, 1979).
-/// The same seed gives the same points; those of another n are others altogether.
+/// The same seed gives the same points; designs for different n share no points.
 ///
-/// All coordinates are above 0 and below 1. Throws what room_for() throws.
+/// All coordinates are above 0 and below 1. Throws the exceptions of room_for().
 Points latin_hypercube(std::uint64_t count, std::uint64_t dimensions, std::uint64_t seed, std::uint64_t limit);
 
 /// The largest number of dimensions of sobol().
@@ -46,7 +46,7 @@ std::uint64_t most_sobol_dimensions();
 /// seed gives the same points on every machine, and a longer sequence begins with the shorter one. Numbers of points
 /// that are powers of 2 are balanced best.
 ///
-/// All coordinates are odd multiples of 2^-53, above 0 and below 1. Throws what room_for() throws, and InputError
+/// All coordinates are odd multiples of 2^-53, above 0 and below 1. Throws the exceptions of room_for(), and InputError
 /// beyond most_sobol_dimensions().
 Points sobol(std::uint64_t count, std::uint64_t dimensions, std::uint64_t seed, std::uint64_t limit);
 

@@ -96,14 +96,14 @@ record::Track temperature(const Scenario& s, double start_s, double end_s) {
     return track;
 }
 
-/// What an effect does to the samples.
+/// Action of an effect on the samples.
 struct Stage {
     const effects::Effect* effect;
     std::unique_ptr<effects::SampleStage> does;
 };
 using Stages = std::vector<Stage>;
 
-/// What effects do to the samples, in the order in which it happens.
+/// Actions of all effects on the samples, in the order of application.
 Stages sample_stages(const Scenario& s, std::int64_t gyro) {
     Stages stages;
     const random::Identity who{s.ensemble.seed, static_cast<std::uint64_t>(gyro)};
@@ -167,7 +167,7 @@ struct Extent {
     double source_rows = 0.0;  ///< samples taken before the stages
 };
 
-/// Throws InputError where the record would have none, or more than are allowed.
+/// Throws InputError where the record would have no rows, or more than are allowed.
 Extent extent_of(const Scenario& s, std::int64_t gyro) {
     Extent extent;
     const bool samples = extent.samples = s.record.kind == scenario::RecordKind::samples;

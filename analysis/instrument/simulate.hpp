@@ -7,9 +7,9 @@
 /// Records of gyros that are simulated.
 namespace ringlock::instrument {
 
-/// What an instrumented gyro of the scenario would have recorded, by section [record] of it: gyro `gyro` of its
-/// ensemble over ensemble.duration_s after ensemble.settle_s. Times count from the start of the run, as those of
-/// effects do. Rows are what the electronics have: neither the detectors' ellipse nor the phase is improved.
+/// The record of an instrumented gyro of the scenario, by its section [record]: gyro `gyro` of its ensemble over
+/// ensemble.duration_s after ensemble.settle_s. Times count from the start of the run, as those of effects do. Rows are
+/// the data of the electronics: neither the detectors' ellipse nor the phase is improved.
 ///
 /// /declared holds the scenario's own values, /reference the input rate, /environment the temperature where it changes:
 /// `start_temperature_c` at the start.
@@ -18,7 +18,7 @@ namespace ringlock::instrument {
 /// trajectory cannot be followed, Interrupted.
 record::Record simulate_record(const scenario::Scenario& scenario, std::int64_t gyro = 0);
 
-/// What such a record takes: memory while it is made, and the disk when it is written.
+/// Memory that such a record takes while it is made, and its size on the disk.
 struct Room {
     std::uint64_t memory_bytes = 0;
     std::uint64_t disk_bytes = 0;

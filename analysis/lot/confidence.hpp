@@ -20,7 +20,7 @@ enum class Sampling {
     until_precise,  ///< a StoppingRule chose it from the figures; intervals are wider, so that they keep their coverage
 };
 
-/// What an interval is to hold.
+/// Requirements on an interval.
 struct Confidence {
     double level = 0.95;  ///< probability that the interval holds the truth, in (0, 1)
     Sampling sampling = Sampling::fixed;

@@ -19,7 +19,7 @@ struct Mean {
 
 /// Arithmetic mean with Student's t interval (Biometrika 6, 1, 1908): mean +- t s/sqrt(n) widening(), t the quantile
 /// (1 + level)/2 of n - 1 degrees of freedom. Exact for normal values in a lot of fixed size. Equal values have an
-/// interval of no width: they tell of no scatter.
+/// interval of no width: they show no scatter.
 ///
 /// \param values  one a gyro; NaN: this gyro has none
 /// Throws InputError where the level is not in (0, 1).

@@ -12,16 +12,16 @@ namespace ringlock::lot {
 struct PairedFigure {
     std::optional<double> value;       ///< absent where there is no pair
     std::optional<Interval> interval;  ///< absent where there are fewer than 2 pairs
-    /// The interval excludes what equal arms have (ratio 1, difference 0), and the value differs from that by more than
-    /// the rounding of the values.
+    /// The interval excludes the value of equal arms (ratio 1, difference 0), and the value differs from that by more
+    /// than the rounding of the values.
     bool distinguishable = false;
     std::int64_t pairs = 0;
     std::int64_t left_out = 0;  ///< gyros that make no pair
 };
 
-/// Geometric mean of a/b over the gyros, with the t interval of the mean of log(a/b) (see geometric_mean). What both
-/// arms of a gyro share cancels, so that the interval is as narrow as the arms' own scatter allows. A gyro makes no
-/// pair where either value is NaN, infinite, zero or negative.
+/// Geometric mean of a/b over the gyros, with the t interval of the mean of log(a/b) (see geometric_mean). The
+/// contributions that both arms of a gyro share cancel, so that the interval is as narrow as the arms' own scatter
+/// allows. A gyro makes no pair where either value is NaN, infinite, zero or negative.
 ///
 /// \param a,b  one value a gyro, the same gyro at the same place
 /// Throws InputError where the lengths differ or the level is not in (0, 1).

@@ -12,7 +12,7 @@
 namespace ringlock::lot {
 namespace {
 
-/// The first x of [begin, end) for which `reached` is true, end if there is none; once true it stays so.
+/// The first x of [begin, end) for which `reached` is true, end if there is no such x; once true it stays true.
 template <class Predicate>
 std::int64_t first_reached(std::int64_t begin, std::int64_t end, Predicate reached) {
     while (begin < end) {

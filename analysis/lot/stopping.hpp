@@ -25,7 +25,7 @@ std::optional<std::int64_t> next_look(std::int64_t n, std::int64_t most);
 struct Precision {
     /// Of the geometric mean of each arm's random walk: upper end over mean less 1. Positive.
     std::optional<double> arw_relative;
-    /// Of each yield: half the width of its exact interval, a share. In (0, 0.5).
+    /// For each yield, half the width of its exact interval, a share. In (0, 0.5).
     std::optional<double> yield_absolute;
 };
 
@@ -41,25 +41,25 @@ struct YieldCount {
     std::int64_t k = 0;
 };
 
-/// One precision asked for.
+/// One requested precision.
 struct Reached {
     std::string name;               ///< of the column or the yield
-    double wanted = 0.0;            ///< half width asked for
+    double wanted = 0.0;            ///< requested half width
     std::optional<double> reached;  ///< half width; absent where there is no interval
     bool met = false;
 };
 
-/// What a rule says at a look.
+/// Decision of a rule at a look.
 struct Decision {
     bool stop = false;
-    bool precise = false;              ///< all that was asked for is reached; false where nothing was
+    bool precise = false;              ///< every requested precision is reached; false without a request
     std::optional<std::int64_t> next;  ///< gyros of the next look; absent where the lot stops
     std::vector<Reached> figures;      ///< random walks, then yields, in the order given
     std::string why;                   ///< a sentence for a reader
 };
 
-/// Runs a lot until it is precise enough. A study asks next(0), runs so many gyros, asks decide(), and goes on to next
-/// where that does not stop. It reports all figures of the lot with confidence(), the last look's included.
+/// Runs a lot until it is precise enough. A study calls next(0), runs that many gyros, calls decide(), and goes on to
+/// its `next` unless that stops. It reports all figures of the lot with confidence(), the last look's included.
 class StoppingRule {
    public:
     /// \param precision   half widths to reach
@@ -68,19 +68,19 @@ class StoppingRule {
     /// Throws InputError where one is outside.
     StoppingRule(const Precision& precision, std::int64_t most_gyros, double level = 0.95);
 
-    /// Intervals of a lot that this rule stopped: until_precise if any precision is asked for.
+    /// Intervals of a lot that this rule stopped: until_precise if any precision is requested.
     Confidence confidence() const;
 
-    /// next_look(), but most_gyros alone where no precision is asked for.
+    /// next_look(), but most_gyros alone where no precision is requested.
     std::optional<std::int64_t> next(std::int64_t gyros) const;
 
-    /// Stop or go on?
+    /// Decides whether to stop or to go on.
     ///
     /// \param gyros   of the lot so far: must be a look of next()
-    /// \param arws    the arms whose random walk is to be known; at least one if arw_relative is asked for
-    /// \param yields  the yields to be known; at least one if yield_absolute is asked for
-    /// Throws InputError where gyros is no look, a column has another length, k is not of the lot, or nothing is given
-    /// that a precision asked for could be judged by.
+    /// \param arws    the arms whose random walk is to be known; at least one if arw_relative is set
+    /// \param yields  the yields to be known; at least one if yield_absolute is set
+    /// Throws InputError where gyros is no look, a column has another length, k exceeds the lot, or the data for a
+    /// requested precision are missing.
     Decision decide(std::int64_t gyros, std::span<const ArwColumn> arws, std::span<const YieldCount> yields) const;
 
    private:

@@ -5,7 +5,7 @@
 
 #include "analysis/study/study.hpp"
 
-/// What a block of gyros leaves, as the content of a record.
+/// Results of a block of gyros as the content of a record.
 namespace ringlock::parts {
 
 std::vector<std::byte> pack(const study::FinishedBlock& block);

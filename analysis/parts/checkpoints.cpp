@@ -38,7 +38,7 @@ constexpr auto longest_without_folder = 10s;
 
 std::string now_utc() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
-/// Whether what the system refuses today it may grant later: somebody makes room, or a server comes back.
+/// Whether an operation that the system refused may succeed later: when somebody makes room, or a server comes back.
 bool may_pass(int error) {
     constexpr int passing[] = {ENOSPC, EDQUOT, EIO, ENOENT, ESTALE, ETIMEDOUT, EAGAIN, EBUSY, ENOMEM, ENFILE, EMFILE};
     return std::find(std::begin(passing), std::end(passing), error) != std::end(passing);
@@ -286,7 +286,8 @@ void Checkpoints::keep_blocks(std::vector<Waiting>& blocks) {
 void Checkpoints::settle(const fs::path& partial, const fs::path& file) {
     while (const int error = sync(partial, O_RDONLY)) {
         wait_out(fmt::format("{}: cannot be brought to the disk: {}", printable(partial), system_text(error)), error);
-        // What the system could not write it may take for written from now on: only a copy is sure to be written.
+        // The system may regard the data that it could not write as written from now on: only a copy is sure to be
+        // written.
         const fs::path copy = partial.string() + std::string(partial_suffix);
         try {
             fs::remove(copy);
@@ -362,7 +363,7 @@ void Checkpoints::work(const std::stop_token& stop) {
                 kept = Clock::now();
             }
         } catch (const std::exception&) {
-            // Interrupted, or asked to end: whoever ended the run keeps what can be kept.
+            // Interrupted, or asked to end: the code that ends the run keeps the finished blocks as far as possible.
         }
         if (pace_ && (shown == Clock::time_point::min() || Clock::now() - shown >= longest_without_status)) {
             tell_status();

@@ -33,11 +33,11 @@ class Checkpoints final : public study::Store {
     struct Options {
         double every_s = 30.0;            ///< 0: every block by itself
         std::optional<Shard> shard = {};  ///< the part of the run to simulate; empty: all of it
-        std::int64_t of_gyros = 0;        ///< of which write_status() tells
+        std::int64_t of_gyros = 0;        ///< all gyros of the run, for the status file
         Leader* leader = nullptr;         ///< of the processes that simulate the run together; null: there is one
     };
 
-    /// Reads what the folder holds. Files that are damaged are told of and put aside: their gyros are simulated again.
+    /// Reads the files of the folder. Damaged files are reported and put aside: their gyros are simulated again.
     Checkpoints(const Folder& folder, const study::Experiment& plan, Options options, Tell tell);
     /// Those of a member, which reads nothing and writes into the folder of the leader.
     Checkpoints(const std::filesystem::path& folder, const Manifest& manifest, const Member& member,
@@ -54,26 +54,26 @@ class Checkpoints final : public study::Store {
     /// first block is simulated.
     void begin(std::function<ensemble::Progress::Pace()> pace);
 
-    /// Ends that thread, and waits for it. What is not written by then stays in memory.
+    /// Ends that thread, and waits for it. Blocks that are not written by then stay in memory.
     void end() noexcept;
 
-    /// What this process has to simulate, of an experiment that does not grow.
+    /// The gyros that this process has to simulate, for an experiment that does not grow.
     std::vector<study::Stretch> to_do() const;
 
     /// Gyros that were finished before this process.
     std::int64_t gyros_before() const { return gyros_before_; }
     /// Gyros that are finished, whether kept yet or not.
     std::int64_t gyros() const;
-    /// Blocks that this process has finished, and the mean time that one took a thread [s]; nothing where there is
-    /// none.
+    /// Blocks that this process has finished, and the mean time that one took a thread [s]; nothing before the first
+    /// block.
     std::optional<double> mean_block_s() const;
 
-    /// Keeps what is finished, or waits until the disk takes it. Throws Interrupted.
+    /// Keeps the finished blocks, or waits until the disk accepts them. Throws Interrupted.
     void keep_all();
     /// The same after an interruption or a failure: tries once. Returns whether all is kept now.
     bool keep_what_can_be() noexcept;
 
-    /// What is finished. After all of it is simulated, and keep_all().
+    /// The finished gyros. To be called after all of them are simulated, and after keep_all().
     const FinishedGyros& finished() const { return finished_; }
 
    private:
@@ -112,7 +112,7 @@ class Checkpoints final : public study::Store {
     const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 
     std::mutex keeping_;        ///< one writes at a time
-    mutable std::mutex mutex_;  ///< guards what follows
+    mutable std::mutex mutex_;  ///< guards the members below
     std::condition_variable_any wake_;
     std::vector<Waiting> waiting_;
     std::int64_t numbers_ = 0;

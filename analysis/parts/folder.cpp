@@ -138,7 +138,7 @@ Folder::Folder(const fs::path& output, const Manifest& manifest, Beginning begin
             for (const fs::path& file : found) fs::remove(file);
         } else if (!found.empty()) {
             std::vector<std::string> other;
-            // A damaged file says nothing of its run, and is told of when it is read.
+            // A damaged file does not identify its run; it is reported when it is read.
             for (const fs::path& file : found) {
                 try {
                     other = differences(read_manifest(file), manifest_);
@@ -188,7 +188,7 @@ void Folder::lock_or_refuse() {
         }
         const int fd = open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
         if (fd < 0) {
-            if (errno == ENOENT) continue;  // whoever held it has just removed it
+            if (errno == ENOENT) continue;  // the process that held it has just removed it
             throw InputError(fmt::format("{}: cannot be made: {}", printable(lock), system_text(errno)));
         }
         if (flock(fd, LOCK_EX | LOCK_NB) != 0) {
@@ -234,7 +234,7 @@ void Folder::remove() {
     for (const fs::path& file : contents(path_)) {
         if (is_of_run(file) && file.filename() != lock_name) fs::remove(file, stays);
     }
-    // The lock goes last: until then nobody else can take over what is left.
+    // The lock is removed last: until then no other process can take over the remaining files.
     fs::remove(path_ / lock_name, stays);
     rmdir(path_.c_str());
 }

@@ -9,16 +9,17 @@
 
 namespace ringlock::parts {
 
-/// What people are told while a run goes on: a line without its end.
+/// Receives the messages to people while a run goes on: a line without its end.
 using Tell = std::function<void(const std::string& line)>;
 
-/// What to do with finished gyros of an earlier run that are found.
+/// Treatment of finished gyros of an earlier run that are found.
 enum class Beginning { refuse, resume, discard };
 
-/// The folder beside an output in which its run keeps what is finished: OUTPUT.parts. It belongs to one process at a
-/// time, by a lock that the system takes away with the process however that ends; so it guards the output as well.
+/// The folder next to an output in which its run keeps finished gyros: OUTPUT.parts. It belongs to one process at a
+/// time, by a lock that the system releases when the process ends, for any reason; the lock therefore guards the output
+/// as well.
 ///
-/// It goes when its run is complete, or when it holds nothing that was finished.
+/// It is removed when its run is complete, or when it holds no finished gyros.
 class Folder {
    public:
     /// Makes the folder or takes over the one that an interrupted run has left.
@@ -75,7 +76,7 @@ inline constexpr std::string_view manifest_name = "run.json";
 /// Files of finished gyros in a folder, sorted by name; none where there is no such folder.
 std::vector<std::filesystem::path> part_files(const std::filesystem::path& folder);
 
-/// Who holds a folder now: "process 123 on host", or empty where nobody does.
+/// Process that holds a folder now: "process 123 on host", or empty if no process holds it.
 std::string holder(const std::filesystem::path& folder);
 
 }  // namespace ringlock::parts

@@ -26,7 +26,7 @@ std::string to_string(const Shard& shard);
 struct Manifest {
     std::string program_version;
     std::string git_hash;
-    scenario::Scenario scenario;  ///< as it was asked for
+    scenario::Scenario scenario;  ///< as it was requested
     std::optional<Shard> shard;
 
     bool operator==(const Manifest&) const = default;
@@ -37,10 +37,10 @@ Manifest manifest_of(const scenario::Scenario& scenario, const std::optional<Sha
 
 /// As JSON, canonical.
 std::string to_json(const Manifest& manifest);
-/// Reads it. Throws InputError naming the file `from` where it is none.
+/// Reads it. Throws InputError naming the file `from` where the text is no manifest.
 Manifest parse_manifest(std::string_view json, std::string_view from);
 
-/// In what two runs differ, one line each; the shard does not matter.
+/// The differences of two runs, one line each; the shard is not compared.
 std::vector<std::string> differences(const Manifest& before, const Manifest& now);
 
 }  // namespace ringlock::parts

@@ -33,14 +33,14 @@ class FinishedGyros {
     explicit FinishedGyros(Manifest manifest) : manifest_(std::move(manifest)) {}
 
     /// Takes up a file after all of it is found whole and of this run. Blocks of gyros that are known already are left
-    /// out. Returns the wall time that the file says was spent [s]. Throws InputError otherwise, having taken nothing.
+    /// out. Returns the spent wall time in the file [s]. Throws InputError otherwise, having taken nothing.
     double add_file(const std::filesystem::path& file);
     /// Notes a block with the file that has it; `taken_up` where its point has it already.
     void add_block(std::size_t point, std::int64_t first_gyro, std::int64_t gyros, const std::filesystem::path& file,
                    bool taken_up);
 
     /// Puts finished gyros [first, last) of each point into the points, as far as these have them; each block once.
-    /// Returns what is missing. Throws InputError where a block does not fit its point.
+    /// Returns the missing gyros. Throws InputError where a block does not fit its point.
     std::vector<study::Stretch> take_up(std::span<study::Study> points, std::int64_t first, std::int64_t last);
 
     /// Gyros [first, last) of points of so many gyros that are not there.
@@ -56,7 +56,7 @@ class FinishedGyros {
     std::int64_t gyros() const;                        ///< finished, of all points
     std::vector<std::filesystem::path> files() const;  ///< that have them, sorted
     std::int64_t blocks() const { return static_cast<std::int64_t>(blocks_.size()); }
-    double wall_s() const { return wall_s_; }  ///< longest time that a file says was spent
+    double wall_s() const { return wall_s_; }  ///< longest spent time in a file
 
    private:
     struct Block {

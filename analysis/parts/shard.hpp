@@ -16,7 +16,7 @@ namespace ringlock::parts {
 /// Throws InputError where there are fewer gyros than shards.
 std::vector<study::Stretch> stretches_of(const Shard& shard, std::span<const std::int64_t> gyros_of_points);
 
-/// What of the stretches belongs to the shard.
+/// The parts of the stretches that belong to the shard.
 std::vector<study::Stretch> within(std::span<const study::Stretch> stretches,
                                    std::span<const std::int64_t> gyros_of_points, const Shard& shard);
 

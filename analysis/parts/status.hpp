@@ -18,14 +18,14 @@ struct Status {
     std::string last_block;  ///< "gyros 16 to 31 at 2026-01-01T00:00:00Z"; empty where none is finished yet
 };
 
-/// Puts text in the place of a file of a folder, so that nobody reads half of it. Not brought to the disk: after a
-/// crash of the machine it is worth nothing. Throws RunError.
+/// Replaces a file of a folder by a text as a whole, so that no reader sees a part of it. The text is not synced to the
+/// disk: after a crash of the machine it may be lost. Throws RunError.
 void replace_text(const std::filesystem::path& file, const std::string& text);
 
-/// Writes it for read_status(). Fails silently: a run goes on without.
+/// Writes it for read_status(). Failures are ignored: a run goes on without the status.
 void write_status(const std::filesystem::path& folder, const Status& status);
 
-/// Nothing where there is none, or none that can be read.
+/// Nothing where there is no status file, or an unreadable one.
 std::optional<Status> read_status(const std::filesystem::path& folder);
 
 }  // namespace ringlock::parts

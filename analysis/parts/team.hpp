@@ -14,7 +14,7 @@
 /// finished into the same folder and reports them.
 namespace ringlock::parts {
 
-/// What all processes simulate next.
+/// The gyros that all processes simulate next.
 struct Order {
     std::string manifest;                   ///< of the run, as JSON: that of each member must be the same
     std::int64_t gyros = 0;                 ///< of each point, where the lot grows
@@ -25,13 +25,13 @@ struct Order {
 class Leader : public ensemble::BlockSource {
    public:
     virtual int members() const = 0;    ///< the leader apart
-    virtual void use(int threads) = 0;  ///< of each process, the leader's
+    virtual void use(int threads) = 0;  ///< of each process, the leader included
     /// Has the members simulate this, together with the leader.
     virtual void give(const Order& order) = 0;
-    /// Waits until every member has done what was ordered, and returns the files that they have written. Throws
+    /// Waits until every member has carried out the order, and returns the files that they have written. Throws
     /// Interrupted.
     virtual std::vector<std::filesystem::path> wait_for_reports() = 0;
-    /// Whom to tell what the members' blocks do, from the next begin() on; nobody where it is null.
+    /// Sets the observer of the members' blocks, from the next begin() on; null: no observer.
     virtual void tell(ensemble::Observer* observer) = 0;
 };
 
@@ -43,7 +43,7 @@ class Member : public ensemble::BlockSource {
     virtual std::optional<Order> next_order() = 0;
     /// The order is carried out, and these files have its gyros.
     virtual void report(const std::vector<std::filesystem::path>& files) = 0;
-    /// Tells the leader what blocks do.
+    /// Reports the progress of blocks to the leader.
     virtual ensemble::Observer& observer() = 0;
 };
 

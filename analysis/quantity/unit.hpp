@@ -6,7 +6,7 @@
 /// Units of measured data.
 namespace ringlock::quantity {
 
-/// What an instrument measures: decides the names and units of its noise coefficients.
+/// Kind of instrument by its measured quantity. It determines the names and units of the noise coefficients.
 enum class Instrument {
     gyro,           ///< an angle and its rate
     accelerometer,  ///< a velocity and the acceleration

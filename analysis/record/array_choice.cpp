@@ -12,7 +12,7 @@
 namespace ringlock::record {
 namespace {
 
-/// A name as it was asked for with an option.
+/// A name requested by an option.
 struct Asked {
     const std::string& file;
     const char* option;
@@ -69,7 +69,7 @@ const Dataset* named(const Asked& asked, const std::string& name, const std::vec
                                  printable(name), listed(names)));
 }
 
-/// Throws InputError: the dataset that is asked for is there, but is no series of numbers; the message says why.
+/// Throws InputError: the requested dataset exists, but is no series of numbers; the message says why.
 void refuse_unreadable(const Asked& asked, const std::vector<Unreadable>& others) {
     const std::string plain = without_brackets(asked.name);
     for (const Unreadable& other : others) {

@@ -12,7 +12,7 @@ namespace ringlock::record {
 struct Dataset {
     std::string path;  ///< of a field with its name behind: "/imu/gyro_x"
     std::vector<std::uint64_t> sides;
-    /// Path of the dataset itself, and the names that lead to the field in its records; no names where it is none.
+    /// Path of the dataset itself, and the names that lead to the field in its records; no names if it is no field.
     std::string dataset = {};
     std::vector<std::string> field = {};
     bool field_is_array = false;  ///< each record has sides[1] numbers of it
@@ -28,7 +28,7 @@ struct Unreadable {
     std::string why;  ///< a sentence about it, without subject: "holds text"
 };
 
-/// What a file has.
+/// Datasets of a file.
 struct Contents {
     std::vector<Dataset> datasets;
     std::vector<Unreadable> others;
@@ -52,9 +52,9 @@ struct Choice {
 /// A name without the brackets at its end.
 std::string without_brackets(const std::string& name);
 
-/// What is asked for among the datasets of a file: by path, or by the end of it where only one ends so; of a
-/// two-dimensional one with row [I,:] or column [:,J] after it, counted from 0. Throws InputError where that is
-/// nothing, not one thing or outside the dataset, and says what could be asked for.
+/// The requested series among the datasets of a file: by path, or by the end of the path where only one dataset ends in
+/// it; for a two-dimensional dataset with row [I,:] or column [:,J] after it, counted from 0. Throws InputError where
+/// that is no series, more than one or outside the dataset; the message lists the possible requests.
 Choice choose_datasets(const SeriesRequest& request, const Contents& there);
 
 }  // namespace ringlock::record

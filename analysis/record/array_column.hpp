@@ -23,7 +23,7 @@ class ArrayColumn {
     virtual std::string label() const = 0;
     std::string place(std::size_t element) const;
 
-    /// Elements from `first` on, as many as there is room for; pieces are asked for from front to back. Whole numbers
+    /// Elements from `first` on, as many as there is room for; pieces are requested from front to back. Whole numbers
     /// in the type of kind(), any into double. Throws InputError.
     virtual void read(std::uint64_t first, std::span<double> into) = 0;
     virtual void read(std::uint64_t first, std::span<std::int64_t> into) = 0;

@@ -13,7 +13,7 @@
 namespace ringlock::record {
 namespace {
 
-/// What of one kind is wrong: the first place, and how many.
+/// Errors of one kind: the first position, and their number.
 struct Tally {
     std::size_t first = 0;
     std::size_t count = 0;
@@ -30,7 +30,7 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
-/// Of an output, in any unit: squares and sums of more have no digit left for what is beside it.
+/// Largest output, in any unit: in squares and sums with larger values other values lose all of their digits.
 constexpr double largest_reading = 1e15;
 
 class Checker {
@@ -61,7 +61,7 @@ class Checker {
     static std::string row(const std::string& column, std::size_t number) {
         return fmt::format("{}, row {} (counted from 0)", column, number);
     }
-    /// One finding for the tally; `what` says what the first row is.
+    /// One finding for the tally; `what` gives the text for the first row.
     template <class What>
     void report(Severity severity, const std::string& column, const Tally& tally, const What& what) {
         if (tally.count == 0) return;
@@ -76,7 +76,7 @@ class Checker {
         return false;
     }
 
-    /// True where all values are finite, and none so large that sums with it lose what others are.
+    /// True where all values are finite, and none is so large that the others lose their digits in sums with it.
     bool finite(const std::string& column, std::span<const double> values,
                 double largest = std::numeric_limits<double>::infinity()) {
         Tally bad;
@@ -317,8 +317,8 @@ class Checker {
                   "falls after minima and rises after maxima; direction or count has the wrong sign");
             return false;
         }
-        // Half cycles of the same sign on either side of each tell what was to be expected of it, so that steady
-        // rates, drifting amplitudes and steps of the rate are no jumps.
+        // The expected swing of each half cycle is the median over half cycles of the same sign on either side, so that
+        // steady rates, drifting amplitudes and steps of the rate are no jumps.
         constexpr std::ptrdiff_t reach = 4;
         std::vector<double> off(swing.size());
         for (std::size_t i = 0; i < swing.size(); ++i) {
@@ -333,7 +333,8 @@ class Checker {
             std::nth_element(near.begin(), near.begin() + found / 2, near.begin() + found);
             off[i] = std::abs(swing[i] - near[found / 2]);
         }
-        // 30 standard deviations of what is usual: no noise does that, and a few counts missed are no jump.
+        // 30 standard deviations of the usual deviation: noise does not reach that, and a few missed counts are no
+        // jump.
         constexpr double deviations = 30.0;
         constexpr double normal = 1.4826;  // standard deviation of a normal distribution over its median size
         constexpr double least = 32.0;     // quarter fringes
@@ -353,7 +354,7 @@ class Checker {
     }
 
     /// Whether count and detectors keep naming the same quarter fringe. Where they do not, counts were missed, or the
-    /// detectors' circle is none: an effect to be found, and no fault of the record.
+    /// detectors' curve is no circle: an effect to be found, and no error of the record.
     void compare_counts(const Turns& t) {
         const std::size_t n = t.size();
         std::array<std::size_t, 4> shifts{};
@@ -415,7 +416,7 @@ class Checker {
         return most(sums) > nearly_all && most(differences) < far_from_all;
     }
 
-    /// Mean acceleration over that of a dither with the counted swing; 1 where the record has none.
+    /// Mean acceleration over that of a dither with the counted swing; 1 where the record has no accelerations.
     static double acceleration_over_swing(const Turns& t) {
         const std::size_t n = t.size();
         const double w = 0.5 * units::two_pi * static_cast<double>(n - 1) / (t.time_s.back() - t.time_s.front());
@@ -484,7 +485,7 @@ class Checker {
                                ? static_cast<double>(s.counts[i]) - static_cast<double>(s.counts[i - 1])
                                : s.values[i] - s.values[i - 1]);
         }
-        // NaN beside a sample that is missing.
+        // The gain next to a missing sample is NaN.
         const auto there = [](std::vector<double> values) {
             std::erase_if(values, [](double value) { return std::isnan(value); });
             return values;

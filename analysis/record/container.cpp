@@ -29,7 +29,7 @@ Container container_of(const std::string& path) {
     std::error_code unknown;
     if (!std::filesystem::is_regular_file(path, unknown)) return Container::text;
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
-    if (!file) return Container::text;  // whoever reads it as text says why it cannot
+    if (!file) return Container::text;  // the reader of text reports the error
     std::array<char, 128> bytes{};
     const std::string_view head(bytes.data(), std::fread(bytes.data(), 1, bytes.size(), file.get()));
     if (head.starts_with(npy_magic)) return Container::npy;

@@ -3,11 +3,11 @@
 
 namespace ringlock::record {
 
-/// What a file of numbers is, by its first bytes: its name may say anything.
+/// Format of a file of numbers, by its first bytes and not by its name.
 enum class Container { text, hdf5, npy, npz, mat };
 
-/// Pipes, and whatever has no mark of the others, are text. Throws InputError where the file cannot be opened or is a
-/// folder.
+/// Pipes, and files without a mark of the other formats, are text. Throws InputError where the file cannot be opened or
+/// is a folder.
 Container container_of(const std::string& path);
 
 /// "an array of NumPy (.npy)"

@@ -223,7 +223,7 @@ class CsvReader {
         for (std::size_t k = 0; k < columns_.size(); ++k) take(columns_[k], table_.fields()[k]);
     }
 
-    /// Puts every row where its time says that it belongs, and NaN where none does.
+    /// Puts every row at the position of its time, and NaN at positions without a row.
     void place_rows() {
         const auto place = [this](std::size_t line) {
             return fmt::format("{}:{}: column {}", printable(path_), line, printable(times_->name()));

@@ -40,7 +40,7 @@ std::string why_no_numbers(hid_t type) {
     }
 }
 
-/// The text of an attribute of fixed length, as MATLAB writes its classes; empty where there is none.
+/// The text of an attribute of fixed length, as MATLAB writes its classes; empty without such an attribute.
 std::string matlab_class(hid_t object) {
     if (H5Aexists(object, "MATLAB_class") <= 0) return "";
     const Handle attribute(H5Aopen(object, "MATLAB_class", H5P_DEFAULT), H5Aclose);
@@ -88,7 +88,7 @@ class Listing {
         try {
             add(root, name, info, by_link);
         } catch (const InputError& error) {
-            // The file and the dataset are named where it is told.
+            // The caller's message names the file and the dataset.
             const std::string what = error.what();
             const std::string head = fmt::format("{}: dataset {}: ", printable(path_), printable(shown_path(name)));
             found_.others.push_back({shown_path(name), what.starts_with(head) ? what.substr(head.size()) : what});
@@ -128,7 +128,7 @@ class Listing {
             return;
         }
         const bool is_new = seen_.insert({info.fileno, info.addr}).second;
-        store::check_files(dataset, path_, path);  // before its extent is asked for
+        store::check_files(dataset, path_, path);  // before its extent is read
         Dataset whole{path, {}, path};
         whole.is_alias = by_link && !is_new;
         const Handle space(H5Dget_space(dataset), H5Sclose);
@@ -220,7 +220,7 @@ class Listing {
                            [&](const Dataset& d) { return d.dataset == path; });
     }
 
-    /// Step by step, as the library asks for.
+    /// Step by step, as the library requires.
     bool exists(const std::string& name) const {
         for (std::size_t end = name.find('/', 1);; end = name.find('/', end + 1)) {
             const std::string step = name.substr(0, end);

@@ -10,11 +10,11 @@ namespace ringlock::record {
 /// Of a dataset that is a series or a table of series.
 inline constexpr int most_dimensions = 2;
 
-/// The datasets of an open HDF5 file and the fields of those whose elements are records; what soft links and, where
-/// they are followed, external links lead to included. `asked` are names that may lead through links to groups.
+/// The datasets of an open HDF5 file and the fields of those whose elements are records; targets of soft links and,
+/// where they are followed, of external links included. `asked` are names that may lead through links to groups.
 Contents hdf5_contents(std::int64_t file, const std::string& path, const std::vector<std::string>& asked);
 
-/// The type in which a field is read alone: records of nothing but it. Close it with H5Tclose.
+/// The type in which a field is read alone: records with this field only. Close it with H5Tclose.
 ///
 /// \param element  HDF5's type in memory of the numbers
 /// \param count    numbers that each record has of it; 0 where it is one number and no array

@@ -48,7 +48,7 @@ std::optional<double> rate_above(hid_t file, const std::string& path, std::strin
     }
 }
 
-/// Bytes of one chunk of a dataset, 0 where it has none.
+/// Bytes of one chunk of a dataset, 0 for a dataset without chunks.
 std::size_t chunk_bytes(hid_t file, const std::string& name) {
     const Handle dataset(H5Dopen2(file, name.c_str(), H5P_DEFAULT), H5Dclose);
     const Handle creation(H5Dget_create_plist(dataset), H5Pclose);

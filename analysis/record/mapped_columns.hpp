@@ -30,12 +30,12 @@ struct MappedLog {
 std::vector<std::string> quantities_to_map();
 /// Whether that quantity is a rate of rotation; its unit then is one of rates.
 bool is_rate(const std::string& quantity);
-/// Whether it has a unit: a count or a witness has none.
+/// Whether the quantity has a unit: a count or a witness has no unit.
 bool has_unit(const std::string& quantity);
 
-/// Reads the columns as a record; what is missing in a column of floats is NaN there. Throws InputError, naming file
-/// and column, where none or two of them are samples, a quantity is unknown or stands twice, columns differ in length,
-/// or a count is missing.
+/// Reads the columns as a record; missing values in a column of floats are NaN. Throws InputError, naming file and
+/// column, where none or two of them are samples, a quantity is unknown or stands twice, columns differ in length, or a
+/// count is missing.
 Record read_mapped(const MappedLog& log);
 
 /// Sets a declared constant by its name in a record. Throws InputError where there is no such name.

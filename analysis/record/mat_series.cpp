@@ -28,7 +28,8 @@ namespace {
 using MatFile = std::unique_ptr<mat_t, int (*)(mat_t*)>;
 using Variable = std::unique_ptr<matvar_t, void (*)(matvar_t*)>;
 
-/// Holds the parts that a file says it has against its size: the library takes zeros for what is cut off.
+/// Compares the sizes of the parts that a file claims with the size of the file: the library reads zeros in place of
+/// data that are cut off.
 ///
 /// The format is that of "MAT-File Format" (The MathWorks): behind a head of 128 bytes elements of a type, a length and
 /// so many bytes; a matrix is made of elements for its class, sides, name and numbers, each padded to 8 bytes.
@@ -127,7 +128,7 @@ MatFile open_mat(const std::string& path) {
     return file;
 }
 
-/// Bytes of a number of that class; 0 where it holds none.
+/// Bytes of a number of that class; 0 for a class without numbers.
 std::size_t bytes_of(matio_classes of) {
     switch (of) {
         case MAT_C_DOUBLE:
@@ -175,7 +176,7 @@ std::string why_not(const matvar_t& variable) {
 void check_mat_size(const std::string& path, const std::string& name, const std::vector<std::uint64_t>& sides) {
     std::error_code unknown;
     const auto there = static_cast<double>(std::filesystem::file_size(path, unknown));
-    // MATLAB writes whole numbers with as few bytes as they need, and packs what it writes with deflate (RFC 1951).
+    // MATLAB writes whole numbers with as few bytes as they need, and packs its data with deflate (RFC 1951).
     constexpr double greatest_ratio = 1032.0;
     constexpr double small = 1048576.0;
     const double values = static_cast<double>(sides[0]) * static_cast<double>(sides[1]);

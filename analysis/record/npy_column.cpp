@@ -39,7 +39,7 @@ T as(const std::array<char, 8>& bytes) {
     return static_cast<T>(value);
 }
 
-/// One number of the array. Kinds that T does not hold are not asked for.
+/// One number of the array. Kinds that T cannot represent are not requested.
 template <class T>
 T number_at(const char* at, const NpyType& type) {
     std::array<char, 8> bytes{};
@@ -61,7 +61,7 @@ T number_at(const char* at, const NpyType& type) {
                 return as<std::int64_t, T>(bytes);
         }
     }
-    return as<std::uint64_t, T>(bytes);  // what is shorter has been filled up with zeros
+    return as<std::uint64_t, T>(bytes);  // shorter types have been filled up with zeros
 }
 
 const NpyField& field_of(const NpyHeader& head, const Slice& slice) {

@@ -15,13 +15,13 @@ namespace ringlock::record {
 class ByteSource {
    public:
     virtual ~ByteSource() = default;
-    /// Bytes from `at` on; places that are asked for increase. False where there are fewer.
+    /// Reads bytes from `at` on; positions increase from call to call. False where there are fewer bytes.
     virtual bool read(std::uint64_t at, std::span<char> into) = 0;
 };
 
-/// Adds the fields of an array to what a file has; `bytes` are those of the array and its head, if known.
+/// Adds the fields of an array to the contents of a file; `bytes` is the size of the array and its head, if known.
 ///
-/// Throws InputError where the head says more values than these can be.
+/// Throws InputError where the head claims more values than these bytes can hold.
 void add_array(const NpyHeader& head, const std::string& file, const std::string& name,
                std::optional<std::uint64_t> bytes, Contents& contents);
 

@@ -119,7 +119,7 @@ class LiteralReader {
     const std::string& where_;
 };
 
-/// "<f8" in a field; `bytes` is what it takes in an element, be it a number or not.
+/// "<f8" in a field; `bytes` is its size in an element, whether it is a number or not.
 NpyField field_of_type(const std::string& text, const LiteralReader& reader) {
     if (text.size() < 2) reader.fail(fmt::format("has the type '{}'", text::shown(text)));
     NpyField field;

@@ -87,7 +87,7 @@ class Zip {
         if (archive_entry_size_is_set(entry_) == 0 || archive_entry_size(entry_) < 0) return std::nullopt;
         return static_cast<std::uint64_t>(archive_entry_size(entry_));
     }
-    /// Bytes of the entry, one after the other; fewer than asked for at its end.
+    /// Bytes of the entry, one after the other; fewer than requested at its end.
     std::size_t read(std::span<char> into) {
         const la_ssize_t got = archive_read_data(archive_.get(), into.data(), into.size());
         if (got < 0) fail();
@@ -180,8 +180,7 @@ SeriesInfo stream_archive(const SeriesRequest& request, const TakePiece& take) {
     return stream_column(request, *column, time.get(), take);
 }
 
-/// The array of a .npy file has no name of its own: what is asked for may be brackets alone or begin with the name of
-/// the file.
+/// The array of a .npy file has no name of its own: a request may be brackets alone or begin with the name of the file.
 std::optional<std::string> named_array(const std::optional<std::string>& asked, const std::string& path) {
     if (!asked) return asked;
     if (asked->starts_with('[')) return std::string(nameless) + *asked;

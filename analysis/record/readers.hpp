@@ -59,7 +59,7 @@ inline constexpr std::array<ReaderName, 9> reader_names = {
 inline constexpr std::array reader_words = {"stripping", "fraction"};
 
 /// The reader's attribute of that name set from a text or a number; false where there is no such attribute. `wrong`
-/// says what is wrong with the value, where something is.
+/// describes the error of the value, if it has one.
 bool set_reader_word(DeclaredReader& reader, const std::string& name, const std::string& word, std::string& wrong);
 bool set_reader_number(DeclaredReader& reader, const std::string& name, double value, std::string& wrong);
 
@@ -81,7 +81,7 @@ inline constexpr std::array<SampleKind, 3> sample_kinds = {SampleKind::angle_inc
 inline constexpr const char* format_name = "rlg-record";
 inline constexpr std::int64_t format_version = 1;
 
-/// Bytes of memory that were free when it was first asked for: before the columns of a record took some of them.
+/// Bytes of memory that were free at the first call: before the columns of a record took some of them.
 double memory_bytes();
 
 using text::listed;

@@ -11,7 +11,7 @@
 /// Measured data from files.
 namespace ringlock::record {
 
-/// What the operator says about the instrument: a starting point, not truth.
+/// The operator's statements about the instrument: a starting point, not truth.
 struct Declared {
     std::optional<double> scale_factor_arcsec;  ///< K: arcsec of rotation per fringe, 2 pi of optical phase
     std::optional<double> lockin_threshold_deg_h;
@@ -23,7 +23,7 @@ struct Declared {
     std::optional<double> input_rate_deg_h;
 };
 
-/// The reader that took samples, as far as it is known: its settings and what follows from them.
+/// The reader that took samples, as far as it is known: its settings and the figures that follow from them.
 struct DeclaredReader {
     reader::Settings settings;
     double delay_s = 0.0;           ///< by which the samples lag behind a steady rotation
@@ -87,7 +87,7 @@ struct Record {
     std::optional<DeclaredReader> reader;  ///< of the samples
     Track temperature_c;                   ///< /environment
     Track input_rate_deg_h;                ///< /reference
-    /// Of a file: names that no record has, such as "/turns/note". They were left aside and are never written.
+    /// Names in the file that no record has, such as "/turns/note". They were ignored and are never written.
     std::vector<std::string> ignored;
     /// Likewise, where its samples are left out; the samples hold NaN there.
     std::vector<Gap> gaps;
@@ -95,10 +95,10 @@ struct Record {
 
 /// Whether a file is HDF5, by its signature; a pipe is not. Throws InputError where it cannot be opened or is a folder.
 bool is_hdf5(const std::string& path);
-/// The root attribute `format` of an HDF5 file: what it is; empty where there is none.
+/// The root attribute `format` of an HDF5 file, which gives its kind; empty without this attribute.
 std::string hdf5_format(const std::string& path, store::Links links = store::Links::refuse);
 
-/// Reads the HDF5 or the CSV form, told apart by their content. Throws InputError, naming file and dataset or line,
+/// Reads the HDF5 or the CSV form, distinguished by their content. Throws InputError, naming file and dataset or line,
 /// where the file cannot be read, is no record, or check() finds an error. Accelerations that the file leaves out are
 /// zeros.
 Record read_record(const std::string& path, store::Links links = store::Links::refuse);
@@ -111,7 +111,7 @@ class RecordWriter {
     explicit RecordWriter(const std::string& path);
 
     /// Writes the record, unchecked, and gives the file its name; accelerations without any row are left out. Throws
-    /// RunError where the disk refuses or somebody else has made or changed the file since it was claimed.
+    /// RunError where the disk refuses or another process has made or changed the file since it was claimed.
     void write(const Record& record);
 
    private:
@@ -126,10 +126,10 @@ enum class Severity {
     warning,  ///< strange, but it may be so
 };
 
-/// One thing that is wrong with a record: what and where.
+/// One error or warning of a record, and its position.
 struct Finding {
     std::string where;  ///< dataset, with the row, counted from 0, where there is one
-    std::string what;   ///< value found and what is allowed
+    std::string what;   ///< value found and allowed values
     Severity severity = Severity::error;
 };
 
@@ -138,7 +138,7 @@ struct Finding {
 /// a column are, an error.
 std::vector<Finding> check(const Record& record);
 
-/// Throws InputError with the findings that are errors, `path` before each; does nothing where there are none.
+/// Throws InputError with the findings that are errors, `path` before each; does nothing without errors.
 void refuse_errors(const std::string& path, const Record& record);
 
 }  // namespace ringlock::record

@@ -162,7 +162,7 @@ class TextSeries {
     std::optional<double> rate_hz_;
     std::size_t value_column_ = 0;
     bool only_whole_ = true;  ///< no value so far that was no whole number, be it too large
-    std::string too_large_;   ///< what to say of the first that is
+    std::string too_large_;   ///< message about the first value that is too large
 };
 
 }  // namespace

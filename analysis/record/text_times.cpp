@@ -16,7 +16,7 @@ namespace {
 
 constexpr double ns_s = 1e-9;
 
-/// "sec,nsec" in two, unless a column is called so.
+/// Splits "sec,nsec" into two names, unless a column has that name.
 std::vector<std::string> parts_of(const text::Layout& layout, const std::string& asked) {
     for (const text::Column& column : layout.columns) {
         if (column.heading == asked || column.name == asked) return {asked};

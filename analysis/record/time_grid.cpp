@@ -18,7 +18,8 @@ constexpr double rate_tolerance = 1e-3;   // relative
 constexpr double least_left_out = 1e6;    // points that may always be left out
 constexpr double most_left_out_row = 20;  // and how many for each row that is there
 constexpr double standard_errors = 5.0;   // that the grid near by may be off
-// Rows from which the stamps tell the length of an interval better than the rate, for the far side of a gap.
+// Number of rows from which the stamps determine the length of an interval better than the rate, for the far side of a
+// gap.
 constexpr double rows_to_know_rate = 1000.0;
 constexpr std::size_t rows_to_judge_rate = 5;
 constexpr double rows_to_judge_steps = 10.0;
@@ -134,7 +135,7 @@ void TimeGrid::check_first(std::span<const StampedRow> first, std::span<const do
     }
     const bool spread = most - least > 2.0 * furthest_off + rounding;
     if (!spread && worst_excess <= rounding) return;
-    // Of stamps that scatter evenly the middle of their range tells best where the grid is.
+    // For stamps that scatter evenly the middle of their range is the best estimate of the grid.
     if (spread) worst_off = std::copysign(0.5 * (most - least), worst_off);
     if (n >= rows_to_judge_rate && std::abs(tilt.slope) > rate_tolerance + errors * tilt.error) {
         fail_rate(first[n - 1].row, tilt.slope);
@@ -173,7 +174,7 @@ void TimeGrid::begin(std::span<const StampedRow> first) {
     check_first(first.subspan(stretch), std::span<const double>(start_points_).subspan(stretch));
 }
 
-/// Of the clock against the rate, where the stamps tell it well enough to be followed over that many steps.
+/// Slope of the clock against the rate, where the stamps determine it well enough to be followed over that many steps.
 double TimeGrid::known_slope(double steps) const {
     if (rows_ < static_cast<double>(rows_to_judge_rate)) return 0.0;
     if (rows_ >= rows_to_know_rate) return points_by_lag_ / points_squared_;
@@ -190,7 +191,7 @@ TimeGrid::Centre TimeGrid::centre_at(double point, double steps) const {
     return {lag / count, std::min(most_allowance, standard_errors * scatter / std::sqrt(count))};
 }
 
-/// Of the lags near by and one more, the largest less the smallest.
+/// Range of the lags near by and one more: the largest less the smallest.
 double TimeGrid::spread_with(const Lag& added, double slope) const {
     double least = added.lag, most = added.lag;
     for (std::size_t i = 0; i < near_count_; ++i) {
@@ -214,7 +215,7 @@ void TimeGrid::check_left_out(const text::Stamp& stamp, std::size_t row, double 
 }
 
 void TimeGrid::remember(const Lag& lag, double steps) {
-    // Far behind a gap the rows before it say nothing of where the grid is.
+    // Far behind a gap the rows before it do not determine the grid.
     if (steps > near_rows) {
         near_count_ = near_next_ = 0;
         near_sum_ = {};
@@ -229,7 +230,7 @@ void TimeGrid::remember(const Lag& lag, double steps) {
     near_next_ = (near_next_ + 1) % near_rows;
     near_count_ = std::min(near_count_ + 1, near_rows);
     if (near_next_ != 0) return;
-    near_sum_ = {};  // anew, or rounding would add up
+    near_sum_ = {};  // summed again from the start, or rounding would add up
     for (const Lag& l : near_) {
         near_sum_.point += l.point;
         near_sum_.lag += l.lag;

@@ -10,7 +10,7 @@
 
 namespace ringlock::record {
 
-/// Says for a message where row or element `row` stands: "FILE:LINE: column NAME".
+/// Position of row or element `row` for a message: "FILE:LINE: column NAME".
 using SayPlace = std::function<std::string(std::size_t row)>;
 
 /// The time of a row.
@@ -21,21 +21,21 @@ struct StampedRow {
 
 /// Places rows on the grid of a sampling rate by their time stamps.
 ///
-/// The grid is that of the stamps near by: one that lies a quarter of an interval off it, to either side, is in its
-/// place, and so are stamps of which all near by lie within half an interval of each other, off the grid. The grid
+/// The grid is that of the stamps near by: a stamp is accepted if it lies within a quarter of an interval of the grid,
+/// to either side; stamps off the grid are accepted if all near by lie within half an interval of each other. The grid
 /// follows a clock that runs off from the rate. All errors are InputErrors with place and both times.
 class TimeGrid {
    public:
-    /// How a user says in which unit the times are; for messages.
+    /// Source of the unit of the times; for messages.
     enum class UnitBy {
         option,  ///< --time-unit
         header,  ///< the name of the column
     };
 
-    /// `rate_hz` is positive. `place` is asked for the rows given to begin() and steps_to().
+    /// `rate_hz` is positive. `place` is called with the rows given to begin() and steps_to().
     TimeGrid(double rate_hz, SayPlace place, text::TimeUnit unit = {}, UnitBy unit_by = UnitBy::option);
 
-    /// Rows that begin() wants, or all that there are.
+    /// Number of rows that begin() needs, or all rows of a shorter table.
     static constexpr std::size_t first_rows = 64;
 
     /// Looks at the first rows, so that the grid is known before any of them is placed. Throws where steps_to() would,
@@ -57,7 +57,7 @@ class TimeGrid {
         double point = 0.0;
         double lag = 0.0;
     };
-    /// The grid near by: the mean lag, and what it is sure to.
+    /// The grid near by: the mean lag, and its uncertainty.
     struct Centre {
         double lag = 0.0;
         double allowance = 0.0;  ///< by which a stamp may be further off than a quarter, for the mean is of few

@@ -16,7 +16,7 @@ namespace ringlock::report {
 
 namespace {
 
-/// What a cell of a table, or a link, may hold.
+/// The text escaped for a cell of a table, or for a link.
 std::string escaped(std::string_view text) {
     std::string out;
     for (const char c : text) {

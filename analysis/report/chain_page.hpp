@@ -12,8 +12,8 @@ namespace ringlock::report {
 /// folder, in which each record has one of its own already.
 ///
 /// Throws InputError where they cannot be written there, RunError where the disk refuses.
-/// \param folders  names of those of the records
-/// \param object   what --json prints
+/// \param folders  names of the folders of the records
+/// \param object   the object that --json prints
 void write_chain_page(const std::filesystem::path& folder, const closure::Chain& chain,
                       const std::vector<std::string>& folders, const nlohmann::json& object);
 

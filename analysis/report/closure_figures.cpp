@@ -51,7 +51,7 @@ void add_band(const PredictiveStatistic& statistic, const std::string& kind, int
     }
 }
 
-/// Value of the first parameter of the step that has the role; NaN where there is none.
+/// Value of the first parameter of the step that has the role; NaN if there is no such parameter.
 double value_of(const Step& step, effects::Role role) {
     const effects::Parameter* parameter = effects::first_of(*step.effect, role);
     for (const Estimate& estimate : step.parameters) {

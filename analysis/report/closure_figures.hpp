@@ -16,8 +16,8 @@ struct Picture {
     Figure figure;
 };
 
-/// The figures of a report, in its order: the rate over time with what was found, the statistics of the predictive
-/// check, each line that was found, the held-out error step by step.
+/// The figures of a report, in its order: the rate over time with the effects that were found, the statistics of the
+/// predictive check, each line that was found, the held-out error step by step.
 /// \param source  name of the record
 std::vector<Picture> closure_pictures(const std::string& source, const record::Record& record,
                                       const closure::Closure& closure, const closure::Predictive& predictive);

@@ -30,7 +30,7 @@ using closure::Predictive;
 using closure::PredictiveStatistic;
 using closure::Step;
 
-/// What a cell of a table may hold.
+/// The text escaped for a cell of a table.
 std::string cell(std::string_view text) {
     std::string out;
     for (const char c : text) out += c == '|' ? std::string("\\|") : std::string(1, c == '\n' ? ' ' : c);

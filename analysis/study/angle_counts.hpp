@@ -8,8 +8,8 @@
 #include "engine/gyro/setup.hpp"
 #include "engine/simd/lanes.hpp"
 
-/// From an arm's counts, which wrap round, to its angle. Whoever simulates a gyro anew goes the same way, so that
-/// angles are the same to the bit.
+/// From an arm's counts, which wrap round, to its angle. Code that simulates a gyro again uses the same conversion, so
+/// that angles are the same to the bit.
 namespace ringlock::study {
 
 /// Counts that do not wrap round.
@@ -18,7 +18,7 @@ __extension__ using WideCounts = __int128;
 /// Angle output of a block of gyros since the start of a record.
 class AngleCounts {
    public:
-    /// The record begins: its first angle is one by itself, from then on differences tell.
+    /// The record begins: its first angle is stored as it is; later angles follow from differences.
     void start(const simd::LaneCounts& row) {
         last_ = origin_ = row;
         turned_ = {};
@@ -34,7 +34,7 @@ class AngleCounts {
 
     /// Turned since the start.
     WideCounts turned(std::size_t lane) const { return turned_[lane]; }
-    /// The angle: that at the start and what was turned since.
+    /// The angle: that at the start and the rotation since.
     WideCounts angle(std::size_t lane) const { return origin_[lane] + turned_[lane]; }
 
    private:

@@ -51,7 +51,7 @@ class TrialObserver final : public ensemble::Observer {
     std::atomic<std::int64_t> turns_ = 0;
 };
 
-/// Takes no statistics: these are made of what the gyros do, and cost little beside it.
+/// Takes no statistics: their cost is small against that of the simulation.
 class Nothing final : public BlockKeeper {
    public:
     bool wants_samples() const override { return false; }

@@ -6,7 +6,7 @@
 
 namespace ringlock::study {
 
-/// What it costs to simulate an experiment, by a short trial.
+/// Cost of simulating an experiment, estimated by a short trial.
 struct Cost {
     std::int64_t turns = 0;    ///< of the whole experiment; with a stopping rule, at most
     double turns_per_s = 0.0;  ///< of all threads together
@@ -18,7 +18,7 @@ struct Cost {
 };
 
 /// Simulates the first, the middle and the last point of the design for some `seconds` together, as many blocks side
-/// by side as there are threads, and throws the outcome away. Throws Interrupted where `cancelled` says so, RunError
+/// by side as there are threads, and discards the results. Throws Interrupted where `cancelled` returns true, RunError
 /// where the gyros cannot be simulated.
 Cost measure_cost(const Experiment& experiment, int threads, double seconds, const std::function<bool()>& cancelled);
 

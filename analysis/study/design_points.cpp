@@ -49,7 +49,7 @@ std::string why_not(const std::string& path) {
     return "";
 }
 
-/// Throws InputError where the key is none of a scenario.
+/// Throws InputError where a scenario has no such key.
 design::Factor factor_of(const Variation& v) {
     if (scenario::find_key(v.key) == nullptr) throw InputError(fmt::format("\"{}\" {}", v.key, why_not(v.key)));
     design::Factor factor{v.key, design::Values{v.values}};
@@ -235,7 +235,7 @@ std::string numbers_text(const std::vector<std::size_t>& points) {
     return points.size() > most ? text + fmt::format(" ... ({} points)", points.size()) : text;
 }
 
-/// Values that their keys do not allow: a design knows a key's ends, not that 0 is allowed besides.
+/// Values that their keys do not allow: a design has a key's limits, but not the additional permission of 0.
 std::vector<Complaint> out_of_bounds(const std::vector<Axis>& axes, std::size_t point) {
     std::vector<Complaint> found;
     for (const Axis& axis : axes) {

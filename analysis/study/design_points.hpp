@@ -23,8 +23,9 @@ std::vector<Axis> design_axes(const scenario::Scenario& scenario);
 /// The scenario alone of one point, without a design.
 scenario::Scenario scenario_at(const scenario::Scenario& scenario, const std::vector<Axis>& axes, std::size_t point);
 
-/// Checks a study. Without a design these are the rules of the scenario. With one they are the errors of the design
-/// itself or, where it has none, the rules that its points break: each rule once, with the points that break it.
+/// Checks a study. Without a design these are the rules of the scenario. With a design they are the errors of the
+/// design itself or, for a correct design, the rules that its points break: each rule once, with the points that break
+/// it.
 std::vector<scenario::Complaint> complaints(const scenario::Scenario& scenario);
 
 }  // namespace ringlock::study

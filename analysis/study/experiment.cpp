@@ -40,7 +40,7 @@ std::int64_t Experiment::turns() const {
 
 namespace {
 
-/// What the rule judges at a look: random walks of arms whose records show them, and yields, of all points.
+/// Figures that the rule judges at a look: random walks of arms whose records show them, and yields, of all points.
 struct Judged {
     std::vector<std::string> names;
     std::vector<std::vector<double>> walks;

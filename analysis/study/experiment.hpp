@@ -18,7 +18,7 @@ namespace ringlock::study {
 /// How a lot grew, where the scenario has a stopping rule.
 struct Growth {
     std::vector<std::int64_t> looks;  ///< numbers of gyros at which the rule was asked
-    bool precise = false;             ///< all that was asked for is reached
+    bool precise = false;             ///< every requested precision is reached
     std::string why;                  ///< why no gyros were added: a sentence
 };
 
@@ -38,19 +38,18 @@ struct Experiment {
     std::int64_t turns() const;  ///< of all points
 };
 
-/// Where the gyros of an experiment come from and go to: it keeps blocks that are finished, so that what was simulated
-/// before need not be simulated again.
+/// Store of the gyros of an experiment: it keeps finished blocks, so that they need not be simulated again.
 class Store {
    public:
     virtual ~Store() = default;
-    /// Puts what is kept of gyros [first, last) of each point into the points, and returns what is missing of them.
+    /// Puts the kept gyros of [first, last) of each point into the points, and returns the missing ones.
     virtual std::vector<Stretch> take_up(std::span<Study> points, std::int64_t first, std::int64_t last) = 0;
-    /// A keeper of what is about to be simulated.
+    /// A keeper for a block that is about to be simulated.
     virtual std::unique_ptr<BlockKeeper> keeper(std::size_t point, std::int64_t first_gyro, std::size_t gyros) = 0;
     /// All that was missing of gyros [first, last) is simulated. Where other processes have simulated some of it, puts
     /// these gyros into the points.
     virtual void collect(std::span<Study> points, std::int64_t first, std::int64_t last) = 0;
-    /// Wall time that was spent on what is kept [h].
+    /// Wall time that was spent on the kept blocks [h].
     virtual double hours_before() const = 0;
 };
 
@@ -62,14 +61,14 @@ Experiment run(Experiment experiment, int threads, Store& store, const ensemble:
 Experiment run(Experiment experiment, int threads, const OnSamples& on_samples = nullptr,
                const ensemble::Monitor& monitor = {});
 
-/// Of a point, [first, last) without the stretches that are there; they do not overlap.
+/// The parts of gyros [first, last) of a point that are not among the stretches `there`, which do not overlap.
 std::vector<Stretch> missing(std::size_t point, std::int64_t first, std::int64_t last, std::vector<Stretch> there);
 
 /// Sums every point up.
 std::vector<Summary> summarise(const Experiment& experiment);
 
 /// Random walks of an arm at a point over those at the first one, gyro by gyro: both share their random numbers.
-/// Nothing where either point's records show none.
+/// Nothing where the records of either point show no random walk.
 std::optional<lot::PairedFigure> arw_over_first(const Experiment& experiment, const std::vector<Summary>& summaries,
                                                 std::size_t point, std::size_t arm);
 

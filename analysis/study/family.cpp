@@ -16,7 +16,7 @@
 namespace ringlock::study {
 namespace {
 
-/// The record of one gyro. Simulated records have no gaps, and the mean over the gyros wants the same points of all.
+/// The record of one gyro. Simulated records have no gaps, and the mean over the gyros needs the same points for all.
 allan::Phase phase_of_row(const store::Dataset& angles, std::size_t gyro, double interval_s) {
     const std::vector<double> record = angles.read_rows<double>(gyro, 1);
     // Beyond that, squares overflow.
@@ -90,7 +90,8 @@ std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesyste
         for (std::size_t arm = 0; arm < study.arms.size(); ++arm) {
             const store::Dataset angles = records_of(file, study, experiment.points.size(), arm);
             const Rows rows{point * gyros, gyros};
-            if (store::is_trial()) {  // it reads what will be read; the deviations take longer than any trial may
+            if (store::is_trial()) {  // a trial checks only that the data can be read; the deviations take longer than
+                                      // any trial may
                 for (std::size_t row = 0; row < gyros; ++row) {
                     static_cast<void>(angles.read_rows<double>(rows.first + row, 1));
                 }

@@ -77,7 +77,8 @@ std::vector<LotFigure> lot_figures(const Study& study, const ArmStatistics& arm)
 
 namespace {
 
-/// Gyros that are told apart: those of one rate of a sweep are those of every other, and turn-ons in a row are of one.
+/// Distinct gyros: the gyros of one rate of a sweep are those of every other rate, and consecutive turn-ons belong to
+/// one gyro.
 struct Members {
     std::size_t rows_of_rate;
     std::size_t turn_ons;
@@ -91,14 +92,14 @@ Members members_of(const Study& study, const ArmStatistics& arm) {
             static_cast<std::size_t>(study.scenario.ensemble.turn_ons)};
 }
 
-/// One limit of a specification, and what must not exceed it in magnitude: of every gyro, at every rate of a sweep
-/// where there is one value each, as the rows of a study are.
+/// One limit of a specification, and the values that must not exceed it in magnitude: one for every gyro, and for every
+/// rate of a sweep where each rate has a value, in the order of the rows of a study.
 struct Limit {
     std::string name;
     double most;
     std::vector<double> values;
 
-    /// Of every member whether all its values are within the limit; what is no number is not.
+    /// For every member, whether all its values are within the limit; NaN is not.
     std::vector<bool> holds(const Members& members) const {
         std::vector<bool> within(members.count(), true);
         for (std::size_t row = 0; row < values.size(); ++row) {
@@ -108,7 +109,7 @@ struct Limit {
     }
 };
 
-/// Of every gyro, through its rates of the sweep.
+/// Scale factor error of every gyro, from the line through its rates of the sweep.
 std::vector<double> scale_factor_errors(const Study& study, const ArmStatistics& arm) {
     std::vector<double> rates;
     for (std::int64_t rate = 0; rate < study.scenario.input.sweep_points; ++rate) {

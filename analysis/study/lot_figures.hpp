@@ -7,7 +7,7 @@
 #include "analysis/lot/share.hpp"
 #include "analysis/study/study.hpp"
 
-/// What a study tells of its gyros as a lot: quantiles, the share that passes a specification, arms in pairs.
+/// Figures of a study's gyros as a lot: quantiles, the share that passes a specification, arms in pairs.
 namespace ringlock::study {
 
 /// Quantiles of one figure over the gyros of an arm.
@@ -37,11 +37,11 @@ struct ArmPair {
     lot::Comparison arw_deg_rt_h;
 };
 
-/// Of a study's intervals over its gyros: 95 %, wider where a stopping rule chose their number.
+/// Confidence of a study's intervals over its gyros: 95 %, wider where a stopping rule chose the number of gyros.
 lot::Confidence confidence_of(const scenario::Scenario& scenario);
 
-/// Random walks of the gyros [deg/sqrt(h)], in the model that all records together choose: what medians, quantiles and
-/// yields are made of.
+/// Random walks of the gyros [deg/sqrt(h)], in the model that all records together select; medians, quantiles and
+/// yields are computed from them.
 std::vector<double> random_walks_deg_rt_h(const ArmStatistics& arm);
 
 /// One figure of every gyro of an arm; NaN where its record does not have it.
@@ -50,17 +50,16 @@ struct LotValues {
     std::vector<double> values;
 };
 
-/// Random walk, mean rate error, deviations at the averaging times asked for, and angle errors.
+/// Random walk, mean rate error, deviations at the requested averaging times, and angle errors.
 std::vector<LotValues> lot_values(const Study& study, const ArmStatistics& arm);
 
-/// Which gyros meet the scenario's specification: of a sweep, those that do at every one of its rates, one value a gyro
-/// and not one a row.
+/// Which gyros meet the scenario's specification; in a sweep, at every rate. One value a gyro, not one a row.
 std::vector<bool> passed_gyros(const Study& study, const ArmStatistics& arm);
 
-/// Quantiles of random walk, mean rate error, deviations at the averaging times asked for, and angle errors.
+/// Quantiles of random walk, mean rate error, deviations at the requested averaging times, and angle errors.
 std::vector<LotFigure> lot_figures(const Study& study, const ArmStatistics& arm);
 
-/// The share of passed_gyros(), and of each limit by itself. What a record does not have (NaN) does not pass.
+/// The share of passed_gyros(), and of each limit by itself. A figure that a record does not have (NaN) does not pass.
 Yield yield_of(const Study& study, const ArmStatistics& arm);
 
 }  // namespace ringlock::study

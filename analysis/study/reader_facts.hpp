@@ -9,7 +9,7 @@
 /// The readers of a study, as its result records them.
 namespace ringlock::study {
 
-/// A setting of the section [reader] of a scenario, or what follows from them.
+/// A setting of the section [reader] of a scenario, or a figure that follows from the settings.
 struct ReaderFact {
     std::string name;  ///< with its unit
     std::variant<std::int64_t, double, std::string> value;

@@ -25,8 +25,8 @@ struct AverageScatter {
 std::vector<AverageScatter> scatter_of_averages(const Study& study, const ArmStatistics& arm);
 
 /// Standard deviation of the mean rate over the record from turn-on to turn-on of one gyro (IEEE Std 647-2006 calls it
-/// the bias repeatability): of the deviations from each gyro's mean, all gyros together. Absent where gyros are
-/// switched on once.
+/// the bias repeatability): it is computed from the deviations from each gyro's mean, over all gyros. Absent where
+/// gyros are switched on once.
 std::optional<Scatter> turn_on_repeatability(const Study& study, const ArmStatistics& arm);
 
 }  // namespace ringlock::study

@@ -42,7 +42,7 @@ struct Fringes {
     }
 };
 
-/// Root of the mean square of what is a number.
+/// Root of the mean square of the values that are not NaN.
 class MeanSquare {
    public:
     void add(double value) {

@@ -26,12 +26,12 @@ struct ReplayedTurn {
     double angle_arcsec = 0.0;    ///< output of the arm
     double correction_rad = 0.0;  ///< lock-in error that the compensator takes away
 
-    // What is true:
+    // True values:
     double zero_rate_s = 0.0;  ///< when the phase turns, from the dither's turn
     WholePhase phase;          ///< optical phase there
     double lockin_error_rad = 0.0;
     double lockin_step_rad = 0.0;  ///< that error less the one at the turn before; NaN at the first turn of the run
-    double left_step_rad = 0.0;    ///< the same of what the compensator leaves of it
+    double left_step_rad = 0.0;    ///< the same for the error that remains behind the compensator
     double rotation_arcsec = 0.0;  ///< of the case, rates that effects add included
     // Of the half cycle that ends at the turn:
     double dither_amplitude_rad = 0.0;         ///< half its swing in optical phase, injected noise included
@@ -40,7 +40,7 @@ struct ReplayedTurn {
     double lockin_threshold_deg_h = 0.0;
     double coupling_phase_rad = 0.0;
 
-    /// What the electronics report.
+    /// A reading of the electronics.
     struct Reading {
         double sine = 0.0;  ///< detectors
         double cosine = 0.0;
@@ -49,7 +49,7 @@ struct ReplayedTurn {
     Reading seen;  ///< by the compensator
     double accel_before_rad_s2 = 0.0;
     double accel_after_rad_s2 = 0.0;
-    double pulses_before_s[readout::kept_pulses] = {};  ///< nearest first; 0 where a pulse was not told apart
+    double pulses_before_s[readout::kept_pulses] = {};  ///< nearest first; 0 where a pulse was not distinguished
     double pulses_after_s[readout::kept_pulses] = {};
     Reading hardware;  ///< before ellipse or phase are improved
     std::int64_t quarter_count = 0;
@@ -63,7 +63,7 @@ class TurnSink {
     virtual void take(std::span<const ReplayedTurn> turns) = 0;
 };
 
-/// What a replay shows as a whole.
+/// Figures of a replay as a whole.
 struct ReplayFigures {
     std::int64_t turns = 0;    ///< handed on
     std::int64_t samples = 0;  ///< of the angle record that were gone through
@@ -96,7 +96,7 @@ class GyroReplay {
     /// Those at these times, both ends included; none where first = last.
     Range turns_between(double from_s, double to_s) const;
 
-    /// Told of every sample of the angle record before the end of the range.
+    /// Called for every sample of the angle record before the end of the range.
     using OnSample = std::function<void(std::int64_t sample, double angle_arcsec)>;
     /// Simulates the gyro up to the end of the range, once, and hands the turns of the range on.
     /// Throws RunError where its trajectory cannot be followed, Interrupted.

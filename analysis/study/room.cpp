@@ -17,11 +17,12 @@ namespace {
 
 /// The program with its libraries and a thread pool.
 constexpr std::uint64_t memory_of_program = 40'000'000;
-/// What one thread holds of an arm while it simulates a block: sums at all octaves and at most fit_samples rows.
+/// Memory of one thread for an arm while it simulates a block [bytes]: sums at all octaves and at most fit_samples
+/// rows.
 constexpr std::uint64_t memory_of_block = 2'000'000;
 
-/// What one thread holds of the readers of a block: the instants of a piece, of which a vector may have room for twice
-/// as many, for each trajectory, and the filters of all arms, taps and angles.
+/// Memory of one thread for the readers of a block [bytes]: for each trajectory the instants of a piece, for which a
+/// vector may have reserved twice the room, and for all arms the filters, taps and angles.
 std::uint64_t memory_of_readers(const scenario::Scenario& scenario) {
     if (!scenario::reads_arms(scenario)) return 0;
     constexpr double trajectories = 3.0;  // at most

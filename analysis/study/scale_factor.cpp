@@ -118,7 +118,7 @@ std::optional<ScaleFactor> scale_factor(std::span<const double> input_rates_deg_
     std::vector<double> biases(gyros);
     for (std::size_t m = 0; m < gyros; ++m) biases[m] = middles[m] - slopes[m] * centre;
 
-    // Deviations of each gyro from its line: what all share at a rate, and the rest.
+    // Deviations of each gyro from its line: the part that all gyros share at a rate, and the remainder.
     std::vector<double> largest(gyros, 0.0);
     double scatter = 0.0;
     const double allowance = quantile(complement(boost::math::students_t(n - 1.0), 0.5 * outside / k));

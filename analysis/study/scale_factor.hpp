@@ -4,7 +4,8 @@
 #include <span>
 #include <vector>
 
-/// The straight line through a sweep of input rates: what a rate table tells of gyros (docs/scale-factor.md).
+/// The straight line through a sweep of input rates: the figures of gyros that a rate table measures
+/// (docs/scale-factor.md).
 namespace ringlock::study {
 
 /// A mean over the gyros with its 95 % interval; no value where the interval holds zero.
@@ -14,8 +15,8 @@ struct SignedFigure {
     double hi = 0.0;
 };
 
-/// A size, which cannot be negative, with its 95 % interval. Where the data do not tell it from zero there is no value,
-/// and `hi` is the upper limit.
+/// A size, which cannot be negative, with its 95 % interval. Where the data do not distinguish it from zero there is no
+/// value, and `hi` is the upper limit.
 struct SizeFigure {
     std::optional<double> value;
     double lo = 0.0;
@@ -26,8 +27,8 @@ struct ScaleFactor {
     double full_scale_deg_h = 0.0;       ///< largest input rate of the sweep, in size
     SignedFigure scale_factor_ppm;       ///< slope of output over input rate less one, mean over the gyros
     SizeFigure repeatability_ppm;        ///< standard deviation of the gyros' slopes, as measured
-    double noise_ppm = 0.0;              ///< what the scatter about the lines puts into it
-    SizeFigure beyond_noise_ppm;         ///< what is left of it without that
+    double noise_ppm = 0.0;              ///< contribution of the scatter about the lines to it
+    SizeFigure beyond_noise_ppm;         ///< the same without this contribution
     SignedFigure bias_deg_h;             ///< the lines at input rate zero, mean over the gyros
     double bias_spread_deg_h = 0.0;      ///< standard deviation of the same over the gyros
     SizeFigure largest_deviation_deg_h;  ///< from the line, of the mean over the gyros; over all rates together
@@ -36,11 +37,12 @@ struct ScaleFactor {
     double gyro_deviation_deg_h = 0.0;     ///< largest deviation of a gyro from its own line: median over the gyros ...
     double gyro_deviation_lo_deg_h = 0.0;  ///< ... and their central 68.27 %
     double gyro_deviation_hi_deg_h = 0.0;
-    double scatter_deg_h = 0.0;  ///< rms deviation of a gyro's rates from its line and what all gyros share
+    double scatter_deg_h = 0.0;  ///< rms deviation of a gyro's rates from its line, less the deviation that all gyros
+                                 ///< share
 };
 
-/// Slopes less one of the gyros' own lines [ppm]: least squares of output over input rate. Not a number where a rate of
-/// the gyro is none.
+/// Slopes less one of the gyros' own lines [ppm]: least squares of output over input rate. NaN where a rate of the gyro
+/// is NaN.
 ///
 /// \param input_rates_deg_h, errors_deg_h  as below
 /// Empty where there are fewer than three rates, or the rates are all the same.

@@ -22,7 +22,7 @@ struct ArmSensitivity {
 /// Indices of first and total order of each key of a design with sensitivity_base_points; empty for others.
 ///
 /// An evaluation is the mean of a figure over the gyros of a point: the logarithm of the random walk, the mean rate
-/// error, the logarithms of the Allan deviations asked for, and the share that passes. Its noise is the standard error
+/// error, the logarithms of the requested Allan deviations, and the share that passes. Its noise is the standard error
 /// of that mean, of two gyros and more.
 std::vector<ArmSensitivity> sensitivity(const Experiment& experiment);
 

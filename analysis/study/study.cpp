@@ -30,7 +30,7 @@ namespace {
 
 bool is_octave(std::int64_t m) { return (m & (m - 1)) == 0; }
 
-/// Octaves of an output, and the averaging times asked for in whole outputs.
+/// Octaves of an output, and the requested averaging times in whole outputs.
 std::vector<std::int64_t> factors_of(const scenario::Scenario& scenario, const ensemble::Schedule& schedule) {
     auto factors = allan::octave_factors(allan::largest_factor(allan::Estimator::oadev, schedule.outputs()));
     for (const double tau_s : scenario.output.tau_s) factors.push_back(ensemble::outputs_in(schedule, tau_s));
@@ -121,7 +121,7 @@ void predict_noise(Study& study) {
 
 namespace {
 
-/// Samples gathered before they are handed on: enough for a write to be worth its while.
+/// Samples gathered before they are handed on: enough for an efficient write.
 constexpr std::size_t gathered_samples = 256;
 
 /// The statistics of one arm of one block while it is simulated.
@@ -182,7 +182,7 @@ class ArmStream {
         return result;
     }
 
-    /// Hands on what waits.
+    /// Hands the waiting samples on.
     void flush() {
         if (waiting_rows_.empty()) return;
         const std::size_t samples = waiting_rows_.size();
@@ -199,7 +199,7 @@ class ArmStream {
     }
 
    private:
-    /// Output at which an angle is told; none of the record where it has none.
+    /// Output at which an angle error is taken; one beyond the record where the record does not reach that time.
     std::int64_t output_at(std::size_t i) const { return study_.angle_output(i).value_or(study_.schedule.outputs()); }
 
     /// Keeps angles at those times.

@@ -19,7 +19,7 @@
 /// A study of one scenario, or a point of a design: the ensemble simulated and every gyro's record analysed.
 namespace ringlock::study {
 
-/// What one gyro's record of one arm shows.
+/// Figures of one gyro's record of one arm.
 struct GyroStatistics {
     std::vector<allan::Point> allan;  ///< at Study::factors
     noise::NoiseFit noise;
@@ -46,11 +46,12 @@ struct Study {
     /// Averaging factors of the Allan deviations in outputs of the schedule: octaves, and those of output.tau_s and of
     /// the specification; ascending.
     std::vector<std::int64_t> factors;
-    /// Times since the start of the record at which angle errors are told: dither::spread_times_s, then those asked
-    /// for, then that of the specification.
+    /// Times since the start of the record at which angle errors are computed: dither::spread_times_s, then those of
+    /// the scenario's output, then that of the specification.
     std::vector<double> angle_times_s;
-    /// Output at which the angle of such a time is told: the nearest one. A record of whole samples may end up to a
-    /// sample before the duration asked for; a time beyond its end by no more is told at its end. Absent beyond that.
+    /// Output at which the angle of one of these times is taken: the nearest one. A record of whole samples may end up
+    /// to a sample before the requested duration; for a time that lies beyond its end by no more than that, the last
+    /// output is taken. Absent for later times.
     std::optional<std::int64_t> angle_output(std::size_t time) const;
     std::vector<gyro::Setup> gyros;  ///< parameters as drawn
     std::vector<ArmStatistics> arms;
@@ -74,11 +75,12 @@ bool shows_noise(const scenario::Arm& arm);
 /// Whether all gyros have one input rate, which does not change.
 bool has_steady_input(const scenario::Scenario& scenario);
 
-/// Predicts the effect of the injected noise, where an arm has nothing but it. May take some ten seconds.
+/// Predicts the effect of the injected noise, where an arm has injected noise and no compensator. May take some ten
+/// seconds.
 void predict_noise(Study& study);
 
-/// Told of samples of the angle output of an arm: those of gyros first_gyro + i, i < gyros, from sample first_sample
-/// on, [gyro][sample] in arcsec. From any thread.
+/// Samples of the angle output of an arm that are handed to a caller: those of gyros first_gyro + i, i < gyros, from
+/// sample first_sample on, [gyro][sample] in arcsec. From any thread.
 struct SampledAngles {
     std::size_t study = 0;  ///< of those that run together
     std::size_t arm = 0;
@@ -101,15 +103,15 @@ struct FinishedBlock {
     double turn_map_error_rad = 0.0;
 };
 
-/// Puts into its study what a block of it left. Each gyro must come once.
+/// Puts the results of a finished block into its study. Each gyro must come once.
 void take_up(Study& study, const FinishedBlock& block);
 
-/// Keeps what one block leaves. Where it is destroyed before finish(), the block failed and is forgotten.
+/// Keeps the results of one block. If it is destroyed before finish(), the block has failed and nothing of it is kept.
 class BlockKeeper {
    public:
     virtual ~BlockKeeper() = default;
     virtual bool wants_samples() const = 0;
-    /// Samples of an arm of the block, as they come, where it wants them.
+    /// Samples of an arm of the block, as they come, if wants_samples() is true.
     virtual void samples(const SampledAngles& samples) = 0;
     /// The block is done.
     virtual void finish(const FinishedBlock& block) = 0;
@@ -136,16 +138,17 @@ struct Stretch {
 /// simulated time but the number of octaves. Throws RunError, Interrupted.
 Study run(Study study, int threads, const OnSamples& on_samples = nullptr, const ensemble::Monitor& monitor = {});
 
-/// Simulates some gyros of several studies side by side: a gyro is to the bit what it is in any other company. The
-/// effect of injected noise is not predicted.
+/// Simulates some gyros of several studies side by side: the results of a gyro do not depend, to the bit, on the gyros
+/// that are simulated with it. The effect of injected noise is not predicted.
 void run(std::span<Study> studies, std::span<const Stretch> stretches, int threads, const MakeKeeper& make_keeper,
          const ensemble::Monitor& monitor);
 
 /// predict_noise() of several studies on that many threads: some seconds each for the noise of a drive, during which
-/// nobody asks whether they are cancelled. The observer is told of it as a stage. Throws Interrupted.
+/// cancellation is not checked. It is a stage for the observer. Throws Interrupted.
 void predict_noise(std::span<Study> studies, int threads, const ensemble::Monitor& monitor);
 
-/// Makes room for more gyros: what is there stays as it is in a study of so many. Without a sweep only.
+/// Makes room for more gyros; the results so far equal those of a study with that many gyros from the start. Without a
+/// sweep only.
 void extend(Study& study, std::int64_t gyros);
 
 /// Most samples of a gyro that noise coefficients are fitted to: N is known to 1 % from as many.

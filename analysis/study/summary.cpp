@@ -97,10 +97,11 @@ bool beyond_chance(double evidence, std::size_t records) {
 
 struct Models {
     bool red = false;          ///< most records have flicker, rate random walk or a ramp
-    bool angle_noise = false;  ///< white angle noise stands beside the random walk
+    bool angle_noise = false;  ///< there is white angle noise in addition to the random walk
 };
 
-/// What all records together choose: left to each record, those that miss angle noise would read N too high.
+/// The model that all records together select. If each record selected its own, those that miss angle noise would give
+/// too high an N.
 Models models_of(const ArmStatistics& arm) {
     double angle_noise_evidence = 0.0;
     std::int64_t red = 0;
@@ -111,8 +112,8 @@ Models models_of(const ArmStatistics& arm) {
     return {most(red, arm), beyond_chance(angle_noise_evidence, arm.gyros.size())};
 }
 
-/// Angle random walk is the ensemble's where all records together resolve it: gyros of an arm are alike, and a record
-/// too short to tell white noise from flicker by itself is not alone.
+/// The angle random walk is estimated for the ensemble where all records together resolve it. Gyros of an arm are
+/// alike: records that are too short to distinguish white noise from flicker one by one can do so together.
 Figure angle_random_walk(const Study& study, const ArmStatistics& arm, std::uint64_t seed) {
     Figure result;
     double evidence = 0.0;
@@ -145,8 +146,8 @@ std::vector<EnsemblePoint> ensemble_allan(const ArmStatistics& arm) {
     return ensemble_points(curves);
 }
 
-/// More than the output of a locked gyro moves over a record [arcsec]: a fringe, and through a reader what that leaves
-/// of the dither, and six standard deviations of its reference's noise.
+/// Upper limit of the motion of a locked gyro's output over a record [arcsec]: a fringe, and through a reader the
+/// dither that it leaves, and six standard deviations of its reference's noise.
 double still_arcsec(const scenario::Scenario& s) {
     if (!scenario::reads_arms(s)) return s.gyro.scale_factor_arcsec;
     constexpr double sigmas_of_difference = 6.0 * std::numbers::sqrt2;
@@ -250,7 +251,7 @@ ArwTheory arw_theory(const Study& study, const scenario::Arm& arm) {
     return theory;
 }
 
-/// Random walk of an arm, and why it has none.
+/// Describes the random walk of an arm, or the reason why it has no random walk.
 void describe_random_walk(ArmSummary& out, const Study& study, const ArmStatistics& arm, std::uint64_t seed) {
     out.arw_theory = arw_theory(study, arm.arm);
     const bool corrected = arm.arm.compensator != scenario::Compensator::none;
@@ -290,7 +291,7 @@ std::string why_not_randomised(const dither::NoiseEffectiveness& predicted, doub
     if (predicted.arw_over_theory && std::abs(*predicted.arw_over_theory - 1.0) > tenth) {
         why = fmt::format("the random walk is {:.2f} of that of random phases", *predicted.arw_over_theory);
     }
-    // Of a mean over one hour, a random walk of N deg/sqrt(h) leaves N deg/h.
+    // The mean rate over one hour has a standard deviation of N deg/h for a random walk of N deg/sqrt(h).
     if (predicted.bias_deg_h && std::abs(*predicted.bias_deg_h) > arw_deg_rt_h && arw_deg_rt_h > 0.0) {
         why += fmt::format("{}a bias of {:.2g} deg/h stays", why.empty() ? "" : ", ", *predicted.bias_deg_h);
     }

@@ -13,7 +13,7 @@
 
 namespace ringlock::study {
 
-/// A figure over the ensemble; what the data do not show is absent.
+/// A figure over the ensemble; values that the data do not resolve are absent.
 struct Figure {
     std::optional<double> median;
     std::optional<double> lo;         ///< central 68.27 % of the gyros
@@ -58,7 +58,7 @@ struct Step {
     double last_deg_h = 0.0;
 };
 
-/// Angle random walk of arm `noise_injected` over that of another: what a cure takes away.
+/// Angle random walk of arm `noise_injected` over that of another: the factor by which a compensator reduces it.
 struct Reduction {
     std::optional<double> ratio;  ///< of the medians; absent where the other's is not resolved
     double lo = 0.0;              ///< from the medians' 95 % intervals, or from the other's upper limit
@@ -68,15 +68,16 @@ struct Reduction {
 /// One deviation of the Allan family, of an ensemble.
 struct FamilyDeviation {
     allan::Estimator estimator = allan::Estimator::oadev;
-    std::vector<EnsemblePoint> points;  ///< deg/h, time errors in arcsec; lo, hi and edf NaN where there are none
+    std::vector<EnsemblePoint> points;  ///< deg/h, time errors in arcsec; lo, hi and edf are NaN for deviations without
+                                        ///< interval
 };
 
 /// Effect of the injected noise, as predicted and as measured in the simulation.
 struct NoiseFigures {
     dither::NoiseEffectiveness predicted;
     /// Why the turns are not at random phases, by the prediction: a random walk that is off by a tenth, or a bias
-    /// beyond what the random walk leaves of a mean over an hour. Empty where they are, and where nothing was
-    /// predicted.
+    /// larger than the contribution of the random walk to a mean over an hour. Empty where the turns are at random
+    /// phases, and where nothing was predicted.
     std::string not_randomised;
     double change_per_cycle_percent = 0.0;  ///< as predicted, of the dither's amplitude
     struct Measured {
@@ -114,8 +115,8 @@ struct ArmSummary {
     std::vector<SweepPoint> sweep;                    ///< empty without a sweep
     std::vector<Step> steps;                          ///< of the closed form, in the order of the sweep
     std::optional<ScaleFactor> scale_factor;          ///< of sweeps of three rates and more, with two gyros and more
-    std::vector<FamilyDeviation> family;              ///< empty unless asked for
-    std::vector<EnsemblePoint> asked;                 ///< of stored samples, at times asked for; empty unless asked for
+    std::vector<FamilyDeviation> family;              ///< empty unless requested
+    std::vector<EnsemblePoint> asked;                 ///< of stored samples, at requested times; empty unless requested
     std::optional<NoiseFigures> noise_effectiveness;  ///< of the arm `noise_injected`
     std::optional<Reduction> arw_reduction;           ///< of arms with injected noise other than `noise_injected`
 };
@@ -134,14 +135,14 @@ struct Summary {
     Theory theory;               ///< of the scenario's device without spread
 };
 
-/// Whether a random walk, or a limit of it, is told of the arm.
+/// Whether the arm has a random walk or an upper limit of it.
 bool has_arw(const ArmSummary& arm);
 
 /// Whether rates of the arm's sweep are known in closed form.
 bool has_closed_form(const ArmSummary& arm);
 
-/// Highest rate of the sweep up to which, from its first rate that can tell on, every gyro of the arm is locked; none
-/// where the first is not.
+/// Highest rate of the sweep up to which every gyro of the arm is locked, counted from the first rate that is large
+/// enough to distinguish a locked gyro from a turning one; absent where a gyro is not locked at that rate.
 std::optional<double> locked_up_to_deg_h(const ArmSummary& arm);
 
 /// The root of the mean variance of some gyros, with the 68.27 % interval of their degrees of freedom together.
@@ -151,7 +152,7 @@ std::vector<EnsemblePoint> ensemble_points(const std::vector<std::vector<allan::
 
 /// Sums the study up. An angle random walk is claimed where the records of an arm show white rate noise. None is
 /// claimed for a locking arm on which no white rate noise acts, injected or declared, and that no compensator corrects:
-/// its error is deterministic, a dead band and a staircase, whatever spectrum it has. No bias instability is claimed
+/// its error is deterministic, a dead band and a staircase, regardless of its spectrum. No bias instability is claimed
 /// unless most records resolve an Allan floor, and none for arms without injected noise but `ideal`.
 Summary summarise(const Study& study);
 

@@ -26,7 +26,7 @@ std::size_t find_column(const Layout& layout, const std::string& asked, const st
         unquoted = unquoted.substr(1, unquoted.size() - 2);
     }
     std::vector<std::size_t> found;
-    // The first name of a header that is a comment may be asked for with the mark of comments, as "%time".
+    // The first name of a header that is a comment may be requested with the mark of comments, as "%time".
     if (layout.has_header && unquoted.size() > 1 &&
         std::string_view("#%").find(unquoted.front()) != std::string::npos &&
         without_mark(unquoted) == layout.columns.front().heading) {

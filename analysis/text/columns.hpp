@@ -6,11 +6,11 @@
 
 namespace ringlock::text {
 
-/// The column that is asked for: by its heading, by its name without the unit where only one is called so, or by its
-/// number from 1. Throws InputError where there is none or the name stands for several.
+/// Index of the requested column: by its heading, by its name without the unit where only one column has that name, or
+/// by its number from 1. Throws InputError where no column or several columns have that name.
 std::size_t find_column(const Layout& layout, const std::string& asked, const std::string& file);
 
-/// What columns there are, for messages.
+/// List of the columns, for messages.
 std::string columns_text(const Layout& layout);
 
 }  // namespace ringlock::text

@@ -10,7 +10,7 @@
 namespace ringlock::text {
 namespace {
 
-constexpr std::size_t most_rows = 200;  // at the end of the sample, behind whatever stands above the table
+constexpr std::size_t most_rows = 200;  // at the end of the sample, behind the lines above the table
 
 /// Rows with at least one value by their number of fields, and the number of most; the first of two that are as many.
 std::size_t commonest_width(Fields& divider, const Candidates& candidates, std::size_t from) {
@@ -99,7 +99,7 @@ Evidence evidence_for(const Dialect& dialect, const Candidates& candidates) {
         break;
     }
     out.header_fits = !header.empty() && divider.divide(header, true).size() == out.columns;
-    // "1,2" is one number only where a single name above says so.
+    // "1,2" is one number only if the header above has a single name.
     const bool one_name = !headings(header, dialect, 1).empty() && header.find(',') == std::string_view::npos;
     if (dialect.decimal_comma && out.columns == 1 && !one_name) out.score = 0.0;
     return out;
@@ -115,7 +115,7 @@ Evidence best_evidence(const std::vector<std::string>& sample, const Options& op
             if (decimal_comma && delimiter == ',') continue;
             const Dialect dialect{delimiter, decimal_comma};
             const Evidence found = evidence_for(dialect, candidates_of(sample, options.skip, dialect));
-            // What parts nothing is no delimiter: one column is one of white space.
+            // A character that divides no row is no delimiter: a single column counts as delimited by white space.
             if (found.columns < 2 && delimiter != ' ' && !options.delimiter) continue;
             if (explains_better(found, best)) best = found;
         }

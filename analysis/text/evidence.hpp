@@ -7,7 +7,7 @@
 #include "analysis/text/fields.hpp"
 #include "analysis/text/layout.hpp"
 
-/// What the lines of a text look like in a dialect.
+/// Structure of the lines of a text in a dialect.
 namespace ringlock::text {
 
 /// The lines of a sample that may be rows in a dialect: neither empty nor comments nor skipped.
@@ -17,10 +17,10 @@ struct Candidates {
 };
 Candidates candidates_of(const std::vector<std::string>& sample, std::size_t skip, const Dialect& dialect);
 
-/// What the rows have in common.
+/// Common structure of the rows.
 struct Evidence {
     Dialect dialect;
-    std::size_t columns = 0;    ///< of most rows with numbers; 0 where there are none
+    std::size_t columns = 0;    ///< of most rows with numbers; 0 without such rows
     std::vector<bool> numeric;  ///< which columns hold numbers
     double score = 0.0;         ///< rows of that many columns, times the share of numbers in them
     std::size_t others = 0;     ///< rows without values, or with another number of fields
@@ -32,7 +32,7 @@ Evidence evidence_for(const Dialect& dialect, const Candidates& candidates);
 /// The dialect that explains the lines best; `delimiter`, where it is given, is not in question.
 Evidence best_evidence(const std::vector<std::string>& sample, const Options& options);
 
-/// How a row goes with the columns of the evidence.
+/// Agreement of a row with the columns of the evidence.
 enum class RowKind {
     other,  ///< another number of fields
     words,  ///< no number where numbers are
@@ -42,7 +42,7 @@ enum class RowKind {
 };
 RowKind kind_of(const std::vector<std::string_view>& fields, const Evidence& evidence);
 
-/// A value that is there or says that it is missing; an empty field is none.
+/// A value, or a word for a missing value; an empty field is no value.
 bool is_value(std::string_view field, const Dialect& dialect);
 
 }  // namespace ringlock::text

@@ -65,7 +65,7 @@ const std::vector<std::string_view>& Fields::divide(std::string_view row, bool w
     return fields_;
 }
 
-/// False where there is something that wants the slow way: quotes, a comment.
+/// False where the row needs the slow method: quotes, a comment.
 bool Fields::divide_plain(std::string_view row) {
     const char* begin = row.data();
     const char* const end = begin + row.size();

@@ -35,7 +35,7 @@ class Fields {
 
     const Dialect& dialect() const { return dialect_; }
 
-    /// Divides a row; what is given out stays until the next one. With `whole` a `#` in it is no comment.
+    /// Divides a row; the fields are valid until the next call. With `whole` a `#` in it is no comment.
     const std::vector<std::string_view>& divide(std::string_view row, bool whole = false);
 
     /// Number, from 1, of the field of that row whose quotes do not close or are followed by text; 0 where none is.

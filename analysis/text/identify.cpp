@@ -68,7 +68,7 @@ constexpr Magic magics[] = {
     {0, "\0\0\xfe\xff"sv, {"text in UTF-32", "save it as UTF-8"}},
 };
 
-/// Archives of the format zip are told apart by the names of their first members.
+/// Archives of the format zip are distinguished by the names of their first members.
 Identity identify_zip(std::string_view first) {
     if (first.find(".npy") != std::string_view::npos) {
         return {"a NumPy archive (.npz)", "save the arrays with numpy.savetxt, or as HDF5"};

@@ -4,10 +4,10 @@
 /// Files that are no text, by their first bytes.
 namespace ringlock::text {
 
-/// What a file is that cannot be read as text, and what its owner can do.
+/// Format of a file that cannot be read as text, and advice for its owner.
 struct Identity {
     std::string_view kind;    ///< as in "is ...", with its article; empty where the bytes may be text
-    std::string_view advice;  ///< what to do, as an imperative
+    std::string_view advice;  ///< an instruction, as an imperative
 };
 
 /// Looks at the first bytes of a file, 512 of them or all that there are. Files that are packed with gzip, xz or

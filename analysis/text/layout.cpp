@@ -139,7 +139,7 @@ class Finder {
         refuse_numbers_above(above);
     }
 
-    /// A header at most, with no numbers below it: the line with the names that are asked for, or the last one.
+    /// A header at most, with no numbers below it: the line with the requested names, or the last one.
     void without_rows() {
         std::vector<std::string> names;
         std::size_t line = 0;
@@ -197,8 +197,8 @@ class Finder {
         return end > candidate;
     }
 
-    /// A row of names right above the rows, or above a row of units there. One with the names that are asked for may
-    /// stand higher: what is between are rows, be they wrong.
+    /// A row of names right above the rows, or above a row of units there. A row with the requested names may stand
+    /// higher: the lines between are then rows, even if they are wrong.
     bool header_above(std::size_t& above) {
         if (first_ == 0) return false;
         std::size_t header = first_ - 1;
@@ -294,8 +294,8 @@ class Finder {
         return names.size() > 1 || !split_unit(names[0]).unit.empty();
     }
 
-    /// The numbers of the columns as names, which is what pandas writes for a table without names: 0, 1, 2, ... behind
-    /// an empty field, or above rows that all have decimals.
+    /// The numbers of the columns as names, as pandas writes them for a table without names: 0, 1, 2, ... behind an
+    /// empty field, or above rows that all have decimals.
     void header_of_numbers() {
         const auto& fields = row(first_);
         const std::size_t index = fields[0].empty() ? 1 : 0;

@@ -21,15 +21,15 @@ struct Layout {
     Dialect dialect;
     std::vector<Column> columns;  ///< none where the text has no rows
     bool has_header = false;
-    std::size_t header_line = 0;  ///< from 1; 0 where there is none
-    std::size_t first_line = 0;   ///< of the first row, from 1; 0 where there is none
+    std::size_t header_line = 0;  ///< from 1; 0 without a header
+    std::size_t first_line = 0;   ///< of the first row, from 1; 0 without rows
     std::vector<std::string> notes;
 
     /// A line for messages about the columns as a whole.
     std::size_t line() const { return header_line > 0 ? header_line : first_line; }
 };
 
-/// The columns that will be asked for, which help to tell a header from data.
+/// The columns that will be requested, which help to distinguish a header from data.
 struct Wanted {
     std::vector<std::string> names;  ///< or numbers from 1
     bool header_needed = false;      ///< only names count, and a row of text above numbers is the header

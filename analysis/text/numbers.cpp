@@ -19,8 +19,8 @@ std::errc parse_whole_field(std::string_view field, Number& value) {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/// "1.#INF00", "-1.#IND", "1.#QNAN0": what the C library of Windows prints, with the digits that were asked for; short
-/// of these it rounds the words themselves ("1.#J", "1.#QO").
+/// "1.#INF00", "-1.#IND", "1.#QNAN0": the output of the C library of Windows, with the requested number of digits; with
+/// fewer digits it rounds the words themselves ("1.#J", "1.#QO").
 bool parse_windows_word(std::string_view field, double& value) {
     const bool negative = field.starts_with('-');
     if (negative || field.starts_with('+')) field.remove_prefix(1);

@@ -14,7 +14,7 @@ bool parse_number(std::string_view field, double& value, bool decimal_comma = fa
 /// not.
 bool parse_value(std::string_view field, double& value, bool decimal_comma = false);
 
-/// For messages and help: what a field may say where a value is missing.
+/// For messages and help: words of a field for a missing value.
 inline constexpr std::string_view missing_words = "nan, NA, N/A, null, none, -, --, or nothing between delimiters";
 
 /// A whole number of digits alone. errc() where it is one; result_out_of_range where 64 bits do not hold it.

@@ -6,7 +6,7 @@
 /// The bytes of a text file.
 namespace ringlock::text {
 
-/// Bytes, one after the other. What wraps another source owns it.
+/// Bytes, one after the other. A source that wraps another one owns it.
 class Source {
    public:
     Source() = default;
@@ -15,7 +15,7 @@ class Source {
     virtual ~Source() = default;
 
     /// Reads up to `size` bytes, at least one where there are more; 0 at the end. Throws InputError, naming the file,
-    /// where it cannot be read, is damaged or ends too early, and Interrupted where the user wants no more.
+    /// where it cannot be read, is damaged or ends too early, and Interrupted where the user asks to stop.
     virtual std::size_t read(char* to, std::size_t size) = 0;
 };
 
@@ -38,7 +38,7 @@ class Peeked final : public Source {
 /// of a kind that is no text (identify()).
 std::unique_ptr<Source> open_text(const std::string& path);
 
-/// The same of bytes that somebody else reads; `name` is what messages call them.
+/// The same for bytes of another source; `name` is their name in messages.
 std::unique_ptr<Source> as_text(std::unique_ptr<Source> bytes, const std::string& name);
 
 }  // namespace ringlock::text

@@ -119,7 +119,7 @@ bool parse_iso(std::string_view text, Stamp& stamp) {
     return parse_time_of_day(trimmed(text), stamp);
 }
 
-/// "1403636579.758555392" keeps its digits; what has an exponent or is a word goes through a double.
+/// "1403636579.758555392" keeps its digits; a number with an exponent, and a word, are read as a double.
 bool parse_decimal(std::string_view field, bool decimal_comma, Stamp& stamp) {
     std::string_view text = field;
     const bool negative = text.starts_with('-');

@@ -7,10 +7,10 @@
 /// Time stamps, to the last digit that is written.
 namespace ringlock::text {
 
-/// What time stamps are counted in.
+/// Unit of time stamps.
 struct TimeUnit {
     std::string name = "s";  ///< of --time-unit: s, ms, us, ns, mjd, iso; or min, h, d where a header declares these
-    double seconds = 1.0;    ///< in one; of ISO dates, which are kept in seconds since 1970, 1
+    double seconds = 1.0;    ///< in one unit; 1 for ISO dates, which are kept in seconds since 1970
     bool iso = false;
 
     bool operator==(const TimeUnit&) const = default;
@@ -30,15 +30,16 @@ struct Stamp {
     std::int64_t whole = 0;
     double part = 0.0;  ///< NaN where the time is missing
 
-    /// Of a double, whose digits are all that there is.
+    /// From a double, whose digits are all that is known.
     static Stamp of(double time);
     /// Units from `other` to this one.
     double since(const Stamp& other) const;
     double value() const { return static_cast<double>(whole) + part; }
 };
 
-/// A stamp as a text says it: a number or, with `iso`, a date with or without a time of day (2024-05-01T12:00:00.5Z,
-/// a blank for the T, an offset such as +02:00; without one it is taken for UTC). False where it is none.
+/// A stamp as text: a number or, with `iso`, a date with or without a time of day (2024-05-01T12:00:00.5Z,
+/// a blank for the T, an offset such as +02:00; without an offset it is taken for UTC). False where the text is no
+/// stamp.
 bool parse_stamp(std::string_view field, bool iso, bool decimal_comma, Stamp& stamp);
 
 /// Whether a text looks like such a date.

@@ -15,14 +15,14 @@ namespace ringlock::text {
 /// A table in a text file, read row by row in memory that does not grow with the file.
 class Table {
    public:
-    /// What is to be done with comments: their line, from 1, and their text without its mark.
+    /// Called with each comment: its line, from 1, and its text without the mark.
     using OnComment = std::function<void(std::size_t line, std::string_view text)>;
 
     /// Opens the file, or standard input for "-", and finds the table by its first lines: up to a thousand rows that
-    /// look like numbers, or 1 MiB, comments not counted. What is not obvious is said in a notice, unless
+    /// look like numbers, or 1 MiB, comments not counted. Choices that are not obvious are reported in a notice, unless
     /// options.quiet. Throws InputError as open_text(), Lines and find_layout() do.
     Table(const std::string& path, const Options& options, const Wanted& wanted, OnComment on_comment);
-    /// The same of bytes that are open already; `name` is what messages call them.
+    /// The same for bytes that are open already; `name` is their name in messages.
     Table(std::unique_ptr<Source> from, const std::string& name, const Options& options, const Wanted& wanted,
           OnComment on_comment);
 

@@ -10,7 +10,7 @@ namespace {
 
 using namespace std::string_view_literals;
 
-// Times, angles, accelerations, lengths, temperatures, electricity, pressure, counts, and what joins them.
+// Times, angles, accelerations, lengths, temperatures, electricity, pressure, counts, and the words that join them.
 constexpr std::array symbols = std::to_array<std::string_view>({"s",           "sec",         "secs",
                                                                 "second",      "seconds",     "ms",
                                                                 "msec",        "millisecond", "milliseconds",

@@ -17,8 +17,8 @@ struct NameAndUnit {
 };
 NameAndUnit split_unit(std::string_view heading);
 
-/// What a cell of a row of units says: "(deg/s)", "[s]", "rad/s" or, of what has none, "-" or "1"; nullopt where it is
-/// no unit.
+/// The unit in a cell of a row of units: "(deg/s)", "[s]", "rad/s" or, for a column without unit, "-" or "1"; nullopt
+/// where the cell is no unit.
 std::optional<std::string> unit_cell(std::string_view cell);
 
 }  // namespace ringlock::text

@@ -18,7 +18,7 @@ using namespace std::string_view_literals;
 
 constexpr std::size_t piece_bytes = std::size_t{1} << 17;
 
-/// What the three have in common: packed bytes in pieces, and what to say of damage.
+/// Common part of the three formats: packed bytes in pieces, and the message for damaged data.
 class Unpacking : public Source {
    public:
     Unpacking(std::unique_ptr<Source> from, const char* program, std::string name)
@@ -177,7 +177,8 @@ class Zstandard final : public Unpacking {
                 fail_damaged(ZSTD_getErrorName(left));
             }
             within_ = left != 0;
-            more_within_ = out.pos == out.size && left != 0;  // what it still holds comes out before it takes more in
+            more_within_ = out.pos == out.size && left != 0;  // the bytes that it still holds come out before it takes
+                                                              // more in
         }
         return out.pos;
     }

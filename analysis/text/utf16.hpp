@@ -15,7 +15,7 @@ enum class Encoding {
     utf16_be,
 };
 
-/// Told by the mark of the byte order or, where there is none, by zero bytes in every other place.
+/// Detected by the mark of the byte order or, without a mark, by zero bytes in every other position.
 Encoding encoding_of(std::string_view first);
 
 /// UTF-8 without the mark. Throws InputError, naming the character, where the bytes are no UTF-16.

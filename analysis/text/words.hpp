@@ -29,7 +29,8 @@ std::string name_of_file(const std::string& path);
 /// "a, b, c", at most the first 20.
 std::string listed(const std::vector<std::string>& names);
 
-/// The name that `asked` may have been meant to be: another case, or few letters off; empty where none is.
+/// The name that `asked` may have been meant to be: another case, or few letters different; empty if there is no such
+/// name.
 std::string nearest(const std::string& asked, const std::vector<std::string>& names);
 
 }  // namespace ringlock::text

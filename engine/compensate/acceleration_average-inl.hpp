@@ -13,8 +13,8 @@ namespace ringlock::compensate::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Mean of the positive values seen: of all of them at first, then of about the last 512. The acceleration that two
-/// pulses give is bent by the lock-in in step with the phase; over turns that averages out.
+/// Mean of the positive values seen: of all of them at first, then of about the last 512. The lock-in distorts the
+/// acceleration that two pulses give, in step with the phase; over many turns that averages out.
 template <class V>
 struct AverageOf {
     V mean, count;

@@ -9,19 +9,19 @@
 namespace ringlock::compensate {
 
 /// The exact compensator with a coupling that it learns online: neither lock-in threshold nor coupling phase need be
-/// told, the calibration's threshold is where it starts from.
+/// known; it starts from the calibration's threshold.
 ///
-/// The lock-in does not only kick the phase at a turn, it bends the path there: pulses come early on one side and late
-/// on the other, by an amount that shows b sin(psi + e) and b cos(psi + e) at every single turn, whatever the dither
-/// and the input do. FractionRecovery adds up the normal equations of that, CouplingFilter makes of those of 128 turns
-/// each what is known of the coupling, and this compensator inverts the turn map with it.
+/// The lock-in does not only kick the phase at a turn, it also distorts the path there: pulses come early on one side
+/// and late on the other, by an amount that shows b sin(psi + e) and b cos(psi + e) at every single turn, independently
+/// of dither and input. FractionRecovery adds up the normal equations of that, CouplingFilter estimates the coupling
+/// from those of 128 turns each, and this compensator inverts the turn map with it.
 ///
 /// Its state beyond Exact's are five sums, the filter's 15 numbers, and the pulse tables for the coupling as known,
 /// which are made anew when the estimate has moved by a hundredth. Readings are to be as sampled, with pulses: it
 /// recovers the phase from them by itself.
 class Adaptive final : public LaneCompensator {
    public:
-    /// \param electronics    what the readout's noise is
+    /// \param electronics    they determine the noise of the readout
     /// \param tolerance_rad  of the turn map's tables, for one turn
     Adaptive(const Calibration& calibration, const readout::Electronics& electronics, double tolerance_rad);
 

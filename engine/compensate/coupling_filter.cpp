@@ -12,9 +12,10 @@ constexpr double enough_to_begin = 0.15;  // error of the coupling over itself
 // Bends are linear in the coupling near that of the tables: farther off, their solution only serves for better tables.
 constexpr double linear_within = 0.05;
 constexpr double linear_sigmas = 4.0;
-constexpr double corrections_before = 64.0;  // what the electronics' own figures of their noise count for
+constexpr double corrections_before = 64.0;  // weight of the electronics' own figures of their noise, in corrections
 constexpr double corrections_kept = 8192.0;  // of 128 turns: an hour
-constexpr double largest_surprise = 9.0;     // what a single correction may say of the noise, in variances
+constexpr double largest_surprise = 9.0;     // largest square of a single correction that enters the noise, in
+                                             // variances
 constexpr double short_over_long = 1.1;      // in variances: before that the two memories are too much the same
 
 double squared(double value) { return value * value; }
@@ -61,7 +62,7 @@ void CouplingFilter::predict(double duration_s) {
 }
 
 void CouplingFilter::correct(const Bends& bends, const Coupling& tables, double turns) {
-    // x and y of the estimate, how they go with the logarithm l and the phase e, and the normal equations of these.
+    // x and y of the estimate, their derivatives by the logarithm l and the phase e, and the normal equations of these.
     const double ratio = b_rad_s_ / tables.b_rad_s;
     const double cosine = ratio * std::cos(phase_rad_ - tables.phase_rad);
     const double sine = ratio * std::sin(phase_rad_ - tables.phase_rad);

@@ -25,8 +25,8 @@ using V = hn::Vec<D>;
 
 constexpr int most_steps = 20000;
 
-/// What the phase gains from the zero-rate point, where its sine and cosine are given, to the dither's turn, and the
-/// lock-in's share of that. `sine` and `cosine` become those at the dither's turn. False where it is too far.
+/// Gain of the phase from the zero-rate point, where its sine and cosine are given, to the dither's turn, and the
+/// lock-in's share of that gain. `sine` and `cosine` become those at the dither's turn. False where it is too far.
 HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V inverse_angle, V& sine, V& cosine,
                                     V& phase_rad, V& lockin_rad) {
     const V zero = hn::Zero(d);
@@ -66,8 +66,8 @@ HWY_INLINE bool walk_to_dither_turn(D d, const gm::UprightSide<V>& side, V inver
     return false;
 }
 
-/// What was known of the rate or the coupling has changed: from the last reading to the dither's turn anew, so that the
-/// error told there makes no step.
+/// The estimate of the rate or the coupling has changed: the path from the last reading to the dither's turn is
+/// computed anew, so that the error returned there makes no step.
 bool place_last_turn(D d, bool minimum, std::size_t lane, Exact::State& state) {
     const auto load = [&](const simd::Lanes& values) HWY_ATTR { return hn::Load(d, values.data() + lane); };
     const auto store = [&](V value, simd::Lanes& to) HWY_ATTR { hn::Store(value, d, to.data() + lane); };
@@ -94,7 +94,7 @@ bool place_last_turn(D d, bool minimum, std::size_t lane, Exact::State& state) {
     return true;
 }
 
-/// Rows [first_row, last_row) of the readings; errors are told less errors.whole. `changed`: rate or coupling are
+/// Rows [first_row, last_row) of the readings; errors are given less errors.whole. `changed`: rate or coupling are
 /// others than at the row before. `first_turn`: number of turns seen before the first row.
 bool observe_lanes(std::size_t lanes, const propagate::TurnTables& tables, const Exact::Parts& parts,
                    const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row, bool begun,
@@ -308,7 +308,7 @@ void Exact::make_tables(std::size_t lane) {
 void Exact::see_minima(const readout::LaneReadings& readings, std::size_t first_row, std::size_t last_row,
                        const LaneErrors* errors) {
     // Minima only: the dither drops out but for its noise, which a long baseline makes small. The lock-in's share is
-    // taken away as far as it is known.
+    // subtracted as far as it is known.
     const std::size_t first = first_row + (readings.minimum(first_row) ? 0 : 1);
     if (first >= last_row) return;
     const std::size_t last = first + (last_row - 1 - first) / 2 * 2;

@@ -13,21 +13,21 @@ namespace ringlock::compensate {
 ///
 ///     s (2 shift + 2 arg[(1 + z exp(-i x_0)) (1 - z exp(-i x_1))])
 ///
-/// beyond drive and input: no first order, no knowledge of what lies between. The amplitude, on which z depends,
-/// follows from the swing measured between the turns; the input rate from the corrected output over 16 to 32 s. Phases
-/// are carried from the zero-rate point, where they are read, to the dither's turn by the Taylor series of the equation
-/// of motion.
+/// beyond drive and input: no first order, and no knowledge of the phase between the turns. The amplitude, on which z
+/// depends, follows from the swing measured between the turns; the input rate from the corrected output over 16 to 32
+/// s. Phases are carried from the zero-rate point, where they are read, to the dither's turn by the Taylor series of
+/// the equation of motion.
 ///
 /// Behind a noisy drive the amplitude changes over the half cycle, too (docs/noise-injection.md). A swing is the sum of
-/// the amplitudes at its two turns, and tells that at the later one where the earlier one is known.
+/// the amplitudes at its two turns, and determines that at the later one where the earlier one is known.
 ///
 /// The rate must be known roughly before the first correction: errors of the first piece of readings of a run are
-/// computed with the mean rate over that piece, which ought to hold two minima at least: with a rate of nothing the
-/// first few corrections of a fast input are off by per cents. How later readings are cut into pieces does not matter.
+/// computed with the mean rate over that piece, which ought to hold two minima at least: with a rate of zero the first
+/// few corrections of a fast input are wrong by some per cent. How later readings are cut into pieces does not matter.
 /// Where the phase's turn lies after the dither's, the half cycle under way is taken to have the mean amplitude, as its
 /// swing is not known yet. At the paper's device with injected noise that leaves 1e-5 of the error of a half cycle,
-/// 2e-4 at 5000 deg/h, most of which the next half cycle takes back; without noise 5e-7, 3e-5 at 5000 deg/h. Rates that
-/// vary within the 128 turns between two estimates of the rate are not known: 1.5e-3 at a vibration of 100 deg/h.
+/// 2e-4 at 5000 deg/h, most of which the next half cycle compensates; without noise 5e-7, 3e-5 at 5000 deg/h. Rates
+/// that vary within the 128 turns between two estimates of the rate are not known: 1.5e-3 at a vibration of 100 deg/h.
 class Exact final : public LaneCompensator {
    public:
     /// `tolerance_rad`: of the tables, for one turn. Throws RunError where a dither has too few fringes for a turn map.
@@ -51,8 +51,8 @@ class Exact final : public LaneCompensator {
         simd::Lanes rate_rad_s;               ///< as estimated
         // Of the turn before: sine and cosine of its upright phase at the dither's turn, and that phase.
         simd::Lanes sine, cosine, turn_fringes, turn_whole;
-        // Where the amplitude changes over half cycles: that of the dither at that turn, and the input's rate as the
-        // middles between turns tell it.
+        // Where the amplitude changes over half cycles: that of the dither at that turn, and the input's rate as
+        // estimated from the middles between turns.
         simd::Lanes turn_amplitude_rad, middles_rate_rad_s;
         simd::Lanes error_fringes;  ///< at the dither's turn
         simd::Lanes error_whole;

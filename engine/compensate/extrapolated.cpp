@@ -88,7 +88,8 @@ void observe_lanes(std::size_t lanes, const readout::Electronics& electronics, c
             const V tau = tau_numerator / tau_denominator;
             const V before = sm::fma(d, s1[0], tau, hn::Neg(sy[0])) / s0[0];
             const V after = sm::fma(d, s1[1], tau, hn::Neg(sy[1])) / s0[1];
-            // Phase and instant of the turn take a pulse on either side and one more; without these nothing is told.
+            // Phase and instant of the turn take a pulse on either side and one more; without these there is no
+            // estimate.
             const auto enough = hn::And(fewest >= one, most >= one + one);
             const V half_kick = hn::IfThenElseZero(enough, half * per_rad * sign * (after - before));
             if (errors.middles) store(error + (error_whole - told_whole), errors.middle_fringes[i]);

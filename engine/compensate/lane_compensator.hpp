@@ -10,7 +10,7 @@
 /// Lock-in compensators: they see readings and a calibration, never the truth.
 namespace ringlock::compensate {
 
-/// What an operator has measured about each gyro of a block beforehand.
+/// Calibration of each gyro of a block, which an operator has measured beforehand.
 struct Calibration {
     std::size_t lanes = simd::lanes;                         ///< gyros of the block
     std::array<double, simd::lanes> b_rad_s{};               ///< (2 pi / K) Omega_L
@@ -28,8 +28,8 @@ struct Calibration {
 struct LaneErrors {
     std::vector<simd::Lanes> fringes;  ///< [turns], less ...
     simd::Lanes whole;                 ///< ... these whole fringes
-    /// [turns] up to the middle of the half cycle that ends at the turn, less `whole`: what the angle between the turns
-    /// is to be corrected by, because the lock-in acts next to the turns alone. Filled where `middles` asks for it.
+    /// [turns] up to the middle of the half cycle that ends at the turn, less `whole`: the correction of the angle
+    /// between the turns, since the lock-in acts next to the turns alone. Filled where `middles` asks for it.
     std::vector<simd::Lanes> middle_fringes;
     bool middles = false;
 

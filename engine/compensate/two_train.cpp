@@ -21,7 +21,7 @@ using V = hn::Vec<D>;
 using Average = AverageOf<V>;
 
 constexpr std::int64_t turns_between_solutions = 128;
-// Trains that look alike do not tell B1 from B2: least square of the sine between them.
+// Trains that are nearly parallel do not distinguish B1 from B2: least square of the sine of the angle between them.
 constexpr double least_determinant = 1e-6;
 
 void observe_lanes(std::size_t lanes, const readout::LaneReadings& readings, TwoTrain::State& state,

@@ -49,7 +49,7 @@ fs::path resolve(const fs::path& target) {
         fmt::format("cannot write {}: directory {}: {}; {}", printable(target), directory, reason(error), what_to_do));
 }
 
-/// This machine as the names of partial files have it.
+/// Name of this machine in the names of partial files.
 std::string host() {
     constexpr std::size_t longest = 40;
     std::array<char, HOST_NAME_MAX + 1> name{};
@@ -61,8 +61,8 @@ std::string host() {
     return text;
 }
 
-/// A lock that goes with the process, wherever its number means something: a container has numbers of its own. File
-/// systems that know no locks are lived with.
+/// A lock that ends with the process. It is valid across containers, in which process numbers differ. File systems
+/// without locks are accepted.
 bool lock_for_life(int descriptor) {
     struct flock whole = {};
     whole.l_type = F_WRLCK;
@@ -70,7 +70,7 @@ bool lock_for_life(int descriptor) {
     return fcntl(descriptor, F_OFD_SETLK, &whole) == 0 || (errno != EAGAIN && errno != EACCES);
 }
 
-/// Creates a file that did not exist, beside the target. Nobody else may read it if he may not read the file that it
+/// Creates a file that did not exist, next to the target. Others must not read it if they may not read the file that it
 /// replaces, which is not known before the end.
 Descriptor claim(const fs::path& target, bool replaces, fs::path& partial) {
     const std::string name = host();
@@ -124,8 +124,8 @@ void remove_abandoned(const fs::path& target) {
     }
 }
 
-/// Brings a file to the disk; returns 0 or errno. Ends with Interrupted where the user asks to stop meanwhile, not
-/// where he did before: who writes after that wants the file.
+/// Brings a file to the disk; returns 0 or errno. Throws Interrupted if the user asks to stop during the call, not if
+/// that happened before: a caller that writes after an interruption needs the file.
 int bring_to_disk(int descriptor) {
     const bool before = interrupted();
     struct stat status = {};
@@ -135,7 +135,7 @@ int bring_to_disk(int descriptor) {
     for (off_t begin = 0; begin < status.st_size; begin += piece) {
         if (!before) check_interrupt();
         constexpr unsigned now = SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER;
-        if (sync_file_range(descriptor, begin, piece, now) != 0) break;  // fsync() says what is wrong
+        if (sync_file_range(descriptor, begin, piece, now) != 0) break;  // fsync() reports the error
     }
     return fsync(descriptor) == 0 || errno == EINVAL ? 0 : errno;
 }
@@ -143,7 +143,7 @@ int bring_to_disk(int descriptor) {
 /// Whether a call failed because the file system, or the kernel, does not know it.
 bool is_unknown(int error) { return error == EINVAL || error == ENOSYS || error == EOPNOTSUPP || error == EPERM; }
 
-/// Gives a file another name that nobody has; returns 0 or errno, EEXIST where somebody has it.
+/// Gives a file another name that no file has; returns 0 or errno, EEXIST if a file has that name.
 int move_to_free_name(const fs::path& from, const fs::path& to) {
     if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;
     if (!is_unknown(errno)) return errno;
@@ -225,7 +225,7 @@ void AtomicPath::keep_owner_and_mode() const {
     mode_t mode = old.st_mode & 07777;
     const bool owner_kept = old.st_uid == ours.st_uid || fchown(descriptor_.get(), old.st_uid, as_it_is) == 0;
     const bool group_kept = old.st_gid == ours.st_gid || fchown(descriptor_.get(), as_it_is, old.st_gid) == 0;
-    // Another group may do no more than everybody may, and nobody gets the rights of another owner or group.
+    // Another group gets no more rights than all users have, and no user gets the rights of another owner or group.
     if (!group_kept) mode = (mode & ~mode_t{02070}) | (mode & ((mode & 07) << 3));
     if (!owner_kept) mode &= ~mode_t{04000};
     fchmod(descriptor_.get(), mode);
@@ -234,7 +234,7 @@ void AtomicPath::keep_owner_and_mode() const {
 void AtomicPath::give_name() {
     if (!found_) return give_new_name();
     const std::optional<Identity> there = identity_of(target_);
-    if (!there) return give_new_name();  // removed meanwhile: nobody's file is lost
+    if (!there) return give_new_name();  // removed meanwhile: no file is lost
     if (there != found_) refuse_to_replace("changed or replaced it");
     replace_found();
 }
@@ -248,7 +248,8 @@ void AtomicPath::give_new_name() {
 }
 
 void AtomicPath::replace_found() {
-    // Not by the partial name: what is exchanged for the target would have it, and partial files are removed.
+    // Not under the partial name: the file that is exchanged for the target would get that name, and partial files are
+    // removed.
     const fs::path aside = move_beside();
     if (aside.empty()) {
         if (std::rename(partial_.c_str(), target_.c_str()) != 0) fail(target_, errno);
@@ -259,12 +260,12 @@ void AtomicPath::replace_found() {
     if (error == 0 && identity_of(aside) == found_) {
         unlink(aside.c_str());
     } else if (error == 0) {
-        // Somebody was faster by a moment: both get their names back.
+        // Another process was faster: both files get their names back.
         exchange(aside, target_);
         partial_ = aside;
         refuse_to_replace("changed or replaced it");
     } else if (std::rename(aside.c_str(), target_.c_str()) != 0) {
-        // As of somebody else's file in a folder like /tmp: only now is it known, and the work is done.
+        // For example for another user's file in a folder like /tmp: the error is known only now, after the work.
         const int failed = errno;
         note_written(aside);
         throw RunError(fmt::format("cannot write {}: {}; what was to be written is in {}", printable(target_),
@@ -273,7 +274,7 @@ void AtomicPath::replace_found() {
     note_written(target_);
 }
 
-/// Moves the partial file to a free name beside the target; empty where that fails.
+/// Moves the partial file to a free name next to the target; empty where that fails.
 fs::path AtomicPath::move_beside() {
     constexpr int most = 1000;
     for (int number = 1; number <= most; ++number) {

@@ -18,9 +18,9 @@ std::filesystem::path follow_links(const std::filesystem::path& path);
 
 /// A file that appears whole or not at all.
 ///
-/// Write to partial(), a file of its own beside the target; commit() brings it to the disk and gives it the target's
+/// Write to partial(), a separate file next to the target; commit() brings it to the disk and gives it the target's
 /// name. A file that had the name at the claim is replaced, its mode and, where permitted, its owner are kept. A file
-/// that somebody made or changed since then is not. Destroyed without commit(), it leaves nothing.
+/// that another process has made or changed since then is not replaced. Destroyed without commit(), it leaves nothing.
 class AtomicPath {
    public:
     /// Claims the partial file, and removes those that killed runs on this machine have left of the same target (each
@@ -38,13 +38,13 @@ class AtomicPath {
     int descriptor() const { return descriptor_.get(); }
 
     /// Throws RunError where the disk refuses; the partial file is then removed by the destructor. Throws RunError,
-    /// too, where somebody else has made or changed the target since the claim: then his file is kept, and this one
-    /// beside it under a name that the message tells. Throws Interrupted where the user asks to stop while it waits
+    /// too, where another process has made or changed the target since the claim: then that file is kept, and this one
+    /// next to it under a name that the message gives. Throws Interrupted where the user asks to stop while it waits
     /// for the disk.
     void commit();
 
    private:
-    /// What tells a file from another one, or from itself as it was.
+    /// Data that distinguish a file from another one, or from an earlier state of itself.
     struct Identity {
         dev_t device;
         ino_t inode;
@@ -71,8 +71,8 @@ class AtomicPath {
     bool settled_ = false;  ///< the partial file has gone
 };
 
-/// Writes a text file, whole or not at all. Throws InputError where it cannot be there, RunError where the disk
-/// refuses or somebody else changes it meanwhile.
+/// Writes a text file, whole or not at all. Throws InputError where the file cannot be created, RunError where the disk
+/// refuses or another process changes it meanwhile.
 void write_text(const std::filesystem::path& path, std::string_view text);
 /// The same for a file that is claimed already.
 void write_text(AtomicPath& target, std::string_view text);

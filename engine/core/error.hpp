@@ -6,8 +6,8 @@ namespace ringlock {
 
 /// Wrong input or command line: the program ends with exit status 2.
 ///
-/// The message says what is wrong and where (file, line, column, key or dataset), the value found, what is allowed,
-/// and, where there is something to suggest, what to do.
+/// The message gives the error and its position (file, line, column, key or dataset), the value found, the allowed
+/// values, and advice where there is any.
 class InputError : public std::runtime_error {
    public:
     using std::runtime_error::runtime_error;
@@ -23,7 +23,7 @@ class RunError : public std::runtime_error {
 class Interrupted : public std::runtime_error {
    public:
     Interrupted() : std::runtime_error("interrupted") {}
-    /// With a message that says more than that: what is left, and how to go on.
+    /// With a message that says more: which files remain, and how to go on.
     explicit Interrupted(const std::string& message) : std::runtime_error(message), says_more_(true) {}
     bool says_more() const { return says_more_; }
 

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t unlimited = std::numeric_limits<std::uint64_t>::max();
 
-/// The number that the file consists of; nothing where there is none ("max").
+/// The number that the file consists of; nothing where the file holds no number ("max").
 std::optional<std::uint64_t> number_in(const fs::path& path) {
     std::ifstream file(path);
     std::uint64_t value = 0;
@@ -67,7 +67,7 @@ std::uint64_t left_in(const fs::path& group, const Names& names) {
     return *limit - std::min(*limit, taken);
 }
 
-/// What a group and those above it leave. A container may see its own group as the topmost.
+/// Memory that a group and those above it leave [bytes]. A container may see its own group as the topmost.
 std::uint64_t left_in_all(const fs::path& top, const fs::path& group, const Names& names) {
     std::uint64_t left = left_in(top, names);
     fs::path at = top;

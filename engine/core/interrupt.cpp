@@ -43,7 +43,7 @@ std::mutex written_mutex;
 std::vector<std::string> written;       // since the guard was made
 std::deque<std::string> all_farewells;  // a deque does not move its elements
 
-/// A path in static storage, so that the handler never meets freed memory.
+/// A path in static storage, so that the handler never reads freed memory.
 struct Slot {
     std::atomic<bool> armed{false};
     bool taken = false;  // under slots_mutex
@@ -58,7 +58,7 @@ static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_alw
                   std::atomic<const char*>::is_always_lock_free,
               "a signal handler may only touch lock-free atomics");
 
-// What follows runs in signal handlers: functions that are safe there, and no other.
+// The code below runs in signal handlers and uses only functions that are safe there.
 
 void set_clock(long nanoseconds) {
     if (!has_clock) return;
@@ -155,7 +155,7 @@ InterruptGuard::InterruptGuard() {
 
 InterruptGuard::~InterruptGuard() {
     if (has_clock.exchange(false)) timer_delete(end_clock);
-    signal(clock_signal, SIG_IGN);  // forgets one that is on its way
+    signal(clock_signal, SIG_IGN);  // discards a pending one
     for (std::size_t i = 0; i < signals_; ++i) sigaction(watched[i], &before_[i], nullptr);
     const int descriptor = wake_descriptor.exchange(-1);
     if (descriptor >= 0) close(descriptor);

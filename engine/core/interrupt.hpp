@@ -14,13 +14,14 @@ bool interrupted();
 /// Throws Interrupted where interrupted() holds.
 void check_interrupt();
 
-/// The signal that interrupted() is about, also after the guard is gone; SIGINT where there was none.
+/// The signal that interrupted() reports, also after the end of the guard; SIGINT if no signal has arrived.
 int interrupt_signal();
 
 /// A descriptor that poll() finds readable from the first signal on; -1 while no InterruptGuard stands.
 int interrupt_descriptor();
 
-/// The line that tells of the interruption: that nothing was written or, by name, what was (note_written()).
+/// The line that reports the interruption: that nothing was written, or the names of the written files
+/// (note_written()).
 std::string_view farewell();
 
 /// Announces a file that is whole and has its name, for farewell().
@@ -28,10 +29,10 @@ void note_written(const std::filesystem::path& path);
 
 /// Turns SIGINT, SIGTERM and SIGHUP into a flag for as long as it lives; the handlers it found return on destruction.
 ///
-/// The first signal sets the flag and leaves the program 0.8 s to end by itself. What does not look at the flag for
-/// so long (a system call that waits, hours within a library) is not waited for: then, or at the second signal, the
-/// process tells farewell(), removes the files announced by RemoveOnKill and ends by the first or the second signal.
-/// SIGHUP stays ignored where it was (nohup). One guard at a time, made in main().
+/// The first signal sets the flag and leaves the program 0.8 s to end by itself. Code that does not check the flag for
+/// so long (a system call that waits, hours within a library) is not waited for: after that time, or at the second
+/// signal, the process writes farewell(), removes the files announced by RemoveOnKill and ends by the first or the
+/// second signal. SIGHUP stays ignored where it was (nohup). One guard at a time, made in main().
 class InterruptGuard {
    public:
     InterruptGuard();
@@ -44,7 +45,7 @@ class InterruptGuard {
     struct sigaction before_[signals_] = {};
 };
 
-/// While one lives, no signal ends the process: for steps that belong together and take no time to speak of.
+/// While one lives, no signal ends the process: for steps that belong together and take a negligible time.
 class HoldEnd {
    public:
     HoldEnd();

@@ -27,7 +27,7 @@ void wait_until_ready(int descriptor, short events, int milliseconds) {
         const int ready = poll(both.data(), both.size(), milliseconds);
         if (ready < 0 && errno == EINTR) continue;
         check_interrupt();
-        return;  // an error of poll() itself is found again, and told, by what the caller does next
+        return;  // an error of poll() itself occurs again, and is reported, in the caller's next system call
     }
 }
 
@@ -73,7 +73,7 @@ int write_all(int descriptor, std::string_view text) {
 }
 
 int wait_for_child(pid_t child) {
-    // Ready when the child has ended. Where the kernel has none, the child is looked after now and then.
+    // Ready when the child has ended. Where the kernel has no such descriptor, the child is polled now and then.
     const Descriptor end(static_cast<int>(syscall(SYS_pidfd_open, child, 0)));
     const int milliseconds = end.valid() ? -1 : 10;
     for (;;) {

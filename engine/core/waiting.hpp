@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <string_view>
 
-/// What may wait for somebody else: pipes, terminals, child processes. All of it ends with Interrupted when the user
-/// asks to stop (interrupt.hpp), however long the other side keeps silent.
+/// Operations that may wait for another process: pipes, terminals, child processes. All of them end with Interrupted
+/// when the user asks to stop (interrupt.hpp), even if the other side sends nothing.
 namespace ringlock {
 
 /// A descriptor that is closed on destruction.
@@ -29,7 +29,7 @@ class Descriptor {
 /// with errno, where it cannot be opened.
 Descriptor open_to_read(const std::filesystem::path& path);
 
-/// Reads what there is, at most `size` bytes; waits for the first of them. Returns 0 at the end and -1, with errno,
+/// Reads the available bytes, at most `size`; waits for the first of them. Returns 0 at the end and -1, with errno,
 /// where the file cannot be read. Throws Interrupted.
 ssize_t read_some(int descriptor, char* data, std::size_t size);
 

@@ -22,7 +22,8 @@ namespace sm = simd::HWY_NAMESPACE;
 using D = hn::CappedTag<double, simd::lanes>;
 using V = hn::Vec<D>;
 
-/// From a nominal turn to the next: state, loop. `level_rad`: of the half cycle between, where it is constant.
+/// Advances state and loop from a nominal turn to the next. `level_rad`: level of the half cycle between, where it is
+/// constant.
 void advance_lanes(const gyro::Resonator& resonator, std::size_t lanes, const simd::Lanes* level_rad,
                    DriveNoiseLanes::State& state) {
     const D d;
@@ -130,7 +131,7 @@ struct NearTurn {
         return -y - 2.0 * damping * v - 2.0 * damping * force * std::sin(angle_rad);
     }
 
-    /// Goes on by a small angle, up to 0.1 either way, under a constant force (as the amplitude it would come to):
+    /// Goes on by a small angle, up to 0.1 either way, under a constant force (given as its stationary amplitude):
     /// Taylor series of y'' + 2 damping y' + y = -2 damping force sin(angle), whose coefficients are in powers of the
     /// step.
     void go(double step_rad, double force) {

@@ -35,7 +35,7 @@ class DriveNoiseLanes {
     /// [rad]: one, or white_levels of them. The loop's share is not among them.
     std::vector<double> levels_rad(std::size_t lane, std::int64_t turn) const;
 
-    /// Of each gyro, at a turn.
+    /// State of each gyro at a turn.
     struct State {
         simd::Lanes amplitude_rad{};                 ///< without noise
         simd::Lanes u_rad{}, q_rad{};                ///< at the nominal turn
@@ -46,13 +46,13 @@ class DriveNoiseLanes {
     };
 
    private:
-    /// What the force does over one half cycle, for all gyros.
+    /// The force over one half cycle, for all gyros.
     struct Levels {
         std::vector<simd::Lanes> rad;  ///< one row, or white_levels of them; `sinusoidal`: none
     };
 
     Levels levels_of(std::int64_t turn) const;
-    /// Of the turn after that of `last`, in less time.
+    /// Levels of the turn after that of `last`, in less time.
     void levels_after(const Levels& last, std::int64_t turn, Levels& levels);
     void advance();
     void place_turns();

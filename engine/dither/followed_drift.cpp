@@ -26,7 +26,7 @@ class Followed {
    public:
     Followed(const PhaseChain& chain, const gyro::Setup& setup, const gyro::DriveNoise& noise, std::uint64_t first_gyro)
         : chain_(chain), noise_(noise, devices(setup), chain.rms_rad, identities(first_gyro)) {
-        // Phases that fill the circle evenly however many gyros there are: multiples of the golden ratio.
+        // Phases that fill the circle evenly for any number of gyros: multiples of the golden ratio.
         for (std::size_t lane = 0; lane < simd::lanes; ++lane) {
             const double share = (static_cast<double>(first_gyro + lane) + 0.5) * 0.6180339887498949;
             first_rad_[lane] = units::two_pi * (share - std::floor(share));

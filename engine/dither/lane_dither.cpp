@@ -161,8 +161,8 @@ void LaneDither::take_drive_noise(std::size_t turns) {
 }
 
 void LaneDither::finish_drive(gyro::LaneDrive& drive) {
-    // What the input turns while a turn is late, at the rate of the half cycle that ends. Half cycles keep their
-    // length; their swings take it up.
+    // Rotation by the input during the delay of a late turn, at the rate of the half cycle that ends. Half cycles keep
+    // their length; the rotation is added to their swings.
     for (std::size_t i = 0; i <= drive.turns; ++i) {
         for (std::size_t lane = 0; lane < lanes_; ++lane) {
             const double turned_fringes = drive.rate_rad_s[i][lane] * late_s_[i][lane] / units::two_pi;

@@ -29,22 +29,23 @@ struct Wander {
 /// out, or less far. Rates that vary in time are constant over each half cycle: at their mean.
 class LaneDither {
    public:
-    /// `devices`: of each gyro, at most simd::lanes. `noise_rms_rad`: of each turn's angle in optical phase; 0: none.
+    /// `devices`: the device of each gyro, at most simd::lanes. `noise_rms_rad`: rms of the noise of each turn's angle
+    /// in optical phase; 0: no noise.
     LaneDither(std::span<const gyro::Device> devices, double noise_rms_rad, const random::LaneIdentities& who,
                const Wander& wander = {});
     /// With the noise of a drive, of that stationary rms of the amplitude at the turns.
     LaneDither(std::span<const gyro::Device> devices, const gyro::DriveNoise& noise, double noise_rms_rad,
                const random::LaneIdentities& who, const Wander& wander = {});
 
-    /// Fills in the next `turns` turns. `extra_angle_arcsec`: what varying rates add over the half cycle that begins at
-    /// each of them, [turn][gyro], or none; the half cycle's mean rate grows by it. `threshold_factor`: b of these half
-    /// cycles over the device's, or none. `coupling_phase_rad`: by which the coupling moves over them from the device's
-    /// phase, or none.
+    /// Fills in the next `turns` turns. `extra_angle_arcsec`: rotation by varying rates over the half cycle that begins
+    /// at each of them, [turn][gyro], or empty; the half cycle's mean rate grows by it. `threshold_factor`: b of these
+    /// half cycles over the device's, or empty. `coupling_phase_rad`: phase by which the coupling moves over them from
+    /// the device's, or empty.
     void next(std::size_t turns, std::span<const simd::Lanes> extra_angle_arcsec,
               std::span<const simd::Lanes> threshold_factor, gyro::LaneDrive& drive,
               std::span<const simd::Lanes> coupling_phase_rad = {});
 
-    /// What the kernel needs, one value for each gyro; index 0 of a pair: half cycles of positive sign.
+    /// Constants of the kernel, one value for each gyro; index 0 of a pair: half cycles of positive sign.
     struct Constants {
         simd::Lanes amplitude_rad, input_rate_rad_s, b_rad_s, coupling_phase_fringes;
         simd::Lanes start_fringes[2];  ///< phase at minima and maxima without noise and rotation
@@ -64,9 +65,10 @@ class LaneDither {
    private:
     /// Turns' offsets by a noisy drive in place of deviates.
     void take_drive_noise(std::size_t turns);
-    /// What the kernel does not know of it: changes of the amplitude and turns that are late.
+    /// Adds the parts of the drive that the kernel does not compute: changes of the amplitude, and delays of late
+    /// turns.
     void finish_drive(gyro::LaneDrive& drive);
-    /// Makes noise, one deviate a turn, what the turns are off by: noise and change of the amplitude [rad].
+    /// Turns the noise, one deviate a turn, into the deviations of the turns: noise and change of the amplitude [rad].
     void add_wander();
 
     std::size_t lanes_;

@@ -34,7 +34,8 @@ NoiseEffectiveness predict_noise_effectiveness(const gyro::Setup& setup, const I
             chain.hold_half_cycles = noise.drive->hold_half_cycles;
             chain.level_rad = noise.rms_rad / resonator.rms();
         } else {
-            // The sum of 32 levels a half cycle is Gaussian whatever they are.
+            // The sum of 32 levels a half cycle is Gaussian, to a good approximation, for any distribution of the
+            // levels.
             chain.level_rad = noise.rms_rad * std::sqrt((1.0 + chain.decay) / (1.0 - chain.decay));
         }
     }

@@ -15,7 +15,7 @@ namespace ringlock::dither {
 
 /// Noise that is injected into the dither.
 struct InjectedTurns {
-    std::optional<gyro::DriveNoise> drive;  ///< none: turns' angles are Gaussian and independent of each other
+    std::optional<gyro::DriveNoise> drive;  ///< empty: turns' angles are Gaussian and independent of each other
     double rms_rad = 0.0;                   ///< standard deviation of the amplitude at the turns [rad of optical phase]
 };
 
@@ -33,16 +33,16 @@ struct NoiseEffectiveness {
     std::optional<double> arw_over_theory;
     std::optional<double> bias_deg_h;       ///< mean output rate less the input rate
     std::vector<AngleSpread> angle_spread;  ///< where there is no random walk
-    std::string reason;                     ///< why there is none, or no prediction
+    std::string reason;                     ///< why there is no random walk, or no prediction
 };
 
 /// Predicts the effect of the noise on one gyro: its lock-in by the exact turn map at its mean amplitude, equal half
 /// cycles, a steady input. Where the transfer operator is too large, under an amplitude loop, and for a sinusoid, the
-/// chain itself is followed: the random walk then has an error of 1 %. What would take more than some ten seconds is
-/// not predicted, and `reason` says so.
+/// chain itself is followed: the random walk then has an error of 1 %. A prediction that would take more than some ten
+/// seconds is left out, and `reason` says so.
 NoiseEffectiveness predict_noise_effectiveness(const gyro::Setup& setup, const InjectedTurns& noise);
 
-/// Times at which AngleSpread is told [s].
+/// Times at which AngleSpread is computed [s].
 inline constexpr double spread_times_s[] = {1.0, 10.0, 100.0};
 
 }  // namespace ringlock::dither

@@ -39,7 +39,7 @@ class TransferOperator {
     static double work(const PhaseChain& chain, int harmonics);
 
    private:
-    /// A function and, where it is not empty, the sum of the squares that is taken back along with it.
+    /// A function and, where it is not empty, the sum of the squares that is propagated backwards along with it.
     struct Pair {
         Functions value;
         Functions squares;
@@ -64,7 +64,7 @@ class TransferOperator {
     double first_rad_;
     double step_rad_;
     std::vector<DriveLevel> levels_;
-    /// Of each level: functions of the amplitude, a half cycle earlier.
+    /// For each level, the map from a function of the amplitude to that function a half cycle earlier.
     std::vector<Eigen::SparseMatrix<double, Eigen::RowMajor>> maps_;
     Functions turn_;  ///< powers of (v + r)/(1 + r v), as power series of v
     std::array<Functions, 2> cosine_, sine_, kick_;

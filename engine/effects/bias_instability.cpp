@@ -22,7 +22,7 @@ double term_sd(double deg_h) { return deg_h * std::sqrt(std::numbers::ln10 / std
 
 /// Exact transition of the sum over one interval. With x = dt/T and h = tanh(x/2), a term of unit variance goes from
 /// r to (1-h)/(1+h) r + 2 sqrt(h)/(1+h) z; given both ends its integral has the mean T h (r0 + r1) and the variance
-/// T^2 (2 x - 4 h). Only the sum of the integrals is asked for, so their remainders share one deviate.
+/// T^2 (2 x - 4 h). Only the sum of the integrals is needed, so their remainders share one deviate.
 struct Transition {
     double duration_s = -1.0;
     std::array<double, flicker_terms> decay{};

@@ -16,36 +16,37 @@
 /// Effects beyond the base equation. One file each, one line in registry.cpp.
 namespace ringlock::effects {
 
-/// How a parameter enters what a gyro puts out: what a fit to a record has to do to find it.
+/// How a parameter enters the output of a gyro, which determines how a fit to a record finds it.
 enum class Role {
     size,   ///< proportionally, about zero
     phase,  ///< phase of the size before it, with which it makes two amplitudes, size cos(phase) and size sin(phase),
             ///< that enter proportionally; of the lock-in threshold where no size stands before it
-    time,   ///< where in time something happens: to be searched
-    frequency,  ///< to be searched
+    time,   ///< time of an event: the fit must search over it
+    frequency,  ///< the fit must search over it
     deviation,  ///< standard deviation of a random process: its square enters variances proportionally
     probability,
-    sampled,  ///< of what happens to uniform samples, 0 for nothing: found from these alone
+    sampled,  ///< of an effect on uniform samples, 0 without the effect: found from these samples alone
     setting,  ///< any other way
 };
 
 /// One parameter of an effect: its name carries the unit, as in a scenario's [effects.NAME] table.
 struct Parameter {
     std::string_view name;
-    double default_value;  ///< the value at which an effect that is not asked for stands
+    double default_value;  ///< value of an effect that the scenario does not turn on
     double min;
     double max;
     Role role;
     std::string_view doc;  ///< one line
-    /// Size that comes with the typical sizes of the effect's other parameters, to an order of magnitude: a record that
-    /// could not show it does not tell whether it is there. Zero where sizes have no such proportion.
+    /// Size that comes with the typical sizes of the effect's other parameters, to an order of magnitude: a record in
+    /// which that size would be invisible does not decide whether the effect is present. Zero where sizes have no
+    /// typical proportion.
     double typical = 0.0;
 };
 
 /// The value of every parameter of one effect.
 using Values = std::map<std::string, double>;
 
-/// A stretch of time and what a gyro is exposed to in it: values at both ends, linear between them.
+/// A stretch of time and the exposure of a gyro in it: values at both ends, linear between them.
 struct Interval {
     double start_s = 0.0;  ///< since the start, of the run or of the record
     double duration_s = 0.0;
@@ -53,9 +54,9 @@ struct Interval {
     double input_rate_deg_h[2] = {0.0, 0.0};      ///< of the case, the dither apart
 };
 
-/// What an effect does to a gyro over an interval, chance apart. Angles of intervals that follow each other add up.
+/// Deterministic change of a gyro by an effect over an interval. Angles of intervals that follow each other add up.
 /// Threshold and phase of the coupling are those in the middle of the interval. The engine keeps both constant over
-/// each half cycle of the dither and asks for them at the instant in its middle: an interval without duration, both
+/// each half cycle of the dither and evaluates them at the instant in its middle: an interval without duration, both
 /// ends of which are alike.
 struct Change {
     double angle_arcsec = 0.0;        ///< rotation that the output gains
@@ -68,7 +69,7 @@ struct Change {
 /// The change over an interval: a pure function of it.
 using ChangeOver = std::function<Change(const Interval&)>;
 
-/// What of Change an effect can set; the rest stays as it is by default.
+/// The members of Change that an effect can set; the others keep their defaults.
 struct Changes {
     bool angle = false;
     bool threshold = false;
@@ -111,7 +112,7 @@ struct Exposure {
 /// How far an effect can take a gyro, chance apart: magnitudes that Change does not exceed at any time of a run.
 struct Bounds {
     double rate_deg_h = 0.0;  ///< of the angle over the duration
-    /// Of the slope of that rate [deg/h each second]; a rate that steps, or whose slope nobody asks for, has none.
+    /// Bound of the slope of that rate [deg/h each second]; absent for a rate that steps, or whose slope is not needed.
     std::optional<double> rate_slope_deg_h_s = {};
     double threshold_relative = 0.0;  ///< of the threshold's factor less one
     double coupling_phase_rad = 0.0;
@@ -142,7 +143,8 @@ class LaneRateProcess {
     virtual void add_angles(const LaneIntervals& intervals, std::span<simd::Lanes> angle_arcsec) = 0;
 };
 
-/// Angle increments on their way into a record of uniform samples, and the instruments that watch beside the gyro.
+/// Angle increments on their way into a record of uniform samples, and the reference channels (witnesses) next to the
+/// gyro.
 struct Sampled {
     double rate_hz = 0.0;    ///< of the increments
     double record_hz = 0.0;  ///< of the record that they end in
@@ -152,10 +154,10 @@ struct Sampled {
         {};  ///< by their names in a record, as long as the increments
 };
 
-/// What happens to the samples of one gyro.
+/// Change of the samples of one gyro.
 class SampleStage {
    public:
-    /// Stages act in this order, whatever their names.
+    /// Stages act in this order, independently of their names.
     enum class Place {
         motion,      ///< the case rotates
         output,      ///< something is added to the angle that is put out
@@ -169,8 +171,8 @@ class SampleStage {
     virtual void apply(Sampled& samples) const = 0;
 };
 
-/// The quantity that drives an effect which is not random: whoever wants to tell such effects apart must change these
-/// quantities independently of each other.
+/// The quantity that drives an effect which is not random: in order to distinguish effects with different drivers,
+/// these quantities must be changed independently of each other.
 enum class Follows {
     nothing,      ///< none of these: constants of the gyro, lines, random rates
     time,         ///< the time since the start
@@ -178,24 +180,24 @@ enum class Follows {
     input_rate,   ///< the rotation that the gyro is to measure
 };
 
-/// An effect: what it is called, what it needs, what it does to a gyro.
+/// An effect: its name, its parameters, and its action on a gyro.
 class Effect {
    public:
     virtual ~Effect() = default;
     virtual std::string_view name() const = 0;
     virtual std::string_view summary() const = 0;   ///< one line
     virtual std::string_view equation() const = 0;  ///< plain text, with its source
-    /// What to do on the test bench where the effect was found: one or two sentences.
+    /// Advice for the test bench where the effect was found: one or two sentences.
     virtual std::string_view advice() const = 0;
     virtual std::span<const Parameter> parameters() const = 0;
     /// True where these values do something.
     virtual bool active(const Values& values) const = 0;
     /// Changes constants of the gyro. The default does nothing.
     virtual void configure(const Values& /*values*/, gyro::Setup& /*setup*/) const {}
-    /// What change() sets.
+    /// The members that change() sets.
     virtual Changes changes() const { return {}; }
     bool adds_angle() const { return changes().angle; }
-    /// What the effect does in time, chance apart.
+    /// The deterministic change by the effect as a function of time.
     virtual ChangeOver change(const Values& /*values*/) const {
         return [](const Interval&) { return Change{}; };
     }
@@ -215,7 +217,7 @@ class Effect {
     virtual Follows follows() const { return Follows::nothing; }
     /// Where sample_stage() acts; none where the effect has no such stage.
     virtual std::optional<SampleStage::Place> sample_place() const { return std::nullopt; }
-    /// What the effect does to uniform samples in addition to all that, or null.
+    /// The additional change of uniform samples by the effect, or null.
     virtual std::unique_ptr<SampleStage> sample_stage(const Values& /*values*/, const random::Identity& /*who*/) const {
         return nullptr;
     }

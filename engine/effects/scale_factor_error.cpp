@@ -18,9 +18,9 @@ class ScaleFactorError final : public Effect {
         return "Calibrate the scale factor on a rate table at several rates of either sign; its error follows the "
                "input of the record alone.";
     }
-    /// The light counts C (1 + relative) for C. Of the input that leaves relative times its angle. Of the dither it
-    /// makes every swing longer by the same factor, which is a dither of another amplitude and nothing else: at the
-    /// minima of the dither angle, where the output is taken, the whole of it has come back.
+    /// The light counts C (1 + relative) for C. In the output of the input rate this leaves an error of `relative`
+    /// times the angle. Every swing of the dither becomes longer by the same factor, which is equivalent to a dither of
+    /// another amplitude: at the minima of the dither angle, where the output is taken, the swings cancel.
     std::string_view equation() const override {
         return "rate = relative times the input rate. The swings of the dither grow as well, but cancel over each "
                "cycle: "

@@ -8,7 +8,7 @@
 namespace ringlock::ensemble {
 
 /// Calls `work` where loops of oneTBB use that many threads. An arena alone gets no more workers than there are cores;
-/// asked for more threads, this gives more.
+/// this function provides more threads if more are requested.
 template <class Work>
 void on_threads(int threads, Work&& work) {
     const oneapi::tbb::global_control control(oneapi::tbb::global_control::max_allowed_parallelism,

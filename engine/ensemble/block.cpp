@@ -37,8 +37,8 @@ struct Listener {
     std::unique_ptr<compensate::LaneCompensator> compensator;
     compensate::LaneErrors errors;
     std::vector<simd::LaneCounts> counts;
-    std::vector<simd::LaneCounts> turn_counts;  ///< at maxima, too, where asked for
-    std::vector<reader::Reader> readers;        ///< of each gyro, where asked for
+    std::vector<simd::LaneCounts> turn_counts;  ///< at maxima, too, where requested
+    std::vector<reader::Reader> readers;        ///< of each gyro, where requested
 };
 
 scenario::InjectedNoise noise_of(const scenario::Scenario& scenario, TrajectoryKind kind) {
@@ -49,8 +49,8 @@ dither::Wander wander_of(const scenario::Scenario& scenario) {
     return {scenario.dither.amplitude_wander_relative_rt_s, scenario.dither.amplitude_drift_relative_per_h / 3600.0};
 }
 
-/// What drift and wander can make of the amplitudes: of the scenario's device, drawn large. Tables depend on it, and a
-/// gyro must not know the others of its block.
+/// Largest change of the amplitudes by drift and wander, for the scenario's device with an amplitude six standard
+/// deviations above the mean. Tables depend on it, and a gyro's tables must not depend on the other gyros of its block.
 double wander_margin_rad(const scenario::Scenario& scenario) {
     constexpr double sigmas = 6.0;
     const double largest = gyro::Device(nominal_setup(scenario)).dither_amplitude_rad *
@@ -87,7 +87,7 @@ std::vector<gyro::Ellipse> ellipses_of(const std::vector<gyro::Setup>& setups) {
 std::unique_ptr<propagate::LanePropagator> make_propagator(const scenario::Scenario& scenario,
                                                            const std::vector<gyro::Device>& devices,
                                                            TrajectoryKind kind) {
-    // Without lock-in too: the turn map would ask for the fringes that this method is chosen to do without.
+    // Without lock-in too: the turn map would require the number of fringes that the direct method does not need.
     if (scenario.propagation.method == scenario::PropagationMethod::direct) {
         return std::make_unique<propagate::DirectPropagator>(devices, scenario.propagation.direct_tolerance_rad);
     }
@@ -276,7 +276,7 @@ class Branch {
     }
 
     /// Half cycles' amplitudes are means of their turns': from a turn to the next but one the amplitude changes by
-    /// twice what it does from half cycle to half cycle.
+    /// twice the change from half cycle to half cycle.
     void add_changes() {
         for (std::size_t i = 0; i < drive_.turns; ++i) {
             const simd::Lanes& before = drive_.amplitude_rad[i];
@@ -311,7 +311,7 @@ class Branch {
     gyro::LaneTurns turns_;
     readout::LaneReadings readings_;
     readout::LaneReadings samples_;   ///< as they were before the phase was recovered from pulses
-    readout::LaneReadings hardware_;  ///< as the electronics have them, where asked for
+    readout::LaneReadings hardware_;  ///< as the electronics have them, where requested
     readout::LaneAngles angles_;
 };
 
@@ -366,7 +366,7 @@ struct GyroBlock::State {
         steady.push_back(std::move(added));
     }
 
-    /// A reader asks between turns for what the turns know from half cycle to half cycle.
+    /// A reader needs between turns the rotation that the turns have as a mean from half cycle to half cycle.
     void follow_between_turns(const scenario::Scenario& scenario) {
         reader::CaseRotation rotation;
         rotation.who = who;
@@ -439,8 +439,8 @@ struct GyroBlock::State {
     std::span<const simd::Lanes> count_errors;
     std::vector<Branch> branches;
     std::vector<std::unique_ptr<effects::LaneRateProcess>> processes;
-    std::vector<AngleOver> steady;  ///< what those of them that have no chance in them add
-    bool every_turn = false;        // some compensator wants the maxima, too
+    std::vector<AngleOver> steady;  ///< angles of the deterministic ones among the processes
+    bool every_turn = false;        // some compensator needs the maxima, too
     bool noisy_detectors = false;
     bool noisy_comparators = false;
     std::array<simd::Lanes, 2> duration_s;

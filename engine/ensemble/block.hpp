@@ -17,11 +17,11 @@
 
 namespace ringlock::ensemble {
 
-/// What a block keeps of its turns.
+/// Amount of data that a block keeps of its turns.
 enum class Detail {
-    output,    ///< what the arms ask for
-    hardware,  ///< also what the electronics have of every turn: readings uncorrected, times, counts
-    truth,     ///< also what is true of every turn, and the arms' output there
+    output,    ///< the output that the arms need
+    hardware,  ///< also the data of the electronics at every turn: uncorrected readings, times, counts
+    truth,     ///< also the true values at every turn, and the arms' output there
 };
 
 /// Readers attached to all gyros and arms of a block.
@@ -30,8 +30,8 @@ struct ReaderPlan {
     std::int64_t first_turn = 0;  ///< with which tick 0 falls together, a minimum
 };
 
-/// Consecutive gyros of a study, at most simd::lanes, taken through all its arms at once, piece after piece. What a
-/// gyro does depends on the scenario and its own number, never on the block that it is in.
+/// Consecutive gyros of a study, at most simd::lanes, taken through all its arms at once, piece after piece. The
+/// results of a gyro depend on the scenario and its own number, never on the block that it is in.
 ///
 /// Rates that vary in time, noise included, are constant over each half cycle, at their mean; the stripping of the
 /// dither is exact and refers each angle to the nominal time of its turn.
@@ -55,39 +55,39 @@ class GyroBlock {
     std::span<const simd::LaneCounts> counts(std::size_t arm) const;
     /// Readings of the trajectory of an arm. Where no arm of it has a compensator those at maxima are missing.
     const readout::LaneReadings& readings(std::size_t arm) const;
-    /// Readings that the compensator of an arm was given; those of the trajectory where it has none.
+    /// Readings that the compensator of an arm was given; those of the trajectory for an arm without compensator.
     const readout::LaneReadings& observed(std::size_t arm) const;
     /// The readings as the electronics have them, before ellipse or phase are improved, with times and counts; from
     /// Detail::hardware on.
     const readout::LaneReadings& hardware(std::size_t arm) const;
-    /// What the counter says at a turn of the piece, in quarter fringes; from Detail::hardware on.
+    /// Count of the counter at a turn of the piece, in quarter fringes; from Detail::hardware on.
     std::int64_t quarter_count(std::size_t arm, std::size_t turn, std::size_t lane) const;
     /// Whether readings of an arm hold the times of pulses.
     bool has_pulses(std::size_t arm) const;
     /// Nominal time of a turn of the dither, counted from the start of the run [s].
     double turn_time_s(std::int64_t turn, std::size_t lane) const;
-    /// What is true of these turns.
+    /// The true values at these turns.
     const readout::LaneAngles& angles(std::size_t arm) const;
     /// Counts of the up/down counters less the true ones at these turns, [turn][gyro] in quarter fringes, for every arm
     /// alike; empty where none is ever missed.
     std::span<const simd::Lanes> count_errors() const;
     /// Lock-in error of the trajectory of an arm at a turn of the piece [rad].
     double lockin_error_rad(std::size_t arm, std::size_t turn, std::size_t lane) const;
-    /// What the compensator of an arm takes for that error, at every turn of the piece; null where it has none.
+    /// The compensator's estimate of that error, at every turn of the piece; null where the arm has no compensator.
     const compensate::LaneErrors* corrections(std::size_t arm) const;
     /// Dither, rates and couplings of the trajectory of an arm over the half cycles of the piece.
     const gyro::LaneDrive& drive(std::size_t arm) const;
     /// counts() at every turn of the piece, maxima included; of Detail::truth only.
     std::span<const simd::LaneCounts> turn_counts(std::size_t arm) const;
 
-    /// The reader of an arm, which has read the piece; only where readers were asked for.
+    /// The reader of an arm, which has read the piece; only where readers were requested.
     const reader::Reader& reader(std::size_t arm, std::size_t lane) const;
 
     const std::vector<gyro::Setup>& setups() const;
     /// Physical trajectories that lock-in acts on.
     int trajectories() const;
-    /// Of each gyro, rms change of the dither's amplitude from a turn to the next but one under injected noise [rad of
-    /// optical phase]; empty where none is injected.
+    /// Rms change of each gyro's dither amplitude from a turn to the next but one under injected noise [rad of optical
+    /// phase]; empty without injected noise.
     std::vector<double> change_per_cycle_rad() const;
     double table_error_rad() const;  ///< largest measured when the turn maps were tabulated; 0: no tables
     std::int64_t tables_remade() const;

@@ -11,7 +11,7 @@ class BlockSource {
     virtual ~BlockSource() = default;
     /// Threads of all processes together. The size of the blocks follows from it, so all processes must agree on it.
     virtual int threads() const = 0;
-    /// A simulation of so many blocks begins. Each process calls this before it asks for its first block.
+    /// A simulation of so many blocks begins. Each process calls this before it requests its first block.
     virtual void begin(std::size_t blocks) = 0;
     /// A block that no other process has, by its place in the plan; nothing when all are given out. From any thread.
     virtual std::optional<std::size_t> next() = 0;

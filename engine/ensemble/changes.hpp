@@ -12,14 +12,14 @@
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/scenario.hpp"
 
-/// What effects do to a block of gyros without chance, under the scenario's temperature and input rate.
+/// The deterministic part of the effects on a block of gyros, under the scenario's temperature and input rate.
 namespace ringlock::ensemble {
 
 /// Rotation [arcsec] that something adds to a gyro of a block from `start_s` after the start of the run on, over
 /// `duration_s`: a pure function of these.
 using AngleOver = std::function<double(std::size_t lane, double start_s, double duration_s)>;
 
-/// What an effect adds. The effect must outlive it.
+/// Rotation that an effect adds. The effect must outlive the function.
 AngleOver angle_of(const scenario::ActiveEffect& active, const scenario::Scenario& scenario,
                    const std::vector<gyro::Setup>& setups);
 
@@ -29,8 +29,8 @@ AngleOver angle_of_profile(const scenario::InputRate& input, const std::vector<g
 /// The same over the half cycles of a block of `lanes` gyros.
 std::unique_ptr<effects::LaneRateProcess> angles_of(AngleOver added, std::size_t lanes);
 
-/// What all active effects do to the coupling, half cycle by half cycle. Effects whose bounds say that nothing of it
-/// changes over the run are left out.
+/// Changes of the coupling by all active effects, half cycle by half cycle. Effects whose bounds exclude a change over
+/// the run are left out.
 class CouplingChanges {
    public:
     /// The effects must outlive it.
@@ -40,9 +40,9 @@ class CouplingChanges {
 
     /// Evaluates the half cycles that begin at `turns` turns, from turn `first_turn` of the run on.
     void evaluate(std::int64_t first_turn, std::size_t turns);
-    /// By what the threshold is multiplied, [turn][gyro]; none where it stays.
+    /// Factors of the threshold, [turn][gyro]; empty where it does not change.
     std::span<const simd::Lanes> threshold_factors() const { return factors_; }
-    /// By what the coupling's phase moves, [turn][gyro]; none where it stays.
+    /// Changes of the coupling's phase, [turn][gyro]; empty where it does not change.
     std::span<const simd::Lanes> phases_rad() const { return phases_rad_; }
 
    private:

@@ -16,11 +16,11 @@ double input_rate_deg_h(const scenario::Scenario& scenario, std::int64_t gyro);
 /// Input rate of a gyro at a time since the start of the run [deg/h]: constant.
 double input_rate_at_deg_h(const scenario::Scenario& scenario, const gyro::Setup& setup, double time_s);
 
-/// Who gyro g is to the random streams: the same member at another rate draws the same numbers, so that rates are
+/// Identity of gyro g in the random streams: the same member at another rate draws the same numbers, so that rates are
 /// compared in pairs like arms.
 random::Identity identity(const scenario::Scenario& scenario, std::int64_t gyro);
 
-/// Who gyro g is to the streams that its constants are drawn from: one for all its turn-ons.
+/// Identity of gyro g in the streams from which its constants are drawn: one for all its turn-ons.
 random::Identity device_identity(const scenario::Scenario& scenario, std::int64_t gyro);
 
 /// Draws the parameters of gyro g and lets the scenario's effects change them. Depends on the scenario and g only.

@@ -98,8 +98,8 @@ std::vector<Block> spread(const std::vector<Block>& blocks) {
     return order;
 }
 
-/// Tells the monitor what a block does. Where the block fails and its gyros go through the same turns again one by one,
-/// no turn is told twice, and no stage.
+/// Reports the progress of a block to the monitor. Where the block fails and its gyros go through the same turns again
+/// one by one, no turn and no stage is reported twice.
 class BlockProgress {
    public:
     BlockProgress(const Monitor& monitor, std::size_t block) : monitor_(monitor), block_(block) { tell(); }
@@ -135,7 +135,7 @@ class BlockProgress {
     BlockStage stage_ = BlockStage::set_up;
     bool again_ = false;
     std::int64_t told_ = 0;     ///< since the last beginning
-    std::int64_t already_ = 0;  ///< told before it and not gone through again so far
+    std::int64_t already_ = 0;  ///< reported before it and not gone through again so far
 };
 
 void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm> arms, std::int64_t first,

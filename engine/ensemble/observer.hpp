@@ -12,7 +12,7 @@ struct PlannedBlock {
     std::int64_t turns = 0;  ///< of all its gyros, as BlockResult::turns counts them
 };
 
-/// What a block is at; it goes through all of them in this order, once.
+/// Stage of a block; it goes through all stages in this order, once.
 enum class BlockStage {
     set_up,  ///< its gyros are drawn
     turns,   ///< goes through the turns
@@ -20,12 +20,12 @@ enum class BlockStage {
     over,    ///< done, or failed
 };
 
-/// Is told what a simulation does while it runs. All functions may be called from any thread, those about one block
-/// from one thread after the other.
+/// Receives the progress of a simulation while it runs. All functions may be called from any thread, those about one
+/// block from one thread after the other.
 class Observer {
    public:
     virtual ~Observer() = default;
-    /// What comes next is not the simulation of gyros, but what `name` says, until plan() or the next stage.
+    /// The stage `name` begins, which is not the simulation of gyros. It lasts until plan() or the next stage.
     virtual void stage(const std::string& name) = 0;
     /// These blocks are simulated next, as many at a time as there are threads. Blocks planned before are over.
     virtual void plan(std::span<const PlannedBlock> blocks, int threads) = 0;

@@ -13,8 +13,8 @@
 
 namespace ringlock::ensemble {
 
-/// Where and how progress is shown. What is left empty is taken from the process: standard error, whether it is a
-/// terminal, the monotonic clock, the width of the terminal.
+/// Where and how progress is shown. Empty fields are taken from the process: standard error, whether it is a terminal,
+/// the monotonic clock, the width of the terminal.
 struct ProgressOptions {
     using Clock = std::function<std::chrono::steady_clock::time_point()>;
 
@@ -24,7 +24,7 @@ struct ProgressOptions {
     };
 
     bool quiet = false;
-    std::int64_t total_turns = 0;  ///< the share done is told by turns where given, else by gyros
+    std::int64_t total_turns = 0;  ///< the share done is counted in turns where given, else in gyros
     Done already_done = {};        ///< of the total by an earlier run: part of the share, not of the rate
     bool grows = false;  ///< the total is the most that it can come to; share and time are those to the next look
     std::ostream* out = nullptr;               ///< with one given, is_terminal is as said below
@@ -36,8 +36,8 @@ struct ProgressOptions {
 /// Shows how far a run is: on a terminal a bar updated in place a few times a second, elsewhere plain lines (the first,
 /// one every 10 s at most, and the last), nothing when quiet.
 ///
-/// A line names what goes on where that is not the simulation: the set-up, until a first block goes through its turns,
-/// and the stages. Rate and time left are as TimeLeft has them: no set-up is in the rate.
+/// A line names the stage where that is not the simulation: the set-up, until a first block goes through its turns, and
+/// the stages. Rate and time left are as TimeLeft has them: no set-up is in the rate.
 ///
 /// All functions may be called from any thread. Output that fails is given up silently: it must not stop a run.
 class Progress final : public Observer {
@@ -53,7 +53,7 @@ class Progress final : public Observer {
     void enter(std::size_t block, BlockStage stage) override;
     void advance(std::size_t block, std::int64_t gyros, std::int64_t turns, bool tabulated) override;
 
-    /// What is known of the speed now, shown or not.
+    /// Present knowledge of the speed, shown or not.
     struct Pace {
         std::int64_t gyros = 0;        ///< finished in this run, by all its processes
         double turns_per_s = 0.0;      ///< 0: no turn was gone through yet
@@ -85,7 +85,7 @@ class Progress final : public Observer {
     Clock::time_point read_;    ///< of the clock, last
     Clock::duration now_{};     ///< since the beginning
     Clock::duration shown_{};   ///< when a line was, last
-    Clock::duration looked_{};  ///< when the time left was asked for, last
+    Clock::duration looked_{};  ///< when the time left was requested last
     std::int64_t gyros_ = 0;    ///< of this run
     std::int64_t turns_ = 0;
     ProgressOptions::Done planned_;  ///< all that was planned so far

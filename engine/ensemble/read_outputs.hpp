@@ -12,15 +12,15 @@ namespace ringlock::ensemble {
 
 /// The outputs of the readers of a block side by side, as a sink takes them.
 ///
-/// Turns of a noisy drive come late or early, so that one gyro has put out more than another when a piece ends. What
-/// is ahead waits here until all gyros have it.
+/// Turns of a noisy drive come late or early, so that one gyro has put out more than another when a piece ends. Outputs
+/// that are ahead wait here until all gyros have reached them.
 class ReadOutputs {
    public:
     /// \param gyros  of the block
     ReadOutputs(const Schedule& schedule, std::size_t arms, std::size_t gyros);
 
-    /// Takes what the readers have put out in the piece that the block has gone through; the warm-up of the readers and
-    /// what comes after the record are left out.
+    /// Takes the outputs of the readers in the piece that the block has gone through; outputs during the readers'
+    /// warm-up and after the record are left out.
     void take(const GyroBlock& block);
 
     /// Outputs of an arm that the last take() has completed: [output][gyro] in counts of 1/counts_per_fringe fringes

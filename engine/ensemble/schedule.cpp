@@ -29,7 +29,7 @@ Schedule::Schedule(const scenario::Scenario& scenario) {
                       ? 1 + static_cast<std::int64_t>(
                                 std::ceil(static_cast<double>(warm_up_outputs + outputs() - 1) * output_s * frequency))
                       : outputs() - 1;
-    // Whoever follows a run looks at it between pieces: they are shorter where each turn takes milliseconds.
+    // Progress and interruption are handled between pieces: pieces are shorter where each turn takes milliseconds.
     piece_turns = scenario.propagation.method == scenario::PropagationMethod::direct ? 8 : 128;
 }
 

@@ -5,9 +5,9 @@
 
 namespace ringlock::ensemble {
 
-/// When the angles of the arms are put out that statistics are made of, and which of them are samples of the record.
+/// Times of the arms' outputs, from which statistics are computed, and which of them are samples of the record.
 ///
-/// An output is the angle at a minimum of the phase, one a cycle of the nominal dither, or what a reader puts out at
+/// An output is the angle at a minimum of the phase, one a cycle of the nominal dither, or the output of a reader at
 /// `reader.output_hz`. Readers begin at the turn at which settling ends, and the record once they are fit for use.
 struct Schedule {
     explicit Schedule(const scenario::Scenario& scenario);
@@ -30,8 +30,8 @@ struct Schedule {
 
     std::int64_t cycles_read;  ///< of the dither, in which all outputs of readers and of the record come
     std::int64_t piece_turns;  ///< most turns that are gone through at once
-    /// Turn before which the piece that begins with this one ends. Pieces are part of what a gyro does: compensators
-    /// and tables take the first one as a whole. None holds turns both before the record and of it.
+    /// Turn before which the piece that begins with this one ends. Results depend on the pieces: compensators and
+    /// tables take the first one as a whole. No piece holds turns both before the record and of it.
     std::int64_t piece_end(std::int64_t turn) const;
 };
 

@@ -14,7 +14,7 @@ constexpr double longest_look_back_s = 5.0;
 constexpr double between_looks_s = 0.1;
 constexpr double agreement = std::numbers::sqrt2;
 constexpr double rounding_s = 1.0;  ///< estimates that differ by no more agree
-/// A block's own rate counts as much as that of all once it has gone on for so long.
+/// Time after which a block's own rate has the same weight as that of all blocks.
 constexpr double own_rate_s = 1.0;
 /// With more blocks than this waiting for each thread, threads end at the same time as good as.
 constexpr std::size_t many = 32;
@@ -114,7 +114,7 @@ double TimeLeft::left_of_s(const Block& block, double preparation_s, double now_
         return std::max(0.0, preparation_s - at_stage_s) + block.left * measured_.time_s / measured_.work +
                output_.value_s();
     }
-    const double others_s = own_rate_s * (now_s - *origin_s_);  // weighted as what is measured
+    const double others_s = own_rate_s * (now_s - *origin_s_);  // weighted like the measured work
     const double work = block.measured.work + others_s * measured_.work / measured_.time_s;
     const double time_s = block.measured.time_s + others_s;
     return std::max(0.0, preparation_s - block.prepared_s) + std::max(0.0, block.left * time_s / work - at_stage_s) +

@@ -10,28 +10,29 @@
 
 namespace ringlock::ensemble {
 
-/// Time that a simulation will still take, and its speed, from what its blocks have taken so far.
+/// Time that a simulation will still take, and its speed, from the times of its blocks so far.
 ///
-/// What is measured of each block: the time of its preparation (set-up, and turns on whose way turn maps were
-/// tabulated), of its other turns, of its output. A block that goes through its turns is taken to go on as it does; one
-/// that waits, to take the mean of those before it. Waiting blocks are given to the thread that is free first, as they
-/// are when they run: threads without work towards the end are so accounted for.
+/// Three times of each block are measured: that of its preparation (set-up, and turns during which turn maps were
+/// tabulated), of its other turns, and of its output. A block that goes through its turns is taken to go on as it does;
+/// one that waits, to take the mean of those before it. Waiting blocks are given to the thread that is free first, as
+/// they are when they run: threads without work towards the end are thus included.
 ///
-/// Rates weight what was measured by the time since the turns began, so that a slow start is forgotten in proportion as
-/// the run goes on. An estimate is given once it can be trusted: when turns have gone on for some seconds, and what it
-/// would have said at any time in the last half of these (at most the last 5 s) agrees with what is known now within a
-/// factor of the root of 2. To look back further hides more on a machine with other work and makes no time better.
+/// Rates weight each measurement by the time since the turns began, so that the influence of a slow start decreases as
+/// the run goes on. An estimate is given once it can be trusted: when turns have gone on for some seconds, and the
+/// estimates at all times in the last half of these (at most the last 5 s) agree with the present one within a factor
+/// of the root of 2. A longer comparison would suppress more estimates on a machine with other work, and would not
+/// improve them.
 ///
 /// Times are seconds of any clock that does not go back.
 class TimeLeft {
    public:
-    /// These blocks come next; what was measured of others is forgotten, but for the speed.
+    /// These blocks come next; measurements of other blocks are discarded, except for the speed.
     void plan(std::span<const PlannedBlock> blocks, int threads);
     void enter(std::size_t block, BlockStage stage, double now_s);
     void advance(std::size_t block, std::int64_t turns, bool tabulated, double now_s);
 
-    /// Seconds until all blocks are over; nothing while that is not known well. To be asked some times a second, as the
-    /// estimates are compared with each other.
+    /// Seconds until all blocks are over; nothing while that is not known well. To be called a few times a second, as
+    /// the estimates are compared with each other.
     std::optional<double> seconds(double now_s);
     /// No block has gone through turns without tabulating turn maps, or nothing is planned.
     bool setting_up() const { return !origin_s_; }
@@ -55,9 +56,9 @@ class TimeLeft {
     };
     struct Block {
         double work = 0.0;      ///< of all its turns
-        double per_turn = 0.0;  ///< work of one turn told
+        double per_turn = 0.0;  ///< work of one reported turn
         double left = 0.0;      ///< work
-        double since_s = 0.0;   ///< when its stage began, or its last turn was told
+        double since_s = 0.0;   ///< when its stage began, or its last turn was reported
         double prepared_s = 0.0;
         Rate measured = {};
         BlockStage stage = BlockStage::over;
@@ -67,7 +68,7 @@ class TimeLeft {
         double at_s;
         double left_s;
     };
-    /// Of all plans, without weights.
+    /// Speed over all plans, without weights.
     struct Speed {
         double turns = 0.0;
         double turns_s = 0.0;  ///< time of threads in these turns

@@ -3,7 +3,7 @@
 
 namespace ringlock::ensemble {
 
-/// What happens to a gyro physically; arms that differ in their compensator only share it.
+/// Physical history of a gyro; arms that differ only in their compensator share it.
 enum class TrajectoryKind { ideal, plain, noise_injected };
 
 inline TrajectoryKind kind_of(const scenario::Arm& arm) {

@@ -12,8 +12,8 @@ constexpr double least_adiabaticity = 100.0;
 constexpr double relaxed = 0.9;      // from one that is tried to the next: 104.6 is the last
 constexpr double least_beat = 4.0;   // g over b: the slow solution is a series in b/g, too
 constexpr double latest_sine = 0.9;  // the slow solution must hold from here to the middle
-/// Phase from the zero-rate point to the middle. The slow solution's n-th term goes as n!/phase^n: below this, its ten
-/// terms are more than are of use.
+/// Phase from the zero-rate point to the middle. The slow solution's n-th term is proportional to n!/phase^n: below
+/// this phase, ten terms are more than the asymptotic series can use.
 constexpr double least_phase_rad = 10.0;
 
 double needed_rate_rad_s(const HalfCycle& half, double b_rad_s, double adiabaticity) {
@@ -32,7 +32,7 @@ bool is_fast_from_there(const HalfCycle& half, double needed_rad_s) {
 }
 
 /// Time from which the motion is fast: g^2 >= adiabaticity * (greatest phase acceleration), up to the middle. NaN where
-/// there is none. It need not be exact: any time at which the motion is fast will do.
+/// the motion is fast at no time. It need not be exact: any time at which the motion is fast will do.
 double fast_from_s(const HalfCycle& half, double b_rad_s, double adiabaticity) {
     const double fast = needed_rate_rad_s(half, b_rad_s, adiabaticity);
     if (!is_fast_from_there(half, fast)) return std::nan("");

@@ -1,9 +1,10 @@
 #pragma once
 #include "engine/gyro/half_cycle.hpp"
 
-/// Where the phase of a half cycle runs fast: its rate is large beside the coupling and changes little in a fringe.
-/// There the turn map takes it for a plain rotation (docs/turn-map.md). Where motion is nowhere fast enough to do so
-/// without error the rotation begins in the middle, where the map needs it only as a smooth choice of coordinates.
+/// Where the phase of a half cycle runs fast: its rate is large compared with the coupling and changes little in a
+/// fringe. There the turn map takes it for a plain rotation (docs/turn-map.md). Where motion is nowhere fast enough to
+/// do so without error the rotation begins in the middle, where the map needs it only as a smooth choice of
+/// coordinates.
 namespace ringlock::gyro {
 
 /// Time at which the rate of drive and input vanishes next to the turn at the beginning; a harmonic of the dither
@@ -21,7 +22,7 @@ double fast_motion_from_s(const HalfCycle& half, double b_rad_s);
 /// fringes in a half cycle of a sinusoid without input), and its rate there is at least four times the coupling.
 bool has_fast_middle(const HalfCycle& half, double b_rad_s);
 
-/// The coupling strength to ask for where the fast motion is a series of harmonics: the factor 2 leaves it room for
+/// The coupling strength that fast motion is tested for where it is a series of harmonics: the factor 2 leaves room for
 /// these.
 double strength_with_harmonics_rad_s(const Coupling& coupling);
 

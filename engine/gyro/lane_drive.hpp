@@ -7,7 +7,7 @@
 
 namespace ringlock::gyro {
 
-/// What the dither and the input do to a block of gyros over some consecutive turns: one row for each turn or half
+/// Motion of a block of gyros by the dither and the input over some consecutive turns: one row for each turn or half
 /// cycle, one column for each gyro. Turn 0 of a run is a minimum of the phase.
 ///
 /// Half cycle i ends at turn i of the piece, half cycle i + 1 begins there.
@@ -64,7 +64,7 @@ inline Coupling coupling_of(const Device& device, const LaneDrive& drive, std::s
     return coupling;
 }
 
-/// What the phase does at these turns of the dither.
+/// State of the phase at these turns of the dither.
 struct LaneTurns {
     /// [turns] of psi + coupling phase, that of the half cycle that ends at the turn.
     std::vector<simd::Lanes> cosine;

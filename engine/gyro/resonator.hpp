@@ -4,18 +4,18 @@
 #include <cstdint>
 #include <vector>
 
-/// The dithered body as what it is, a mechanical resonator with a noisy drive.
+/// The dithered body as a mechanical resonator with a noisy drive.
 ///
 /// The dither angle x obeys
 ///
 ///     x'' + (w/Q) x' + w^2 x = (F_0 + e(t)) sin(w t),
 ///
 /// w the undamped natural frequency and that of the drive. Without noise x = -A cos(w t) with A = Q F_0/w^2, and the
-/// turns are where the force is zero, the nominal turns. A force F is given here as the amplitude that it would come
-/// to, Q F/w^2, in any unit.
+/// turns are where the force is zero, the nominal turns. A force F is given here as its stationary amplitude, Q F/w^2,
+/// in any unit.
 ///
-/// What noise adds is linear in e. Upright, that is with the sign of the turn taken out, its angle u and its velocity
-/// over w, q, at nominal turns obey exact linear recursions.
+/// The contribution of the noise is linear in e. Upright, that is with the sign of the turn taken out, its angle u and
+/// its velocity over w, q, at nominal turns obey exact linear recursions.
 namespace ringlock::gyro {
 
 enum class NoiseForm { held, white, sinusoidal };
@@ -36,18 +36,18 @@ struct DriveNoise {
 /// Levels of the force within a half cycle that `white` draws independently.
 inline constexpr int white_levels = 32;
 
-/// The linear recursion from a nominal turn to the next, and what is stationary about it.
+/// The linear recursion from a nominal turn to the next, and its stationary moments.
 class Resonator {
    public:
     explicit Resonator(const DriveNoise& noise);
 
     /// Deviation (u, q) at a nominal turn, of the case where the force has no noise over the half cycle to the next.
     const Eigen::Matrix2d& step() const { return step_; }
-    /// What a constant force over the half cycle adds to (u, q).
+    /// Contribution of a constant force over the half cycle to (u, q).
     const Eigen::Vector2d& held_input() const { return held_input_; }
-    /// What each of the levels within a half cycle adds.
+    /// Contributions of the levels within a half cycle.
     const std::array<Eigen::Vector2d, white_levels>& white_inputs() const { return white_inputs_; }
-    /// By what share of the amplitude's deviation at a turn the loop lowers the force from the next nominal turn on.
+    /// Share of the amplitude's deviation at a turn by which the loop lowers the force from the next nominal turn on.
     double loop_gain() const { return loop_gain_; }
     /// Damping over natural frequency: 1/(2 Q).
     double damping() const { return damping_; }
@@ -58,8 +58,8 @@ class Resonator {
     };
     const Response& response() const { return response_; }
 
-    /// Largest modulus of the recursion's eigenvalues: what is left of a deviation after a half cycle. With a loop that
-    /// is too fast it is 1 or more, and nothing is stationary.
+    /// Largest modulus of the recursion's eigenvalues: the factor by which a deviation decreases in a half cycle. With
+    /// a loop that is too fast it is 1 or more, and nothing is stationary.
     double decay() const { return decay_; }
     /// Half cycles after which 1e-9 is left of a deviation, loop included; 0 where no chance is in it.
     double settling_half_cycles() const;

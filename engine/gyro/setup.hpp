@@ -1,6 +1,6 @@
 #pragma once
 
-/// The device: what one gyro is, in the units of the edges.
+/// The device: the parameters of one gyro, in the units of scenarios and results.
 namespace ringlock::gyro {
 
 /// Errors of the quadrature detectors: sin = (1 + gain) sin(psi) + offset_sin, cos = cos(psi + orthogonality_rad) +
@@ -14,7 +14,7 @@ struct Ellipse {
     bool operator==(const Ellipse&) const = default;
 };
 
-/// Constants of one gyro after its parameters are drawn and the effects have had their say.
+/// Constants of one gyro after its parameters are drawn and changed by the effects.
 struct Setup {
     double scale_factor_arcsec = 0.5;       ///< K: arcsec per fringe
     double lockin_threshold_deg_h = 300.0;  ///< Omega_L

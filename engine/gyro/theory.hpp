@@ -1,7 +1,7 @@
 #pragma once
 #include "engine/gyro/setup.hpp"
 
-/// What is known in closed form about a dithered gyro; derivations in docs/physics.md.
+/// Closed-form results for a dithered gyro; derivations in docs/physics.md.
 namespace ringlock::gyro {
 
 /// Kick of one whole turn to first order, amplitude [rad]: kappa = 2 pi Omega_L / sqrt(K Omega_D w_D).

@@ -28,7 +28,7 @@ struct UprightSide {
     V scale_s, angle;
 };
 
-/// What only some devices have: zeros where code is compiled without.
+/// Parameters that only some devices have; code that is compiled without them takes them as zero.
 template <class V>
 struct UprightExtras {
     V ratio, harmonic_sine, harmonic_cosine;  ///< of f
@@ -36,8 +36,8 @@ struct UprightExtras {
     V second, second_sine, second_cosine;  ///< of h
 };
 
-/// Taylor series of x and of the lock-in's share of it, around a point of the path. Within longest_step() what is left
-/// out is below 1e-10 rad, at slow input rates below 1e-12.
+/// Taylor series of x and of the lock-in's share of it, around a point of the path. Within longest_step() the
+/// truncation error is below 1e-10 rad, at slow input rates below 1e-12.
 ///
 /// Compiled without `extras` it gives, where these are zero, the same bits in half the time.
 template <class D, bool extras, class V = hn::Vec<D>>
@@ -128,7 +128,7 @@ struct TurnSeries {
         return value;
     }
 
-    /// What x and the lock-in's share of it gain in `h` scales of time [rad].
+    /// Gain of x and of the lock-in's share of it in `h` scales of time [rad].
     HWY_INLINE void gains(D d, V h, V& phase, V& lockin_share) const {
         phase = rate[order] * hn::Set(d, 1.0 / static_cast<double>(order));
         lockin_share = lockin[order] * hn::Set(d, 1.0 / static_cast<double>(order));
@@ -145,7 +145,7 @@ struct TurnSeries {
    private:
     /// n-th Taylor coefficients of sine and cosine of `times` x + a constant: S' = times Q x', Q' = - times S x'.
     HWY_INLINE void next(D d, std::size_t n, double times, V* sines, V* cosines) const {
-        // What is known longest comes first: the chain from term to term is what takes the time.
+        // The earliest known terms come first, since the chain of dependencies from term to term takes the time.
         V sum_s = n > 2 ? rate[2] * cosines[n - 2] : hn::Zero(d);
         V sum_c = n > 2 ? rate[2] * sines[n - 2] : hn::Zero(d);
         RINGLOCK_UNROLL
@@ -186,7 +186,7 @@ HWY_INLINE auto within_step(D d, V step, V rate) {
     return step * hn::Max(hn::Abs(rate), hn::Set(d, 1.0)) <= hn::Set(d, 0.125);
 }
 
-/// What a swing tells where the dither's amplitude changes from turn to turn.
+/// Estimates from a swing where the dither's amplitude changes from turn to turn.
 template <class V>
 struct SwingTold {
     V amplitude;      ///< at the turn that ends it

@@ -63,8 +63,8 @@ double integrated_rad(const gyro::HalfCycle& half, const gyro::Coupling& couplin
     return lockin_rad;
 }
 
-/// Phase by which the frame gains on drive and input from the middle to the instant of `side` [rad]. The rate goes as
-/// one over the time from the zero-rate point, and nodes stand evenly in the logarithm of that.
+/// Phase by which the frame gains on drive and input from the middle to the instant of `side` [rad]. The rate is
+/// proportional to one over the time from the zero-rate point, and nodes are equidistant in the logarithm of that time.
 double rotated_rad(const gyro::HalfCycle& half, const gyro::Coupling& coupling, const Side& side) {
     constexpr std::size_t nodes = 8;
     using Gauss = boost::math::quadrature::gauss<double, nodes>;

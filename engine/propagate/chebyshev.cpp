@@ -12,7 +12,7 @@ namespace {
 /// Matrix of `terms` columns in each row.
 using Matrix = std::vector<std::vector<double>>;
 
-/// Row n: what values at the Chebyshev nodes count for in the coefficient of the n-th Chebyshev polynomial.
+/// Row n: weights of the values at the Chebyshev nodes in the coefficient of the n-th Chebyshev polynomial.
 Matrix chebyshev_weights(std::size_t terms) {
     Matrix rows(terms, std::vector<double>(terms, 0.0));
     for (std::size_t i = 0; i < terms; ++i) {
@@ -24,7 +24,7 @@ Matrix chebyshev_weights(std::size_t terms) {
     return rows;
 }
 
-/// Row k: what Chebyshev polynomials count for in the coefficient of the k-th power.
+/// Row k: weights of the Chebyshev polynomials in the coefficient of the k-th power.
 Matrix chebyshev_powers(std::size_t terms) {
     Matrix rows(terms, std::vector<double>(terms, 0.0));
     rows[0][0] = 1.0;

@@ -49,12 +49,13 @@ namespace sm = simd::HWY_NAMESPACE;
 using D = hn::CappedTag<double, simd::lanes>;
 using V = hn::Vec<D>;
 
-/// Taylor order. Work per step goes with its square, and the length of a step is that of convergence (the solution has
-/// poles at ln(2 g/b)/g in imaginary time) times the order-th root of the tolerance: between 1e-8 and 1e-11 rad, 20 to
-/// 24 cost least.
+/// Taylor order. Work per step is proportional to its square, and the length of a step is that of convergence (the
+/// solution has poles at ln(2 g/b)/g in imaginary time) times the order-th root of the tolerance: between 1e-8 and
+/// 1e-11 rad, 20 to 24 cost least.
 constexpr std::size_t order = 24;
 
-/// About the order-th root of what is near one, by square roots, which are exact on every machine: power 1/32 + 1/128.
+/// Approximately the order-th root of a value near one, by square roots, which are exact on every machine: power 1/32 +
+/// 1/128.
 HWY_INLINE V root(V x) {
     for (int i = 0; i < 5; ++i) x = hn::Sqrt(x);
     return x * hn::Sqrt(hn::Sqrt(x));

@@ -19,7 +19,7 @@ struct Stretch {
     double end_s = 0.0;          ///< time from the turn to the end of the stretch; 0: nothing is done
 };
 
-/// What the motion does over a stretch.
+/// Result of the motion over a stretch.
 struct StretchResult {
     double lockin_rad = 0.0;  ///< phase that the lock-in adds beyond that of drive and input
     double cosine = 1.0;      ///< of psi + coupling phase at the beginning
@@ -31,16 +31,16 @@ struct StretchResult {
 /// 2005, Experimental Mathematics 14). The variable is the phase that the lock-in adds, which stays small: nothing is
 /// lost over thousands of fringes.
 ///
-/// Every stretch has its own steps, and its result depends on nothing but itself. `tolerance_rad`: error over a half
-/// cycle, shared out among its steps. `results` has as many elements as `stretches`. Throws RunError where the steps
-/// become too short for the tolerance.
+/// Every stretch has its own steps, and its result does not depend on the other stretches. `tolerance_rad`: error over
+/// a half cycle, shared out among its steps. `results` has as many elements as `stretches`. Throws RunError where the
+/// steps become too short for the tolerance.
 void integrate(std::span<const Stretch> stretches, double tolerance_rad, std::span<StretchResult> results);
 
 /// Goes through the turns of a block of gyros by integrate(): the reference for step_turns(), with the same drive and
 /// the same output.
 class DirectLanes {
    public:
-    /// `devices`: of each gyro, at most simd::lanes. `tolerance_rad`: error of a half cycle.
+    /// `devices`: the device of each gyro, at most simd::lanes. `tolerance_rad`: error of a half cycle.
     DirectLanes(std::span<const gyro::Device> devices, double tolerance_rad);
 
     /// Goes through the turns of `drive`, the next piece of a run, and on to the turn after the last. `turns` is filled

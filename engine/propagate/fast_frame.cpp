@@ -67,7 +67,8 @@ FastFrame::FastFrame(const gyro::HalfCycle& half, const gyro::Coupling& coupling
     if (tolerance_rad > 0.0) {
         const double beat = std::abs(b[0] / g[0]) * (1.0 + std::abs(coupling.second_ratio));
         terms = terms_for(tolerance_rad, beat, g[0] * g[0] / gyro::greatest_acceleration_rad_s2(half));
-        // The k-th harmonic goes as the k-th power of the beat, or, of a second harmonic, of its root.
+        // The k-th harmonic is proportional to the k-th power of the beat, or, with a second harmonic of the coupling,
+        // of its root.
         const double power = coupling.second_ratio == 0.0 ? beat : std::sqrt(beat);
         harmonics_ = std::clamp<std::size_t>(
             static_cast<std::size_t>(std::ceil(std::log(tolerance_rad) / std::log(std::min(power, 0.5)))), 2,

@@ -6,7 +6,7 @@
 
 namespace ringlock::propagate {
 
-/// The frame in which fast motion is plain rotation, whatever harmonics the coupling has:
+/// The frame in which fast motion is plain rotation, for any harmonics of the coupling:
 ///
 ///     phi = theta + 2 Re sum_k p_k exp(i k theta),      theta = psi + coupling phase,
 ///
@@ -14,7 +14,7 @@ namespace ringlock::propagate {
 /// the rate within a fringe; derived in docs/turn-map.md. Without second harmonic it is that of half_turn.hpp.
 class FastFrame {
    public:
-    /// Of a half cycle at `t_s` from its first turn, where motion must be fast (fast_motion_from_s()).
+    /// The frame of a half cycle at `t_s` from its first turn, where motion must be fast (fast_motion_from_s()).
     /// `tolerance_rad`: terms that are smaller are left out, which saves time; 0: all terms are taken.
     FastFrame(const gyro::HalfCycle& half, const gyro::Coupling& coupling, double t_s, double tolerance_rad = 0.0);
 

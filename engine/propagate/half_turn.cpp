@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::size_t quadrature_nodes = 20;
 
-/// Problems side by side, one in each lane, with what is decided about each beforehand.
+/// Problems side by side, one in each lane, with the choices that are made for each beforehand.
 struct Batch {
     simd::Lanes amplitude_rad, angular_frequency_rad_s, rate_rad_s, harmonic_ratio, harmonic_phase_fringes;
     simd::Lanes amplitude_change_rad;
@@ -251,8 +251,8 @@ HWY_EXPORT(solve);
 
 namespace {
 
-/// Fills one lane. K goes as 1/(t - zero), and the substitution t - zero = (start - zero) stretch^u takes that out of
-/// the quadrature.
+/// Fills one lane. K is proportional to 1/(t - zero), and the substitution t - zero = (start - zero) stretch^u removes
+/// that factor from the quadrature.
 void prepare(Batch& batch, std::size_t lane, const HalfTurnProblem& problem, double start_s) {
     const gyro::HalfCycle& half = problem.half;
     const double w = half.angular_frequency_rad_s();

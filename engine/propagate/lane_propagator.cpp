@@ -7,18 +7,19 @@ namespace ringlock::propagate {
 
 namespace {
 
-/// Slow rates and couplings wander: ranges this many times as wide as what a piece asks for need not be made anew soon.
+/// Slow rates and couplings change at random: ranges this many times as wide as a piece needs need not be made anew
+/// soon.
 constexpr double spare = 3.0;
 /// Half widths up to which there is such room [deg/h; relative]; far beyond, terms would run out.
 constexpr double most_spare_rate_deg_h = 5000.0;
 constexpr double most_spare_coupling = 0.5;
-/// What a piece asks for no table may do without, with a little room for the next piece.
+/// Every table must cover the range that a piece needs, with a little room for the next piece.
 constexpr double least_spare = 1.05;
 /// Ranges grow with each remake up to this rate, beyond which they need more and more terms [deg/h].
 constexpr double widest_rate_deg_h = 200.0;
 constexpr double widest_coupling = 0.05;  // relative
 
-/// A range around what is asked for, wider than the last one up to `widest`, with room to spare up to `most_spare`.
+/// A range around the required one, wider than the last one up to `widest`, with room to spare up to `most_spare`.
 Range around(double lowest, double highest, const Range& last, double widest, double most_spare) {
     const double asked = 0.5 * (highest - lowest);
     const double grown = std::min(last.highest - last.lowest, widest);  // twice the old half width
@@ -60,7 +61,7 @@ void TurnMapLanes<Turns>::cover(const gyro::LaneDrive& drive) {
     if (!begun_ || drive.rates_vary) extremes(drive.rate_rad_s, low_rate, high_rate);
     if (!begun_ || drive.thresholds_vary) extremes(drive.b_rad_s, low_b, high_b);
     if (Turns::evaluates_first_half_cycle && begun_) {
-        // The tables so far have it, new ones must.
+        // The ranges of the present tables include it, those of new tables must include it.
         const auto include = [&](const std::vector<simd::Lanes>& rows, simd::Lanes& low, simd::Lanes& high) {
             for (std::size_t lane = 0; lane < devices_.size(); ++lane) {
                 low[lane] = std::min(low[lane], rows[0][lane]);

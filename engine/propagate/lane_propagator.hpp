@@ -14,14 +14,14 @@
 
 namespace ringlock::propagate {
 
-/// Takes a block of gyros through a run, piece after piece. What a gyro does depends on itself alone.
+/// Takes a block of gyros through a run, piece after piece. The results of a gyro do not depend on the other gyros.
 class LanePropagator {
    public:
     virtual ~LanePropagator() = default;
     /// Goes through the turns of `drive`, which follow those of the call before, and fills `turns`.
-    /// Throws RunError where a half cycle cannot be solved to the tolerance asked for.
+    /// Throws RunError where a half cycle cannot be solved to the required tolerance.
     virtual void step(const gyro::LaneDrive& drive, gyro::LaneTurns& turns) = 0;
-    /// Largest error of a turn of that gyro's tables, measured between their nodes [rad]; 0 where there are none.
+    /// Largest error of a turn of that gyro's tables, measured between their nodes [rad]; 0 without tables.
     virtual double table_error_rad(std::size_t lane) const = 0;
     /// Times that a gyro's tables were made anew because the drive left their ranges.
     virtual std::int64_t tables_remade(std::size_t lane) const = 0;
@@ -50,8 +50,8 @@ struct AmplitudeRoom {
     double change_rad = 0.0;  ///< over a half cycle
 };
 
-/// The production propagator: the turn map. Tables are made over the ranges that the first piece asks for, with room to
-/// spare, and anew where a later one leaves them.
+/// The production propagator: the turn map. Tables are made over the ranges that the first piece needs, with room to
+/// spare, and anew where a later piece leaves them.
 template <class Turns>
 class TurnMapLanes final : public LanePropagator {
    public:

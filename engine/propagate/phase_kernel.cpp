@@ -104,7 +104,7 @@ void step(const PhaseTables& tables, const gyro::LaneDrive& drive, std::size_t f
                 hn::Store(lockin[g], d, turns->lockin_fringes[i].data() + lane);
             }
             if (drive.phases_vary) {
-                // psi goes on as it is, and psi + coupling phase jumps with the phase.
+                // psi is continuous, and psi + coupling phase jumps with the coupling phase.
                 const V next = hn::Load(d, drive.coupling_phase_fringes[i + 1].data() + lane);
                 sm::sincos(d, plain + (next - phase[g]) + lockin[g], sine, cosine);
             }

@@ -14,8 +14,8 @@ struct PhaseState {
     bool under_way = false;
 };
 
-/// Goes through the turns of `drive` by tabulated half turns: what step_turns() of turn_kernel.hpp does, for couplings
-/// with a second harmonic.
+/// Goes through the turns of `drive` by tabulated half turns: the counterpart of step_turns() of turn_kernel.hpp for
+/// couplings with a second harmonic.
 ///
 /// `state`: as left by the turns before; at the beginning of a run all zero but for the coupling phase, which lets the
 /// motion begin at the turn itself. `lanes`: gyros to go through, from the first; rounded up to whole vectors. `turns`

@@ -81,7 +81,7 @@ class PhaseSource {
         : device_(device), sign_(sign), end_(end), ranges_(ranges), tolerance_rad_(tolerance_rad) {}
 
     /// Fourier coefficients [rad] at each point up to `harmonics`, [point][k], from `phases` equidistant phases each.
-    /// Where `waves_only`, what all phases have in common is left out of k = 0.
+    /// Where `waves_only`, the part that all phases share is left out of k = 0.
     std::vector<Complex> at(const std::vector<Point>& points, std::size_t harmonics, std::size_t phases,
                             bool waves_only = false) const {
         // Every phase is integrated to where motion becomes fast, and one of them on to the middle: in between all
@@ -120,8 +120,8 @@ class PhaseSource {
         return all;
     }
 
-    /// Half turns at the points, integrated all the way: where they begin, as an angle that the series takes, and what
-    /// the series should give.
+    /// Half turns at the points, integrated all the way: the start, as an angle that the series takes, and the value
+    /// that the series should give.
     struct Probe {
         std::size_t point;
         double angle_rad;

@@ -22,7 +22,7 @@ namespace ringlock::propagate {
 ///
 /// each with functions of its own for the two signs of half cycles. The shift, the mean of the way back, is taken out
 /// of the angle because it may be large and grow with the amplitude. The nodes are integrated through every fringe,
-/// with integrate(). What a gyro's series are depends on its device and ranges alone. Derived in docs/turn-map.md.
+/// with integrate(). The series of a gyro depend on its device and ranges alone. Derived in docs/turn-map.md.
 class PhaseTables {
    public:
     static constexpr std::size_t variables = 3;
@@ -49,7 +49,7 @@ class PhaseTables {
 
     /// End 0: from the turn at which the half cycle begins to its middle. End 1: from its middle to the next turn.
     const Part& part(double sign, int end) const { return parts_[index(sign, end)]; }
-    /// Middle and inverse half width of the ranges, 0 for what does not vary.
+    /// Middle and inverse half width of the ranges, 0 for variables that do not vary.
     const std::array<simd::Lanes, variables>& centre() const { return centre_; }
     const std::array<simd::Lanes, variables>& inverse_half_width() const { return inverse_; }
     const HalfCycleRanges& ranges(std::size_t lane) const { return ranges_[lane]; }

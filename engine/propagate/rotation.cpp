@@ -21,7 +21,7 @@ Phase gained(const LiftedMap& map) {
     return sum;
 }
 
-/// What decides between locked and free, for d = plain + shift less whole fringes.
+/// Quantities that decide between locked and free, for d = plain + shift less whole fringes.
 struct Edge {
     double excess;  ///< sin^2(d/2) - |z|^2: negative where locked
     double cosine;  ///< cos(d/2), >= 0

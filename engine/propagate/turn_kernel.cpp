@@ -102,7 +102,7 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
                 hn::Store(whole[g] + at_turn, d, turns->lockin_fringes[i].data() + lane);
             }
             if constexpr (jumping) {
-                // psi goes on as it is, and psi + coupling phase jumps with the phase.
+                // psi is continuous, and psi + coupling phase jumps with the coupling phase.
                 V jump_sine, jump_cosine;
                 sm::sincos(d, hn::Load(d, drive.coupling_phase_fringes[i + 1].data() + lane) - phase[g], jump_sine,
                            jump_cosine);
@@ -110,8 +110,9 @@ void step(const TurnTables& tables, const gyro::LaneDrive& drive, std::size_t fi
             }
             const sm::Complex<V> q = sm::mul_add(d, z_after, w, v);
             const V gain = sm::fma(d, bend<strong>(d, q), per_half_pi, after.shift);
-            // Whole fringes go at every turn, or rounding would know where a piece began. They go from what was there
-            // before the turn, which is off the chain of operations that a turn must wait for.
+            // Whole fringes are removed at every turn, or rounding would depend on where a piece began. They are
+            // removed from the phase before the turn, which is not in the chain of operations that a turn must wait
+            // for.
             const V carry = sm::nearest(d, before_turn);
             whole[g] = whole[g] + carry;
             lockin[g] = sm::fma(d, sign, gain, before_turn - carry);

@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t variables = TurnTables::variables;
 using Values = std::array<double, 3>;  // shift in fringes, Re z, Im z
 
-/// What exact_half_turns makes of points of the ranges.
+/// Results of exact_half_turns at points of the ranges.
 class KickSource {
    public:
     KickSource(const gyro::Device& device, double sign, int end, const std::array<Range, variables>& ranges)

@@ -18,7 +18,7 @@ struct Range {
     bool covers(double value) const { return value >= lowest && value <= highest; }
 };
 
-/// What may differ from half cycle to half cycle of one gyro.
+/// Ranges of the quantities that may differ from half cycle to half cycle of one gyro.
 struct HalfCycleRanges {
     Range amplitude_rad;  ///< at the turn; the half cycle's own where it does not change
     Range rate_rad_s;
@@ -29,7 +29,7 @@ struct HalfCycleRanges {
 /// The exact half turns of a block of gyros as polynomials in amplitude, rate, coupling and change of the amplitude.
 ///
 /// Each gyro has its own polynomials over its own ranges, of as many terms as hold the error measured between the
-/// nodes; a quantity that does not vary takes one term. What a gyro's polynomials are depends on its device and ranges
+/// nodes; a quantity that does not vary takes one term. The polynomials of a gyro depend on its device and ranges
 /// alone.
 class TurnTables {
    public:
@@ -62,7 +62,7 @@ class TurnTables {
     bool changing() const { return changing_; }
     /// Lock-in may turn some gyro's phase by more than a quarter fringe at a turn.
     bool strong() const { return strong_; }
-    /// Middle and inverse half width of the ranges, 0 for what does not vary.
+    /// Middle and inverse half width of the ranges, 0 for variables that do not vary.
     const std::array<simd::Lanes, variables>& centre() const { return centre_; }
     const std::array<simd::Lanes, variables>& inverse_half_width() const { return inverse_; }
     const HalfCycleRanges& ranges(std::size_t lane) const { return ranges_[lane]; }

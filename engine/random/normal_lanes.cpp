@@ -12,7 +12,7 @@ namespace ringlock::random::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 namespace sm = simd::HWY_NAMESPACE;
 
-/// The low halves of 64-bit lanes hold the words of Philox; the high halves hold whatever is left there.
+/// The low halves of 64-bit lanes hold the words of Philox; the high halves are arbitrary.
 template <class V>
 struct Words {
     V w0, w1, w2, w3;

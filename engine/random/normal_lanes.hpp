@@ -9,15 +9,15 @@
 /// Standard normal deviates for many gyros at once.
 namespace ringlock::random {
 
-/// Who draws in each lane.
+/// Identity of the gyro in each lane.
 struct LaneIdentities {
     std::uint64_t seed = 0;
     std::array<std::uint64_t, simd::lanes> gyro{};
 };
 
 /// Fills out[i][lane], i < steps, with the standard normal deviates of steps first_step + i of the gyros' streams of
-/// that purpose. Any step can be asked for at any time and always has the same deviate, whatever the lanes beside it,
-/// the instruction set and the steps asked for together.
+/// that purpose. Any step can be requested at any time and always has the same deviate, independently of the adjacent
+/// lanes, of the instruction set and of the other steps of the call.
 ///
 /// Philox 4x32-10 (Salmon, Moraes, Dror, Shaw, SC11) with the seed as key and the counter {step / 2, gyro, purpose};
 /// gyros are below 2^56; the 128 bits of a counter make two deviates by the method of Box and Muller (Ann. Math. Stat.
@@ -30,7 +30,7 @@ struct LaneIdentities {
 void normals(const LaneIdentities& who, Purpose purpose, std::uint64_t first_step, std::size_t steps, std::size_t lanes,
              double* out, std::size_t pair_stride = 1);
 
-/// The deviate of one step of one gyro: what normals() gives.
+/// The deviate of one step of one gyro, equal to that of normals().
 double normal(Identity who, Purpose purpose, std::uint64_t step);
 
 }  // namespace ringlock::random

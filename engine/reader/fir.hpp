@@ -26,7 +26,7 @@ class Fir final : public Stripper {
     double cutoff_hz_;
     double latch_hz_;
     double dither_hz_;
-    std::vector<double> taps_;    ///< made with the first angle: many filters are only asked for their delay
+    std::vector<double> taps_;    ///< made with the first angle: many filters are only needed for their delay
     std::vector<double> angles_;  ///< the last ones, oldest at next_
     std::size_t next_ = 0;
 };

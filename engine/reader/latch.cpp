@@ -10,7 +10,8 @@ namespace ringlock::reader {
 
 namespace {
 
-/// What varying rates add within one half cycle of one gyro beyond a constant rate over it: zero at both ends.
+/// Rotation by varying rates within one half cycle of one gyro, less that of a constant rate over it: zero at both
+/// ends.
 class Bend {
    public:
     Bend(const CaseRotation& rotation, std::size_t lane, double start_s, double duration_s)
@@ -18,7 +19,8 @@ class Bend {
         if (rotation.angle_arcsec) whole_arcsec_ = rotation.angle_arcsec(lane, start_s, duration_s);
     }
 
-    /// At an instant after its start that is not before the one asked for last; `number` makes the chance of it.
+    /// Value at an instant after the start, which must not be before that of the previous call; `number` selects its
+    /// random number.
     double arcsec(double after_s, std::uint64_t number) {
         after_s = std::clamp(after_s, 0.0, duration_s_);
         double bend_arcsec = 0.0;

@@ -24,8 +24,8 @@ struct Instant {
     double dither_ahead_fringes = 0.0;  ///< its rate over its angular frequency: the same a quarter of a cycle later
 };
 
-/// Rates of the case that vary. The turns know what they add from turn to turn, as a constant rate over each half
-/// cycle; this is how the angle runs between them.
+/// Rates of the case that vary. The turns contain their rotation from turn to turn, as a constant rate over each half
+/// cycle; this gives the angle between the turns.
 struct CaseRotation {
     /// Rotation [arcsec] of a gyro of the block from `start_s` after the start of the run on, over `duration_s`, chance
     /// apart; empty where no rate varies.

@@ -91,7 +91,7 @@ void Reader::read(std::span<const Instant> instants, std::span<const double> cor
     angles_arcsec_.clear();
     first_output_ = next_output_;
     for (const Instant& instant : instants) {
-        // Counts are missed between turns; the counter has what it had at the turn before.
+        // Counts are missed between turns; the counter has the error that it had at the turn before.
         const double count_error = count_errors.empty() ? 0.0
                                    : instant.row == 0   ? last_count_error_
                                                         : count_errors[instant.row - 1];

@@ -13,7 +13,7 @@
 
 namespace ringlock::reader {
 
-/// What a reader is attached to.
+/// The gyro and the electronics to which a reader is attached.
 struct Source {
     double scale_factor_arcsec = 0.5;
     double dither_hz = 0.0;

@@ -2,7 +2,7 @@
 #include <array>
 #include <cstdint>
 
-/// The reader: what latches the gyro's angle at the ticks of a clock of its own and takes the dither out of it.
+/// The reader latches the gyro's angle at the ticks of its own clock and removes the dither from it.
 namespace ringlock::reader {
 
 /// How the dither is taken out of the latched angle.
@@ -15,7 +15,7 @@ enum class Stripping {
     reference_fir,  ///< a measured dither angle is subtracted, then the low-pass filter
 };
 
-/// What a latched angle is made of.
+/// Parts of the phase from which a latched angle is made.
 enum class Fraction {
     ideal,      ///< the phase itself
     detectors,  ///< the counter's quarter fringe and the quadrature detectors within it

@@ -13,8 +13,8 @@ namespace ringlock::reader {
 std::unique_ptr<Stripper> make_stripper(const Settings& settings, double latch_hz, double dither_hz) {
     const auto fir = [&] {
         const double cutoff_hz = settings.fir_cutoff_hz > 0.0 ? settings.fir_cutoff_hz : 0.25 * dither_hz;
-        // Hamming's window passes what is within two over the filter's length of the cut-off: with four cycles of the
-        // dither that is half of the dither's frequency.
+        // The transition band of Hamming's window extends to two over the filter's length beyond the cut-off: with four
+        // cycles of the dither that is half of the dither's frequency.
         const auto order = settings.fir_order > 0 ? static_cast<std::size_t>(settings.fir_order)
                                                   : 2 * static_cast<std::size_t>(std::ceil(2.0 * latch_hz / dither_hz));
         return Fir(order, cutoff_hz, latch_hz, dither_hz);

@@ -6,11 +6,12 @@
 
 namespace ringlock::reader {
 
-/// What a reader has at a tick of its clock.
+/// Data of a reader at a tick of its clock.
 struct Latched {
     double time_s = 0.0;        ///< since tick 0
     double angle_arcsec = 0.0;  ///< latched angle, dither included
-    /// Measured angle of the dither and the same a quarter of a cycle later: of A sin x they are A sin x and A cos x.
+    /// Measured angle of the dither and the same a quarter of a cycle later: for a dither A sin x they are A sin x and
+    /// A cos x.
     double dither_arcsec = 0.0;
     double dither_ahead_arcsec = 0.0;
 };
@@ -36,7 +37,7 @@ class Stripper {
     virtual double warm_up_s() const = 0;
 };
 
-/// The stripper that the settings ask for. `latch_hz`: of the ticks; `dither_hz`: of the dither's drive.
+/// The stripper that the settings select. `latch_hz`: rate of the ticks; `dither_hz`: frequency of the dither's drive.
 std::unique_ptr<Stripper> make_stripper(const Settings& settings, double latch_hz, double dither_hz);
 
 /// Outputs at that rate, from tick 0 on, that are not fit for use; 1e15 where there are more.

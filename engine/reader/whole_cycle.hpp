@@ -6,8 +6,8 @@
 namespace ringlock::reader {
 
 /// Counts over whole cycles of the dither, as in Gao & Deng 2007: the angle is latched where the measured dither angle
-/// crosses zero upwards, where the dither itself adds nothing whatever its amplitude, and the output at a tick is
-/// linear between these angles one cycle earlier, when both of them are known.
+/// crosses zero upwards, where the dither itself adds nothing, for any amplitude, and the output at a tick is linear
+/// between these angles one cycle earlier, when both of them are known.
 ///
 /// Sampling once a cycle and the straight line between make a response of sinc^2(frequency/dither frequency) to slow
 /// rotations; faster ones are aliased.

@@ -22,8 +22,8 @@ struct Electronics {
     static constexpr double adc_range = 1.25;
 };
 
-/// Chance in the electronics, the same for all trajectories of a block; empty where they have none. Standard normal
-/// deviates but for the counters'.
+/// Random numbers of the electronics, the same for all trajectories of a block; empty for electronics without noise.
+/// They are standard normal deviates except those of the counters.
 struct ElectronicNoise {
     std::span<const simd::Lanes> detectors = {};  ///< [2 turn + detector][gyro]: sine, cosine
     /// [2 kept_pulses turn + kept_pulses side + pulse][gyro]: before, after the turn; nearest pulse first

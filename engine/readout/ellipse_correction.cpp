@@ -78,7 +78,7 @@ constexpr std::int64_t most_turns_between_fits = 8192;
 // Where phases do not move, noise bends the fit by its variance times the readings: keep ahead of it.
 constexpr int made_up_readings = 8;
 constexpr double made_up_share = 1e-3;
-constexpr double least_eigenvalue = 1e-3;  // of the quadratic form, beside 1: what is no ellipse to speak of
+constexpr double least_eigenvalue = 1e-3;  // of the quadratic form, relative to 1; a form below it is no ellipse
 
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
@@ -112,7 +112,7 @@ void EllipseCorrection::fit() {
         const Vector5 conic = normal.ldlt().solve(right);
         Eigen::Matrix2d form;
         form << conic[0], 0.5 * conic[1], 0.5 * conic[1], conic[2];
-        // A hyperbola, or nothing at all: what is known stays.
+        // A hyperbola, or no solution: the previous correction is kept.
         if (!conic.allFinite() ||
             Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(form).eigenvalues()[0] < least_eigenvalue) {
             continue;

@@ -23,7 +23,7 @@ class EllipseCorrection {
     explicit EllipseCorrection(std::size_t lanes);
 
     /// Corrects sine, cosine and phase_fringes of consecutive readings, and the angle output where `interpolated`;
-    /// tells the pulses where comparators are known to switch.
+    /// gives the pulses the phases at which the comparators are known to switch.
     void correct(LaneReadings& readings, LaneAngles& angles, bool interpolated);
 
     /// As known by now.

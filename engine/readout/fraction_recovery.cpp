@@ -20,7 +20,7 @@ namespace gm = gyro::HWY_NAMESPACE;
 using D = hn::CappedTag<double, simd::lanes>;
 using V = hn::Vec<D>;
 
-constexpr double model_rad = 1e-6;        // what parabola, tables and coupling may be wrong by
+constexpr double model_rad = 1e-6;        // allowance for errors of parabola, tables and coupling
 constexpr double largest_step_rad = 0.2;  // beyond it pulses and detectors contradict each other
 constexpr double memory_cycles = 512.0;
 
@@ -218,7 +218,7 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                     }
                 }
             }
-            // All products less what the share of psi'' explains of them (Sherman and Morrison 1950).
+            // All products less the part that the share of psi'' explains (Sherman and Morrison 1950).
             const V explained = share_variance / sm::fma(d, share_variance, share_share, one);
             const auto without = [&](V& product, V u, V v)
                                      HWY_ATTR { product = sm::fnma(d, explained * u, v, product); };
@@ -247,12 +247,12 @@ void recover_all(std::size_t lanes, const FractionRecovery::Known& known, const 
                                 e + hn::IfThenElseZero(late, half * steeper * sampled_s * sampled_s));
             const auto agree = hn::Abs(change) < hn::Set(d, largest_step_rad);
             change = sign * hn::IfThenElseZero(agree, change);
-            // No swing has told the amplitude yet.
+            // No swing has determined the amplitude yet.
             if (growing && before_turns == 0) change = zero;
             contradictions = contradictions + hn::IfThenElse(agree, zero, one);
 
             if constexpr (learning) {
-                // What of the bends the three unknowns do not explain.
+                // The part of the bends that the three unknowns do not explain.
                 const V determinant = one / sm::fnma(d, s1, s1, s0 * s2);
                 const auto apart = [&](const Column<V>& column, V product, V with_one, V with_slope) HWY_ATTR {
                     const V of_one = sm::fnma(d, s1, with_slope, s2 * with_one) * determinant;

@@ -9,11 +9,11 @@
 
 namespace ringlock::readout {
 
-/// The phase at the zero-rate point from all that the hardware has of a turn: the sampled detectors and the nearest
-/// pulses on either side (Gao & Deng 2007, equations 14 and 15, which use one pulse on one side).
+/// The phase at the zero-rate point from all data of a turn that the hardware has: the sampled detectors and the
+/// nearest pulses on either side (Gao & Deng 2007, equations 14 and 15, which use one pulse on one side).
 ///
 /// Near the extremum psi_0 at t_0 the phase, turned upright, is psi_0 + (t - t_0)^2 a/(2 R^2), with R as in PulseTables
-/// for the coupling that the electronics have been told. A pulse at time t from the instant of sampling whose
+/// for the coupling that has been set in the electronics. A pulse at time t from the instant of sampling whose
 /// comparator switches D from the sampled phase therefore says, with e = psi_0 - sampled + a tau^2/2, tau = t_0,
 ///
 ///     a t^2/(2 R^2) - D = -e + (a t/R^2) tau + noise,
@@ -23,13 +23,13 @@ namespace ringlock::readout {
 /// cycle an amplitude that is not known yet: a is wrong by a share, the same at all pulses there, which adds that share
 /// of D to each. It is a third unknown, whose variance is known beforehand.
 /// Behind a noisy drive the amplitude is the same on both sides of the turn and grows over either half cycle
-/// (docs/noise-injection.md): the swings of successive half cycles tell the amplitude at the turn and its change
+/// (docs/noise-injection.md): the swings of successive half cycles determine the amplitude at the turn and its change
 /// before, which takes c (w t)^3/(3 pi) off the distance to a pulse; the change c after the turn is the third unknown
 /// then. The sides meet at the dither's turn, not at the zero-rate point: at a rate r there, lock-in and input, the
 /// parabola of a side has its vertex r/a before it, so that the side after has its own by (r/a)(1 - a/a') later than
 /// the side before, a' being its acceleration. At asymmetries of 1e-3 that is 2e-10 s. The lock-in bends the two sides
-/// in opposite ways, so that an error of the coupling goes into tau; what it leaves in psi_0 is of second order in the
-/// coupling.
+/// in opposite ways, so that an error of the coupling goes into tau; the remaining error of psi_0 is of second order in
+/// the coupling.
 class FractionRecovery {
    public:
     /// \param devices           as the electronics know them: amplitude, durations, coupling
@@ -46,11 +46,11 @@ class FractionRecovery {
     /// The same for rows [first_row, last_row).
     void recover(LaneReadings& readings, std::size_t first_row, std::size_t last_row, LaneAngles* angles);
 
-    /// What the pulses tell of the coupling itself: with b and phase e those of the tables, a coupling
+    /// Information on the coupling itself from the pulses: with b and phase e those of the tables, a coupling
     /// b ((1 + x) sin(psi + e) + y cos(psi + e)) adds x P + y Q to the left-hand sides above, P = 2 D (R - 1)/R and Q
-    /// the same of a coupling a quarter fringe on. What is orthogonal to e, tau and the share adds up to normal
-    /// equations of x and y, weighted with the inverse of the noise's variance: of all turns since learn() or
-    /// forget_bends().
+    /// the same of a coupling a quarter fringe on. The parts of P and Q that are orthogonal to e, tau and the share add
+    /// up to normal equations of x and y, weighted with the inverse of the noise's variance: of all turns since learn()
+    /// or forget_bends().
     struct Bends {
         double xx, xy, yy, x, y;
     };
@@ -68,7 +68,8 @@ class FractionRecovery {
     Coupling told(std::size_t lane) const {
         return {devices_[lane].coupling.b_rad_s, devices_[lane].coupling.phase_rad};
     }
-    /// Makes the tables anew, for bends are linear about theirs only, and forgets those of the old ones.
+    /// Makes the tables anew for this coupling. Bends are linear about the coupling of their tables only, so the
+    /// earlier ones are discarded.
     void tell(std::size_t lane, const Coupling& coupling);
 
     /// Turns at which pulses and detectors contradicted each other, so that the detectors' phase was kept.

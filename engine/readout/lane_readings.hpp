@@ -10,7 +10,7 @@ namespace ringlock::readout {
 /// Times of the comparators' pulses next to consecutive turns, as the counter's clock sees them.
 struct LanePulses {
     /// From the instant at which the detectors were sampled, in the direction of time [s]; 0 where that pulse was not
-    /// told apart from its neighbour beyond the turn. [before, after][nearest first][turn]
+    /// distinguished from its neighbour beyond the turn. [before, after][nearest first][turn]
     std::vector<simd::Lanes> time_s[2][kept_pulses];
     /// Number of the quarter fringe of the nearest pulses, counted upright: the phase itself at minima, its negative at
     /// maxima; in quarter fringes, on the branch of phase_fringes. [turn]
@@ -28,8 +28,8 @@ struct LanePulses {
     bool empty() const { return first_quarter.empty(); }
 };
 
-/// What the electronics report of consecutive zero-rate points of a block of gyros: one row a turn, one column a gyro.
-/// Even turns of a run are minima of the phase. Compensators see this and nothing else.
+/// Readings of the electronics at consecutive zero-rate points of a block of gyros: one row a turn, one column a gyro.
+/// Even turns of a run are minima of the phase. These are the only data that compensators receive.
 struct LaneReadings {
     std::int64_t first_turn = 0;
     std::size_t turns = 0;
@@ -39,14 +39,14 @@ struct LaneReadings {
     /// names (wrong by whole fringes where it has missed counts); fringes, less ...
     std::vector<simd::Lanes> phase_fringes;
     std::vector<simd::Lanes> phase_whole;  ///< ... these whole ones
-    /// Magnitude of the phase acceleration on either side; 0 where no two pulses were told apart.
+    /// Magnitude of the phase acceleration on either side; 0 where no two pulses were distinguished.
     std::vector<simd::Lanes> accel_before_rad_s2;
     std::vector<simd::Lanes> accel_after_rad_s2;
-    LanePulses pulses;  ///< empty where nobody asked for them
-    // For records; empty where nobody asked for them:
+    LanePulses pulses;  ///< empty unless requested
+    // For records; empty unless requested:
     std::vector<simd::Lanes>
         zero_rate_s;                 ///< when the phase turned, as the electronics find it, from the dither's turn
-    std::vector<simd::Lanes> count;  ///< what the counter says, in quarter fringes, less those of phase_whole
+    std::vector<simd::Lanes> count;  ///< count of the counter, in quarter fringes, less those of phase_whole
 
     void resize(std::size_t wanted) {
         turns = wanted;
@@ -66,7 +66,7 @@ struct LaneAngles {
     /// Lock-in error at the zero-rate point, less the whole fringes below.
     std::vector<simd::Lanes> lockin_fringes;
     simd::Lanes lockin_whole;
-    // Empty where nobody asked for them:
+    // Empty unless requested:
     std::vector<simd::Lanes> phase_fringes;  ///< at the zero-rate point, less the whole ones of LaneReadings
     std::vector<simd::Lanes> zero_rate_s;    ///< when the phase turns, from the dither's turn
 

@@ -31,7 +31,7 @@ HWY_INLINE V acceleration_of_pulses(D d, V roots, V interval_s) {
     return hn::IfThenElseZero(interval_s > hn::Zero(d), root * root);
 }
 
-/// What is known of a turn so far.
+/// Results for a turn so far.
 struct Found {
     Walk walk;
     V quarters;  ///< phase at the zero-rate point in quarter fringes
@@ -56,8 +56,8 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> pu
         store(lockin_whole, angles.lockin_whole);
         const auto sides_of = [&](std::size_t i) HWY_ATTR { return sides_at<extras>(d, constants, drive, i, lane); };
         V last_scale = zero;
-        // A few turns at a time, step by step: what one turn does waits for itself, turns do not wait for each other,
-        // and short steps let the processor work at several of them.
+        // A few turns at a time, step by step: the operations of one turn depend on each other, those of different
+        // turns do not, and short steps let the processor work at several turns in parallel.
         Found found[turns_together];
         for (std::size_t first = 0; first < drive.turns; first += turns_together * stride) {
             const std::size_t end = std::min(drive.turns, first + turns_together * stride);

@@ -10,14 +10,15 @@
 #include "engine/readout/pulse_tables.hpp"
 #include "engine/readout/readout_constants.hpp"
 
-/// From the true phase to what the electronics report.
+/// From the true phase to the readings of the electronics.
 namespace ringlock::readout {
 
-/// What readings hold beside the phase.
+/// Content of readings in addition to the phase.
 enum class Wanted {
     phase,
     accelerations,  ///< from two pulses on either side unless the electronics are ideal
-    pulses,         ///< these, too, and the detectors sampled where the pulses tell; every property of the electronics
+    pulses,         ///< these, too, and the detectors sampled at the instant that the pulses determine; every property
+                    ///< of the electronics
 };
 
 /// Readout of a block of gyros.
@@ -27,9 +28,9 @@ enum class Wanted {
 /// as it takes; pulses next to it come from PulseTables.
 class LaneReadout {
    public:
-    /// \param devices     of each gyro, at most simd::lanes; with b = 0 where there is no lock-in
+    /// \param devices     of each gyro, at most simd::lanes; with b = 0 for a gyro without lock-in
     /// \param ellipses    errors of each gyro's detectors; not used by ideal electronics
-    /// \param wanted      what the readings must hold
+    /// \param wanted      content of the readings
     /// \param phases_vary whether drives say that the coupling's phase varies
     LaneReadout(std::span<const gyro::Device> devices, std::span<const gyro::Ellipse> ellipses,
                 const Electronics& electronics, Wanted wanted, bool phases_vary = false);

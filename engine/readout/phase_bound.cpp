@@ -44,7 +44,7 @@ double phase_variance_bound_rad2(const Electronics& electronics, const BoundedTu
     }
     const bool known = turn.acceleration_rms_relative == 0.0;
     if (!known) information[2][2] += 1.0 / squared(turn.acceleration_rms_relative);
-    // What is left for psi_0 when the others are eliminated, one after the other.
+    // Information on psi_0 that remains when the other unknowns are eliminated, one after the other.
     for (std::size_t gone = known ? 1 : 2; gone > 0; --gone) {
         for (std::size_t i = 0; i < gone; ++i) {
             const double factor = information[i][gone] / information[gone][gone];

@@ -2,10 +2,10 @@
 #include "engine/gyro/setup.hpp"
 #include "engine/readout/electronics.hpp"
 
-/// What no estimator of the phase at a zero-rate point can fall below (docs/compensation.md).
+/// Lower bound of the error of any estimator of the phase at a zero-rate point (docs/compensation.md).
 namespace ringlock::readout {
 
-/// What is known of a turn beside the readings.
+/// Knowledge about a turn in addition to the readings.
 struct BoundedTurn {
     double acceleration_rad_s2 = 0.0;  ///< psi''
     /// Standard deviation of the acceleration after the turn over itself, as known when the turn is read; 0: known. On

@@ -92,8 +92,8 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> ta
             const V per_three_pi = hn::Set(d, 0.10610329539459689);
             const V swell[2] = {growth[0] * before.w * scale[0] * per_three_pi,
                                 hn::Neg(growth[1]) * after.w * scale[1] * per_three_pi};
-            // The parabola of the half cycle in which the extremum does not lie would have it elsewhere: at the time
-            // t_0 a/a' and, from the dither's turn on, by as much more of phase.
+            // The parabola of the half cycle that does not contain the extremum has its vertex elsewhere: at the time
+            // t_0 a/a', and its phase, counted from the dither's turn, is scaled likewise.
             const V t0 = walk.time_s;
             const auto late = t0 > zero;
             const V a_here = one / hn::IfThenElse(late, scale[1] * scale[1], scale[0] * scale[0]);
@@ -151,9 +151,9 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> ta
             const auto told = hn::And(switched, hn::And(distance[1][0] > zero, interval_s > least_s));
             const V counted = hn::IfThenElse(switched, floor, floor + one);
 
-            // Sampling: half-way between the nearest pulses that were told apart, t_b and t_a, but for the hysteresis,
-            // for which t_a^2 - t_b^2 is 4 h/a with times from the zero-rate point; these go with 1/sqrt(a), and
-            // sqrt(a) with the half cycle's angular frequency.
+            // Sampling: half-way between the nearest pulses that were distinguished, t_b and t_a, but for the
+            // hysteresis, for which t_a^2 - t_b^2 is 4 h/a with times from the zero-rate point; these are proportional
+            // to 1/sqrt(a), and sqrt(a) to the half cycle's angular frequency.
             const V last = hn::IfThenElse(told, seen[0][0], seen[0][1]);
             const V first = hn::IfThenElse(told, seen[1][0], seen[1][1]);
             const V share = before.w / (before.w + after.w);
@@ -202,7 +202,8 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> ta
                 const V branch = sm::nearest(d, off - (phase + error - named));
                 read_fringes = read_fringes + branch;
                 output_error = output_error + (electronics.interpolate ? branch : off);
-                // Which comparator switched, and in which direction, tells its number modulo 4: it moves along.
+                // The comparator that switched, and its direction, determine the number of the quarter modulo 4, which
+                // therefore moves along.
                 first_quarter = sm::fma(d, sign * branch, hn::Set(d, 4.0), first_quarter);
             }
             store(read_fringes, readings.phase_fringes[i]);
@@ -225,8 +226,8 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> ta
                 store(drive_acceleration<extras>(d, after, extra, t0), readings.accel_after_rad_s2[i]);
                 continue;
             }
-            // Accelerations from the two nearest pulses that were told apart, by the distances that the phase read and
-            // the hysteresis give.
+            // Accelerations from the two nearest pulses that were distinguished, by the distances that the phase read
+            // and the hysteresis give.
             const V read = sm::fnma(d, sign * error, hn::Set(d, 6.283185307179586), near);
             V roots[3];
             for (std::size_t side = 0; side < 2; ++side) {

@@ -26,7 +26,7 @@ struct QuarterOf {
     hn::Mask<D> odd, upper;
 };
 
-/// Of whole numbers of quarter fringes, modulo 4.
+/// The quarter of whole numbers of quarter fringes, modulo 4.
 template <class D, class V>
 HWY_INLINE QuarterOf<D> quarter_of(D d, V number) {
     const V index = number - hn::Set(d, 4.0) * hn::Floor(number * hn::Set(d, 0.25));  // 0...3
@@ -35,7 +35,7 @@ HWY_INLINE QuarterOf<D> quarter_of(D d, V number) {
     return {in_pair > hn::Set(d, 0.5), upper};
 }
 
-/// What of four lanes' values belongs to the quarter.
+/// The one of four tables' values that belongs to the quarter, in each lane.
 template <class D, class Table>
 HWY_INLINE hn::Vec<D> pick(D d, const QuarterOf<D>& quarter, const Table& of, std::size_t lane) {
     const auto value = [&](std::size_t number) HWY_ATTR { return hn::Load(d, of[number].data() + lane); };
@@ -43,7 +43,7 @@ HWY_INLINE hn::Vec<D> pick(D d, const QuarterOf<D>& quarter, const Table& of, st
                           hn::IfThenElse(quarter.odd, value(1), value(0)));
 }
 
-/// S of PulseTables: what the dither's cosine makes of the times of pulses beside a parabola's.
+/// S of PulseTables: the times of pulses on the dither's cosine over those on a parabola.
 template <class D, class V>
 HWY_INLINE V sinusoid_factor(D d, V share) {
     const V half = share * hn::Set(d, 0.5);

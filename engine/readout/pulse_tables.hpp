@@ -18,13 +18,14 @@ inline constexpr double arcsin_series[] = {1.0 / 6,       3.0 / 40,         15.0
 /// With x the phase turned upright (psi + coupling phase at minima, its negative at maxima), d the phase from the
 /// extremum to the pulse and a the phase acceleration, t sqrt(a) = sqrt(2 d) (S + R). S = arccos(1 - s)/sqrt(2 s) is
 /// that of the dither's cosine, s = d w^2/a; a parabola has S = 1. R is the bend by the lock-in, a smooth function of
-/// sqrt(d), for it goes with the third power of t, for each of the four quarters that the pulse may begin: polynomials
-/// from the equation of motion, solved from the zero-rate point outwards. Amplitude noise and rates that vary enter
-/// through a.
+/// sqrt(d), since it is proportional to the third power of t, for each of the four quarters that the pulse may begin:
+/// polynomials from the equation of motion, solved from the zero-rate point outwards. Amplitude noise and rates that
+/// vary enter through a.
 ///
-/// The half cycle of that side is taken to rule from the zero-rate point on, even where the dither turns only between
-/// that point and the pulses. Where accelerations differ between the sides by a share q, both pulses of one side are
-/// misplaced by up to q times the time between the two turns; the interval between them is not, to first order.
+/// The half cycle of that side is assumed to apply from the zero-rate point on, even where the dither turns only
+/// between that point and the pulses. Where accelerations differ between the sides by a share q, both pulses of one
+/// side are misplaced by up to q times the time between the two turns; the interval between them is not, to first
+/// order.
 struct PulseTables {
     static constexpr std::size_t terms = 10;
     static constexpr std::size_t quarters = 4;
@@ -36,9 +37,9 @@ struct PulseTables {
     using Times = std::array<std::array<simd::Lanes, terms>, quarters>;
     /// [minimum, maximum][before, after][pulse, nearest first]
     std::array<std::array<std::array<Times, kept_pulses>, 2>, 2> times;
-    std::size_t used = 1;  ///< terms that some gyro needs: what others do without is zero
-    /// For each gyro, what R is in proportion to: it goes with b/sqrt(a), and this is the inverse of that of the
-    /// tables; 0 without lock-in. [sides: positive, negative]
+    std::size_t used = 1;  ///< terms that some gyro needs; they are zero for gyros that do not need them
+    /// For each gyro, the inverse of b/sqrt(a) of the tables, to which R is proportional; 0 without lock-in. [sides:
+    /// positive, negative]
     simd::Lanes inverse_bend[2];
 
     /// Makes the tables of one gyro for so many pulses on each side, at most kept_pulses. Throws RunError where the

@@ -15,7 +15,7 @@ struct ComparatorPoints {
 };
 ComparatorPoints comparator_points(const gyro::Ellipse& ellipse);
 
-/// What readout kernels need of a block of gyros; index 0 of a pair: half cycles of positive sign.
+/// Constants of a block of gyros for the readout kernels; index 0 of a pair: half cycles of positive sign.
 struct ReadoutConstants {
     simd::Lanes angular_frequency_rad_s[2];
     simd::Lanes duration_s[2];

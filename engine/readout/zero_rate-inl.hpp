@@ -106,14 +106,14 @@ HWY_INLINE bool walk_to_zero_rate(D d, const Side& before, const Side& after, co
         series.expand(d, side, extra, sine_wt, cosine_wt, walk.sine, walk.cosine);
         // A parabola's extremum, then Newton, and again with the same slope, where that is near enough for the series.
         V root = hn::Neg(series.rate[1]) / series.rate[2];
-        // A fast input beside a strong coupling can bend the parabola away from zero: then on, too.
+        // A fast input with a strong coupling can curve the parabola away from zero: then, too, the walk goes on.
         const auto near = hn::And(series.rate[2] > zero, gm::within_step(d, forward * root, series.rate[1]));
         V value, slope;
         series.rate_at(d, root, value, slope);
         const V inverse = one / slope;
         root = sm::fnma(d, value, inverse, root);
         root = sm::fnma(d, series.rate_at(d, root), inverse, root);
-        // A step too far is taken back, but not beyond the dither's turn, where the other half cycle rules.
+        // A step that went too far is reversed, but not beyond the dither's turn, where the other half cycle applies.
         root = forward * hn::Max(forward * root, hn::Neg(forward * time));
         V h = root;
         if (!hn::AllTrue(d, near)) h = hn::IfThenElse(near, root, forward * gm::longest_step(d, series.rate[1]));

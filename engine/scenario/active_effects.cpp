@@ -51,7 +51,7 @@ InputRange input_range(const InputRate& input) {
 
 namespace {
 
-/// Of a profile, a second.
+/// Steepest slope of a profile [its unit per second].
 double steepest_slope(const std::vector<double>& times_s, const std::vector<double>& values) {
     double steepest = 0.0;
     for (std::size_t i = 1; i < std::min(times_s.size(), values.size()); ++i) {

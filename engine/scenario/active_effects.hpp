@@ -6,7 +6,8 @@
 #include "engine/gyro/setup.hpp"
 #include "engine/scenario/scenario.hpp"
 
-/// The effects that a scenario turns on. Whoever needs to know what they do asks them here, not by their names.
+/// The effects that a scenario turns on. Code that needs their effect on a gyro evaluates them from here, not by their
+/// names.
 namespace ringlock::scenario {
 
 /// Draws further out than this from their mean are treated as impossible by rules and bounds, in standard deviations.

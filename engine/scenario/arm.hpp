@@ -3,7 +3,7 @@
 #include <string_view>
 #include <vector>
 
-/// Arms of a study: what is done to the gyros whose random numbers they share.
+/// Arms of a study: treatments of the same gyros, with the same random numbers.
 namespace ringlock::scenario {
 
 enum class Compensator {
@@ -13,7 +13,7 @@ enum class Compensator {
     exact,         ///< the turn map inverted
     adaptive,      ///< the same with a coupling that it learns
     extrapolated,  ///< the pulses of both sides extrapolated to the turn (Lim 1982)
-    two_train,     ///< two trains of corrections, scaled by what they explain of the output (Fan et al. 2011)
+    two_train,     ///< two trains of corrections, scaled so that the output varies least (Fan et al. 2011)
 };
 
 struct Arm {
@@ -25,7 +25,7 @@ struct Arm {
 };
 
 /// The arm of that name.
-/// @throws InputError that says which arms there are, without a place in a file.
+/// @throws InputError that lists the arms, without a position in a file.
 Arm parse_arm(std::string_view name);
 
 /// The same of several names, in their order.

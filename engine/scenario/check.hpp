@@ -6,13 +6,13 @@
 
 #include "engine/scenario/scenario.hpp"
 
-/// What no single key can say: rules between keys.
+/// Rules between the keys of a scenario, which no single key can express.
 namespace ringlock::scenario {
 
 /// A rule that a scenario breaks.
 struct Complaint {
     std::vector<std::string> keys;  ///< paths of the keys involved, the likeliest culprit first
-    std::string problem;            ///< what is found and what is allowed
+    std::string problem;            ///< values found and values allowed
 };
 
 /// Every rule that the scenario breaks.

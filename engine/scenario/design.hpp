@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-/// Scenarios beside each other: what a design of a study varies, as it stands in a scenario's file.
+/// Several scenarios in one study: the keys that a design varies, as in a scenario's file.
 namespace ringlock::scenario {
 
 enum class DesignKind { none, grid, list, latin_hypercube, sobol };
@@ -46,23 +46,23 @@ struct Design {
     bool operator==(const Design&) const = default;
 };
 
-/// When the lot is large enough; 0: not asked for. Gyros are added at looks, 16, 32, 64 and so on, until every
-/// precision asked for is reached.
+/// When the lot is large enough; 0: no such condition. Gyros are added at looks, 16, 32, 64 and so on, until every
+/// requested precision is reached.
 struct Stop {
     double arw_relative = 0.0;    ///< half width of the 95 % interval of each arm's mean random walk, over the mean
     double yield_absolute = 0.0;  ///< half width of the 95 % interval of each arm's yield, a share
     std::int64_t most_gyros = 4096;
-    double most_hours = 0.0;  ///< of wall time, asked at looks only
+    double most_hours = 0.0;  ///< of wall time, checked at looks only
     bool operator==(const Stop&) const = default;
 };
 
-/// Whether a precision is asked for.
+/// Whether a precision is requested.
 bool asks(const Stop& stop);
 
-/// The names of the keys of [[design.vary]] that belong together, by what the variation is.
+/// The names of the keys of [[design.vary]] that belong together, for one kind of variation.
 struct VariationForm {
     std::string_view name;                   ///< for messages: "a range"
-    std::vector<std::string_view> required;  ///< beside `key`
+    std::vector<std::string_view> required;  ///< in addition to `key`
     std::vector<std::string_view> optional = {};
 };
 const VariationForm& form_of(const Variation& variation);

@@ -18,7 +18,7 @@ struct DeviceFile {
 /// All of them, by name.
 std::span<const DeviceFile> device_files();
 
-/// The file of that name; null where there is none.
+/// The file of that name; null if there is no such file.
 const DeviceFile* find_device(std::string_view name);
 
 /// Where a value of a device comes from.

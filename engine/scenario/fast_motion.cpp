@@ -20,7 +20,7 @@ namespace {
 /// Turns that a run makes its tables for at one time.
 constexpr double turns_of_tables = 128.0;
 
-/// Standard deviations that the rates of so many half cycles stay within, all but always.
+/// Standard deviations within which the rates of that many half cycles stay, with very few exceptions.
 constexpr double sigmas_of_a_piece = 5.0;
 
 /// How far the rate of a half cycle may be from the input rate [deg/h].
@@ -34,7 +34,7 @@ double varying_rate_deg_h(const Scenario& s) {
     return certain + sigmas * random;
 }
 
-/// Half of what the input's profile can span within the turns that a run makes its tables for at one time [deg/h].
+/// Half of the range of the input's profile within the turns for which a run makes its tables at one time [deg/h].
 double profile_half_span_deg_h(const Scenario& s) {
     if (!has_profile(s.input)) return 0.0;
     const auto [lowest, highest] = input_range(s.input);
@@ -42,21 +42,22 @@ double profile_half_span_deg_h(const Scenario& s) {
            std::min(highest - lowest, input_slope_deg_h_s(s.input) * turns_of_tables / (2.0 * s.dither.frequency_hz));
 }
 
-/// The varying rate with the room that tables leave on either side, see lane_propagator.cpp: up to twice what varies or
-/// 5000 deg/h, and 200 deg/h in any case.
+/// The varying rate with the room that tables leave on either side, see lane_propagator.cpp: twice the varying part, at
+/// most 5000 deg/h and at least 200 deg/h.
 double tabulated_rate_deg_h(const Scenario& s) {
     const double varies = varying_rate_deg_h(s);
     const double spans = varies + profile_half_span_deg_h(s);
     return spans > 0.0 ? varies + std::max(200.0, std::min(2.0 * spans, 5000.0)) : 0.0;
 }
 
-/// Largest coupling over that of the gyro, of the run's tables: what varies with as much room, at most half.
+/// Largest coupling of the run's tables over that of the gyro: the varying part, and room of twice its size, at most
+/// one half.
 double tabulated_coupling(const Scenario& s) {
     const double varies = threshold_change_relative(s);
     return varies > 0.0 ? 1.0 + varies + std::max(0.05, std::min(2.0 * varies, 0.5)) : 1.0;
 }
 
-/// What a table is asked to cover; the couplings go up to, and the amplitudes down from, those of the gyro.
+/// Ranges that a table must cover; the couplings go up to, and the amplitudes down from, those of the gyro.
 struct Room {
     double margin_rad;
     double change_rad;  ///< of the amplitude over a half cycle
@@ -150,12 +151,12 @@ Point fastest_corner(const Point& low, const Point& high, std::size_t which) {
 }
 
 /// Whether polynomials hold a half turn's kick over these ranges. Its phase is that of the zero-rate point against the
-/// turn, which turns with amplitude and rate; that is what takes terms (docs/turn-map.md). Powers of high orders lose
-/// digits besides: a term of order k counts (1 + sqrt(2))^k times in the rounding.
+/// turn. It varies with amplitude and rate, and this variation determines the number of terms (docs/turn-map.md).
+/// Powers of high orders lose digits besides: a term of order k counts (1 + sqrt(2))^k times in the rounding.
 bool holds_kick(const gyro::Device& device, double sign, int end, const Point& low, const Point& high, double kick_rad,
                 double harmonics, std::size_t most_nodes, double tolerance_rad) {
     constexpr double rounding = 1e-15;  // of a radian, and of each that the phase goes through
-    // The shift of a half turn is rounded on the whole of its way, whatever the kick.
+    // The shift of a half turn is rounded over the whole of its path, independently of the kick.
     const double shift_rad = 2e-17 * high[0];
     double largest_rad = 0.0;
     const auto phase_rad = [&](const Point& at) {
@@ -236,10 +237,10 @@ bool hold_kicks(const Scenario& s, const Room& room) {
         const double kick_rad =
             std::min(1.0, device.coupling.b_rad_s * std::sqrt(units::two_pi / (amplitude - room.margin_rad)) / w);
         const bool series = setup.lockin_second_ratio != 0.0;
-        // The tables' own limits, less a few terms for what this leaves out.
+        // The tables' own limits, less a few terms for effects that this estimate neglects.
         const std::size_t most_nodes = series ? 20 : 28;
         const double half = std::min(room.half_width_deg_h, 0.5 * (room.highest_rate_deg_h - room.lowest_rate_deg_h));
-        // Of a sinusoid the phase is even in the rate, and both ends are alike.
+        // For a sinusoidal dither the phase is even in the rate, and both ends are alike.
         const bool alike = setup.dither_harmonic_ratio == 0.0;
         const double centres[] = {room.lowest_rate_deg_h + half, room.highest_rate_deg_h - half};
         for (const double centre : centres) {
@@ -260,7 +261,7 @@ bool hold_kicks(const Scenario& s, const Room& room) {
     return true;
 }
 
-/// Half of what the rates can span within the turns that tables are made for at one time [deg/h].
+/// Half of the range of the rates within the turns for which tables are made at one time [deg/h].
 double half_span_deg_h(const Scenario& s) {
     const double piece_s = turns_of_tables / (2.0 * s.dither.frequency_hz);
     double certain = profile_half_span_deg_h(s);
@@ -281,8 +282,8 @@ double table_half_width_deg_h(const Scenario& s) {
     return std::max({1.05 * asked, std::min(3.0 * asked, 5000.0), 200.0});
 }
 
-/// Calls `allows` with the room of every table that the scenario's arms ask for, as long as it says so: with the direct
-/// method these are the compensators'.
+/// Calls `allows` with the room of every table that the scenario's arms need, until it returns false: with the direct
+/// method these are the compensators' tables.
 template <class Allows>
 bool all_tables(const Scenario& s, Allows&& allows) {
     const auto [lowest, highest] = input_range(s.input);
@@ -295,7 +296,8 @@ bool all_tables(const Scenario& s, Allows&& allows) {
     }
     const double room = tabulated_rate_deg_h(s);
     const double half_width = table_half_width_deg_h(s);
-    // The compensators' tables are of the sinusoid, the threshold as told, and the rate as measured, see exact.cpp.
+    // The compensators' tables are those of the sinusoid, the calibrated threshold, and the measured rate, see
+    // exact.cpp.
     const double amplitude_rad =
         s.dither.peak_rate_deg_s * units::deg_h_per_deg_s / (s.gyro.scale_factor_arcsec * s.dither.frequency_hz);
     const double told_width = 0.01 * std::max(std::abs(lowest), std::abs(highest)) + 16.0 * s.gyro.scale_factor_arcsec;

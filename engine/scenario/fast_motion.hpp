@@ -3,13 +3,13 @@
 
 namespace ringlock::scenario {
 
-/// Whether every half cycle that the scenario's arms may ask of the turn map has a fast middle (gyro/fast_motion.hpp):
-/// over the spread of the gyros, injected noise, rates and thresholds that vary, and the room that tables leave for
-/// them.
+/// Whether every half cycle that the scenario's arms may need from the turn map has a fast middle
+/// (gyro/fast_motion.hpp): over the spread of the gyros, injected noise, rates and thresholds that vary, and the room
+/// that tables leave for them.
 bool fast_middles(const Scenario& scenario);
 
-/// The most that the phase of a gyro goes through between a turn of the dither and its own, where the rate of dither
-/// and input vanishes [rad]; with it what the readout's steps, limited in time as well, count for on that way.
+/// Largest change of a gyro's phase between a turn of the dither and the phase's own turn, where the rate of dither and
+/// input vanishes [rad]; a phase for the steps of the readout on that way, which are limited in time as well, is added.
 double way_to_turns_rad(const Scenario& scenario);
 
 /// Whether the phase of every gyro, from a turn at any input rate to the middle of the half cycle, passes the quarter

@@ -23,7 +23,7 @@ gyro::DriveNoise drive_noise(const Scenario& scenario) {
 
 namespace {
 
-/// What a resonator has that takes long to compute where its noise is remembered for long.
+/// Figures of a resonator that take long to compute where its noise has a long memory.
 struct Spread {
     double rms;
     double change_per_half_cycle;
@@ -35,7 +35,7 @@ auto key_of(const gyro::DriveNoise& noise) {
                            noise.hold_half_cycles, noise.modulation_hz, noise.amplitude_loop_hz);
 }
 
-/// Several rules ask of one scenario: each thread keeps its last answer.
+/// Several rules need this for one scenario: each thread keeps its last result.
 Spread spread_of(const gyro::DriveNoise& noise) {
     thread_local std::optional<std::pair<decltype(key_of(noise)), Spread>> last;
     if (!last || last->first != key_of(noise)) {
@@ -70,7 +70,7 @@ InjectedNoise injected_noise(const Scenario& scenario) {
         const double swing_rad = gyro::modulation_depth_rad(configured_setup(scenario));
         injected.turn_rms_rad = noise.drive_noise_relative * swing_rad * spread.rms;
     }
-    // Of noise whose square is no number, nothing is left.
+    // Noise that is so small that its square underflows is taken as zero.
     if (injected.turn_rms_rad < least_noise_rad) injected.turn_rms_rad = 0.0;
     injected.amplitude_rms_rad = injected.turn_rms_rad;
     injected.margin_rad = sigmas_of_tables * injected.turn_rms_rad;

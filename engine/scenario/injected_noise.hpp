@@ -4,7 +4,7 @@
 
 namespace ringlock::scenario {
 
-/// What the noise injected by a scenario does to the dither's amplitude, in optical phase.
+/// Figures of the dither's amplitude under the noise that a scenario injects, in optical phase.
 struct InjectedNoise {
     double turn_rms_rad = 0.0;       ///< rms of the angle at a turn
     double amplitude_rms_rad = 0.0;  ///< rms of a half cycle's amplitude

@@ -64,12 +64,12 @@ std::string name_text(std::string_view name) {
     return bare ? std::string(name) : in_quotes(name);
 }
 
-/// Walks a parsed file, sets what is right and notes what is wrong.
+/// Walks a parsed file, sets correct values and notes the errors.
 class Reader {
    public:
     Reader(std::string_view file, const Rules& rules) : file_(printable(file)), rules_(rules) {}
 
-    /// Settings come after the file, in its place: text of each, and what it says.
+    /// Settings are applied after the file and replace its values: the text of each, and its parsed table.
     Scenario read(const toml::table& root, const std::vector<std::pair<std::string, toml::table>>& settings) {
         const toml::node* device = root.get("device");
         std::string device_from;
@@ -87,7 +87,7 @@ class Reader {
             setting_ = text;
             read_keys(table);
         }
-        // Whoever gives the strength of a drive's noise does not give the other one, which has a default.
+        // A file that gives the strength of a drive's noise does not give the other strength, which has a default.
         if (scenario_.noise_injection.drive_noise_relative > 0.0 &&
             !places_.contains("noise_injection.turn_phase_rms_rad")) {
             scenario_.noise_injection.turn_phase_rms_rad = 0.0;
@@ -354,7 +354,7 @@ class Reader {
                          value_text(node), hint, section.name, fmt::join(known, ", ")));
     }
 
-    /// Says where a key of that name does stand.
+    /// A hint for messages: the sections that do have a key of that name.
     static std::string elsewhere(std::string_view name) {
         for (const Section& section : schema()) {
             for (const Key& key : section.keys) {
@@ -474,7 +474,7 @@ toml::table parse_setting(const std::string& setting) {
     value.erase(0, value.find_first_not_of(' '));
     value.erase(value.find_last_not_of(' ') + 1);
     if (value.empty()) refuse("has no value");
-    // Shells take quotes away: a word that is none of TOML's own is a string.
+    // Shells take quotes away: a word that TOML does not define is a string.
     const bool word = value != "true" && value != "false" && value != "inf" && value != "nan" &&
                       std::isalpha(static_cast<unsigned char>(value.front())) != 0 &&
                       std::all_of(value.begin(), value.end(), [](char c) {

@@ -3,7 +3,7 @@
 
 #include "engine/scenario/scenario.hpp"
 
-/// Studies whose arms are read by readers (`reader.output_hz`), and what follows from that for their outputs and times.
+/// Studies whose arms are read by readers (`reader.output_hz`), and the consequences for their outputs and times.
 namespace ringlock::scenario {
 
 /// Whether the arms of a study are read by readers; otherwise their angles are taken at the minima of the dither.

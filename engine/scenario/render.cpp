@@ -64,7 +64,7 @@ std::string elements_text(const Section& section, const Scenario& scenario) {
     return out;
 }
 
-/// What such an element could be: there is none by default.
+/// An example of an element of the section, as a comment: by default there is no element.
 std::string commented_element(const Section& section) {
     std::string out = fmt::format("# [[{}]]\n", section.name);
     for (const Key& key : section.keys) {

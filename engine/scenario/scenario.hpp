@@ -51,7 +51,7 @@ enum class ReadoutModel { ideal, latched, instrument };
 enum class PhaseFrom { detectors, detectors_and_pulses };
 enum class AngleOutput { interpolated, quarter_fringe };
 
-/// What the electronics can know of the phase.
+/// Readout of the phase by the electronics.
 struct Readout {
     ReadoutModel model = ReadoutModel::latched;
     AngleOutput angle_output = AngleOutput::interpolated;
@@ -67,9 +67,9 @@ struct Readout {
     bool operator==(const Readout&) const = default;
 };
 
-/// What the compensators are told of the gyros, against the truth.
+/// Errors of the calibration that the compensators receive.
 struct Calibration {
-    double threshold_error_relative = 0.0;  ///< lock-in threshold as told over the true one, less one
+    double threshold_error_relative = 0.0;  ///< calibrated lock-in threshold over the true one, less one
     bool operator==(const Calibration&) const = default;
 };
 
@@ -105,8 +105,8 @@ double temperature_change_k(const Environment& environment, double time_s);
 /// How many gyros, for how long, and how they differ.
 struct Ensemble {
     std::int64_t gyros = 64;
-    /// So many gyros one after the other are the same one, switched on anew: its constants are drawn once, initial
-    /// phases and noises each time.
+    /// That many consecutive gyros are the same one, switched on again: its constants are drawn once, initial phases
+    /// and noises each time.
     std::int64_t turn_ons = 1;
     double settle_s = 0.0;  ///< simulated before the record begins; rounded to whole dither cycles
     double duration_s = 600.0;
@@ -128,16 +128,16 @@ struct Propagation {
     bool operator==(const Propagation&) const = default;
 };
 
-/// What the result file holds.
+/// Content of the result file.
 struct Output {
     double sample_interval_s = 1.0;          ///< of the decimated angle record; rounded to whole outputs
     bool angle_record = true;                ///< store the record of every gyro and arm, not only its statistics
-    std::vector<double> angle_after_s = {};  ///< times since the start of the record at which angle errors are told
-    std::vector<double> tau_s = {};          ///< averaging times at which deviations are wanted beside those of octaves
+    std::vector<double> angle_after_s = {};  ///< times since the start of the record at which angle errors are computed
+    std::vector<double> tau_s = {};          ///< averaging times of deviations in addition to the octaves
     bool operator==(const Output&) const = default;
 };
 
-/// What a gyro must meet to pass; 0: not asked for.
+/// Limits that a gyro must meet to pass; 0: no limit.
 struct Specification {
     double arw_deg_rt_h = 0.0;            ///< largest angle random walk
     double bias_stability_deg_h = 0.0;    ///< largest Allan deviation at at_s
@@ -149,15 +149,15 @@ struct Specification {
     bool operator==(const Specification&) const = default;
 };
 
-/// Whether anything is asked for.
+/// Whether any limit is set.
 bool asks(const Specification& specification);
 
 enum class RecordKind { turns, samples };
 
-/// What `ringlock record` writes of a gyro.
+/// Content of the record of a gyro that `ringlock record` writes.
 struct RecordSettings {
     RecordKind kind = RecordKind::turns;
-    Arm trajectory = parse_arm("noise_injected");  ///< of samples any arm, of turns one without compensator
+    Arm trajectory = parse_arm("noise_injected");  ///< for samples any arm, for turns one without compensator
     double rate_hz = 100.0;                        ///< of samples
     double temperature_interval_s = 1.0;           ///< between rows of the temperature, where it changes
     bool operator==(const RecordSettings&) const = default;

@@ -77,7 +77,7 @@ HWY_INLINE V nearest(D d, V x) {
     return (x + magic) - magic;
 }
 
-/// What is left of `fringes`, |fringes| < 2^50, after whole ones are taken away: in [-1/2, 1/2].
+/// `fringes`, |fringes| < 2^50, less the nearest whole number: in [-1/2, 1/2].
 template <class D, class V>
 HWY_INLINE V fraction(D d, V fringes) {
     return fringes - nearest(d, fringes);

@@ -27,7 +27,7 @@ std::vector<std::string> available_targets() {
 }
 
 void use_target(const std::string& wanted) {
-    hwy::SetSupportedTargetsForTest(0);  // the choice before this one hides the others
+    hwy::SetSupportedTargetsForTest(0);  // the previous choice hides the other targets
     for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
         if (wanted != hwy::TargetName(target)) continue;
         hwy::SetSupportedTargetsForTest(target);

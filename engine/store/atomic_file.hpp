@@ -13,7 +13,7 @@ class AtomicFile {
     /// Claims the name. Throws InputError where the target cannot be written.
     explicit AtomicFile(const std::filesystem::path& target);
 
-    /// Made when it is asked for first.
+    /// Made at the first call.
     File& file();
     const std::filesystem::path& target() const { return path_.target(); }
 

@@ -52,7 +52,7 @@ Opened open_attribute(const Node& node, hid_t object, const std::string& name) {
     return opened;
 }
 
-/// Reads one number (a vector of one counts) in the type asked for; `classes` is what may be stored.
+/// Reads one number (a vector of one counts) in the requested type.
 template <class T>
 T read_scalar(const Node& node, const Opened& opened, const std::string& name) {
     T value{};
@@ -107,7 +107,7 @@ void Node::set_attribute(const std::string& name, const std::vector<double>& val
     const Lock lock;
     const hsize_t size = values.size();
     const Id space(values.empty() ? H5Screate(H5S_NULL) : H5Screate_simple(1, &size, nullptr));
-    constexpr double nothing = 0.0;  // HDF5 wants an address even where there is nothing to write
+    constexpr double nothing = 0.0;  // HDF5 requires an address even if there is nothing to write
     write_attribute(*this, id_.get(), name, space, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE,
                     values.empty() ? &nothing : values.data());
 }

@@ -34,7 +34,7 @@ std::uint64_t size_of(const Shape& shape) {
     return size;
 }
 
-/// Whether every value of the stored type can be told in T.
+/// Whether T can represent every value of the stored type.
 template <Element T>
 bool fits(hid_t stored) {
     const H5T_class_t stored_class = H5Tget_class(stored);
@@ -84,7 +84,7 @@ Dataset::Dataset(Id id, std::string file, std::string path) : Node(std::move(id)
 }
 
 Dataset Dataset::opened(Id id, std::string file, std::string path) {
-    // Before the constructor asks for the extent: that of a virtual dataset may lie in other files.
+    // Before the constructor reads the extent: that of a virtual dataset may lie in other files.
     const Storage storage = check_storage(id.get(), file, path);
     Dataset dataset(std::move(id), std::move(file), std::move(path));
     dataset.is_plain_ = storage.is_plain;

@@ -22,7 +22,7 @@ Id file_access() {
     return access;
 }
 
-/// Whether `name` leads to an object; asks step by step because the library does.
+/// Whether `name` leads to an object; checks step by step because the library requires it.
 bool exists(hid_t group, const std::string& name) {
     if (name.empty() || name == "/") return true;
     for (std::size_t end = name.find('/', 1);; end = name.find('/', end + 1)) {

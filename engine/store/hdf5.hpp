@@ -34,8 +34,8 @@ class Id {
     std::int64_t value_ = -1;
 };
 
-/// What a dataset or attribute can be made of. Stored as little-endian IEEE double, little-endian integers, and UTF-8
-/// strings of variable length.
+/// Types of the elements of datasets and attributes. They are stored as little-endian IEEE double, little-endian
+/// integers, and UTF-8 strings of variable length.
 template <class T>
 concept Element = std::same_as<T, double> || std::same_as<T, std::int64_t> || std::same_as<T, std::uint64_t> ||
     std::same_as<T, std::int8_t> || std::same_as<T, std::string>;
@@ -43,13 +43,13 @@ concept Element = std::same_as<T, double> || std::same_as<T, std::int64_t> || st
 /// Extent of a dataset: {} (scalar, read only), {n} or {rows, columns}.
 using Shape = std::vector<std::uint64_t>;
 
-/// What the numbers mean. The unit of a pure number is "1", that of text "".
+/// Unit and meaning of the numbers. The unit of a pure number is "1", that of text "".
 struct Label {
     std::string unit;
     std::string description;
 };
 
-/// What groups and datasets share: a place and attributes.
+/// Common base of groups and datasets: a location and attributes.
 class Node {
    public:
     const std::string& file() const { return file_; }
@@ -153,7 +153,7 @@ class Group : public Node {
     bool has(const std::string& name) const;
     bool has_group(const std::string& name) const;
     bool has_dataset(const std::string& name) const;
-    /// Names of what it holds, links that lead nowhere included, sorted.
+    /// Names of its members, links that lead nowhere included, sorted.
     std::vector<std::string> children() const;
 
     /// Creates a dataset whose space on the disk is taken at once (a full disk shows here); rows not yet written are
@@ -184,7 +184,7 @@ class Group : public Node {
                          std::uint64_t chunk_rows = 0);
     std::string child_path(const std::string& name) const;
     Id open(const std::string& name, bool want_group) const;
-    /// Kind of the object as HDF5 numbers kinds, negative where there is none. Throws InputError where a link to it
+    /// Kind of the object as HDF5 numbers kinds, negative if there is no object. Throws InputError where a link to it
     /// leads to another file and is not followed. Under the lock.
     int type_in_this_file(const std::string& name) const;
 };
@@ -198,7 +198,7 @@ class File : public Group {
     /// Opens for reading, within guarded().
     static File open(const GuardedPath& guarded_path);
 
-    /// Number of the file in the HDF5 library, for readers of what this interface does not have.
+    /// Number of the file in the HDF5 library, for readers that need functions which this interface does not have.
     std::int64_t library_id() const { return file_id_.get(); }
 
     /// Brings everything to the disk and closes; nothing of the file can be used after. Throws RunError where the disk

@@ -54,7 +54,8 @@ pid_t fork_with_library() {
 std::string last_error() {
     std::string text;
     H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keep_first, &text);
-    // A failed system call is told with the time and addresses of buffers; what matters is the system's own message.
+    // The library reports a failed system call with the time and addresses of buffers; only the system's own message is
+    // kept.
     if (const auto start = text.find(system_mark); start != std::string::npos) {
         const auto message = start + system_mark.size();
         return printable(text.substr(message, text.find('\'', message) - message));
@@ -92,7 +93,7 @@ Id::~Id() {
     if (!valid()) return;
     const detail::Lock lock;
     if (detail::abandoned) return;
-    // Closing a file closes what was open in it: the number may stand for nothing any more.
+    // Closing a file closes the objects that were open in it: the identifier may be invalid by now.
     if (H5Iis_valid(value_) > 0) H5Idec_ref(value_);
 }
 

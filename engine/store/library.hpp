@@ -14,7 +14,7 @@ namespace ringlock::store::detail {
 
 static_assert(std::is_same_v<hid_t, std::int64_t>, "Id holds an hid_t without naming HDF5");
 
-/// Held during every use of HDF5. Keeps the library from printing its errors and forgets those of earlier calls.
+/// Held during every use of HDF5. Keeps the library from printing its errors and clears those of earlier calls.
 class Lock {
    public:
     Lock();
@@ -26,7 +26,7 @@ class Lock {
 /// fork() while no thread uses the library, which the child can then use.
 pid_t fork_with_library();
 
-/// What the library or the operating system said last, in a few words.
+/// The last error message of the library or of the operating system, shortened.
 std::string last_error();
 
 /// "FILE: WHERE: PROBLEM" as the error of wrong input.

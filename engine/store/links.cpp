@@ -27,10 +27,10 @@ std::string file_of(hid_t object) {
     return name;
 }
 
-/// Where a file lies that another one names: beside it, unless the name is absolute.
+/// Path of a file that another file names: relative to the folder of the latter, unless the name is absolute.
 fs::path beside(const std::string& file, const std::string& name) { return fs::path(file).parent_path() / name; }
 
-/// Opens what an external link leads to, where that is allowed: only a regular file, for a FIFO would wait.
+/// Opens the target of an external link, where that is allowed: only a regular file, for a FIFO would wait.
 hid_t open_external(hid_t group, const std::string& file, const std::string& object, hid_t access) {
     if (links_in_force() == Links::refuse) {
         refused = fmt::format("an external link leads to {} in another file, {}", printable(object), printable(file));
@@ -111,7 +111,7 @@ std::vector<std::string> virtual_files(std::int64_t creation) {
 }
 
 bool is_readable_beside(std::int64_t object, const std::string& name) {
-    // "%b" in a name stands for the number of a block: there may be any number of such files, or none.
+    // "%b" in a name stands for the number of a block: there may be any number of files of that form.
     if (name.find('%') != std::string::npos) return true;
     std::error_code unreachable;
     return fs::is_regular_file(beside(file_of(object), name), unreachable);

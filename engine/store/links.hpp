@@ -6,7 +6,7 @@
 /// For the sources of this room: how a file leads to others.
 namespace ringlock::store::detail {
 
-/// Lets external links lead nowhere unless links_in_force() says so: without that the library opens whatever file a
+/// Lets external links lead nowhere unless links_in_force() says so: without that the library opens any file that a
 /// link names, of any owner, and waits for a FIFO.
 void take_over_external_links();
 
@@ -18,7 +18,7 @@ std::string refused_link();
 std::vector<std::string> external_files(std::int64_t creation);
 std::vector<std::string> virtual_files(std::int64_t creation);
 
-/// Whether a file of that name lies beside the one that holds the object.
+/// Whether a file of that name lies in the folder of the file that holds the object.
 bool is_readable_beside(std::int64_t object, const std::string& name);
 
 }  // namespace ringlock::store::detail

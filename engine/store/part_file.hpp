@@ -7,14 +7,14 @@
 #include <string>
 #include <vector>
 
-/// Files of records that tell whether they are whole: checkpoints and shards of a run.
+/// Files of records whose completeness can be checked: checkpoints and shards of a run.
 ///
 /// A file is 8 bytes that name the format, then records, then one that counts them. A record is its kind (4 bytes), the
 /// length of its content (8 bytes), the content, and the CRC-32 of all three (4 bytes), in the byte order of x86. A
-/// file that was cut off, or in which any bit has changed, is told from a whole one.
+/// file that was cut off, or in which any bit has changed, is detected.
 namespace ringlock::store {
 
-/// What a record holds is for the program above to say; 0 is the record at the end.
+/// The program above defines the content of each kind; 0 is the record at the end.
 using RecordKind = std::uint32_t;
 
 /// Writes a file of records. From one thread at a time.
@@ -53,7 +53,8 @@ class PartWriter {
 using OnRecord = std::function<bool(RecordKind kind, std::span<const std::byte> content)>;
 
 /// Reads a file of records from its beginning to its end. Throws InputError where the file cannot be read or is not
-/// whole: records before the damage have been told by then, so what may not be taken in halves is checked first.
+/// whole: records before the damage have been handed to the caller by then, so a caller that must not use a part of a
+/// file checks the file first.
 void read_part(const std::filesystem::path& path, const OnRecord& on_record);
 
 /// Throws InputError unless the file is whole.

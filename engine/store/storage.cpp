@@ -19,7 +19,7 @@ namespace ringlock::store {
 namespace {
 
 constexpr double greatest_ratio = 1032.0;
-constexpr double small_bytes = 1048576.0;  // of a dataset that costs nothing, whatever it says
+constexpr double small_bytes = 1048576.0;  // a dataset up to this size is not refused, since it costs little memory
 
 class StorageCheck {
    public:
@@ -77,7 +77,8 @@ class StorageCheck {
         throw InputError(fmt::format("{}: dataset {}: {}", printable(file_), printable(name_), what));
     }
 
-    /// The library copies by these sizes, be they damaged, and from beyond what it has unpacked.
+    /// The library copies as many bytes as these sizes state even if they are damaged, and then reads beyond the data
+    /// that it has unpacked.
     void check_type(hid_t type) const {
         const H5T_class_t kind = H5Tget_class(type);
         const std::size_t size = H5Tget_size(type);
@@ -99,7 +100,7 @@ class StorageCheck {
         return values;
     }
 
-    /// Bytes of one chunk, unpacked; 0 where there are none.
+    /// Bytes of one chunk, unpacked; 0 for a dataset without chunks.
     double chunk_bytes() const {
         if (layout_ != H5D_CHUNKED) return 0.0;
         std::array<hsize_t, H5S_MAX_RANK> sides{};
@@ -119,7 +120,7 @@ class StorageCheck {
         const auto file_bytes = static_cast<double>(size);
         const auto stored = static_cast<double>(H5Dget_storage_size(dataset_));
         if (stored == 0.0 && layout_ != H5D_VIRTUAL) {
-            // Reading gives as many values of nothing as it says: harmless where they are few.
+            // Reading gives as many fill values as the dataset claims: harmless where they are few.
             if (bytes > small_bytes) fail("was never written, although it has room for values");
             return;
         }

@@ -27,9 +27,9 @@ struct EstimatorShape {
 /// With few starts in a tau the sum is taken lag by lag and costs well below a microsecond a start.
 ///
 /// Where this differs from the paper: for alpha <= 0 the phase is taken as sampled, not averaged over tau0 (F infinite
-/// instead of m). That is what an integrating gyro or a phase counter gives, it makes white frequency noise exact at
-/// every m, where the filter is up to 17 % off at m = 1 and 4 % at m = 20. Up to m = 8 the modified variances take the
-/// mean of m samples of it, as they do, and not an average over tau.
+/// instead of m). That is the output of an integrating gyro or of a phase counter, and it is exact for white frequency
+/// noise at every m, where the filter is up to 17 % off at m = 1 and 4 % at m = 20. Up to m = 8 the modified variances
+/// take the mean of m samples of it, as they do, and not an average over tau.
 double degrees_of_freedom(const EstimatorShape& shape, int alpha, std::int64_t m, std::int64_t points);
 
 }  // namespace ringlock::allan

@@ -17,11 +17,11 @@ inline constexpr std::int64_t noise_identification_points = 30;
 ///
 /// Lag-1 autocorrelation r of the phase taken every m points, a parabola removed, differenced d times until
 /// rho = r/(1+r) < 1/4; then 2 - 2 (d + rho). W. Riley, C. Greenhall, "Power law noise identification using the lag 1
-/// autocorrelation", 18th EFTF (2004); NIST SP1065 section 5.5.6. Of long records a part in the middle is looked at,
-/// 2^17 decimated points: they tell the exponent to a hundredth.
+/// autocorrelation", 18th EFTF (2004); NIST SP1065 section 5.5.6. In long records a part in the middle is used, 2^17
+/// decimated points: they determine the exponent to a hundredth.
 std::optional<double> noise_exponent(std::span<const double> phase, std::int64_t m, int most_differences = 2);
 
-/// The exponent at one averaging factor with what the octaves below add to it where points are few.
+/// The exponent at one averaging factor, combined with those of the octaves below where points are few.
 ///
 /// \param phase, m, most_differences  as above
 /// \return nothing where noise_exponent() has nothing
@@ -30,7 +30,7 @@ std::optional<double> noise_exponent(std::span<const double> phase, std::int64_t
 /// beyond 200 points it is taken as it is. With fewer it is the mean, weighted by points, with those at m/2, m/4 and
 /// m/8, each of which is taken in as long as it is no more than 2.5 standard deviations of the difference from the mean
 /// of those before (pooling as far as they agree: O. Lepskii, Theory Probab. Appl. 35 (1991) 454). Phase noise is
-/// believed only where the octave below shows it alone, since it would promise thousands of degrees of freedom.
+/// accepted only where the octave below shows it alone, since it would imply thousands of degrees of freedom.
 std::optional<double> pooled_noise_exponent(std::span<const double> phase, std::int64_t m, int most_differences = 2);
 
 /// The kind of noise nearest to an exponent: 2 (white phase), 1, 0 (white frequency, angle random walk), -1 (flicker),

@@ -15,7 +15,7 @@ namespace ringlock::allan::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Running sums, whatever the width of a vector: term i goes to the (i mod columns)-th.
+/// Number of running sums, independent of the width of a vector: term i goes to the (i mod columns)-th.
 constexpr std::size_t columns = 32;
 /// The same of four octaves at once.
 constexpr std::size_t octave_columns = 8;
@@ -150,7 +150,7 @@ std::size_t starts_of(std::size_t size, int order, std::size_t m) {
 constexpr std::size_t cached_starts = 2048;
 constexpr std::size_t cached_step = 512;
 
-/// A step in a piece of work: which of those asked for, and how many starts it has there.
+/// A step in a piece of work: its index among the requested ones, and the number of its starts there.
 struct Step {
     std::size_t which;
     std::size_t m;

@@ -8,17 +8,17 @@
 #include "analysis/allan/sums/pieces.hpp"
 
 /// Sums of squares that the estimators are made of. They do not depend on the number of threads nor on the instruction
-/// set: what is added to what is fixed by the data's positions alone.
+/// set: the order of the additions depends on the positions of the data alone.
 namespace ringlock::allan {
 
-/// What to do with a difference.
+/// How a difference is formed.
 struct Difference {
     int order = 2;          ///< 1, 2 or 3
     bool skipping = false;  ///< leave out those that meet a NaN
 };
 
-/// A running sum of squares of differences. Thirty-two sums side by side, folded at the end: the same whatever the
-/// width of a machine's vectors.
+/// A running sum of squares of differences. Thirty-two sums side by side, folded at the end: the same for any width of
+/// a machine's vectors.
 class DifferenceSums {
    public:
     /// Adds the differences that begin at x[0], ..., x[count - 1]; points up to x[count - 1 + order m] are read.

@@ -2,7 +2,7 @@
 
 namespace ringlock::allan {
 
-/// A sum and what rounding took from it: value + error is exact.
+/// A sum and its rounding error: value + error is exact.
 struct ExactSum {
     double value = 0.0;
     double error = 0.0;

@@ -24,7 +24,7 @@ struct Extremes {
         for (double& v : lowest) v = std::isnan(v) ? infinity : v;
     }
 
-    /// Of two windows side by side. In place: what is read lies ahead of what is written.
+    /// Combines two adjacent windows into one of twice the length. In place: reads are ahead of writes.
     void twice_as_long() {
         const std::size_t there = highest.size() - length;
         for (std::size_t i = 0; i < there; ++i) {

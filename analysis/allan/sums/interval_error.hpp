@@ -7,7 +7,7 @@
 
 namespace ringlock::allan {
 
-/// Phase with the line that phase_of() took away put back: what time interval errors are made of.
+/// Phase with the line that phase_of() removed added again: time interval errors are computed from it.
 std::vector<double> with_line(const Phase& phase);
 
 /// A maximum, and of how many windows.

@@ -68,8 +68,8 @@ HWY_EXPORT(add_squares);
 
 namespace {
 
-/// Squares of the sums from `first` on: each is the one before and a third difference of the phase. Eight chains of
-/// additions side by side hide what one addition waits for the other.
+/// Squares of the sums from `first` on: each is the one before and a third difference of the phase. Eight independent
+/// chains of additions hide the latency of an addition.
 SquareMean mean_difference_piece(const double* x, std::size_t m, std::size_t count, double begin) {
     constexpr std::size_t chains = 8;
     alignas(64) std::array<double, piece_starts> z;
@@ -121,7 +121,7 @@ MeanDifferences::Exact MeanDifferences::before(std::size_t i) const {
 
 double MeanDifferences::difference(std::size_t i, std::size_t m) const {
     const std::array<Exact, 4> at = {before(i), before(i + m), before(i + 2 * m), before(i + 3 * m)};
-    // The sums over m points first, then their differences: each step is done with what it rounds away.
+    // The sums over m points first, then their differences: each step carries its rounding error along.
     const auto over = [&](std::size_t k) {
         Exact sum = at[k + 1];
         sum.add(-at[k].value);

@@ -23,7 +23,7 @@ std::vector<Stretch> stretches_of(std::size_t size, const There& there) {
     return out;
 }
 
-/// Real samples: what is summed carries its rounding error along.
+/// Real samples: sums carry their rounding errors along.
 class Reals {
    public:
     explicit Reals(std::span<const double> data) : data_(data) {}

@@ -6,10 +6,10 @@
 
 namespace ringlock::allan {
 
-/// What a series of numbers is. It must be said: the same numbers give another deviation for each kind.
+/// Kind of a series of numbers. The caller must state it: the same numbers give another deviation for each kind.
 enum class Kind {
     phase,      ///< accumulated angle (or time error) at each instant
-    increment,  ///< what the phase gained over each interval
+    increment,  ///< gain of the phase over each interval
     rate        ///< mean rate (or fractional frequency) over each interval
 };
 
@@ -25,8 +25,8 @@ struct Phase {
     std::vector<double> x;  ///< at uniform instants; NaN where it is not known. Begins and ends with a known value
     double line_per_sample = 0.0;    ///< slope of the line that was taken away; time interval errors put it back
     std::vector<Stretch> stretches;  ///< the parts without gaps, ascending; at least one where x is not empty
-    /// Whether phase is counted from one origin in all stretches. A missing increment or rate loses it: what the phase
-    /// did meanwhile is not known, so that no difference may reach across.
+    /// Whether phase is counted from one origin in all stretches. A missing increment or rate loses the origin: the
+    /// change of the phase meanwhile is not known, so that no difference may reach across.
     bool one_origin = true;
 
     bool whole() const { return stretches.size() <= 1; }  ///< no gaps
@@ -35,7 +35,7 @@ struct Phase {
 /// Phase of a record that may have gaps.
 ///
 /// \param data    samples in time order, tau0_s apart; NaN where one is missing, else finite
-/// \param kind    what they are
+/// \param kind    kind of the data
 /// \param tau0_s  sampling interval [s]; > 0
 /// \param scale   unit of the data: multiplied in last, when all digits that matter are small
 /// \return phase in the unit `scale` makes (times seconds for rates): one point a sample for phase, one more than

@@ -12,8 +12,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace ringlock::allan::HWY_NAMESPACE {
 
-/// Sums side by side, term i in the (i mod columns)-th, whatever the width of a vector: the compiler may take several
-/// at once without changing a bit.
+/// Number of sums side by side, term i in the (i mod columns)-th, independent of the width of a vector: the compiler
+/// may take several at once without changing a bit.
 constexpr std::size_t columns = 16;
 
 HWY_INLINE double folded(double (&part)[columns]) {
@@ -137,8 +137,9 @@ class Block {
    private:
     static constexpr double most_lost = 100.0;
 
-    /// The sums over the samples before each, less the line that suits the samples best, and their mean. What is left
-    /// is of the size of what the pieces show, if each sample counts as often as there are pieces that have it.
+    /// The sums over the samples before each, less the line that suits the samples best, and their mean. The line is
+    /// fitted with each sample weighted by the number of pieces that contain it; the remaining sums are then of the
+    /// size of the pieces' own sums.
     void sum_samples(const double* x) {
         const double origin = x[samples_ / 2];
         const double middle = 0.5 * static_cast<double>(samples_ - 1);
@@ -194,7 +195,8 @@ class Block {
             const auto k = static_cast<double>(i);
             q[i] = (p[i] - p[0]) - slope * (0.5 * k * (k - static_cast<double>(size)));
         }
-        // Piece, mirror image, piece: one period of 6m of the piece mirrored on and on, and what its last terms reach.
+        // Piece, mirror image, piece: one period of 6m of the piece mirrored repeatedly, and the samples that its last
+        // terms reach.
         const double all = q[size];
         for (std::size_t i = 1; i <= size; ++i) q[size + i] = 2.0 * all - q[size - i];
         for (std::size_t i = 1; i <= size; ++i) q[2 * size + i] = 2.0 * all + q[i];
@@ -205,7 +207,7 @@ class Block {
     }
 
     /// The mean of the second half of a piece less that of the first, over the distance between the middles of the
-    /// halves. An odd sample in the middle belongs to none.
+    /// halves. An odd sample in the middle belongs to neither half.
     double half_slope(const double* p) const {
         const std::size_t size = 3 * m_;
         const std::size_t half = size / 2;
@@ -229,8 +231,8 @@ class Block {
         return 4.0 * about(3, 0) - 12.0 * (about(2, 0) + about(2, 1)) + 30.0 * (about(1, 0) + about(1, 2));
     }
 
-    /// What each piece adds of its own: the part of equation (4) with the sums at its ends, and its slope, equation
-    /// (7).
+    /// The contribution of each piece by itself: the part of equation (4) with the sums at its ends, and its slope,
+    /// equation (7).
     double single() {
         // Trapezoidal sums of p, k p and k^2 p from the first on.
         double* sums = scratch_;

@@ -17,8 +17,8 @@ namespace ringlock::allan {
 /// \return over all pieces: sum of mean squares, in the unit of x squared, and how many pieces
 SquareMean sum_of_pieces(std::span<const double> x, std::size_t m);
 
-/// The same piece by piece and difference by difference, as the definition stands, at a cost of 6m a piece: what short
-/// pieces are summed by, and what the others are held against.
+/// The same piece by piece and difference by difference, as the definition stands, at a cost of 6m a piece. Short
+/// pieces are summed in this way, and the faster sums of longer ones are compared with it.
 SquareMean sum_of_single_pieces(std::span<const double> x, std::size_t m);
 
 }  // namespace ringlock::allan

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-/// Work on a long record, cut into pieces whose sums do not depend on who does which.
+/// Work on a long record, cut into pieces whose sums do not depend on the thread that computes them.
 namespace ringlock::allan {
 
 /// Sum of squares, and how many.
@@ -22,11 +22,11 @@ struct SquareMean {
     }
 };
 
-/// Starts of differences in a piece of a record: with what the differences reach, up to 5 x 8192 points, it fits a
-/// second-level cache.
+/// Starts of differences in a piece of a record: together with the points that the differences reach, up to 5 x 8192, a
+/// piece fits a second-level cache.
 inline constexpr std::size_t piece_starts = 16384;
 
-/// Running sums side by side, whatever the width of a vector: term i goes to the (i mod 32)-th.
+/// Running sums side by side, independent of the width of a vector: term i goes to the (i mod 32)-th.
 using Columns = std::array<double, 32>;
 
 inline double folded_sum(Columns part) {

@@ -10,7 +10,7 @@
 namespace ringlock::allan {
 
 /// Phase with its mirror image, turned around at the ends: x_{-j} = 2 x_0 - x_j and alike at the other end, as the
-/// total deviation wants it (NIST SP1065 section 5.2.11).
+/// total deviation requires (NIST SP1065 section 5.2.11).
 class Reflected {
    public:
     explicit Reflected(const Phase& phase);

@@ -25,7 +25,7 @@ namespace {
 /// A source adds two parameters, its rate and its phase, apart from the error of interpolated readings.
 double p_of_source(double gain) { return chi2_tail(2.0 * gain, 2); }
 
-/// Rates that the records found, the most certain first: it stands for others of the same pattern.
+/// Rates that the records found, the most precise first: it represents others of the same pattern.
 std::vector<double> found_by(std::vector<std::unique_ptr<RecordInChain>>& records) {
     std::vector<RateEstimate> found;
     for (const auto& record : records) {
@@ -40,7 +40,7 @@ std::vector<double> found_by(std::vector<std::unique_ptr<RecordInChain>>& record
     return hz;
 }
 
-/// What each record says of the likeliest rate, the `k`th of those that were tried.
+/// Compares each record with the most likely rate, the `k`th of those that were tried.
 void hold_against(std::size_t k, const std::vector<double>& rates_hz,
                   std::vector<std::unique_ptr<RecordInChain>>& records, Chain& chain) {
     for (std::size_t r = 0; r < records.size(); ++r) {
@@ -53,7 +53,7 @@ void hold_against(std::size_t k, const std::vector<double>& rates_hz,
         const double most = std::max(*best, record.log_likelihood_without());
         said.gain_of_shared = all[k] - record.log_likelihood_without();
         said.gain_alone = most - all[k];
-        // Of the other rates, and of none, the likeliest was taken.
+        // The most likely of the other rates, and of the model without a source, was taken.
         said.p_alone = said.gain_alone > 0.0 ? p_of_wrong(said.gain_alone, all.size()) : 1.0;
         said.contradicts = of_several(said.p_alone, static_cast<double>(records.size())) < options.level_of_effects;
         const bool found = record.resampled() && same_source(record.found_hz(), rates_hz[k], record.rate_hz());
@@ -63,7 +63,7 @@ void hold_against(std::size_t k, const std::vector<double>& rates_hz,
     }
 }
 
-/// Takes the rate that all records share into the report of each.
+/// Writes the rate that all records share into the report of each.
 void report_shared(std::vector<std::unique_ptr<RecordInChain>>& records, Chain& chain) {
     const auto showing = std::count_if(chain.records.begin(), chain.records.end(),
                                        [](const ChainRecord& record) { return record.near_shared.has_value(); });

@@ -12,20 +12,20 @@ namespace ringlock::closure {
 /// A record of a chain: the loop that has run on it, and the likelihood of its model at other rates of the source.
 class RecordInChain {
    public:
-    /// Runs the loop. Throws InputError with the record's name where the record does not suffice.
+    /// Runs the loop. Throws InputError with the record's name if the record does not suffice.
     RecordInChain(const NamedRecord& record, const Monitor& monitor);
 
     const Closure& alone() const { return alone_; }
     double rate_hz() const { return loop_->model_fit().series().rate_hz; }
     bool resampled() const { return loop_->resampled(); }
-    /// Of a record that is resampled by its own account.
+    /// Rate of the source that this record shows alone.
     double found_hz() const { return loop_->model_fit().model().noise.from_hz; }
     std::vector<double> other_hz() const { return loop_->other_sources_hz(); }
     const Estimate& found_rate() const { return found_rate_; }  ///< of all rows, as it is reported
 
     /// Fits the model with each of these rates of its source, and without any.
     void try_rates(const std::vector<double>& hz);
-    /// Of the last rates that were tried.
+    /// For the last rates that were tried.
     const std::vector<double>& log_likelihood() const { return log_likelihood_; }
     double log_likelihood_without() const { return log_likelihood_without_; }
     /// The record's own rate near one of them.
@@ -40,7 +40,7 @@ class RecordInChain {
 
     std::string name_;
     Monitor monitor_;
-    std::string note_;  ///< on how the record was summed
+    std::string note_;  ///< on the summing of the record
     record::Record record_;
     std::unique_ptr<SampleLoop> loop_;
     Closure alone_;

@@ -52,7 +52,7 @@ std::vector<ChainRate> ranked(const RateTable& table) {
 SharedRate shared_of(std::span<const RateEstimate> rates) {
     SharedRate shared;
     if (rates.empty()) return shared;
-    // About the first, so that no digits are lost.
+    // Relative to the first, so that no digits are lost.
     const double about_hz = rates.front().hz;
     double information = 0.0;
     double sum = 0.0;

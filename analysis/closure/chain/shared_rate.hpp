@@ -15,15 +15,15 @@ struct RateTable {
     std::vector<std::vector<double>> log_likelihood;  ///< by record, then by rate
 };
 
-/// Rates that leave the same pattern in a record as one of those found does, each once; of two that are the same the
-/// one that comes first.
+/// Rates that leave the same pattern in a record as one of those found, without repetitions; of two equal ones the
+/// first is kept.
 std::vector<double> rates_of_patterns(std::span<const double> found_hz, double record_rate_hz);
 
-/// The rates by the sum of the log-likelihoods, the likeliest first. Tied to it are those whose sum is within the tie
-/// and, where it is above twice the record's rate, all of the same pattern that are as well.
+/// The rates by the sum of the log-likelihoods, the most likely first. Tied to it are those whose sum is within the tie
+/// and, where it is above twice the record's rate, all of the same pattern that are above it as well.
 std::vector<ChainRate> ranked(const RateTable& table);
 
-/// Their mean, weighted by information, and how far they are from it.
+/// Mean of the rates, weighted by information, and chi-squared of their deviations from it.
 struct SharedRate {
     RateEstimate mean;
     double chi2 = 0.0;
@@ -32,7 +32,8 @@ struct SharedRate {
 };
 SharedRate shared_of(std::span<const RateEstimate> rates);
 
-/// Bound for the probability that one of so many wrong models gains so much in log-likelihood over the true one.
+/// Upper bound of the probability that one of so many wrong models exceeds the log-likelihood of the true one by
+/// `gain`.
 double p_of_wrong(double gain, std::size_t models);
 
 }  // namespace ringlock::closure

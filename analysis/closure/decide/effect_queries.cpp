@@ -29,7 +29,8 @@ OnSamples of_place(const effects::Effect& effect, effects::SampleStage::Place pl
     return OnSamples::transport;
 }
 
-/// The values at which this amplitude alone acts, from the middle of the intervals on that are looked at.
+/// The values at which this amplitude alone acts; an effect that begins at a time begins within the intervals that are
+/// compared.
 effects::Values values_of_one(const effects::Effect& effect, const Amplitude& amplitude) {
     effects::Values values = values_at_rest(effect);
     for (const effects::Parameter& parameter : effect.parameters()) {
@@ -39,7 +40,7 @@ effects::Values values_of_one(const effects::Effect& effect, const Amplitude& am
     return values;
 }
 
-/// Whether an amplitude of one effect does the same as one of another, each by itself.
+/// Whether one amplitude of an effect has the same result as one of another effect, each by itself.
 bool act_alike(const effects::Effect& a, const Amplitude& of_a, const effects::Effect& b, const Amplitude& of_b) {
     if ((of_a.turned_by == nullptr) != (of_b.turned_by == nullptr)) return false;
     const auto random = [](const effects::Effect& effect) {

@@ -55,7 +55,7 @@ std::optional<double> evidence_for_addition(const effects::Effect& larger, const
     double evidence = 0.0;
     for (const Amplitude& amplitude : additional) {
         const Estimate& found = *estimate(*amplitude.value);
-        // Of a size that the fit could not tell the record says nothing.
+        // The record contains no information on a size that the fit could not determine.
         if (!(found.sd > 0.0) || !std::isfinite(found.sd)) continue;
         const double expected = squares * std::pow(amplitude.value->typical / found.sd, 2);
         const double shown = std::pow(found.value / found.sd, 2);

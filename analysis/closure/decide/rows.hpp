@@ -5,10 +5,10 @@
 
 namespace ringlock::closure {
 
-/// The training rows of a record of that many rows: effects are chosen and parameters fitted on them. The record is cut
-/// into contiguous blocks and every tenth block is held out (Options::blocks), so that the error of predictions for it
-/// can be reported.
-/// \return 1 for each training row, 0 for each row that is held out
+/// The training rows of a record with that number of rows: effects are selected and parameters fitted on them. The
+/// record is cut into contiguous blocks and every tenth block is held out (Options::blocks), so that the error of
+/// predictions on it can be reported.
+/// \return 1 for each training row, 0 for each held-out row
 Rows training_rows(std::size_t rows);
 
 }  // namespace ringlock::closure

@@ -4,34 +4,35 @@
 
 #include "engine/effects/effect.hpp"
 
-/// Sets of effects that explain a record about equally well: the choice of the effect to name and of its alternatives.
+/// Sets of effects that explain a record about equally well: the choice of the effect to report and of its
+/// alternatives.
 namespace ringlock::closure {
 
 /// Effects that explain the record together.
 struct EffectSet {
     std::vector<const effects::Effect*> effects;
-    double merit = 0.0;  ///< log-likelihood gain less the cost of parameters and search [nats]
+    double merit = 0.0;  ///< evidence: log-likelihood gain less the cost of parameters and search [nats]
 
     bool has(const effects::Effect* effect) const;
 };
 
-/// The effect that is named next.
+/// The effect that is reported next.
 struct Naming {
-    /// An effect and the merit of the set that it belongs to.
+    /// An effect and the evidence of the set that it belongs to.
     struct Alternative {
         const effects::Effect* effect = nullptr;
         double merit = 0.0;
     };
     const effects::Effect* named = nullptr;
-    std::vector<const effects::Effect*> partners;  ///< the other members of the best set, to be added next
-    /// The effect that is named, then those that explain as much in its place, each with the merit of its set.
+    std::vector<const effects::Effect*> partners;  ///< other members of the best set, to be added next
+    /// The effect that is reported, then those that explain as much in its place, each with the evidence of its set.
     std::vector<Alternative> alternatives;
 };
 
-/// Chooses the effect to name among sets that are tied, the best of them first. Of the members of the best set it is
-/// the one that most of the tied sets contain. The effects of sets that do without it, and that are not members of the
-/// best set, are confounded with it.
-/// \param may_lead  whether an effect other than the first of the best set may be named: it must pass alone
+/// Chooses the effect to report among tied sets, the best of them first. It is the member of the best set that most of
+/// the tied sets contain. The effects of sets without it, unless they are members of the best set, are confounded with
+/// it.
+/// \param may_lead  whether an effect other than the first of the best set may be reported: it must pass alone
 Naming name_among(const std::vector<EffectSet>& tied, const std::function<bool(const effects::Effect*)>& may_lead);
 
 }  // namespace ringlock::closure

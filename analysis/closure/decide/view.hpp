@@ -12,17 +12,18 @@ namespace ringlock::closure {
 template <class Column>
 struct View {
     ResidualTest test;
-    double cost = 0.0;                                  ///< of its parameters and its search, in the log-likelihood
-    std::function<std::vector<Column>()> columns = {};  ///< none where nothing regresses
-    double largest = std::numeric_limits<double>::infinity();  ///< coefficient that makes sense
-    bool jumps = false;             ///< random rates can follow it nearly as well as it can be said
-    std::optional<double> hz = {};  ///< of a line
-    /// Of a line whose power is scattered: merit as the likelihood gains it where as much of the variance goes.
+    double cost = 0.0;                                  ///< in the log-likelihood, of its parameters and its search
+    std::function<std::vector<Column>()> columns = {};  ///< empty if the test is no regression
+    double largest = std::numeric_limits<double>::infinity();  ///< largest coefficient that makes sense
+    bool jumps = false;             ///< random rates follow it nearly as well as it can be described
+    std::optional<double> hz = {};  ///< frequency of a line
+    /// Of a line whose power is scattered: evidence by the gain of a model that removes as much of the variance.
     std::optional<double> by_variance = {};
-    /// Merit where it is fitted anew otherwise than by a regression, if it is; by a search, that is gone through with
-    /// only where it comes near the merit of a rival.
+    /// Evidence by a new fit that is no regression; empty if there is none. A search is completed only if it comes near
+    /// the evidence `rival`.
     std::function<double(double rival)> refitted = {};
-    int courses = 0;  ///< so many of the columns of what is not of time are courses in time of any size
+    /// In a test that is not located in time: number of columns that are trends in time with free coefficients.
+    int courses = 0;
 };
 
 }  // namespace ringlock::closure

@@ -17,7 +17,7 @@ using nlohmann::json;
 json finite_json(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 json finite_json(const std::optional<double>& value) { return value ? finite_json(*value) : json(nullptr); }
 
-/// A rate has a standard error only where no other explains as much.
+/// A rate has a standard error only where no other rate explains as much.
 json rate_estimate_json(const std::optional<RateEstimate>& rate, bool tied) {
     if (!rate) return nullptr;
     return {{"value", finite_json(rate->hz)}, {"std", tied ? json(nullptr) : finite_json(rate->sd_hz)}};

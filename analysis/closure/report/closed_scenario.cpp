@@ -43,14 +43,14 @@ std::string fitted(const Estimate& estimate) {
                                       : "Fitted; the fit gives no standard error.";
 }
 
-/// Fills the scenario of a closed model, and notes where each value comes from.
+/// Fills the scenario of a closed model, and records the origin of each value.
 class Filler {
    public:
     Filler(const record::Record& record, const Closure& closure) : record_(record), closure_(closure) {
         for (auto& [effect, values] : scenario().effects) {
             const effects::Effect* known = effects::find(effect);
             for (const effects::Parameter& parameter : known->parameters()) {
-                // The standard device has quantum noise; this one has what was found.
+                // The standard device has quantum noise; this device has the noise that was found.
                 if (parameter.role == effects::Role::deviation) values.at(std::string(parameter.name)) = 0.0;
             }
         }
@@ -92,7 +92,7 @@ class Filler {
     void remark(const std::string& key, std::string text) { closed_.remarks[key] = std::move(text); }
     void cannot_hold(std::string finding) { closed_.not_held.push_back(std::move(finding)); }
 
-    /// The declared value, or the one that is there as a placeholder.
+    /// The declared value, or the present one as a placeholder.
     void take_declared(const std::string& key, const std::optional<double>& declared, double& to) {
         if (declared) {
             to = *declared;
@@ -103,7 +103,7 @@ class Filler {
                                     placeholder_mark));
         }
     }
-    /// The estimate of the base model, or the one that is there as a placeholder.
+    /// The estimate of the base model, or the present value as a placeholder.
     bool take_estimate(const std::string& key, std::string_view name, double& to) {
         const Estimate* estimate = find(closure_.base, name);
         if (estimate != nullptr) {
@@ -166,7 +166,7 @@ class Filler {
                        : scenario::parse_arms({"ideal", "uncompensated", "compensated", "compensated_exact"});
     }
 
-    /// The parameter of the effect that shows on samples in this way: its key, and its value in the scenario.
+    /// The parameter of the effect that acts on samples in this way: its key, and its value in the scenario.
     struct Place {
         std::string key;
         double* value;
@@ -262,8 +262,8 @@ class Filler {
         }
     }
 
-    /// In a short record whose rate changes the mean rate is hardly determined. The fitted one may be larger than any
-    /// that the dither takes through the lock-in zone.
+    /// In a short record with a varying rate the mean rate is hardly determined. The fitted one may be larger than any
+    /// with which the dither passes through the lock-in zone.
     void drop_rate_that_no_gyro_follows() {
         const std::string key = "input.rate_deg_h";
         const std::vector<scenario::Complaint> complaints = scenario::check(scenario());
@@ -280,7 +280,7 @@ class Filler {
                                 placeholder_mark));
     }
 
-    /// Temperature and input, of which a scenario has a ramp and a mean.
+    /// Temperature and input, which a scenario describes by a ramp and a mean.
     void take_exposure() {
         const record::Track& input = record_.input_rate_deg_h;
         if (!input.empty() && std::any_of(input.value.begin(), input.value.end(),
@@ -312,7 +312,7 @@ class Filler {
             const auto value = values.find(estimate.name);
             if (value != values.end() && std::isfinite(estimate.value)) value->second = estimate.value;
         }
-        // Times and phases were those of the record's own clock.
+        // Convert times and phases from the record's own clock to the time since its start.
         set_back_clock(*step.effect, values, start_of(record_));
         for (const effects::Parameter& parameter : step.effect->parameters()) {
             double& value = values.at(std::string(parameter.name));
@@ -332,7 +332,7 @@ class Filler {
         }
     }
 
-    /// A tie is a finding that no scenario can hold: the scenario has one of the effects.
+    /// A tie is a finding that no scenario can contain: the scenario has one of the effects.
     void tie(const std::string& name, const effects::Effect& other) {
         cannot_hold(fmt::format("{} explains the record as well as {}, which stands here", other.name(), name));
     }
@@ -358,7 +358,7 @@ std::vector<std::string> ClosedScenario::placeholders() const {
 double start_of(const record::Record& record) {
     if (record.turns) return record.turns->time_s.front();
     const record::Samples& samples = *record.samples;
-    // Increments end at their times; of angles the first is only where the first increment begins.
+    // Increments end at their times; the first angle is the start of the first increment.
     return samples.kind == record::SampleKind::angle_increment_arcsec ? samples.t0_s - 1.0 / samples.rate_hz
                                                                       : samples.t0_s;
 }

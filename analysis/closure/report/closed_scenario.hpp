@@ -12,25 +12,25 @@ namespace ringlock::closure {
 /// were added. Times count from the start of the record. The scenario obeys all rules of scenarios.
 struct ClosedScenario {
     scenario::Scenario scenario;
-    /// Where values come from, by "section.key": fitted with its standard error, declared by the record, or a
-    /// placeholder, which the record neither declares nor determines.
+    /// Origin of values, by "section.key": fitted, with its standard error; declared by the record; or a placeholder,
+    /// which the record neither declares nor determines.
     std::map<std::string, std::string> remarks;
-    /// Findings that no scenario can hold, each a sentence.
+    /// Findings that a scenario cannot contain, each a sentence.
     std::vector<std::string> not_held;
 
     /// Keys whose values are placeholders.
     std::vector<std::string> placeholders() const;
 };
 
-/// In a scenario of a record of samples the lock-in threshold is zero: the fitted white noises contain the random walk
-/// that the lock-in makes. The white noise of the angle becomes noise of the reader's reference.
+/// Makes the scenario. For a record of samples the lock-in threshold is zero: the fitted white noises contain the
+/// random walk that the lock-in makes. The white noise of the angle becomes noise of the reader's reference.
 ClosedScenario closed_scenario(const record::Record& record, const Closure& closure);
 
 /// The text of closed.toml.
 /// \param source  name of the record
 std::string to_toml(const ClosedScenario& closed, const std::string& source, Verdict verdict);
 
-/// When the record begins [s], on its own clock.
+/// Start of the record [s], on its own clock.
 double start_of(const record::Record& record);
 
 }  // namespace ringlock::closure

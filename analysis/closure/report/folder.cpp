@@ -36,7 +36,7 @@ std::string text_of(const fs::path& path) {
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// Whether it is the object of to_json(), of a record or of a data chain, as it is written.
+/// Whether the text is an object of to_json(), of a record or of a data chain, in the form in which it is written.
 bool is_closure_json(const std::string& text) {
     const auto object = nlohmann::json::parse(text, nullptr, false);
     if (!object.is_object()) return false;
@@ -59,7 +59,7 @@ bool is_ours(const fs::path& path) {
     }
 }
 
-/// Why nothing can be written into the folder, or made where it is to be.
+/// Reason why the folder cannot be made, or nothing can be written into it; empty if there is none.
 std::string why_not(fs::path folder) {
     std::error_code error;
     folder = fs::absolute(folder, error);

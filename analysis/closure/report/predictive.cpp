@@ -35,7 +35,7 @@ namespace ringlock::closure {
 
 namespace {
 
-// Seeds of nobody's study: the record itself may be of a simulation, whose chance must not come again.
+// Seeds that no study uses: the record itself may be simulated, and its random numbers must not be used again.
 constexpr std::uint64_t first_seed = 0x7072656469637400;
 constexpr std::size_t fold_points = options.report.phase_points;
 constexpr Eigen::Index harmonics = options.report.kick_harmonics;
@@ -45,10 +45,10 @@ constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
 struct Curve {
     std::vector<double> x, y;
 };
-/// All of them: in the order of `blank()`.
+/// All statistics of one record, in the order of `blank()`.
 using Curves = std::vector<Curve>;
 
-/// What the curves are called.
+/// Names and units of the curves.
 std::vector<PredictiveStatistic> blank(bool turns) {
     std::vector<PredictiveStatistic> all;
     all.push_back({.name = "allan_deviation",
@@ -76,7 +76,7 @@ std::vector<PredictiveStatistic> blank(bool turns) {
     return all;
 }
 
-/// Allan deviation at octaves and spectrum in bands of a rate: consecutive increments [arcsec] of intervals [s].
+/// Allan deviation at octaves and spectrum in bands of a rate, from consecutive increments [arcsec] of intervals [s].
 ///
 /// 1 arcsec/s is 1 deg/h.
 void add_rate_curves(const std::vector<double>& increment_arcsec, double interval_s, Curves& curves) {
@@ -88,7 +88,7 @@ void add_rate_curves(const std::vector<double>& increment_arcsec, double interva
         deviation.x.push_back(point.tau_s);
         deviation.y.push_back(point.dev);
     }
-    // Tapered (Hann), for the ends of a strong line would be seen in all bands, as its phase there is.
+    // Tapered (Hann): otherwise the ends of a strong line leak into all bands, depending on its phase there.
     std::vector<double> rate_deg_h = increment_arcsec;
     const auto n = static_cast<double>(rate_deg_h.size());
     const double mean = std::accumulate(rate_deg_h.begin(), rate_deg_h.end(), 0.0) / n;
@@ -98,7 +98,7 @@ void add_rate_curves(const std::vector<double>& increment_arcsec, double interva
         rate_deg_h[i] = unit * bell * bell * (rate_deg_h[i] - mean);
     }
     const noise::Spectrum spectrum = noise::cosine_spectrum(rate_deg_h);
-    // Bands of equal ratio, where these have coefficients enough.
+    // Bands of equal ratio, where these have enough coefficients.
     Curve& density = curves.emplace_back();
     const std::size_t last = spectrum.z.size();
     const double ratio = std::pow(static_cast<double>(last), 1.0 / options.report.spectrum_bands);
@@ -120,7 +120,7 @@ void add_rate_curves(const std::vector<double>& increment_arcsec, double interva
     }
 }
 
-/// Looks at records of turns in the way that the measured one is looked at.
+/// Statistics of records of turns, computed as for the measured one.
 class TurnSight {
    public:
     TurnSight(const record::Record& record, const Closure& closure) {
@@ -138,7 +138,7 @@ class TurnSight {
         measured_ = prepare(record, join(*record.turns, ellipse_, count_again_));
     }
 
-    /// The dither's, from the mean swing.
+    /// Peak rate of the dither, from the mean amplitude [deg/s].
     double peak_rate_deg_s(const record::Record& record) const {
         return prepare(record, join(*record.turns, ellipse_, count_again_)).setup.dither_peak_rate_deg_s;
     }
@@ -151,13 +151,13 @@ class TurnSight {
         for (std::size_t i = 0; i < n; ++i) time_s[i] = turns.time_s[i] - turns.time_s[0];
         std::vector<double> angle_arcsec = measured_.input_angles_arcsec(time_s);
         for (std::size_t i = 0; i < n; ++i) angle_arcsec[i] = arcsec_per_rad * joined.phase_rad[i] - angle_arcsec[i];
-        // A turn with half of those on either side: the dither is not in it, whatever its amplitude does.
+        // A turn and half of the turns on either side: the dither is not in this sum, even if its amplitude varies.
         std::vector<double> steady_rad;
         for (std::size_t i = 1; i + 1 < n; ++i) {
             steady_rad.push_back(0.25 * (angle_arcsec[i - 1] + 2.0 * angle_arcsec[i] + angle_arcsec[i + 1]) /
                                  arcsec_per_rad);
         }
-        // The rates between minima: as many of every record, whichever kind of turn it begins with.
+        // Rates between minima: the same number for every record, with either kind of turn at its start.
         std::vector<double> increment_arcsec;
         const std::size_t first = turns.direction[1] > 0 ? 0 : 1;
         for (std::size_t k = first; k + 2 < steady_rad.size(); k += 2) {
@@ -171,11 +171,11 @@ class TurnSight {
     }
 
    private:
-    /// What the angle gains across a turn by direction and phase [rad], less the mean of that direction, three
-    /// harmonics of the phase. `steady_rad` is the angle at the turns with the dither off it, that of turn 1 first.
+    /// Gain of the angle across a turn by direction and phase [rad], less the mean of that direction, as three
+    /// harmonics of the phase. `steady_rad` is the angle at the turns without the dither, from turn 1 on.
     ///
-    /// Noise on the dither at every turn hides the kick of a turn, but not the sum of many kicks: the angle is fitted
-    /// by the sums so far of what may follow the phase. Stretches have a line of their own each, so that slow rates do
+    /// Noise of the dither at every turn hides the kick of a turn, but not the sum of many kicks: the angle is fitted
+    /// by cumulative sums of the functions of phase. Each stretch has a straight line of its own, so that slow rates do
     /// not matter.
     static void fold(const record::Turns& turns, const std::vector<double>& phase_rad,
                      const std::vector<double>& steady_rad, Curves& curves) {
@@ -213,8 +213,8 @@ class TurnSight {
             Eigen::VectorXd time(rows);
             for (std::size_t r = 0; r < rows; ++r) {
                 const std::size_t k = begin + r;
-                // Half of a kick comes before its turn, half after it; weighted 1 : 2 : 1 as the angle is, an eighth of
-                // it is there one turn before, a half at the turn, seven eighths one turn later.
+                // Half of a kick comes before its turn, half after it. With the weights 1 : 2 : 1 of the angle, an
+                // eighth of it is there one turn before, a half at the turn, and seven eighths one turn later.
                 const Row next = shape_of(k + 2);
                 const Row row = sums - 0.125 * last + 0.5 * now + 0.125 * next;
                 sums += now;
@@ -232,7 +232,7 @@ class TurnSight {
         const Row right = products.topRightCorner<columns, 1>();
         const Row scale = normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
         Eigen::Matrix<double, columns, columns> scaled = scale.asDiagonal() * normal * scale.asDiagonal();
-        // Of phases that come in step several shapes are one: something between them.
+        // Phases without noise may make several columns collinear: the solution is then a compromise between them.
         scaled.diagonal().array() += 1e-10;
         const Row size = scale.asDiagonal() * scaled.ldlt().solve(scale.asDiagonal() * right);
         for (std::size_t direction = 0; direction < 2; ++direction) {
@@ -256,12 +256,12 @@ class TurnSight {
     TurnSeries measured_;
 };
 
-/// The same for samples.
+/// Statistics of records of samples, computed as for the measured one.
 class SampleSight {
    public:
     SampleSight(const record::Record& record, const Closure& closure)
         : measured_(prepare_samples(record)), left_out_(measured_.size(), 0) {
-        // A row is in a stretch where its middle is.
+        // A row is in a stretch if its middle is.
         for (std::size_t i = 0; i < left_out_.size(); ++i) {
             const double middle_s = measured_.time_s[i] - 0.5 * measured_.interval_s;
             for (const std::vector<TimeSpan>* spans : {&closure.disturbed, &closure.gaps}) {
@@ -272,7 +272,7 @@ class SampleSight {
         }
     }
 
-    /// Disturbed stretches and gaps are left out of simulations as of the record: their rows get the mean of the
+    /// Disturbed stretches and gaps are excluded from simulations as from the record: their rows get the mean of the
     /// others.
     Curves look(std::vector<double> increment_arcsec) const {
         std::vector<double> increment = less_input(std::move(increment_arcsec));
@@ -381,7 +381,7 @@ scenario::Scenario replica(const record::Record& record, const Closure& closure,
     return s;
 }
 
-/// What the simulations leave out of the model.
+/// Notes on parts of the model that the simulations do not contain.
 std::vector<std::string> left_out(const Closure& closure) {
     std::vector<std::string> notes;
     const scenario::EffectSettings known = scenario::default_effect_settings();
@@ -399,11 +399,11 @@ std::vector<std::string> left_out(const Closure& closure) {
     return notes;
 }
 
-/// Ranks the first of the curves, the measured one, among them all.
+/// Ranks the first of the curves, the measured one, among all of them.
 ///
-/// Each is held against the mean and the standard deviation of the others, at every point; its largest deviation is
-/// ranked. Curves that come of one law are exchangeable, and the rank is then as probable as any other, whatever the
-/// law and however the points depend on each other.
+/// Each curve is compared with the mean and the standard deviation of the others, at every point, and its largest
+/// deviation is ranked. Curves of one distribution are exchangeable, so that all ranks are equally probable, whatever
+/// the distribution and the correlation of the points.
 void rank(const std::vector<std::vector<double>>& curves, PredictiveStatistic& statistic) {
     const std::size_t records = curves.size();
     const std::size_t points = curves.front().size();
@@ -414,7 +414,7 @@ void rank(const std::vector<std::vector<double>>& curves, PredictiveStatistic& s
     for (std::size_t j = 0; j < points; ++j) {
         std::vector<double> value;
         for (const auto& curve : curves) value.push_back(statistic.positive ? std::log(curve[j]) : curve[j]);
-        // A point that some record does not have is left out for all.
+        // A point that is not defined for some record is excluded for all.
         if (!std::all_of(value.begin(), value.end(), [](double v) { return std::isfinite(v); })) continue;
         std::size_t above = 0;
         std::size_t below = 0;
@@ -461,10 +461,10 @@ std::vector<double> mean_of(const std::vector<Curves>& all, std::size_t k, std::
     return mean;
 }
 
-/// The closed model with every parameter as uncertain as it is: drawn about its estimate, each by itself.
+/// The closed model with all parameters drawn about their estimates, by their standard errors, independently.
 ///
-/// What is positive is drawn by its logarithm, with half of itself for a standard error at most: those of variances
-/// near zero mean nothing.
+/// Positive parameters are drawn by their logarithm, with a standard error of half the value at most: those of
+/// variances near zero are not meaningful.
 Closure drawn(const Closure& closure, std::uint64_t seed) {
     Closure out = closure;
     random::NormalStream normal({seed, 0}, random::Purpose::fitted_parameters);
@@ -493,11 +493,10 @@ Closure drawn(const Closure& closure, std::uint64_t seed) {
     return out;
 }
 
-/// The peak rate of the dither [deg/s] with which simulations swing as the record does.
+/// Peak rate of the dither [deg/s] with which simulations have the amplitude of the record.
 ///
-/// The swing that was measured has the mean of the kicks in it. Over a half cycle of thousands of radians that is
-/// nothing; but without noise on the dither the phases of minima and maxima go together, and there it is a shift of the
-/// one against the other.
+/// The measured amplitude contains the mean of the kicks. Over a half cycle of thousands of radians that is negligible;
+/// but without noise of the dither the phases of minima and maxima are correlated, and it shifts one against the other.
 double swinging_deg_s(const record::Record& record, Closure closure, const TurnSight& sight, int simulations) {
     const auto peak = std::find_if(closure.base.begin(), closure.base.end(),
                                    [](const Estimate& e) { return e.name == "dither_peak_rate_deg_s"; });
@@ -623,7 +622,7 @@ Predictive simulated_check(const record::Record& record, const Closure& closure,
 Predictive check_predictive(const record::Record& record, const Closure& closure, int simulations,
                             const Monitor& monitor) {
     const auto check = [&] { return simulated_check(record, closure, monitor, simulations); };
-    // Each thread holds a simulated record and what is looked at in it.
+    // Each thread holds a simulated record and its statistics.
     return record.turns ? on_threads_for(record.turns->size(), check) : check();
 }
 

@@ -15,10 +15,10 @@ struct RateSeries {
     std::vector<double> rate_deg_h;
 };
 
-/// The rates of a record: of samples each one, of turns those between minima of the dither's phase.
+/// The rates of a record: of each sample, or between successive minima of the dither's phase in a record of turns.
 RateSeries rates_of(const record::Record& record);
 
-/// Means over as many of these as make at most `points` of them.
+/// Means over groups of these rates, as large as needed for at most `points` means.
 RateSeries averaged(const RateSeries& rates, std::size_t points);
 
 /// The deterministic part of the model, as mean rates over the same intervals [deg/h]: mean rate or bias, known input,
@@ -28,10 +28,10 @@ std::vector<double> determined_rates(const record::Record& record, const Closure
 /// A spectrum near one frequency, finer than the resolution of the record.
 struct NearLine {
     std::vector<double> hz;
-    std::vector<double> amplitude_deg_h;  ///< of a line there, that would look alike
+    std::vector<double> amplitude_deg_h;  ///< amplitude of a line at that frequency with the same power
     double resolution_hz = 0.0;           ///< one over the length of the record
 };
-/// \param hz  as the record shows it, up to half of the rate of the series
+/// \param hz  frequency as the record shows it, up to half of the rate of the series
 NearLine spectrum_near(const RateSeries& rates, double hz);
 
 }  // namespace ringlock::closure

@@ -9,22 +9,22 @@
 
 namespace ringlock::closure {
 
-/// The JSON object of docs/commands.md, "closure". What is not finite is null.
+/// The JSON object of docs/commands.md, "closure". Values that are not finite are null.
 nlohmann::json to_json(const Closure& closure);
-/// What stands at its key "predictive" where the check was made.
+/// The object at its key "predictive", if the check was made.
 nlohmann::json to_json(const Predictive& predictive);
-/// What stands at its key "closed".
+/// The object at its key "closed".
 nlohmann::json to_json(const ClosedScenario& closed);
 
 /// The same for people.
 std::string to_text(const Closure& closure);
 std::string to_text(const Predictive& predictive);
 
-/// The verdict in one sentence, with where structure is left.
+/// The verdict in one sentence, with the location of the remaining structure.
 std::string verdict_sentence(const Closure& closure);
 
-/// Writes closure.json, closed.toml and closure.h5 into the folder, which is made where it is missing. Throws
-/// InputError where it cannot be.
+/// Writes closure.json, closed.toml and closure.h5 into the folder, which is created if it is missing. Throws
+/// InputError if it cannot be.
 void write_closure(const std::filesystem::path& folder, const std::string& source, const record::Record& record,
                    const Closure& closure, const Predictive& predictive);
 

@@ -4,16 +4,16 @@
 
 namespace ringlock::closure {
 
-/// How a language writes a comment.
+/// Form of a comment in a language.
 enum class Comment {
     toml,   ///< "# ..."
     markup  ///< "<!-- ... -->": Markdown, SVG
 };
 
-/// The text with a last line, a comment, that says that `ringlock closure` wrote it and gives its checksum (CRC-32).
+/// The text with an additional last line, a comment: `ringlock closure` wrote it, and its checksum (CRC-32).
 std::string sealed(std::string text, Comment comment);
 
-/// Whether the text is one that sealed() made, unchanged since.
+/// Whether the text was made by sealed() and is unchanged since.
 bool is_sealed(std::string_view text);
 
 }  // namespace ringlock::closure

@@ -14,7 +14,7 @@ namespace {
 
 double below(double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); }
 
-/// Probability that what is read at x, from the middle of a quarter, is in that quarter.
+/// Probability that a phase read at x from the middle of a quarter lies in that quarter.
 double inside(double x, double sd) { return below((0.5 - x) / sd) - below((-0.5 - x) / sd); }
 
 }  // namespace
@@ -26,17 +26,17 @@ CountChain::CountChain(const CountedQuarters& counted, double edge)
         for (std::size_t lost = 0; lost < quarters; ++lost) {
             double x = counted.off[i] - static_cast<double>(lost);
             x -= quarters * std::round(x / quarters);
-            // However far off it is: something else has happened, and the chain goes on.
+            // However far off the reading is: it has another cause then, and the chain continues.
             seen_[i][lost] = std::max(options.stats.count_chain.never, inside(x, sd));
         }
-        // Down to a minimum the count stays too high by what it misses.
+        // Towards a minimum the count stays too high by the quarters that it misses.
         step_[i] = counted.direction[i] > 0 ? quarters - 1 : 1;
     }
 }
 
 CountChain::Pass CountChain::pass(double p, std::span<const std::uint8_t> rows) {
     Pass pass{forward(p), 0.0};
-    Chances after{1.0, 1.0, 1.0, 1.0};  // of all that is seen later, scaled
+    Chances after{1.0, 1.0, 1.0, 1.0};  // probability of all later readings, scaled
     for (std::size_t i = seen_.size(); i-- > 1;) {
         double all = 0.0;
         double stepped = 0.0;
@@ -78,13 +78,13 @@ double CountChain::forward(double p) {
 }
 
 std::vector<std::int64_t> CountChain::likeliest_course(double p) const {
-    // Of the steps from 0 to 3 quarters the way that the direction has it; the last is one back.
+    // Probabilities of steps of 0 to 3 quarters in the direction of the phase; three are one against the direction.
     const double chances[quarters] = {1.0 - p, p, options.stats.count_chain.two_at_once * p,
                                       options.stats.count_chain.against_direction * p};
     double costs[quarters];
     std::transform(std::begin(chances), std::end(chances), costs, [](double chance) { return -std::log(chance); });
     const std::size_t n = seen_.size();
-    std::vector<std::array<std::uint8_t, quarters>> came(n);  // how many steps the cheapest way here took
+    std::vector<std::array<std::uint8_t, quarters>> came(n);  // number of steps of the cheapest path to this state
     Chances cost{};
     for (std::size_t i = 0; i < n; ++i) {
         Chances next{};

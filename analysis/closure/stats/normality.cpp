@@ -12,8 +12,8 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Of the fourth moment over the square of the second, and how many standard errors that is: Anscombe and Glynn
-/// (Biometrika 70, 227, 1983).
+/// Kurtosis beyond 3, and its deviation from the expected one in standard errors: Anscombe and Glynn (Biometrika 70,
+/// 227, 1983).
 struct Excess {
     double kurtosis, z;
 };

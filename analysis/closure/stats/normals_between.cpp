@@ -16,7 +16,7 @@ namespace ringlock::closure::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 namespace sm = simd::HWY_NAMESPACE;
 
-/// The probability of more than z >= 0, relative error below 1e-12 up to z = 37, beyond which it is nothing.
+/// The probability above z >= 0, with a relative error below 1e-12 up to z = 37; zero beyond.
 template <class D, class V>
 HWY_INLINE V far_tail(D d, V z) {
     // Chebyshev interpolation of (1 + z) exp(z^2/2) of it in (z - 4)/(z + 4), from quadruple precision
@@ -40,7 +40,8 @@ HWY_INLINE V upper_tail(D d, V z) {
     return hn::IfThenElse(z < hn::Zero(d), hn::Set(d, 1.0) - tail, tail);
 }
 
-/// Where a tail from 1e-300 to 1/2 begins (Wichura, Appl. Stat. 37, 477, 1988, algorithm AS 241, PPND16).
+/// The number above which the given tail lies, from 1e-300 to 1/2 (Wichura, Appl. Stat. 37, 477, 1988, algorithm AS
+/// 241, PPND16).
 template <class D, class V>
 HWY_INLINE V begin_of_tail(D d, V tail) {
     static constexpr double a[] = {3.3871328727963666080e0, 1.3314166789178437745e2, 1.9715909503065514427e3,
@@ -98,7 +99,7 @@ HWY_INLINE void between_of(D d, const double* low_of, double width, const double
     const V low = hn::LoadU(d, low_of);
     const V high = low + hn::Set(d, width);
     const V share = hn::LoadU(d, share_of);
-    // The side on which both tails are small numbers
+    // The side on which both tails are small numbers.
     const auto turned = low + high < zero;
     const V near = hn::IfThenElse(turned, hn::Neg(high), low);
     const V of_near = upper_tail(d, near);

@@ -20,8 +20,8 @@ TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right
     const auto level = [&](Eigen::Index k) { return high[static_cast<std::size_t>(k)]; };
     Eigen::VectorXd shape = Eigen::VectorXd::Zero(n);
     TwoLevels best;
-    // Beyond these what is gained is rounding, which could be had for ever.
-    constexpr double gained = 1e-6;  // of the merit
+    // Smaller gains are rounding errors, for which the search would not end.
+    constexpr double gained = 1e-6;  // relative to the evidence
     const Eigen::Index most_steps = options.stats.two_levels.most_steps_per_stretch * n;
     for (Eigen::Index taken = 0; taken < most_steps; ++taken) {
         const Eigen::VectorXd pull = normal * shape;
@@ -33,14 +33,14 @@ TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right
         for (Eigen::Index a = 0; a < n; ++a) {
             double new_product = product;
             double new_squares = squares;
-            Eigen::VectorXd cross = Eigen::VectorXd::Zero(n);  // normal times what has been turned over so far
+            Eigen::VectorXd cross = Eigen::VectorXd::Zero(n);  // normal times the exchanges so far
             for (Eigen::Index b = a; b < n; ++b) {
                 const double sign = 1.0 - 2.0 * level(b);
                 new_product += sign * right(b);
                 new_squares += sign * 2.0 * (pull(b) + cross(b)) + normal(b, b);
                 cross += sign * normal.col(b);
                 if (new_squares < floor) continue;
-                // A jump at either end of the range comes where there was none, and goes where there was one.
+                // Either end of the range gets a jump where there was none, and loses it where there was one.
                 int changes = best.changes;
                 if (a > 0) changes += level(a) == level(a - 1) ? 1 : -1;
                 if (b + 1 < n) changes += level(b) == level(b + 1) ? 1 : -1;

@@ -3,19 +3,20 @@
 
 namespace ringlock::closure {
 
-/// A rate that jumps between two levels, as a regression on the rates of stretches of the record shows it.
+/// A rate that jumps between two levels, from a regression on the rates of stretches of the record.
 struct TwoLevels {
-    double chi2 = 0.0;  ///< that the jumps explain
+    double chi2 = 0.0;  ///< chi-squared that the jumps explain
     int changes = 0;
-    double merit = 0.0;          ///< gain of the log-likelihood less the cost
-    double cost = 0.0;           ///< of levels and places
-    double p_value = 1.0;        ///< by chance, all courses of as many changes counted
+    double merit = 0.0;          ///< evidence: gain of the log-likelihood less the cost
+    double cost = 0.0;           ///< cost of levels and places
+    double p_value = 1.0;        ///< by chance, with the search over all paths of as many changes
     Eigen::VectorXd shape = {};  ///< 1 in the stretches of one level, 0 in those of the other
 };
 
-/// The best course found, from the normal equations of the regression (one column a stretch, in the order of time,
-/// freed of constant rates). Ranges are turned over one by one from the best single jump on, for as long as the merit
-/// rises: the largest of all courses is not promised, so what is found is never too much.
+/// The best path that is found, from the normal equations of the regression (one column a stretch, in the order of
+/// time, with constant rates projected off). Starting from the best single jump, the levels of one range of stretches
+/// are exchanged as long as the evidence rises. The path need not be the best of all, so its evidence is never too
+/// large.
 TwoLevels two_levels(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right);
 
 }  // namespace ringlock::closure

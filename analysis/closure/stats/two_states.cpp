@@ -38,7 +38,7 @@ class Chain {
         states.up = states.down = std::clamp(changes / static_cast<double>(shape.size()), least_chance, most_chance);
     }
 
-    /// What each stretch's state and its neighbour's are, with these numbers.
+    /// Expectations of the state of each stretch, and of it and its neighbour, with these parameters.
     void expect(TwoStates& states) {
         const auto n = static_cast<std::size_t>(right_.size());
         const Pair level{states.rate, states.rate + states.step};
@@ -92,7 +92,7 @@ class Chain {
         states.expected = (states.rate + states.step * upper_.array()).matrix();
     }
 
-    /// The likeliest numbers with what is expected.
+    /// The most likely parameters with these expectations.
     void mend(TwoStates& states) {
         set_levels(states);
         states.up = up_;
@@ -117,8 +117,8 @@ class Chain {
     }
 
     Eigen::VectorXd own_, next_, right_;
-    Eigen::VectorXd upper_;     ///< probability of the upper state
-    std::vector<double> both_;  ///< of that one and the next being in it
+    Eigen::VectorXd upper_;     ///< probability of the upper state of each stretch
+    std::vector<double> both_;  ///< that each stretch and the next are both in it
     double up_ = least_chance;
     double down_ = least_chance;
 };

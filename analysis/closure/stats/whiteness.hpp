@@ -7,12 +7,12 @@
 #include "analysis/closure/options.hpp"
 #include "analysis/closure/types.hpp"
 
-/// Whether innovations are white: independent of those before, and of one variance.
+/// Tests of whether innovations are white: independent of earlier ones, and of one variance.
 namespace ringlock::closure {
 
-/// Correlations of the innovations that count with those before, in standard errors by their own scatter.
+/// Correlations of the innovations that count with earlier ones, in standard errors by their own scatter.
 struct Correlations {
-    std::array<double, options.stats.lags + 1> root{};  ///< [lag]; none at 0
+    std::array<double, options.stats.lags + 1> root{};  ///< by lag; zero at lag 0
 
     ResidualTest test(Where where, std::string view) const;
 };
@@ -24,7 +24,7 @@ struct Squares {
 };
 Squares squares_of(const std::vector<double>& innovations, const Rows& rows);
 
-/// Whether the residual is as large everywhere: its squares in stretches of the record, each of `fewest` rows at least.
+/// Whether the residual has the same size everywhere: its squares in stretches of the record of at least `fewest` rows.
 ResidualTest size_over_time(const std::vector<double>& innovations, const Rows& rows, std::size_t stretches,
                             double fewest);
 

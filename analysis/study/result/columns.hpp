@@ -3,7 +3,7 @@
 
 #include "analysis/study/study.hpp"
 
-/// What of a study becomes a dataset of its own: name, unit, meaning and where it lives. Writing and reading of result
+/// Figures of a study that have a dataset of their own: name, unit, meaning and member. Writing and reading of result
 /// files go through these lists.
 namespace ringlock::study {
 
@@ -26,7 +26,7 @@ inline constexpr std::array drawn_parameters = {
                         &gyro::Setup::dither_peak_rate_deg_s},
 };
 
-/// Mean rate in closed form: in arms that have one only. NaN where a gyro has none.
+/// Mean rate in closed form, only in arms with a closed form. NaN for a gyro without a closed form.
 inline constexpr Column<GyroStatistics, std::optional<double>> closed_form_column{
     "rate_error_closed_form_deg_h", "deg/h",
     "mean output rate over infinite time, computed from one cycle, less the input rate",
@@ -46,7 +46,7 @@ inline constexpr std::array coefficient_columns = {
                                                 &noise::NoiseFit::rate_ramp_deg_h_h},
 };
 
-/// What decides over the gyros together.
+/// Figures from which the noise model of all gyros together is selected.
 inline constexpr std::array pooling_columns = {
     Column<noise::Pooling>{"arw_evidence", "1", "rise of the deviance without N, all other terms free",
                            &noise::Pooling::arw_evidence},

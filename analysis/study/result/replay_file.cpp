@@ -134,7 +134,7 @@ std::string scenario_text(const Experiment& experiment) { return scenario::to_to
 
 /// Keeps files that are there: only a replay of the same gyro may be replaced.
 std::filesystem::path keep_other_files(const std::filesystem::path& path, const GyroOfResult& of) {
-    std::error_code unreachable;  // claiming the output says what is wrong with what is no file
+    std::error_code unreachable;  // claiming the output reports the error if this is no file
     if (!std::filesystem::is_regular_file(path, unreachable)) return path;
     bool same = false;
     try {
@@ -148,7 +148,7 @@ std::filesystem::path keep_other_files(const std::filesystem::path& path, const 
     } catch (const Interrupted&) {
         throw;
     } catch (const std::exception&) {
-        // Not HDF5 or not readable: somebody's file all the same.
+        // Not HDF5 or not readable: still a file that must not be lost.
     }
     if (!same) {
         throw InputError(
@@ -170,7 +170,7 @@ StoredGyro::StoredGyro(const GyroOfResult& of)
     : of_(of), opened_(store::guarded(of.result, [&](const store::GuardedPath& guarded) {
           Opened opened = open(of, guarded);
           if (!opened.record || !store::is_trial()) return opened;
-          // All that check_sample() will ask for.
+          // All samples that check_sample() will read.
           for (std::int64_t sample = 0; sample < of.study().schedule.samples; sample += at_once) {
               static_cast<void>(read_samples(of, opened, sample));
           }

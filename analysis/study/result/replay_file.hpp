@@ -12,7 +12,7 @@
 #include "engine/store/atomic_file.hpp"
 #include "engine/store/provenance.hpp"
 
-/// Gyros of a result that are replayed: what the result has of them, and the file of the replay.
+/// Gyros of a result that are replayed: their data in the result, and the file of the replay.
 namespace ringlock::study {
 
 inline constexpr std::int64_t replay_format_version = 1;
@@ -31,8 +31,8 @@ struct GyroOfResult {
     std::string text() const;
 };
 
-/// What a result has stored of a gyro, for a replay to be held against, to the bit. What differs is a RunError that
-/// says where, and by which programs the two were made.
+/// The data of a gyro that a result has stored, with which a replay is compared to the bit. A difference is a RunError
+/// that says where it is, and by which programs the two were made.
 class StoredGyro {
    public:
     /// `of` outlives it. Throws InputError where the result is damaged.
@@ -43,15 +43,15 @@ class StoredGyro {
     void check(const gyro::Setup& setup) const;
     /// A sample of the angle record; they come in their order. Nothing where the result has no records.
     void check_sample(std::int64_t sample, double angle_arcsec);
-    /// What the replay shows of the whole record.
+    /// Compares the figures of the whole record.
     void check(const ReplayFigures& figures) const;
 
    private:
     [[noreturn]] void fail(const std::string& what, double stored, double replayed) const;
 
-    /// The file of the result and what of it is this gyro's.
+    /// The file of the result and its datasets of this gyro.
     struct Opened {
-        store::File file;  // datasets of a file that is closed are so, too
+        store::File file;  // closing a file closes its datasets, too
         store::Provenance provenance;
         std::optional<store::Dataset> record;
         std::uint64_t row = 0;  // of the gyro among those of all points

@@ -38,7 +38,8 @@ constexpr Allowed deviation{0.0, 1e100, true, "a number from 0 on, or NaN where 
 constexpr Allowed freedom{0.0, 1e15, true, "0 or degrees of freedom from 0.01 to 1e15, or NaN where there are none"};
 constexpr double least_freedom = 0.01;
 
-/// What is evaluated later, by functions that have no value far out, is within its range.
+/// Checks that values are within their range, since they are evaluated later by functions that have no value far
+/// outside it.
 void check_values(const store::Dataset& dataset, const std::vector<double>& values, const Allowed& allowed) {
     for (std::size_t i = 0; i < values.size(); ++i) {
         const double v = values[i];
@@ -51,7 +52,7 @@ void check_values(const store::Dataset& dataset, const std::vector<double>& valu
     }
 }
 
-/// A dataset of the shape that the study asks for.
+/// A dataset of the shape that the study requires.
 template <class T = double>
 std::vector<T> read_column(const store::Group& group, const std::string& name, const store::Shape& expected,
                            const Allowed& allowed = {}) {
@@ -179,7 +180,7 @@ class ArmReader {
         }
     }
 
-    /// Results of earlier programs have none.
+    /// Results of earlier programs have no angle errors.
     void read_angle_errors() const {
         const std::size_t times = experiment_.points.front().angle_times_s.size();
         std::vector<double> errors(gyros_ * times, layout::nan);
@@ -273,7 +274,7 @@ void read_counts(const store::File& file, Experiment& experiment) {
 }
 
 void read_gyros(const store::File& file, Experiment& experiment) {
-    // What is not drawn is in the scenario.
+    // Parameters that are not drawn are in the scenario.
     for (Study& study : experiment.points) {
         std::fill(study.gyros.begin(), study.gyros.end(), ensemble::nominal_setup(study.scenario));
     }
@@ -307,7 +308,7 @@ void check_size(const store::File& file, const scenario::Scenario& scenario, std
     std::error_code unknown;
     const auto there = static_cast<double>(std::filesystem::file_size(file.file(), unknown));
     constexpr double fixed_bytes = 1e8;      // of a small result with many points
-    constexpr double greatest_ratio = 64.0;  // of what is in memory over the file, be it packed by h5repack
+    constexpr double greatest_ratio = 64.0;  // size in memory over that of the file, even if h5repack has packed it
     if (!unknown && needed > fixed_bytes + greatest_ratio * there) {
         throw InputError(
             fmt::format("{}: dataset /scenario asks for {:.10g} gyros, which the file of {:.4g} bytes "

@@ -79,7 +79,7 @@ class FigureWriter {
         : home_(home), rows_(rows), points_(points) {}
 
     /// \param base   with its unit at the end, as in "arw_deg_rt_h"
-    /// \param after  what stands after it in the name, as in "_median"
+    /// \param after  suffix of the name behind it, as in "_median"
     template <class Value>
     void set(const std::string& base, const std::string& after, Value&& value) {
         if (rows_ == nullptr) return home_.set_attribute(base + after, value(std::size_t{0}));
@@ -164,7 +164,7 @@ class ArmWriter {
                     {"1", "1 where the noise model describes the record"});
     }
 
-    /// Of every gyro a row of averaging times, of which some points may have fewer.
+    /// A row of averaging times for every gyro; some points may have fewer times.
     template <class T, class What>
     std::vector<T> over_taus(T none, What&& what) const {
         const std::size_t taus = layout::most_taus(experiment_);
@@ -259,7 +259,7 @@ class ArmWriter {
                     {"s", "since the start of the record"});
     }
 
-    /// The figures of the summary, for readers that want no computing; NaN where nothing is claimed.
+    /// The figures of the summary, for readers that do not compute them; NaN where nothing is claimed.
     void write_figures(store::Group& group, store::Group* rows) const {
         FigureWriter figures(group, rows, experiment_.points.size());
         const auto figure = [&](const std::string& name, auto&& of) {
@@ -324,7 +324,7 @@ void write_gyros(store::Group& root, const Experiment& experiment) {
     }
 }
 
-/// What the whole run counted, and what its points are in theory.
+/// Writes the counts of the whole run and the theoretical figures of its points.
 void write_totals(store::File& root, const Experiment& experiment, const std::vector<Summary>& summaries) {
     std::optional<store::Group> design;
     if (experiment.has_design()) design = root.group("design");
@@ -410,7 +410,8 @@ void write_pairs(store::File& root, const Experiment& experiment, const std::vec
     write("arw_distinguishable", distinguishable, "1 where the interval excludes 1");
 }
 
-/// Whether a scenario's text is that of the experiment; what a stopping rule made of its gyros does not matter.
+/// Whether a scenario's text is that of the experiment; the number of gyros is not compared where a stopping rule
+/// decides it.
 bool is_text_of(const std::string& text, const Experiment& experiment) {
     if (!scenario::asks(experiment.scenario.stop)) return text == scenario::to_toml(experiment.scenario);
     scenario::Scenario other =
@@ -421,7 +422,7 @@ bool is_text_of(const std::string& text, const Experiment& experiment) {
 
 /// Keeps results that are there: only a result of this very study may be replaced.
 std::filesystem::path refuse_to_lose(const std::filesystem::path& path, const Experiment& experiment) {
-    std::error_code unreachable;  // claiming the output says what is wrong with what is no file
+    std::error_code unreachable;  // claiming the output reports the error if this is no file
     if (std::filesystem::is_regular_file(path, unreachable) && !is_result_of(path, experiment)) {
         throw InputError(
             fmt::format("{}: the file is there and is not a result of this scenario and seed; it is kept. Give "

@@ -3,7 +3,7 @@
 namespace ringlock::scenario {
 namespace {
 
-/// The element that is read or written; a default one where there is none yet.
+/// The element that is read or written; a default one if the list is empty.
 template <class T>
 T& last(std::vector<T>& list) {
     return list.back();

@@ -17,7 +17,7 @@ using Value = std::variant<bool, std::int64_t, double, std::string, std::vector<
 
 enum class Type { boolean, integer, real, word, text, arms, reals };
 
-/// What a number may be. The limits have the type of the key.
+/// Allowed values of a number. The limits have the type of the key.
 struct Bounds {
     Value min;
     Value max;
@@ -57,10 +57,10 @@ struct Section {
 /// All sections in the order in which they are printed.
 const std::vector<Section>& schema();
 
-/// The key of that path, outside of sections that may stand several times; nullptr where there is none.
+/// The key of that path, outside of sections that may occur several times; nullptr if there is no such key.
 const Key* find_key(std::string_view path);
 
-/// The unit that the name of a key ends in: "deg/h" of "lockin_threshold_deg_h", "1" where it has none.
+/// The unit that the name of a key ends in: "deg/h" of "lockin_threshold_deg_h", "1" for a name without unit.
 std::string_view unit_of(std::string_view name);
 
 /// True where a number of the key's type lies within its bounds, all of a list do; a real must be finite as well.

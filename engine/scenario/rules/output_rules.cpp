@@ -141,7 +141,7 @@ Finding specification_can_be_met(const Scenario& s) {
 }
 
 Finding scale_factor_has_a_sweep(const Scenario& s) {
-    constexpr std::int64_t fewest_rates = 3;  // of a line that says how far it is off, as in study::scale_factor
+    constexpr std::int64_t fewest_rates = 3;  // of a line with an estimate of its error, as in study::scale_factor
     if (s.specification.scale_factor_error_ppm == 0.0 || s.input.sweep_points >= fewest_rates) return {};
     return Complaint{{"specification.scale_factor_error_ppm", "input.sweep_points"},
                      fmt::format("a scale factor error is that of a straight line through the rates of a sweep, and "

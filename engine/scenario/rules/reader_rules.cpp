@@ -18,7 +18,7 @@ namespace {
 
 using reader::Stripping;
 
-/// A rate at which a reader puts out angles, the key that sets it, and what happens at that rate.
+/// A rate at which a reader puts out angles, the key that sets it, and a phrase for messages that describes it.
 struct Outputs {
     double hz;
     std::string key;
@@ -27,7 +27,7 @@ struct Outputs {
     double latch_hz(const Scenario& s) const { return reader::latch_hz(s.reader, hz); }
 };
 
-/// Of a record of samples, whose rate effects on the samples may change.
+/// Outputs for a record of samples; effects on the samples may change their rate.
 Outputs outputs_of_record(const Scenario& s) {
     Outputs outputs{s.record.rate_hz, "record.rate_hz", "samples are taken"};
     for (const auto& [effect, values] : active_effects(s)) {
@@ -42,7 +42,7 @@ Outputs outputs_of_record(const Scenario& s) {
     return outputs;
 }
 
-/// All outputs that the scenario's reader makes: of a record of samples, of the arms of a study, or of both.
+/// All outputs that the scenario's reader makes: for a record of samples, for the arms of a study, or for both.
 std::vector<Outputs> all_outputs(const Scenario& s) {
     std::vector<Outputs> all;
     if (s.record.kind == RecordKind::samples) all.push_back(outputs_of_record(s));

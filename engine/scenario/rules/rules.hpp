@@ -9,8 +9,8 @@
 #include "engine/scenario/check.hpp"
 #include "engine/scenario/scenario.hpp"
 
-/// The rules behind check.hpp, in groups, and the quantities that several groups judge by. For the sources of the rules
-/// only; everybody else asks check.hpp.
+/// The rules behind check.hpp, in groups, and the quantities that several groups use. For the sources of the rules
+/// only; other code uses check.hpp.
 namespace ringlock::scenario {
 
 using Finding = std::optional<Complaint>;
@@ -24,7 +24,7 @@ std::span<const Rule> rate_rules();      ///< the dither reverses the rate, and 
 std::span<const Rule> run_rules();       ///< profiles, sweep and size of a run
 std::span<const Rule> turn_map_rules();  ///< where the turn map exists and can be tabulated
 std::span<const Rule> noise_rules();     ///< injected noise and the drive that makes it
-std::span<const Rule> lockin_rules();    ///< what effects leave of the lock-in
+std::span<const Rule> lockin_rules();    ///< the lock-in that remains under the effects
 std::span<const Rule> readout_rules();   ///< readout models and the instrument's electronics
 std::span<const Rule> output_rules();    ///< samples, averaging times and the specification
 std::span<const Rule> record_rules();    ///< records

@@ -44,7 +44,7 @@ Finding turn_map_has_small_kicks(const Scenario& s) {
                     kick, largest)};
 }
 
-/// What a scenario whose turn map does not exist, or cannot be tabulated, can do instead.
+/// Advice for a scenario whose turn map does not exist or cannot be tabulated.
 std::string way_without_tables(const Scenario& s) {
     return s.propagation.method == PropagationMethod::turn_map
                ? "set propagation.method = \"direct\""

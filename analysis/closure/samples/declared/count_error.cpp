@@ -16,7 +16,7 @@ namespace ringlock::closure {
 
 namespace {
 
-/// All that is declared of it and its frequency under the mean rate; none where there is no such error.
+/// The declared properties of the error and its frequency under the mean rate; no value where there is no such error.
 std::optional<SampleNoise::CountError> declared_error(const SampleSeries& series, const record::Record& record) {
     const double k_arcsec = record.declared.scale_factor_arcsec.value_or(0.0);
     const double dither_hz = record.declared.dither_frequency_hz.value_or(0.0);
@@ -28,7 +28,7 @@ std::optional<SampleNoise::CountError> declared_error(const SampleSeries& series
     error.step_arcsec = 0.25 * k_arcsec;
     error.hz = std::abs(angle_arcsec) / duration_s / error.step_arcsec;
     error.latch_hz = dither_hz;
-    // Noise of the measured dither moves its zero crossings, where the dither turns meanwhile.
+    // Noise of the measured dither moves its zero crossings, and the dither turns the angle in the meantime.
     error.jitter_arcsec = record.reader->settings.reference_noise_arcsec;
     if (error.hz * duration_s < options.samples.count_error.fewest_steps) return std::nullopt;
     return error;
@@ -76,11 +76,11 @@ std::shared_ptr<SampleFit> with_late_crossings(const SampleFit& fit, const recor
         SampleModel model = fit.model();
         model.noise.sidebands = {by.late_first_rms * late_arcsec, 0.0, width * *record.declared.dither_frequency_hz};
         auto with = std::make_shared<SampleFit>(fit.series(), std::move(model), fit.rows(), SampleFit::Noise::near);
-        // A larger one than the amplitude itself could make is no noise of the dither.
+        // A noise larger than the amplitude itself could make is no noise of the dither.
         if (with->model().noise.sidebands.arcsec > by.late_most_rms * late_arcsec) continue;
         if (!best || with->log_likelihood() > best->log_likelihood()) best = std::move(with);
     }
-    // A short record hardly distinguishes it from random walk, which is then uncertain: it is there where it may be.
+    // A short record hardly distinguishes it from random walk, which is then uncertain: a small gain is enough.
     return best && best->gain_over(fit) > by.late_least_gain ? best : nullptr;
 }
 
@@ -88,7 +88,7 @@ std::shared_ptr<SampleFit> with_interpolated_errors(const SampleFit& fit, const 
     const double dither_hz = record.declared.dither_frequency_hz.value_or(0.0);
     if (!fit.series().whole_cycles || !(dither_hz > 0.0) || fit.model().noise.from_hz > 0.0) return nullptr;
     const double rate_hz = fit.series().rate_hz;
-    // The declared frequency, and the one near it that the squares show: a dither drifts.
+    // The declared frequency, and the one near it that the squares show, since a dither drifts.
     std::vector<double> all_hz{alias(dither_hz, rate_hz).hz};
     const FoundCycle cycle = find_cycle(fit.innovations(), fit.telling(), rate_hz);
     const double resolution_hz = rate_hz / static_cast<double>(fit.series().size());

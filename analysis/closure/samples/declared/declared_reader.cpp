@@ -36,8 +36,8 @@ double dither_arcsec(const record::Declared& declared) {
            (units::two_pi * *declared.dither_frequency_hz);
 }
 
-/// Amplitude of a line at the dither that the lock-in itself makes, at most: the second order of half a turn, which
-/// comes and goes with the half cycles, is below the square of a kick.
+/// Largest amplitude of a line at the dither that the lock-in makes itself: the second order of half a turn, which
+/// alternates with the half cycles, is below the square of a kick.
 double lockin_line_arcsec(const record::Declared& declared) {
     const double k = declared.scale_factor_arcsec.value_or(0.0);
     const double peak_arcsec_s = declared.dither_peak_rate_deg_s.value_or(0.0) * units::arcsec_per_deg;
@@ -203,7 +203,7 @@ std::optional<double> line_arcsec(const Step& step) {
         case OnSamples::angle_line:
             return value_of(step, effects::Role::sampled);
         case OnSamples::rate_line:
-            // By the angle at the frequency that was fitted: 1 deg/h is 1 arcsec/s.
+            // As an angle, by the fitted frequency: 1 deg/h is 1 arcsec/s.
             return value_of(step, effects::Role::size) / (units::two_pi * hz);
         default:
             return std::nullopt;

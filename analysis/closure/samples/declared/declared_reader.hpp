@@ -10,30 +10,30 @@
 /// Properties of samples that follow from the declared reader and are no effects that the model lacks.
 namespace ringlock::closure {
 
-/// The record as the loop reads it. A low-pass filter passes nothing that is faster than its length: samples are summed
-/// until one lasts as long, and neighbours alone have the filter in common. Where the reader leaves the noise of the
-/// dither, samples are summed until one lasts for a half cycle, whose readings have that noise in common. `note` says
-/// so where it was done.
+/// The record as the loop reads it. A low-pass filter suppresses signals that are faster than its length: samples are
+/// summed until one is as long as the filter, so that only adjacent samples share it. Where the reader leaves the noise
+/// of the dither, samples are summed until one lasts for a half cycle, whose readings share that noise. `note` says so
+/// if samples were summed.
 record::Record summed_for_reader(const record::Record& record, std::string& note);
 
-/// Whether the declared reader leaves the dither in the samples, or takes off its line alone.
+/// Whether the declared reader leaves the dither in the samples, or removes its line alone.
 bool leaves_dither_noise(const record::Record& record);
 
-/// How a low-pass filter divides white rate noise between a row and the next; null where the reader has none.
+/// Division of white rate noise between a row and the next by a low-pass filter; null where the reader has none.
 std::shared_ptr<const KickRows> filtered_rows(const record::Record& record);
 
 /// Rms of the uniform error that a count of quarter fringes leaves in each reading [arcsec]; 0 where none is declared.
 double count_noise_arcsec(const record::Record& record);
 
 /// Whether the step follows from the declared reader: a line within its residue of the dither, or samples interpolated
-/// from whole cycles of it. `why` says so.
+/// from whole cycles of it. `why` is a sentence on the reason.
 bool accounted_by_reader(const Step& step, const record::Record& record, std::string& why);
 
 /// The value that a step found for the first parameter of that role; 0 where it has none.
 double value_of(const Step& step, effects::Role role);
 
-/// Amplitude of the line that a step added, as an angle [arcsec]; none where it added none. As lines in the rate or in
-/// the angle they look alike.
+/// Amplitude of the line that a step added, as an angle [arcsec]; no value if it added none. Lines in the rate and in
+/// the angle are not distinguished.
 std::optional<double> line_arcsec(const Step& step);
 
 }  // namespace ringlock::closure

@@ -17,16 +17,16 @@ namespace ringlock::closure {
 
 namespace {
 
-/// How the dither goes from the amplitude at one turn to that at the next.
+/// Path of the dither from the amplitude at one turn to that at the next.
 enum class Path {
     cosine,    ///< amplitudes are drawn turn by turn: along a cosine from one turn's angle to the next
     resonator  ///< a noisy drive has the amplitude of a resonator grow evenly (engine/gyro/half_cycle.hpp)
 };
 
-/// A resonator remembers; amplitudes that are drawn turn by turn do not.
+/// Amplitudes of a resonator are correlated; amplitudes that are drawn turn by turn are not.
 Path path_with(double memory) { return memory > 0.0 ? Path::resonator : Path::cosine; }
 
-/// 1/(2 Q) of the resonator that remembers so much from turn to turn, exp(-pi/(2 Q)).
+/// 1/(2 Q) of a resonator with the correlation exp(-pi/(2 Q)) from turn to turn.
 double damping_with(double memory) { return -std::log(memory) / units::pi; }
 
 /// Weights of a reading between two turns.
@@ -59,7 +59,7 @@ DitherRows rows_of(const SampleSeries& series, const DitherNoise& noise, bool no
             rows.follower.push_back(-sign * cosine);
             continue;
         }
-        // The quadrature at the next turn follows from that at the last and from both amplitudes.
+        // The quadrature at the next turn follows from that at the last turn and from both amplitudes.
         const double of_next = -0.5 * damping * sign * sine * gone * noise.memory;
         rows.last.back() -= of_next;
         rows.next.back() += of_next;
@@ -80,12 +80,12 @@ class Search {
         noise.asymmetry = asymmetry;
         noise.share = options.samples.turns.dither_first_share;
         if (notch_hz_ > 0.0) {
-            // Of an amplitude it learns a share in half a cycle.
+            // In half a cycle it learns a share of an amplitude.
             const double learnt = 1.0 - std::exp(-units::pi * notch_hz_ / turn_hz);
             noise.follower = {1.0 - learnt, 0.5 * learnt, 0.5 * learnt};
         } else if (path_with(memory) == Path::resonator) {
             // Turns of a damped resonator are late when its amplitude changes: v = -damping/2 times the changes, which
-            // are forgotten as the amplitude is.
+            // decay as the amplitude does.
             noise.follower = {memory, -memory, memory};
         }
         noise.rows = std::make_shared<const DitherRows>(rows_of(base_.series(), noise, notch_hz_ > 0.0));
@@ -95,7 +95,7 @@ class Search {
     /// From the start of the record.
     double middle_s() const { return 0.5 * base_.series().interval_s * static_cast<double>(base_.series().size()); }
 
-    /// The likeliest of several, each with the likeliest of a few sizes of the white noises.
+    /// The most likely of several, each with the most likely of a few sizes of the white noises.
     DitherNoise best_of(std::vector<DitherNoise> all) const {
         std::vector<double> values(all.size());
         oneapi::tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t k) {
@@ -108,7 +108,7 @@ class Search {
         return all[static_cast<std::size_t>(best)];
     }
 
-    /// The fit of the base model with it. Later comparisons start from its white noises.
+    /// The fit of the base model with this noise. Later comparisons start from its white noises.
     SampleFit fitted(DitherNoise& noise) {
         SampleModel model = base_.model();
         const auto sizes = sizes_with(noise);
@@ -126,8 +126,8 @@ class Search {
         double angle_arcsec, rate_arcsec_rt_s;
     };
 
-    /// The base model's noise with it, and white noises as of the last fit and somewhat smaller and larger; before the
-    /// first fit those of the base model, or the innovations' size as that of the readings.
+    /// The base model's noise with it, and white noises as in the last fit and somewhat smaller and larger. Before the
+    /// first fit these are those of the base model, or the size of the innovations as that of the readings.
     std::vector<SampleNoise> sizes_with(const DitherNoise& noise) const {
         std::vector<Whites> whites;
         if (whites_) {
@@ -169,7 +169,7 @@ bool has_dither_line(const SampleFit& fit, double dither_hz) {
     });
 }
 
-/// The likeliest of those a step of frequency, place or asymmetry away, all else as it is.
+/// The most likely of those one step of frequency, place or asymmetry away; other parameters are unchanged.
 DitherNoise nearby(const Search& search, const DitherNoise& here, double hz_step, double place_step,
                    double asymmetry_step) {
     std::vector<DitherNoise> all;
@@ -200,7 +200,7 @@ void take_dither_noise(const DitherNoise& found, SampleNoise& noise) {
 
 namespace {
 
-/// Injected noise by its amplitudes at the turns, drawn turn by turn or made by a resonator.
+/// Injected noise by its amplitudes at the turns, which are drawn turn by turn or made by a resonator.
 std::optional<DitherNoise> find_noise_of_turns(const SampleFit& base, const record::Record& record) {
     const reader::Settings& settings = record.reader->settings;
     const auto seen = turns_in_squares(base, record.declared);
@@ -229,7 +229,7 @@ std::optional<DitherNoise> find_noise_of_turns(const SampleFit& base, const reco
         for (const double memory : memories) {
             all.push_back(search.at(best.turn_hz, best.place, memory, best.asymmetry));
             all.back().share = best.share;
-            // What is new at each turn is known best: with a longer memory the amplitudes are larger.
+            // The innovation at each turn is determined best: with a longer memory the amplitudes are larger.
             if (memory > 0.0 && best.memory > 0.0) {
                 all.back().larger = std::sqrt((1.0 - best.memory * best.memory) / (1.0 - memory * memory));
             }
@@ -282,7 +282,7 @@ std::optional<DitherNoise> find_sidebands(const SampleFit& base, double dither_h
         const SampleFit fit(base.series(), std::move(model), base.rows(), SampleFit::Noise::free);
         const double gain = fit.gain_over(base);
         const SampleNoise::Resonance& found = fit.model().noise.sidebands;
-        // Elsewhere it is not the dither's, however well it explains the record.
+        // At another frequency it is not the noise of the dither, even if it explains the record well.
         const double tolerance_hz = found.width_hz + options.samples.declared_dither_error * dither_hz;
         if (std::abs(found.hz - dither_hz) > tolerance_hz) continue;
         if (gain < by.least_gain || (best && gain <= best->gain)) continue;

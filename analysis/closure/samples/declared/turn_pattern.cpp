@@ -16,13 +16,13 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Variance of the part of a kick that has come `x` units of time after its turn, over that of the whole kick:
-/// abs(1/2 + (C(x) + i S(x))/(1 + i))^2 with Fresnel's integrals of pi x^2/2 (Abramowitz and Stegun, 7.3), for a phase
-/// that is equally likely everywhere.
+/// Variance of the part of a kick up to `x` units of time after its turn, relative to that of the whole kick: abs(1/2 +
+/// (C(x) + i S(x))/(1 + i))^2 with Fresnel's integrals of pi x^2/2 (Abramowitz and Stegun, 7.3), for a uniformly
+/// distributed phase.
 class KickProfile {
    public:
     KickProfile() {
-        // Simpson's rule on a grid that follows the fastest swing.
+        // Simpson's rule on a grid that resolves the fastest oscillation.
         std::complex<double> integral = 0.0;
         const auto swing = [](double x) { return std::polar(1.0, 0.5 * units::pi * x * x); };
         for (std::size_t i = 0; i < right_.size(); ++i) {
@@ -48,8 +48,8 @@ class KickProfile {
     std::array<double, static_cast<std::size_t>(reach / step) + 1> right_{}, left_{};
 };
 
-/// The profile averaged over turns that are late by a normal deviate, by the place of the end of a row in turns after
-/// the turn.
+/// The profile averaged over turns with a normal deviation of their times, as a function of the place of the row's end
+/// in turns after the turn.
 class BlurredProfile {
    public:
     BlurredProfile(double unit_turns, double late_turns) {
@@ -83,7 +83,7 @@ class BlurredProfile {
     std::array<double, 801> values_{};
 };
 
-/// Variance by kicks of a row whose end is at that place between two turns, over the mean. `ratio`: turns in a row.
+/// Variance by kicks of a row that ends at that place between two turns, relative to the mean. `ratio`: turns per row.
 double weight_at(const BlurredProfile& profile, double place, double ratio) {
     double sum = 0.0;
     const auto first = static_cast<int>(std::floor(place - ratio - BlurredProfile::reach));
@@ -121,7 +121,7 @@ struct Placed {
     std::size_t shift = 0;
 };
 
-/// The likeliest place of the turns. `share`: of the innovations' variance that comes in kicks.
+/// The most likely place of the turns. `share`: share of the innovations' variance that arrives in kicks.
 Placed place_turns(const Folded& folded, const Weights& weights, double share) {
     std::array<double, cycle_bins> log_variance{}, inverse{};
     for (std::size_t b = 0; b < cycle_bins; ++b) {
@@ -147,7 +147,7 @@ double peak_arcsec_s(const record::Declared& declared) {
     return declared.dither_peak_rate_deg_s.value_or(0.0) * units::arcsec_per_deg;
 }
 
-/// Time in which a kick comes [s]: the root of pi over the acceleration of the phase at a turn; 0 where it is unknown.
+/// Duration of a kick [s]: the root of pi over the acceleration of the phase at a turn; 0 where it is unknown.
 double kick_unit_s(const record::Declared& declared) {
     const double k = scale_factor(declared);
     const double peak = peak_arcsec_s(declared);
@@ -211,7 +211,7 @@ std::optional<TurnPattern> find_turn_pattern(const SampleFit& base, const record
     const auto& e = base.innovations();
     const double seen_hz = seen->turn_hz;
     const double bin_hz = seen->bin_hz;
-    // Of an innovation of the base model, by its white rate.
+    // Share of the variance of an innovation of the base model by its white rate.
     const double by_rate =
         std::min(1.0, std::pow(base.model().noise.rate_arcsec_rt_s / base.typical_sd(), 2) * series.interval_s);
     const double unit_s = kick_unit_s(declared);

@@ -35,11 +35,12 @@ double middle_of(const SampleSeries& series) {
            0.5 * static_cast<double>(series.size() - 1) * series.interval_s;
 }
 
-/// Frequency at which a declared dither, or a harmonic of it, is read as this line; the line's own where there is none.
+/// Frequency of a declared dither, or of its harmonic, whose alias is this line; without one, the frequency of the
+/// line.
 struct Unaliased {
     double hz;
     double drift_sign = 1.0;
-    double from_hz_times = 0.0;  ///< that the source's rate is in it
+    double from_hz_times = 0.0;  ///< multiple of the source's rate in it
 };
 Unaliased unaliased(double hz, const SampleFit& fit, const record::Declared& declared) {
     if (!declared.dither_frequency_hz) return {hz};
@@ -55,8 +56,9 @@ Unaliased unaliased(double hz, const SampleFit& fit, const record::Declared& dec
     return {hz};
 }
 
-/// Lines at other frequencies leave the same readings. Those that dithers have come first, the declared one before all.
-/// \param amplitude  of the line at a frequency
+/// Lines at other frequencies leave the same readings. Frequencies of typical dithers are listed first, harmonics of
+/// the declared one before all.
+/// \param amplitude  text of the amplitude of the line at a frequency
 std::string note_on_aliases(const Unaliased& line, const SampleFit& fit, const record::Declared& declared,
                             const effects::Effect& effect, const std::function<std::string(double hz)>& amplitude) {
     const double from_hz = fit.model().noise.from_hz;
@@ -106,7 +108,7 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
     const auto of_a = static_cast<Eigen::Index>(cosine);
     const auto of_hz = static_cast<Eigen::Index>(columns.size());
     const double amplitude = std::max(std::hypot(a, b), 1e-300);
-    // Of the amplitude and of the phase in the middle, by a, b
+    // Derivatives of the amplitude by a and b
     const Eigen::Vector2d along(a / amplitude, b / amplitude);
     const double amplitude_sd = std::sqrt(std::max(0.0, along.dot(joint.block<2, 2>(of_a, of_a) * along)));
     const Unaliased real = unaliased(course.hz, fit, declared);
@@ -115,7 +117,7 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
         all.push_back(
             estimate_of(effect, courses[0]->name, real.hz, std::hypot(hz_sd, real.from_hz_times * from_hz_sd)));
         if (course.free == 1 && courses.size() > 1) {
-            // It is held at zero; the error says what of it would not show.
+            // The drift is held at zero; the error is that of a drift that was fitted.
             LineCourse drifting = course;
             drifting.free = 2;
             const auto more = fit.joint_covariance(line_slopes(fit, drifting, a, b));
@@ -135,7 +137,7 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
         return;
     }
     all.push_back(estimate_of(effect, courses[0]->name, course.hz, hz_sd));
-    // Increments are those of a rate integrated over each interval.
+    // Increments are integrals of a rate over each interval.
     const double gain = std::sin(units::pi * course.hz * series.interval_s) / (units::pi * course.hz);
     all.push_back(estimate_of(effect, parameter_of(effect, Role::size).name, amplitude / std::abs(gain),
                               amplitude_sd / std::abs(gain)));
@@ -156,7 +158,7 @@ void take_line(const SampleFit& fit, std::size_t cosine, const record::Declared&
                               std::sqrt(std::max(0.0, by.dot(joint * by)))));
 }
 
-/// Mean and standard deviation of the time of a step under its likelihood, which is no parabola.
+/// Mean and standard deviation of the time of a step under its likelihood, which is not parabolic.
 Estimate time_of_step(const SampleFit& fit, std::size_t at) {
     const SampleSeries& series = fit.series();
     const std::size_t n = series.size();
@@ -167,7 +169,7 @@ Estimate time_of_step(const SampleFit& fit, std::size_t at) {
     const SampleFit without(series, std::move(model), fit.rows(), SampleFit::Noise::held);
     const auto chi2_at = [&](std::size_t place) { return std::pow(root_of_step(without, place), 2); };
     const double top = chi2_at(row);
-    // So far to either side that the likelihood is gone, then evenly
+    // Up to where the likelihood is negligible on either side, then in even steps
     std::size_t reach = 1;
     while (reach < n / 4) {
         const std::size_t before = row > reach ? row - reach : 1;
@@ -187,7 +189,7 @@ Estimate time_of_step(const SampleFit& fit, std::size_t at) {
         second += weight * time * time;
     }
     const double mean = first / sum;
-    // Within a row nothing tells.
+    // The time within a row is not determined.
     const double within = series.interval_s * static_cast<double>(step);
     return estimate_of(*column.effect, parameter_of(*column.effect, Role::time).name, series.time_s[row] + mean,
                        std::sqrt(std::max(0.0, second / sum - mean * mean) + within * within / 12.0));
@@ -197,7 +199,7 @@ double of_readings_hz(const SampleFit& fit) {
     return fit.model().noise.from_hz > 0.0 ? fit.model().noise.from_hz : fit.series().rate_hz;
 }
 
-/// Mean square of a resonance's angle between two frequencies, by the spectrum of the autoregression that it is.
+/// Mean square of a resonance's angle between two frequencies, by the spectrum of its autoregression.
 double power_between(const SampleNoise::Resonance& resonance, double from_hz, double to_hz, double rate_hz) {
     constexpr int parts = 64;
     const double r = std::exp(-units::pi * resonance.width_hz / rate_hz);
@@ -215,7 +217,7 @@ double power_between(const SampleNoise::Resonance& resonance, double from_hz, do
     return sum;
 }
 
-/// What a witness does not tell of a motion, with the relative errors of their amplitudes.
+/// Part of a motion that a witness does not predict, with the relative errors of the amplitudes.
 struct Untold {
     std::vector<SampleNoise::Resonance> resonances;
     std::vector<double> relative;
@@ -233,8 +235,8 @@ Untold untold_in(const SampleFit& fit, int step) {
     return untold;
 }
 
-/// Weak motion is told by two numbers, a response of many lags would be mostly noise: the motion as a resonance of its
-/// own beside these.
+/// A weak motion is predicted by two numbers only, since a response of many lags would be mostly noise: the unpredicted
+/// part is the motion's resonance, fitted next to these.
 Untold untold_beside(const SampleFit& fit, const SampleFit& whole) {
     SampleModel beside = whole.model();
     beside.motion.assign(fit.series().size(), 0.0);
@@ -248,8 +250,9 @@ Untold untold_beside(const SampleFit& fit, const SampleFit& whole) {
     return {{resonance}, {sd / std::max(resonance.arcsec, 1e-12)}};
 }
 
-/// The motion's angle as a resonance of its own, whatever the witness tells of it. Noises that stood in for it where it
-/// was taken out may go on to: those that were told beside it are tried as well.
+/// The motion's angle as a resonance of its own, without any prediction from the witness. In the model without the
+/// motion, other noises may have absorbed it; the noises that were fitted with it are therefore tried as a start as
+/// well.
 SampleFit motion_as_resonance(const SampleFit& fit, const SampleFit& bare, const WitnessMotion& told,
                               const ResonanceOwner& owner) {
     const double centre_hz = std::max(told.centre_hz, 0.01);
@@ -274,7 +277,7 @@ std::vector<Estimate> whites_of(const SampleNoise& noise, const SampleNoise& err
             {"", "white_rate_deg_rt_h", noise.rate_arcsec_rt_s * to_deg, errors.rate_arcsec_rt_s * to_deg}};
 }
 
-/// What the motion is, and what its witness leaves of it.
+/// Parameters of a motion, and the part that its witness does not predict.
 void take_motion(const SampleFit& fit, const AddedEffect& added, std::vector<Estimate>& all,
                  std::vector<Estimate>& whites, std::vector<std::string>& notes) {
     const SampleSeries& series = fit.series();
@@ -292,16 +295,16 @@ void take_motion(const SampleFit& fit, const AddedEffect& added, std::vector<Est
     const SampleNoise errors = whole.noise_errors().noise;
     const SampleNoise::Resonance& error = errors.resonances.front();
     const bool seen = whole.log_likelihood() - bare.log_likelihood() > options.samples.fit.motion_stands_out;
-    // The witness's own noise comes in with what it tells of a strong motion, and is none of the gyro's. A motion that
-    // is no resonance leaves more beside it than there is.
+    // A strong motion as predicted from the witness contains the witness's own noise, which is no noise of the gyro. A
+    // motion that is not a resonance leaves a larger white angle in this model; then the fitted one is kept.
     if (seen && added.strong && whole.model().noise.angle_arcsec < fit.model().noise.angle_arcsec) {
         whites = whites_of(whole.model().noise, errors);
     }
     double coherence = unknown;
     double coherence_sd = unknown;
     if (seen) {
-        // What is still needed beside what the witness tells, of the power where the motion is: elsewhere it is what
-        // the witness cannot tell.
+        // Power that is still needed in addition to the prediction, in the band of the motion: elsewhere it is power
+        // that the witness cannot predict.
         const Untold untold = added.strong ? untold_in(fit, added.id) : untold_beside(fit, whole);
         const auto power = [&](const SampleNoise::Resonance& of) {
             return power_between(of, motion.hz - motion.width_hz, motion.hz + motion.width_hz, of_readings_hz(fit));
@@ -318,8 +321,8 @@ void take_motion(const SampleFit& fit, const AddedEffect& added, std::vector<Est
         const double left = std::min(1.0, squares / all_of_it);
         coherence = 1.0 - left;
         const double relative = 0.5 * squares_sd / std::max(squares, 1e-300);
-        // Of n independent spectra: (1 - c) sqrt(2 c/n) (Bendat and Piersol 2010, table 9.6); of their power's
-        // logarithm the standard error is 1/sqrt(n).
+        // For n independent spectra: (1 - c) sqrt(2 c/n) (Bendat and Piersol 2010, table 9.6); the logarithm of their
+        // power has the standard error 1/sqrt(n).
         coherence_sd = relative < options.samples.fit.small_relative_sd ? left * std::sqrt(8.0 * coherence) * relative
                                                                         : squares_sd / all_of_it;
     } else {
@@ -338,7 +341,7 @@ double walk_of_unit(const effects::Effect& effect) { return effect.rate_noise(un
 
 void take_walk(const effects::Effect& effect, const SampleNoise& noise, const SampleNoise& errors,
                std::vector<Estimate>& all) {
-    // The walk goes by its variance; of a root the relative error is half.
+    // The parameter of the walk is a variance; the relative error of its root is half.
     const double deviation = deviation_of_walk(effect, noise);
     const double sd = 0.5 * errors.walk_arcsec2_s3 / walk_of_unit(effect) / std::max(deviation, 1e-300);
     all.push_back(estimate_of(effect, parameter_of(effect, Role::deviation).name, deviation, sd));
@@ -356,7 +359,7 @@ void take_resampling(const SampleFit& fit, const AddedEffect& added, double from
     }
 }
 
-/// A line that wanders, as a narrow resonance.
+/// A phase-incoherent line, as a narrow resonance.
 void take_wandering(const SampleFit& fit, std::size_t resonance, const SampleNoise& errors,
                     const record::Declared& declared, std::vector<Estimate>& all) {
     const effects::Effect& effect = *fit.model().resonances[resonance].effect;

@@ -8,35 +8,35 @@
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/record/record.hpp"
 
-/// What a fit to samples says of the parameters of the effects in it, with standard errors.
+/// Parameters of the effects that a fit to samples contains, with standard errors.
 namespace ringlock::closure {
 
-/// An effect that is in a model: its part of the model, and what is reported of it.
+/// An effect in a model: its part of the model and its entry in the report.
 struct AddedEffect {
-    Step step = {};                     ///< its parameters, unless they are known already, come from a last fit
-    int id = 0;                         ///< the step of its columns and resonances
-    std::size_t witness = 0;            ///< of a motion, in the series
+    Step step = {};                     ///< its parameters; unless they are known already, they come from the last fit
+    int id = 0;                         ///< step of the loop that added its columns and resonances
+    std::size_t witness = 0;            ///< of a motion: index in the series
     bool strong = false;                ///< a motion that is fitted at many lags of its witness
-    double hz = 0.0;                    ///< of a line, where the record shows it
-    std::vector<double> other_hz = {};  ///< rates that explain a resampled record as well
+    double hz = 0.0;                    ///< of a line: frequency at which the record shows it
+    std::vector<double> other_hz = {};  ///< rates of the source that explain a resampled record as well
 
     AddedEffect(const effects::Effect& added, int number) : id(number) { step.effect = &added; }
     const effects::Effect& effect() const { return *step.effect; }
-    /// Whether it is that readings were taken at another rate.
+    /// Whether the effect is resampling from readings at another rate.
     bool is_source() const { return on_samples(effect()) == OnSamples::transport; }
 };
 
 struct SampleFigures {
     std::vector<Estimate> base;
     std::vector<std::vector<Estimate>> steps;          ///< of each effect that was added
-    std::vector<std::vector<std::string>> step_notes;  ///< on the parameters of each
-    std::vector<std::string> notes;                    ///< why some have no standard error
+    std::vector<std::vector<std::string>> step_notes;  ///< notes on the parameters of each
+    std::vector<std::string> notes;                    ///< reasons why some parameters have no standard error
 };
 
-/// \param fit  to all rows that are to count
+/// \param fit  model that is fitted to all rows that are to count
 SampleFigures figures_of(const SampleFit& fit, const std::vector<AddedEffect>& added, const record::Declared& declared);
 
-/// The deviation of a random-walk effect that makes the walk of the noise.
+/// Deviation of a random-walk effect that makes the walk of the noise.
 double deviation_of_walk(const effects::Effect& effect, const SampleNoise& noise);
 
 }  // namespace ringlock::closure

@@ -64,7 +64,7 @@ std::vector<SampleFit::Shared> SampleFit::taken_by(const SampleModel& model) con
         } else if (column.course.hz == 0.0) {
             all.push_back(share(closure::as_taken(source, *column.series, series_->interval_s)));
         } else {
-            // A cosine, and the sine behind it.
+            // A cosine, and the sine that follows it.
             for (auto& taken : line_as_taken(source, series_->size(), series_->rate_hz, column.course)) {
                 all.push_back(share(std::move(taken)));
             }
@@ -82,7 +82,7 @@ std::vector<double> SampleFit::determined_by(const SampleModel& model) const {
     };
     const SampleSource source = source_of(model.noise);
     if (!series_->input_rate_deg_h.empty()) {
-        // What is known of the input but for its mean, which belongs to the mean rate.
+        // The known input without its mean, which is a part of the mean rate.
         const auto& input = series_->input_rate_deg_h;
         const double mean = std::accumulate(input.begin(), input.end(), 0.0) / static_cast<double>(input.size());
         std::vector<double> known(sum.size());
@@ -106,7 +106,8 @@ void SampleFit::filter_by(const SampleNoise& noise) {
     find_settled(noise);
 }
 
-/// What the digits are, nobody knows: rows tell of the rest that would be as uncertain with others.
+/// The values of the digits are unknown: a row is informative if its prediction would be as uncertain with other
+/// digits.
 void SampleFit::find_settled(SampleNoise noise) {
     const SampleFitOptions& by = options.samples.fit;
     const std::size_t n = series_->size();
@@ -132,7 +133,7 @@ void SampleFit::find_settled(SampleNoise noise) {
         settled_[i] = 1;
         telling_[i] = 0;
     }
-    // Few rows tell mostly of the blur; where many do, it is the noise of the record.
+    // A few rows mostly determine the blur and are excluded; where most rows do, the blur is the noise of the record.
     if (mostly_blur.size() > others) return;
     for (const std::size_t i : mostly_blur) {
         settled_[i] = 1;
@@ -140,9 +141,9 @@ void SampleFit::find_settled(SampleNoise noise) {
     }
 }
 
-/// Their values, unless they are held, and the errors of these.
+/// Values of the columns, unless they are held, and their standard errors.
 void SampleFit::fit_columns(bool held) {
-    // rest + columns = what was measured; a correction to each value.
+    // rest + columns = measured increments; the regression gives a correction to each value.
     take_off();
     whitened_.clear();
     for (const Shared& taken : taken_by(model_)) whitened_.push_back(filter_->apply(*taken));

@@ -14,89 +14,93 @@
 
 namespace ringlock::closure {
 
-/// Increments in proportion to one parameter.
+/// Increments that are proportional to one parameter.
 struct SampleColumn {
     const effects::Effect* effect = nullptr;  ///< null: of the base model
     std::string name;
     std::shared_ptr<const std::vector<double>> series = nullptr;
     double value = 0.0;
     double sd = 0.0;
-    int step = -1;             ///< of the loop that added it
-    bool as_recorded = false;  ///< and no further what a resampled record's source makes of it
-    /// Of a line's cosine and of the sine that follows it; 0 Hz: no line. It may be any up to half of the rate at which
-    /// the readings were taken.
+    int step = -1;  ///< step of the loop that added it; -1: none
+    /// The series is used as it is, without interpolation by the source of a resampled record.
+    bool as_recorded = false;
+    /// Frequency track of a line, in the column of its cosine and in that of its sine, which follows; 0 Hz: no line.
+    /// The frequency may be any up to half of the rate at which the readings were taken.
     LineCourse course = {};
 };
 
-/// The effect, and the step of the loop that added it, which a resonance of the noise belongs to.
+/// Effect, and step of the loop that added it, to which a resonance of the noise belongs.
 struct ResonanceOwner {
     const effects::Effect* effect = nullptr;
     int step = -1;
 };
 
-/// What a model of the samples consists of.
+/// Parts of a model of the samples.
 struct SampleModel {
     SampleNoise noise;
-    double flicker_deg_h = 0.0;         ///< B of the bias instability; makes the noise's terms
+    double flicker_deg_h = 0.0;         ///< B of the bias instability, which gives the terms of the noise
     std::vector<SampleColumn> columns;  ///< the mean rate first
-    std::vector<double> motion;         ///< of the case, by its witness: taken off the increments; empty: none
-    double motion_from_hz = 0.0;        ///< what the witness does not tell of it is no slower: that is a slow rate
-    double from_shift = 0.0;            ///< of from_hz, in tenths of a cycle over the record, while it is fitted
-    /// Standard error of from_hz where other records tell it as well: it is held then.
+    /// Motion of the case, predicted from its witness and subtracted from the increments; empty: none.
+    std::vector<double> motion;
+    /// Lowest frequency of the part that the witness does not predict: below it, that part would be a slow rate.
+    double motion_from_hz = 0.0;
+    double from_shift = 0.0;  ///< change of from_hz, in tenths of a cycle over the record, during its fit
+    /// Standard error of from_hz where it is also estimated from other records; from_hz is then held.
     std::optional<double> held_from_hz_sd = {};
-    std::vector<ResonanceOwner> resonances;  ///< of each resonance of the noise, in their order
+    std::vector<ResonanceOwner> resonances;  ///< one owner per resonance of the noise, in the same order
     bool walk = false;
     bool flicker = false;
 };
 
-/// Gives the source of a resampled record a rate that is higher by so much. Its readings stay where they are in the
-/// middle of the record, so that rate and place are told apart.
+/// Raises the rate of a resampled record's source by shift_hz. The readings in the middle of the record keep their
+/// place, so that rate and place are uncorrelated.
 void move_source(SampleModel& model, const SampleSeries& series, double shift_hz);
 
-/// Fitted by maximum likelihood of the innovations in the rows that count: noise by its likelihood, columns by least
-/// squares of what the filter makes of them.
+/// Fit by maximum likelihood of the innovations in the rows that count: the noise by its likelihood, the columns by
+/// least squares of the whitened increments.
 class SampleFit {
    public:
-    /// Noise and columns as they are; noise as it is, from near where it will be, or from anywhere.
+    /// all_held: noise and columns as given; held: noise as given; near: noise fitted from a start near the maximum;
+    /// free: noise fitted from any start.
     enum class Noise { all_held, held, near, free };
     SampleFit(const SampleSeries& series, SampleModel model, const Rows& rows, Noise noise = Noise::free);
 
     const SampleSeries& series() const { return *series_; }
     const SampleModel& model() const { return model_; }
     const Rows& rows() const { return *rows_; }
-    /// Whether those before it settle a row but for its digits: where a record has more samples than it was made of.
-    /// Where what those say of the source grows from one interval to the next, the digits do as well.
+    /// Whether a row is deterministic: it follows from the rows before it except for its digits, where a record has
+    /// more samples than its source has readings. Where the error of a prediction grows from one interval to the next,
+    /// the effect of the digits grows with it; such rows count as deterministic too.
     bool settled(std::size_t row) const { return settled_[row] != 0; }
-    /// Rows that count and are not settled.
+    /// Rows that count and are not deterministic.
     const Rows& telling() const { return telling_; }
-    /// What the filter makes of the columns.
+    /// Columns after the filter.
     const std::vector<std::vector<double>>& whitened() const { return whitened_; }
-    /// Over their standard deviations, all rows.
+    /// Divided by their standard deviations; all rows.
     const std::vector<double>& innovations() const { return innovations_; }
     double sd(std::size_t row) const { return filter_->sd(row); }
-    /// Root mean square of these over the rows that count.
+    /// Root mean square of the innovations' standard deviations over the rows that count.
     double typical_sd() const { return typical_sd_; }
     double log_likelihood() const { return log_likelihood_; }
-    /// Of the log-likelihood over that of another model of the same rows. Where both are resampled, rows that are
-    /// settled to their digits say how exactly the source's times are known, and nothing of the effects: they are left
-    /// out.
+    /// Gain of the log-likelihood over another model of the same rows. Where both are resampled, deterministic rows are
+    /// excluded: they determine the source's times, and carry no information on the effects.
     double gain_over(const SampleFit& other) const;
     const SampleFilter& filter() const { return *filter_; }
-    /// Increments of an angle that the record's source takes at its own times: on the straight lines between these,
-    /// where the record is resampled. Rows that those before them settle know it to their digits.
+    /// Increments after interpolation, for an angle with the given increments: on the straight lines between the times
+    /// of the source where the record is resampled, else unchanged.
     std::vector<double> as_taken(const std::vector<double>& increments) const;
-    /// Cosine and sine of a line, as the record has them.
+    /// Columns of cosine and sine of a line, as the record contains them.
     std::vector<std::vector<double>> line(const LineCourse& course) const;
-    /// Of a column.
+    /// Column as the record contains it.
     std::vector<double> taken(const SampleColumn& column) const;
-    /// Increments by all that is deterministic in the model.
+    /// Increments of all deterministic parts of the model.
     std::vector<double> determined() const;
-    /// Increments less that.
+    /// Increments less the deterministic parts.
     const std::vector<double>& rest() const { return rest_; }
-    /// Standard errors of the noise, by Fisher's information of the rows that count: a model that holds them in the
-    /// places of what they belong to. Columns are known independently of the noise and have theirs.
+    /// Standard errors of the noise, by Fisher's information of the rows that count: a model in which each parameter
+    /// has the value of its standard error. Columns are independent of the noise and have their own errors.
     SampleModel noise_errors() const;
-    /// Of the columns, one with another.
+    /// Covariance of the values of the columns.
     const Eigen::MatrixXd& covariance() const { return covariance_; }
 
     struct Score {
@@ -105,9 +109,9 @@ class SampleFit {
         double chi2 = 0.0;
         int rank = 0;
     };
-    /// Regression of the innovations that count on series of increments, freed of what the columns could take of them.
+    /// Regression of the innovations that count on series of increments, which are made orthogonal to the columns.
     Score score(const std::vector<std::vector<double>>& series) const;
-    /// Of the columns and these behind them, all fitted together.
+    /// Covariance of the columns and of these series after them, all fitted together.
     Eigen::MatrixXd joint_covariance(const std::vector<std::vector<double>>& series) const;
 
    private:
@@ -116,10 +120,11 @@ class SampleFit {
         Eigen::VectorXd gradient;
         Eigen::MatrixXd information;
     };
-    /// Increments less what a source's clock makes of all that is determined, and how they go with the clock.
+    /// Increments less the deterministic parts for a clock of the source, and their derivatives by the clock.
     struct ByClock {
         std::vector<double> rest;
-        /// A knob each, innovations over their standard deviations; empty where it does not move the clock.
+        /// One series per free parameter, in units of the innovations' sd; empty where the parameter does not change
+        /// the clock.
         std::vector<std::vector<double>> moved;
     };
     Eigen::MatrixXd normal_with(const std::vector<std::vector<double>>& series, Eigen::VectorXd& right) const;
@@ -135,7 +140,7 @@ class SampleFit {
     void share_whites(SampleNoise& noise, double share) const;
     bool gone(const SampleNoise& noise) const;
     void raise_whites(SampleNoise& noise) const;
-    /// Minus the log-likelihood under each.
+    /// Minus the log-likelihood under each model.
     std::vector<double> evaluate(const std::vector<SampleModel>& models, std::span<const double> rest,
                                  const Rows& rows) const;
     SampleModel at(const std::vector<double>& knobs) const;
@@ -154,7 +159,7 @@ class SampleFit {
     std::vector<double> rest_;
     std::shared_ptr<SampleFilter> filter_;
     std::vector<double> innovations_;
-    std::vector<std::vector<double>> whitened_;  ///< columns
+    std::vector<std::vector<double>> whitened_;  ///< columns after the filter
     double log_likelihood_ = 0.0;
     double typical_sd_ = 0.0;
     Eigen::MatrixXd covariance_;
@@ -162,7 +167,7 @@ class SampleFit {
     Rows telling_;
 };
 
-/// Gauss-Markov rates that make the flicker of that bias instability between `shortest_s` and `longest_s`: two a
+/// Gauss-Markov rates that add up to flicker of that bias instability between `shortest_s` and `longest_s`: two a
 /// decade, or fewer where that would be more than eight; one a decade is within 3 % of flat.
 std::vector<SampleNoise::Term> flicker_terms(double deg_h, double shortest_s, double longest_s);
 

@@ -1,4 +1,4 @@
-// The random part of the fit, by the likelihood of what the columns leave.
+// The random part of the fit, by the likelihood of the increments less the deterministic part.
 #include <oneapi/tbb/parallel_for.h>
 
 #include <Eigen/Dense>
@@ -23,12 +23,12 @@ namespace {
 struct Free {
     double* value;
     bool logarithmic;
-    double scale = 1.0;      ///< of its steps
-    bool of_source = false;  ///< of a resampled record
-    bool of_clock = false;   ///< when that source takes its samples
+    double scale = 1.0;      ///< unit of its steps
+    bool of_source = false;  ///< of a resampled record's source
+    bool of_clock = false;   ///< of the times at which that source takes its readings
 };
 
-constexpr std::size_t whites = 2;    // the first of the knobs
+constexpr std::size_t whites = 2;    // they are the first of the free parameters
 constexpr double negligible = 1e-4;  // ratio to the other white noise below which one has no effect on the fit
 
 std::vector<Free> knobs(SampleModel& model) {
@@ -38,7 +38,7 @@ std::vector<Free> knobs(SampleModel& model) {
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
         auto& resonance = model.noise.resonances[k];
         all.push_back({&resonance.arcsec, true});
-        // A wandering line is narrow: its frequency is known to its width.
+        // A phase-incoherent line is narrow: its frequency is determined to within its width.
         all.push_back({&resonance.hz, true, std::min(1.0, resonance.width_hz / resonance.hz)});
         all.push_back({&resonance.width_hz, true});
     }
@@ -70,7 +70,7 @@ std::vector<double> places_of(SampleModel model) {
     return places;
 }
 
-/// What is not told at all must not spoil what is.
+/// Parameters without any information must not spoil the errors of the others.
 Eigen::MatrixXd inverse_of_information(const Eigen::MatrixXd& information) {
     const Eigen::VectorXd over = information.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
     Eigen::MatrixXd scaled = over.asDiagonal() * information * over.asDiagonal();
@@ -82,8 +82,8 @@ Eigen::MatrixXd inverse_of_information(const Eigen::MatrixXd& information) {
 }  // namespace
 
 std::vector<SampleNoise::Term> flicker_terms(double deg_h, double shortest_s, double longest_s) {
-    // B^2/(2 pi f) by Markov rates: each of the variance (B^2/pi) ln(ratio), the integral of the density over the band
-    // that it stands for, doubled for both signs. The slowest is as good as constant over the record.
+    // B^2/(2 pi f) by Markov rates. Each has the variance (B^2/pi) ln(ratio), the integral of the density over its
+    // band, doubled for both signs. The slowest is nearly constant over the record.
     constexpr int most = 8;
     const double last_s = std::sqrt(10.0) * longest_s;
     const double ratio = std::max(std::sqrt(10.0), std::pow(last_s / shortest_s, 1.0 / (most - 1)));
@@ -101,7 +101,7 @@ void move_source(SampleModel& model, const SampleSeries& series, double shift_hz
     model.noise.from_phase -= std::floor(model.noise.from_phase);
 }
 
-/// The white noises by the variance of the rest and the covariance of neighbours, as if there were no others.
+/// White noises from the variance of the residual and the covariance of adjacent rows, as if there were no other noise.
 void SampleFit::take_whites(SampleNoise& noise) const {
     const Rows& rows = *rows_;
     double sum = 0.0;
@@ -137,7 +137,7 @@ std::vector<double> SampleFit::evaluate(const std::vector<SampleModel>& models, 
     return values;
 }
 
-/// The model with its knobs at these places.
+/// The model with its free parameters at x.
 SampleModel SampleFit::at(const std::vector<double>& x) const {
     const double duration_s = series_->interval_s * static_cast<double>(series_->size());
     SampleModel model = model_;
@@ -161,8 +161,8 @@ SampleModel SampleFit::at(const std::vector<double>& x) const {
     return model;
 }
 
-/// The values of columns are fitted anew for each place of the clock: what it moves is freed of what these can take of
-/// it (Golub and Pereyra, SIAM Journal on Numerical Analysis 10, 413, 1973; Kaufman, BIT 15, 49, 1975).
+/// The values of columns are fitted again for each clock of the source, and the derivatives by the clock are projected
+/// off the columns (Golub and Pereyra, SIAM Journal on Numerical Analysis 10, 413, 1973; Kaufman, BIT 15, 49, 1975).
 SampleFit::ByClock SampleFit::by_clock(const std::vector<double>& x, const Rows& rows,
                                        const std::vector<bool>& held) const {
     constexpr double step = 1e-4;
@@ -205,14 +205,14 @@ SampleFit::ByClock SampleFit::by_clock(const std::vector<double>& x, const Rows&
     return by;
 }
 
-/// Minus the log-likelihood, columns fitted anew where the record was resampled.
+/// Minus the log-likelihood. The columns are fitted again where the record was resampled.
 double SampleFit::value_at(const std::vector<double>& x, const Rows& rows) const {
     return evaluate({at(x)}, by_clock(x, rows, {}).rest, rows).front();
 }
 
-/// Of the likelihood, with Fisher's information: sum over the rows of (dS/S)(dS/S)'/2 + (dr)(dr)'/S, r the innovations
-/// and S their variances (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter", 1989, section
-/// 3.4.5).
+/// Gradient of the likelihood, with Fisher's information: sum over the rows of (dS/S)(dS/S)'/2 + (dr)(dr)'/S, r the
+/// innovations and S their variances (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter", 1989,
+/// section 3.4.5).
 SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows, const std::vector<bool>& held) const {
     constexpr double step = 1e-4;
     const std::size_t n = rest_.size();
@@ -233,7 +233,7 @@ SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows
         moves.push_back(j);
         moved_there.push_back(there);
     }
-    // d log(sd) and d(innovation) of each knob
+    // d log(sd) and d(innovation) by each free parameter
     std::vector<std::vector<float>> log_sd(x.size(), std::vector<float>(n, 0.0F));
     std::vector<std::vector<float>> moved(x.size(), std::vector<float>(n, 0.0F));
     const auto parts = std::max<std::size_t>(1, (moves.size() + most_lanes - 2) / (most_lanes - 1));
@@ -283,7 +283,7 @@ SampleFit::Slope SampleFit::slope(const std::vector<double>& x, const Rows& rows
     return slope;
 }
 
-/// Fisher's scoring, damped (Levenberg and Marquardt): steps by the information where the likelihood rises.
+/// Fisher's scoring, damped (Levenberg and Marquardt): steps by the information while the likelihood increases.
 void SampleFit::score_noise(std::vector<double>& x, const Rows& rows, const std::vector<bool>& held) const {
     constexpr double longest = 1.5;
     constexpr double enough = 2e-3;  // of the log-likelihood
@@ -303,7 +303,7 @@ void SampleFit::score_noise(std::vector<double>& x, const Rows& rows, const std:
             if (-now.gradient.dot(step) < enough) return;
             auto next = x;
             for (std::size_t i = 0; i < x.size(); ++i) next[i] += step(static_cast<Eigen::Index>(i));
-            // Most steps are taken, and the next begins with the slope there.
+            // Most steps are accepted, so the slope is computed together with the value.
             Slope there = slope(next, rows, held);
             if (there.value < now.value) {
                 better = true;
@@ -319,7 +319,7 @@ void SampleFit::score_noise(std::vector<double>& x, const Rows& rows, const std:
     }
 }
 
-/// The white noises by the differences of neighbours, of whose variance the readings' errors have that share.
+/// White noises from the differences of adjacent rows; the errors of readings have that share of their variance.
 void SampleFit::share_whites(SampleNoise& noise, double share) const {
     double squares = 0.0;
     double count = 0.0;
@@ -333,14 +333,14 @@ void SampleFit::share_whites(SampleNoise& noise, double share) const {
     noise.rate_arcsec_rt_s = std::sqrt((1.0 - share) * squares / (2.0 * series_->interval_s));
 }
 
-/// Whether one of the white noises is nothing beside the other.
+/// Whether one of the white noises is negligible against the other.
 bool SampleFit::gone(const SampleNoise& noise) const {
     const double root_s = std::sqrt(series_->interval_s);
     const double scale = std::hypot(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s);
     return std::min(noise.angle_arcsec, noise.rate_arcsec_rt_s * root_s) < negligible * scale;
 }
 
-/// White noises that stand at zero, made small: from nothing they could not grow, and it would tell nothing of them.
+/// Raises white noises at zero to a small value: a fit in logarithms cannot leave zero, and has no information there.
 void SampleFit::raise_whites(SampleNoise& noise) const {
     constexpr double small = 1e-2;
     const double root_s = std::sqrt(series_->interval_s);
@@ -349,7 +349,7 @@ void SampleFit::raise_whites(SampleNoise& noise) const {
     if (noise.rate_arcsec_rt_s * root_s < negligible * scale) noise.rate_arcsec_rt_s = small * scale / root_s;
 }
 
-/// The knobs for the places of resonances that one point has and the other has not.
+/// Free parameters for frequency and width of the resonances that one point has and the other has not.
 std::vector<bool> SampleFit::places_of_lost(const std::vector<double>& before, const std::vector<double>& after) const {
     SampleModel own = model_;
     const auto all = knobs(own);
@@ -369,7 +369,8 @@ std::vector<bool> SampleFit::places_of_lost(const std::vector<double>& before, c
 void SampleFit::fit_noise() {
     const bool had_both = !gone(model_.noise);
     raise_whites(model_.noise);
-    // So does a part of what a witness leaves of a motion: a line beside it may have had no use for it.
+    // The second resonance of a motion starts again as well: a line that was not yet in the model may have left it
+    // unused.
     auto& resonances = model_.noise.resonances;
     for (std::size_t k = 1; k < resonances.size(); ++k) {
         const bool of_one_motion = is_motion(model_.resonances[k].effect) && is_motion(model_.resonances[k - 1].effect);
@@ -384,7 +385,7 @@ void SampleFit::fit_noise() {
     const bool resampled = model_.noise.from_hz > 0.0;
     const bool narrow = !model_.resonances.empty();
     if (!resampled) {
-        // What has just come into the model may have been most of the noise: far from there the likelihood is flat.
+        // An effect that was added last may have been most of the noise; far from the maximum the likelihood is flat.
         SampleModel anew = model_;
         take_whites(anew.noise);
         double least = evaluate({at(start)}, rest_, *rows_).front();
@@ -396,7 +397,8 @@ void SampleFit::fit_noise() {
             start = std::move(other);
         };
         try_from(anew);
-        // Beside a rate that wanders neighbours are alike, and hide what is white: their differences show it.
+        // With a random rate in the model, adjacent rows are correlated and hide the white noises; differences show
+        // them.
         for (const double share : {0.05, 0.5, 0.95}) {
             if (!model_.walk && !model_.flicker) break;
             share_whites(anew.noise, share);
@@ -405,9 +407,9 @@ void SampleFit::fit_noise() {
     }
     std::vector<double> as_it_was = start;
     if (!searched_ && (resampled || narrow)) {
-        // The likelihood may have several tops: by a simplex on a part of the record first, from where it stopped until
-        // that gains nothing, for it may have fallen flat. Of a source by where it takes its samples and what is white;
-        // the rest is as it was without it.
+        // The likelihood may have several maxima. A simplex searches a part of the record first, and starts again from
+        // its result until that gains nothing, since it may have degenerated. With a source, only its clock, its blur
+        // and the white noises are searched; the other parameters keep their values.
         const std::size_t part = std::min<std::size_t>(n, resampled ? 15000 : 20000);
         std::vector<std::size_t> turned;
         const std::vector<Free> own = knobs(model_);
@@ -438,7 +440,7 @@ void SampleFit::fit_noise() {
     }
     score_noise(start, *rows_, {});
     if (!resampled && had_both && gone(at(start).noise)) {
-        // Where one of the white noises goes to nothing, there may be another top with both.
+        // Where one of the white noises goes to zero, there may be another maximum with both.
         SampleModel both = at(start);
         share_whites(both.noise, 0.5);
         auto other = places_of(both);
@@ -446,15 +448,15 @@ void SampleFit::fit_noise() {
         const auto values = evaluate({at(start), at(other)}, rest_, *rows_);
         if (values[1] < values[0]) start = std::move(other);
     }
-    // A resonance that goes beyond the end of its range does not come back.
+    // A resonance that leaves its range does not return.
     const std::vector<bool> lost = places_of_lost(as_it_was, start);
     if (std::find(lost.begin(), lost.end(), true) != lost.end()) {
         score_noise(as_it_was, *rows_, lost);
         if (value_at(as_it_was, *rows_) < value_at(start, *rows_)) start = std::move(as_it_was);
     }
     if (resampled) {
-        // Rows that are settled to their digits say how exactly the source's times are known, so well that numbers are
-        // rounded there by more than the noise tells elsewhere.
+        // Deterministic rows determine the source's times so precisely that rounding of numbers there outweighs the
+        // information of all other rows on the noise. The noise is therefore fitted once more to the informative rows.
         model_ = at(start);
         filter_by(model_.noise);
         fit_columns();
@@ -478,8 +480,8 @@ SampleModel SampleFit::noise_errors() const {
     const auto own = knobs(values);
     Eigen::MatrixXd information = slope(x, telling_, {}).information;
     if (model_.noise.from_hz > 0.0) {
-        // The source's times, and how far readings are off its lines, are told by the rows that tell nothing else. How
-        // far they are off goes with their errors.
+        // The source's times and the deviation of its readings from straight lines are determined by the deterministic
+        // rows as well. That deviation is correlated with the white angle.
         const Eigen::MatrixXd by_all = slope(x, *rows_, {}).information;
         for (std::size_t a = 0; a < x.size(); ++a) {
             for (std::size_t b = 0; b < x.size(); ++b) {
@@ -492,7 +494,7 @@ SampleModel SampleFit::noise_errors() const {
     }
     Eigen::MatrixXd covariance = inverse_of_information(information);
     for (std::size_t a = 0; a < x.size(); ++a) {
-        // What stands at zero, its lower bound, moves no other.
+        // A parameter at zero, its lower bound, is not correlated with the others.
         const auto i = static_cast<Eigen::Index>(a);
         if (own[a].of_clock || !own[a].of_source || !(std::sqrt(covariance(i, i)) > options.samples.fit.log_sd_at_zero))
             continue;
@@ -508,7 +510,7 @@ SampleModel SampleFit::noise_errors() const {
         double sd = std::sqrt(std::max(0.0, covariance(k, k)));
         if (own[i].logarithmic) {
             sd *= own[i].scale * *own[i].value;
-            // Near zero it is the square that the record knows, to 2 value sd.
+            // Near zero the record determines the square of the value, with the error 2 value sd.
             if (sd > *own[i].value) sd = std::sqrt(2.0 * *own[i].value * sd);
         }
         *slots[i].value = sd;

@@ -18,7 +18,7 @@ using Complex = std::complex<double>;
 constexpr std::size_t most_pieces = options.samples.lines.pieces.back();
 using Polynomials = std::array<double, LineCourse::most + 1>;
 
-/// Those of Legendre, which do not make up for each other: a start that is only near is improved in few steps.
+/// Legendre polynomials. They are orthogonal, so that a start near the maximum converges in few steps.
 Polynomials legendre(double x) {
     Polynomials p{1.0, x};
     for (std::size_t k = 1; k + 1 < p.size(); ++k) {
@@ -28,7 +28,7 @@ Polynomials legendre(double x) {
     return p;
 }
 
-/// A sum over so many samples that a line near the start turns little, at x from -1 to 1.
+/// Sum over samples in which the phase of a line near the start changes little. Polynomials at x from -1 to 1.
 struct Cell {
     Complex sum;
     double weight = 0.0;
@@ -53,18 +53,18 @@ std::vector<Cell> cells_about(const std::vector<double>& values, double rate_hz,
     return cells;
 }
 
-/// Turns that are added to the start's, of which each of so many pieces of the record keeps a phase of its own.
+/// Phase in cycles that is added to that of the start. Each piece of the record has an amplitude and phase of its own.
 class Bending {
    public:
     Bending(const std::vector<Cell>& cells, std::size_t degree) : cells_(cells), degree_(degree) {
         by_ = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(degree));
     }
 
-    /// Fewer and longer pieces, until the whole record is one.
+    /// Halves the number of pieces until the whole record is one.
     void run(std::size_t pieces) {
         for (; pieces >= 1; pieces /= 2) improve(pieces);
     }
-    /// Of the last pieces: power over that of the record's whole.
+    /// Power of the last pieces relative to that of the whole record.
     double power() const { return power_; }
     const Eigen::VectorXd& by() const { return by_; }
 
@@ -73,7 +73,7 @@ class Bending {
         double power = 0.0;
         Eigen::VectorXd step;
     };
-    /// Gauss and Newton, the amplitude and phase of each piece the best.
+    /// Step of Gauss and Newton, with the best amplitude and phase of each piece.
     Step step_from(const Eigen::VectorXd& by, std::size_t pieces) const {
         const auto d = static_cast<Eigen::Index>(degree_);
         Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(d, d);
@@ -132,9 +132,9 @@ class Bending {
     double power_ = 0.0;
 };
 
-/// The start with those turns more.
+/// The start with the additional phase.
 LineCourse bent(LineCourse course, const Eigen::VectorXd& by, double duration_s) {
-    // Polynomials of Legendre in powers of x
+    // Legendre polynomials in powers of x
     Eigen::MatrixXd powers = Eigen::MatrixXd::Zero(LineCourse::most + 1, LineCourse::most + 1);
     powers(0, 0) = powers(1, 1) = 1.0;
     for (Eigen::Index k = 1; k + 1 < powers.rows(); ++k) {
@@ -157,7 +157,8 @@ double places_of_bends(double chi2, double cycles, std::size_t coefficients) {
     constexpr double tracked = 2.0 * most_pieces * most_pieces;
     double places = places_of_drift(chi2, cycles, tracked);
     for (std::size_t k = 3; k <= coefficients; ++k) {
-        // With unit variance about the best phase the slope by a polynomial of Legendre has (2 pi)^2/(2 k + 1).
+        // With unit variance about the best phase the slope by a Legendre polynomial has the variance
+        // (2 pi)^2/(2 k + 1).
         places *= static_cast<double>(most_pieces) *
                   std::sqrt(units::two_pi * std::max(1.0, chi2) / (2.0 * static_cast<double>(k) + 1.0));
     }

@@ -48,7 +48,8 @@ std::vector<double> periodogram(const std::vector<double>& values, std::size_t p
 
 namespace {
 
-/// Mean level of a periodogram about each bin: of medians, which lines do not move, over stretches of so many bins.
+/// Mean level of a periodogram about each bin, from medians over stretches of that many bins, which lines do not
+/// change.
 std::vector<double> level_about(const std::vector<double>& power, std::size_t stretch) {
     const std::size_t n = power.size();
     stretch = std::clamp<std::size_t>(stretch, 16, std::max<std::size_t>(16, n));
@@ -81,12 +82,12 @@ std::vector<double> level_about(const std::vector<double>& power, std::size_t st
     return level;
 }
 
-/// The spectrum of the whole record, and what is about each frequency.
+/// Spectrum of the whole record, and the level about each frequency.
 struct Spectrum {
     std::size_t padded;
     double rows, rate_hz, duration_s, bin_hz;
     std::vector<double> power, level;
-    std::size_t first;  ///< bin that is looked at
+    std::size_t first;  ///< first bin of the search
     std::vector<double> known_hz;
     double width_hz;
 
@@ -99,7 +100,7 @@ struct Spectrum {
           power(periodogram(values, padded)),
           known_hz(std::move(known)),
           width_hz(width) {
-        const double per_bin = rows / static_cast<double>(padded);  // Fourier frequencies a bin
+        const double per_bin = rows / static_cast<double>(padded);  // Fourier frequencies per bin
         level = level_about(power, static_cast<std::size_t>(std::min(300.0, std::max(40.0, rows / 100.0)) / per_bin));
         first = static_cast<std::size_t>(options.samples.lines.fewest_cycles / per_bin);
     }
@@ -114,8 +115,8 @@ struct Spectrum {
     double cycles() const { return 0.5 * rows; }
 };
 
-/// Over the level about it; where that leaves nothing to chance, by its own power: a strong line raises the level about
-/// itself, and what is elsewhere may be what it does there.
+/// Lines are compared by chi-squared over the level about them. Where both are significant beyond chance they are
+/// compared by their own power: a strong line raises the level about itself, and makes power elsewhere.
 bool stands_out(double chi2, double squares, const FoundLine& from) {
     return std::min(chi2, from.chi2) > options.samples.lines.certain ? squares > from.squares : chi2 > from.chi2;
 }
@@ -138,9 +139,9 @@ FoundLine still_line(const Spectrum& spectrum) {
     return found;
 }
 
-/// All frequencies, drifts of so many cycles of either sign, the phase followed over the whole record.
+/// All frequencies, and drifts of up to so many cycles of either sign; the phase is followed over the whole record.
 FoundLine slow_line(const std::vector<double>& values, const Spectrum& spectrum) {
-    // A drift that is off by half a cycle at most leaves 98 % of a line's power.
+    // A drift with an error of half a cycle at most keeps 98 % of a line's power.
     const int most = options.samples.lines.slow_drift_cycles;
     FoundLine found;
     const std::size_t n = values.size();
@@ -153,7 +154,7 @@ FoundLine slow_line(const std::vector<double>& values, const Spectrum& spectrum)
             turned[i] = values[i] * std::polar(1.0, -units::pi * drift * t * t);
         }
         const auto out = transform(turned);
-        // Of real values, the other sign of the drift is at the other sign of the frequency.
+        // For real values, the drift of the other sign is at the frequency of the other sign.
         for (const int sign : {1, -1}) {
             for (std::size_t k = spectrum.first; k + 4 < spectrum.power.size(); ++k) {
                 const double power = std::norm(out[sign > 0 ? k : spectrum.padded - k]);
@@ -169,12 +170,12 @@ FoundLine slow_line(const std::vector<double>& values, const Spectrum& spectrum)
     return found;
 }
 
-/// The phase followed about a frequency and a drift: within so many hertz, and the drifts from `drift` on in steps of
-/// one cycle, `steps` to either side.
+/// Follows the phase about a frequency and a drift: within half_hz of centre_hz, and over drifts about `drift` in steps
+/// of one cycle, `steps` to either side.
 FoundLine follow(const std::vector<double>& values, const Spectrum& spectrum, double centre_hz, double half_hz,
                  double drift, int steps, FoundLine found = {}) {
     const std::size_t n = values.size();
-    // Sums over cells so short that the band's edges lose 2 % at most.
+    // Sums over cells so short that the edges of the band lose 2 % at most.
     const auto cells = static_cast<std::size_t>(std::ceil(8.0 * half_hz * spectrum.duration_s));
     const std::size_t keep = std::min<std::size_t>(n, std::max<std::size_t>(1024, cells));
     const std::size_t step = n / keep;
@@ -212,8 +213,7 @@ FoundLine follow(const std::vector<double>& values, const Spectrum& spectrum, do
     return found;
 }
 
-/// Lines that drift by anything: sums of power along straight tracks over pieces, each so short that the line stays in
-/// its bin.
+/// Lines with any drift: sums of power along straight tracks over pieces, each so short that the line stays in its bin.
 void track_lines(const std::vector<double>& values, const Spectrum& spectrum, FoundLines& lines) {
     const std::size_t n = values.size();
     constexpr auto lengths = static_cast<double>(options.samples.lines.pieces.size());
@@ -226,7 +226,7 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
         if (length < options.samples.lines.shortest_piece) continue;
         const std::size_t wide = power_of_two(2 * length);
         const double hz = spectrum.rate_hz / static_cast<double>(wide);
-        // A piece in which a part does not count is as much the less: each by its own level.
+        // A piece of which a part does not count has less power: each piece has its own level.
         const double bins = static_cast<double>(wide) / static_cast<double>(length);
         std::vector<std::vector<double>> relative;
         std::vector<std::vector<double>> levels;
@@ -275,7 +275,7 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
                 }
             }
         }
-        // Sums of many pieces keep to a bin each: not far from independent.
+        // Each piece adds one bin to a sum, so that sums along different tracks are nearly independent.
         const double count = lengths * 1.5 * 0.5 * static_cast<double>(length) * (2.0 * most + 1.0);
         const double p = of_several(chi2_tail(best, static_cast<int>(2.0 * used)), count);
         if (best - 2.0 * used > lines.scattered && p < options.samples.lines.scattered_p) {
@@ -302,7 +302,7 @@ void track_lines(const std::vector<double>& values, const Spectrum& spectrum, Fo
 
 double places_of_drift(double chi2, double cycles, double drift_cycles) {
     // With unit variance about the best phase the slopes by frequency and drift have the variances (2 pi)^2 T^2/12 and
-    // pi^2 T^4/180; the field's density is (chi2 - 1) exp(-chi2/2)/(2 pi).
+    // pi^2 T^4/180; the density of the field is (chi2 - 1) exp(-chi2/2)/(2 pi).
     const double inside = units::pi / std::sqrt(2160.0) * cycles * drift_cycles * std::max(0.0, chi2 - 1.0);
     return places_of_frequency(chi2, cycles) + inside;
 }
@@ -310,7 +310,7 @@ double places_of_drift(double chi2, double cycles, double drift_cycles) {
 FoundLine FoundLines::likeliest() const {
     FoundLine best = still;
     for (const FoundLine& other : {slow, tracked}) {
-        // Of strong lines no p is left to compare.
+        // For strong lines both p-values are zero.
         const bool as_rare = other.p_value == best.p_value && stands_out(other.chi2, other.squares, best);
         if (other.p_value < best.p_value || as_rare) best = other;
     }
@@ -337,7 +337,7 @@ FoundLines find_lines(const std::vector<double>& values, double rate_hz, const s
 
 NarrowLines find_lines_in(const std::vector<double>& values, double rate_hz, const LineBand& band,
                           const std::vector<double>& known_hz, double width_hz) {
-    // More drifts than these are left to the search over all frequencies.
+    // Larger drifts are in the search over all frequencies.
     const double most_cycles = options.samples.lines.declared_drift_cycles;
     const Spectrum spectrum(values, rate_hz, known_hz, width_hz);
     const double cycles = 2.0 * band.half_width_hz * spectrum.duration_s;

@@ -12,7 +12,7 @@ namespace ringlock::closure {
 
 namespace {
 
-/// A step of the coefficients no longer than where the next is surely better told.
+/// Limits a step of the coefficients to the range in which the linearisation holds.
 void step_course(LineCourse& course, const Eigen::VectorXd& off, double duration_s) {
     if (course.free <= 2) {
         const double most = 2.0 / (duration_s * duration_s);
@@ -20,7 +20,7 @@ void step_course(LineCourse& course, const Eigen::VectorXd& off, double duration
         if (course.free == 2) course.drifts[0] += std::clamp(off[1], -most, most);
         return;
     }
-    // Coefficients of a polynomial make up for each other: all go together.
+    // Coefficients of a polynomial compensate each other: all have the same factor.
     constexpr double most_cycles = 0.3;
     constexpr int places = 64;
     double share = 1.0;
@@ -61,7 +61,7 @@ SampleLine refined_from(const SampleFit& fit, SampleLine line) {
 
 std::vector<std::vector<double>> line_slopes(const SampleFit& fit, const LineCourse& course, double a, double b) {
     const double duration_s = static_cast<double>(fit.series().size()) * fit.series().interval_s;
-    // So small a part of a cycle at either end of the record that the next term does not matter.
+    // So small a part of a cycle at either end of the record that the next order does not matter.
     constexpr double part = 1e-4;
     std::vector<std::vector<double>> slopes;
     for (std::size_t k = 0; k < course.free; ++k) {
@@ -99,8 +99,8 @@ SampleLine refine_line(const SampleFit& fit, const LineCourse& shown) {
 bool scatters(const SampleFit& fit, std::vector<double> innovations, const FoundLines& found, const SampleLine& line) {
     const SampleLineOptions& lines = options.samples.lines;
     if (!(found.scattered > line.chi2 + lines.much_scattered)) return false;
-    // A strong line raises the level about it, which powers are over, and hides others near it: what is left of it is a
-    // good part of its own power, over the level as well.
+    // A strong line raises the level about it, over which powers are measured, and hides others near it. The residual
+    // must therefore have a large part of the line's own power as well as of that over the level.
     const auto columns = fit.line(line.course);
     const auto score = fit.score(columns);
     for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -125,7 +125,7 @@ SampleModel with_wandering_line(const SampleFit& fit, const FoundLines& found, c
         squares += fit.innovations()[i] * fit.innovations()[i];
         count += 1.0;
     }
-    // Power over the level is chi-squared of two a piece; the angle's increments have 2 sin of it.
+    // Power over the level is chi-squared of two per piece; increments are the angle times 2 sin.
     const double sd = fit.sd(0) * std::sqrt(squares / count);
     const double gain = 2.0 * std::sin(units::pi * found.scattered_hz / series.rate_hz);
     const double rms = sd * std::sqrt(found.scattered / count) / std::max(gain, 1e-6);
@@ -148,7 +148,7 @@ SampleFit refine_lines(SampleFit fit, const Rows& rows) {
             any = true;
             LineCourse course = cosine.course;
             const auto score = fit.score(line_slopes(fit, course, cosine.value, model.columns[k + 1].value));
-            // Where it cannot be said better than within a cycle over the record there is nothing to be mended.
+            // The limit of a step holds a frequency that is not determined to within a cycle over the record.
             step_course(course, Eigen::VectorXd::Map(score.value.data(), static_cast<Eigen::Index>(course.free)),
                         duration_s);
             set_line(model, k, series, course);

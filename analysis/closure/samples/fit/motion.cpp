@@ -49,18 +49,20 @@ SampleModel without_motion(SampleModel model) {
 
 namespace {
 
-/// Where, beside most of it, something is left of a motion that the witness does not tell: its own noise hides the
-/// edges, and what is a mean over intervals has nothing at half the rate of the record.
+/// Where the second resonance starts, for the part of a motion that the witness does not predict: about the motion,
+/// since the witness's own noise hides its edges, or at half the rate of the record, where a mean over intervals has no
+/// power.
 enum class ResonanceStart { about_the_motion, at_half_the_rate };
 
-/// The noise with two resonances for what is left of a motion, the likeliest of many: how wide they are no mean over
-/// frequencies tells, and the likelihood has several tops.
+/// The noise with two resonances for the unpredicted part of a motion, the most likely of many starts: no mean over
+/// frequencies shows their widths, and the likelihood has several maxima.
 SampleNoise begun_with(const SampleFit& now, const std::vector<double>& told, double rms_arcsec, double hz,
                        ResonanceStart where) {
     const SampleSeries& series = now.series();
     std::vector<double> rest = now.as_taken(told);
     for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = now.rest()[i] - rest[i];
-    // The noise as it was has most of the motion in it. Twice differenced, increments have little but white angle.
+    // The noise of the model so far contains most of the motion. Second differences of the increments are mostly white
+    // angle.
     double squares = 0.0;
     for (std::size_t i = 2; i < rest.size(); ++i) squares += std::pow(rest[i] - 2.0 * rest[i - 1] + rest[i - 2], 2);
     const double angle = std::sqrt(squares / 20.0 / static_cast<double>(rest.size()));
@@ -98,7 +100,7 @@ SampleModel moved_as(const SampleFit& now, const effects::Effect& effect, std::s
     SampleModel model = now.model();
     model.motion = motion.increments;
     model.motion_from_hz = options.samples.fit.slowest_of_motion * motion.centre_hz;
-    // What the witness does not tell moves like what it tells; its own noise hides the edges of that, which are wider.
+    // The unpredicted part moves like the predicted one; the witness's own noise hides its edges, which are wider.
     const double untold = motion.rms_arcsec * std::sqrt(std::max(1.0 - motion.coherence, 1e-3));
     const double centre_hz = std::max(motion.centre_hz, 0.01);
     model.resonances.insert(model.resonances.end(), 2, {&effect, step});
@@ -107,13 +109,13 @@ SampleModel moved_as(const SampleFit& now, const effects::Effect& effect, std::s
         SampleModel trial = model;
         trial.noise = begun_with(now, motion.increments, untold, centre_hz, where);
         SampleFit fit(now.series(), std::move(trial), now.rows());
-        // What is narrow and elsewhere is a line, and none of the motion.
+        // A narrow resonance elsewhere is a line and no part of the motion.
         const bool line = where == ResonanceStart::at_half_the_rate &&
                           fit.model().noise.resonances.back().width_hz <
                               options.samples.fit.narrowest_at_half_rate * now.series().rate_hz;
         if (!first || (!line && fit.log_likelihood() > first->log_likelihood())) first.emplace(std::move(fit));
     }
-    // Once more with what is left as the noise.
+    // Estimates the response once more, with the residual as the noise.
     model = first->model();
     const WitnessMotion more = fit_witness(*first, watched);
     for (std::size_t i = 0; i < model.motion.size(); ++i) model.motion[i] += more.increments[i];

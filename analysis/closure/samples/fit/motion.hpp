@@ -5,12 +5,13 @@
 
 namespace ringlock::closure {
 
-/// What a motion in proportion to a witness adds to the increments, and the same a quarter of a cycle later.
+/// Increments of a motion that is proportional to a witness, and of the same motion a quarter of a cycle later.
 std::vector<std::vector<double>> motion_columns(const std::vector<double>& witness);
 void add_motion(SampleModel& model, const SampleSeries& series, const effects::Effect& effect, std::size_t witness,
                 int step);
 SampleModel without_motion(SampleModel model);
-/// The model with all that a witness tells of a motion, lag by lag, and what it does not tell as two resonances.
+/// The model with the motion that a witness predicts, lag by lag, and two resonances for the part that it does not
+/// predict.
 SampleModel moved_as(const SampleFit& now, const effects::Effect& effect, std::size_t witness, int step);
 
 /// Whether the effect, null for the base model, is a motion of the case.

@@ -26,7 +26,7 @@ FoundCycle find_cycle(const std::vector<double>& innovations, const Rows& rows, 
         std::vector<double> product(n, 0.0);
         double sum = 0.0;
         double count = 0.0;
-        // Products of tamed values: a few wild ones would be all that counts.
+        // Products of clamped values: otherwise a few outliers would dominate.
         const auto tame = [](double e) { return std::clamp(e, -4.0, 4.0); };
         for (std::size_t i = lag; i < n; ++i) {
             if (!rows[i] || !rows[i - lag]) continue;
@@ -41,7 +41,7 @@ FoundCycle find_cycle(const std::vector<double>& innovations, const Rows& rows, 
         double p = line.p_value;
         double hz = line.frequency_hz;
         // At half the rate there is one amplitude, not two.
-        // The place of the peak to a small part of a cycle over the record.
+        // The frequency of the maximum to a small part of a cycle over the record.
         const auto power_at = [&](double f) {
             const std::complex<double> turn = std::polar(1.0, units::two_pi * f / rate_hz);
             std::complex<double> total = 0.0;
@@ -101,7 +101,7 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
     found.lags = lags;
     for (std::size_t w = 0; w < series.witnesses.size(); ++w) {
         const auto& raw = series.witnesses[w].second;
-        // The witness made white by an autoregression (Levinson and Durbin), so that lags tell one thing each.
+        // The witness is whitened by an autoregression (Levinson and Durbin), so that its lags are independent.
         constexpr int order = options.samples.fit.witness_order;
         const double mean = std::accumulate(raw.begin(), raw.end(), 0.0) / static_cast<double>(n);
         std::vector<double> r(order + 1, 0.0);
@@ -144,7 +144,8 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
             for (std::size_t k = 0; k < padded; ++k) fy[k] = fx[k] * std::conj(fy[k]);
             return transform(fy, true);
         };
-        // Each lag over its own standard error, whatever goes up and down together (White, Econometrica 48, 817, 1980).
+        // Each lag over its own standard error, which allows for common changes of variance (White, Econometrica 48,
+        // 817, 1980).
         const auto products = correlation(false);
         const auto weights = correlation(true);
         const auto at = [&](std::ptrdiff_t lag) {
@@ -154,7 +155,7 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
         };
         double chi2 = 0.0;
         for (int l = -lags; l <= lags; ++l) chi2 += at(l) * at(l);
-        // The same where nothing can be: windows of lags far away tell how it is spread.
+        // The same in windows of lags so far away that there is no correlation: they give the distribution of chi2.
         double sum = 0.0;
         double square = 0.0;
         double count = 0.0;
@@ -171,7 +172,7 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
         if (count < options.samples.fit.fewest_far_windows) continue;
         const double m = sum / count;
         const double v = std::max(square / count - m * m, 2.0 * m * m / (2.0 * lags + 1.0));
-        // Gamma of that mean and variance: v/(2 m) times chi-squared of 2 m^2/v
+        // Gamma distribution with that mean and variance: v/(2 m) times chi-squared of 2 m^2/v
         const double p = chi2_tail(chi2 * 2.0 * m / v, std::max(1, static_cast<int>(std::lround(2.0 * m * m / v))));
         const double corrected = of_several(p, static_cast<double>(series.witnesses.size()));
         if (corrected < found.p_value || (found.name.empty())) {
@@ -191,8 +192,8 @@ FoundWitness find_witness(const std::vector<double>& innovations, const Rows& ro
 
 namespace {
 
-/// What the filter makes of a witness that is up to `lags` late or early. The filter of a resampled record changes from
-/// row to row: there each lag goes through it by itself, as the source would have taken it.
+/// The filtered witness at delays and advances of up to `lags` rows. The filter of a resampled record changes from row
+/// to row: each lag is filtered by itself there, as the source would have sampled it.
 class WitnessAtLags {
    public:
     WitnessAtLags(const SampleFit& fit, const std::vector<double>& witness, int lags)
@@ -221,7 +222,7 @@ class WitnessAtLags {
     int lags_;
     bool each_;
     std::vector<double> same_;
-    std::vector<std::vector<float>> of_lag_;  ///< of many: half as large
+    std::vector<std::vector<float>> of_lag_;  ///< single precision: half as large
 };
 
 }  // namespace
@@ -288,7 +289,7 @@ WitnessMotion fit_witness(const SampleFit& fit, const std::vector<double>& witne
         }
         pieces += 1.0;
     }
-    // Where the angle moves most: increments over (2 sin)^2.
+    // Frequency at which the angle moves most: increments over (2 sin)^2.
     double most = 0.0;
     double angle2 = 0.0;
     const double window_power = 0.375 * static_cast<double>(length) * static_cast<double>(length);

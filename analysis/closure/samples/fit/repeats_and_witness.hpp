@@ -6,7 +6,7 @@
 
 namespace ringlock::closure {
 
-/// Variance, or the covariance of neighbours, that repeats: a line in the products of innovations.
+/// A variance, or a covariance of adjacent rows, that repeats: a line in the products of innovations.
 struct FoundCycle {
     double frequency_hz = 0.0;
     double p_value = 1.0;
@@ -24,16 +24,17 @@ struct FoundWitness {
 };
 FoundWitness find_witness(const std::vector<double>& innovations, const Rows& rows, const SampleSeries& series);
 
-/// Response of the increments to the witness, lag by lag, fitted in the rows that count, and the motion by it.
+/// Response of the increments to the witness, lag by lag, fitted in the rows that count, and the motion that it
+/// predicts.
 struct WitnessMotion {
     std::vector<double> increments;
-    double coherence = 0.0;   ///< magnitude-squared, where most of the motion is
-    double rms_arcsec = 0.0;  ///< of the motion's angle that the witness tells
-    double centre_hz = 0.0;   ///< where most of it is
+    double coherence = 0.0;   ///< magnitude-squared, at the frequency with most of the motion
+    double rms_arcsec = 0.0;  ///< of the predicted motion's angle
+    double centre_hz = 0.0;   ///< frequency with most of the motion
 };
 WitnessMotion fit_witness(const SampleFit& fit, const std::vector<double>& witness);
 
-/// Lags that a witness is held against, on either side.
+/// Number of lags of a witness on either side.
 int witness_lags(double rate_hz);
 
 }  // namespace ringlock::closure

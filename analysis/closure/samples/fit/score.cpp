@@ -33,7 +33,7 @@ SampleScore score_of(const SampleFit& fit, const Rows& reported, double lattice_
                 mean += w * value;
             }
             e = x - mean / sum;
-            // Of the step about each value, the density's share.
+            // The density's share of the step about each value.
             score.log_score -= std::log(sum * lattice_arcsec / (sd * std::sqrt(units::two_pi)));
         }
         score.error += e * e;

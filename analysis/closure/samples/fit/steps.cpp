@@ -43,7 +43,7 @@ std::optional<Jump> jump_beside_random(const SampleFit& fit) {
 }
 
 std::size_t refine_place(const SampleFit& without, std::size_t row, std::size_t reach) {
-    // Nearer to an end a step can hardly be told from how the record begins, or ends.
+    // Nearer to an end a step is hardly distinguished from the start or the end of the record.
     const std::size_t first = std::max<std::size_t>(1, without.series().size() / options.samples.fit.places_of_a_step);
     const std::size_t last = without.series().size() - 1 - first;
     double best = std::abs(root_of_step(without, row));

@@ -38,7 +38,7 @@ Swing swing_of_variance(const SampleFit& fit, double hz) {
 SampleFit with_swinging_errors(const SampleFit& fit, double hz, const Swing& seen) {
     SampleModel model = fit.model();
     const auto phase = line_phase(1, fit.series().rate_hz, LineCourse::still(hz))[0];
-    // From the phase of the innovations to one that begins with the record.
+    // The model's oscillation is relative to the start of the record, that of the innovations to its middle.
     model.noise.swing_hz = hz;
     model.noise.swing_cos = seen.cos * std::cos(phase) + seen.sin * std::sin(phase);
     model.noise.swing_sin = seen.sin * std::cos(phase) - seen.cos * std::sin(phase);

@@ -44,7 +44,7 @@ class Contest {
    private:
     using Shared = std::shared_ptr<SampleCandidate>;
     enum class Wanted { all, slow };
-    /// An explanation of the record: one effect, or several, each fitted with those before it.
+    /// A candidate model: one effect, or several, each fitted with those before it.
     struct CandidateSet {
         std::vector<Shared> members;
         double merit = 0.0;
@@ -109,7 +109,7 @@ std::vector<SampleCandidate> Contest::screened(const SampleState& state, Wanted 
 
 Contest::Shared Contest::fitted(const SampleState& state, SampleCandidate candidate) const {
     SampleFit fit(series_, candidate.model, rows_, candidate.noise);
-    // Places were found by the noise as it was, which a large effect was a part of, and without that effect.
+    // The times of steps were found with the noise so far, of which a large effect was a part, and without that effect.
     const auto& columns = fit.model().columns;
     const bool steps = std::any_of(columns.begin(), columns.end(), [&](const SampleColumn& column) {
         return is_step(column) && column.step >= now_.step;
@@ -124,12 +124,12 @@ Contest::Shared Contest::judged(const SampleState& state, SampleCandidate candid
     candidate.fit = std::make_shared<SampleFit>(std::move(fit));
     const double gain = candidate.fit->gain_over(*state.fit);
     candidate.merit = gain - std::log(candidate.places.value_or(candidate.searched)) - candidate.parameters;
-    // Scores are of the noise as it is; the effect must be worth its place when all is fitted anew.
+    // The score tests use the noise so far; the gain of the effect is that of a full fit.
     candidate.passes = candidate.merit > 0.0 && passes_on_samples(p_of_gain(gain, candidate));
     return std::make_shared<SampleCandidate>(std::move(candidate));
 }
 
-/// A step that was chosen in a set is placed where the whole set has it, which is elsewhere than for the step alone.
+/// A step that was chosen in a set is placed at its time in the whole set, which differs from that of the step alone.
 Contest::Shared Contest::placed(Shared first, const SampleModel& all) const {
     if (!shows(*first, OnSamples::step)) return first;
     SampleModel model = first->fit->model();
@@ -140,8 +140,8 @@ Contest::Shared Contest::placed(Shared first, const SampleModel& all) const {
     return judged(now_, *first, SampleFit(series_, std::move(model), rows_, SampleFit::Noise::near));
 }
 
-/// Candidates of the screening that pass when they are fitted in full, the likeliest first. Slow rates and lines are
-/// fitted at weaker scores as well: the noise that scores go by may have absorbed them.
+/// Candidates of the score tests that pass when they are fitted in full, the most likely first. Slow rates and lines
+/// are fitted at weaker scores as well, since the noise of the score tests may have absorbed them.
 std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
                                                  std::vector<SampleCandidate> candidates) const {
     std::erase_if(candidates, [](const SampleCandidate& candidate) {
@@ -149,8 +149,8 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
                            candidate.p_value < options.samples.contest.worth_looking;
         return !passes_on_samples(candidate.p_value) && !worth;
     });
-    // Rates that a record may be resampled from take long to fit, and explain much the same: where the likeliest by
-    // either kind of errors are far from the leader, the others are as well.
+    // Fits of resampling take long, and all rates explain nearly the same: where the most likely rates, with either
+    // kind of errors, are far from the leader, the others are as well.
     const SampleContestOptions& by = options.samples.contest;
     const auto resampled = [](const SampleCandidate& c) { return shows(c, OnSamples::transport); };
     std::vector<SampleCandidate> later;
@@ -178,7 +178,7 @@ std::vector<Contest::Shared> Contest::contenders(const SampleState& state,
     if (!(most_resampled > 0.0 && most_resampled < by.far * most)) fit_all(std::move(later));
     std::erase_if(all, [](const Shared& contender) { return !contender->passes; });
     std::sort(all.begin(), all.end(), [](const Shared& a, const Shared& b) { return a->merit > b->merit; });
-    // Those rates crowd nobody out.
+    // Rates of a source take no place from other candidates.
     std::size_t count = 0;
     std::size_t count_resampled = 0;
     std::erase_if(all, [&](const Shared& contender) {
@@ -215,11 +215,11 @@ double Contest::p_beside(const SampleCandidate& first, const SampleCandidate& se
                                   others * first.searched * second.searched));
 }
 
-/// Sets that begin with one effect: with the likeliest random rate; with the likeliest other rate; and with that and
-/// the likeliest third.
+/// Sets that start from one effect: with the most likely random rate; with the most likely other rate; and with that
+/// and the most likely third.
 std::vector<Contest::CandidateSet> Contest::sets_from(const Shared& first, const std::vector<Shared>& firsts,
                                                       const std::vector<SampleCandidate>& candidates) const {
-    // That there are so many others to choose from.
+    // Cost of the choice among so many other effects.
     const double choice = std::log(effects_on_samples());
     std::vector<CandidateSet> found;
     const SampleState with_first = beside(now_, *first);
@@ -253,7 +253,7 @@ std::vector<Contest::CandidateSet> Contest::sets(const std::vector<Shared>& all,
     bool random = false;
     for (const Shared& contender : all) {
         if (!is_slow_rate(*contender->effect)) continue;
-        // One random rate can stand for another.
+        // One random rate can substitute for another.
         if (is_random_rate(*contender->effect) && std::exchange(random, true)) continue;
         firsts.push_back(contender);
     }
@@ -273,9 +273,8 @@ std::vector<Contest::CandidateSet> Contest::sets(const std::vector<Shared>& all,
     return candidate_sets;
 }
 
-/// Merit that a set must exceed: where a residual test explains more, the set is only a proxy for something that the
-/// library does not have. A residual test must explain more than an effect, by the margins below, to be taken for the
-/// truth.
+/// Evidence that a set must exceed: where a residual test explains more, the set only substitutes for a cause that is
+/// not in the library. A residual test is preferred to an effect if it explains more by the margins below.
 double Contest::bar(const CandidateSet& set, const std::vector<Rival>& rivals, std::size_t rows) {
     const bool random = set.random();
     const bool moves = std::all_of(set.members.begin(), set.members.end(), [](const Shared& member) {
@@ -283,50 +282,51 @@ double Contest::bar(const CandidateSet& set, const std::vector<Rival>& rivals, s
     });
     double most = 0.0;
     for (const Rival& rival : rivals) {
-        // Noise whose size changes looks like no rate and no line, nor do these like it.
+        // A varying size of the noise does not look like a rate or a line, nor do these look like it.
         if (rival.repeats && moves) continue;
-        // A line is nothing of another that is far from it.
+        // A line is not explained by another one that is far from it.
         const SampleCandidate& first = *set.members.front();
         if (rival.hz && set.members.size() == 1 && is_line(*first.effect) &&
             std::abs(*rival.hz - first.hz) > options.samples.lines.beside_hz) {
             continue;
         }
         double merit = set.has(OnSamples::motion) ? rival.of_a_motion : rival.merit;
-        // What keeps its phase, and readings that were interpolated, leave no power of a strong line; a resonance
-        // follows any line.
+        // A line of constant phase, or interpolation of readings, leaves no power of a strong line; a resonance follows
+        // any line.
         const bool keeps = is_line(*first.effect) ? !first.wanders : shows(first, OnSamples::transport);
         if (keeps && rival.by_variance) merit = *rival.by_variance;
         if (rival.repeats && set.has(OnSamples::transport)) {
-            // On straight lines the variance swings by half, no more and no less. What they are blurred by makes that
-            // less, as any other swing may be.
+            // Interpolation on straight lines makes the variance oscillate by one half exactly. Blur reduces that, and
+            // any other oscillation may be smaller as well.
             const SampleNoise& noise = set.members.front()->fit->model().noise;
             merit +=
                 noise.blur_arcsec < options.samples.contest.blurred * noise.angle_arcsec ? -options.tie : options.tie;
             most = std::max(most, merit);
             continue;
         }
-        // Several effects are chosen from many: against what follows another column of the record they get nothing for
-        // being of the library. A course in time follows all of them.
+        // A set is chosen from many: against a test of another column of the record it has no margin for being in the
+        // library. A trend in time follows all columns.
         double more = set.members.size() > 1 && rival.where != Where::time ? 0.0 : -options.tie;
-        // The likelihood of a process has its whole course integrated out: so must be the coefficients of any other
-        // course in time (Schwarz 1978).
+        // The likelihood of a random process is integrated over its path: the coefficients of a trend in time must be
+        // integrated out as well (Schwarz 1978).
         if (random) merit -= rival.courses * (0.5 * std::log(static_cast<double>(rows)) - 1.0);
         if (random && (rival.where != Where::time || rival.jumps)) {
-            // What follows jumps, or another column of the record, a random rate can follow nearly as well. The course
-            // of jumps is searched stretch by stretch and loses a part of what they explain.
+            // A random rate can follow jumps, or another column of the record, nearly as well as their regression. The
+            // times of jumps are searched stretch by stretch, which loses a part of their gain.
             more = rival.jumps ? std::max(options.tie, options.samples.contest.lost_of_jumps * set.merit) : options.tie;
         } else if (!random && rival.jumps && set.members.size() > 1) {
             more = options.tie;
         }
         most = std::max(most, merit + more);
-        // A process as well, as a random rate is: within a tie nothing tells them apart.
+        // A chain of states is a random process as well: within a tie the record does not distinguish it from a random
+        // rate.
         if (rival.of_states) most = std::max(most, *rival.of_states + (random ? options.tie : -options.tie));
     }
     return most;
 }
 
 /// Adds a random rate that does not pass by itself to the candidates as likely as a trend. In a short record they
-/// differ by little: a random walk of which the record shows no more than one slow move passes as a trend first.
+/// differ by little: a random walk that shows as one slow change passes as a trend first.
 void Contest::add_weak_random(const std::vector<SampleCandidate>& candidates, const std::vector<Shared>& all,
                               double least, std::vector<CandidateSet>& as_likely) const {
     const double duration_s = series_.interval_s * static_cast<double>(series_.size());
@@ -342,7 +342,7 @@ void Contest::add_weak_random(const std::vector<SampleCandidate>& candidates, co
 }
 
 /// True if one of two effects of different kinds still improves the fit when the other is present. Two such effects are
-/// not alternatives, even if their merit is equal.
+/// not alternatives, even if their evidence is equal.
 bool Contest::beside_each_other(const SampleCandidate& a, const SampleCandidate& b) const {
     const auto kind = [](const SampleCandidate& contender) {
         const effects::Effect& effect = *contender.effect;
@@ -384,7 +384,7 @@ void Contest::tie(const CandidateSet& best, const std::vector<CandidateSet>& as_
     }
     for (const CandidateSet& other : as_likely) {
         if (other.has(effect)) {
-            // The same with another drift, which may go by other names.
+            // The same effect with another drift, which may have other ties.
             if (other.members.size() > 1) continue;
             for (const effects::Effect* same : other.members.front()->confounded) {
                 add(choice.confounded_with, same);
@@ -404,16 +404,16 @@ void Contest::tie(const CandidateSet& best, const std::vector<CandidateSet>& as_
     }
 }
 
-/// Removes contenders that cannot be the answer: those without a name, and resampling where a repeating variance
-/// explains more.
-/// \return the likeliest contender without a name, or null
+/// Removes candidates that cannot be the answer: those that are not in the library, and resampling where a variance
+/// that oscillates explains more.
+/// \return the most likely candidate that is not in the library, or null
 Contest::Shared Contest::set_aside(std::vector<Shared>& all, const std::vector<Rival>& against) const {
     Shared unnamed;
     std::erase_if(all, [&](const Shared& contender) {
         if (contender->nameless && !unnamed) unnamed = contender;
         return contender->nameless;
     });
-    // What repeats otherwise than on straight lines is not resampled.
+    // A variance that oscillates otherwise than on straight lines is no resampling.
     if (all.empty() || !shows(*all.front(), OnSamples::transport)) return unnamed;
     std::vector<Rival> repeats = against;
     std::erase_if(repeats, [](const Rival& rival) { return !rival.repeats; });
@@ -433,9 +433,9 @@ Contest::Shared Contest::nearest(const std::vector<Shared>& all, const Shared& u
     return random == all.end() ? unnamed : *random;
 }
 
-/// Readings at k times the record's rate plus or minus the same difference leave the same pattern in the record.
-/// Whether its noise tells these rates apart is found by a fit at each. Above twice the record's rate it does not:
-/// interpolated readings that no sample lies between are not seen.
+/// Readings at k times the record's rate plus or minus the same difference leave the same pattern in the record. A fit
+/// at each of these rates shows whether the noise distinguishes them. Above twice the record's rate it does not:
+/// readings between which there is no sample leave no trace.
 void Contest::tie_sources(SampleChoice& choice) const {
     const SampleModel& chosen = choice.chosen->fit->model();
     const double from_hz = chosen.noise.from_hz;
@@ -479,18 +479,18 @@ SampleChoice Contest::choose() {
     }
     std::stable_sort(candidate_sets.begin(), candidate_sets.end(),
                      [](const CandidateSet& a, const CandidateSet& b) { return a.merit > b.merit; });
-    // Where a view explains more than the likeliest effect, another must be as likely and explain more than any view by
-    // far, and several must be far better than it.
+    // Where a residual test explains more than the most likely effect, another effect must be as likely and explain
+    // more than every test by far, and a set must be far better than that effect.
     const auto may_be = [&](const CandidateSet& set) {
         if (led || all.empty()) return holds(set);
         if (set.members.size() > 1) {
-            // A random rate that does not hold comes near to whatever there is.
+            // A random rate that does not exceed the residual tests comes near to any structure.
             const double more = random_leads && !set.random() ? 0.0 : options.tie;
             return set.merit > leader + more && holds(set);
         }
         return set.merit > std::max(leader - options.tie, bar(set, against, series_.size()) + options.tie);
     };
-    // The fewest effects of those that explain as much as any.
+    // The smallest number of effects that explains as much as any.
     const CandidateSet* best = nullptr;
     double least = 0.0;
     for (const CandidateSet& set : candidate_sets) {
@@ -512,7 +512,7 @@ SampleChoice Contest::choose() {
     }
     if (slow) add_weak_random(candidates, all, least_random, as_likely);
     SampleChoice choice;
-    // Of several, what most of those as likely have in them.
+    // The effect of a set that most of the equally likely candidate models contain is added first.
     std::ptrdiff_t most = -1;
     for (const Shared& member : best->members) {
         const effects::Effect* effect = member->effect;

@@ -24,8 +24,8 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Frequency, as the record shows it, of the line that was added with that number. It need not be the last component of
-/// the model, since a motion that is fitted again moves to the end.
+/// Frequency, as the record shows it, of the line that was added in that step. It need not be the last component of the
+/// model, since a motion that is fitted again moves to the end.
 double line_hz(const SampleModel& model, int step) {
     for (std::size_t k = 0; k < model.resonances.size(); ++k) {
         if (model.resonances[k].step == step) return model.noise.resonances[k].hz;
@@ -38,7 +38,7 @@ double line_hz(const SampleModel& model, int step) {
 
 }  // namespace
 
-/// Increments of the training rows: the step of a lattice is chosen by them like any other effect.
+/// Increments of the training rows, which select the step of a quantisation like any other effect.
 std::vector<double> SampleLoop::chosen_increments() const {
     std::vector<double> values;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -61,7 +61,7 @@ void SampleLoop::take_lattice(Closure& closure) {
     if (lattice_.step_arcsec == 0.0 || effect == nullptr) return;
     const double step = lattice_.step_arcsec;
     const double sd = now_.fit->typical_sd();
-    // Steps add step^2/12 to the variance.
+    // Quantisation adds step^2/12 to the variance.
     if (step * step / 12.0 < options.samples.loop.negligible_steps * sd * sd) {
         closure.notes.push_back(fmt::format(
             "values come in steps of {:.6g} arcsec, which are negligible against {:.3g} arcsec of noise", step, sd));
@@ -78,7 +78,7 @@ void SampleLoop::take_lattice(Closure& closure) {
     Step& taken = added.step;
     taken.p_value = lattice_.p_value;
     const SampleScore before = score_of(*now_.fit, reported_, 0.0);
-    // Values do not lie on a blurred lattice, but on that of the printed digits.
+    // Values are not multiples of the blurred step, but of that of the printed digits.
     used_step_ = blurred ? lattice_.printed_arcsec : step;
     find_coarse_steps(closure);
     const SampleScore after = score(*now_.fit);
@@ -89,7 +89,7 @@ void SampleLoop::take_lattice(Closure& closure) {
     now_.added.push_back(std::move(added));
 }
 
-/// Replaces increments in coarse steps, whose rounding follows the angle, by increments that are drawn within the
+/// Replaces increments in coarse steps, whose rounding follows the angle, by increments that are imputed within the
 /// steps.
 void SampleLoop::find_coarse_steps(Closure& closure) {
     const bool blurred = lattice_.step_arcsec > options.samples.loop.coarser_than_printed * lattice_.printed_arcsec;
@@ -119,8 +119,8 @@ void SampleLoop::add_all(Closure& closure, bool random_rates) {
     }
 }
 
-/// Takes the likelier of two random rates. Increments that were drawn by a model without a random rate say little about
-/// which one it is; the likelihood of the rounded increments decides.
+/// Takes the more likely of two random rates. Increments that were imputed by a model without a random rate carry
+/// little information on its kind; the likelihood of the rounded increments decides.
 const SampleCandidate& SampleLoop::take_likelier(const SampleChoice& choice, Step& step) {
     now_.fit = choice.chosen->fit;
     if (!rounded_.drawn() || !choice.other_random) return *choice.chosen;
@@ -167,7 +167,7 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     added.other_hz = choice.other_hz;
     if (rounded_.drawn()) {
         now_.fit = rounded_.draw(now_.fit, options.samples.loop.draws);
-        // Increments that were drawn without a motion say little about it.
+        // Increments that were imputed without a motion carry little information on it.
         for (int k = 0; k < options.samples.loop.most_motions && move_anew(); ++k)
             now_.fit = rounded_.draw(now_.fit, 1);
     } else if (series_.counted || used_step_ > 0.0) {
@@ -192,7 +192,7 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
     monitor_.tell(fmt::format("added {}", effect.name()));
 }
 
-/// The model without that effect, if it may only have stood in for the effect that was added last.
+/// The model without that effect, if it may only have substituted for the effect that was added last.
 std::optional<SampleLoop::Stripped> SampleLoop::stripped(const AddedEffect& of, const effects::Effect& last) const {
     Stripped without{now_.fit->model()};
     SampleModel& model = without.model;
@@ -207,7 +207,7 @@ std::optional<SampleLoop::Stripped> SampleLoop::stripped(const AddedEffect& of, 
         std::erase_if(model.columns, [&](const SampleColumn& c) { return c.effect == of.step.effect; });
         if (as == OnSamples::step) without.parameters = 2;
     } else if (is_line(of.effect()) && on_samples(last) == OnSamples::transport) {
-        // A line that was resampled has images, each of which looks like a line until the resampling is known.
+        // A resampled line has images, each of which looks like a line until the resampling is in the model.
         const auto of_step = [&](const SampleColumn& c) { return c.step == of.id; };
         const auto cosine = std::find_if(model.columns.begin(), model.columns.end(), of_step);
         if (cosine == model.columns.end()) return std::nullopt;
@@ -219,7 +219,7 @@ std::optional<SampleLoop::Stripped> SampleLoop::stripped(const AddedEffect& of, 
     return without;
 }
 
-/// Removes effects that only stood in for the one that was added last.
+/// Removes effects that only substituted for the one that was added last.
 void SampleLoop::drop_needless(const effects::Effect& last) {
     for (std::size_t k = now_.added.size(); k-- > 0;) {
         const AddedEffect& one = now_.added[k];
@@ -240,7 +240,8 @@ void SampleLoop::drop_needless(const effects::Effect& last) {
 }
 
 /// Fits motions of the case again: their response to the witness was estimated with noise that included the effect
-/// which has been added since. \return whether any fit improved
+/// which has been added since.
+/// \return whether any fit improved
 bool SampleLoop::move_anew() {
     bool any = false;
     for (AddedEffect& added : now_.added) {

@@ -31,8 +31,8 @@ ResidualTest test_of(const Disturbed& disturbed) {
 
 }  // namespace
 
-/// Tests the residual. If any test passes the level, the unexplained structure is named by the regression that explains
-/// most with the noise fitted again; if no regression explains anything, by the test that is least probable by chance.
+/// Tests the residual. If any test passes the level, the reported structure is that of the regression that explains
+/// most with the noise fitted again; if no regression explains anything, that of the test with the smallest p-value.
 void SampleLoop::test_what_is_left(Closure& closure) const {
     const std::size_t looked_at = options.samples.loop.most_views;
     auto views = view_samples(*now_.fit, lattice_step());
@@ -81,8 +81,8 @@ void SampleLoop::test_what_is_left(Closure& closure) const {
     }
 }
 
-/// Stretches that were left out of all fits because they are far larger than the others are structure as well. They are
-/// no rate and no line, so that effects which have been named stay.
+/// Stretches that are excluded from all fits because they are far larger than the others are structure as well. They
+/// are no rate and no line, so that effects which have been reported stay.
 void SampleLoop::test_left_out(Closure& closure) const {
     if (std::find(disturbed_.rows.begin(), disturbed_.rows.end(), 1) == disturbed_.rows.end()) return;
     const ResidualTest test = test_of(still_disturbed());
@@ -100,14 +100,14 @@ void SampleLoop::test_left_out(Closure& closure) const {
 
 void SampleLoop::begin_again(const State& at) {
     now_ = at;
-    // The fit of that state was to increments that have been drawn again since.
+    // The fit of that state was to increments that have been imputed again since.
     if (rounded_.drawn()) now_.fit = rounded_.draw(now_.fit, options.samples.loop.draws);
 }
 
-/// A random rate was added but left structure, so that it may only be a proxy for another rate. The loop goes on
-/// without random rates from before it: if several effects of the library together leave no structure and are likelier,
-/// they are the answer. Otherwise no rate is reported, and effects that were found after the random rate stay unless
-/// they are rates.
+/// A random rate was added but left structure, so that it may only substitute for another rate. The loop continues
+/// without random rates from the model before it: if several effects of the library together leave no structure and are
+/// more likely, they are the answer. Otherwise no rate is reported, and effects that were found after the random rate
+/// stay unless they are rates.
 void SampleLoop::go_without_random(Closure& closure) {
     const State followed = now_;
     const std::optional<ResidualTest> left = closure.unexplained;
@@ -143,7 +143,7 @@ void SampleLoop::look_beside_nearest(Closure& closure) {
         add_all(closure, line);
     }
     const bool of_witness = left && left->view == followed_witnesses;
-    // Lines near a placeholder are what it leaves of the unknown line; a rate may be part of the unknown rate; and a
+    // Lines near a placeholder are its residual of the unknown line; a rate may be part of the unknown rate; and a
     // motion may be part of a rate that follows an acceleration.
     const auto keeps = [&](const AddedEffect& added) {
         if (!line) return !is_slow_rate(added.effect()) && !(of_witness && is_motion(added.step.effect));
@@ -156,7 +156,7 @@ void SampleLoop::look_beside_nearest(Closure& closure) {
     closure.tests = tests;
 }
 
-/// Effects that were added from that one on stay in the model, but those that `keeps` refuses are not reported.
+/// Effects that were added from `first_id` on stay in the model, but those that `keeps` refuses are not reported.
 /// \return whether any is reported
 bool SampleLoop::keep_names(int first_id, const std::function<bool(const AddedEffect&)>& keeps, Closure& closure) {
     const auto since = [&](const AddedEffect& added) { return added.id >= first_id; };
@@ -173,7 +173,7 @@ bool SampleLoop::keep_names(int first_id, const std::function<bool(const AddedEf
     return true;
 }
 
-/// Lines of the library keep their amplitude and, but for a drift, their frequency. A line that does not, as its
+/// Lines of the library keep their amplitude and, except for a drift, their frequency. A line that does not, as its
 /// amplitude over time or another line next to it shows, is not reported. Changes of a strong line by a small share of
 /// its power stay in the residual, and the line is reported.
 void SampleLoop::take_back_lines(Closure& closure) {

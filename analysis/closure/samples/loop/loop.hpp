@@ -22,11 +22,11 @@
 
 namespace ringlock::closure {
 
-/// The closed loop on one record of samples: its course is in run.cpp, the growth of the model in grow.cpp, and the
+/// The closed loop on one record of samples: its steps are in run.cpp, the growth of the model in grow.cpp, and the
 /// tests of the residual in left.cpp.
 class SampleLoop {
    public:
-    /// \param source  that the record was resampled from, where other records tell it: no other is looked for
+    /// \param source  source of the record, if known from other records: no other is searched then
     explicit SampleLoop(const record::Record& record, const Monitor& monitor = {},
                         std::optional<KnownSource> source = {})
         : record_(record),
@@ -39,19 +39,19 @@ class SampleLoop {
     Closure run();
     Closure fit(const std::vector<ActiveEffect>& effects);
 
-    // Of a loop that has run:
-    /// The model that it has ended with, in the rows that choose.
+    // The following functions are for a loop that has run.
+    /// The final model, fitted to the training rows.
     const SampleFit& model_fit() const { return *now_.fit; }
-    /// Log-likelihood of a model of these rows; of values in coarse steps, of what was measured.
+    /// Log-likelihood of a model of these rows; with values in coarse steps, that of the measured increments.
     double log_likelihood(const SampleFit& fit) const { return score(fit).log_likelihood; }
-    /// Whether that model has a source which is reported.
+    /// Whether that model has a source that is reported.
     bool resampled() const;
     /// Rates that explain the record as well as that source.
     std::vector<double> other_sources_hz() const;
-    /// The rate of a source by this record alone: of all rows that are to count, fitted from a model near by.
+    /// The rate of the source by this record alone: fitted to all rows that are to count, from a nearby model.
     Estimate source_rate(const SampleModel& from);
-    /// What is reported when the source has that rate, which is near the one found: it is held, all else is fitted
-    /// again. The residual was tested with the rate as this record alone has it, which differs by no more than chance.
+    /// The report if the source has that rate, which is near the one found: it is held, and all other parameters are
+    /// fitted again. The residual was tested with the rate from this record alone, which differs by chance only.
     Closure report_with(const KnownSource& source);
 
    private:
@@ -63,7 +63,7 @@ class SampleLoop {
         series.cycle_counts = series.whole_cycles && record.reader->settings.fraction == reader::Fraction::none;
         return series;
     }
-    /// The model as it has grown, with what was added.
+    /// The model with the effects that were added to it.
     struct State {
         std::shared_ptr<SampleFit> fit;
         std::vector<AddedEffect> added;
@@ -71,7 +71,7 @@ class SampleLoop {
         std::vector<std::string> notes;  ///< on these steps
         Partners of_partners;            ///< of all choices
     };
-    /// Step of the values that fits and tests see; drawn increments have none that could be seen.
+    /// Step of the values as fits and tests see it; imputed increments have a negligible one.
     double lattice_step() const {
         if (rounded_.drawn()) return 1e-9 * rounded_.step_arcsec();
         return counted_step() > 0.0 ? counted_step() : lattice_.step_arcsec;
@@ -107,7 +107,7 @@ class SampleLoop {
     bool move_anew();
     struct Stripped {
         SampleModel model;
-        int parameters = 1;  ///< that it has less
+        int parameters = 1;  ///< number of parameters that were removed
     };
     std::optional<Stripped> stripped(const AddedEffect& of, const effects::Effect& last) const;
     void drop_needless(const effects::Effect& last);
@@ -125,7 +125,7 @@ class SampleLoop {
     SampleSeries series_;
     RoundedSamples rounded_;
     Rows chosen_;
-    Rows rows_;  ///< chosen and not disturbed
+    Rows rows_;  ///< training rows that are not disturbed
     Rows reported_;
     Rows whole_;
     Disturbed disturbed_;
@@ -134,16 +134,16 @@ class SampleLoop {
     std::shared_ptr<SampleFit> base_;
     State now_;
     std::optional<State> earlier_;              ///< before the first random rate
-    std::shared_ptr<SampleCandidate> nearest_;  ///< of the last choice, which had nothing to add
-    int next_id_ = 0;                           ///< of the next effect that is added
-    Closure tested_;                            ///< what the loop has said before figures are filled in
+    std::shared_ptr<SampleCandidate> nearest_;  ///< placeholder of the last choice, which had nothing to add
+    int next_id_ = 0;                           ///< step of the next effect that is added
+    Closure tested_;                            ///< result of the loop before its parameters are filled in
 };
 
-/// Runs the loop on a record of samples. Throws InputError where the record does not suffice.
+/// Runs the loop on a record of samples. Throws InputError if the record does not suffice.
 Closure close_samples(const record::Record& record, const Monitor& monitor = {});
 
-/// The model with these effects fitted, without any search; the residual is not tested. Effects start from the values
-/// given.
+/// The model with these effects fitted, without any search; the residual is not tested. The fit starts from the given
+/// values of the effects.
 Closure fit_samples(const record::Record& record, const std::vector<ActiveEffect>& effects);
 
 }  // namespace ringlock::closure

@@ -17,8 +17,8 @@ std::vector<Rival> rivals_of(const SampleFit& fit, double lattice_arcsec, bool r
     std::vector<Where> columns;
     std::size_t place = 0;
     std::erase_if(views, [&](const SampleView& view) {
-        // Jumps are looked at in any case, which a random rate can follow and no other view tells, and what follows
-        // another column of the record most: courses in time come near to that.
+        // Tests of jumps are always kept: a random rate can follow them, and no other test shows them. The best test of
+        // each kind of other column is kept as well, since trends in time come near to it.
         const bool follows = view.columns && view.test.where != Where::time && !view.hz;
         const bool first = follows && std::find(columns.begin(), columns.end(), view.test.where) == columns.end();
         if (first) columns.push_back(view.test.where);

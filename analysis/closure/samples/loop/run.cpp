@@ -56,8 +56,8 @@ std::string note_of_late(const SampleNoise::Resonance& noise) {
         note_on_late, noise.arcsec, noise.width_hz);
 }
 
-/// In a short record a motion of the case swings a few times only. The part of it that no witness explains then looks
-/// like a random rate, or like a line: these are tied to the motion.
+/// In a short record a motion of the case has a few cycles only. Its part that no witness predicts then looks like a
+/// random rate, or like a line: these are tied to the motion.
 void tie_to_motion(Step& step, const SampleSeries& series) {
     const double duration_s = series.interval_s * static_cast<double>(series.size());
     if (series.witnesses.empty() || duration_s >= options.samples.loop.motion_determined_s) return;
@@ -73,8 +73,8 @@ void tie_to_motion(Step& step, const SampleSeries& series) {
 
 }  // namespace
 
-/// All rows but those at gaps, and those at the ends of the record for which a witness has no values at all lags. At
-/// the start more rows are left out, since a narrow motion remembers what the witness does not explain there.
+/// All rows except those at gaps, and those at the ends of the record for which a witness has no values at all lags. At
+/// the start more rows are excluded, since a narrow motion remembers the unpredicted part before the start.
 Rows SampleLoop::all_rows() const {
     Rows all(series_.size(), 1);
     if (!series_.missing.empty()) {
@@ -89,7 +89,7 @@ Rows SampleLoop::all_rows() const {
     return all;
 }
 
-/// The base model: the turns of the declared dither, where the record shows them, belong to it.
+/// The base model. The turns of the declared dither are a part of it where the record shows them.
 std::shared_ptr<SampleFit> SampleLoop::fit_base(Closure& closure) const {
     if (const auto filtered = filtered_rows(record_)) {
         SampleModel model;
@@ -104,7 +104,7 @@ std::shared_ptr<SampleFit> SampleLoop::fit_base(Closure& closure) const {
 }
 
 /// The same model with the turns of the declared dither and the error of counts at its zero crossings, where the record
-/// shows them; else null. In a record that was resampled the turns do not show.
+/// shows them; else null. A resampled record does not show the turns.
 std::shared_ptr<SampleFit> SampleLoop::with_turns(const SampleFit& fit, Closure& closure) const {
     for (const std::string_view own : {note_on_counts, note_on_late, note_on_dither, note_on_turns}) {
         std::erase_if(closure.notes, [own](const std::string& other) { return other.starts_with(own); });
@@ -123,7 +123,7 @@ std::shared_ptr<SampleFit> SampleLoop::with_turns(const SampleFit& fit, Closure&
         closure.notes.push_back(note_of(*dither));
         found = std::make_shared<SampleFit>(series_, std::move(model), rows_);
     }
-    // Beside the noise of the dither the kicks may show, too.
+    // Next to the noise of the dither the kicks may be significant, too.
     const SampleFit& best = found ? *found : fit;
     if (const auto pattern = find_turn_pattern(best, record_.declared)) {
         SampleModel model = best.model();
@@ -135,8 +135,9 @@ std::shared_ptr<SampleFit> SampleLoop::with_turns(const SampleFit& fit, Closure&
     return found;
 }
 
-/// Looks for the turns again after an effect was added: before, its contribution was part of the noise, of which the
-/// kicks then seemed a smaller share, or were not seen. The turns belong to the base model, which gets them as well.
+/// Searches for the turns again after an effect was added: before, its contribution was part of the noise, so that the
+/// share of the kicks seemed smaller, or they were not significant. The turns belong to the base model, which gets them
+/// as well.
 void SampleLoop::find_turns_again(Closure& closure) {
     const SampleNoise& noise = now_.fit->model().noise;
     if (rounded_.drawn() || filtered_rows(record_)) return;
@@ -207,7 +208,7 @@ SampleScore SampleLoop::score(const SampleFit& fit) const {
     return rounded_.drawn() ? rounded_.score_of(fit, reported_) : score_of(fit, reported_, used_step_);
 }
 
-/// Stretches that the fit leaves out, by the record's clock.
+/// Stretches that are excluded from the fit, by the record's clock.
 void SampleLoop::take_disturbed(Closure& closure) const {
     for (std::size_t i = 0; i < disturbed_.rows.size(); ++i) {
         if (!disturbed_.rows[i]) continue;
@@ -240,7 +241,7 @@ void SampleLoop::take_gaps(Closure& closure) const {
         closure.gaps.size() == 1 ? "it" : "them", left_out, all.size()));
 }
 
-/// Fills in what is reported: errors on the held-out blocks, and parameters of a last fit to the whole record.
+/// Fills in the report: errors on the held-out blocks, and parameters of a last fit to the whole record.
 void SampleLoop::finish(Closure& closure) {
     const SampleScore last = score(*now_.fit);
     closure.heldout_after = last.error;
@@ -294,17 +295,17 @@ void SampleLoop::finish(Closure& closure) {
     closure.verdict = verdict_of(closure);
 }
 
-/// Rows that are still disturbed when the present model is taken off, among all rows.
+/// Rows that are disturbed with the present model, among all rows.
 Disturbed SampleLoop::still_disturbed() const {
-    // With all that is there, as a place in it may be known by nothing else.
+    // With all rows, as the time of a step may be determined by disturbed rows alone.
     const Rows all = all_rows();
     SampleFit whole(series_, now_.fit->model(), all, SampleFit::Noise::held);
     whole = refine_steps(std::move(whole), all);
     return find_disturbed(whole, all);
 }
 
-/// Takes back rows that seemed disturbed and that an effect which was added since explains.
-/// \return whether there are enough of them for the loop to begin again
+/// Restores rows that seemed disturbed and that are explained by an effect which was added since.
+/// \return whether they are enough for the loop to start again
 bool SampleLoop::restore() {
     if (disturbed_.share == 0.0) return false;
     const Disturbed still = still_disturbed();
@@ -408,7 +409,7 @@ void SampleLoop::take_known(const std::vector<ActiveEffect>& effects, Closure& c
     if (series_.counted || used_step_ > 0.0) find_coarse_steps(closure);
 }
 
-/// Fits the known effects at the values given or near them, and does not test the residual.
+/// Fits the known effects from the values given, and does not test the residual.
 Closure SampleLoop::fit(const std::vector<ActiveEffect>& effects) {
     Closure closure;
     for (int look = 0; look < options.samples.loop.most_looks; ++look) {

@@ -20,7 +20,7 @@ void SampleFilter::advance(const SampleFilter& filter, std::array<double, D>& x)
     x = next;
 }
 
-/// As the lanes do (lanes.cpp), of the states alone.
+/// Same as pass_turns() of the lanes (lanes.cpp), for the states alone.
 template <int D>
 void SampleFilter::pass_turns(std::size_t row, std::array<double, D>& x, std::array<double, D>& h) const {
     const DitherRows& rows = *states_.dither;
@@ -130,7 +130,7 @@ std::vector<double> SampleFilter::minus_log_likelihoods(std::span<const SampleNo
                                                         std::span<const std::uint8_t> rows) {
     std::vector<SampleStates> states;
     for (const SampleNoise& noise : noises) states.emplace_back(noise, interval_s);
-    // By kind, as many at once as there are lanes.
+    // Filters of the same structure together, as many as there are lanes.
     std::vector<std::vector<std::size_t>> parts;
     for (std::size_t k = 0; k < noises.size(); ++k) {
         const auto part = std::find_if(parts.begin(), parts.end(), [&](const std::vector<std::size_t>& of) {
@@ -148,7 +148,8 @@ std::vector<double> SampleFilter::minus_log_likelihoods(std::span<const SampleNo
         std::vector<SampleStates> alike;
         for (const std::size_t k : part) alike.push_back(states[k]);
         std::array<double, most_lanes> sums{};
-        std::array<double, most_lanes> products;  // of variances, whose logarithms cost more than all the rest
+        // Of variances: the logarithm of each would cost more than all other operations.
+        std::array<double, most_lanes> products;
         products.fill(1.0);
         filter_lanes(alike, increments, [&](std::size_t row, const double* e, const double* variances) {
             if (!rows[row]) return;

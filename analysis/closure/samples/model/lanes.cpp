@@ -15,7 +15,7 @@ namespace ringlock::closure::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Filters in the lanes of a vector.
+/// Arithmetic on vectors, with one filter per lane.
 struct Beside {
     using Tag = hn::CappedTag<double, most_lanes>;
     using Value = hn::Vec<Tag>;
@@ -37,7 +37,7 @@ struct Beside {
     static Value where_less(Value a, Value b, Value yes, Value no) { return hn::IfThenElse(hn::Lt(a, b), yes, no); }
 };
 
-/// One filter: the compiler puts what is known of its states in the lanes.
+/// Arithmetic on one filter, whose states the compiler may put in lanes.
 struct Alone {
     using Value = double;
     static std::size_t lanes() { return 1; }
@@ -57,14 +57,14 @@ struct Alone {
     static Value where_less(Value a, Value b, Value yes, Value no) { return a < b ? yes : no; }
 };
 
-/// As many filters as a value of the arithmetic holds. D states.
+/// As many Kalman filters as a value of the arithmetic A has lanes, with D states each.
 template <class A, int D>
 class Lanes {
    public:
     using V = typename A::Value;
     using Line = std::array<V, D>;
 
-    /// The last filter again in lanes that no other is in.
+    /// Lanes without a filter of their own repeat the last filter.
     void begin(std::span<const SampleStates> filters, std::size_t first) {
         of_ = &filters.front();
         const auto from = [&](auto&& value) {
@@ -122,17 +122,17 @@ class Lanes {
         A::store(variance_, variance);
     }
 
-    /// Source intervals passed before the last row; of the first filter.
+    /// Source intervals between the last two rows, of the first filter.
     int ticks() const { return static_cast<int>(ticks_[0]); }
     V share() const { return place_; }
     const Line& gain() const { return gain_; }
-    /// Whether variances and gains stay what they are.
+    /// Whether variances and gains no longer change.
     bool settled() const { return settled_; }
 
    private:
     bool reads(int i) const { return of_->resampled ? i >= D - 2 : of_->h[i] != 0.0; }
 
-    /// On to the row, by as many intervals of the source as lie between.
+    /// Advances to the next row by the source intervals in between.
     void step_row() {
         if (!of_->resampled) {
             ticks_[0] = 1.0;
@@ -151,7 +151,7 @@ class Lanes {
         double tick = 0.0;
         for (; tick < *least; ++tick) step();
         if (tick == *most) return;
-        // Some are there before others.
+        // Filters with fewer intervals keep their states while the others advance.
         const V all = A::load(ticks_.data());
         for (; tick < *most; ++tick) {
             const auto p = p_;
@@ -190,7 +190,7 @@ class Lanes {
         }
     }
 
-    /// Kicks at the turns next to the end of the row.
+    /// Adds the kicks at the turns next to the end of the row.
     void kick(std::size_t row) {
         const KickRows& kicks = *of_->kicks;
         p_[0][0] = A::mul_add(kick_, A::set(kicks.variance[row]), p_[0][0]);
@@ -199,7 +199,8 @@ class Lanes {
         p_[1][1] = A::mul_add(kick_, A::set(kicks.carried[row]), p_[1][1]);
     }
 
-    /// Amplitudes of the dither's noise at the turns that were passed, and how they are read.
+    /// Advances the amplitudes of the dither's noise over the turns that were passed, and sets their weights in the
+    /// reading.
     void pass_turns(std::size_t row) {
         const DitherRows& rows = *of_->dither;
         const int u = of_->of_dither;
@@ -233,7 +234,7 @@ class Lanes {
         x_ = next;
     }
 
-    /// Variance and gains of this row, and what is known after it.
+    /// Variance and gains of this row, and the covariance of the states after it.
     void weigh(std::size_t row) {
         Line ph;
         for (V& v : ph) v = A::set(0.0);
@@ -262,7 +263,8 @@ class Lanes {
         if (!of_->resampled && !of_->swings && !of_->kicks && !of_->dither) settle(last);
     }
 
-    /// Whether gains have stopped changing: each, since those of slow rates settle long after the variance has.
+    /// Whether gains have stopped changing. Each gain is compared, since those of slow rates converge long after the
+    /// variance.
     void settle(const Line& last) {
         constexpr int rows = 50;
         const V little = A::set(1e-9);
@@ -278,7 +280,7 @@ class Lanes {
     struct Swing {
         double by_row, cosine, sine;
     };
-    const SampleStates* of_ = nullptr;  ///< what all have in common
+    const SampleStates* of_ = nullptr;  ///< the first filter; all have its structure
     std::array<Line, D> p_, q_, f_;
     Line h_, x_, gain_;
     V floor_, kick_, ratio_, place_;
@@ -293,7 +295,7 @@ class Lanes {
 template <int D>
 void lanes_with(std::span<const SampleStates> filters, std::span<const double> increments, const TakeLanes& take) {
     const Beside::Tag d;
-    // On the stack: what the heap gives is not aligned for the longest vectors.
+    // On the stack, since memory from the heap is not aligned for the longest vectors.
     Lanes<Beside, D> vectors[most_lanes / hn::MaxLanes(d)];
     const std::size_t count = (filters.size() + hn::Lanes(d) - 1) / hn::Lanes(d);
     for (std::size_t k = 0; k < count; ++k) vectors[k].begin(filters, k * hn::Lanes(d));

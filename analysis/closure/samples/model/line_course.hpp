@@ -7,18 +7,18 @@
 
 namespace ringlock::closure {
 
-/// How the frequency of a line goes through a record: a polynomial of the time from the middle. A dither follows the
-/// temperature of its springs, evenly over minutes, on a curve over an hour.
+/// Frequency track of a line: a polynomial of the time from the middle of the record. A dither follows the temperature
+/// of its springs: evenly over minutes, on a curve over an hour.
 struct LineCourse {
     static constexpr std::size_t most = options.samples.lines.most_coefficients;
-    double hz = 0.0;  ///< in the middle
+    double hz = 0.0;  ///< in the middle of the record
     /// Derivatives of the frequency there, from the first on [Hz/s, Hz/s^2, ...].
     std::array<double, most - 1> drifts{};
-    std::size_t free = 1;  ///< coefficients that are fitted: 1, it keeps its frequency; 2, it drifts evenly
+    std::size_t free = 1;  ///< number of coefficients that are fitted; 1: constant frequency, 2: even drift
 
     double coefficient(std::size_t k) const { return k == 0 ? hz : drifts[k - 1]; }
     double& coefficient(std::size_t k) { return k == 0 ? hz : drifts[k - 1]; }
-    /// Cycles from the middle on.
+    /// Cycles since the middle of the record.
     double turns(double since_middle_s) const {
         double sum = 0.0;
         double power = 1.0;
@@ -37,13 +37,13 @@ struct LineCourse {
         }
         return sum;
     }
-    /// Of a coefficient, so much as makes a cycle at either end of a record of that length.
+    /// Unit of coefficient k: the change that adds one cycle at either end of a record of that length.
     static double a_cycle(std::size_t k, double duration_s) {
         double unit = 1.0;
         for (std::size_t j = 0; j <= k; ++j) unit *= static_cast<double>(j + 1) / (0.5 * duration_s);
         return unit;
     }
-    /// As it shows where frequencies are read as others, and go down there as they go up where `folded`.
+    /// The same track at an alias, `other_hz` in the middle; the drifts change sign if `folded`.
     LineCourse shown_at(double other_hz, bool folded) const {
         LineCourse other = *this;
         other.hz = other_hz;
@@ -56,7 +56,7 @@ struct LineCourse {
     static LineCourse even(double hz, double drift_hz_per_s) { return {hz, {drift_hz_per_s}, 2}; }
 };
 
-/// The angle of a line at each sample, zero in the middle.
+/// Phase of a line at each sample [rad], without whole cycles, zero in the middle of the record.
 std::vector<double> line_phase(std::size_t size, double rate_hz, const LineCourse& course);
 
 }  // namespace ringlock::closure

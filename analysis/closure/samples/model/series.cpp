@@ -17,13 +17,13 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Whether two of the values that are there differ.
+/// Whether two of the values that are not missing differ.
 bool changes(const std::vector<double>& values) {
     const auto first = std::find_if(values.begin(), values.end(), [](double v) { return !std::isnan(v); });
     return std::any_of(first, values.end(), [&](double v) { return !std::isnan(v) && v != *first; });
 }
 
-/// Greatest common divisor of numbers that are known to `tolerance`.
+/// Greatest common divisor of two numbers that are known to `tolerance`.
 double common_divisor(double a, double b, double tolerance) {
     while (b > tolerance) {
         const double rest = std::abs(a - std::round(a / b) * b);
@@ -33,8 +33,9 @@ double common_divisor(double a, double b, double tolerance) {
     return a;
 }
 
-/// The known input in the middle of each interval. A sample belongs to its end; where the increments say by far that
-/// the other instrument's clock means the start, or the middle, they are believed.
+/// The known input in the middle of each interval. A sample belongs to the end of its interval by convention; where the
+/// start or the middle leaves a residual that is smaller by far (options.samples.record.other_clock), the time stamps
+/// are interpreted in that way.
 void take_input(const record::Record& record, SampleSeries& series) {
     const std::size_t n = series.size();
     double least = 0.0;
@@ -63,8 +64,8 @@ struct Smoothed {
     double start_sd = 0.0;
 };
 
-/// A thermometer's noise is faster than any temperature: straight lines through a 500th of the record about each row,
-/// at the ends those through the first of them and the last.
+/// Removes the noise of a thermometer, which is faster than any temperature, by straight lines through a 500th of the
+/// record about each row; near the ends, by the first and the last of these lines.
 Smoothed smooth(const std::vector<double>& values) {
     const std::size_t n = values.size();
     const std::size_t half = std::min(std::max<std::size_t>(1, n / options.samples.record.smoothed_parts), (n - 1) / 2);
@@ -96,13 +97,13 @@ Smoothed smooth(const std::vector<double>& values) {
         const double off = static_cast<double>(i) - static_cast<double>(half);
         squares += std::pow(values[i] - mean_about(half) - off * first_slope, 2);
     }
-    // At the end of a line through m values its error is 2/sqrt(m) of theirs, m large.
+    // At its end, a line through m values has the standard error 2/sqrt(m) of one value, for large m.
     smoothed.start_sd =
         2.0 * std::sqrt(squares / static_cast<double>(2 * half - 1) / static_cast<double>(2 * half + 1));
     return smoothed;
 }
 
-/// Slopes of a smoothed course [1/row], over some rows to both sides.
+/// Slopes of a smoothed series [1/row], over some rows on either side.
 std::vector<double> slopes(const std::vector<double>& values) {
     const std::size_t last = values.size() - 1;
     const std::size_t apart = std::max<std::size_t>(1, values.size() / options.samples.record.slope_parts);
@@ -115,7 +116,7 @@ std::vector<double> slopes(const std::vector<double>& values) {
     return all;
 }
 
-/// Increments of the samples, NaN where one of those that they are made of is missing.
+/// Increments of the samples; NaN where one of the samples of an increment is missing.
 void take_increments(const record::Record& record, SampleSeries& series) {
     const record::Samples& samples = *record.samples;
     if (samples.kind == record::SampleKind::angle_increment_arcsec) {
@@ -133,7 +134,7 @@ void take_increments(const record::Record& record, SampleSeries& series) {
     }
 }
 
-/// Fills the gaps and marks their rows. Of angles the rotation during a gap is known, of increments it is lost.
+/// Fills the gaps and marks their rows. Angles keep the rotation during a gap; increments lose it.
 void take_gaps(const record::Samples& samples, SampleSeries& series) {
     Rows missing(series.size(), 0);
     std::size_t count = 0;
@@ -221,7 +222,7 @@ Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
     for (const double x : sorted) {
         if (x - levels.back() > tolerance) levels.push_back(x);
     }
-    // Without a lattice no two values of so many digits are the same.
+    // Without quantisation no two values with so many digits are equal.
     if (levels.size() > n / options.samples.record.values_per_level || levels.size() < 2) return lattice;
     double step = std::max(std::abs(levels.front()), range);
     for (const double x : levels) {
@@ -229,7 +230,7 @@ Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
             step = common_divisor(std::max(step, std::abs(x)), std::min(step, std::abs(x)),
                                   20.0 * tolerance + 1e-6 * range);
     }
-    // Best over the levels, each a whole multiple.
+    // Least-squares step over the levels, each of which is a whole multiple of it.
     double xy = 0.0;
     double yy = 0.0;
     for (const double x : levels) {
@@ -245,9 +246,9 @@ Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
     lattice.strength = 1.0;
     lattice.p_value = 0.0;
     lattice.step_sd_arcsec = 1e-9 * step;  // by the digits of the values
-    // A coarser one that the digits of the record blur: its characteristic function stands out between the bulk's, near
-    // zero, and the digits' own, at 1/printed.
-    std::vector<std::pair<double, double>> weights;  // level, how often; those not zero
+    // A larger step that the digits of the record blur: its characteristic function has a maximum between that of the
+    // distribution, near zero, and that of the digits, at 1/printed.
+    std::vector<std::pair<double, double>> weights;  // level and number of values; without level zero
     double count = 0.0;
     double second = 0.0;
     const auto most = static_cast<std::int64_t>(std::llround(std::max(-sorted.front(), sorted.back()) / step));
@@ -298,8 +299,8 @@ Lattice find_lattice(const std::vector<double>& increments, double sd_arcsec) {
         lattice.step_arcsec = 1.0 / at;
         lattice.strength = best;
         lattice.p_value = p;
-        // A frequency from phases 2 pi u x with noise of which exp(i noise) has the mean c, cos(2 noise) c^4 where it
-        // is normal: variance (1 - c^4)/(2 c^2 N (2 pi sigma)^2) of u = 1/step.
+        // Standard error of a frequency u = 1/step from phases 2 pi u x with noise. If exp(i noise) has the mean c,
+        // cos(2 noise) has the mean c^4 for normal noise, and u the variance (1 - c^4)/(2 c^2 N (2 pi sigma)^2).
         const double c2 = best * best;
         const double u_sd = std::sqrt((1.0 - c2 * c2) / (2.0 * c2 * count)) / (units::two_pi * sigma);
         lattice.step_sd_arcsec = u_sd / (at * at);

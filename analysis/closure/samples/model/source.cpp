@@ -12,7 +12,7 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Differences of angles at the ends of the record's intervals, on straight lines between the source's readings.
+/// Differences of angles at the ends of the record's intervals, on the straight lines between the source's readings.
 template <std::size_t N, class Readings>
 std::array<std::vector<double>, N> between_readings(const SampleSource& source, std::size_t size, double interval_s,
                                                     const Readings& readings) {
@@ -43,7 +43,7 @@ struct Clock {
     double start, period;
 };
 
-/// Of a clock that ticks at all these times, and at others, with about that period; none where there is none.
+/// Clock with about that period that ticks at all these times, and possibly at others; no value if there is none.
 std::optional<Clock> clock_of(const std::vector<double>& times, double period) {
     const double exact = options.samples.record.off_clock;
     double start = times.front();
@@ -98,7 +98,7 @@ std::optional<SampleSource> find_straight_lines(const std::vector<double>& incre
     const auto [low, high] = std::minmax_element(increments.begin(), increments.end());
     const double tolerance = record.same_line * (*high - *low);
     const auto line_goes_on = [&](std::size_t i) { return std::abs(increments[i] - increments[i - 1]) <= tolerance; };
-    // Times of readings, in intervals of the record, where one turn lies between two lines.
+    // Times of readings, in intervals of the record, where one interval lies between two lines.
     std::vector<double> turns;
     for (std::size_t i = 2; i + 2 < increments.size(); ++i) {
         if (!line_goes_on(i - 1) || line_goes_on(i) || line_goes_on(i + 1) || !line_goes_on(i + 2)) continue;
@@ -110,7 +110,8 @@ std::optional<SampleSource> find_straight_lines(const std::vector<double>& incre
     if (turns.size() < record.fewest_readings) return std::nullopt;
     std::vector<double> apart;
     for (std::size_t k = 1; k < turns.size(); ++k) apart.push_back(turns[k] - turns[k - 1]);
-    // The shortest, but for a few by chance, is one interval of the source or, where few turns can be told, some.
+    // The shortest distance, except for some by chance, is one interval of the source, or a few of them if few readings
+    // are found.
     const auto shortest = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 20);
     std::nth_element(apart.begin(), shortest, apart.end());
     for (double some = 1.0; *shortest / some >= record.shortest_source_interval; some += 1.0) {
@@ -181,7 +182,7 @@ std::vector<Alias> of_source(double shown_hz, double rate_hz, double from_hz) {
             if (hz > 0.0 && hz <= 0.5 * from_hz) all.push_back({hz, sign < 0});
         }
     }
-    // Of a slower source a line shows above half its rate as well, if less.
+    // A source slower than the record shows a line above half of its rate as well, with less power.
     if (all.empty()) all.push_back(alias(shown_hz, from_hz));
     return all;
 }

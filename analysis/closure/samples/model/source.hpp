@@ -4,57 +4,59 @@
 
 #include "analysis/closure/samples/model/line_course.hpp"
 
-/// What a resampled record has of an angle: its source took readings at a rate of its own, and the record has the
+/// Model of a resampled record: its source took readings of the angle at a rate of its own, and the record contains the
 /// straight lines between them.
 namespace ringlock::closure {
 
 struct SampleSource {
-    double from_hz = 0.0;     ///< 0: the record was not resampled, and has what there is
-    double from_phase = 0.0;  ///< of the record's begin, between two of the source's readings; of their distance
+    double from_hz = 0.0;  ///< rate of the source; 0: the record was not resampled
+    /// Place of the record's start between two of the source's readings, as a share of their distance.
+    double from_phase = 0.0;
 };
 
-/// A rate at which readings leave the same pattern in a record as readings at another rate do: a multiple of the
-/// record's rate plus or minus that.
+/// Rate of a source that leaves the same pattern in a record as another rate: a multiple of the record's rate plus or
+/// minus the other rate.
 struct SamePattern {
     double hz = 0.0;
-    double sign = 1.0;  ///< of the other rate in it, and of the place of the record's begin
+    double sign = 1.0;  ///< of the other rate in that sum, and of the place of the record's start
 };
 
-/// That rate itself, and all of these rates that a record may be resampled from.
+/// The rate itself, and all rates with the same pattern that a record may be resampled from (options.samples.screen).
 std::vector<SamePattern> with_same_pattern(double from_hz, double rate_hz);
 
-/// Whether two rates of sources are one.
+/// Whether two rates belong to one source, by options.samples.contest.same_source of the record's rate.
 bool same_source(double one_hz, double other_hz, double rate_hz);
 
-/// The place of the record's begin, where the source of another rate leaves the same pattern.
+/// Place of the record's start between two readings of a source whose rate has the same pattern.
 double phase_of(const SamePattern& pattern, double from_phase);
 
-/// The source of a record that has more than five intervals to every two of its source: neighbours on one straight
-/// line are the same, and where the angle turns between two lines says when its reading was taken. None where these are
-/// not the times of a clock, or are few, as in a record that was not resampled or whose values are coarse.
+/// Source of a record that has more than five intervals to every two of its source. Adjacent increments on one straight
+/// line are equal, and an interval between two lines gives the time of the reading at which they meet.
+/// \return no value if these are not the times of a regular clock, or are few, as in a record that was not resampled or
+///     whose values are coarse
 std::optional<SampleSource> find_straight_lines(const std::vector<double>& increments, double rate_hz);
 
-/// Increments of the record, of an angle that has these between the same times.
+/// Increments of a record that the source makes of an angle with these increments between the same times.
 std::vector<double> as_taken(const SampleSource& source, const std::vector<double>& increments, double interval_s);
 
-/// Increments of a line that are cos and sin of its course, from the middle of the record to the middle of each
-/// interval.
+/// Two columns of increments, cos and sin of the phase of a line, which is counted from the middle of the record to the
+/// middle of each interval.
 std::vector<std::vector<double>> line_columns(std::size_t size, double rate_hz, const LineCourse& course);
-/// The same as the record has it. The frequency is what the source's readings are of: up to half of its rate, which may
-/// be more than half the record's. It is no multiple of the record's rate.
+/// The same columns in a resampled record. The frequency is that in the source's readings: up to half of the source's
+/// rate, which may be more than half of the record's, and not a multiple of the record's rate.
 std::vector<std::vector<double>> line_as_taken(const SampleSource& source, std::size_t size, double rate_hz,
                                                const LineCourse& course);
 
-/// Where a frequency shows in samples, and whether it goes down there as it goes up.
+/// Frequency at which a line appears in samples, and whether it falls there if the frequency of the line rises.
 struct Alias {
     double hz = 0.0;
     bool folded = false;
 };
 Alias alias(double hz, double rate_hz);
-/// In samples of that rate, of readings at `from_hz` where that is not zero.
+/// The same in samples at `rate_hz` of readings at `from_hz`; without a source `from_hz` is zero.
 Alias alias(double hz, double rate_hz, double from_hz);
-/// What readings at `from_hz` have, at most half of it, and shows at that frequency in samples of them: the likeliest
-/// first. Where there is no such rate, that frequency.
+/// Frequencies in readings at `from_hz`, up to half of it, that appear at `shown_hz` in samples of these readings, the
+/// most likely (lowest) first. Without a source the frequency itself.
 std::vector<Alias> of_source(double shown_hz, double rate_hz, double from_hz);
 
 }  // namespace ringlock::closure

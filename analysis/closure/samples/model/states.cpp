@@ -10,13 +10,14 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Stationary covariance of the amplitudes at the last and the next turn and of what follows them.
+/// Stationary covariance of the amplitudes at the last and the next turn and of the state that follows them.
 std::array<std::array<double, 3>, 3> covariance_of_dither(double variance, double memory,
                                                           const DitherFollower& follower) {
     std::array<std::array<double, 3>, 3> p{};
     p[0][0] = p[1][1] = variance;
     p[0][1] = p[1][0] = memory * variance;
-    // With u' = v and v' = memory v + noise: stationary of E[m' u'] = E[m' v], E[m' v'] = memory E[m' v] and E[m'^2].
+    // With u' = v and v' = memory v + noise, from stationarity of E[m' u'] = E[m' v], E[m' v'] = memory E[m' v] and
+    // E[m'^2].
     const auto& [kept, by_last, by_next] = follower;
     const double with_u = (by_last * memory + by_next) * variance / (1.0 - kept * memory);
     const double with_v = memory * with_u;
@@ -34,8 +35,9 @@ struct Rotation {
     double variance, hz, width_hz;
 };
 
-/// Harmonics of a count's error (SampleNoise::CountError). Where readings between two latched counts are interpolated,
-/// and the record does not tell when counts were latched, the mean over all places between them remains.
+/// Harmonics of the error of counts (SampleNoise::CountError). Where readings are interpolated between two latched
+/// counts, and the record does not show when counts were latched, the variance is the mean over all places between
+/// them.
 std::vector<Rotation> rotations_of(const SampleNoise::CountError& error, bool resampled) {
     std::vector<Rotation> rotations;
     for (int m = 1; m <= error.harmonics; ++m) {
@@ -49,8 +51,8 @@ std::vector<Rotation> rotations_of(const SampleNoise::CountError& error, bool re
 
 }  // namespace
 
-/// The sawtooth's, times the characteristic function of the jitter (Widrow and Kollar, "Quantization Noise", 2008,
-/// chapter 5).
+/// Amplitude in the sawtooth, times the characteristic function of the jitter (Widrow and Kollar, "Quantization Noise",
+/// 2008, chapter 5).
 double SampleNoise::CountError::amplitude_arcsec(int harmonic) const {
     const double jitter_rad = units::two_pi * harmonic * jitter_arcsec / step_arcsec;
     return step_arcsec / (units::pi * harmonic) * std::exp(-0.5 * jitter_rad * jitter_rad);
@@ -101,7 +103,8 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         f[count][count] = a;
         f[count][count + 1] = -b;
         f[count + 1][count] = 1.0;
-        // Variance over that of what drives it (Box and Jenkins, "Time Series Analysis", 1976, section 3.2.4)
+        // Variance relative to that of the driving noise (Box and Jenkins, "Time Series Analysis", 1976, section
+        // 3.2.4).
         q[count][count] = v * (1.0 - b) * ((1.0 + b) * (1.0 + b) - a * a) / (1.0 + b);
         p[count][count] = p[count + 1][count + 1] = v;
         p[count][count + 1] = p[count + 1][count] = v * a / (1.0 + b);
@@ -122,7 +125,7 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         }
         count += dither_states;
     }
-    // The record begins at angle zero as it was read.
+    // The angle is zero at the first reading, which has an error.
     p[0][0] = readout;
     std::vector<int> read = resonances;  // states that a reading adds to the angle
     const auto add = [&](const Rotation& rotation) {
@@ -140,7 +143,7 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         count += 2;
     };
     if (noise.sidebands.arcsec > 0.0 && count + 4 <= most) {
-        // Two quadratures of one correlation time turn at the frequency of the dither; one of them is read.
+        // Two quadratures with one correlation time rotate at the frequency of the dither; one of them is read.
         add({noise.sidebands.arcsec * noise.sidebands.arcsec, noise.sidebands.hz, noise.sidebands.width_hz});
     }
     for (const Rotation& rotation : rotations_of(noise.count_error, resampled)) {
@@ -152,7 +155,8 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         const int r0 = count;
         const int r1 = count + 1;
         f[r0][r1] = 1.0;
-        // r1 of the new tick = angle and the states read with it + error; the noise of all is in q.
+        // The reading r1 of the new tick is the angle plus the states read with it plus an error; q has the noise of
+        // all.
         f[r1] = f[0];
         for (int j = 0; j < count; ++j) q[r1][j] = q[0][j];
         for (const int state : read) {
@@ -166,8 +170,8 @@ SampleStates::SampleStates(const SampleNoise& noise, double interval_s) {
         for (int j = 0; j < count; ++j) q[j][r1] = q[r1][j];
         count += 2;
         p[r0][r0] = p[r1][r1] = p[0][0] + q[r1][r1];
-        // Interpolated readings have no error of their own; digits have. They do not go with the noise: rows that are
-        // settled by others would count for a smaller one.
+        // Interpolated readings have no error of their own except for digits, whose variance does not scale with the
+        // noise: otherwise deterministic rows would favour a smaller noise.
         floor = noise.blur_arcsec * noise.blur_arcsec + noise.digits_arcsec * noise.digits_arcsec;
         ratio = interval_s * noise.from_hz;
         first_place = noise.from_phase;

@@ -7,88 +7,93 @@
 
 namespace ringlock::closure {
 
-/// Kicks of the lock-in, by the rows of a record. A kick goes to the row in which its turn falls, or, of a turn near
-/// the end of a row, to that row and the next: variance of the first part, of the second one, and their covariance,
-/// over that of a whole kick, summed over the turns that are next to the row's end.
+/// Kicks of the lock-in by the rows of a record. A kick is added to the row in which its turn falls; the kick of a turn
+/// near the end of a row is divided between that row and the next. Variance of the first part, variance of the second
+/// part, and their covariance, each divided by the variance of a whole kick and summed over the turns next to the row's
+/// end.
 struct KickRows {
     std::vector<double> variance, carried, covariance;
 };
 
-/// Noise of the dither in readings that still have it, by the amplitudes at its turns. By the rows of a record: turns
-/// passed since the row before, and the weights with which the amplitudes at the last turn and at the next, and what
-/// follows the amplitudes, enter the reading.
+/// Noise of the dither in readings that contain it, expressed by the amplitudes at its turns. For each row: the number
+/// of turns passed since the row before, and the weights in the reading of the amplitude at the last turn, of that at
+/// the next turn, and of the state that follows the amplitudes.
 struct DitherRows {
     std::vector<std::uint16_t> passed;
     std::vector<double> last, next, follower;
 };
 
-/// What follows the amplitudes of the dither's noise from turn to turn: m' = kept m + by_last a_k + by_next a_(k+1).
+/// State that follows the amplitudes a_k of the dither's noise: m' = kept m + by_last a_k + by_next a_(k+1) at a turn.
 struct DitherFollower {
     double kept = 0.0, by_last = 0.0, by_next = 0.0;
 };
 
-/// What is random in a record of samples; angles in arcsec.
+/// Random part of a record of samples; angles in arcsec.
 struct SampleNoise {
     double angle_arcsec = 0.0;      ///< rms of the white error of each reading of the angle
-    double rate_arcsec_rt_s = 0.0;  ///< white rate: root of the variance of the angle a second
-    double walk_arcsec2_s3 = 0.0;   ///< growth of the variance of a rate that walks [(arcsec/s)^2/s]
+    double rate_arcsec_rt_s = 0.0;  ///< white rate: root of the angle's variance per second
+    double walk_arcsec2_s3 = 0.0;   ///< random walk of the rate: growth of its variance [(arcsec/s)^2/s]
     struct Term {
         double time_s, variance_arcsec2_s2;
     };
     std::vector<Term> terms = {};  ///< Gauss-Markov rates
-    /// Share of the white rate's variance that comes in kicks at the turns of the dither, so many a second; null: none.
+    /// Share of the variance of the white rate that arrives in kicks at the turns of the dither, and turns per second.
+    /// `kicks` is null if there are none.
     double kick_share = 0.0;
     double turn_hz = 0.0;
     double kick_excess = 0.0;  ///< kurtosis of a kick beyond 3
     std::shared_ptr<const KickRows> kicks = {};
     /// Variance of a kick [arcsec^2].
     double kick_variance() const { return kick_share * rate_arcsec_rt_s * rate_arcsec_rt_s / turn_hz; }
-    /// Share of the variance of the readings' errors that is noise of the dither, as it is at the turns; correlation of
-    /// its amplitudes from turn to turn. Null: none.
+    /// Share of the variance of the readings' errors, as it is at the turns, that is noise of the dither, and
+    /// correlation of its amplitudes from turn to turn. `dither` is null if there is no such noise.
     double dither_share = 0.0;
     double dither_memory = 0.0;
     DitherFollower dither_follower = {};
     std::shared_ptr<const DitherRows> dither = {};
-    /// An angle that is a second-order autoregression.
+    /// Angle that is a second-order autoregression.
     struct Resonance {
         double arcsec, hz, width_hz;
     };
     std::vector<Resonance> resonances = {};
-    /// Sidebands of the dither in the readings, where a noisy drive moves its amplitude and its phase: rms at any time,
-    /// frequency of the dither, full width at half maximum of their spectrum. 0 arcsec: none. At 0 Hz it is the
-    /// noise of the amplitude that a reader at late zero crossings has.
+    /// Sidebands of the dither in the readings, where a noisy drive changes its amplitude and its phase: rms at any
+    /// time, frequency of the dither, full width at half maximum of their spectrum. 0 arcsec: none. At 0 Hz they are
+    /// the noise of the amplitude in a reader whose zero crossings are late.
     Resonance sidebands = {0.0, 0.0, 0.0};
-    /// Error of counts that are latched where the dither adds nothing: a sawtooth of the angle. Under a steady rate its
-    /// harmonics are lines, which the random walk of the counted angle widens: the phase of harmonic m diffuses m^2
-    /// times as fast as that of the first. All but the width follows from the declared reader and the mean rate.
+    /// Error of counts that are latched where the dither adds nothing to the angle: a sawtooth of the angle. Under a
+    /// steady rate its harmonics are lines, which the random walk of the counted angle widens: the phase of harmonic m
+    /// diffuses m^2 times as fast as that of the first. The width is fitted; all other values follow from the declared
+    /// reader and the mean rate.
     struct CountError {
         double step_arcsec = 0.0;  ///< of the count; 0: none
-        double hz = 0.0;           ///< steps that the counted angle passes in a second
+        double hz = 0.0;           ///< steps that the counted angle passes per second
         double width_hz = 0.0;     ///< of the first harmonic, full width at half maximum
         double latch_hz = 0.0;     ///< rate at which counts are latched
-        /// Rms of the angle at which a count is latched, independent from one to the next: it blurs the sawtooth.
+        /// Rms error of the angle at which a count is latched, independent between counts: it blurs the sawtooth.
         double jitter_arcsec = 0.0;
-        int harmonics = 0;  ///< that are states; the others are part of the white error of the readings
+        /// Number of harmonics that are states; the others are part of the white error of the readings.
+        int harmonics = 0;
         double amplitude_arcsec(int harmonic) const;
     };
     CountError count_error = {};
-    /// The variance of the readings' errors goes up and down at that frequency: its logarithm by cos, and by sin.
+    /// The variance of the readings' errors oscillates at that frequency: coefficients of cos and sin in its logarithm.
     double swing_hz = 0.0, swing_cos = 0.0, swing_sin = 0.0;
-    double from_hz = 0.0;        ///< taken at that rate and interpolated; 0: not
-    double blur_arcsec = 0.0;    ///< rms of what interpolated readings are off the straight line
-    double digits_arcsec = 0.0;  ///< the least of it: what the values are written to
-    double from_phase = 0.0;     ///< source intervals from the sample before the record's start to that start
+    double from_hz = 0.0;        ///< rate of the source that the record was interpolated from; 0: not resampled
+    double blur_arcsec = 0.0;    ///< rms deviation of interpolated readings from the straight lines
+    double digits_arcsec = 0.0;  ///< rms of rounding to the digits of the values
+    /// Source intervals from the source's last reading before the record's start to that start.
+    double from_phase = 0.0;
 };
 
 /// A record of samples as a linear system: x' = F x + noise of covariance Q from reading to reading of the instrument,
-/// or of the source that it was resampled from; a sample is h x + error. States: angle, rates, resonances (two each),
-/// of a resampled record two readings.
+/// or of the source of a resampled record; a sample is h x + error. States: angle, rates, resonances (two each), and
+/// two readings of the source in a resampled record.
 struct SampleStates {
     static constexpr int most = 16;
-    static constexpr int dither_states = 3;  ///< of the noise of the dither, behind the angle
+    static constexpr int dither_states = 3;  ///< number of states of the dither's noise
     using Vector = std::array<double, most>;
     using Matrix = std::array<Vector, most>;
-    /// Which of a row of F are not zero.
+    /// Columns of the elements in a row of F that are not zero.
     struct Terms {
         int count = 0;
         std::array<int, most> at{};
@@ -98,31 +103,32 @@ struct SampleStates {
     SampleStates() = default;
     SampleStates(const SampleNoise& noise, double interval_s);
 
-    /// Whether the states are the same, and steps from one to the next: their numbers may differ.
+    /// Whether both systems have the same states and steps, so that they can share vector lanes; their values may
+    /// differ.
     bool is_like(const SampleStates& other) const;
 
     int count = 0;
     bool resampled = false;
-    /// Variance of a kick. The part of a kick that belongs to the next row is the second state, after the angle.
+    /// Variance of a kick. The second state, after the angle, is the part of a kick that belongs to the next row.
     double kick = 0.0;
     std::shared_ptr<const KickRows> kicks;
-    /// The dither's noise: the first of its three states, amplitudes at the last and the next turn and what follows
-    /// them; their variance and memory.
+    /// Noise of the dither: index of the first of its three states (amplitudes at the last and the next turn, and the
+    /// state that follows them), variance and memory of the amplitudes.
     std::shared_ptr<const DitherRows> dither;
     int of_dither = 0;
     double dither_variance = 0.0, dither_memory = 0.0;
     DitherFollower dither_follower;
     bool swings = false;
     double swing_by_row = 0.0, swing_cos = 0.0, swing_sin = 0.0;
-    double floor = 0.0;  ///< variance of the measurement itself
-    double ratio = 0.0;  ///< resampled: source intervals a row
+    double floor = 0.0;  ///< variance of the error of the measurement itself
+    double ratio = 0.0;  ///< resampled: source intervals per row
     double first_place = 0.0;
-    Matrix f{}, q{}, start{};  ///< one interval of the source
-    Vector h{};                ///< of a resampled record: by row
+    Matrix f{}, q{}, start{};  ///< over one interval of the source
+    Vector h{};                ///< of a resampled record, its last two elements differ by row
     std::array<Terms, most> nonzero{};
 };
 
-/// Calls `with` with the number of states as a constant.
+/// Calls `with` with the number of states as a compile-time constant.
 template <int D = 1, class With>
 void for_states(int states, With&& with) {
     if constexpr (D <= SampleStates::most) {

@@ -16,8 +16,8 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Values behind a lag of first order: y' = (x - y)/lag. What is before the first is as they are in the mean over the
-/// first lag, since a single one may be all noise.
+/// Values behind a lag of first order: y' = (x - y)/lag. Before the start, values are taken as the mean over the first
+/// lag, since a single one may be mostly noise.
 std::vector<double> lagged(std::vector<double> values, double interval_s, double lag_s) {
     if (!(lag_s > 0.0)) return values;
     const double kept = std::exp(-interval_s / lag_s);
@@ -28,8 +28,8 @@ std::vector<double> lagged(std::vector<double> values, double interval_s, double
     return values;
 }
 
-/// Cubics through the values within `half` of each, nearer at the ends (Savitzky and Golay, Anal. Chem. 36, 1964,
-/// 1627); the slope is that of a line.
+/// Cubics through the values within `half` of each, fewer at the ends (Savitzky and Golay, Anal. Chem. 36, 1964, 1627);
+/// the slope is that of a straight line.
 struct LocalCubic {
     std::vector<double> value, slope;
 };
@@ -75,7 +75,7 @@ void test_temperature(const SampleFit& fit, Views& views) {
     for (std::size_t i = 0; i < n; ++i) square[i] = t[i] * t[i];
     test_columns(fit, Where::temperature, "rates that follow temperature, its square and its slope",
                  {t, square, series.temperature_slope_k_per_s}, views);
-    // A mass between thermometer and gyro, which may be warmer or colder at the start. Short lags are the slope.
+    // A mass between thermometer and gyro, which may be warmer or colder at the start. Short lags equal the slope.
     const auto lag_s = [&series](std::size_t place) {
         return 0.5 * duration_s(series) * std::pow(1.6, -static_cast<double>(place));
     };
@@ -108,8 +108,8 @@ void test_input(const SampleFit& fit, Views& views) {
     }
     test_columns(fit, Where::rate, "rates that follow the input rate, its square and its cube", {one, square, cube},
                  views);
-    // The instrument that tells the input may be late or early by little, and has noise of its own, which is faster
-    // than the input.
+    // The instrument that measures the input may be early or late by a little, and has noise of its own, which is
+    // faster than the input.
     const auto half = [n](std::size_t place) {
         return std::max<std::size_t>(
             2, static_cast<std::size_t>(0.02 * static_cast<double>(n) * std::pow(3.0, -static_cast<double>(place))));
@@ -126,7 +126,7 @@ void test_input(const SampleFit& fit, Views& views) {
                 {options.samples.residual.input_reaches, columns, said}, views);
 }
 
-/// A bias that goes with the acceleration. What is late smooths the witness as well, whose noise is fast.
+/// A bias that is proportional to the acceleration. A lag smooths the witness as well, whose noise is fast.
 void test_accelerations(const SampleFit& fit, Views& views) {
     const SampleSeries& series = fit.series();
     if (series.witnesses.empty()) return;

@@ -27,7 +27,7 @@ std::optional<RateBeat> find_rate_beat(const SampleFit& fit, const record::Decla
     RateBeat beat;
     beat.hz = std::abs(fringes_hz - steps_hz);
     const int multiples = options.samples.screen.beat_multiples;
-    // Slower than a few cycles over the record it is no line.
+    // A beat slower than a few cycles over the record is not distinguished as a line.
     if (beat.hz * duration_s < options.samples.screen.beat_cycles) return std::nullopt;
     for (int m = 1; m <= multiples; ++m) {
         std::complex<double> sum = 0.0;

@@ -23,7 +23,7 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Rates that go with a power of time, as few of them as the record asks for (Schwarz, Annals of Statistics 6, 1978,
+/// Rates that are polynomials of time, of as few terms as the record requires (Schwarz, Annals of Statistics 6, 1978,
 /// 461).
 void test_powers_of_time(const SampleFit& fit, Views& views) {
     const std::size_t degrees = options.samples.residual.polynomial_degrees;
@@ -55,7 +55,7 @@ void test_powers_of_time(const SampleFit& fit, Views& views) {
                      [powers = std::make_shared<const Columns>(std::move(powers))] { return *powers; }});
 }
 
-/// A rate that goes up and down too slowly for a line.
+/// A rate with an oscillation that is too slow for a line.
 void test_slow_swings(const SampleFit& fit, Views& views) {
     const std::size_t n = fit.series().size();
     const auto periods = [](std::size_t place) { return 0.25 * static_cast<double>(place + 1); };
@@ -75,11 +75,11 @@ void test_slow_swings(const SampleFit& fit, Views& views) {
                 views);
 }
 
-/// A rate that settles after the start.
+/// A rate that settles exponentially after the start.
 void test_settling(const SampleFit& fit, Views& views) {
     const auto& time_s = fit.series().time_s;
     const double duration_s = time_s.back() - time_s.front();
-    // A constant between two of them loses little by either.
+    // A constant between two of these loses little with either.
     const auto constant_s = [duration_s](std::size_t place) {
         return duration_s * std::pow(options.samples.residual.settling_factor, -static_cast<double>(place));
     };
@@ -125,7 +125,7 @@ void test_steps(const SampleFit& fit, Views& views) {
                      [step_at, at] { return Columns{step_at(at)}; }});
 }
 
-/// A rate of one where the shape of stretches is, of zero elsewhere, with the jumps moved to where they explain most.
+/// A rate of one in some stretches and of zero in the others, with the jumps moved to where they explain most.
 std::vector<double> two_level_rate(const SampleFit& fit, const Eigen::VectorXd& shape) {
     const std::size_t n = fit.series().size();
     const auto stretches = static_cast<std::size_t>(shape.size());
@@ -163,8 +163,8 @@ std::vector<double> two_level_rate(const SampleFit& fit, const Eigen::VectorXd& 
     return rate();
 }
 
-/// The normal equations of a regression on the rates of stretches of the record, beside the columns of the model; and
-/// what these take off them.
+/// Normal equations of a regression on the rates of stretches of the record, and the part of them that the columns of
+/// the model explain.
 struct Stretches {
     Eigen::MatrixXd normal, of_columns;
     Eigen::VectorXd right;
@@ -172,7 +172,7 @@ struct Stretches {
 
 Stretches regress_on_stretches(const SampleFit& fit, std::size_t stretches) {
     const std::size_t n = fit.series().size();
-    // The filter forgets: of each stretch's series only what is not negligible.
+    // The filter's response decays: only its part that is not negligible is kept for each stretch.
     struct Response {
         std::size_t from = 0;
         std::vector<float> values;
@@ -192,7 +192,7 @@ Stretches regress_on_stretches(const SampleFit& fit, std::size_t stretches) {
         for (const double x : column) most = std::max(most, std::abs(x));
         std::size_t last = n;
         while (last > 0 && std::abs(column[last - 1]) < 1e-5 * most) --last;
-        // Of a resampled record it begins with the source's interval before.
+        // In a resampled record the response begins with the source's interval before the stretch.
         responses[s].from = n * s / stretches - std::min<std::size_t>(n * s / stretches, 4);
         double sum = 0.0;
         for (std::size_t i = responses[s].from; i < last; ++i) {
@@ -224,7 +224,8 @@ Stretches regress_on_stretches(const SampleFit& fit, std::size_t stretches) {
     return {std::move(normal), cross.transpose() * fit.covariance() * cross, std::move(right)};
 }
 
-/// Gain of the log-likelihood by a rate of two states, the noise fitted anew beside it, less its numbers.
+/// Gain of the log-likelihood by a rate of two states, less the cost of its parameters; the noise is fitted again with
+/// it.
 double merit_of_states(const SampleFit& fit, const TwoStates& first) {
     const std::size_t n = fit.series().size();
     const auto stretches = static_cast<std::size_t>(first.expected.size());
@@ -237,7 +238,7 @@ double merit_of_states(const SampleFit& fit, const TwoStates& first) {
     SampleModel without = fit.model();
     without.noise = SampleFit(fit.series(), std::move(with), fit.rows(), SampleFit::Noise::near).model().noise;
     const SampleFit beside(fit.series(), std::move(without), fit.rows(), SampleFit::Noise::held);
-    // Jumps do not wait for the end of a stretch: as short as has nothing to do with any but its neighbours.
+    // Jumps may be within a stretch: stretches are divided while each is correlated with the adjacent ones only.
     constexpr double little = 1e-3;
     std::size_t finer = 4;
     Stretches all = regress_on_stretches(beside, finer * stretches);
@@ -253,19 +254,19 @@ double merit_of_states(const SampleFit& fit, const TwoStates& first) {
            options.samples.residual.price_of_states;
 }
 
-/// Rates of stretches of the record, for a rate that jumps to and fro.
+/// Rates of stretches of the record, for a rate that jumps between two levels.
 void test_levels(const SampleFit& fit, Views& views) {
     const std::size_t stretches = options.samples.residual.level_stretches;
     const Stretches all = regress_on_stretches(fit, stretches);
     const TwoLevels found = two_levels(all.normal - all.of_columns, all.right);
-    // Jumps do not wait for the end of a stretch.
+    // Jumps may be within a stretch.
     const double cost = found.cost + options.samples.residual.price_of_jump * found.changes;
     SampleView view{
         {Where::time, std::string(jumping_rate), found.p_value, fmt::format("{} jumps", found.changes), found.merit},
         cost,
         [&fit, found] { return Columns{two_level_rate(fit, found.shape)}; }};
-    view.jumps = found.changes > 1;  // one is the library's step
-    // Beside a random rate stretches are not on their own.
+    view.jumps = found.changes > 1;  // a single jump is the step of the library
+    // With a random rate in the model, stretches are not independent.
     if (view.jumps && !fit.model().walk && !fit.model().flicker) {
         const TwoStates states = two_states(all.normal, all.right, found.shape);
         if (states.step != 0.0) view.refitted = [&fit, states](double) { return merit_of_states(fit, states); };

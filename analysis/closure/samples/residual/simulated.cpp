@@ -16,22 +16,22 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Errors of counts at one latching after the other.
+/// Errors of counts at successive latches.
 class CountErrors {
    public:
     CountErrors(const SampleNoise& noise, double latch_hz, random::NormalStream& normal)
         : normal_(normal),
           error_(noise.count_error),
           steps_a_latch_(error_.hz / latch_hz),
-          // The first harmonic of a phase that diffuses by D a second is 2 pi D/q^2 wide. The counted angle has the
-          // random walk of the angle that is read, and that which a compensator has taken from it.
+          // The first harmonic of a phase that diffuses by D a second has the width 2 pi D/q^2. The counted angle has
+          // the random walk of the angle that is read, and the one that a compensator has subtracted from it.
           walk_(std::sqrt(std::max(0.0, error_.width_hz / units::two_pi -
                                             std::pow(noise.rate_arcsec_rt_s / error_.step_arcsec, 2)) /
                           latch_hz)),
-          // Any place within a step.
+          // Uniform within a step.
           angle_(units::two_pi * normal()) {}
 
-    /// \param turned_arcsec  that the angle has turned since the count before, apart from the mean rate
+    /// \param turned_arcsec  rotation since the count before, apart from the mean rate
     void advance(double turned_arcsec) {
         before_ = now_;
         angle_ += steps_a_latch_ + turned_arcsec / error_.step_arcsec + walk_ * normal_();
@@ -52,7 +52,7 @@ class CountErrors {
 
 using Root = Eigen::MatrixXd;
 
-/// A root of a covariance, which may be singular.
+/// A matrix root of a covariance, which may be singular.
 Root root_of(const SampleStates::Matrix& covariance, int count) {
     Eigen::MatrixXd matrix(count, count);
     for (int i = 0; i < count; ++i) {
@@ -68,7 +68,7 @@ Eigen::VectorXd normals(int count, random::NormalStream& normal) {
     return values;
 }
 
-/// The noise with all of the counts' error in the simulated counts, and none in the states and the white errors.
+/// The noise without the error of counts in states and white errors: it is in the simulated counts.
 SampleNoise without_counts(SampleNoise noise) {
     const SampleNoise::CountError& error = noise.count_error;
     double others = error.step_arcsec * error.step_arcsec / 12.0 + error.jitter_arcsec * error.jitter_arcsec;
@@ -80,7 +80,7 @@ SampleNoise without_counts(SampleNoise noise) {
     return noise;
 }
 
-/// Increments of all that is random in the model.
+/// Increments of the random part of the model.
 std::vector<double> simulated_noise(const SampleFit& fit, random::NormalStream& normal) {
     const SampleNoise& noise = fit.model().noise;
     const double interval_s = fit.series().interval_s;
@@ -125,7 +125,7 @@ std::vector<double> simulated_noise(const SampleFit& fit, random::NormalStream& 
     return increments;
 }
 
-/// Views of a record that the model makes.
+/// Residual tests of a record that is simulated by the model.
 Views simulated_views(const SampleFit& fit, double lattice_arcsec, std::uint64_t number) {
     constexpr std::uint64_t seed = 0;
     random::NormalStream normal({seed, number}, random::Purpose::bootstrap);

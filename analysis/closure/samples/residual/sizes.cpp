@@ -26,7 +26,7 @@ void test_size(const SampleFit& fit, Views& views) {
     const std::size_t n = e.size();
     const auto [mean, variance] = squares_of(e, rows);
     views.push_back({size_over_time(e, rows, 40, 20.0)});
-    // Patterns of the place in the record: mean and size for each remainder.
+    // Patterns of the place in the record: mean and mean square for each remainder.
     double least = 1.0;
     std::size_t at = 0;
     const std::size_t most_modulo = options.samples.residual.most_modulo;
@@ -68,22 +68,22 @@ void test_size(const SampleFit& fit, Views& views) {
 
 void test_distribution(const SampleFit& fit, double lattice_arcsec, Views& views) {
     const auto& e = fit.innovations();
-    // Steps that are not small are no normal noise; sums of them are.
+    // Large steps are not normal noise; sums of them are nearly normal.
     const bool steps = lattice_arcsec > options.samples.residual.coarse_lattice * fit.typical_sd();
-    // Between two readings of a whole cycle two kicks have come, which are flatter than normal; sums of many are
-    // normal.
+    // Between two readings of a whole cycle there are two kicks, whose distribution is flatter than a normal one; sums
+    // of many are nearly normal.
     const std::size_t bounded = fit.series().whole_cycles ? 16 : 1;
     if (const auto test = fourth_moments(e, fit.telling(), steps ? 16 : 1, bounded,
                                          [&](std::size_t length) { return expected_excess(fit, length); })) {
         views.push_back({*test});
     }
     if (lattice_arcsec == 0.0 && !fit.series().cycle_counts) {
-        // No two values of so many digits are the same by chance, the largest least of all.
+        // Values with so many digits are not equal by chance, least of all the largest.
         const auto& x = fit.series().increment;
         const double high = *std::max_element(x.begin(), x.end());
         const double low = *std::min_element(x.begin(), x.end());
         const double tolerance = 1e-9 * (high - low);
-        // On one straight line between two readings of a source all are the same.
+        // Values on one straight line between two readings of a source are equal.
         const bool on_lines = fit.model().noise.from_hz > 0.0;
         int ties = 0;
         for (std::size_t i = 0; i < x.size(); ++i) {
@@ -107,7 +107,7 @@ void view_sizes(const SampleFit& fit, double lattice_arcsec, Views& views) {
 Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
     const auto& e = fit.innovations();
     const std::size_t n = e.size();
-    // Of rows that tell something: of a record with many to every reading of its source these are few.
+    // Length by the informative rows, which are few in a record with many samples to every reading of its source.
     std::size_t telling = 0;
     for (std::size_t i = 0; i < n; ++i) telling += rows[i] && !fit.settled(i) ? 1 : 0;
     const SampleResidualOptions& by = options.samples.residual;
@@ -117,7 +117,7 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
     std::vector<double> power(windows, 0.0);
     std::vector<double> freedom(windows, 0.0);
     for (std::size_t w = 0; w < windows; ++w) {
-        // About their mean: a rate that is another than elsewhere disturbs nothing.
+        // Variance about the mean of the window: a different rate in a window is no disturbance.
         double sum = 0.0;
         double squares = 0.0;
         double count = 0.0;
@@ -131,7 +131,7 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
         freedom[w] = count - 1.0;
         power[w] = (squares - sum * sum / count) / freedom[w];
     }
-    // Of those that have rows that count.
+    // Usual variance of the windows with rows that count.
     std::vector<double> sorted;
     for (std::size_t w = 0; w < windows; ++w) {
         if (freedom[w] > 0.0) sorted.push_back(power[w]);
@@ -155,7 +155,7 @@ Disturbed find_disturbed(const SampleFit& fit, const Rows& rows) {
             disturbed.p_value = p;
         }
         if (ratio < by.disturbed_variance || p > by.disturbed_p) continue;
-        // What comes up and goes down reaches into its neighbours.
+        // A disturbance may begin and end in the adjacent windows.
         const std::size_t a = w > 0 ? (w - 1) * length : 0;
         const std::size_t b = w + 2 < windows ? (w + 2) * length : n;
         for (std::size_t i = a; i < b; ++i) disturbed.rows[i] = 1;

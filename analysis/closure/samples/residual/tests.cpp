@@ -42,14 +42,14 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     const auto power = periodogram(e, padded);
     double square = 0.0;
     for (const double x : e) square += x * x;
-    // Frequencies that the rows that count can tell apart, a bin
+    // Independent frequencies of the rows that count, per bin
     const double independent = count / static_cast<double>(padded);
     double chi2 = 0.0;
     double worst = 0.0;
     double worst_ratio = 1.0;
     double worst_hz = 0.0;
     int bands = 0;
-    // Doubling from below, then 32 of equal width.
+    // Bands that double from the lowest frequency on, then 32 bands of equal width.
     double from = 1.0 / independent;
     const double widest = static_cast<double>(power.size()) / 32.0;
     while (from < static_cast<double>(power.size()) - 1.0) {
@@ -77,7 +77,7 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     const FoundLines lines = find_lines(e, fit.series().rate_hz);
     const FoundLine line = lines.likeliest();
     const double cost = 3.0 + std::log(line.searched);
-    // A line whose power is scattered explains as much as follows it from stretch to stretch.
+    // A scattered line explains as much as a model that follows it from stretch to stretch.
     const double gain = 0.5 * std::max(line.chi2, lines.scattered);
     double p = line.p_value;
     bool coherent = line.chi2 >= lines.scattered;
@@ -86,7 +86,7 @@ void test_spectrum(const SampleFit& fit, Views& views) {
                                                             : LineCourse::still(line.frequency_hz);
         const SampleLine refined = refine_line(fit, shown);
         coherent = !scatters(fit, e, lines, refined);
-        // The level about a line is itself a random number: what the regression says counts as well.
+        // The level about a line is itself random, so that the p-value of the regression counts as well.
         if (coherent) p = std::max(p, of_several(chi2_tail(refined.chi2, 2), line.searched));
     }
     SampleView view{{Where::frequency, "lines, still and drifting", p,
@@ -100,8 +100,8 @@ void test_spectrum(const SampleFit& fit, Views& views) {
         };
     }
     if (!coherent) {
-        // Power over the level in pieces is no likelihood: of a strong line it is far more. What follows it is a
-        // resonance.
+        // Power over the level in pieces is no likelihood: for a strong line it is far more. The model of a scattered
+        // line is a resonance.
         const double squares = std::inner_product(e.begin(), e.end(), e.begin(), 0.0);
         const auto rows = static_cast<double>(std::count_if(e.begin(), e.end(), [](double x) { return x != 0.0; }));
         const double share = std::min(lines.scattered_squares / std::max(squares, 1e-300), 1.0 - 1e-9);
@@ -114,11 +114,11 @@ void test_spectrum(const SampleFit& fit, Views& views) {
     views.push_back(std::move(view));
 }
 
-/// A line that is not what it was: its amplitudes in stretches. Of the cosine in that column.
+/// Variation of a line over the record, by its amplitudes in stretches. `cosine` is the column of its cosine.
 struct OverTime {
     double p_value = 1.0;  ///< by chance
     double power = 0.0;    ///< chi-squared of the line
-    double off = 0.0;      ///< chi-squared of what the stretches have beside it, less what chance leaves
+    double off = 0.0;      ///< chi-squared of the stretches in addition to the line, less its expectation by chance
 };
 OverTime line_over_time(const SampleFit& fit, std::size_t cosine) {
     const std::size_t stretches = options.samples.residual.line_stretches;

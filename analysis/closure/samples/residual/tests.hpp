@@ -7,49 +7,49 @@
 
 namespace ringlock::closure {
 
-/// Stretches of the record whose residual is far larger than usual: 1 for each row in one.
+/// Stretches of the record whose residual is much larger than usual (outlier stretches): 1 for each row in one.
 struct Disturbed {
     Rows rows;
     double share = 0.0;
     double worst = 1.0;     ///< largest mean square over the usual one
-    double at_s = 0.0;      ///< where
+    double at_s = 0.0;      ///< time of the largest
     double length_s = 0.0;  ///< of a stretch
-    double p_value = 1.0;   ///< of the worst, if the residual were normal
+    double p_value = 1.0;   ///< of the largest mean square, for a normal residual
 };
-/// \param rows  that are looked at
+/// \param rows  rows to be tested
 Disturbed find_disturbed(const SampleFit& fit, const Rows& rows);
 
-/// A residual test of samples and the columns, as series of increments, that it regresses them on.
+/// A residual test of samples, with the columns of its regression as series of increments.
 using SampleView = View<std::vector<double>>;
 
-/// The view of a variance that goes up and down evenly.
+/// The test of a variance that oscillates.
 inline constexpr std::string_view repeating_variance = "variance and covariance that repeat";
 
-/// The view of a rate that jumps to and fro between two levels.
+/// The test of a rate that jumps between two levels.
 inline constexpr std::string_view jumping_rate = "a rate that jumps between two levels";
 
-/// The view of a rate that goes with accelerations.
+/// The test of a rate that is proportional to accelerations.
 inline constexpr std::string_view followed_witnesses = "rates that follow the witnesses";
 
-/// Holds the innovations that count against everything that the record has: time, frequency, the place in the record
-/// modulo small numbers, witnesses, temperature, input rate, their own size. The views refer to the fit.
-/// \param lattice_arcsec  steps of the values, which are not normal then
+/// Tests the innovations that count against all quantities of the record: time, frequency, the place in the record
+/// modulo small numbers, witnesses, temperature, input rate, their own size. The tests refer to the fit.
+/// \param lattice_arcsec  quantisation of the values, with which they are not normal
 std::vector<SampleView> view_samples(const SampleFit& fit, double lattice_arcsec);
 
-/// The line of the model that keeps amplitude and phase least.
+/// The line of the model whose amplitude and phase vary most.
 struct UnsteadyLine {
-    int step = -1;  ///< of the loop that added it; -1: there is none
+    int step = -1;  ///< step of the loop that added it; -1: there is none
     double hz = 0.0;
     double p_value = 1.0;
-    double off = 0.0;     ///< power of its changes over that of the line
-    double beside = 0.0;  ///< power of another line within beside_hz of it, over its own
+    double off = 0.0;     ///< power of its variations relative to that of the line
+    double beside = 0.0;  ///< power of another line within beside_hz of it, relative to that of the line
 };
 UnsteadyLine unsteady_line(const SampleFit& fit);
 
-/// The model with the view's regression, the noise fitted anew beside it.
+/// The model with the regression of a residual test, the noise fitted again with it.
 SampleFit fit_beside(const SampleFit& fit, const SampleView& view);
 
-/// Gain of the log-likelihood by that, less the view's cost.
+/// Gain of the log-likelihood by that regression, less its cost.
 double refitted_merit(const SampleFit& fit, const SampleView& view);
 
 }  // namespace ringlock::closure

@@ -6,30 +6,30 @@
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/closure/samples/residual/tests.hpp"
 
-/// The views of a residual of samples, by what they look at: view_samples() puts them together.
+/// Residual tests of samples, by their subject; view_samples() collects them.
 namespace ringlock::closure {
 
 using Columns = std::vector<std::vector<double>>;
 using Views = std::vector<SampleView>;
 
-/// Rates as the record has them.
+/// Series of rates as the record contains them.
 Columns taken_by(const SampleFit& fit, const Columns& columns);
 
-/// Rates of which one is looked for at so many places.
+/// Rates with a free place or time constant, which is searched.
 struct Places {
     std::size_t count;
     std::function<Columns(std::size_t place)> columns;
     std::function<std::string(std::size_t place)> said;
-    int courses = 0;  ///< of the view
+    int courses = 0;  ///< trends in time that the test contains
 };
-/// The view of the place where a regression on its columns explains most, each column and the place a parameter.
+/// The test at the place where a regression on its columns explains most; each column and the place are parameters.
 void test_places(const SampleFit& fit, Where where, const std::string& view, const Places& of, Views& views);
 
-/// Its size: over the record, at places modulo small numbers, as it repeats; its distribution.
+/// Size of the residual: over the record, by place modulo small numbers, its repetition; its distribution.
 void view_sizes(const SampleFit& fit, double lattice_arcsec, Views& views);
-/// Rates: with time; steps; two levels; jumps of a rate that wanders.
+/// Rates: trends in time; steps; two levels; jumps next to a random rate.
 void view_rates(const SampleFit& fit, Views& views);
-/// Rates that follow another column of the record: temperature, input rate, accelerations; at once or late.
+/// Rates that follow another column of the record: temperature, input rate, accelerations; immediately or with a lag.
 void view_followed(const SampleFit& fit, Views& views);
 
 }  // namespace ringlock::closure

@@ -41,7 +41,7 @@ std::shared_ptr<SampleFit> RoundedSamples::begin(const SampleFit& fit, double st
     double& angle = model.noise.angle_arcsec;
     angle = std::sqrt(std::max(angle * angle - variance_of_steps(step_), least * least * step_ * step_));
     SampleFit now(series_, std::move(model), fit.rows(), SampleFit::Noise::held);
-    // The rate's noise may have grown by what the rounding is on the way from one step to the next.
+    // The noise of the rate may contain the error of rounding between two steps of the values.
     filters_ = filters_for(step_, now.sd(measured_.size() / 2));
     summit_ = towards_summit(now, rounded(), of.first_look, of.climbs_at_start);
     wandering_.reset();
@@ -66,8 +66,8 @@ std::shared_ptr<SampleFit> RoundedSamples::draw(std::shared_ptr<SampleFit> fit, 
     return draw_by(drawing, beside_walk ? fit->model() : drawing, fit->rows());
 }
 
-/// By how much the variance of a rate that walks grows, as means of stretches differ from one to the next; zero where
-/// white noise alone may do that.
+/// Growth of the variance of a random walk of the rate, from the differences between means of successive stretches;
+/// zero where white noise alone may cause them.
 double RoundedSamples::wander(const SampleFit& fit) const {
     constexpr std::size_t stretches = options.samples.rounded.stretches;
     const std::vector<double> known = fit.determined();
@@ -88,8 +88,8 @@ double RoundedSamples::wander(const SampleFit& fit) const {
     return squares > options.samples.rounded.wanders * white ? 1.5 * squares / length_s : 0.0;
 }
 
-/// What the model lacks is drawn as its noise makes it. A slow rate that it lacks is drawn beside a walk, which follows
-/// it, where that is likelier by far.
+/// Imputations follow the noise of the model. Where the model lacks a slow rate, and a random walk, which follows that
+/// rate, makes the increments likelier by far, they are imputed with the walk.
 SampleModel RoundedSamples::likeliest(const SampleFit& fit) {
     summit_ = find_summit(fit, rounded(), options.samples.rounded.climbs, near(fit.model()));
     const double walk = fit.model().walk || fit.model().flicker ? 0.0 : wander(fit);
@@ -173,7 +173,7 @@ SampleFigures RoundedSamples::figures_of(const SampleFit& fit,
             combine([s, k](SampleFigures& of) -> Estimate& { return of.steps[s][k]; });
         }
     }
-    // Draws by one model are less apart than models that would do.
+    // Imputations by one model differ less than models that are nearly as likely.
     const SampleNoise& noise = summit.model.noise;
     const auto known_to = [&](Estimate& estimate, double value, std::size_t of) {
         if (!std::isfinite(summit.noise_log_sd[of])) return;

@@ -14,31 +14,32 @@
 
 namespace ringlock::closure {
 
-/// The increments of a record as they were measured, and in their place, where they come in steps whose rounding shows
-/// the angle, increments that are drawn from them: all that fits and tests then sees noise that is normal.
+/// Increments of a record as measured, and imputed increments in their place where steps are so large that their
+/// rounding follows the angle: fits and tests then see normal noise.
 class RoundedSamples {
    public:
     explicit RoundedSamples(SampleSeries& series) : series_(series), measured_(series.increment) {}
 
-    /// Those that were measured.
+    /// Puts the measured increments back.
     void restore();
     bool drawn() const { return step_ > 0.0; }
     double step_arcsec() const { return step_; }
-    /// Whether such steps show the angle beside what is left of the fit's noise without their variance.
+    /// Whether the rounding to such steps follows the angle, given the residual of the fit without the variance of the
+    /// steps.
     static bool show(const SampleFit& fit, double step_arcsec);
-    /// Draws them: the fit to what was drawn.
+    /// Imputes the increments; the fit is to the imputed ones.
     std::shared_ptr<SampleFit> begin(const SampleFit& fit, double step_arcsec);
-    /// The same, drawn by another model: what was rounded is drawn by it and the model fitted to that, a stochastic
-    /// approximation of the likeliest (Celeux and Diebolt, Comput. Stat. Q. 2, 73, 1985), which is then looked for by
-    /// what was rounded itself.
+    /// Imputes the increments again by another model. Imputations and fits to them alternate, as a stochastic
+    /// approximation of the maximum of the likelihood (Celeux and Diebolt, Comput. Stat. Q. 2, 73, 1985); then the
+    /// likelihood of the measured increments is maximised.
     std::shared_ptr<SampleFit> draw(std::shared_ptr<SampleFit> fit, int rounds);
-    /// Whether the measured increments are off what is foretold of them by as much as that says.
+    /// Whether the errors of the predictions of the measured increments agree with their variances.
     ResidualTest test(const SampleFit& fit) const;
-    /// Of the measured increments.
+    /// Prediction errors and likelihood of the measured increments.
     SampleScore score_of(const SampleFit& fit, const Rows& reported) const;
-    /// The mean of several, each of increments that were drawn by the likeliest model; what they are apart counted
-    /// (Rubin, "Multiple Imputation for Nonresponse in Surveys", 1987, equation 3.1.5), and how sharp the likelihood of
-    /// what was rounded is.
+    /// Mean over several imputations by the most likely model, with the spread between them in the standard errors
+    /// (Rubin, "Multiple Imputation for Nonresponse in Surveys", 1987, equation 3.1.5), and with the curvature of the
+    /// likelihood of the measured increments.
     SampleFigures figures_of(const SampleFit& fit, const std::function<SampleFigures(const SampleFit&)>& figures);
 
    private:
@@ -53,8 +54,8 @@ class RoundedSamples {
     double step_ = 0.0;
     std::size_t filters_ = 0;
     std::uint64_t draws_ = 0;
-    std::optional<RoundedSummit> summit_;     ///< that was found last
-    std::optional<RoundedSummit> wandering_;  ///< beside a walk that the model lacks
+    std::optional<RoundedSummit> summit_;     ///< the last one
+    std::optional<RoundedSummit> wandering_;  ///< with a random walk that the model lacks
 };
 
 }  // namespace ringlock::closure

@@ -11,7 +11,7 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Steps that are no more, in standard errors, are the last.
+/// A step of at most so many standard errors is the last.
 constexpr double little = 0.5;
 
 class Climb {
@@ -26,11 +26,11 @@ class Climb {
     const SampleModel& model() const { return model_; }
     double log_likelihood() const { return here_; }
 
-    /// All noises by one parabola; how far, in standard errors.
+    /// Moves all noises by one parabola; returns the distance in standard errors.
     double climb_noises();
     const std::vector<double>& noise_log_sd() const { return noise_log_sd_; }
-    /// Columns, by one parabola for each direction that would be independent of the others, were the increments known;
-    /// how far, in standard errors.
+    /// Moves the columns, by one parabola for each direction that would be independent of the others if the increments
+    /// were known; returns the distance in standard errors.
     double climb_columns();
     const std::vector<double>& column_times() const { return column_times_; }
 
@@ -53,7 +53,7 @@ class Climb {
     std::size_t noises() const {
         return (random() ? 3U : 2U) + model_.noise.resonances.size() + (model_.motion.empty() ? 0U : 1U);
     }
-    /// Their logarithms moved by so many lengths.
+    /// The noises with their logarithms moved by `lengths` in units of log_length_.
     SampleModel with_noises(const Eigen::VectorXd& lengths) const;
     SampleModel with_columns(const Eigen::VectorXd& moved) const;
     void climb_to(SampleModel&& model, double log_likelihood) {
@@ -66,13 +66,14 @@ class Climb {
     const std::size_t until_;
     SampleModel model_;
     double here_ = 0.0;
-    double off_by_ = least_off;  ///< differences of the log-likelihoods, about
-    double wanted_bend_ = 0.0;   ///< of a length
+    double off_by_ = least_off;  ///< typical error of a difference of log-likelihoods
+    double wanted_bend_ = 0.0;   ///< curvature over a length
     Eigen::VectorXd log_length_;
     std::vector<double> noise_log_sd_, column_times_;
 };
 
-/// The filters' log-likelihood of nearly the same model is not nearly the same, least of all where many rates walk.
+/// The log-likelihood of the filters is rough: it varies between nearly equal models, most of all with strong random
+/// rates.
 void Climb::measure_roughness() {
     constexpr double nothing = 0.005;  // lengths
     constexpr double most_off = 4.0;
@@ -174,7 +175,7 @@ double Climb::climb_noises() {
     for (Eigen::Index j = 0; j < m; ++j) {
         const auto along = axes.eigenvectors().col(j);
         const double bends = axes.eigenvalues()(j);
-        // Where it is no summit that bends, uphill all the same
+        // Where the curvature is not that of a maximum, the step is still uphill.
         const double stiff = std::max(std::abs(bends), softest);
         lengths += std::clamp(slope.dot(along) / stiff, -most, most) * along;
         for (Eigen::Index i = 0; i < m; ++i) {
@@ -197,7 +198,7 @@ double Climb::climb_noises() {
     for (Eigen::Index i = 0; i < m; ++i) {
         if (bend(i, i) <= 0.0) continue;
         const double length = std::min(log_length_(i) * std::sqrt(wanted_bend_ / bend(i, i)), first_log);
-        // A parabola of that many standard errors is none: once more.
+        // The parabola extended over too many standard errors: repeat with a shorter one.
         if (length < 0.4 * log_length_(i)) furthest = std::max(furthest, 1.0);
         log_length_(i) = length;
     }
@@ -205,7 +206,7 @@ double Climb::climb_noises() {
 }
 
 double Climb::climb_columns() {
-    constexpr double first_length = 3.0;  // standard errors, were the increments known
+    constexpr double first_length = 3.0;  // standard errors with known increments
     constexpr int doublings = 3;
     const double enough = 5.0 * off_by_;
     constexpr double reach = 3.0;
@@ -213,7 +214,7 @@ double Climb::climb_columns() {
     const Eigen::Index m = known.rows();
     const Eigen::VectorXd scale = known.diagonal().cwiseMax(1e-300).cwiseSqrt();
     const Eigen::MatrixXd correlation = scale.cwiseInverse().asDiagonal() * known * scale.cwiseInverse().asDiagonal();
-    // Of all independent directions those nearest to the columns: steps hide a line's amplitude, and not the mean rate.
+    // Independent directions nearest to the columns: steps hide the amplitude of a line, and not the mean rate.
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(correlation);
     const Eigen::MatrixXd root = axes.eigenvectors() * axes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
                                  axes.eigenvectors().transpose();
@@ -227,7 +228,7 @@ double Climb::climb_columns() {
     double furthest = 0.0;
     std::vector<Along> all;
     for (Eigen::Index j = 0; j < m; ++j) all.push_back({scale.asDiagonal() * root.col(j), first_length});
-    // Further where the increments say little
+    // Longer where the increments carry little information
     for (int k = 0; k <= doublings; ++k) {
         std::vector<Along*> open;
         std::vector<SampleModel> beside;
@@ -247,11 +248,11 @@ double Climb::climb_columns() {
         }
     }
     for (const Along& along : all) {
-        // What bends less than the likelihood is off by is not seen to bend.
+        // A curvature below the error of the likelihood is not measured.
         const double bend = std::max(along.bend, 2.0 * off_by_ / (along.length * along.length));
         moved += std::clamp(along.slope / bend, -reach * along.length, reach * along.length) * along.direction;
         furthest = std::max(furthest, std::abs(along.slope) / std::sqrt(bend));
-        // Rounding hides, it does not tell.
+        // Rounding loses information and does not add any.
         rounded += along.direction * along.direction.transpose() / std::min(bend, 1.0);
     }
     bool higher = false;

@@ -6,27 +6,26 @@
 #include "analysis/closure/samples/fit/fit.hpp"
 #include "analysis/closure/samples/rounded/unrounding.hpp"
 
-/// Where the likelihood of rounded increments is largest, and how sharp it is there. Increments that are drawn within
-/// their steps hardly move a model where the steps hide most of what tells: each fit to them goes a small part of the
-/// way.
+/// Maximum of the likelihood of rounded increments, and its curvature there. Imputed increments hardly move a model
+/// where the steps hide most of the information: each fit to them goes a small part of the way.
 namespace ringlock::closure {
 
 struct RoundedSummit {
     SampleModel model;
     double log_likelihood = 0.0;
     /// Standard errors of the logarithms of the noises: white angle, white rate, random rate where there is one,
-    /// resonances, what a witness tells of a motion; not finite where the increments say nothing of them.
+    /// resonances, predicted motion of the case; not finite where the increments do not determine them.
     std::vector<double> noise_log_sd;
-    /// Of each column, its standard error over that which it would have were the increments known.
+    /// For each column: its standard error relative to that with known increments.
     std::vector<double> column_times;
 };
 
-/// Noises alone, from afar, by the increments up to that row; of columns it says nothing.
-/// \param near  of a model like it, or nothing: its noises are begun with where they are likelier
+/// Noises alone, from a distant start, by the increments up to row `until`; columns are unchanged.
+/// \param near  maximum for a similar model, or null: its noises are the start where they are likelier
 RoundedSummit towards_summit(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until, int most_rounds,
                              const RoundedSummit* near = nullptr);
 
-/// Noises and columns of a model that is near it.
+/// Noises and columns, from a model near the maximum.
 RoundedSummit find_summit(const SampleFit& fit, const RoundedIncrements& rounded, int most_rounds,
                           const RoundedSummit* near = nullptr);
 

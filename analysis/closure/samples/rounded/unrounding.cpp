@@ -42,15 +42,15 @@ class Mixture {
    public:
     enum class Paths { kept, forgotten };
     Mixture(const SampleFit& fit, const RoundedIncrements& rounded, std::uint64_t seed, Paths paths);
-    /// Goes on to the next increment, and draws its reading.
+    /// Processes the next increment and draws its reading.
     void go_on();
-    /// The increment that comes next.
+    /// Distribution of the next increment.
     void foretell(Foretold& foretold) const;
     std::vector<double> path();
     double log_probability() const { return log_probability_; }
 
    private:
-    /// Of the filters' readings of that row; the same for all where paths are not kept.
+    /// Start of the filters' readings at that row; the same for all rows where paths are not kept.
     std::size_t at_row(std::size_t row) const { return drawn_.size() > count_ ? row * count_ : 0; }
     double uniform() { return boost::random::uniform_01<double>()(generator_); }
     void advance();
@@ -65,16 +65,16 @@ class Mixture {
     std::vector<double> no_noise_;
     std::size_t row_ = 0;
     double total_ = 0.0;       ///< of the rounded increments
-    double determined_ = 0.0;  ///< of what is no noise
+    double determined_ = 0.0;  ///< of the deterministic part
     double log_probability_ = 0.0;
     std::vector<float> drawn_;          ///< all readings, within their steps
-    std::vector<std::uint8_t> parent_;  ///< whom each continued
+    std::vector<std::uint8_t> parent_;  ///< index of the filter that each continued
     SampleFilter::Many filters_;
     std::vector<double> weight_;
     std::vector<double> foretold_;    ///< next reading
     std::vector<double> innovation_;  ///< of the last reading
     std::vector<double> low_, share_, probability_;
-    std::vector<std::uint64_t> key_;  ///< place of a filter among all, and in the last byte which it is
+    std::vector<std::uint64_t> key_;  ///< rank of a filter by its prediction, with its index in the last byte
     hwy::Sorter sorter_;
     std::vector<std::uint8_t> from_;
 };
@@ -119,9 +119,9 @@ void Mixture::advance() {
     draw_anew();
 }
 
-/// Evenly along the sum of the weights (Kitagawa, J. Comput. Graph. Stat. 5, 1, 1996), in the order of what they
-/// foretell and of the same random numbers whatever the model: that makes the likelihood a nearly smooth function of it
-/// (Malik and Pitt, J. Econom. 165, 190, 2011).
+/// Resamples the filters, evenly along the sum of the weights (Kitagawa, J. Comput. Graph. Stat. 5, 1, 1996), in the
+/// order of their predictions and with the same random numbers for every model: the likelihood is then a nearly smooth
+/// function of the model (Malik and Pitt, J. Econom. 165, 190, 2011).
 void Mixture::draw_anew() {
     constexpr double same = 1e-9;
     constexpr double places = 0x1p54;
@@ -174,7 +174,7 @@ void Mixture::go_on() {
     advance();
 }
 
-/// Minus the logarithm of the density at the bound that is nearest.
+/// Minus the logarithm of the density at the nearest bound.
 double Mixture::distance(double width) const {
     double nearest = std::numeric_limits<double>::infinity();
     for (const double low : low_) nearest = std::min(nearest, std::max({low, -low - width, 0.0}));

@@ -6,7 +6,7 @@
 
 #include "analysis/closure/samples/fit/fit.hpp"
 
-/// Readings in steps that are not small beside their noise. Their rounding is no noise of its own: it follows the
+/// Readings in steps that are not small against their noise. Their rounding is not an independent noise: it follows the
 /// angle.
 namespace ringlock::closure {
 
@@ -14,33 +14,34 @@ namespace ringlock::closure {
 struct RoundedIncrements {
     std::span<const double> arcsec;
     double step_arcsec;
-    /// How many Kalman filters go through them, 256 at most. Log-likelihoods that are compared want as many.
+    /// Number of Kalman filters, 256 at most. Log-likelihoods that are compared need the same number.
     std::size_t filters;
 };
 
-/// As many as hit the moments at which the angle crosses a step beside that noise: the rarer, the more.
+/// Number of filters that resolves the moments at which the angle crosses a step, given that noise: the rarer, the
+/// more.
 std::size_t filters_for(double step_arcsec, double sd_arcsec);
 
-/// What increments may have been before they were rounded, drawn: by a mixture of Kalman filters (Chen and Liu, J. R.
-/// Stat. Soc. B 62, 493, 2000). Each draws every reading from what it foretells within the step that was recorded, and
-/// they are drawn anew by how probable they made it. The increments are one path through them: where the model is true
-/// they are as probable as those that were rounded.
+/// Imputes increments before rounding, by a mixture of Kalman filters (Chen and Liu, J. R. Stat. Soc. B 62, 493, 2000).
+/// Each filter draws every reading from its prediction, within the step that was recorded; the filters are resampled by
+/// the probabilities that they gave to the step. One path through them is returned. If the model is true it is
+/// distributed as the increments before rounding.
 std::vector<double> unround(const SampleFit& fit, const RoundedIncrements& rounded, std::uint64_t seed);
 
-/// Of each rounded increment, by those before it, as the same filters foretell it.
+/// Distribution of each rounded increment, predicted by the same filters from the increments before it.
 struct Foretold {
     std::vector<double> mean, variance, fourth_moment, log_probability;
 };
 Foretold foretell_rounded(const SampleFit& fit, const RoundedIncrements& rounded);
 
-/// Log-likelihood of the rounded increments up to that row, of those that count in the fit. By chance it is off by
-/// some units, but for models near each other nearly by the same: a difference of ten by a few tenths, up to two where
-/// steps are sixty times the noise.
+/// Log-likelihood of the rounded increments up to row `until`, over rows that count in the fit. It has a random error
+/// of some units, which is nearly the same for models near each other: a difference of ten has an error of a few
+/// tenths, and of up to two where steps are sixty times the noise.
 double log_likelihood_of_rounded(const SampleFit& fit, const RoundedIncrements& rounded, std::size_t until);
 
-/// Whether steps are so large that their rounding shows the angle: the first harmonic of the rounding, of which noise
-/// of that standard deviation leaves exp(-2 pi^2 sd^2/step^2) (Widrow and Kollar, "Quantization Noise", 2008, chapter
-/// 5).
+/// Whether steps are so large that their rounding follows the angle, by the first harmonic of the rounding: noise of
+/// that standard deviation reduces it to exp(-2 pi^2 sd^2/step^2) (Widrow and Kollar, "Quantization Noise", 2008,
+/// chapter 5).
 bool rounding_shows(double step_arcsec, double sd_arcsec);
 
 }  // namespace ringlock::closure

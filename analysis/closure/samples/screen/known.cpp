@@ -16,7 +16,7 @@ using effects::Role;
 
 namespace {
 
-/// The line's frequency in the middle of the record and its derivatives, free up to the last that is not zero.
+/// The line's frequency in the middle of the record and its derivatives; free up to the last that is not zero.
 LineCourse course_of(const ActiveEffect& active) {
     const auto parameters = parameters_of(*active.effect, Role::frequency);
     LineCourse course = LineCourse::still(value_of(active.values, *parameters[0]));

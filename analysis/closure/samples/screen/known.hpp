@@ -6,14 +6,14 @@
 
 namespace ringlock::closure {
 
-/// A model with effects whose values are known at least roughly, for a fit to start from.
+/// A model with effects whose values are known at least roughly, as the start of a fit.
 struct KnownEffects {
     SampleModel model;
     std::vector<AddedEffect> added;  ///< all of them; a motion is not in the model yet, but its witness is known
-    SampleFit::Noise noise;          ///< how its noise is to be fitted
+    SampleFit::Noise noise;          ///< how the noise of the model is to be fitted
 };
 
-/// \param base  the model that they are added to, fitted
+/// \param base  fitted model to which they are added
 KnownEffects known_effects(const SampleFit& base, const std::vector<ActiveEffect>& effects);
 
 }  // namespace ringlock::closure

@@ -24,12 +24,12 @@ std::shared_ptr<const std::vector<double>> shared(std::vector<double> values) {
     return std::make_shared<const std::vector<double>>(std::move(values));
 }
 
-/// The model has columns of the effect.
+/// Whether the model has columns of the effect.
 bool has(const SampleModel& model, const effects::Effect* effect) {
     return std::any_of(model.columns.begin(), model.columns.end(), [&](const auto& c) { return c.effect == effect; });
 }
 
-/// The model has columns of effects that show in this way.
+/// Whether the model has columns of effects that act in this way.
 bool has(const SampleModel& model, OnSamples as) {
     return std::any_of(model.columns.begin(), model.columns.end(),
                        [&](const auto& c) { return c.effect != nullptr && on_samples(*c.effect) == as; });
@@ -39,8 +39,8 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     const SampleScreenOptions& by = options.samples.screen;
     const std::size_t n = in.series.size();
     const SampleModel& model = now.model();
-    // Where the model has left something, slow sums move more than white innovations would let them: by that much less
-    // is a slow rate's chi-squared worth.
+    // Where the residual has structure, slow sums have a larger variance than those of white innovations. The
+    // chi-squared of a slow rate is divided by that ratio.
     double spread = 0.0;
     double sums = 0.0;
     const std::size_t length = std::max(by.slow_rows, n / by.slow_parts);
@@ -69,7 +69,7 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     for (SampleColumn& column : rate_columns(in.series)) one(std::move(column));
     auto candidate = candidate_of(OnSamples::step);
     if (!candidate || has(model, OnSamples::step)) return;
-    // Steps: everywhere, coarsely, then about the best.
+    // Steps: at all places of a coarse grid, then about the best one.
     std::vector<double> roots;
     double best = 0.0;
     std::size_t at = 0;
@@ -92,7 +92,8 @@ void screen_rates(const SampleFit& now, const SampleContext& in, std::vector<Sam
     at = refine_place(now, at, n / places / 2);
     best = root_of_worth * std::abs(root_of_step(now, at));
     c.searched = places_of_step(best * best, 0.5 / static_cast<double>(places));
-    // One that is forgotten within less than there is between these places shows at its own only.
+    // With a random rate, a step that decays within less than the distance of these places is visible near its time
+    // only.
     const auto jump = jump_beside_random(now);
     if (jump && jump->length < n / places) {
         const std::size_t place = refine_place(now, jump->row, jump->length);
@@ -117,14 +118,14 @@ void screen_noises(const SampleFit& now, const SampleContext& in, std::vector<Sa
         const SampleFit fit(in.series, std::move(model), in.rows, SampleFit::Noise::near);
         const double chi2 = std::max(0.0, 2.0 * fit.gain_over(now));
         candidate->model = fit.model();
-        // A variance cannot be negative: half of the time there is no gain at all (Chernoff 1954).
+        // A variance cannot be negative: the gain is zero with probability one half (Chernoff 1954).
         candidate->p_value = 0.5 * chi2_tail(chi2, 1);
         out.push_back(*std::move(candidate));
     };
     const double duration_s = static_cast<double>(in.series.size()) * in.series.interval_s;
     const double known =
         now.model().noise.rate_arcsec_rt_s / std::sqrt(duration_s) + now.model().noise.angle_arcsec / duration_s;
-    // Only where sums over long stretches move more than the white noises let them.
+    // Only where sums over long stretches vary more than white noises make them vary.
     {
         std::vector<std::vector<double>> slow;
         for (int k = 1; k <= options.samples.screen.slow_cosines; ++k) {
@@ -138,7 +139,7 @@ void screen_noises(const SampleFit& now, const SampleContext& in, std::vector<Sa
             const auto score = now.score(cosines);
             return chi2_tail(score.chi2, score.rank) <= options.samples.screen.random_rate_p;
         };
-        // Of a random walk a short record shows one slow move at most, the first cosine.
+        // A short record shows one slow change of a random walk at most, the first cosine.
         const bool is_short = duration_s < options.samples.contest.trend_determined_s;
         if (!moves(slow) && !(is_short && moves({slow.front()}))) return;
     }
@@ -157,8 +158,8 @@ void screen_noises(const SampleFit& now, const SampleContext& in, std::vector<Sa
     }
 }
 
-/// A motion in proportion to a witness, and a quarter of a cycle later, without slow drifts: two numbers show a weak
-/// motion that a response of many lags would not.
+/// A motion in proportion to a witness, and a quarter of a cycle later, without slow drifts: these two numbers show a
+/// weak motion better than a response of many lags.
 std::optional<SampleCandidate> weak_motion(const SampleFit& now, const SampleContext& in) {
     double best = 0.0;
     std::size_t at = 0;
@@ -191,7 +192,7 @@ void screen_witnesses(const SampleFit& now, const SampleContext& in, std::vector
     if (in.series.witnesses.empty() || !now.model().motion.empty() || has(now.model(), OnSamples::motion)) return;
     const auto weak = weak_motion(now, in);
     FoundWitness witness = find_witness(now.innovations(), in.rows, in.series);
-    // A motion of few frequencies shows by two numbers first, however strong it is.
+    // A motion of few frequencies is shown by two numbers first, even if it is strong.
     if (weak && !(witness.p_value < weak->p_value)) {
         witness.p_value = weak->p_value;
         witness.index = weak->witness;
@@ -226,9 +227,9 @@ std::vector<SampleColumn> rate_columns(const SampleSeries& series, std::span<con
     const bool warms = !series.temperature_change_k.empty();
     const bool turns = !series.input_rate_deg_h.empty();
     const std::size_t last = series.size() - 1;
-    // What the record was exposed to in that row. Temperatures and input rates are those of the middle of the interval.
-    // Temperatures change over it by the slope of the series, input rates by that from the row before to the row
-    // behind.
+    // Exposure of the record in that row. Temperatures and input rates are those of the middle of the interval. Over
+    // the interval, temperatures change by the slope of the series, input rates by the slope from the row before to the
+    // row after.
     const auto exposure = [&](std::size_t row) {
         effects::Interval at{.start_s = static_cast<double>(row) * series.interval_s, .duration_s = series.interval_s};
         const auto ends = [](double middle, double half, double(&both)[2]) {
@@ -253,7 +254,7 @@ std::vector<SampleColumn> rate_columns(const SampleSeries& series, std::span<con
         const auto angle = unit_angle(*effect);
         std::vector<double> values(series.size());
         for (std::size_t i = 0; i < values.size(); ++i) values[i] = angle(exposure(i));
-        // A rate that does not change is part of the mean rate.
+        // A constant rate is part of the mean rate.
         const auto [low, high] = std::minmax_element(values.begin(), values.end());
         if (!(*high > *low)) continue;
         columns.push_back({.effect = effect,

@@ -11,69 +11,68 @@
 
 namespace ringlock::closure {
 
-/// One effect that may be added to a model of samples: as the screening found it, and as it turned out when it was
-/// fitted in full.
+/// An effect that may be added to a model of samples: the result of the score test, and that of the full fit.
 struct SampleCandidate {
     const effects::Effect* effect = nullptr;
     SampleModel model = {};  ///< to be fitted
     double p_value = 1.0;
+    /// Look-elsewhere factor of the search.
     double searched = 1.0;
-    /// Places that were searched over those that explain as much: the cost of the search where the likelihood is
-    /// integrated over places. As `searched` if not given.
+    /// Number of places searched, divided by the number that explain as much: the cost of the search where the
+    /// likelihood is integrated over places. `searched` if not given.
     std::optional<double> places = {};
     int parameters = 1;
-    int freedom = 1;          ///< degrees of freedom of its chi-squared, the search apart
-    double hz = 0.0;          ///< of a line, where the record has it
-    bool wanders = false;     ///< a line as a narrow resonance
+    int freedom = 1;          ///< degrees of freedom of its chi-squared, without the search
+    double hz = 0.0;          ///< of a line, frequency at which the record shows it
+    bool wanders = false;     ///< a line that is modelled as a narrow resonance
     bool strong = false;      ///< a motion that is fitted at many lags of its witness
     bool nameless = false;    ///< not a library effect; fitted so that it does not mask others
-    std::size_t witness = 0;  ///< in the series, of a motion
+    std::size_t witness = 0;  ///< of a motion: index in the series
     SampleFit::Noise noise = SampleFit::Noise::near;
-    Effects confounded = {};  ///< that make the same model
+    Effects confounded = {};  ///< effects that make the same model
 
-    std::shared_ptr<SampleFit> fit = {};  ///< in full; null while the candidate is only screened
-    double merit = 0.0;                   ///< gain of the log-likelihood less its search and its parameters
-    bool passes = false;                  ///< the level of one effect, by that gain
+    std::shared_ptr<SampleFit> fit = {};  ///< full fit; null while there is only a score test
+    double merit = 0.0;                   ///< gain of the log-likelihood less the cost of search and parameters
+    bool passes = false;                  ///< whether that gain passes the level of one effect
 };
 
-/// The rate of the source that a record was resampled from, as several records of one data chain tell it together.
+/// The rate of a record's source, estimated from several records of one data chain together.
 struct KnownSource {
     double from_hz = 0.0;
     double sd_hz = 0.0;
-    double p_value = 1.0;               ///< by chance, of what it gains on this record
+    double p_value = 1.0;               ///< by chance, for its gain on this record
     std::vector<double> other_hz = {};  ///< rates that explain these records as well
 };
 
-/// What the screening of samples needs to know of the loop.
+/// Quantities of the loop that the score tests use.
 struct SampleContext {
     const record::Declared& declared;
     const SampleSeries& series;
-    const Rows& rows;                     ///< fitted
-    const std::vector<double>& lines_hz;  ///< that are in the model
-    int step = 0;                         ///< that a candidate would be
+    const Rows& rows;                     ///< rows of the fit
+    const std::vector<double>& lines_hz;  ///< lines in the model
+    int step = 0;                         ///< step of the loop that would add a candidate
     bool slow = false;                    ///< slow rates only
-    const KnownSource* source = nullptr;  ///< where it is known: no other is looked for
+    const KnownSource* source = nullptr;  ///< if known, no other source is searched
 };
 
-/// A column of each effect of the library that is a rate of known shape over this record: in proportion to time, to the
-/// temperature or how it changes, to the input rate. Effects whose rate does not change in it have none.
+/// A column of each effect of the library that is a rate of known shape over this record: proportional to time, to the
+/// temperature or its slope, to the input rate. Effects whose rate does not change in the record have no column.
 std::vector<SampleColumn> rate_columns(const SampleSeries& series,
                                        std::span<const effects::Effect* const> library = effects::registry());
 void add_line(SampleModel& model, const SampleSeries& series, const LineCourse& course, const effects::Effect& effect,
               int step);
-/// The model of readings that were taken at that rate and interpolated, with the likeliest place of the record's start
-/// within the source's interval.
+/// The model of readings that were taken at that rate and interpolated, with the most likely place of the record's
+/// start in the source's interval.
 SampleModel resampled_from(const SampleFit& now, double from_hz);
-/// The same with noises, rate and place that are known; lines are where they explain most.
+/// The same with known noises, rate and place; each line has the frequency of the source that explains most.
 SampleModel resampled_with(const SampleFit& now, const SampleNoise& noise);
-/// Models of readings at that rate from which fits start, by either kind of errors that interpolation may have hidden;
-/// lines are where they explain most.
+/// Models of readings at that rate as starts of fits, one for each assumption on errors that interpolation may have
+/// hidden; each line has the frequency of the source that explains most.
 std::vector<SampleModel> models_of_source(const SampleFit& now, double from_hz);
-/// The model of a resampled record as if its readings had been taken at its own rate: lines are where they show.
+/// The model of a resampled record as if its readings had been taken at the record's rate: lines are at their aliases.
 SampleModel without_source(const SampleFit& now);
 
-/// Candidates among the effects that show on samples and that the fit does not have yet, by score tests of its
-/// residual.
+/// Candidates among the effects that act on samples and are not in the fit, by score tests of its residual.
 std::vector<SampleCandidate> screen_samples(const SampleFit& now, const SampleContext& in);
 
 }  // namespace ringlock::closure

@@ -14,10 +14,10 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Lines have the level of two effects. Lines that keep their frequency have that of a line in the input rate. That of
-/// a line in the output goes to lines that drift; where a dither is declared, nearly all of it goes to lines near its
-/// frequency and its harmonics, one half to lines that keep their frequency and one to those that drift: a declaration
-/// makes these likely.
+/// Lines have the level of two effects. Lines of constant frequency have that of a line in the input rate. The level of
+/// a line in the output angle belongs to lines that drift. Where a dither is declared, nearly all of it belongs to
+/// lines near its frequency and its harmonics, one half to lines of constant frequency and one half to those that
+/// drift, since a declaration makes these likely.
 struct LineShares {
     double drifting = 1.0;
     double declared = 0.0;
@@ -28,7 +28,7 @@ constexpr LineShares dither_declared{options.samples.screen.drifting_share_if_de
 constexpr auto of_harmonic = options.samples.screen.harmonic_shares;
 constexpr int most_harmonics = static_cast<int>(of_harmonic.size());
 
-/// A line with the share of the level that it has.
+/// A line with its share of the level.
 struct OfferedLine {
     FoundLine found;
     bool drifts = false;
@@ -50,7 +50,8 @@ bool near_declared(const SampleFit& now, const SampleContext& in, double hz) {
     return false;
 }
 
-/// The likeliest line near the declared dither or a harmonic, by its own frequency range and drifts of a physical size.
+/// The most likely line near the declared dither or a harmonic, within its own range of frequencies and of physical
+/// drifts.
 std::vector<OfferedLine> declared_lines(const SampleFit& now, const SampleContext& in, const std::vector<double>& e,
                                         double width_hz) {
     OfferedLine still{{}, false, true};
@@ -85,7 +86,7 @@ std::optional<SampleCandidate> wandering_line(const SampleFit& now, const Sample
     return candidate;
 }
 
-/// Whether the line is too slow, where it is slowest, to be told from a rate that changes.
+/// Whether the lowest frequency of the line is too low to distinguish it from a slow rate.
 bool is_slow(const LineCourse& course, double duration_s) {
     constexpr int places = 64;
     for (int i = 0; i <= places; ++i) {
@@ -95,7 +96,7 @@ bool is_slow(const LineCourse& course, double duration_s) {
     return false;
 }
 
-/// A line whose frequency follows a curve, where no line that drifts evenly has all of the scattered power.
+/// A line on a curved frequency track, where no line of even drift contains all of the scattered power.
 std::optional<SampleCandidate> bent_line(const SampleFit& now, const SampleContext& in, const FoundLines& lines,
                                          const std::vector<double>& e) {
     auto candidate = candidate_of(OnSamples::angle_line);
@@ -184,7 +185,7 @@ void screen_lines(const SampleFit& now, const SampleContext& in, std::vector<Sam
         if (scattered && std::abs(line.found.frequency_hz - lines.scattered_hz) < options.samples.lines.beside_hz)
             continue;
         const SampleLine mended = refined(line.found, line.drifts);
-        // What hardly drifts is told as well without.
+        // A line that hardly drifts is described as well without the drift.
         if (line.drifts && !(std::abs(mended.course.drifts[0]) * duration_s * duration_s > by.least_drift_cycles))
             continue;
         const bool fast = mended.course.hz > by.fast_hz;

@@ -16,12 +16,12 @@ namespace ringlock::closure {
 
 namespace {
 
-/// The model with each of its lines at that frequency of the source, of all that show at the same, which explains most.
+/// The model with each line at that frequency of the source, of all with the same alias, which explains most.
 SampleModel with_lines_of_source(const SampleFit& now, SampleModel model) {
     const auto fitted = [&](const SampleModel& m) {
         return SampleFit(now.series(), m, now.rows(), SampleFit::Noise::held).log_likelihood();
     };
-    // One line after another, each tried wherever it may be.
+    // One line after another, each at every possible frequency.
     const auto choose = [&](double shown_hz, const auto& put) {
         const auto all = of_source(shown_hz, now.series().rate_hz, model.noise.from_hz);
         double most = -std::numeric_limits<double>::infinity();
@@ -52,7 +52,7 @@ SampleModel with_lines_of_source(const SampleFit& now, SampleModel model) {
     return model;
 }
 
-/// How a model of the source begins: interpolated errors of readings look as if they were white rates.
+/// Errors in the start of a fit to a source: interpolated errors of readings look like white rates.
 enum class Errors { as_they_are, of_readings };
 
 /// The model with readings of that source.
@@ -62,10 +62,10 @@ SampleModel as_of(const SampleFit& now, const SampleSource& source, Errors error
     model.noise.from_phase = source.from_phase;
     model.noise.blur_arcsec = 0.2 * now.sd(0);
     model.noise.digits_arcsec = 1e-6 * now.sd(0);
-    // Between two readings the errors of both average out, to two thirds of the variance of one in the mean.
+    // Between two readings the errors of both are averaged, to two thirds of the variance of one on average.
     if (errors == Errors::as_they_are) model.noise.angle_arcsec *= std::sqrt(1.5);
     if (errors == Errors::of_readings) {
-        // On the line between two readings an increment is a part of what they differ by.
+        // On the line between two readings an increment is a part of their difference.
         double squares = 0.0;
         for (const double x : now.rest()) squares += x * x;
         const double part = std::min(1.0, source.from_hz * now.series().interval_s);
@@ -75,7 +75,7 @@ SampleModel as_of(const SampleFit& now, const SampleSource& source, Errors error
     return model;
 }
 
-/// The same where straight lines tell exactly when the readings were taken.
+/// The same where straight lines determine the times of the readings exactly.
 SampleModel on_straight_lines(const SampleFit& now, const SampleSource& source, Errors errors) {
     SampleModel model = as_of(now, source, errors);
     model.noise.blur_arcsec = 1e-3 * now.sd(0);
@@ -105,8 +105,8 @@ double log_likelihood_of_shape(const SampleFit& now, const SampleNoise& noise) {
     return -0.5 * count * std::log(squares / count) - logs;
 }
 
-/// The likeliest place of the record's start within the source's interval, and the likeliest share of errors of
-/// readings, which interpolation makes look like a white rate.
+/// The most likely place of the record's start in the source's interval, and the most likely share of errors of
+/// readings, which look like a white rate after interpolation.
 Resampled best_placed(const SampleFit& now, double from_hz, Errors errors) {
     constexpr int places = options.samples.screen.places_of_source;
     Resampled best{{}, -std::numeric_limits<double>::infinity()};
@@ -128,7 +128,7 @@ Resampled best_placed(const SampleFit& now, double from_hz, Errors errors) {
     return best;
 }
 
-/// Candidates of a source whose rate is known: nothing is searched, and the rate is held.
+/// Candidates with a source of known rate: nothing is searched, and the rate is held.
 void screen_known_source(const SampleFit& now, const KnownSource& source, std::vector<SampleCandidate>& out) {
     auto candidate = candidate_of(OnSamples::transport);
     if (!candidate) return;
@@ -143,8 +143,8 @@ void screen_known_source(const SampleFit& now, const KnownSource& source, std::v
     }
 }
 
-/// The rate at which a reader that is declared to count over whole cycles latches: that of the dither, as the pattern
-/// of the record shows it. None where no such reader is declared.
+/// Rate at which a reader latches that is declared to count over whole cycles: that of the dither, as refined by the
+/// pattern of the record. No value where no such reader is declared.
 std::optional<double> declared_source_hz(const SampleContext& in, double pattern_hz) {
     if (!in.series.whole_cycles || !in.declared.dither_frequency_hz) return std::nullopt;
     const double dither_hz = *in.declared.dither_frequency_hz;
@@ -191,7 +191,7 @@ void screen_source(const SampleFit& now, const SampleContext& in, std::vector<Sa
         return;
     }
     const SampleScreenOptions& by = options.samples.screen;
-    // Rates whose distance from a multiple of the record's is that frequency
+    // Rates whose distance from a multiple of the record's rate is that frequency
     const double rate = in.series.rate_hz;
     std::vector<double> rates;
     for (int m = 0; m <= by.most_multiple; ++m) {
@@ -206,7 +206,7 @@ void screen_source(const SampleFit& now, const SampleContext& in, std::vector<Sa
     std::vector<Resampled> found(rates.size());
     oneapi::tbb::parallel_for(std::size_t{0}, rates.size(),
                               [&](std::size_t k) { found[k] = best_placed(now, rates[k], Errors::as_they_are); });
-    // That was on a part of the record, with noises that are not fitted: it may be wrong by tens of nats.
+    // These values are for a part of the record and noises that are not fitted: they may be wrong by tens of nats.
     std::sort(found.begin(), found.end(),
               [](const Resampled& a, const Resampled& b) { return a.log_likelihood > b.log_likelihood; });
     if (!found.empty()) offer(best_placed(now, found.front().model.noise.from_hz, Errors::of_readings).model);

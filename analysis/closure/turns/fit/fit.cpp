@@ -15,7 +15,7 @@ namespace ringlock::closure {
 namespace {
 
 constexpr std::size_t drift_terms = options.turns.fit.degree_of_amplitude;
-constexpr std::size_t swing_columns = 3;  // of a swing of the amplitude: two amplitudes and the frequency
+constexpr std::size_t swing_columns = 3;  // of an oscillation of the amplitude: two amplitudes and the frequency
 constexpr std::size_t base_columns = 2;   // bias and threshold, after the nuisances
 
 /// Legendre polynomial of that degree at x.
@@ -32,14 +32,14 @@ double legendre(std::size_t degree, double x) {
     return now;
 }
 
-/// Parameters that the phases decide; those that other columns tell of (side_channels.hpp) stay as they are.
+/// Parameters that are fitted to the phases. Those that other columns determine (side_channels.hpp) are held.
 bool fitted_in_phase(const effects::Effect& effect, effects::Role role) {
     using effects::Role;
     return (role == Role::size || role == Role::phase || role == Role::time || role == Role::frequency) &&
            !told_by_other_columns(effect);
 }
 
-/// Whether a phase turns the size, so that it may have either sign on its way.
+/// Whether the size has a phase, so that it may take either sign during the fit.
 bool is_turned(const effects::Effect& effect, const effects::Parameter& size) {
     const std::vector<Amplitude> amplitudes = amplitudes_of(effect);
     return std::any_of(amplitudes.begin(), amplitudes.end(),
@@ -135,9 +135,10 @@ void TurnFit::climb() {
     }
 }
 
-/// Where the coupling changes at once, each turn by which the time is off leaves a kick in all later phases: the
-/// likelihood has a summit at nearly every turn, and steps of Gauss and Newton end on the nearest. All turns nearby are
-/// tried; tells whether another time is more likely.
+/// If the coupling changes at once, each turn by which the time is off leaves a kick in all later phases. The
+/// likelihood then has a maximum at nearly every turn, and Gauss-Newton ends at the nearest one, so all turns nearby
+/// are tried.
+/// \return whether another time is more likely
 bool TurnFit::place_times() {
     if (effects_ == Effects::held) return false;
     bool moved = false;
@@ -175,7 +176,7 @@ bool TurnFit::place_times() {
 }
 
 void TurnFit::find_columns() {
-    columns_.clear();  // before others take their place
+    columns_.clear();  // before the new ones are allocated
     columns_ = columns(parameters_, prediction_);
     columns_at_ = parameters_;
 }
@@ -209,7 +210,7 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnParameters& at, const Tu
         try {
             return by(step);
         } catch (const RunError&) {
-            return by(-step);  // on the edge of what can be followed
+            return by(-step);  // at the edge of the parameters whose motion can be followed
         }
     };
     TurnParameters p = at;
@@ -225,10 +226,10 @@ std::vector<TurnFit::Column> TurnFit::columns(const TurnParameters& at, const Tu
             const std::string name(parameter.name);
             double& value = active.values.at(name);
             double step = 1e-4 * std::max(std::abs(value), 1e-2);
-            // Over the whole record it is a phase that a frequency moves.
+            // A frequency changes the phase over the whole record.
             if (parameter.role == effects::Role::frequency) step = 1e-4 / model_->series().time_s.back();
             const bool angle_only = changes_angle_only(*active.effect);
-            // A coupling that changes at once shows a time in the turns that this passes over.
+            // The time of a sudden change of the coupling shows in the turns that the step passes over.
             if (parameter.role == effects::Role::time && !angle_only) step = 2.0 * model_->series().interval_s;
             if (value + step > parameter.max) step = -step;
             if (angle_only) {
@@ -250,7 +251,7 @@ std::size_t TurnFit::nuisances() const { return nuisance_.size() + swing_columns
 
 std::size_t TurnFit::solved() const { return effects_ == Effects::held ? nuisances() + base_columns : columns_.size(); }
 
-/// Offset and amplitude, which the start knows nothing of, by the noise that it knows.
+/// Fits offset and amplitude, which have no start values, with the start values of the noise.
 void TurnFit::fit_nuisances() {
     set_rest(prediction_);
     const Whitening whitening(prediction_.frame, model_->noise(parameters_));
@@ -266,7 +267,7 @@ void TurnFit::fit_nuisances() {
 
 void TurnFit::fit_deterministic(int most) {
     for (int pass = 0; pass < most; ++pass) {
-        // Those of so near a point that another step gains nothing serve as well.
+        // Columns of a point so near that another step gains nothing remain valid.
         if (moved_) find_columns();
         moved_ = false;
         set_rest(prediction_);
@@ -277,7 +278,7 @@ void TurnFit::fit_deterministic(int most) {
             guess.wander_sd_rad = 1e-3;
         }
         TurnNoise noise = model_->noise(guess);
-        // Nothing is known yet: a radian a turn, that what wanders does not drown the kicks.
+        // No noise has been fitted yet: a radian a turn, so that a random wander does not hide the kicks.
         if (guessed) noise.white_rad2_per_s = 1.0 / model_->series().interval_s;
         const Whitening whitening(prediction_.frame, noise);
         moved_ = go_down(equations(whitening, guessed), guessed ? &whitening : nullptr);
@@ -288,7 +289,7 @@ void TurnFit::fit_deterministic(int most) {
 TurnFit::Equations TurnFit::equations(const Whitening& whitening, bool guessed) const {
     const std::size_t count = solved();
     const Eigen::VectorXd y = counted(whitening, rest_);
-    // Beside a noise that is only guessed |1 - before'| makes up for nothing.
+    // With a noise that is only guessed |1 - before'| does not compensate.
     const Eigen::Index used = guessed ? y.size() / 2 : y.size();
     Eigen::VectorXd scale;
     const auto column_of = [this](std::size_t k) -> const Regressor& { return columns_[k].of; };
@@ -306,9 +307,9 @@ TurnFit::Equations TurnFit::equations(const Whitening& whitening, bool guessed) 
     return {std::move(normal), std::move(right), std::move(scale)};
 }
 
-/// How innovations go with what changes the filter's gains as well. What the lock-in makes of each reading's error adds
-/// up, and so does what these errors are thought to be: of an effect that is far from its size that is a rotation, a
-/// hundred times what the fit feels, which a step must let the bias take.
+/// Columns of the innovations that include the change of the filter's gains. The response of the lock-in to each
+/// reading error adds up, and so does the response to the estimated errors. For an effect far from its size this is a
+/// rotation of a hundred times the errors of the fit, which the bias must compensate within the step.
 void TurnFit::follow_gains(const Whitening& whitening, Eigen::MatrixXd& x, Eigen::VectorXd& scale) const {
     const TurnNoise noise = model_->noise(parameters_);
     const std::size_t n = rows_.size();
@@ -335,10 +336,10 @@ void TurnFit::follow_gains(const Whitening& whitening, Eigen::MatrixXd& x, Eigen
     });
 }
 
-/// Times, frequencies and phases are far from linear. Where a whole step goes far or leads uphill: a part of it, which
-/// follows a valley that bends, or a damped one (Levenberg 1944), which goes down its wall.
+/// Times, frequencies and phases are far from linear. If a full step goes far or increases the objective, the fit tries
+/// a part of the step, which follows a curved valley, and then a damped step (Levenberg 1944), which descends its wall.
 bool TurnFit::go_down(const Equations& equations, const Whitening* guessed) {
-    constexpr double gained = 1e-3;  // of chi-squared: another step is not worth it
+    constexpr double gained = 1e-3;  // of chi-squared: another step would gain less than is useful
     constexpr int parts = 4;
     constexpr int trials = 12;
     const auto& [normal, right, scale] = equations;
@@ -377,7 +378,7 @@ bool TurnFit::go_down(const Equations& equations, const Whitening* guessed) {
     return false;
 }
 
-/// Of the likelihood, with all that the filter's gains and variances make of it.
+/// Derivative of the log-likelihood, with the changes of the filter's gains and variances.
 double TurnFit::slope_of_objective(const TurnFrame& frame, const std::vector<double>& rest, const Regressor& of,
                                    double step) const {
     const auto at = [&](double value) {
@@ -389,8 +390,8 @@ double TurnFit::slope_of_objective(const TurnFrame& frame, const std::vector<dou
     return (at(-step) - at(step)) / (2.0 * step);
 }
 
-/// Times move by a part of the record at once, frequencies by a part of a period over it and a phase that has no size
-/// by a part of a turn, others as far as they will: a time between turns that count hardly shows in those that do.
+/// Limits a step: times to a part of the record, frequencies to a part of a period over it, and a phase without a size
+/// to a part of a turn. A time between training rows hardly shows in them and would otherwise move too far.
 void TurnFit::hold_back(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal) const {
     constexpr double part = 0.1;
     const double duration_s = model_->series().time_s.back();
@@ -429,8 +430,8 @@ void TurnFit::take(const Eigen::VectorXd& step) {
     parameters_.threshold_deg_h = std::max(0.0, parameters_.threshold_deg_h + step(k++));
     if (effects_ == Effects::held) return;
     for (ActiveEffect& active : parameters_.effects) {
-        // The size that a phase turns. A phase of the gyro's coupling turns the coupling, whose size is the threshold;
-        // one that comes in time leaves the threshold alone.
+        // The size that belongs to the phase. A phase of the gyro's coupling belongs to the coupling, whose size is the
+        // threshold; a phase that varies in time does not change the threshold.
         const bool moves_in_time = active.effect->changes().coupling_phase;
         double* size = nullptr;
         double size_from = 0.0;
@@ -445,7 +446,7 @@ void TurnFit::take(const Eigen::VectorXd& step) {
             }
             if (parameter.role == effects::Role::phase) {
                 double& along = size != nullptr ? *size : parameters_.threshold_deg_h;
-                // Straight on in the plane of both: of what is next to nothing the phase may turn far.
+                // Straight on in the plane of size and phase: the phase of a very small size may turn by any angle.
                 const double across = (size != nullptr ? size_from : threshold_from) * by;
                 value = std::remainder(value + std::atan2(across, along), units::two_pi);
                 along = std::hypot(along, across);
@@ -498,8 +499,8 @@ TurnFit::Belief TurnFit::belief_of(const TurnParameters& parameters) const {
     return belief;
 }
 
-/// A gyro that is locked shows its bias and its threshold together only: beside so weak a belief that no other record
-/// feels it, they would be without bounds.
+/// A locked gyro shows only a combination of bias and threshold. Priors so weak that they do not matter for any other
+/// record keep both finite.
 void TurnFit::add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, Eigen::VectorXd* right) const {
     const auto bias = static_cast<Eigen::Index>(nuisances());
     const auto believe = [&](Eigen::Index k, double off, double sd) {
@@ -512,9 +513,10 @@ void TurnFit::add_priors(const Eigen::VectorXd& scale, Eigen::MatrixXd& normal, 
 }
 
 ReadingErrors TurnFit::reading_errors() const {
-    // About the phase that was read a kick has kick' v, of which the part of v matters that is not known, and
-    // kick'' v^2 / 2, of which all but the mean does: variances of left kick'^2 and R^2 kick''^2 / 2. Models beside one
-    // another must be linear about the same, or one gains by that alone: long before it can be seen.
+    // The kick, linear about the phase that was read, has an error kick' v, of which only the unknown part of v
+    // matters, and kick'' v^2 / 2, of which all but the mean matters: their variances are left kick'^2 and R^2 kick''^2
+    // / 2. Models that are compared must be linear about the same phases, or one gains by the linearisation alone.
+    // Therefore the limit is far below a visible effect.
     const double readout_rad2 = parameters_.readout_sd_rad * parameters_.readout_sd_rad;
     if (parameters_.injected_sd_rad > parameters_.readout_sd_rad) return {};
     ReadingErrors errors = ready().whitening_->reading_errors(rest_);
@@ -546,7 +548,7 @@ void TurnFit::put_away() const {
     has_basis_ = false;
     prediction_ = TurnModel::Prediction();
     columns_.clear();
-    // An empty list in their place would leave them their memory.
+    // Assignment of an empty vector would not release the memory.
     for (std::vector<double>* of_turns : {&rest_, &innovations_, &sd_rad_}) std::vector<double>().swap(*of_turns);
     whitening_.reset();
     basis_.resize(0, 0);
@@ -564,7 +566,7 @@ const TurnFit& TurnFit::ready() const {
     return *this;
 }
 
-/// For scores.
+/// The basis for scores.
 const Eigen::MatrixXd& TurnFit::basis() const {
     if (has_basis_) return basis_;
     ready();

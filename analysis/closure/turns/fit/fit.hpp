@@ -17,12 +17,13 @@
 
 namespace ringlock::closure {
 
-/// What a parameter adds to the phases that are foretold, a unit of it.
+/// The change of the predicted phases for a unit of a parameter.
 ///
-/// Some of that follows from the very phase that it is added to: what the lock-in does before a turn, what is read at
-/// it. Its derivative by that phase, turn after turn, is the slope; empty where nothing does. Such a series goes with
-/// the innovations even where nothing is missing, which the likelihood's |1 - before'| makes up for, and `left` where
-/// the noise has a shape (NoiseShape). `kick` is the derivative of all that the turn adds to those after it.
+/// A part of the series may depend on the phase to which it is added: the lock-in before a turn, and the reading at the
+/// turn. `slope` is its derivative by that phase, turn by turn; empty if no part depends on it. Such a series is
+/// correlated with the innovations even if no effect is missing; |1 - before'| of the likelihood compensates for this,
+/// together with `left` if the injected noise is not normal (NoiseShape). `kick` is the derivative of all that the turn
+/// adds to the phases after it.
 struct Regressor {
     Regressor(std::vector<double> of_series, std::vector<double> of_slope = {}, std::vector<double> of_kick = {},
               std::vector<double> of_left = {})
@@ -32,46 +33,48 @@ struct Regressor {
           left(std::move(of_left)) {}
     std::vector<double> series, slope, kick, left;
 
-    /// Takes so much of it from a rest, and adds it to the frame.
+    /// Subtracts `value` times the series from the residual phases and adds the slopes to the frame, likewise.
     void take(double value, std::vector<double>& rest, TurnFrame& frame) const;
 };
 
-/// How much further one model's phases are than another's, over `per`.
+/// The difference of the phases of two models, over `per`.
 Regressor difference(TurnModel::Prediction with, const TurnModel::Prediction& without, double per);
 
-/// What a swing of the amplitude adds to the phases, by its cosine, its sine and its frequency [rad/Hz].
+/// Phases for a unit of the cosine, of the sine and of the frequency of an oscillation of the amplitude [frequency:
+/// rad/Hz].
 std::array<std::vector<double>, 3> amplitude_by(const AmplitudeSwing& swing, const TurnSeries& series);
 
-/// The model fitted to the turns that count, by maximum likelihood.
+/// The model fitted by maximum likelihood to the turns that count.
 ///
-/// The filter goes through all turns; the likelihood is that of the innovations of those that count, each given all
-/// phases before it. What follows deterministically is fitted by Gauss and Newton in the whitened phases, what is
-/// random by the likelihood of the rest (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter",
+/// The filter passes through all turns; the likelihood is that of the innovations of those that count, each given all
+/// phases before it. Deterministic parameters are fitted by Gauss-Newton in the whitened phases, standard deviations by
+/// the likelihood of the residual phases (Harvey, "Forecasting, Structural Time Series Models and the Kalman Filter",
 /// 1989, 3.4).
 class TurnFit {
    public:
-    /// What is done with the parameters of effects: held, they stay as given, and the rest is fitted beside them, so
-    /// that standard errors are what Fisher's information says at these values.
+    /// Treatment of the parameters of effects. If held, they stay as given and all others are fitted, and the standard
+    /// errors are those of Fisher's information at these values.
     enum class Effects { fitted, held };
-    /// \param needed  log-likelihood below which nothing needs to be exact: where the fit will not come that far it is
-    ///                not fitted to the end
+    /// \param needed  log-likelihood below which accuracy does not matter: a fit that will not reach it is not
+    ///        completed
     TurnFit(const TurnModel& model, const TurnParameters& start, Rows rows, Effects effects = Effects::fitted,
             double needed = -std::numeric_limits<double>::infinity());
-    TurnFit(const TurnFit&) = delete;  // the filter refers to what the fit holds
+    TurnFit(const TurnFit&) = delete;  // the filter refers to members of the fit
     TurnFit& operator=(const TurnFit&) = delete;
 
-    /// The same without the noise that hardly shows, for scores: it may have swallowed what an effect does. None where
-    /// all of it shows.
+    /// The same fit without noise that explains little, for scores: such noise may have absorbed an effect. Null if all
+    /// noise explains much.
     std::unique_ptr<TurnFit> with_less_noise() const;
-    /// The same under the noise of these parameters, nothing fitted anew, for scores.
+    /// The same fit with the noise of these parameters, and nothing fitted again, for scores.
     std::unique_ptr<TurnFit> with_noise(const TurnParameters& of) const;
 
-    /// What all phases together tell of the reading's errors, where that is enough for what the lock-in makes of them
-    /// to be linear about it, and not about the phases that were read; else none.
+    /// The reading's errors given all phases, if these determine them so well that the kicks should be linearised about
+    /// the estimate instead of the phases that were read; else empty.
     ReadingErrors reading_errors() const;
 
-    /// Lets go of all that is as long as the record. It is made again from the parameters, bit for bit, where something
-    /// asks for it: of many fits beside one another, those keep it that work. Not while others look at what it has.
+    /// Releases all memory of the length of the record. It is computed again from the parameters on demand, bit for
+    /// bit, so of many fits only those in use need memory. Must not be called while others use references to these
+    /// arrays.
     void put_away() const;
 
     const TurnModel& model() const { return *model_; }
@@ -79,16 +82,16 @@ class TurnFit {
     const TurnModel::Prediction& prediction() const { return ready().prediction_; }
     /// Base parameters and those of effects, with standard errors.
     const std::vector<Estimate>& estimates() const;
-    /// Of the phases that count and of the radii of the quadrature.
+    /// Log-likelihood of the phases that count and of the radii of the quadrature.
     double log_likelihood() const { return log_likelihood_; }
     const Rows& rows() const { return rows_; }
 
-    /// Innovations of all turns over their standard deviations, and those of the phases [rad].
+    /// Innovations of all turns over their standard deviations, and the standard deviations of the phases [rad].
     const std::vector<double>& innovations() const { return ready().innovations_; }
     const std::vector<double>& sd_rad() const { return ready().sd_rad_; }
 
-    /// Regression of the innovations that count on further series of phase, whitened and freed of what the model's own
-    /// parameters could take of them: estimates, covariance and the chi-squared of all together.
+    /// Regression of the innovations that count on further series of phases, which are whitened and projected off the
+    /// model's own parameters: estimates, covariance and the chi-squared of all series together.
     struct Score {
         Eigen::VectorXd value;
         Eigen::MatrixXd covariance;
@@ -96,37 +99,38 @@ class TurnFit {
         int rank = 0;
     };
     Score score(const std::vector<Regressor>& regressors) const;
-    /// The same of so many series, each made where it is whitened and let go of then.
+    /// The same for `count` series, each computed when it is whitened and released afterwards.
     Score score(std::size_t count, const std::function<Regressor(std::size_t)>& regressor) const;
-    /// The same of so many series that no phase moves, which go through the filter a piece at a time: for many of them.
-    /// The squares and products that the regression is of.
+    /// Normal equations of the regression on `count` series without slopes, which pass through the filter in pieces:
+    /// for very many series.
     struct Products {
-        Eigen::MatrixXd squares;  ///< of the series, whitened and freed, with each other
-        Eigen::VectorXd right;    ///< with what is left
+        Eigen::MatrixXd squares;  ///< products of the whitened and projected series with each other
+        Eigen::VectorXd right;    ///< products of the series with the residual
     };
     using Piece = std::function<void(std::size_t series, std::size_t first_turn, std::span<double> values)>;
     Products products(std::size_t count, const Piece& piece) const;
     Score score_pieces(std::size_t count, const Piece& piece) const { return score_of(products(count, piece)); }
-    /// That regression with the noise fitted anew beside it, from the model's own, or from another that is nearer.
+    /// That regression with the noise fitted again, starting from the model's own noise or from a given one.
     struct Regression {
         double gain = 0.0;  ///< of the log-likelihood
         Eigen::VectorXd value;
-        TurnParameters noise = {};  ///< the model's own, with the noise fitted anew
+        TurnParameters noise = {};  ///< the model's parameters with the noise fitted again
     };
     Regression regress(const std::vector<Regressor>& regressors) const { return regress(regressors, parameters_); }
     Regression regress(const std::vector<Regressor>& regressors, const TurnParameters& noise) const;
-    /// One series whitened and freed likewise, and what is left: their product is the derivative of the log-likelihood.
-    /// Rows that do not count are zero. As many again are those of |1 - before'|: what is left is -1 there, the series
-    /// its slope over 1 - before', so that their squares are what it adds to the information.
+    /// One series whitened and projected likewise, and the residual: their product is the derivative of the
+    /// log-likelihood. Rows that do not count are zero. An equal number of rows for |1 - before'| is appended: they are
+    /// -1 in the residual and the slope over 1 - before' in the series, so that their squares are the contribution to
+    /// the information.
     Eigen::VectorXd whitened(const Regressor& regressor) const;
     Eigen::VectorXd residual() const;
-    /// One series whitened, and no more.
+    /// One series whitened, without projection.
     std::vector<double> whitened_alone(const std::vector<double>& series) const {
         return ready().whitening_->apply(series);
     }
 
-    /// Twice the gain of the log-likelihood by a random effect, and its standard deviation (of the parameter of that
-    /// role), all else as fitted.
+    /// Twice the gain of the log-likelihood by a random effect, and its standard deviation (the parameter of that
+    /// role), with all other parameters as fitted.
     struct Spread {
         double deviation = 0.0;
         double chi2 = 0.0;
@@ -134,7 +138,7 @@ class TurnFit {
     Spread spread(const ActiveEffect& effect, const std::string& parameter, double most) const;
 
    private:
-    TurnFit(const TurnFit& of, TurnParameters parameters, int passes);  ///< with that noise
+    TurnFit(const TurnFit& of, TurnParameters parameters, int passes);  ///< with the noise of these parameters
     static Score score_of(const Products& products);
     Score score_whitened(std::size_t count, const std::function<Eigen::VectorXd(std::size_t)>& column) const;
     struct Column {
@@ -143,15 +147,16 @@ class TurnFit {
     };
     void fit_nuisances();
     void fit_deterministic(int most);  ///< passes
-    /// Of a step by Gauss and Newton, in units of the columns' norms.
+    /// Normal equations of a step of Gauss-Newton, in units of the columns' norms.
     struct Equations {
         Eigen::MatrixXd normal;
         Eigen::VectorXd right, scale;
     };
     Equations equations(const Whitening& whitening, bool guessed) const;
     void follow_gains(const Whitening& whitening, Eigen::MatrixXd& x, Eigen::VectorXd& scale) const;
-    /// Such a step, shorter where that is better, in the squares under a noise that is guessed or in the objective.
-    /// Tells whether another may gain something.
+    /// Takes such a step, shortened or damped if needed, that decreases the squares under a guessed noise or else the
+    /// objective.
+    /// \return whether another step may gain
     bool go_down(const Equations& equations, const Whitening* guessed);
     void climb();
     bool place_times();
@@ -162,10 +167,10 @@ class TurnFit {
     void shape_noise();
     TurnParameters with_noise_of(const TurnFrame& frame, const TurnParameters& start,
                                  const std::vector<double>& rest) const;
-    /// The series whitened, rows that do not count zero, and the rows of |1 - before'| below.
+    /// The series whitened, with zero in rows that do not count, and the rows of |1 - before'| below it.
     Eigen::VectorXd counted(const Whitening& whitening, const TurnFrame& frame, const Regressor& regressor) const;
     Eigen::VectorXd counted(const Whitening& whitening, const std::vector<double>& rest) const;
-    /// Several such series beside one another, divided by their norms.
+    /// The same for several series, as columns that are divided by their norms.
     using RegressorAt = std::function<const Regressor&(std::size_t)>;
     Eigen::MatrixXd counted(const Whitening& whitening, const TurnFrame& frame, std::size_t count,
                             const RegressorAt& regressor, Eigen::VectorXd& norms) const;
@@ -174,10 +179,10 @@ class TurnFit {
     void take(const Eigen::VectorXd& step);
     void set_rest(const TurnModel::Prediction& prediction) const;
     double squares_left(const Whitening& whitening) const;
-    double objective_at(const TurnModel::Prediction& prediction) const;  ///< with what is believed
+    double objective_at(const TurnModel::Prediction& prediction) const;  ///< with the priors
     double slope_of_objective(const TurnFrame& frame, const std::vector<double>& rest, const Regressor& of,
                               double step) const;
-    /// How phases go with the parameters, at these, which foretell that.
+    /// Derivatives of the phases by the parameters `at`, whose prediction is given.
     std::vector<Column> columns(const TurnParameters& at, const TurnModel::Prediction& prediction) const;
     void find_columns();
     void finish();
@@ -185,10 +190,10 @@ class TurnFit {
     const TurnFit& ready() const;
     const Eigen::MatrixXd& basis() const;
     std::vector<Estimate> estimate() const;
-    Eigen::MatrixXd whitened_columns(Eigen::VectorXd& scale) const;  ///< of norm one, scale times as long
-    Eigen::MatrixXd information(Eigen::VectorXd& scale) const;       ///< of these, and what is believed
+    Eigen::MatrixXd whitened_columns(Eigen::VectorXd& scale) const;  ///< of unit norm; `scale` has the norms
+    Eigen::MatrixXd information(Eigen::VectorXd& scale) const;       ///< of the same columns, with the priors
     void add_noise_estimates(std::vector<Estimate>& estimates) const;
-    /// How far bias and threshold are from what is believed of them, in standard deviations, and these.
+    /// Deviations of bias and threshold from their priors in standard deviations, and these standard deviations.
     struct Belief {
         double bias, threshold, bias_sd_deg_h, threshold_sd_deg_h;
     };
@@ -198,11 +203,12 @@ class TurnFit {
         return objective(prediction_.frame, parameters, rest);
     }
     double objective(const TurnFrame& frame, const TurnParameters& parameters, const std::vector<double>& rest) const;
-    /// The same under the noise of each of these parameters.
+    /// The same with the noise of each of these parameters.
     std::vector<double> objectives(const TurnFrame& frame, const std::vector<TurnParameters>& parameters,
                                    const std::vector<double>& rest) const;
 
-    /// Columns come in this order: nuisances, base parameters, those of effects; how many are solved for.
+    /// The columns are in this order: nuisances, base parameters, those of effects. The functions count those of the
+    /// first kind, and those that are fitted.
     std::size_t nuisances() const;
     std::size_t solved() const;
 
@@ -211,18 +217,18 @@ class TurnFit {
     Rows rows_;
     Effects effects_;
     double needed_;                 ///< log-likelihood
-    std::vector<double> nuisance_;  ///< offset, amplitude and its drift; swings are among the parameters
-    TurnParameters columns_at_;     ///< whose columns these are
-    bool moved_ = false;            ///< far from where the columns are of
+    std::vector<double> nuisance_;  ///< offset, amplitude and its drift; oscillations of it are among the parameters
+    TurnParameters columns_at_;     ///< parameters at which the columns were computed
+    bool moved_ = false;            ///< the parameters are far from columns_at_
     double log_likelihood_ = 0.0;
 
-    // As long as the record; all of it follows from the above.
-    mutable TurnModel::Prediction prediction_;  ///< of the parameters as they are
-    mutable std::vector<double> rest_;          ///< phases less all that is deterministic
+    // Arrays of the length of the record, which follow from the members above.
+    mutable TurnModel::Prediction prediction_;  ///< of the present parameters
+    mutable std::vector<double> rest_;          ///< residual phases: the phases less the deterministic part
     mutable std::vector<Column> columns_;
     mutable std::vector<double> innovations_, sd_rad_;
     mutable std::shared_ptr<Whitening> whitening_;
-    mutable Eigen::MatrixXd basis_;  ///< orthonormal, of the model's own whitened columns in the rows that count
+    mutable Eigen::MatrixXd basis_;  ///< orthonormal basis of the model's own whitened columns in the rows that count
     mutable std::optional<std::vector<Estimate>> estimates_;
     mutable std::atomic<bool> is_ready_ = false, has_basis_ = false;
     mutable std::mutex getting_ready_, making_basis_, estimating_;

@@ -1,4 +1,4 @@
-// The random part of the fit: standard deviations, by the likelihood of what the deterministic part leaves.
+// The random part of the fit: standard deviations, by the likelihood of the residual phases.
 #include <ceres/ceres.h>
 #include <glog/logging.h>
 
@@ -19,18 +19,18 @@ namespace ringlock::closure {
 
 namespace {
 
-constexpr double no_noise = 1e-9;  // rad: far below what shows
+constexpr double no_noise = 1e-9;  // rad: far below any visible noise
 constexpr const char* forgets_name = "amplitude_correlation_s";
 
 double square(double value) { return value * value; }
 
-/// A standard deviation of the model that the likelihood decides, or another positive number of its noise.
+/// A free parameter of the noise: a standard deviation, or another positive number, that is fitted by the likelihood.
 struct Knob {
     std::string effect, name;
     double* value;
 };
 
-/// The readout's noise is the third.
+/// The readout's noise must be the third.
 std::vector<Knob> knobs(TurnParameters& p, bool of_effects = true) {
     std::vector<Knob> all{{"", "injected_noise_rad", &p.injected_sd_rad},
                           {"", "amplitude_wander_rad", &p.wander_sd_rad},
@@ -47,7 +47,7 @@ std::vector<Knob> knobs(TurnParameters& p, bool of_effects = true) {
     return all;
 }
 
-/// Innovations of a rest over their standard deviations, and these.
+/// Innovations of residual phases over their standard deviations, and these.
 struct Innovations {
     std::vector<double> white, sd_rad;
 
@@ -59,8 +59,8 @@ struct Innovations {
         sd_rad = std::move(of.sd_rad);
     }
 
-    /// How these and the logarithms of their variances differ under another noise, in the rows that count: its square
-    /// is Fisher's information on the change (Harvey 1989, 3.4).
+    /// Differences of the innovations and of the logarithms of their variances under another noise, in the rows that
+    /// count. Their squares are Fisher's information on the change (Harvey 1989, 3.4).
     Eigen::VectorXd change(const Innovations& moved, const Rows& rows) const {
         const std::size_t n = white.size();
         Eigen::VectorXd by = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(2 * n));
@@ -74,16 +74,16 @@ struct Innovations {
     }
 };
 
-// Of a knob's logarithm: nothing is so small or so large.
+// Bounds of the logarithm of a parameter.
 constexpr double smallest_log = -25.0;
 constexpr double largest_log = 12.0;
 
-/// Minus the log-likelihood by the logarithms of the knobs, rising beyond their bounds. Says where it cannot be had:
-/// Ceres ends the program where a value has no finite gradient.
+/// Minus the log-likelihood as a function of the logarithms of the parameters, increasing beyond their bounds. It
+/// reports points where it cannot be computed, since Ceres ends the program if a value has no finite gradient.
 class Objective final : public ceres::FirstOrderFunction {
    public:
     using Point = Eigen::VectorXd;
-    using Values = std::function<std::vector<double>(const std::vector<Point>&)>;  // of many points at once
+    using Values = std::function<std::vector<double>(const std::vector<Point>&)>;  // at many points at once
     Objective(Eigen::Index size, Values values) : size_(size), values_(std::move(values)) {}
     int NumParameters() const override { return static_cast<int>(size_); }
     bool Evaluate(const double* x, double* cost, double* gradient) const override {
@@ -109,7 +109,7 @@ class Objective final : public ceres::FirstOrderFunction {
     Values values_;
 };
 
-/// Ceres warns on standard error where a line search has nowhere to go, which is where it ends.
+/// Ceres warns on standard error if a line search makes no progress, which is its normal end here.
 void quiet_solver() {
     static const bool done = [] {
         if (!google::IsGoogleLoggingInitialized()) FLAGS_minloglevel = google::GLOG_ERROR;
@@ -120,8 +120,8 @@ void quiet_solver() {
 
 }  // namespace
 
-/// Beside what is injected: where the fit of the phases has begun with the wander's share in the lock-in's, its noise
-/// has gone to nothing, where no slope of its logarithm leads back.
+/// Starts the wander again in a record with injected noise. If the fit of the phases began with the wander's share in
+/// the lock-in's, its noise has converged to zero, where the gradient in its logarithm does not lead back.
 void TurnFit::try_wander() {
     if (parameters_.wander_sd_rad > 10.0 * no_noise) return;
     std::vector<TurnParameters> grid;
@@ -135,9 +135,9 @@ void TurnFit::try_wander() {
     if (*least < objective(parameters_, rest_)) try_from(grid[static_cast<std::size_t>(least - values.begin())]);
 }
 
-/// The likelihood can have two summits: a small noise, or none at all, where what it does to the phases is foretold by
-/// their course. Of the one that is not stood on. What is larger than the readout's noise shows itself, and behind it
-/// there is no course.
+/// The likelihood can have two maxima: one with a small noise, and one without it, where the predicted phases account
+/// for its contribution. This tries the other one. A noise larger than the readout's is visible by itself, and the
+/// predicted phases do not follow it.
 void TurnFit::try_other_noise() {
     const double readout = parameters_.readout_sd_rad;
     if (parameters_.injected_sd_rad > readout) return try_wander();
@@ -151,7 +151,7 @@ void TurnFit::try_other_noise() {
             try_from(other);
         }
         if (own(parameters_) > options.turns.fit.other_wander * readout) continue;
-        // In place of the other one.
+        // In place of the other noise.
         other = parameters_;
         other.injected_sd_rad = injected ? options.turns.fit.other_injected * readout : no_noise;
         other.wander_sd_rad = injected ? no_noise : options.turns.fit.other_wander * readout;
@@ -198,7 +198,7 @@ void TurnFit::try_from(const TurnParameters& other) {
     set_rest(prediction_);
     moved_ = moved_from;
     if (!(columns_at_ == columns_from)) {
-        // Where they have moved far, others are found before these are asked for.
+        // If the parameters have moved far, the columns are computed again before they are used.
         if (!moved_) columns_ = columns(columns_from, model_->predict(columns_from));
         columns_at_ = columns_from;
     }
@@ -212,7 +212,7 @@ std::vector<double> TurnFit::objectives(const TurnFrame& frame, const std::vecto
     double left = 0.0;
     for (std::size_t i = 0; i < frame.shape_left.size(); ++i) left += rows_[i] ? frame.shape_left[i] : 0.0;
     for (double& sum : sums) sum += left;
-    // The radius of the quadrature has the noise of the phase: as many degrees of freedom again.
+    // The radius of the quadrature has the noise of the phase, with the same number of degrees of freedom.
     const double radius = model_->series().radius_sd_rad;
     for (std::size_t k = 0; k < sums.size() && radius > options.turns.fit.least_radius_sd_rad; ++k) {
         const double readout = parameters[k].readout_sd_rad;
@@ -227,7 +227,7 @@ double TurnFit::objective(const TurnFrame& frame, const TurnParameters& paramete
     return objectives(frame, {parameters}, rest).front();
 }
 
-/// By what normal noise leaves, where the lock-in is not quite right yet: more than once.
+/// Estimates the density from the innovations of normal noise. The lock-in is not correct yet then, so it is repeated.
 void TurnFit::shape_noise() {
     const int passes = parameters_.shape ? 1 : options.turns.fit.passes_of_shape;
     const auto& series = model_->series();
@@ -243,7 +243,7 @@ void TurnFit::shape_noise() {
             if (rows_[i]) counted_rad.push_back(innovation_rad);
         }
         auto shape = NoiseShape::of(counted_rad, kicks, series.direction, foretold_rad);
-        // One that is given may be of what another model left.
+        // A density that was given may be that of the residual of another model.
         if (!shape && !parameters_.shape) return;
         parameters_.shape = std::move(shape);
         prediction_ = model_->predict(parameters_);
@@ -289,8 +289,8 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
         }
         return changed;
     };
-    // From here in units of what the information says of them, beside so weak a belief that none goes far at once:
-    // what BFGS takes for its first guess of the curvature.
+    // The parameters are in units of the information at this point, with a prior so weak that no step is too long: this
+    // is the first estimate of the curvature for BFGS.
     Eigen::MatrixXd information = Eigen::MatrixXd::Identity(size, size);
     {
         constexpr double step = 1e-3;
@@ -333,10 +333,10 @@ TurnParameters TurnFit::with_noise_of(const TurnFrame& frame, const TurnParamete
     return with(logarithms(x));
 }
 
-/// By Fisher's information on the variances, from the innovations' derivatives (Harvey 1989, 3.4): logarithms know
-/// nothing of a variance that is next to zero, which others may be confounded with all the same.
+/// Standard errors by Fisher's information on the variances, from the derivatives of the innovations (Harvey 1989,
+/// 3.4). The logarithm of a variance near zero has no information, although the variance may be correlated with others.
 void TurnFit::add_noise_estimates(std::vector<Estimate>& estimates) const {
-    constexpr double seen = 0.1;  // of a standard error: as long as steps must be
+    constexpr double seen = 0.1;  // of a standard error: the length of the differences
     TurnParameters trial = parameters_;
     const std::vector<Knob> turned = knobs(trial);
     const Innovations here{innovations_, whitening_->sd_rad()};
@@ -359,7 +359,7 @@ void TurnFit::add_noise_estimates(std::vector<Estimate>& estimates) const {
         }
     }
     Eigen::MatrixXd matrix = derivatives.transpose() * derivatives;
-    // The radius of the quadrature tells of the readout's noise as much again.
+    // The radius of the quadrature has the same information on the readout's noise.
     if (model_->series().radius_sd_rad > options.turns.fit.least_radius_sd_rad) {
         matrix(2, 2) += 0.5 * static_cast<double>(rest_.size()) / square(square(*turned[2].value));
     }
@@ -373,7 +373,7 @@ void TurnFit::add_noise_estimates(std::vector<Estimate>& estimates) const {
         double sd = std::numeric_limits<double>::infinity();
         if (inverse(index, index) > 0.0) {
             const double of_variance = std::sqrt(inverse(index, index)) / scale(index);
-            // Of a deviation that may be zero: how large it may be.
+            // For a standard deviation that may be zero: the largest value that is compatible.
             sd = of_variance < variance ? 0.5 * of_variance / value : std::sqrt(variance + of_variance) - value;
         }
         estimates.push_back({turned[k].effect, turned[k].name, value, sd});

@@ -1,4 +1,4 @@
-// What a fit tells: parameters with their errors, and scores of what it does not have.
+// Results of a fit: parameters with their errors, and scores of series that the model does not contain.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -15,9 +15,9 @@ Eigen::MatrixXd TurnFit::whitened_columns(Eigen::VectorXd& scale) const {
     return counted(*whitening_, prediction_.frame, columns_.size(), column_of, scale);
 }
 
-/// Observed information, in units of the columns' norms. Squares of whitened columns are that but for one thing: what
-/// the lock-in makes of a reading is in the column of a threshold, goes with the very noise of that reading, and is no
-/// information where the variance of the innovation says so as well.
+/// Observed information, in units of the columns' norms. Squares of whitened columns are equal to it with one
+/// exception: the column of a threshold contains the response of the lock-in to a reading's error, which is correlated
+/// with the error itself and is no information, since the variance of the innovation changes likewise.
 Eigen::MatrixXd TurnFit::information(Eigen::VectorXd& scale) const {
     constexpr double part = 0.1;  // of a standard error
     const Eigen::MatrixXd x = whitened_columns(scale);
@@ -47,7 +47,7 @@ Eigen::MatrixXd TurnFit::information(Eigen::VectorXd& scale) const {
     }
     add_priors(scale, normal, nullptr);
     if (normal.ldlt().isPositive()) return normal;
-    normal = squares;  // at the end of a range, or where nothing tells
+    normal = squares;  // at the end of a range, or where no row is informative
     add_priors(scale, normal, nullptr);
     return normal;
 }
@@ -76,7 +76,7 @@ std::vector<Estimate> TurnFit::estimate() const {
         }
         estimates.push_back(std::move(estimate));
     }
-    // Times and phases by the record's clock, which need not begin with the first turn.
+    // Times and phases refer to the record's clock, which need not begin with the first turn.
     const double start_s = model_->series().start_s;
     for (const ActiveEffect& active : parameters_.effects) {
         std::optional<std::size_t> frequency;
@@ -176,10 +176,11 @@ TurnFit::Score TurnFit::score_of(const Products& products) {
     return score;
 }
 
-/// In two passes of the filter: the first finds what of each series is the model's own, the second is without it.
+/// In two passes of the filter: the first determines the part of each series along the model's own columns, and the
+/// second removes it.
 TurnFit::Products TurnFit::products(std::size_t count, const Piece& piece) const {
     constexpr std::size_t turns_at_once = 1024;
-    constexpr Eigen::Index columns_at_once = 24;  // of the lower triangle: parts that are as much work each
+    constexpr Eigen::Index columns_at_once = 24;  // of the lower triangle, so that all parts take equal time
     const Eigen::MatrixXd& own = basis();
     const std::size_t n = rows_.size();
     const auto series = static_cast<Eigen::Index>(count);
@@ -207,7 +208,7 @@ TurnFit::Products TurnFit::products(std::size_t count, const Piece& piece) const
         all += part.colwise().squaredNorm().transpose();
     });
     Products found{Eigen::MatrixXd::Zero(series, series), Eigen::VectorXd::Zero(series)};
-    // Rows of |1 - before'| have nothing of the series but what is taken off with the model's own.
+    // Rows of |1 - before'| contain only the part that is removed with the model's own columns.
     const auto below = own.bottomRows(turns);
     Eigen::MatrixXd lower = share.transpose() * (below.transpose() * below) * share;
     found.right = share.transpose() * (below.transpose() * residual().tail(turns)) * -1.0;
@@ -222,7 +223,7 @@ TurnFit::Products TurnFit::products(std::size_t count, const Piece& piece) const
             lower.block(from, from, series - from, wide).noalias() +=
                 white.topRows(some).rightCols(series - from).transpose() * white.topRows(some).middleCols(from, wide);
         });
-        // Rows that do not count are nothing in the series and in what is the model's own.
+        // Rows that do not count are zero in the series and in the model's own columns.
         found.right.noalias() += white.topRows(some).transpose() * innovations.segment(first, some);
     });
     found.squares = lower.selfadjointView<Eigen::Lower>();

@@ -6,22 +6,23 @@
 #include "analysis/closure/turns/model/series.hpp"
 #include "analysis/record/record.hpp"
 
-/// A record of turns read, prepared and fitted.
+/// A record of turns that is read, prepared and fitted.
 namespace ringlock::closure {
 
-/// The phases of a record, joined from count and quadrature, the record prepared for a fit, and what foretells them.
+/// The phases of a record, joined from count and quadrature, the record prepared for a fit, and the model that predicts
+/// the phases.
 struct TurnReading {
     TurnReading(const record::Record& record, const gyro::Ellipse& ellipse, bool count_again);
 
     JoinedPhase joined;
     TurnSeries series;
-    TurnModel model;  ///< nothing but the scatter of the reading's errors known
+    TurnModel model;  ///< with no estimate of the reading's errors except their variance
 };
 
-/// A model of a record, fitted, with the reading that it was fitted to.
+/// A fitted model of a record, with the reading that it was fitted to.
 struct Fitted {
     std::shared_ptr<const TurnReading> reading;
-    std::unique_ptr<TurnModel> model;  ///< where it is not the reading's
+    std::unique_ptr<TurnModel> model;  ///< if it is not the reading's
     std::unique_ptr<TurnFit> fit;
 
     const JoinedPhase& joined() const { return reading->joined; }
@@ -35,7 +36,7 @@ inline double gain_over(const Fitted& fitted, const Fitted& without) {
     return fitted.log_likelihood() - without.log_likelihood();
 }
 
-/// A record of turns and the rows that models are fitted to. Every fit of the record starts here, so that readings are
+/// A record of turns and the rows to which models are fitted. Every fit of the record starts here, so that readings are
 /// made once and shared.
 class TurnProblem {
    public:
@@ -48,13 +49,13 @@ class TurnProblem {
     const record::Turns& turns() const { return *record_->turns; }
     const Rows& rows() const { return rows_; }
 
-    /// The model with these effects fitted to the rows; from the record's declared device where `start` has no noise
-    /// yet. Throws RunError where no motion of a gyro with such parameters can be followed.
-    /// \param needed  log-likelihood below which nothing needs to be exact
+    /// The model with these effects fitted to the rows. If `start` has no noise yet, the fit starts from the record's
+    /// declared device. Throws RunError if no motion of a gyro with such parameters can be followed.
+    /// \param needed  log-likelihood below which accuracy does not matter
     std::shared_ptr<Fitted> fit(const TurnParameters& start, TurnFit::Effects effects = TurnFit::Effects::fitted,
                                 double needed = -std::numeric_limits<double>::infinity()) const;
 
-    /// The same, or null where no motion can be followed.
+    /// The same, or null if no motion can be followed.
     std::shared_ptr<Fitted> fit_or_none(const TurnParameters& start,
                                         double needed = -std::numeric_limits<double>::infinity()) const;
 

@@ -48,7 +48,7 @@ double p_of_fit(const Fitted& fitted, const Fitted& without, const Candidate& ca
     using effects::Role;
     const double chi2 = 2.0 * std::max(0.0, gain_over(fitted, without));
     const int amplitudes = count_of(*candidate.effect, {Role::size, Role::phase, Role::deviation, Role::probability});
-    // Times and frequencies were searched. The search counts for more the higher its summit, as the root of it.
+    // Times and frequencies were searched. The look-elsewhere factor grows as the root of the maximum.
     const double higher = std::sqrt(std::max(1.0, chi2 / std::max(candidate.chi2, 1e-300)));
     return of_several(chi2_tail(chi2, amplitudes), candidate.searched > 1.0 ? candidate.searched * higher : 1.0);
 }
@@ -66,15 +66,15 @@ void CandidateFit::begin(const Fitted* alike, double needed) {
     const TurnOptions::Loop& limits = options.turns.loop;
     needed_ = now_.log_likelihood() + needed;
     const effects::Effect& effect = *candidate_.effect;
-    // Coupling, threshold and bias move together: from a small share the first step takes all of them along.
+    // Coupling, threshold and bias move together: from a small share the first step moves all of them.
     if (is_of_coupling(effect)) from(with_share(limits.small_share));
     if (!is_of_coupling(effect) || !gained_most()) from(start_);
-    // The fit without the effect may have led the other parameters far astray.
+    // The fit without the effect may have biased the other parameters strongly.
     if (is_random_rate(effect) || changes_reading(effect) ||
         (strong_rate_ && !gained(limits.little_of_chi2 * candidate_.chi2))) {
         anew(alike);
     }
-    // The score's estimate is linear: where it lies too far away, shorter steps are tried.
+    // The score's estimate is linear: if it lies too far away, shorter steps are tried.
     const int shorter = told_by_other_columns(effect) ? 0 : limits.shorter_starts;
     double share = 1.0;
     for (int k = 0; k < shorter && !gained(0.0); ++k) from(with_share(share *= 0.1));
@@ -116,7 +116,7 @@ void CandidateFit::anew(const Fitted* alike) {
 }
 
 TurnParameters CandidateFit::with_share(double share) const {
-    // Some effects are a phase and nothing else.
+    // Some effects have a phase only.
     const bool has_size = effects::first_of(*candidate_.effect, effects::Role::size) != nullptr;
     TurnParameters parameters = start_;
     for (const effects::Parameter& parameter : candidate_.effect->parameters()) {

@@ -7,20 +7,20 @@
 /// The full fit of one candidate and the evidence for it.
 namespace ringlock::closure {
 
-/// Merit that a score test promises: gain of the log-likelihood less the cost of its parameters and of its search
+/// Evidence that a score test predicts: gain of the log-likelihood less the cost of its parameters and of its search
 /// [nats].
 double promised_merit(const Candidate& candidate);
 
-/// Merit of an effect in a full fit [nats]: the gain of the log-likelihood with the amplitudes integrated out, and
-/// times and frequencies as well (Laplace), as the likelihood of a random rate has its course integrated out.
+/// Evidence of an effect in a full fit [nats]: the gain of the log-likelihood with the amplitudes integrated out, and
+/// times and frequencies as well (Laplace), as the likelihood of a random rate has its path integrated out.
 double merit_of(double gain, const Fitted& fitted, const effects::Effect& effect);
 
-/// Probability by chance of the gain of a fit with the candidate over one without it, the search over times and
-/// frequencies counted.
+/// Probability by chance of the gain of a fit with the candidate over one without it, with the search over times and
+/// frequencies included.
 double p_of_fit(const Fitted& fitted, const Fitted& without, const Candidate& candidate);
 
-/// Full fits of the model with one more effect, all parameters free, from several starting points; the likeliest is
-/// kept.
+/// Full fits of the model with one more effect, with all parameters free, from several starting points; the most likely
+/// one is kept.
 class CandidateFit {
    public:
     /// All arguments must outlive it.
@@ -28,18 +28,18 @@ class CandidateFit {
 
     /// Starts from the score test's estimate.
     /// \param alike   a model with another random rate in place of this one, or null
-    /// \param needed  gain of the log-likelihood below which the fit need not be exact [nats]
+    /// \param needed  gain of the log-likelihood below which accuracy does not matter [nats]
     void begin(const Fitted* alike, double needed);
 
-    /// Starts from the fit of a smaller effect that the candidate contains, in its place, and from the score test's
-    /// estimate only where that gains much less than the score promises.
+    /// Starts from the fit of a smaller effect that the candidate contains, with the candidate in its place. Starts
+    /// from the score test's estimate only if that gains much less than predicted.
     void begin_as(const effects::Effect& smaller, const Fitted& fitted, double needed);
 
-    /// Starts from scratch where a strong rate may have led the other parameters astray although it gained most of what
-    /// its score promised.
+    /// Starts from the start of the model as well if the rate is strong. It may have biased the other parameters even
+    /// if the fit gained most of the predicted gain.
     void again_if_strong();
 
-    /// Null where no motion of a gyro with such parameters can be followed.
+    /// Null if no motion of a gyro with such parameters can be followed.
     const std::shared_ptr<Fitted>& best() const { return best_; }
 
    private:

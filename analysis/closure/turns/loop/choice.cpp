@@ -20,7 +20,7 @@ struct CandidateSet {
     std::vector<Candidate> others = {};
     std::shared_ptr<Fitted> fitted = {};
     double merit = 0.0;
-    double p_value = 1.0;  ///< of the first, given the others
+    double p_value = 1.0;  ///< of the first, with the others in the model
 
     EffectSet effects() const {
         EffectSet set{{first->effect}, merit};
@@ -40,8 +40,8 @@ struct CandidateSet {
     }
 };
 
-/// The likeliest candidates, random or not, each with the effect that explains most of its residual, and pairs of
-/// random rates. Both members must be needed.
+/// Pairs of each of the most likely candidates, random or not, with the effect that explains most of its residual, and
+/// pairs of random rates. Both members must be needed.
 std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Candidate>& candidates) {
     const TurnOptions::Loop& limits = options.turns.loop;
     std::vector<CandidateSet> sets;
@@ -59,7 +59,7 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
     std::vector<const Candidate*> random;
     std::size_t tried = 0;
     for (const Candidate& candidate : candidates) {
-        // Sets with an effect that contains another one explain hardly more than those with the other.
+        // Sets with an effect that contains another one explain hardly more than the sets with the other one.
         if (contains_one_of(*candidate.effect, candidates)) continue;
         const bool is_random = is_random_rate(*candidate.effect);
         if (is_random ? !passes(candidate.p_value) : ++tried > limits.first_of_pair) continue;
@@ -76,7 +76,7 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
         for (std::size_t b = a + 1; b < random.size(); ++b) of_random.push_back({random[a], random[b]});
     }
     std::vector<Ranking> seconds(firsts.size());
-    // One after the other: the rankings are done side by side within, and each holds a fit of the record meanwhile.
+    // One after the other: each ranking is parallel in itself, and holds a fit of the record meanwhile.
     for (std::size_t k = 0; k < firsts.size(); ++k) {
         seconds[k] = rank_candidates(problem, *firsts[k]->fitted, limits.second_of_pair, Among::not_random,
                                      candidates.front().merit - firsts[k]->merit);
@@ -98,9 +98,9 @@ std::vector<CandidateSet> pairs(const TurnProblem& problem, const std::vector<Ca
     return sets;
 }
 
-/// The likeliest pairs with a third effect: a random rate can follow three other effects at once, and hide what jumps
-/// next to another random one. Only sets that do as well as the best one, with each effect needed.
-/// \param sets  by decreasing merit
+/// The most likely pairs with a third effect. A random rate can follow three other effects at once, or hide jumps next
+/// to another random rate. Only sets as good as the best one are returned, in which each effect is needed.
+/// \param sets  by decreasing evidence
 std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<Candidate>& candidates,
                                   const std::vector<CandidateSet>& sets) {
     const TurnOptions::Loop& limits = options.turns.loop;
@@ -108,7 +108,7 @@ std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<
     std::vector<const CandidateSet*> extended;
     for (const long random : {0L, 1L}) {
         const auto likeliest = std::find_if(sets.begin(), sets.end(), [&](const CandidateSet& set) {
-            // An effect that contains another one stands in for much that a third effect would explain.
+            // An effect that contains another one substitutes for much that a third effect would explain.
             const EffectSet all = set.effects();
             const bool of_smallest = std::none_of(all.effects.begin(), all.effects.end(), [&](const auto* effect) {
                 return contains_one_of(*effect, candidates);
@@ -154,7 +154,7 @@ std::vector<CandidateSet> triples(const TurnProblem& problem, const std::vector<
     return all;
 }
 
-/// All sets that may be the answer, by decreasing merit.
+/// All sets that may be chosen, by decreasing evidence.
 std::vector<CandidateSet> sets_of(const TurnProblem& problem, const Ranking& ranking) {
     std::vector<CandidateSet> sets;
     for (const Candidate& candidate : ranking.candidates) {
@@ -173,7 +173,7 @@ std::vector<CandidateSet> sets_of(const TurnProblem& problem, const Ranking& ran
     return sets;
 }
 
-/// A rate without chance may be more likely than the random rate that made the record.
+/// A deterministic rate may be more likely than the random rate that generated the record.
 void tie_random_rates(const Ranking& ranking, double merit, std::vector<const effects::Effect*>& tied) {
     for (const Candidate& candidate : ranking.candidates) {
         const bool known = std::find(tied.begin(), tied.end(), candidate.effect) != tied.end();

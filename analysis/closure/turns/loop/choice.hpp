@@ -4,21 +4,21 @@
 #include "analysis/closure/decide/sets.hpp"
 #include "analysis/closure/turns/loop/ranking.hpp"
 
-/// Which of the ranked candidates is added to the model.
+/// Selects the ranked candidate that is added to the model.
 namespace ringlock::closure {
 
 /// The candidate to add, if any.
 struct Choice {
     const Candidate* chosen = nullptr;              ///< null: no candidate passes
     double p_value = 1.0;                           ///< of the chosen one, given its partners
-    std::vector<Naming::Alternative> alternatives;  ///< the chosen effect and all that explain about as much
-    bool on_random = false;                         ///< it is a random rate, or was chosen together with one
+    std::vector<Naming::Alternative> alternatives;  ///< the chosen effect and all effects that explain about as much
+    bool on_random = false;                         ///< it is a random rate, or was chosen in a set with one
     std::vector<const effects::Effect*> confounded_with;
-    std::vector<const effects::Effect*> partners = {};  ///< explain the rest, where several were chosen together
+    std::vector<const effects::Effect*> partners = {};  ///< the other effects of the set, if one was chosen
 };
 
-/// The likeliest candidate where it passes, with all that are as likely tied to it. A random rate can follow two or
-/// three other effects at once: where one is the likeliest, sets of effects are tried before any is taken.
+/// The most likely candidate if it passes, with all that are equally likely tied to it. A random rate can follow two or
+/// three other effects at once: if one is the most likely candidate, sets of effects are tried first.
 /// \param ranking  must outlive the choice
 Choice choose(const TurnProblem& problem, const Ranking& ranking);
 

@@ -15,7 +15,7 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Frequency of the dither by its own turns: the slope of their times. Its error comes from the scatter of means over
+/// Frequency of the dither by its own turns: the slope of their times. Its error follows from the scatter of means over
 /// stretches with their correlation (Newey and West, Econometrica 55, 1987, 703), which a varying input causes.
 Estimate dither_frequency(const TurnFit& fit) {
     constexpr std::size_t stretches = options.turns.loop.frequency_stretches;
@@ -24,7 +24,7 @@ Estimate dither_frequency(const TurnFit& fit) {
     std::vector<double> at;
     std::vector<double> late_s;
     for (std::size_t s = 0; s < stretches; ++s) {
-        // Whole cycles: minima and maxima may be late by different times.
+        // Whole cycles, since minima and maxima may be late by different times.
         const std::size_t begin = (turn_s.size() * s / stretches) & ~std::size_t{1};
         const std::size_t end = (turn_s.size() * (s + 1) / stretches) & ~std::size_t{1};
         double sum = 0.0;

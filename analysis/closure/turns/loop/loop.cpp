@@ -34,8 +34,8 @@ void add_once(std::vector<const effects::Effect*>& effects, const effects::Effec
     if (!is_among(effects, effect)) effects.push_back(effect);
 }
 
-/// Effects with times and phases by a clock that begins with the first turn, as the fit's does (TurnFit::estimates has
-/// the way back).
+/// Effects with times and phases for a clock that begins with the first turn, as in the fit (TurnFit::estimates
+/// converts back).
 std::vector<ActiveEffect> since_first_turn(std::vector<ActiveEffect> effects, const record::Record& record) {
     for (ActiveEffect& active : effects) {
         set_back_clock(*active.effect, active.values, record.turns->time_s.front());
@@ -54,13 +54,13 @@ std::vector<Step> steps_of(const std::vector<ActiveEffect>& effects) {
 TurnLoop::TurnLoop(const record::Record& record, const Monitor& monitor)
     : problem_(record, training_rows(record.turns->size())), monitor_(monitor) {}
 
-/// Of the fit before nothing is kept that is as long as the record.
+/// The previous fit releases its memory of the length of the record.
 void TurnLoop::go_on_with(std::shared_ptr<Fitted> fitted) {
     if (now_ && now_ != fitted) now_->fit->put_away();
     now_ = std::move(fitted);
 }
 
-/// Where the declared device, or the standard one, cannot have made such turns, no other model will do.
+/// If no motion of the declared device, or of the standard one, can be followed, no other model can be fitted.
 void TurnLoop::fit_base() {
     try {
         now_ = problem_.fit({});
@@ -86,9 +86,9 @@ void TurnLoop::fit_base() {
     base_log_likelihood_ = now_->log_likelihood();
 }
 
-/// Amplitude changes of the dither that are no effect of the library but part of the dither itself.
+/// Adds changes of the dither's amplitude, which are no effect of the library but part of the dither itself.
 bool TurnLoop::add_amplitude(const Ranking& ranking, const Choice& choice) {
-    // The lock-in of a locked gyro takes amplitudes up, unless noise is injected.
+    // The lock-in of a locked gyro absorbs changes of the amplitude unless noise is injected.
     const TurnParameters& found = now_->parameters();
     const bool shows = now_->series().all_phases_come || found.injected_sd_rad > found.readout_sd_rad;
     if (ranking.seen_in_other_columns || !shows) return false;
@@ -101,7 +101,7 @@ bool TurnLoop::add_amplitude(const Ranking& ranking, const Choice& choice) {
     return true;
 }
 
-/// Whether the library explains more than any residual test does. May change the choice to an effect of the coupling.
+/// Whether the library explains more than any residual test. May change the choice to an effect of the coupling.
 bool TurnLoop::library_explains_most(Ranking& ranking, Choice& choice) const {
     if (ranking.seen_in_other_columns) return true;
     const TurnFit& fit = *now_->fit;
@@ -116,8 +116,8 @@ bool TurnLoop::library_explains_most(Ranking& ranking, Choice& choice) const {
     return !better_than_library(fit, choice);
 }
 
-/// Looks for one more effect and adds it.
-/// \return false where nothing more is supported
+/// Searches one more effect and adds it.
+/// \return false if the record supports no further effect
 bool TurnLoop::add_one() {
     check_interrupt();
     monitor_.tell("searching the library");
@@ -129,7 +129,7 @@ bool TurnLoop::add_one() {
     return true;
 }
 
-/// An effect that was chosen together with others is confounded with whatever they are confounded with.
+/// An effect that was chosen in a set is confounded with the effects with which the others of the set are.
 void TurnLoop::confound_with_partners(const Choice& choice, Step& step) {
     const auto expected = std::find(partners_.begin(), partners_.end(), step.effect);
     if (expected != partners_.end()) {
@@ -165,7 +165,7 @@ void TurnLoop::take(const Choice& choice) {
     closure_.steps.push_back(std::move(step));
 }
 
-/// The dither's shape by times and accelerations depends on the rates in the model, and on each other.
+/// Evaluates the dither's shape again: it depends on the rates in the model, and both shape effects on each other.
 void TurnLoop::read_shape_again() {
     for (int pass = 0; pass < options.turns.loop.shape_readings; ++pass) {
         const auto shape = shape_read_again(problem_.turns(), *now_->fit);
@@ -177,7 +177,7 @@ void TurnLoop::read_shape_again() {
     }
 }
 
-/// Removes effects that stood in for the one added last.
+/// Removes effects that only substituted for the one added last.
 void TurnLoop::drop_needless() {
     for (std::size_t k = closure_.steps.size(); k-- > 0;) {
         const effects::Effect* effect = closure_.steps[k].effect;
@@ -206,8 +206,8 @@ void TurnLoop::test_residual() {
     closure_.unexplained = std::move(verification.unexplained);
 }
 
-/// A rate is left that no effect of the library makes: the random rate only came nearest to it. The residual without it
-/// shows where the structure lies.
+/// The residual fails although a random rate was added: the library has no effect for this rate, and the random rate
+/// was only the most similar one. The residual without it shows the location of the structure.
 void TurnLoop::take_back_random() {
     const bool on_random = earlier_ && std::any_of(closure_.steps.begin(), closure_.steps.end(), [&](const Step& step) {
                                return step.effect == earlier_->effect || is_random_rate(*step.effect);
@@ -265,8 +265,8 @@ Closure TurnLoop::run() {
     closure_.level = options.level;
     monitor_.tell("fitting the base model");
     fit_base();
-    // Effects that stood in for another are dropped again, and changes of the dither are no steps: there may be more
-    // rounds than steps.
+    // Effects that only substituted for others are removed, and changes of the dither are no steps, so there may be
+    // more rounds than steps.
     const std::size_t most_rounds = options.turns.loop.rounds_per_step * options.most_steps;
     for (std::size_t round = 0; round < most_rounds && closure_.steps.size() < options.most_steps; ++round) {
         if (is_rounding(heldout(*now_->fit).error_rad) || !add_one()) break;

@@ -13,7 +13,7 @@ namespace ringlock::closure {
 /// The closed loop on one record of turns.
 class TurnLoop {
    public:
-    /// The record must outlive the loop. Throws InputError where it has too few turns for a fit.
+    /// The record must outlive the loop. Throws InputError if it has too few turns for a fit.
     TurnLoop(const record::Record& record, const Monitor& monitor);
 
     Closure run();
@@ -38,25 +38,26 @@ class TurnLoop {
     Closure closure_;
     std::shared_ptr<Fitted> now_;
     double base_log_likelihood_ = 0.0;
-    /// The loop before the first effect that was taken on the strength of a random rate.
+    /// The loop before the first effect that was selected because of a random rate.
     struct Earlier {
         std::shared_ptr<Fitted> now;
         std::vector<Step> steps;
         const effects::Effect* effect;
     };
     std::optional<Earlier> earlier_;
-    std::vector<const effects::Effect*> partners_;  ///< of the effects that were added last, still to come
+    /// Partners of the effects that were added last, which are expected next
+    std::vector<const effects::Effect*> partners_;
 };
 
-/// Runs the loop. Throws InputError where the record does not suffice.
+/// Runs the loop. Throws InputError if the record does not suffice.
 Closure close_turns(const record::Record& record, const Monitor& monitor = {});
 
-/// The model with these effects fitted, without any search: what a loop that knows the true effects reaches. Effects
-/// start from the values given.
+/// The model with these effects fitted, without any search, as a loop that knows the true effects would. The effects
+/// start from the given values.
 Closure fit_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
 
-/// Standard errors of the parameters of effects at the values given, those of the true model: by Fisher's information
-/// in the whole record.
+/// Standard errors of the parameters of effects at the given values, which are those of the true model: by Fisher's
+/// information in the whole record.
 std::vector<Estimate> information_on_turns(const record::Record& record, const std::vector<ActiveEffect>& effects);
 
 }  // namespace ringlock::closure

@@ -18,7 +18,7 @@ namespace ringlock::closure {
 namespace {
 
 /// Score tests under the fitted noise, which may have absorbed part of an effect, and under less noise, which may show
-/// more of it. They only say where to look.
+/// more of it. They only select candidates for full fits.
 std::vector<Candidate> screen_by_any_noise(const TurnFit& fit) {
     std::vector<Candidate> candidates = screen(fit);
     const auto less = fit.with_less_noise();
@@ -36,7 +36,7 @@ std::vector<Candidate> screen_by_any_noise(const TurnFit& fit) {
     return candidates;
 }
 
-/// The candidates worth a full fit, the most promising first; random rates in addition to `most` others, and effects
+/// The candidates worth a full fit, the most likely first: `most` of them, and in addition random rates and effects
 /// that contain one of these.
 std::vector<Candidate> worth_a_fit(std::vector<Candidate> candidates, double largest_p, std::size_t most) {
     std::erase_if(candidates, [&](const Candidate& c) { return !(c.p_value < largest_p); });
@@ -64,7 +64,7 @@ void leave_alone_what_changes_the_reading(std::vector<Candidate>& candidates) {
     }
 }
 
-/// The full fits of some candidates, side by side.
+/// The full fits of several candidates, in parallel.
 class RankingFits {
    public:
     RankingFits(const TurnProblem& problem, const Fitted& now, std::vector<Candidate>& candidates, bool other_columns,
@@ -75,10 +75,10 @@ class RankingFits {
     }
 
     void fit_all() {
-        // The most promising candidate and the most promising random rate go first: they set the scale for the others.
+        // The most likely candidate and the most likely random rate are first: the others are compared with them.
         std::vector<std::size_t> first;
         std::vector<std::size_t> others;
-        std::vector<std::size_t> larger;  // than another candidate, whose fit they start from
+        std::vector<std::size_t> larger;  // these contain another candidate, from whose fit they start
         const Candidate* random = nullptr;
         std::size_t first_random = 0;
         for (std::size_t k = 0; k < candidates_.size(); ++k) {
@@ -138,7 +138,7 @@ class RankingFits {
         const Candidate& candidate = candidates_[k];
         merits_[k] =
             other_columns_ ? promised_merit(candidate) : merit_of(gain_over(*best, now_), *best, *candidate.effect);
-        if (!other_columns_ && contained_in(k)) best->fit->estimates();  // which are asked for once all are fitted
+        if (!other_columns_ && contained_in(k)) best->fit->estimates();  // needed when all are fitted
         best->fit->put_away();
     }
 
@@ -150,7 +150,7 @@ class RankingFits {
     std::vector<double> merits_;
 };
 
-/// An effect that contains another one is as likely as that, but for what the record says of the rest of it.
+/// An effect that contains another one is as likely as that one, except for the evidence on its additional sizes.
 void compare_with_contained(std::vector<Candidate>& candidates) {
     for (Candidate& larger : candidates) {
         for (const Candidate& smaller : candidates) {

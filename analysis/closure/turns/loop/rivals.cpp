@@ -19,7 +19,7 @@ bool follows_column(const TurnView& view) {
            view.test.where == Where::amplitude;
 }
 
-/// Whether phases come in step: noise of a radian at the turns leaves nothing of that.
+/// Whether phases come in step: noise of a radian at the turns would prevent it.
 bool phases_in_step(const TurnFit& fit) {
     return fit.parameters().injected_sd_rad < options.turns.loop.randomising_noise_rad;
 }
@@ -61,7 +61,7 @@ std::optional<double> better_than_library(const TurnFit& fit, const Choice& choi
     for (const auto& alternative : choice.alternatives) rival = std::max(rival, alternative.merit);
     std::optional<double> most;
     for (const TurnView& view : views) {
-        // A gyro whose phases come in step makes lines of anything that follows the phase: kicks of first order in a
+        // In a gyro whose phases come in step, anything that follows the phase makes lines: kicks of first order in a
         // test count for more against a line at a harmonic of the beat.
         const bool of_phase = view.test.where == Where::phase;
         const double counts = on_beat && of_phase ? limits.phase_against_beat : 1.0;
@@ -71,8 +71,8 @@ std::optional<double> better_than_library(const TurnFit& fit, const Choice& choi
             const bool in_step = of_phase && changes_angle_only(*alternative.effect) && phases_in_step(fit);
             if (in_step) return merit > std::min(tied, (1.0 - limits.first_order_error) * alternative.merit);
             if (!is_random_rate(*alternative.effect)) return merit > alternative.merit + options.tie;
-            // A random rate can follow jumps nearly as well as the jumps themselves, and anything that follows a noisy
-            // column better than that column does.
+            // A random rate can follow jumps nearly as well as the jumps themselves, and a cause that is visible in a
+            // noisy column better than the column does.
             if (follows_column(view)) {
                 return merit > std::min(tied, (1.0 - limits.noise_of_column) * alternative.merit);
             }

@@ -7,7 +7,7 @@ namespace {
 using effects::Effect;
 using effects::Role;
 
-/// The parameter that, by itself, changes this constant; empty where none does.
+/// The parameter that changes this constant by itself; empty if none does.
 template <class Constant>
 std::string parameter_of(const Effect& effect, Constant&& constant) {
     const effects::Values rest = values_at_rest(effect);

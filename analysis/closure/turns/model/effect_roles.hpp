@@ -5,18 +5,19 @@
 #include "analysis/closure/decide/effect_queries.hpp"
 #include "engine/effects/effect.hpp"
 
-/// Effects of the library by what they change in a gyro: which columns of a record show them, and which parameter is
-/// which. No effect is known by its name, so that another one of the same kind is found as well.
+/// Effects of the library by the constants of a gyro that they change: which columns of a record show them, and which
+/// parameter changes which constant. No effect is identified by its name, so that another one of the same kind is also
+/// found.
 namespace ringlock::closure {
 
-/// Whether times, accelerations, the quadrature circle or the counter show the effect by themselves: the dither's
+/// Whether times, accelerations, the quadrature circle or the counter show the effect without the phases: the dither's
 /// shape, the detectors, the counter.
 bool told_by_other_columns(const effects::Effect& effect);
 
-/// Whether the effect changes the phases as they are read: the detectors or the counter. The record is then read anew.
+/// Whether the effect changes the phases as they are read: the detectors or the counter. The record is then read again.
 bool changes_reading(const effects::Effect& effect);
 
-/// Whether the effect changes the kicks of the lock-in, whatever else it changes. Such an effect is seen in the phases
+/// Whether the effect changes the kicks of the lock-in, whatever else it changes. Such an effect shows in the phases
 /// alone.
 bool is_of_coupling(const effects::Effect& effect);
 
@@ -45,7 +46,7 @@ struct EffectRoles {
     MissedCounts missed_counts;
 };
 
-/// Found once, by the setups that the effects configure.
+/// Computed once, from the setups that the effects configure.
 const EffectRoles& effect_roles();
 
 }  // namespace ringlock::closure

@@ -16,7 +16,7 @@ namespace ringlock::closure::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using Several = hn::CappedTag<double, 8>;
-/// In place of a tag, where there is one noise only.
+/// Replaces the vector tag if there is only one noise.
 struct One {};
 
 HWY_INLINE double set(One, double x) { return x; }
@@ -31,7 +31,7 @@ HWY_INLINE hn::Vec<Several> larger(Several, hn::Vec<Several> a, hn::Vec<Several>
 constexpr std::size_t width(One) { return 1; }
 HWY_INLINE std::size_t width(Several d) { return hn::Lanes(d); }
 
-/// State of the filter fed with a series, with the noises from `first` on.
+/// Filter state driven by a series, for the noises from `first` on.
 template <std::size_t states, class Tag>
 class Follower {
    public:
@@ -49,7 +49,7 @@ class Follower {
     HWY_INLINE V innovation(double value, double sign) const {
         return set(Tag{}, value) - x_[0] - set(Tag{}, sign) * x_[1];
     }
-    /// On to the next turn: what it gains by this innovation.
+    /// Advances to the next turn, with the gain of this innovation.
     HWY_INLINE void step(const Row& gain, V innovation) {
         x_[0] = x_[0] + gain[0] * innovation;
         x_[1] = decay_[1] * x_[1] + gain[1] * innovation;
@@ -70,7 +70,7 @@ class Follower {
     Row decay_, gain_s_, x_;
 };
 
-/// What the filter believes of its state, turn after turn. As each state but the angle keeps to itself, a step takes
+/// Covariance of the filter's state, turn by turn. Since all states except the angle are independent, a step takes
 /// states^2 operations.
 template <std::size_t states, class Tag>
 class Belief {
@@ -91,8 +91,8 @@ class Belief {
         }
     }
 
-    /// On to the next turn: the variance of the innovation, one over it, and what the states gain by an innovation
-    /// that is given in units of that variance.
+    /// Advances to the next turn: the variance of the innovation, its inverse, and the gain of the states for an
+    /// innovation in units of that variance.
     HWY_INLINE void step(const TurnFrame& frame, std::size_t turn, Row& gain, V& f, V& over) {
         const V sign = set(d_, frame.sign[turn]);
         const V through = set(d_, 1.0 - frame.before_slope[turn]);
@@ -185,7 +185,8 @@ template <std::size_t states, class Tag>
 void likelihoods_with(Tag d, const TurnFrame& frame, const FilterNoises& noises, std::size_t first,
                       const double* series, const std::uint8_t* counts, double* sums) {
     using V = typename Belief<states, Tag>::V;
-    // Logarithms cost more than all the rest: of products of so many, which are far from the largest and least numbers.
+    // Logarithms take most of the time. They are taken of products of a few variances, which stay within the range of
+    // doubles.
     constexpr int at_once = 8;
     double of_products[8] = {};
     const auto take_logarithms = [&](V product) {

@@ -23,11 +23,12 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// What the lock-in adds between the turn at one end of a half cycle and its middle, in the frame in which fast motion
-/// is plain rotation, by the angle at that turn (psi and the coupling phase): exact (docs/turn-map.md).
+/// The phase that the lock-in adds between the turn at one end of a half cycle and its middle, in the frame in which
+/// fast motion is plain rotation, as a function of the angle at that turn (psi and the coupling phase): exact
+/// (docs/turn-map.md).
 class HalfKick {
    public:
-    /// `end` 0: the turn at which the half cycle begins, 1: the one at which it ends.
+    /// \param end  0: the turn at which the half cycle begins, 1: the turn at which it ends
     HalfKick(const gyro::Device& device, int sign, int end)
         : sign_(sign), end_(end), second_ratio_(device.coupling.second_ratio) {
         const gyro::HalfCycle cycle = device.half_cycle(sign, device.dither_amplitude_rad);
@@ -43,8 +44,8 @@ class HalfKick {
         return finished(map.shift_rad + 2.0 * std::arg(1.0 + map.z * std::polar(1.0, -upright_rad(theta_rad))));
     }
 
-    /// A second harmonic of the coupling makes the flow no Moebius map. Every phase is integrated to where motion
-    /// becomes fast, the first of them to the middle as well: in between all turn alike in the fast frame.
+    /// With a second harmonic of the coupling the flow is no Moebius map. Every phase is integrated to the beginning of
+    /// fast motion, and the first one also to the middle: in between all phases rotate alike in the fast frame.
     propagate::Stretch to_fast_motion(double theta_rad) const { return stretch(theta_rad, fast_from_s()); }
     propagate::Stretch to_middle(double theta_rad) const { return stretch(theta_rad, middle_s()); }
     std::vector<double> values_rad(const std::vector<double>& theta_rad,
@@ -68,10 +69,10 @@ class HalfKick {
     }
 
    private:
-    /// The half cycle turned upright begins at its turn and has sign +1.
+    /// Angle in the mirrored half cycle, which begins at its turn and has sign +1.
     double upright_rad(double theta_rad) const { return end_ == 0 ? sign_ * theta_rad : units::pi - sign_ * theta_rad; }
     double finished(double upright_value_rad) const {
-        // A harmonic of the dither makes the plain phases of the two halves unequal.
+        // With a harmonic of the dither the plain phases of the two halves are unequal.
         const gyro::HalfCycle& half = problem_.half;
         return sign_ *
                (upright_value_rad + half.amplitude_rad * half.harmonic_ratio * std::cos(half.harmonic_phase_rad));
@@ -98,7 +99,7 @@ class HalfKick {
     double second_ratio_, second_phase_rad_;
 };
 
-/// Their values at these angles, all in one go: lanes of the integrator fill up.
+/// Values of several half kicks at these angles. They are computed together to fill the lanes of the integrator.
 std::vector<std::vector<double>> values_of(const std::vector<HalfKick>& kicks, const std::vector<double>& theta_rad) {
     std::vector<std::vector<double>> values(kicks.size());
     if (kicks.front().is_moebius()) {
@@ -127,12 +128,12 @@ std::vector<std::vector<double>> values_of(const std::vector<HalfKick>& kicks, c
     return values;
 }
 
-/// Phase gained from the dither's turn to the zero-rate point next to it: `late`, on the half cycle that begins at the
-/// turn; else, turned round in time, on the one that ends there.
+/// Phase gained from the dither's turn to the zero-rate point next to it: if `late`, on the half cycle that begins at
+/// the turn; else, with time reversed, on the one that ends there.
 double to_zero_rate(const gyro::Device& device, int direction, bool late, double psi_rad) {
     const gyro::HalfCycle half = device.half_cycle(late ? direction : -direction, device.dither_amplitude_rad);
     const double scale_s = 1.0 / std::sqrt(half.end_acceleration_rad_s2(late ? 0 : 1));
-    // High input rates put the point farther away than one series reaches.
+    // At high input rates the point is farther away than one series reaches.
     constexpr double tolerance_rad = 1e-15;
     constexpr int most_steps = 10000;
     double time_s = late ? 0.0 : half.duration_s;
@@ -158,7 +159,7 @@ double to_zero_rate(const gyro::Device& device, int direction, bool late, double
 TurnKicks::TurnKicks(const gyro::Setup& setup) {
     const gyro::Device device(setup);
     if (device.coupling.b_rad_s == 0.0) return;
-    constexpr std::size_t phases = 31;  // with the way to the middle, full lanes
+    constexpr std::size_t phases = 31;  // full lanes, together with the integration to the middle
     std::vector<double> theta_rad(phases);
     for (std::size_t j = 0; j < phases; ++j) {
         theta_rad[j] = units::two_pi * static_cast<double>(j) / static_cast<double>(phases) + device.coupling.phase_rad;
@@ -166,8 +167,8 @@ TurnKicks::TurnKicks(const gyro::Setup& setup) {
     // Minima, then maxima; before, then after.
     const auto halves = values_of(
         {HalfKick(device, -1, 1), HalfKick(device, 1, 0), HalfKick(device, 1, 1), HalfKick(device, -1, 0)}, theta_rad);
-    // Half cycles of other lengths have other accelerations: the way to the zero-rate point has a kink where that is
-    // the dither's turn.
+    // Half cycles of different lengths have different accelerations: the gain to the zero-rate point has a kink where
+    // that point is the dither's turn.
     kinked_ = device.positive_duration_s != device.negative_duration_s;
     Eigen::Matrix<double, Eigen::Dynamic, 2 * harmonics + 1> basis(phases, 2 * harmonics + 1);
     for (std::size_t parity = 0; parity < 2; ++parity) {
@@ -258,7 +259,7 @@ double TurnKicks::phase_after(int direction, double plain_rad) const {
 TurnKicks::Kick TurnKicks::at(int direction, Complex turned, bool late, const Weights* weights) const {
     const Sides& sides = series_[direction > 0 ? 0 : 1][late ? 1 : 0];
     const auto sum = [&](const Series& c, double& value, double& slope, double& curvature) {
-        // In parts: the product of std::complex looks for infinities.
+        // Real and imaginary parts, since the product of std::complex checks for infinities.
         const double re = turned.real();
         const double im = turned.imag();
         double v_re = 0.0;
@@ -295,7 +296,7 @@ TurnKicks::Kick TurnKicks::at(int direction, Complex turned, bool late, const We
 
 namespace {
 
-/// Where exact values are taken on [-1, 1] (Chebyshev), and what of each goes to each power.
+/// Chebyshev nodes on [-1, 1] for the exact values, and the weight of each node in each power.
 struct Nodes {
     explicit Nodes(int count) : at(static_cast<std::size_t>(count)) {
         Eigen::MatrixXd powers(count, count);
@@ -319,7 +320,7 @@ struct Nodes {
 KicksOverRange::KicksOverRange(const gyro::Setup& setup, Range rate_deg_h, Range threshold)
     : rate_deg_h_(rate_deg_h), threshold_(threshold) {
     const gyro::Device device(setup);
-    // How far zero-rate points move, in the time within which the phase turns.
+    // Shift of the zero-rate points over the time within which the phase turns.
     const double moves = device.phase_per_arcsec * rate_deg_h_.reach /
                          std::sqrt(device.half_cycle(1, device.dither_amplitude_rad).end_acceleration_rad_s2());
     const Nodes rates(rate_deg_h_.reach == 0.0 ? 1 : moves < 0.03 ? 3 : moves < 0.3 ? 5 : moves < 1.0 ? 9 : 17);
@@ -347,7 +348,7 @@ TurnKicks::Kick KicksOverRange::at(int direction, Complex turned, double rate_de
     const double y = threshold_.of(threshold);
     bool late = false;
     if (by_power_.front().front().kinked_) {
-        // Linear in both, but for their product that is none.
+        // Linear in both; there is no product of the two.
         double rate_rad_s = by_power_[0][0].turn_rate_rad_s(direction, turned);
         if (by_power_[0].size() > 1) rate_rad_s += x * by_power_[0][1].turn_rate_rad_s(direction, turned);
         if (by_power_.size() > 1) rate_rad_s += y * by_power_[1][0].turn_rate_rad_s(direction, turned);

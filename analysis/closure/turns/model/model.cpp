@@ -69,7 +69,7 @@ std::vector<double> TurnModel::dither_swings(const Kicks& kicks, const std::vect
         return swing_over_dither(series_.relative_rate(series_.mean_rate_deg_h + rate_deg_h[i]));
     };
     for (std::size_t i = 0; i + 1 < n; ++i) {
-        // Were the lock-in left in it, kicks would depend on their own size.
+        // With the lock-in included, kicks would depend on their own size.
         const double lockin = kicks[i].after_rad + kicks[i + 1].before_rad;
         const double rotation = units::two_pi / series_.setup.scale_factor_arcsec * series_.interval_s * rate_deg_h[i];
         swing[i] = series_.direction[i] * (phase_rad_[i + 1] - phase_rad_[i] - lockin - rotation) / over(i);
@@ -96,8 +96,8 @@ effects::Interval TurnModel::exposure(std::size_t turn, double start_s, double d
 }
 
 std::vector<double> TurnModel::smooth(const std::vector<double>& turn_s) const {
-    // A resonator keeps its time far better than a zero-rate point can be told from pulses that the lock-in moves.
-    constexpr std::ptrdiff_t reach = options.turns.model.smoothing_turns;  // of one parity each
+    // A resonator keeps its time far better than zero-rate points are determined by pulses that the lock-in moves.
+    constexpr std::ptrdiff_t reach = options.turns.model.smoothing_turns;  // turns of the same kind
     const auto n = static_cast<std::ptrdiff_t>(turn_s.size());
     std::vector<double> smoothed(turn_s.size());
     const double start = turn_s.front();
@@ -110,7 +110,7 @@ std::vector<double> TurnModel::smooth(const std::vector<double>& turn_s) const {
         std::ptrdiff_t first = parity;
         std::ptrdiff_t next = parity;
         for (std::ptrdiff_t i = parity; i < n; i += 2) {
-            // As far to one side as to the other, that slopes do not matter.
+            // As far to one side as to the other, so that slopes do not matter.
             const std::ptrdiff_t room = std::min({reach, i - parity, (n - 1 - i) / 2 * 2});
             for (; next <= i + room; next += 2, count += 1.0) sum += off(next);
             for (; first < i - room; first += 2, count -= 1.0) sum -= off(first);
@@ -127,7 +127,7 @@ std::vector<double> TurnModel::smooth(const std::vector<double>& turn_s) const {
 
 namespace {
 
-/// Puts something in front of what was met lately, and lets go of what came longest ago.
+/// Puts an element at the front of the cache and removes the oldest one if the cache is full.
 template <typename Met>
 void meet(std::deque<Met>& met, std::size_t kept, Met one) {
     met.push_front(std::move(one));
@@ -183,8 +183,8 @@ TurnModel::Couplings TurnModel::couplings(const TurnParameters& parameters) cons
         couplings.before.resize(series_.size());
         couplings.after.resize(series_.size());
         const effects::ChangeOver change = active.effect->change(active.values);
-        // Constant over each half cycle, as it is in its middle, but for a temperature and an input rate, which hardly
-        // change from there to the turn.
+        // Constant over each half cycle, with the value in its middle. Temperature and input rate are those at the
+        // turn, since they hardly change from there to the middle.
         const double to_middle_s = 0.5 * series_.interval_s;
         for (std::size_t i = 0; i < series_.size(); ++i) {
             const auto add = [&](Coupling& to, double time_s) {
@@ -228,7 +228,7 @@ TurnModel::Kicks TurnModel::kicks_at(const KicksOverRange& of, double setup_rate
         std::complex<double> turned = turned_[i];
         if (coupling.turn != 1.0) {
             turned *= coupling.turn;
-            // The weights stand in for harmonics of the phase that was read, not of the one that the coupling sees.
+            // The weights refer to harmonics of the phase that was read, not of the phase that the coupling has.
             std::complex<double> by = 1.0;
             for (std::size_t k = 0; shape && k < weights.size(); ++k) {
                 by *= coupling.turn;
@@ -351,7 +351,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
             beside_bias_deg_h[i] += added_deg_h[i];
             most_deg_h = std::max(most_deg_h, std::abs(added_deg_h[i]));
         }
-        // How far zero-rate points move in the time within which the phase turns: what of a kick that changes.
+        // Shift of the zero-rate points over the time within which the phase turns: the relative change of a kick.
         const double acceleration_rad_s2 = device.half_cycle(1, series_.amplitude_rad).end_acceleration_rad_s2();
         if (c * most_deg_h > options.turns.model.rate_felt_by_kicks * std::sqrt(acceleration_rad_s2)) {
             kick_of =
@@ -369,11 +369,12 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
     double lockin = 0.0;
     double angle_arcsec = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
-        // Kicks go with the root of one over the acceleration, which goes with the swing of that half cycle.
+        // Kicks are proportional to the root of one over the acceleration, which is proportional to the swing of the
+        // half cycle.
         const TurnKicks::Kick& kick = (*kick_of)[i];
         const double before = 1.0 / std::sqrt(swing[i > 0 ? i - 1 : i]);
         const double after = 1.0 / std::sqrt(swing[i]);
-        // Straight lines to what was read, of which the filter knows, and the mean over what is not known.
+        // Linearised about the phase that was read, as in the filter, with the mean of the second-order term.
         const double error_rad = known_.mean_rad[i];
         const double half_rad2 = 0.5 * known_.variance_rad2[i];
         double before_rad = kick.before_rad + error_rad * kick.before_slope + half_rad2 * kick.before_curvature;
@@ -399,7 +400,7 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
 }
 
 double TurnModel::beat_hz() const {
-    const std::size_t last = (series_.size() - 1) / 2 * 2;  // of the first one's kind
+    const std::size_t last = (series_.size() - 1) / 2 * 2;  // the last turn of the kind of the first one
     return (phase_rad_[last] - phase_rad_.front()) / (units::two_pi * series_.time_s[last]);
 }
 
@@ -415,7 +416,7 @@ TurnNoise TurnModel::noise(const TurnParameters& parameters) const {
         noise.white_rad2_per_s += c * c * rate.white_deg2_h2_s;
         noise.walk_rad2_per_s3 += c * c * rate.walk_deg2_h2_per_s;
         for (const effects::GaussMarkov& term : rate.terms) {
-            // What hardly changes within the record is bias.
+            // A rate that hardly changes within the record is part of the bias.
             if (term.time_s > options.turns.model.longest_correlation * series_.time_s.back()) continue;
             noise.rates.push_back({term.time_s, c * c * term.variance_deg2_h2});
         }

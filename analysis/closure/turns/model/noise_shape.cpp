@@ -12,7 +12,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// Sizes of innovations, one for each of as many equal parts of them.
+/// Absolute innovations, as the rms in each of 64 parts of equal numbers.
 std::vector<double> sizes_of(std::span<const double> innovations_rad) {
     constexpr std::size_t parts = 64;
     std::vector<double> all;
@@ -31,7 +31,7 @@ std::vector<double> sizes_of(std::span<const double> innovations_rad) {
 
 }  // namespace
 
-/// Over the phases that may be foretold.
+/// Tabulates the correction over the predicted phase.
 NoiseShape::Table NoiseShape::by_phase(const TurnKicks& kicks, int direction, std::span<const double> sizes_rad) {
     double variance = 0.0;
     for (const double size : sizes_rad) variance += size * size / static_cast<double>(sizes_rad.size());

@@ -12,22 +12,23 @@
 
 namespace ringlock::closure {
 
-/// What injected noise that is flatter than a normal one, as between bounds, changes in the likelihood.
+/// Correction of the likelihood for injected noise that is flatter than normal, as noise between bounds is.
 ///
-/// A turn's innovation v, of variance s^2, is a part of the phase psi that comes of it, and what the lock-in adds
-/// before the turn follows that phase: v goes with it where nothing is missing. The likelihood's |1 - before'| makes up
-/// for that in the mean where v is normal (Stein, Annals of Statistics 9, 1135, 1981). Else it leaves, of exp(i k psi)
-/// in what is added,
+/// A turn's innovation v, of variance s^2, is a part of the phase psi, and the phase that the lock-in adds before the
+/// turn is a function of psi: v is correlated with it even if no effect is missing. The factor |1 - before'| of the
+/// likelihood compensates for this in the mean if v is normal (Stein, Annals of Statistics 9, 1135, 1981). Otherwise
+/// the residual score of a term exp(i k psi) in `before` is
 ///
-///     E[(v / s^2 - i k / (1 - before'(psi))) exp(i k psi)],     psi = foretold + v + before(psi),
+///     E[(v / s^2 - i k / (1 - before'(psi))) exp(i k psi)],     psi = predicted + v + before(psi),
 ///
-/// over the density that the innovations show. Kept over the phase, and the phase foretold for each turn.
+/// over the density that the innovations show. It is tabulated over the predicted phase, which is kept for each turn.
 class NoiseShape {
    public:
-    using Left = TurnKicks::Weights;  ///< of harmonics 1, 2, ..
+    using Left = TurnKicks::Weights;  ///< for harmonics 1, 2, ...
 
-    /// `counted_rad`: innovations that show the density. Foretold phases are those but for the lock-in's share before
-    /// the turn. None where the innovations are not flatter than normal ones beyond doubt.
+    /// \param counted_rad  innovations that determine the density
+    /// \param foretold_rad  predicted phases without the phase that the lock-in adds before the turn
+    /// \return null if the innovations are not flatter than normal ones beyond doubt
     static std::shared_ptr<const NoiseShape> of(std::span<const double> counted_rad, const TurnKicks& kicks,
                                                 std::span<const int> direction, std::span<const double> foretold_rad);
 

@@ -7,12 +7,12 @@
 
 namespace ringlock::closure {
 
-/// A function of the phase, by its values at 256 of them, linear in between: for what takes long to compute. `Value`
-/// is added and scaled as Eigen's matrices are.
+/// A function of the phase that takes long to compute, by linear interpolation between its values at 256 phases.
+/// `Value` is added and scaled as Eigen's matrices are.
 template <typename Value>
 class PhaseTable {
    public:
-    /// `of(phase_rad)` at each.
+    /// Evaluates `of(phase_rad)` at each of them.
     template <typename Function>
     explicit PhaseTable(Function&& of) {
         for (std::size_t j = 0; j < phases; ++j) values_[j] = of(units::two_pi * static_cast<double>(j) / phases);

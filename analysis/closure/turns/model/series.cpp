@@ -22,7 +22,7 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
-/// Whole quarters that most of the differences have: the counter's zero.
+/// Whole quarters, modulo four, of most of the differences: the counter's zero.
 std::int64_t most_frequent_quarter(const std::vector<double>& quarters, std::size_t count) {
     int votes[4] = {};
     for (std::size_t i = 0; i < count; ++i) ++votes[std::llround(quarters[i]) & 3];
@@ -47,7 +47,7 @@ bool all_phases_come(const std::vector<double>& phase_rad, const std::vector<int
     return true;
 }
 
-/// Quarters that the counter has lost, turn by turn; near none at the first.
+/// Quarters that the counter has lost, turn by turn; nearly zero at the first turn.
 std::vector<std::int64_t> lost_quarters(const CountedQuarters& counted) {
     const TurnOptions::Reading& of = options.turns.reading;
     const std::size_t n = counted.off.size();
@@ -66,8 +66,8 @@ std::vector<std::int64_t> lost_quarters(const CountedQuarters& counted) {
         lost[i] = now;
     }
     if (changes == 0) return lost;
-    // Near the edges of quarters some hide, and where many are lost there are two at once or four: what is likeliest of
-    // all.
+    // Some miscounts are hidden near the edges of quarters, and where many are lost, two at once or four are. The most
+    // probable path of all turns includes these.
     const double p = std::min(of.most_miscounts_per_turn, static_cast<double>(changes) / static_cast<double>(n));
     double likeliest = -std::numeric_limits<double>::infinity();
     for (const double edge : options.stats.count_chain.edge_sds) {
@@ -119,7 +119,7 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
         squares += r * r;
         ++counted;
     }
-    // What makes a circle of an ellipse makes the noise of the detectors an ellipse.
+    // The transformation of the ellipse to a circle makes an ellipse of the detectors' noise.
     double of_radius = 1.0;
     if (!(ellipse == gyro::Ellipse{})) {
         const double tangent = std::tan(ellipse.orthogonality_rad);
@@ -144,7 +144,7 @@ JoinedPhase join(const record::Turns& turns, const gyro::Ellipse& ellipse, bool 
     }
     joined.miscounts = lost_quarters(quarters);
     const std::int64_t first = joined.miscounts.front();
-    // Whose own zero may be further off than a floating number can count quarters.
+    // The counter's own zero may be further off than a floating-point number can count quarters.
     const std::int64_t whole_fringes = turns.quarter_count[0] / 4 * 4;
     for (std::size_t i = 0; i < n; ++i) {
         const std::int64_t now = joined.miscounts[i];
@@ -182,11 +182,11 @@ double swing_over_dither(double share) { return std::sqrt(1.0 - share * share) +
 
 namespace {
 
-/// Amplitude and swings of the dither from those of the phase. Of the swings, which are relative, only what the
-/// rotation changes from turn to turn is taken.
+/// Amplitude and swings of the dither from those of the phase. The swings are relative, and only the change of the
+/// rotation from turn to turn is removed from them.
 void take_rotation_from_swings(double half_swing_rad, TurnSeries& series) {
     constexpr double most_share = options.turns.reading.most_rotation;
-    constexpr int passes = 12;  // each a tenth of the one before, or less
+    constexpr int passes = 12;  // each changes a tenth of the one before, or less
     const auto n = static_cast<double>(series.size());
     const auto rate_deg_h = [&](std::size_t i) { return series.mean_rate_deg_h + series.input_rate_deg_h[i]; };
     std::vector<double> over(series.size(), 1.0);
@@ -238,14 +238,15 @@ TurnSeries prepare(const record::Record& record, const JoinedPhase& joined) {
         series.input_rate_deg_h[i] = record.input_rate_deg_h.at(turns.time_s[i]);
     }
     series.interval_s = series.time_s.back() / static_cast<double>(n - 1);
-    // Between turns of one kind: the dither is not in it.
+    // Between turns of one kind, where the dither cancels.
     const std::size_t last = (n - 1) / 2 * 2;
     double input = 0.0;
     for (std::size_t i = 0; i < last; ++i) input += series.input_rate_deg_h[i] / static_cast<double>(last);
     series.mean_rate_deg_h = (joined.phase_rad[last] - joined.phase_rad[0]) / series.time_s[last] *
                                  setup.scale_factor_arcsec / units::two_pi -
                              input;
-    // Rotation lengthens swings of one sign and shortens those of the other: no matter of the dither's amplitude.
+    // Rotation lengthens swings of one sign and shortens those of the other, and does not change the dither's
+    // amplitude.
     const double rotation_rad = units::two_pi / setup.scale_factor_arcsec * series.interval_s;
     double swings_of[2] = {};
     std::size_t counts_of[2] = {};

@@ -11,12 +11,12 @@
 
 namespace ringlock::closure {
 
-/// Does something for each of 0, 1, ..., count - 1, on as many threads as there are, and ends early where the program
-/// is interrupted.
+/// Calls `work` for each of 0, 1, ..., count - 1, on all available threads, and ends early if the program is
+/// interrupted.
 ///
-/// A thread that waits for the others at the end takes no work from elsewhere meanwhile. In a loop within a loop it
-/// would begin with another turn of the outer one, and both that and the one that waits would hold what they have in
-/// memory: as many fits of a long record as there are loops within each other, for each thread.
+/// A thread that waits for the others at the end takes no other work meanwhile. In a nested loop it would otherwise
+/// begin another iteration of the outer loop, and both iterations would hold their memory: for each thread as many fits
+/// of a long record as there are nested loops.
 template <typename Index, typename Work>
 void side_by_side(Index count, Work&& work) {
     oneapi::tbb::this_task_arena::isolate([&] {
@@ -27,7 +27,7 @@ void side_by_side(Index count, Work&& work) {
     });
 }
 
-/// Calls the work where no more threads work side by side than a record of so many turns may have in memory.
+/// Calls `work` with a limit on the threads, so that their memory for a record of that number of turns is bounded.
 template <typename Work>
 auto on_threads_for(std::size_t turns, Work&& work) {
     const TurnOptions::Effort& of = options.turns.effort;

@@ -89,7 +89,7 @@ double Whitening::minus_log_likelihood(const TurnFrame& frame, const TurnNoise& 
 std::vector<double> Whitening::minus_log_likelihoods(const TurnFrame& frame, std::span<const TurnNoise> noises,
                                                      std::span<const double> series,
                                                      std::span<const std::uint8_t> counts) {
-    constexpr std::size_t at_once = 8;  // the longest vectors
+    constexpr std::size_t at_once = 8;  // number of lanes of the longest vectors
     std::vector<double> all(noises.size());
     side_by_side((noises.size() + at_once - 1) / at_once, [&](std::size_t part) {
         const auto some = noises.subspan(part * at_once, std::min(at_once, noises.size() - part * at_once));
@@ -132,7 +132,7 @@ ReadingErrors Whitening::reading_errors(std::span<const double> series) const {
     ReadingErrors errors;
     errors.mean_rad.resize(series.size());
     errors.variance_rad2.resize(series.size());
-    // What the turns after say of the state there, and how well.
+    // The information of later turns on the state, and its weight.
     Vector after = Vector::Zero(states);
     Matrix weight = Matrix::Zero(states, states);
     Vector seen = Vector::Zero(states);

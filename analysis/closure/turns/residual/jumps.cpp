@@ -17,7 +17,7 @@ namespace ringlock::closure {
 
 namespace {
 
-/// The angle of a rate that is one or zero, and goes from either to the other at each of the jumps; `on` at first.
+/// The angle of a rate that is one or zero and changes at each of the jumps; its first value is `on`.
 std::vector<double> two_level_angle(const std::vector<double>& time, const std::vector<double>& jumps, double on) {
     std::vector<double> sum(time.size(), 0.0);
     std::size_t next = 0;
@@ -34,19 +34,19 @@ std::vector<double> two_level_angle(const std::vector<double>& time, const std::
     return sum;
 }
 
-/// A rate that is at one of two levels, and jumps from either to the other.
+/// A rate that jumps between two levels.
 struct Jumping {
     std::vector<double> jumps;  ///< [s], in order
-    double on = 0.0;            ///< at first: one or zero
+    double on = 0.0;            ///< the first level: one or zero
     double merit = -std::numeric_limits<double>::infinity();
-    TurnParameters noise = {};  ///< beside it
+    TurnParameters noise = {};  ///< noise with the jumps in the model
 
     std::vector<double> angle(const TurnFit& fit) const {
         return two_level_angle(fit.model().series().time_s, jumps, on);
     }
 };
 
-/// The jumps of stretches moved to where they explain most under the noise of the fit.
+/// The jumps at the ends of stretches, moved to the times at which they explain most under the noise of the fit.
 Jumping placed(const TurnFit& fit, const TwoLevels& levels) {
     const double stretch_s = fit.model().series().time_s.back() / static_cast<double>(levels.shape.size());
     Jumping found{.jumps = {}, .on = levels.shape(0)};
@@ -73,7 +73,7 @@ Jumping placed(const TurnFit& fit, const TwoLevels& levels) {
     return found;
 }
 
-/// The merit of jumps with the noise fitted again, which starts from parameters nearby.
+/// Sets the evidence of jumps with the noise fitted again, starting from parameters nearby.
 void judge(const TurnFit& fit, Jumping& jumping, const TurnParameters& near) {
     const double of_levels = options.stats.two_levels.cost_of_levels;
     const double place =
@@ -84,8 +84,8 @@ void judge(const TurnFit& fit, Jumping& jumping, const TurnParameters& near) {
     jumping.noise = std::move(regression.noise);
 }
 
-/// Jumps moved to where they explain most with the noise that they leave: one that comes later leaves a step of the
-/// angle, so that all of them are one regression (Gauss and Newton).
+/// Moves all jumps to the times at which they explain most, under the noise that remains with them. A jump at a wrong
+/// time leaves a step of the angle, so that one regression (Gauss-Newton) moves all of them.
 void move_jumps(const TurnFit& fit, Jumping& found) {
     const TurnOptions::Jumps& of = options.turns.jumps;
     const auto& time = fit.model().series().time_s;
@@ -97,14 +97,14 @@ void move_jumps(const TurnFit& fit, Jumping& found) {
                 std::copy_n(angle.begin() + static_cast<std::ptrdiff_t>(first), values.size(), values.begin());
                 return;
             }
-            // A later jump stays longer at the level before it.
+            // A later jump keeps the level before it for longer.
             const double late = begins_on == (k % 2 == 1) ? 1.0 : -1.0;
             for (std::size_t i = 0; i < values.size(); ++i)
                 values[i] = time[first + i] > found.jumps[k - 1] ? late : 0.0;
         };
         const Eigen::VectorXd value = fit.with_noise(found.noise)->score_pieces(found.jumps.size() + 1, piece).value;
         const double before = found.merit;
-        // A whole step goes too far where jumps are near each other.
+        // A full step is too long where jumps are near each other.
         for (double share = 1.0; share > of.least_share_of_move && !(found.merit > before); share *= 0.5) {
             Jumping moved{.jumps = found.jumps, .on = found.on};
             for (std::size_t k = 0; k < moved.jumps.size(); ++k) {
@@ -126,7 +126,7 @@ Jumping without_stay(const Jumping& all, std::size_t k) {
     return without;
 }
 
-/// Stays in the order of what they explain under the present noise, the least first.
+/// Stays by how much they explain under the present noise, the least first.
 std::vector<std::size_t> stays_by_use(const TurnFit& fit, const Jumping& all) {
     const auto beside = fit.with_noise(all.noise);
     std::vector<double> left(all.jumps.size() - 1);
@@ -137,8 +137,9 @@ std::vector<std::size_t> stays_by_use(const TurnFit& fit, const Jumping& all) {
     return order;
 }
 
-/// Short stays that only made up for stretches that end elsewhere than jumps are no longer needed: half of all at once,
-/// or a quarter and so on, then each of those that explain least.
+/// Removes short stays that only compensated for stretches that do not end at jumps: half of all stays at once, or a
+/// quarter and so on, then single ones of those that explain least.
+/// \return whether any was removed
 bool drop_some(const TurnFit& fit, Jumping& found) {
     if (found.jumps.size() < 3) return false;
     const std::vector<std::size_t> order = stays_by_use(fit, found);
@@ -149,7 +150,7 @@ bool drop_some(const TurnFit& fit, Jumping& found) {
         return true;
     };
     for (std::size_t most = found.jumps.size() / 2 - 1; most > 1; most /= 2) {
-        std::vector<std::size_t> dropped;  // whose jumps are no other's
+        std::vector<std::size_t> dropped;  // stays that share no jump
         for (const std::size_t k : order) {
             const auto beside_it = [&](std::size_t other) { return other + 1 >= k && other <= k + 1; };
             if (dropped.size() < most && std::none_of(dropped.begin(), dropped.end(), beside_it)) dropped.push_back(k);

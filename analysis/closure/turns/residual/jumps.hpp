@@ -6,18 +6,19 @@
 #include "analysis/closure/stats/two_levels.hpp"
 #include "analysis/closure/turns/fit/fit.hpp"
 
-/// A rate that jumps to and fro between two levels, in what a fit of turns has left.
+/// A rate that jumps between two levels, in the residual of a fit of turns.
 namespace ringlock::closure {
 
 /// Two levels in stretches of the record, under the noise of the fit.
 TwoLevels levels_of_stretches(const TurnFit& fit, std::size_t stretches = options.turns.jumps.stretches);
 
-/// The angle of such a rate, with jumps of stretches moved to where they explain most under the noise of the fit: one
-/// at one level, zero at the other [s].
+/// The angle of such a rate: the integral of one at one level and zero at the other [s]. Jumps at the ends of stretches
+/// are moved to the times at which they explain most under the noise of the fit.
 std::vector<double> placed_jumps(const TurnFit& fit, const TwoLevels& levels);
 
-/// The merit of jumps under the noise that they leave: where they are most of it, short stays are not seen before.
-/// Searched only where jumps come near `rival` to begin with: a rate that wanders leaves them far behind, and has many.
+/// Evidence of jumps under the noise that remains with them in the model. If jumps were most of the noise, short stays
+/// show only then. This is searched only if jumps come near the evidence `rival` at first: of a true random rate they
+/// explain far less, and there are many.
 double merit_of_jumps(const TurnFit& fit, const TwoLevels& levels, double rival);
 
 }  // namespace ringlock::closure

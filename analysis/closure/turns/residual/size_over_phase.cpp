@@ -18,14 +18,14 @@ namespace ringlock::closure {
 
 namespace {
 
-/// The normal deviate that is as rare as an innovation of that size over its standard deviation: a few phases that
-/// hardly ever come weigh too much for squares.
+/// The normal deviate that is as rare as an innovation of this size, in standard deviations. Squares would give too
+/// much weight to a few rare phases.
 double size_deviate(double size) {
     const double rarity = std::erfc(size / std::numbers::sqrt2);
     return std::numbers::sqrt2 * boost::math::erfc_inv(2.0 * std::clamp(rarity, 1e-300, 1.0 - 1e-15));
 }
 
-/// The size that has that deviate.
+/// The size that has this deviate.
 double size_of(double deviate) {
     return std::numbers::sqrt2 * boost::math::erfc_inv(0.5 * std::erfc(deviate / std::numbers::sqrt2));
 }
@@ -36,12 +36,13 @@ Harmonics harmonics_of(double phase_rad) {
     return {std::cos(phase_rad), std::sin(phase_rad), std::cos(2.0 * phase_rad), std::sin(2.0 * phase_rad)};
 }
 
-/// An innovation is a part of the phase that comes of it: where phases are foretold alike turn after turn, sizes follow
-/// the phase even if nothing is missing. Means of harmonics of the phase psi times the size's deviate, with
+/// Means of harmonics of the phase psi times the size's deviate, as a function of the predicted phase. The innovation
+/// is a part of the phase, so that sizes follow the phase even if no effect is missing where the predicted phases
+/// repeat turn after turn:
 ///
-///     psi = foretold + sd (normal innovation) + before(psi),
+///     psi = predicted + sd (normal innovation) + before(psi),
 ///
-/// the last what the lock-in adds before the turn.
+/// with before the phase that the lock-in adds before the turn.
 PhaseTable<Harmonics> size_by_phase(const TurnKicks& kicks, int direction, double sd_rad) {
     constexpr double end = 5.0;
     const int points = static_cast<int>(std::ceil(2.0 * end * std::max(2.0, 2.0 * sd_rad)));
@@ -71,7 +72,7 @@ ResidualTest size_over_phase(const TurnFit& fit) {
     const auto& series = fit.model().series();
     const TurnKicks kicks = fit.model().mean_kicks(fit.parameters());
     std::vector<double> size(n);
-    std::vector<double> sd_rad(n);  // without what the lock-in adds before the turn
+    std::vector<double> sd_rad(n);  // without the phase that the lock-in adds before the turn
     std::vector<double> foretold(n);
     double mean_size = 0.0;
     double mean_sd_rad = 0.0;

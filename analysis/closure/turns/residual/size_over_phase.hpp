@@ -3,8 +3,8 @@
 
 namespace ringlock::closure {
 
-/// Whether the residual of turns is as large at every phase of theirs, by two harmonics at minima and at maxima. Of
-/// normal innovations.
+/// Tests whether the residual of turns has the same size at every phase, by two harmonics at minima and at maxima. The
+/// innovations must be normal.
 ResidualTest size_over_phase(const TurnFit& fit);
 
 }  // namespace ringlock::closure

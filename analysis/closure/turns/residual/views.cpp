@@ -24,7 +24,7 @@ namespace {
 
 using Columns = std::vector<Regressor>;
 
-/// Running sum of a rate [1/s], as an angle: what a rate in proportion to it adds to the phase.
+/// Integral of a rate [1/s]: the phase for a rate in proportion to it.
 std::vector<double> integral(const TurnFit& fit, const std::vector<double>& rate) {
     const auto& time = fit.model().series().time_s;
     std::vector<double> sum(rate.size(), 0.0);
@@ -40,10 +40,10 @@ double largest_of(const std::vector<double>& values) {
     return most;
 }
 
-constexpr std::size_t of_harmonic = 4;  // cosine and sine, at all turns and the other way round at maxima
+constexpr std::size_t of_harmonic = 4;  // cosine and sine, with equal or opposite signs at maxima
 
-/// One column of harmonic k of the phase at the turns: as kicks, or as errors of the reading; `times(turn)` such a
-/// factor.
+/// One column of harmonic k of the phase at the turns, as kicks or as errors of the reading, times the factor
+/// `times(turn)`.
 template <typename Times>
 Regressor harmonic_column(const TurnFit& fit, int k, bool kicks, std::size_t column, Times&& times) {
     const auto& model = fit.model();
@@ -51,7 +51,7 @@ Regressor harmonic_column(const TurnFit& fit, int k, bool kicks, std::size_t col
     const NoiseShape* shape = fit.parameters().shape.get();
     const std::vector<double> zeros(n);
     Regressor of(zeros, zeros, zeros, shape != nullptr ? zeros : std::vector<double>());
-    const double share = kicks ? 0.5 : 1.0;  // half a kick comes before the turn
+    const double share = kicks ? 0.5 : 1.0;  // half of a kick comes before the turn
     double sum = 0.0;
     for (std::size_t i = 0; i < n; ++i) {
         const double angle = k * model.phase_rad()[i];
@@ -85,7 +85,7 @@ Columns harmonic(const TurnFit& fit, int k, bool kicks) {
 
 constexpr std::size_t of_changing_kicks = 2 * of_harmonic;
 
-/// One column of kicks whose size and place go up and down with so many periods over the record.
+/// One column of kicks whose size and phase oscillate with this number of periods over the record.
 Regressor column_of_changing_kicks(const TurnFit& fit, double periods, std::size_t column) {
     const auto n = static_cast<double>(fit.model().series().size());
     const bool sine = column >= of_harmonic;
@@ -101,8 +101,8 @@ Columns kicks_that_change(const TurnFit& fit, double periods) {
     return columns;
 }
 
-/// The ellipse that is in the model is known from radii, as well as phases would tell it: amplitudes of the first two
-/// harmonics, to which it shifts the reading, have that error besides their own.
+/// Adds the error of the model's ellipse to a score. The radii determine the ellipse as well as the phases would, so
+/// the amplitudes of the first two harmonics, to which it shifts the reading, also have that error.
 void doubt_ellipse(const TurnFit& fit, TurnFit::Score& score) {
     if (fit.parameters().find(effect_roles().ellipse.effect) == nullptr || score.rank != 4) return;
     const auto counted = static_cast<double>(std::count(fit.rows().begin(), fit.rows().end(), 1));
@@ -113,8 +113,8 @@ void doubt_ellipse(const TurnFit& fit, TurnFit::Score& score) {
 }
 
 void test_phase(const TurnFit& fit, std::vector<TurnView>& views) {
-    // The innovation is a part of the phase that is read: what they have to do with each other where nothing is missing
-    // is known of normal ones (Stein, Annals of Statistics 9, 1981, 1135) and of those whose shape is.
+    // The innovation is a part of the phase that was read. Their correlation without a missing effect is known for
+    // normal innovations (Stein, Annals of Statistics 9, 1981, 1135) and for those of a known density.
     const bool known = fit.parameters().shape || !is_of_even_density(fit.innovations(), fit.rows());
     for (const bool kicks : {true, false}) {
         if (!kicks && !known) continue;
@@ -143,12 +143,12 @@ void test_phase(const TurnFit& fit, std::vector<TurnView>& views) {
     }
 }
 
-/// A lock-in that does not stay what it is: kicks at the phase, times slow swings.
+/// A lock-in that is not constant: kicks at the phase, times slow oscillations.
 void test_kicks_over_time(const TurnFit& fit, std::vector<TurnView>& views) {
     constexpr std::size_t places = options.turns.residual.kick_periods;
     const auto periods_of = [](std::size_t place) { return 0.5 * static_cast<double>(place + 1); };
     std::vector<TurnFit::Score> scores(places);
-    // One after the other, the columns of each side by side.
+    // One after the other, with the columns of each in parallel.
     for (std::size_t place = 0; place < places; ++place) {
         scores[place] = fit.score(of_changing_kicks, [&](std::size_t column) {
             return column_of_changing_kicks(fit, periods_of(place), column);
@@ -167,8 +167,8 @@ void test_kicks_over_time(const TurnFit& fit, std::vector<TurnView>& views) {
                      options.turns.residual.largest_kick_rad});
 }
 
-/// Amplitude of the dither at the turns over its mean: second differences of the phases, in which no rate is, the
-/// lock-in's kicks taken off. The first and the last repeat their neighbours'.
+/// Amplitude of the dither at the turns over its mean: second differences of the phases, in which a constant rate
+/// cancels, with the kicks of the lock-in subtracted. The first and the last value repeat those next to them.
 std::vector<double> amplitude_at_turns(const TurnFit& fit) {
     const auto& series = fit.model().series();
     const auto& foretold = fit.prediction().phase_rad;
@@ -185,8 +185,8 @@ std::vector<double> amplitude_at_turns(const TurnFit& fit) {
     return amplitude;
 }
 
-/// Gain of the Kalman filter of a walk read with noise (Harvey 1989, section 4.1): variances by how differences grow
-/// with their lag, beyond what neighbours share.
+/// Gain of the Kalman filter of a random walk that is read with noise (Harvey 1989, section 4.1). The variances follow
+/// from the growth of differences with their lag.
 double gain_of_walk(const std::vector<double>& series) {
     const TurnOptions::Residual& of = options.turns.residual;
     const std::size_t lag = of.amplitude_lag;
@@ -200,7 +200,7 @@ double gain_of_walk(const std::vector<double>& series) {
         squares[1] += grown / static_cast<double>(n);
         squares[2] += grown * grown / static_cast<double>(n);
     }
-    // Differences over twice the lag share their values with as many others.
+    // Each difference over twice the lag shares values with that number of others.
     const double error = std::sqrt(squares[2] * 2.0 * turns_apart / static_cast<double>(n));
     const double walk = std::max(squares[1] - of.no_growth_sd * error, 0.0) / turns_apart;
     const double read = std::max(0.5 * (squares[0] - turns_apart * walk), 0.0);
@@ -238,7 +238,7 @@ void test_rates(const TurnFit& fit, std::vector<TurnView>& views) {
         against(Where::rate, "rates that follow the input rate, its square and its cube",
                 {integral(fit, series.input_rate_deg_h), integral(fit, square), integral(fit, cube)});
     }
-    // The amplitude of the cycles before, what the residual itself has done to it staying out.
+    // The amplitude of the cycles before the turn, which the residual itself has not changed.
     const auto at_turn = std::make_shared<const std::vector<double>>(amplitude_at_turns(fit));
     const double memory = gain_of_walk(*at_turn);
     const auto stretch = static_cast<std::ptrdiff_t>(std::min<std::size_t>(n - 1, std::lround(2.0 / memory)));
@@ -262,7 +262,7 @@ void test_rates(const TurnFit& fit, std::vector<TurnView>& views) {
     };
     against(Where::amplitude, "rates that follow the dither's amplitude and its square", angles(amplitude));
     if (!views.empty() && views.back().test.where == Where::amplitude) {
-        // What it explains, once it is known to explain something: with the cycles after as well.
+        // The columns for the evidence, after the test has failed, also use the cycles after the turn.
         views.back().columns = [at_turn, amplitude, angles, memory, n, last = mean_of(at_turn->rbegin())] {
             std::vector<double> change = amplitude;
             double after = last;
@@ -314,7 +314,7 @@ void test_steps(const TurnFit& fit, std::vector<TurnView>& views) {
          [ramp_of, at] { return Columns{ramp_of(at)}; }});
 }
 
-/// Rates of stretches of the record, for a rate that jumps to and fro.
+/// A rate that jumps between two levels, by the rates of stretches of the record.
 void test_levels(const TurnFit& fit, std::vector<TurnView>& views) {
     const TwoLevels found = levels_of_stretches(fit);
     TurnView& view = views.emplace_back();
@@ -331,7 +331,7 @@ void test_levels(const TurnFit& fit, std::vector<TurnView>& views) {
 void test_whiteness(const TurnFit& fit, std::vector<TurnView>& views) {
     const Correlations found = correlations_of(fit.innovations(), fit.rows());
     double rising = 0.0;       // sum of correlations: slow changes
-    double alternating = 0.0;  // with alternating signs: changes of the dither's amplitude
+    double alternating = 0.0;  // the same with alternating signs: changes of the dither's amplitude
     for (std::size_t k = 1; k < found.root.size(); ++k) {
         rising += found.root[k];
         alternating += k % 2 == 0 ? found.root[k] : -found.root[k];
@@ -340,7 +340,7 @@ void test_whiteness(const TurnFit& fit, std::vector<TurnView>& views) {
     views.push_back({found.test(where, fmt::format("correlation with the {} turns before", options.stats.lags))});
 }
 
-/// Lines, those that drift too.
+/// Lines, including those that drift.
 void test_lines(const TurnFit& fit, std::vector<TurnView>& views) {
     constexpr int drifts = options.turns.residual.drifts;
     constexpr double apart = options.turns.residual.drifts_apart;
@@ -397,14 +397,14 @@ void test_lines(const TurnFit& fit, std::vector<TurnView>& views) {
         views.back().hz = static_cast<double>(line.bin) * bin_hz;
     };
     report("lines", lines[drifts / 2], places, 0.0);
-    // A line that holds its frequency is not one that drifts by a little.
+    // A line of constant frequency does not count as one that drifts slightly.
     lines[drifts / 2] = {};
     const auto best =
         std::max_element(lines.begin(), lines.end(), [](const Line& a, const Line& b) { return a.power < b.power; });
     report("lines that drift", *best, drifts * places, drift_of(static_cast<std::size_t>(best - lines.begin())));
 }
 
-/// Random rates are normal, what stands in for them need not be.
+/// Innovations are normal with a true random rate, but not necessarily with one that substitutes for another cause.
 void test_normality(const TurnFit& fit, std::vector<TurnView>& views) {
     const std::size_t bounded = options.turns.residual.bounded_sums;
     if (const auto test = fourth_moments(fit.innovations(), fit.rows(), 1, bounded)) views.push_back({*test});
@@ -431,7 +431,7 @@ double refitted_merit(const TurnFit& fit, const TurnView& view, double rival) {
     if (view.refitted) return view.refitted(rival);
     const TurnFit::Regression regression = fit.regress(view.columns());
     if (regression.value.cwiseAbs().maxCoeff() > view.largest) return -std::numeric_limits<double>::infinity();
-    // The view has taken off one for each of them.
+    // The cost of the test contains one for each of the amplitudes.
     const auto amplitudes = static_cast<int>(regression.value.size());
     return regression.gain - (view.cost - amplitudes) - cost_of_amplitudes(regression.gain, amplitudes);
 }

@@ -7,17 +7,19 @@
 
 namespace ringlock::closure {
 
-/// Of the turn's phase, that views of the residual look at.
+/// Number of harmonics of the turn's phase in residual tests.
 inline constexpr int harmonics_of_phase = options.turns.residual.harmonics;
 
 using TurnView = View<Regressor>;
 
-/// Gain of the log-likelihood by the regression, the noise fitted anew beside it and its coefficients integrated out,
-/// less its search; minus infinity where coefficients make no sense. `rival`: the merit that it is compared with.
+/// Evidence of the regression: gain of the log-likelihood with the noise fitted again and the coefficients integrated
+/// out, less its search; minus infinity if a coefficient is larger than makes sense.
+/// \param rival  evidence with which it is compared
 double refitted_merit(const TurnFit& fit, const TurnView& view, double rival);
 
-/// Holds the innovations that count against everything that the record has: phase at the turns and its harmonics,
-/// direction, amplitude, temperature, input rate, time, frequency, the innovations before. The views refer to the fit.
+/// Tests the innovations that count against all quantities of the record: phase at the turns and its harmonics,
+/// direction, amplitude, temperature, input rate, time, frequency, and earlier innovations. The tests keep a reference
+/// to the fit.
 std::vector<TurnView> view_residual(const TurnFit& fit);
 
 }  // namespace ringlock::closure

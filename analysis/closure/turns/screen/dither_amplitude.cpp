@@ -17,10 +17,10 @@ namespace ringlock::closure {
 
 namespace {
 
-/// Highest peaks of the spectrum of the innovations, each the other way round at minima, up to the band's end [Hz].
+/// Highest peaks of the spectrum of the innovations, with the sign changed at minima, up to the band's end [Hz].
 std::vector<double> highest_peaks(const TurnFit& fit, double band_hz) {
     constexpr std::size_t most = options.turns.dither_amplitude.peaks;
-    constexpr std::size_t finer = 4;  // than the Fourier frequencies
+    constexpr std::size_t finer = 4;  // resolution in Fourier frequencies
     const TurnSeries& series = fit.model().series();
     const std::size_t n = series.size();
     std::size_t padded = 1;
@@ -32,7 +32,7 @@ std::vector<double> highest_peaks(const TurnFit& fit, double band_hz) {
     fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
     fft.fwd(out, in);
     const double bin_hz = 1.0 / (static_cast<double>(padded) * series.interval_s);
-    // Half a period is what the polynomials of the amplitude follow.
+    // The polynomials of the amplitude follow half a period.
     const auto first = static_cast<std::size_t>(0.5 * static_cast<double>(padded) / static_cast<double>(n)) + 1;
     const auto end = std::min(static_cast<std::size_t>(band_hz / bin_hz), padded / 2 - 1);
     std::vector<std::size_t> bins;
@@ -89,7 +89,7 @@ std::optional<AmplitudeModel> find_amplitude_memory(const TurnProblem& problem, 
     for (const double forgets : of.forgets) {
         TurnParameters with = fit.parameters();
         with.wander_forgets = forgets;
-        // Of the white noise, too, a part may have been what is forgotten.
+        // A part of the white noise may also belong to the wander that decays.
         with.wander_sd_rad =
             std::max(with.wander_sd_rad, of.share_of_injected * std::sqrt(forgets) * with.injected_sd_rad);
         auto fitted = problem.fit_or_none(with);

@@ -8,21 +8,22 @@
 
 namespace ringlock::closure {
 
-/// A model of the dither's amplitude that knows more of it.
+/// An extended model of the dither's amplitude.
 struct AmplitudeModel {
     std::shared_ptr<Fitted> fitted;
-    double merit = 0.0;  ///< gain of the log-likelihood, as that of an effect
+    double merit = 0.0;  ///< evidence: gain of the log-likelihood, with costs as for an effect
 };
 
-/// What of the innovations comes at frequencies so near the dither's that no vibration of the base could be told from
-/// the dither's own motion (amplitude_band_hz): none if that may be chance.
+/// An oscillation of the amplitude for structure of the innovations so near the dither's frequency that a vibration of
+/// the base there could not be distinguished from the dither's own motion (amplitude_band_hz). None if it may be
+/// chance.
 std::optional<AmplitudeModel> find_amplitude_swing(const TurnProblem& problem, const Fitted& now);
 
-/// Where innovations go with those before: whether a wander of the amplitude that is forgotten, as by a resonator of
-/// low quality that noise drives, explains it.
+/// A wander of the amplitude that decays, as of a resonator of low quality that noise drives, for innovations that are
+/// correlated with earlier ones. None if it does not explain them.
 std::optional<AmplitudeModel> find_amplitude_memory(const TurnProblem& problem, const Fitted& now);
 
-/// What the report says of either.
+/// Notes for the report on both.
 std::vector<std::string> notes_on_amplitude(const Fitted& fitted);
 
 }  // namespace ringlock::closure

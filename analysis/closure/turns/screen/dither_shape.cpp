@@ -19,13 +19,13 @@ namespace {
 constexpr const TurnOptions::DitherShape& of_shape = options.turns.dither_shape;
 constexpr std::size_t stretches = of_shape.stretches;
 
-/// Where a stretch begins. Whole cycles, so that parities weigh alike.
+/// First turn of a stretch. Stretches are whole cycles, so that minima and maxima have equal weights.
 std::size_t begin_of(std::size_t stretch, std::size_t turns) {
     return stretch == stretches ? turns : (turns * stretch / stretches) & ~std::size_t{1};
 }
 
-/// Rate that the phases have beyond what is foretold of them, stretch by stretch: that of a random process, or of what
-/// is not in the model yet [rad/s].
+/// Slope of the residual phases in each stretch: the rate of a random process, or of an effect that is not in the model
+/// yet [rad/s].
 std::vector<double> rate_left(const TurnFit& fit, const TurnModel::Prediction& prediction) {
     const auto& series = fit.model().series();
     const std::size_t n = series.size();
@@ -34,7 +34,7 @@ std::vector<double> rate_left(const TurnFit& fit, const TurnModel::Prediction& p
         const std::size_t begin = begin_of(s, n);
         const std::size_t end = begin_of(s + 1, n);
         if (end < begin + of_shape.fewest_turns_for_rate) continue;
-        // Beside an offset and another amplitude of the dither.
+        // With an offset and a change of the dither's amplitude in the regression.
         Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
         Eigen::Vector3d right = Eigen::Vector3d::Zero();
         for (std::size_t i = begin; i < end; ++i) {
@@ -88,15 +88,15 @@ BlockMean block_mean(const std::vector<double>& series, const std::vector<std::u
     return mean;
 }
 
-/// How far the pulses next to a turn are, on both sides of it, in quarters of a fringe.
+/// Distance from a turn to the pulses next to it, on both sides, in quarters of a fringe.
 double quarters_to_pulse(int direction, double phase_rad) {
     const double quarters = phase_rad / units::quarter_fringe_rad;
     return direction > 0 ? std::floor(quarters) + 1.0 - quarters : quarters - std::floor(quarters);
 }
 
-/// What follows the phase at a turn, by functions of it: minima and maxima each by themselves, and without its mean
-/// over all phases. Pulses of quarter fringes are what times and accelerations are made of. From one of them to the
-/// next such a function is smooth in the root of the distance to the pulse, to which the time to it goes.
+/// Functions of the phase at a turn, for minima and maxima separately and without their mean over all phases. Times and
+/// accelerations are derived from pulses at quarter fringes. Between two of these, such a function is smooth in the
+/// root of the distance to the next pulse, to which the time to the pulse is proportional.
 class PhaseFunctions {
    public:
     static constexpr Eigen::Index cells = 4;
@@ -115,13 +115,13 @@ class PhaseFunctions {
             root_.push_back(std::sqrt(quarters_to_pulse(series.direction[i], phase_rad)));
         }
     }
-    /// Adds them at a turn, times that, to a row.
+    /// Adds the functions at a turn to a row, with a factor.
     void add(std::size_t turn, double times, Eigen::Ref<Eigen::VectorXd> row) const {
         add(cell_[turn], root_[turn], times, row);
     }
-    /// Mean square over all phases of what has these coefficients: at minima, at maxima.
+    /// Mean square over all phases of the function with these coefficients: at minima, at maxima.
     static std::array<double, 2> mean_squares(const Eigen::VectorXd& coefficients) {
-        constexpr int places = 16;  // of a cell
+        constexpr int places = 16;  // in each cell
         std::array<double, 2> sums{};
         Eigen::VectorXd row(columns);
         for (Eigen::Index cell = 0; cell < 2 * cells; ++cell) {
@@ -141,17 +141,18 @@ class PhaseFunctions {
         double power = 1.0;
         for (Eigen::Index k = 0; k < powers; ++k, power *= root) {
             row(cell + k) += times * power;
-            // Of a quarter of all phases each, over which the root to the k has a mean of 2/(k + 2).
+            // In each cell, a quarter of all phases, the mean of the root to the power k is 2/(k + 2).
             const double mean = 0.5 / static_cast<double>(k + 2);
             for (Eigen::Index other = 0; other < cells; ++other) row(of_direction + other * powers + k) -= times * mean;
         }
     }
 
-    std::vector<Eigen::Index> cell_;  ///< where its functions begin
+    std::vector<Eigen::Index> cell_;  ///< index of the first function of the turn's cell
     std::vector<double> root_;
 };
 
-/// What follows the phases, by functions of those of these turns beside each, with such weights: coefficients.
+/// Removes the dependence on the phases of the given turns near each turn, with these weights, and returns its
+/// coefficients.
 using Beside = std::span<const std::pair<int, double>>;
 Eigen::VectorXd take_phase(std::vector<double>& series, const std::vector<std::uint8_t>& valid, const TurnFit& fit,
                            const PhaseFunctions& functions, Beside turns) {
@@ -169,7 +170,7 @@ Eigen::VectorXd take_phase(std::vector<double>& series, const std::vector<std::u
     for (std::size_t i = 0; i < n; ++i) {
         if (!valid[i] || !fit.rows()[i]) continue;
         fill(i);
-        // The mean of minima and that of maxima stay.
+        // The means of minima and of maxima are kept.
         row(fit.model().series().direction[i] > 0 ? 0 : 1) = 1.0;
         normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
         right += row * series[i];
@@ -184,12 +185,12 @@ Eigen::VectorXd take_phase(std::vector<double>& series, const std::vector<std::u
     return c.tail<PhaseFunctions::columns>();
 }
 
-/// w t of the two pulses of quarter fringes next to a turn.
+/// w t of the two pulses at quarter fringes next to a turn.
 ///
-/// Where the phase stands still off the dither's turn by an angle d, |d| << 1, the acceleration changes by w d of
-/// itself a second. With sqrt(a) = sqrt(2) (sqrt(d_2) - sqrt(d_1))/(t_2 - t_1) of pulses at distances d_1, d_2 it comes
-/// out too large by d w (t_1 + t_2)/3 of it on one side of the turn, and too small on the other: a rotation by the
-/// share x of the dither's peak rate, d = x, adds x w (t_1 + t_2)/6 to `sides`.
+/// If the phase stands still at an angle d from the dither's turn, |d| << 1, the acceleration changes by w d of itself
+/// a second. The acceleration by two pulses, sqrt(a) = sqrt(2) (sqrt(d_2) - sqrt(d_1))/(t_2 - t_1) with the distances
+/// d_1, d_2, is then too large by the share d w (t_1 + t_2)/3 on one side of the turn, and too small on the other: a
+/// rotation by the share x of the dither's peak rate, d = x, adds x w (t_1 + t_2)/6 to `sides`.
 struct PulseAngles {
     double first, second;
 
@@ -199,15 +200,16 @@ struct PulseAngles {
         second = std::sqrt(2.0 * (first_rad + units::quarter_fringe_rad) / amplitude_rad);
     }
 
-    /// The acceleration that they show of a sine, over that where it turns: they are 2 asin(sqrt(d/(2 A))) of it away,
-    /// and roots of distances go as the sine of half of that.
+    /// The acceleration of a sine by these pulses, over its acceleration at the turn. The pulses are at angles 2
+    /// asin(sqrt(d/(2 A))) from it, and roots of distances are proportional to the sine of half the angle.
     double share_of_sine() const {
         const auto angle = [](double root) { return 2.0 * std::asin(std::min(0.5 * root, 1.0)); };
         return std::pow((second - first) / (angle(second) - angle(first)), 2);
     }
 
-    /// How much of the change of the acceleration at a turn of the dither, which is off by that angle, the two show of
-    /// the half cycle that the phase's turn is in: with d(t) in two pieces, to first order in the change.
+    /// If the dither turns at the angle `off` from the turn of the phase, and its acceleration changes there: the share
+    /// of the change that the two pulses measure in the half cycle of the phase's turn, with d(t) in two pieces, to
+    /// first order in the change.
     double share_of_other(double off) const {
         if (off >= second) return 1.0;
         if (off <= first) return off * off / (first * second);
@@ -215,10 +217,10 @@ struct PulseAngles {
     }
 };
 
-/// Means of what accelerations show, and of what pulses do to them.
+/// Means from the accelerations, and the contributions of the pulses to them.
 struct Accelerations {
-    std::optional<BlockMean> sides, turns, even;  ///< none where the record has none
-    double jerk = 0.0;                            ///< what is taken off sides
+    std::optional<BlockMean> sides, turns, even;  ///< none if the record has no accelerations
+    double jerk = 0.0;                            ///< correction that is subtracted from `sides`
     double angle = 0.0;                           ///< w (t1 + t2)/2
     double share_of_other = 1.0;
 };
@@ -262,7 +264,7 @@ Accelerations accelerations(const record::Turns& turns, const TurnFit& fit, cons
     found.jerk /= count;
     found.angle *= 0.5 / count;
     found.share_of_other = of_other / count;
-    // Accelerations are computed from distances that the detectors have read: their ellipse is in them.
+    // Accelerations are computed from distances as the detectors read them, with their ellipse.
     const gyro::Ellipse ellipse = fit.model().setup(fit.parameters()).ellipse;
     const double least =
         of_shape.least_acceleration + std::max({std::abs(ellipse.gain), std::abs(ellipse.offset_sin),
@@ -271,8 +273,8 @@ Accelerations accelerations(const record::Turns& turns, const TurnFit& fit, cons
     const auto [at_minima, at_maxima] = PhaseFunctions::mean_squares(take_phase(sides, valid, fit, functions, itself));
     take_phase(minima, valid, fit, functions, itself);
     take_phase(even, valid, fit, functions, itself);
-    // Of second order in the lock-in, the mean over all phases is no longer nothing (docs/dev/closure-turns.md):
-    // accelerations come out too small on both sides.
+    // To second order in the lock-in, the mean over all phases is not zero (docs/dev/closure-turns.md): accelerations
+    // are too small on both sides.
     const double smaller = of_shape.second_order * (at_minima - at_maxima);
     const double smaller_everywhere = 2.0 * of_shape.second_order * (at_minima + at_maxima);
     found.sides = block_mean(sides, valid, fit.rows(), least);
@@ -302,27 +304,27 @@ DitherShape dither_shape(const record::Turns& turns, const TurnFit& fit) {
     }
     const PhaseFunctions functions(fit);
     const Accelerations seen = accelerations(turns, fit, functions, shares);
-    // Where the phase turns faster than a sine of that swing does, a rotation moves it by less.
+    // If the phase turns faster than a sine of that swing, a rotation moves the turn by less.
     const double less = seen.even && std::isfinite(seen.even->sd) ? std::expm1(-seen.even->value) : 0.0;
     const double less_sd = seen.even && std::isfinite(seen.even->sd) ? seen.even->sd : 0.0;
     std::vector<double> late(n, 0.0);
     std::vector<std::uint8_t> valid(n, 0);
     for (std::size_t i = 1; i + 1 < n; ++i) {
         const double second = prediction.turn_s[i - 1] - 2.0 * prediction.turn_s[i] + prediction.turn_s[i + 1];
-        // Such a rate moves the points where the phase stands still as any other does.
+        // The residual rate moves the points where the phase stands still as any other rate does.
         late[i] =
             -0.25 * series.direction[i] * second + left_rad_s[i] / series.acceleration_rad_s2 + less * shares[i] / w;
         valid[i] = 1;
     }
-    // Clocks that find the zero-rate point from pulses do not follow the lock-in's shift of it all the way.
+    // Clocks that find the zero-rate point from pulses do not follow all of the lock-in's shift.
     const std::array<std::pair<int, double>, 3> neighbours{{{-1, 1.0}, {0, 2.0}, {1, 1.0}}};
     const Eigen::VectorXd of_late = take_phase(late, valid, fit, functions, neighbours);
     const auto [at_minima_s2, at_maxima_s2] = PhaseFunctions::mean_squares(of_late);
-    // Of a turn and of both beside it.
+    // For a turn and the two next to it.
     const double followed_s = std::sqrt(3.0 * (at_minima_s2 + at_maxima_s2));
-    // Beneath: what the approximations of turn times leave, 1e-7 of an asymmetry, a fiftieth of what they do not
-    // follow, what they would not of a rotation: middles between pulses lie off by w^2 t^2/6 of the shift; and what is
-    // not known of the acceleration.
+    // Least error: that of the approximations of turn times (1e-7 of an asymmetry), a fiftieth of the dependence on the
+    // phase, which the clocks do not follow, that of a rotation, since midpoints between pulses are off by w^2 t^2/6 of
+    // the shift, and that of the acceleration.
     const double least_s =
         std::hypot(std::hypot(of_shape.least_late * series.interval_s, of_shape.doubt_of_followed * followed_s),
                    mean_share / (series.amplitude_rad * w), less_sd * mean_share / w);

@@ -49,13 +49,13 @@ MissedShare share_of_missed_counts(const record::Turns& turns, const JoinedPhase
         if (!first && log_likelihood <= likeliest) continue;
         first = false;
         likeliest = log_likelihood;
-        // Information by the bend of the likelihood of all turns
+        // Information from the curvature of the likelihood of all turns.
         const double h = 0.01 * p * (1.0 - p);
         const double bend =
             (2.0 * chain.log_likelihood(p) - chain.log_likelihood(p - h) - chain.log_likelihood(p + h)) / (h * h);
         const double of_rows = bend * n / static_cast<double>(turns.size());
         share.probability_per_turn = p;
-        // Where no bend is to be had, of so many trials.
+        // Without curvature, the error of a binomial probability.
         share.sd = of_rows > 0.0 ? 1.0 / std::sqrt(of_rows) : std::sqrt(p * (1.0 - p) / n);
     }
     return share;

@@ -24,7 +24,7 @@ using effects::Values;
 
 std::string name_of(const Parameter& parameter) { return std::string(parameter.name); }
 
-/// The phases that the effect adds with these values, over `per`.
+/// The phases that the effect adds at these values, over `per`.
 Regressor added(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect, const Values& values,
                 double per = 1.0) {
     if (changes_angle_only(effect)) {
@@ -40,8 +40,8 @@ Regressor added(const TurnFit& fit, const TurnModel::Prediction& without, const 
 /// Step of a size for the derivative of the phases: small against the bounds, large against rounding.
 double step_of(const Parameter& size) { return 1e-3 * std::min(1.0, size.max); }
 
-/// One column for each amplitude of the effect, two where a phase turns it, all else at these values; `unit_steps`: for
-/// an effect whose phases are proportional to its sizes.
+/// One column for each amplitude of the effect, two if the size has a phase, with all other parameters at these values.
+/// \param unit_steps  for an effect whose phases are proportional to its sizes
 std::vector<Regressor> columns_of(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
                                   const std::vector<Amplitude>& amplitudes, const Values& values, bool unit_steps) {
     std::vector<Regressor> columns;
@@ -59,7 +59,7 @@ std::vector<Regressor> columns_of(const TurnFit& fit, const TurnModel::Predictio
     return columns;
 }
 
-/// What a regression on these columns says of the amplitudes, kept within their bounds.
+/// Sets the amplitudes by the regression on these columns, within their bounds.
 void set_amplitudes(const std::vector<Amplitude>& amplitudes, const Eigen::VectorXd& found, Values& values) {
     Eigen::Index k = 0;
     for (const Amplitude& amplitude : amplitudes) {
@@ -74,13 +74,13 @@ void set_amplitudes(const std::vector<Amplitude>& amplitudes, const Eigen::Vecto
     }
 }
 
-/// All amplitudes of an effect that is there all the time.
+/// All amplitudes of an effect that acts all the time.
 std::optional<Candidate> sizes(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
                                Values values) {
     const std::vector<Amplitude> amplitudes = amplitudes_of(effect);
     const std::vector<Regressor> columns = columns_of(fit, without, effect, amplitudes, values, false);
     for (const auto& column : columns) {
-        // The effect adds nothing to what the model has: this record cannot tell.
+        // The model already contains such a column, so the record does not determine the effect.
         const double all =
             Eigen::Map<const Eigen::VectorXd>(column.series.data(), static_cast<Eigen::Index>(column.series.size()))
                 .norm();
@@ -95,8 +95,8 @@ std::optional<Candidate> sizes(const TurnFit& fit, const TurnModel::Prediction& 
 
 /// The phase of the base coupling itself.
 std::optional<Candidate> coupling_phase(const TurnFit& fit, const Effect& effect, Values values) {
-    // The change from no coupling to one that is a quarter turn on and can be seen, whatever threshold the fit has
-    // found.
+    // The change from no coupling to one whose phase is a quarter turn further and whose size is visible, whatever
+    // threshold the fit has.
     const std::string name = name_of(effect.parameters().front());
     TurnParameters p = fit.parameters();
     const double found = p.threshold_deg_h;
@@ -121,8 +121,8 @@ std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Predi
     const double end = fit.model().series().time_s.back();
     constexpr int places = options.turns.score_tests.times;
     constexpr int finer = options.turns.score_tests.refined_times;
-    /// Root of the chi-squared of all amplitudes together, with the sign of a single one; zero where the record cannot
-    /// tell them apart from each other or from the model.
+    /// Root of the chi-squared of all amplitudes together, with the sign of a single one; zero if the record does not
+    /// distinguish them from each other or from the model.
     struct Place {
         double root = 0.0;
         Eigen::VectorXd value = {};
@@ -170,8 +170,8 @@ std::optional<Candidate> at_some_time(const TurnFit& fit, const TurnModel::Predi
     return candidate;
 }
 
-/// Frequencies of a rate that would show at this one too, or there alone: the lock-in's kicks follow the phase, whose
-/// beat with a vibration is a rate that stands in the record as if it were one of its own.
+/// Frequencies of a rate that would also show at this one, or only there. The kicks of the lock-in follow the phase,
+/// and their beat with a vibration is a rate that appears in the record like any other.
 std::array<double, 4> seen_by_beat(const TurnModel& model, double hz) {
     const double beat_hz = model.beat_hz();
     const double dither_hz = 0.5 / model.series().interval_s;
@@ -180,7 +180,7 @@ std::array<double, 4> seen_by_beat(const TurnModel& model, double hz) {
             folded(hz + dither_hz - beat_hz)};
 }
 
-/// A line of that frequency with size and phase free; none where the record cannot tell both amplitudes.
+/// A line of that frequency with free size and phase; none if the record does not determine both amplitudes.
 std::optional<Candidate> at_frequency(const TurnFit& fit, const TurnModel::Prediction& without, const Effect& effect,
                                       double hz) {
     const std::string size = name_of(*first_of(effect, Role::size));
@@ -231,8 +231,8 @@ std::optional<Candidate> at_some_frequency(const TurnFit& fit, const TurnModel::
     fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
     fft.fwd(out, in);
     const double bin_hz = 1.0 / (static_cast<double>(padded) * series.interval_s);
-    // The spectrum does not account for what the model's own parameters can follow of a line, so that the highest peaks
-    // are each tested.
+    // The model's own parameters can follow a part of a line, which the spectrum does not include, so each of the
+    // highest peaks is tested.
     const TurnOptions::ScoreTests& of = options.turns.score_tests;
     std::vector<std::size_t> peaks;
     for (std::size_t k = 1; k < padded / 2; ++k) {
@@ -266,7 +266,7 @@ std::optional<Candidate> spread(const TurnFit& fit, const Effect& effect, Values
     const Parameter& deviation = *first_of(effect, Role::deviation);
     const TurnFit::Spread found = fit.spread({&effect, values}, name_of(deviation), deviation.max);
     values.at(name_of(deviation)) = found.deviation;
-    // A variance cannot be negative: half of the time there is no gain at all (Chernoff 1954).
+    // A variance cannot be negative: in half of the cases there is no gain (Chernoff 1954).
     return Candidate{&effect, std::move(values), found.chi2, 0.5 * chi2_tail(found.chi2, 1), 1.0};
 }
 
@@ -319,7 +319,7 @@ std::vector<Candidate> screen(const TurnFit& fit) {
         try {
             found[k] = score_test(fit, without, *effect);
         } catch (const RunError&) {
-            // no motion of a gyro with a little of it can be followed
+            // no motion of a gyro with a small size of the effect can be followed
         }
     });
     std::vector<Candidate> candidates;

@@ -19,7 +19,7 @@ double chi2_of(const BlockMean& mean, double expected) {
     if (!std::isfinite(mean.sd) || mean.sd == 0.0) return 0.0;
     const double t = std::abs(mean.value - expected) / mean.sd;
     const auto counted = static_cast<double>(std::count(mean.counts.begin(), mean.counts.end(), 1));
-    // Wallace (1959): a normal deviate as rare as t.
+    // Wallace (1959): the normal deviate that is as rare as t.
     const double freedom = counted - 1.0;
     return freedom * std::log1p(t * t / freedom) * (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) *
            (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0);
@@ -33,7 +33,7 @@ struct ShapeFit {
     double ratio = 0.0, ratio_sd = 0.0;
     double sine = 0.0, sine_sd = 0.0;
     double cosine = 0.0, cosine_sd = 0.0;
-    double left = 0.0;  ///< chi-squared of the columns about the fit
+    double left = 0.0;  ///< residual chi-squared of the columns
 
     ShapeFit(const DitherShape& shape, double w, bool asymmetry, bool harmonic) {
         const Eigen::Vector2d of_ratio{0.5 * units::pi, shape.sides_by_ratio};
@@ -118,7 +118,7 @@ RadiusFold radius_fold(const record::Turns& turns, const Rows& rows) {
     double amplitude = 0.0;  // of the cosine; offsets are relative to it
     for (std::size_t i = 0; i < turns.size(); ++i) amplitude += std::hypot(turns.sine[i], turns.cosine[i]);
     amplitude /= static_cast<double>(turns.size());
-    // Gauss and Newton: radius - 1 = gain sin^2 + offset_sin sin + offset_cos cos - orthogonality sin cos + (scale).
+    // Gauss-Newton: radius - 1 = gain sin^2 + offset_sin sin + offset_cos cos - orthogonality sin cos + (scale).
     for (int pass = 0; pass < 8; ++pass) {
         Eigen::Matrix<double, 5, 5> normal = Eigen::Matrix<double, 5, 5>::Zero();
         Eigen::Matrix<double, 5, 1> right = Eigen::Matrix<double, 5, 1>::Zero();

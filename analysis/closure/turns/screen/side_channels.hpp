@@ -8,11 +8,11 @@
 
 namespace ringlock::closure {
 
-/// The shape effects that are in the model as these columns tell of them together; nothing where they tell what the
-/// model has already.
+/// The parameters with the effects of the dither's shape that are in the model, estimated together from these columns;
+/// none if they do not differ from those of the model.
 std::optional<TurnParameters> shape_read_again(const record::Turns& turns, const TurnFit& fit);
 
-/// How the radius of the quadrature circle follows its phase.
+/// The dependence of the radius of the quadrature circle on its phase.
 struct RadiusFold {
     gyro::Ellipse ellipse;       ///< the best one
     Eigen::Matrix4d covariance;  ///< of gain, offset_sin, offset_cos, orthogonality_rad
@@ -20,7 +20,7 @@ struct RadiusFold {
 };
 RadiusFold radius_fold(const record::Turns& turns, const Rows& rows);
 
-/// The effects that these columns tell of and that the fit does not have yet, or all of them `again`, each by itself.
+/// The effects that these columns show and the fit does not contain yet, or all of them if `again`, each by itself.
 std::vector<Candidate> screen_side_channels(const record::Turns& turns, const TurnFit& fit, const JoinedPhase& joined,
                                             bool again = false);
 
