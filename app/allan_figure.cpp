@@ -39,16 +39,24 @@ std::vector<double> fine_grid(double first_s, double last_s) {
     return out;
 }
 
+/// Deviations of all terms together.
+std::vector<double> sums_of(const std::vector<noise::VarianceTerm>& terms, std::size_t size) {
+    std::vector<double> out(size);
+    for (const noise::VarianceTerm& term : terms) {
+        for (std::size_t i = 0; i < size; ++i) out[i] += term.variances[i];
+    }
+    for (double& y : out) y = std::sqrt(y);
+    return out;
+}
+
 void add_fit(const AllanOutput& out, const std::vector<double>& tau_s, report::Figure& figure) {
     const auto terms = noise::variance_terms(*out.noise, tau_s);
     if (terms.empty()) return;
-    report::Curve sum{"fit", tau_s, std::vector<double>(tau_s.size()), {}, {}, Style::dashed};
     double least = figure.curves.front().y.front();
     for (const report::Curve& c : figure.curves) least = std::min(least, *std::min_element(c.y.begin(), c.y.end()));
     for (const noise::VarianceTerm& term : terms) {
         report::Curve line{term.name, {}, {}, {}, {}, Style::line};
         for (std::size_t i = 0; i < tau_s.size(); ++i) {
-            sum.y[i] += term.variances[i];
             const double dev = std::sqrt(term.variances[i]);
             // Far below the curve a line only stretches the axis.
             if (dev < 0.3 * least) continue;
@@ -57,19 +65,16 @@ void add_fit(const AllanOutput& out, const std::vector<double>& tau_s, report::F
         }
         figure.curves.push_back(std::move(line));
     }
-    for (double& y : sum.y) y = std::sqrt(y);
-    figure.curves.push_back(std::move(sum));
+    figure.curves.push_back({"fit", tau_s, sums_of(terms, tau_s.size()), {}, {}, Style::dashed});
 }
 
 }  // namespace
 
-report::Figure allan_figure(const AllanOutput& out) {
-    report::Figure figure;
+void set_axes(const AllanOutput& out, report::Figure& figure) {
     const bool times = std::all_of(out.deviations.begin(), out.deviations.end(),
                                    [](const auto& d) { return allan::traits(d.estimator).time; });
     const bool rates = std::none_of(out.deviations.begin(), out.deviations.end(),
                                     [](const auto& d) { return allan::traits(d.estimator).time; });
-    figure.title = fmt::format("{}, column {}", printable(out.data), printable(out.column));
     figure.x_label = "averaging time tau [s]";
     figure.y_label = "deviation";
     if (out.instrument) {
@@ -80,6 +85,37 @@ report::Figure allan_figure(const AllanOutput& out) {
                                  : fmt::format("deviation [{}; times: {}]", rate, names.integral_unit);
     }
     figure.log_x = figure.log_y = true;
+}
+
+void add_series(const AllanOutput& out, const std::string& name, report::Figure& figure) {
+    std::vector<double> tau_s;
+    std::size_t colour = 0;
+    for (const DeviationOutput& d : out.deviations) {
+        if (d.points.empty()) continue;
+        const std::size_t rank = static_cast<std::size_t>(std::count_if(
+            figure.curves.begin(), figure.curves.end(), [](const auto& c) { return c.style == Style::points; }));
+        figure.curves.push_back(curve_of(d.estimator, d.points));
+        report::Curve& curve = figure.curves.back();
+        curve.label = out.deviations.size() == 1 ? name : fmt::format("{}, {}", name, allan::name(d.estimator));
+        curve.colour = rank;
+        if (estimates_allan_variance(d.estimator) && curve.x.size() > tau_s.size()) {
+            tau_s = curve.x;
+            colour = rank;
+        }
+    }
+    if (!out.noise || !out.noise->described || tau_s.empty()) return;
+    const std::vector<double> fine = fine_grid(tau_s.front(), tau_s.back());
+    const auto terms = noise::variance_terms(*out.noise, fine);
+    if (terms.empty()) return;
+    report::Curve sum{"", fine, sums_of(terms, fine.size()), {}, {}, Style::line};
+    sum.colour = colour;
+    figure.curves.push_back(std::move(sum));
+}
+
+report::Figure allan_figure(const AllanOutput& out) {
+    report::Figure figure;
+    figure.title = fmt::format("{}, column {}", printable(out.data), printable(out.column));
+    set_axes(out, figure);
     std::vector<double> tau_s;
     for (const DeviationOutput& d : out.deviations) {
         if (d.points.empty()) continue;

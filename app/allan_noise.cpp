@@ -7,6 +7,8 @@
 
 #include "analysis/findings/clean_fit.hpp"
 #include "analysis/findings/values.hpp"
+#include "analysis/noise/losses/fit.hpp"
+#include "analysis/noise/losses/lossy_rates.hpp"
 
 namespace ringlock::app {
 namespace {
@@ -30,11 +32,37 @@ Finding in_data(Finding found, std::size_t first_row, allan::Kind kind, double s
     return found;
 }
 
+/// The search and the fit of a record, and the row of its first rate.
+struct Fitted {
+    findings::CleanFit fit;
+    std::size_t first_row = 0;
+};
+
+/// Of all data, or of the longest part without gaps where the record is too long or too empty for that.
+Fitted fit_of(const allan::Phase& phase, allan::Kind kind, AllanOutput& out) {
+    const bool of_angles = kind == allan::Kind::phase;
+    if (!phase.whole()) {
+        noise::LossyRates rates = noise::lossy_rates(phase, out.tau0_s);
+        if (noise::fitted_as_a_whole(rates)) {
+            findings::CleanFit fit = findings::fit_without_events(std::move(rates), out.tau0_s, of_angles);
+            if (!fit.given_up) {
+                out.noise_stretch = out.n;
+                out.noise_filled_in = out.missing;
+                return {std::move(fit), 0};
+            }
+        }
+    }
+    const allan::Stretch& stretch = longest_of(phase);
+    const std::span<const double> angle = std::span(phase.x).subspan(stretch.begin, stretch.size());
+    if (!phase.whole()) out.noise_stretch = stretch.size();
+    return {findings::fit_without_events(angle, out.tau0_s, of_angles), stretch.begin};
+}
+
 }  // namespace
 
 void search_and_fit(std::vector<double> values, const allan::Phase& phase, allan::Kind kind, double scale,
                     AllanOutput& out) {
-    out.findings = findings::search_values(values);
+    for (const Finding& found : findings::search_values(values)) out.findings.push_back(found);
     const allan::Phase* clean = &phase;
     allan::Phase unwrapped;
     if (const auto wraps = findings::find_wraps(values)) {
@@ -49,16 +77,13 @@ void search_and_fit(std::vector<double> values, const allan::Phase& phase, allan
     const auto there = std::find_if(values.begin(), values.end(), [](double v) { return !std::isnan(v); });
     const auto lead = static_cast<std::size_t>(there - values.begin());
     values = {};
-    const allan::Stretch& stretch = longest_of(*clean);
-    const std::span<const double> angle = std::span(clean->x).subspan(stretch.begin, stretch.size());
-    if (!clean->whole()) out.noise_stretch = stretch.size();
-    findings::CleanFit fit = findings::fit_without_events(angle, out.tau0_s, kind == allan::Kind::phase);
+    Fitted fitted = fit_of(*clean, kind, out);
     const auto shown = [&](const Finding& found) {
-        return in_data(found, lead + stretch.begin, kind, scale, out.tau0_s);
+        return in_data(found, lead + fitted.first_row, kind, scale, out.tau0_s);
     };
-    out.noise = std::move(fit.noise);
-    for (const Finding& found : fit.searched.findings) out.findings.push_back(shown(found));
-    if (fit.instead_of_walk) out.jump_instead_of_walk = shown(*fit.instead_of_walk);
+    out.noise = std::move(fitted.fit.noise);
+    for (const Finding& found : fitted.fit.searched.findings) out.findings.push_back(shown(found));
+    if (fitted.fit.instead_of_walk) out.jump_instead_of_walk = shown(*fitted.fit.instead_of_walk);
     std::stable_sort(out.findings.begin(), out.findings.end(),
                      [](const Finding& a, const Finding& b) { return a.row < b.row; });
 }

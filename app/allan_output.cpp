@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "engine/core/json_text.hpp"
+#include "analysis/noise/losses/fit.hpp"
 #include "engine/core/printable.hpp"
 
 namespace ringlock::app {
@@ -61,10 +61,16 @@ noise::Coefficient walk_in(const WalkUnit& unit, const noise::NoiseFit& fit) {
     return {};
 }
 
+/// Line of the file of finding `i`; 0 where it has none.
+std::size_t line_of(const AllanOutput& out, std::size_t i) {
+    return i < out.finding_lines.size() ? out.finding_lines[i] : 0;
+}
+
 /// Rows count data from 1.
-Json finding_json(const findings::Finding& found, double tau0_s) {
+Json finding_json(const findings::Finding& found, double tau0_s, std::size_t line) {
     Json json = {{"kind", findings::name_of(found.kind)},
                  {"row", found.row + 1},
+                 {"line", line == 0 ? Json(nullptr) : Json(line)},
                  {"rows", found.length},
                  {"time_s", number(static_cast<double>(found.row) * tau0_s)},
                  {"size", number(found.size)},
@@ -131,8 +137,10 @@ std::string estimate_line(std::string_view name, const noise::Estimate& e, std::
     return fmt::format("  {:<22} {:>11.5g}  ({:.5g} to {:.5g}) {}\n", name, e.value, e.lo, e.hi, unit);
 }
 
-std::string finding_line(const findings::Finding& found, const AllanOutput& out) {
-    const std::string row = fmt::format("  row {:<9} {:<9}", found.row + 1, findings::name_of(found.kind));
+std::string finding_line(const findings::Finding& found, const AllanOutput& out, std::size_t line) {
+    const std::string place =
+        line == 0 ? fmt::format("row {}", found.row + 1) : fmt::format("row {} (line {})", found.row + 1, line);
+    const std::string row = fmt::format("  {:<22} {:<9}", place, findings::name_of(found.kind));
     switch (found.kind) {
         case findings::Kind::outlier:
             return fmt::format("{} off by {:.4g} {}, {:.3g} standard errors\n", row, found.size, out.input_unit,
@@ -160,10 +168,19 @@ std::string findings_text(const AllanOutput& out) {
     if (out.findings.empty()) return "";
     constexpr std::size_t most = 20;
     std::string text = "\nFound in the data (rows counted from 1; missing data count):\n";
-    for (std::size_t i = 0; i < std::min(most, out.findings.size()); ++i) text += finding_line(out.findings[i], out);
+    for (std::size_t i = 0; i < std::min(most, out.findings.size()); ++i) {
+        text += finding_line(out.findings[i], out, line_of(out, i));
+    }
     if (out.findings.size() > most) text += fmt::format("  and {} more\n", out.findings.size() - most);
+    if (out.cleaned) {
+        return text + fmt::format(
+                          "Deviations and coefficients are of the data without {} outliers and {} jumps, which are "
+                          "taken off by their sizes, and without {} data of disturbed stretches.\n",
+                          out.cleaned->corrected, out.cleaned->jumps, out.cleaned->left_out);
+    }
     const bool estimated = out.noise && out.noise->described;
-    text += fmt::format("The deviations are of the data as they are{}.\n",
+    text += fmt::format("The deviations are of the data as they are{}{}.\n",
+                        out.wraps_undone > 0 ? fmt::format(" with {} wraps undone", out.wraps_undone) : "",
                         estimated ? ", the coefficients of them without outliers, jumps and wraps" : "");
     return text;
 }
@@ -172,8 +189,14 @@ std::string findings_text(const AllanOutput& out) {
 std::string noise_text(const AllanOutput& out) {
     const InstrumentNames& names = names_of(*out.instrument);
     std::string text;
-    if (out.noise_stretch) {
-        text += fmt::format("\nCoefficients from the longest part without gaps, {} points.\n", *out.noise_stretch);
+    if (out.noise_filled_in) {
+        text += fmt::format("\nCoefficients from all {} data; the {} that are missing are allowed for.\n",
+                            *out.noise_stretch, *out.noise_filled_in);
+    } else if (out.noise_stretch) {
+        text += fmt::format(
+            "\nCoefficients from the longest part without gaps, {} points: a record with gaps is not fitted as a whole "
+            "where it has more than {} intervals, less than a quarter of its data, or gaps that take too long.\n",
+            *out.noise_stretch, noise::most_lossy_rates);
     }
     if (out.noise_thinning) {
         text += fmt::format("\nCoefficients from every {}th point, which was kept.\n", *out.noise_thinning);
@@ -193,7 +216,7 @@ std::string noise_text(const AllanOutput& out) {
     }
     if (out.jump_instead_of_walk) {
         text += "    a jump explains the record as well as a random walk of the rate does:\n" +
-                finding_line(*out.jump_instead_of_walk, out);
+                finding_line(*out.jump_instead_of_walk, out, 0);
     }
     if (out.noise->correlated) {
         const noise::Estimate driving = times(out.noise->correlated->amplitude_deg_h_rt_h, names.driving_factor);
@@ -211,7 +234,7 @@ std::string noise_text(const AllanOutput& out) {
 
 }  // namespace
 
-std::string allan_json(const AllanOutput& out) {
+nlohmann::ordered_json allan_object(const AllanOutput& out) {
     Json json;
     json["n"] = out.n;
     json["missing"] = out.missing;
@@ -245,7 +268,15 @@ std::string allan_json(const AllanOutput& out) {
             json["factors_without_terms"][std::string(allan::name(d.estimator))] = d.without_terms;
     }
     json["findings"] = Json::array();
-    for (const findings::Finding& found : out.findings) json["findings"].push_back(finding_json(found, out.tau0_s));
+    for (std::size_t i = 0; i < out.findings.size(); ++i) {
+        json["findings"].push_back(finding_json(out.findings[i], out.tau0_s, line_of(out, i)));
+    }
+    json["wraps_undone"] = out.wraps_undone;
+    json["cleaned"] = nullptr;
+    if (out.cleaned) {
+        json["cleaned"] = {
+            {"outliers", out.cleaned->corrected}, {"jumps", out.cleaned->jumps}, {"left_out", out.cleaned->left_out}};
+    }
     // All keys are always there, null where there is nothing to say.
     json["noise"] = nullptr;
     json["noise_upper_limits_95"] = nullptr;
@@ -255,11 +286,12 @@ std::string allan_json(const AllanOutput& out) {
         json["noise_upper_limits_95"] = std::move(limits);
     }
     json["noise_fitted_points"] = out.noise_stretch ? Json(*out.noise_stretch) : Json(nullptr);
+    json["noise_filled_in"] = out.noise_filled_in ? Json(*out.noise_filled_in) : Json(nullptr);
     json["noise_fitted_every"] = out.noise_thinning ? Json(*out.noise_thinning) : Json(nullptr);
     json["jump_instead_of_random_walk"] =
-        out.jump_instead_of_walk ? finding_json(*out.jump_instead_of_walk, out.tau0_s) : Json(nullptr);
+        out.jump_instead_of_walk ? finding_json(*out.jump_instead_of_walk, out.tau0_s, 0) : Json(nullptr);
     json["noise_withheld"] = out.noise && !out.noise->described ? Json(out.noise->reason) : Json(nullptr);
-    return json_text(json) + "\n";
+    return json;
 }
 
 std::string allan_text(const AllanOutput& out) {

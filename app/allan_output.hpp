@@ -1,10 +1,12 @@
 #pragma once
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/allan/allan.hpp"
+#include "analysis/findings/cleaned.hpp"
 #include "analysis/findings/finding.hpp"
 #include "analysis/noise/fit.hpp"
 #include "analysis/quantity/unit.hpp"
@@ -35,16 +37,20 @@ struct AllanOutput {
     double confidence = 0.0;
     std::vector<DeviationOutput> deviations;
     std::vector<findings::Finding> findings;  ///< by row, counted from 0; sizes in the unit of the data
+    std::vector<std::size_t> finding_lines;  ///< of the file, from 1; 0 where there is none, empty where there are none
+    std::optional<findings::Cleaned> cleaned;  ///< where the deviations are of the data without the findings
+    std::size_t wraps_undone = 0;              ///< in the deviations
     std::optional<noise::NoiseFit> noise;
     /// A jump that explains the record as well as the rate random walk, which is not resolved then.
     std::optional<findings::Finding> jump_instead_of_walk;
-    std::optional<std::size_t>
-        noise_stretch;  ///< points of the part without gaps that was fitted, where there are gaps
+    /// Where there are gaps: data that were fitted, or points of the longest part without gaps if only that was.
+    std::optional<std::size_t> noise_stretch;
+    std::optional<std::size_t> noise_filled_in;  ///< missing data among those, if all data were fitted
     std::optional<std::int64_t> noise_thinning;  ///< samples from one to the next of those that were fitted, if not all
 };
 
-/// One JSON object and a newline; numbers that are not finite are null.
-std::string allan_json(const AllanOutput& out);
+/// The JSON object of one series; numbers that are not finite are null.
+nlohmann::ordered_json allan_object(const AllanOutput& out);
 
 /// Tables for people.
 std::string allan_text(const AllanOutput& out);

@@ -46,10 +46,11 @@ void need_angle_records(const std::string& file, const study::Study& study, cons
         times += fmt::format("{}{:.10g}", times.empty() ? "" : ", ",
                              time.time_s.value_or(interval_s * static_cast<double>(time.samples)));
     }
-    throw InputError(fmt::format(
-        "{}: --tau needs the angle records, which were not stored (output.angle_record = false). Run the scenario "
-        "anew with output.tau_s = [{}], which is computed while the study runs, or with output.angle_record = true",
-        printable(file), times));
+    throw InputError(
+        fmt::format("{}: --tau needs the angle records, which were not stored (output.angle_record = false). "
+                    "Run the scenario anew with output.tau_s = [{}], which is computed while the study runs, "
+                    "or with output.angle_record = true",
+                    printable(file), times));
 }
 
 /// Fills in the nearest whole number of samples. The interval between samples and half of the duration are found by
@@ -66,23 +67,22 @@ void find_among_samples(const study::Study& study, AveragingTime& time) {
     if (!time.time_s) {
         if (time.samples <= largest) return;
         throw InputError(
-            fmt::format("--tau {}: more samples than half of the record, and an Allan deviation needs two of the "
-                        "averaging time; {}. A time in seconds has the unit s",
+            fmt::format("--tau {}: more samples than half of the record, "
+                        "and an Allan deviation needs two of the averaging time; {}. A time in seconds has the unit s",
                         time.text, range()));
     }
     if (*time.time_s < std::min(interval_s, scenario.output.sample_interval_s)) {
         throw InputError(fmt::format(
-            "--tau {}: shorter than a stored sample; {}. A run with this time in output.tau_s has it, from {} ({:.4g} "
-            "s) "
-            "on",
+            "--tau {}: shorter than a stored sample; {}. For such times run the scenario with output.tau_s, "
+            "which takes times from {} ({:.4g} s) on",
             time.text, range(), scenario::reads_arms(scenario) ? "an output of the reader" : "a cycle of the dither",
             study.schedule.output_s));
     }
     constexpr double rounding = 1.0 + 1e-9;  // of a duration that is no binary fraction
     if (*time.time_s > 0.5 * scenario.ensemble.duration_s * rounding) {
         throw InputError(
-            fmt::format("--tau {}: longer than half of the record, and an Allan deviation needs two of the averaging "
-                        "time; {}. A longer one wants a longer ensemble.duration_s",
+            fmt::format("--tau {}: longer than half of the record, and an Allan deviation needs two "
+                        "of the averaging time; {}. A longer time needs a longer ensemble.duration_s",
                         time.text, range()));
     }
     time.samples = std::min(std::max<std::int64_t>(1, std::llround(*time.time_s / interval_s)), largest);
@@ -124,7 +124,7 @@ Analysis evaluate(const AnalyzeArguments& arguments, const study::Experiment& ex
     if (arguments.tau) out.asked = parse_averaging_times("--tau", *arguments.tau);
     // Points with angle records have one schedule.
     out.asked = averaging_times(arguments.file, experiment.points.front(), std::move(out.asked));
-    out.summaries = study::summarise(experiment);
+    name_file_of_values(arguments.file, [&] { out.summaries = study::summarise(experiment); });
     for (std::size_t point = 0; point < out.summaries.size(); ++point) {
         if (!estimators.empty()) {
             auto family = study::family_deviations(arguments.file, experiment, point, estimators);
@@ -161,7 +161,7 @@ void analyze(const AnalyzeArguments& arguments) {
         const study::Experiment experiment = study::read_result(arguments.file);
         const store::Provenance provenance = study::read_provenance(arguments.file);
         const Analysis analysis = evaluate(arguments, experiment);
-        if (figure) report::write_svg(*figure, experiment_figure(experiment, analysis.summaries));
+        if (figure) report::write_figure(*figure, experiment_figure(experiment, analysis.summaries));
         text = arguments.json ? experiment_json(experiment, analysis.summaries, provenance)
                               : text_of(experiment, analysis, provenance);
     });
@@ -176,10 +176,10 @@ void add_analyze(CLI::App& root) {
     auto arguments = std::make_shared<AnalyzeArguments>();
     command->add_option("OUT.h5", arguments->file, "result of ringlock run")->required();
     command->add_option("--dev", arguments->dev,
-                        "also these deviations of the angle records, comma between: " + known_deviations());
+                        "also these deviations of the angle records, separated by commas: " + known_deviations());
     command->add_option("--tau", arguments->tau,
-                        "also the Allan deviation of the angle records at these averaging times, comma between: times "
-                        "with a unit (100s, 2min, 1h) or averaging factors M of stored samples");
+                        "also the Allan deviation of the angle records at these averaging times, separated "
+                        "by commas: times with a unit (100s, 2min, 1h) or averaging factors M of stored samples");
     command->add_option("--plot", arguments->plot, "also draw the figure into this SVG file");
     command->add_flag("--json", arguments->json, "print one JSON object instead of a table");
     command->callback([arguments] { analyze(*arguments); });

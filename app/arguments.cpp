@@ -32,21 +32,10 @@ std::optional<std::pair<T, std::string_view>> leading_number(std::string_view te
 
 /// Seconds in a unit of time; 0 if the text names no unit of time.
 double seconds_in(std::string_view unit) {
+    if (unit == "ms") return 1e-3;
     if (unit == "s") return 1.0;
     if (unit == "min") return 60.0;
     return unit == "h" ? 3600.0 : 0.0;
-}
-
-std::optional<AveragingTime> averaging_time(const std::string& text) {
-    if (const auto factor = leading_number<std::int64_t>(text); factor && factor->second.empty()) {
-        if (factor->first < 1) return std::nullopt;
-        return AveragingTime{text, std::nullopt, factor->first};
-    }
-    const auto number = leading_number<double>(text);
-    if (!number) return std::nullopt;
-    const double time_s = number->first * seconds_in(number->second);
-    if (!(time_s > 0.0) || !std::isfinite(time_s)) return std::nullopt;
-    return AveragingTime{text, time_s, 0};
 }
 
 }  // namespace
@@ -72,8 +61,8 @@ int thread_count(const std::string& asked) {
 void add_settings(CLI::App& command, Changes& changes) {
     command
         .add_option("--set", changes.settings,
-                    "replaces what the file says of a key: --set gyro.lockin_threshold_deg_h=140; may stand several "
-                    "times")
+                    "replaces the value of a key in the file: --set gyro.lockin_threshold_deg_h=140; "
+                    "may be given several times")
         ->type_name("KEY=VALUE")
         ->take_all()
         ->allow_extra_args(false);
@@ -121,9 +110,22 @@ std::vector<allan::Estimator> parse_deviations(const std::string& list) {
     return out;
 }
 
+std::optional<AveragingTime> averaging_time(const std::string& text) {
+    if (const auto factor = leading_number<std::int64_t>(text); factor && factor->second.empty()) {
+        if (factor->first < 1) return std::nullopt;
+        return AveragingTime{text, std::nullopt, factor->first};
+    }
+    const auto number = leading_number<double>(text);
+    if (!number) return std::nullopt;
+    const double time_s = number->first * seconds_in(number->second);
+    if (!(time_s > 0.0) || !std::isfinite(time_s)) return std::nullopt;
+    return AveragingTime{text, time_s, 0};
+}
+
 std::vector<AveragingTime> parse_averaging_times(std::string_view option, const std::string& list) {
     constexpr std::string_view allowed =
-        "times with a unit (100s, 2min, 1h) or averaging factors (whole numbers of samples from 1), comma between";
+        "times with a unit (100s, 2min, 1h) or averaging factors (whole numbers of samples from 1), "
+        "separated by commas";
     if (list.find_first_not_of(' ') == std::string::npos) {
         throw InputError(fmt::format("{}: the list is empty; say {}", option, allowed));
     }
@@ -131,7 +133,7 @@ std::vector<AveragingTime> parse_averaging_times(std::string_view option, const 
     constexpr std::size_t most = 100;
     if (parts.size() > most) {
         throw InputError(
-            fmt::format("{}: {} averaging times; at most {} can be asked for at once, the others in another call",
+            fmt::format("{}: {} averaging times; at most {} can be asked for at once; use another call for the others",
                         option, parts.size(), most));
     }
     std::vector<AveragingTime> out;
@@ -145,8 +147,8 @@ std::vector<AveragingTime> parse_averaging_times(std::string_view option, const 
 
 void add_follow_links(CLI::App& command, bool& follow) {
     command.add_flag("--follow-links", follow,
-                     "also read other files that an HDF5 file leads to: by external links, raw data outside of it or "
-                     "virtual datasets; without it only the file that was named is read");
+                     "also read other files to which an HDF5 file refers by external links, "
+                     "external raw data or virtual datasets; by default only the named file is read");
 }
 
 double duration_s(std::string_view option, const std::string& text) {

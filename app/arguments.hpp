@@ -51,6 +51,10 @@ struct AveragingTime {
     std::int64_t samples = 0;      ///< averaging factor; 0 where a time is given and no sampling interval is known yet
 };
 
+/// A number with a unit (5ms, 100s, 2min, 1h) is a time, a whole number from 1 without one an averaging factor; nothing
+/// where the text is neither.
+std::optional<AveragingTime> averaging_time(const std::string& text);
+
 /// Numbers with a unit are times (100s, 2min, 1h), those without are averaging factors. Throws InputError.
 std::vector<AveragingTime> parse_averaging_times(std::string_view option, const std::string& list);
 

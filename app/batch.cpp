@@ -8,7 +8,6 @@
 #include <exception>
 #include <filesystem>
 #include <map>
-#include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -19,6 +18,7 @@
 #include "analysis/study/cost.hpp"
 #include "analysis/study/result/result_file.hpp"
 #include "app/arguments.hpp"
+#include "app/failure.hpp"
 #include "app/output.hpp"
 #include "app/run_text.hpp"
 #include "engine/core/atomic_path.hpp"
@@ -73,8 +73,10 @@ class Batch {
             const fs::path result = folder_ / fs::path(scenario).filename().replace_extension(".h5");
             const auto [there, fresh] = names.emplace(result, scenario);
             if (!fresh) {
-                throw InputError(fmt::format("{} and {}: would both be written into {}; run them into two folders",
-                                             printable(there->second), printable(scenario), printable(result)));
+                throw InputError(
+                    fmt::format("{} and {}: the results of both would be written into {}; "
+                                "give them different folders",
+                                printable(there->second), printable(scenario), printable(result)));
             }
             Entry& entry = entries_.emplace_back();
             entry.scenario = scenario;
@@ -99,7 +101,7 @@ class Batch {
             }
         } catch (const Interrupted& interrupted) {
             finish();
-            throw Interrupted(fmt::format("{}; the same command goes on with the batch", interrupted.what()));
+            throw Interrupted(fmt::format("{}; the same command continues the batch", interrupted.what()));
         }
         finish();
         const auto failed = std::count_if(entries_.begin(), entries_.end(),
@@ -137,8 +139,8 @@ class Batch {
         // The files that a run keeps while it goes on take as much space as its result, in addition to it.
         if (!unknown && bytes + largest > space.available) {
             throw InputError(
-                fmt::format("{}: the results will take {:.1f} GB, and the disk has {:.1f} GB; run fewer, or "
-                            "set output.angle_record=false with --set",
+                fmt::format("{}: the results will take {:.1f} GB, and the disk has {:.1f} GB; "
+                            "run fewer, or set output.angle_record=false with --set",
                             printable(folder_), static_cast<double>(bytes + largest) * 1e-9,
                             static_cast<double>(space.available) * 1e-9));
         }
@@ -166,7 +168,7 @@ class Batch {
         Entry& entry = entries_[i];
         if (!arguments_.quiet) {
             const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - start_;
-            tell(fmt::format("batch: {} of {}, {}; {} gone, about {} left\n", i + 1, entries_.size(),
+            tell(fmt::format("batch: {} of {}, {}; {} elapsed, about {} left\n", i + 1, entries_.size(),
                              printable(entry.scenario), duration_text(gone.count()), duration_text(expected_left_s())));
         }
         RunArguments one = arguments_;
@@ -195,11 +197,9 @@ class Batch {
             tell(fmt::format("ringlock: error: {}\n", why));
         };
         try {
-            work();
+            name_file_of_failure(entry.scenario, work);
         } catch (const Interrupted&) {
             throw;
-        } catch (const std::bad_alloc&) {
-            fail(fmt::format("{}: out of memory", printable(entry.scenario)));
         } catch (const std::exception& error) {
             fail(error.what());
         }

@@ -26,6 +26,7 @@
 #include "analysis/report/closure_page.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/failure.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
@@ -76,14 +77,14 @@ std::vector<std::filesystem::path> folders_of(const ClosureArguments& arguments)
 void refuse_other_records(const ClosureArguments& arguments) {
     if (!arguments.same_chain && arguments.records.size() > 1) {
         throw InputError(
-            fmt::format("closure takes one RECORD, and there are {}: {}. Name one; records of one box, which its data "
-                        "chain resamples from one source, are read together with --same-chain",
+            fmt::format("closure takes one RECORD, but there are {}: {}. Name one, or give --same-chain "
+                        "to read records of one box together, whose data chain resamples them from one source",
                         arguments.records.size(), fmt::join(arguments.records, ", ")));
     }
     if (arguments.same_chain && arguments.records.size() < 2) {
         throw InputError(
-            fmt::format("--same-chain takes two records or more of one box, and there is one: {}. Name the others too, "
-                        "or leave --same-chain out",
+            fmt::format("--same-chain takes two or more records of one box, but there is one: {}. "
+                        "Name the others too, or leave --same-chain out",
                         arguments.records.front()));
     }
     for (auto one = arguments.records.begin(); one != arguments.records.end(); ++one) {
@@ -91,8 +92,8 @@ void refuse_other_records(const ClosureArguments& arguments) {
             std::error_code none;
             if (*one != *other && !std::filesystem::equivalent(*one, *other, none)) continue;
             throw InputError(
-                fmt::format("RECORD {} and RECORD {} are the same file, whose noise would count twice; nothing was "
-                            "done. Name each record once",
+                fmt::format("RECORD {} and RECORD {} are the same file, whose noise would count twice; "
+                            "nothing was done. Name each record once",
                             *other, *one));
         }
     }
@@ -212,6 +213,17 @@ Printed close_several(const ClosureArguments& arguments, const closure::Monitor&
     return all;
 }
 
+void close_records(const ClosureArguments& arguments) {
+    refuse_other_records(arguments);
+    refuse_to_lose(arguments);
+    StageProgress progress(arguments.quiet);
+    const closure::Monitor monitor{[&](const std::string& stage) { progress.show(stage); },
+                                   [&](double share) { progress.show_share(share); }};
+    const Printed printed = arguments.same_chain ? close_several(arguments, monitor) : close_one(arguments, monitor);
+    put(arguments.json ? json_text(printed.json) + "\n" : printed.text);
+    if (printed.not_written) std::rethrow_exception(printed.not_written);
+}
+
 }  // namespace
 
 void add_closure(CLI::App& root) {
@@ -222,27 +234,20 @@ void add_closure(CLI::App& root) {
                      "rlg-record (.h5), or samples as text; with --same-chain two or more")
         ->required();
     command->add_flag("--same-chain", arguments->same_chain,
-                      "the records are of one box, whose data chain resamples all of them from one source: what they "
-                      "share is fitted once");
+                      "the records are of one box, whose data chain resamples all of them from one source: "
+                      "the rate of the source is fitted once");
     command->add_option("--model", arguments->model,
-                        "scenario (.toml) that supplies scale factor, threshold and dither where the record does not "
-                        "declare them");
+                        "scenario (.toml) that supplies scale factor, threshold and dither "
+                        "where the record does not declare them");
     command->add_option("-o,--output", arguments->out,
-                        "folder for report.md with its figures, closed.toml, closure.h5 and closure.json; with "
-                        "--same-chain each record has a folder in it");
+                        "folder for report.md with its figures, closed.toml, closure.h5 and closure.json; "
+                        "with --same-chain each record has a folder in it");
     add_follow_links(*command, arguments->follow_links);
     command->add_flag("--json", arguments->json, "one JSON object on standard output");
     command->add_flag("-q,--quiet", arguments->quiet, "no progress on standard error");
     command->callback([arguments] {
-        refuse_other_records(*arguments);
-        refuse_to_lose(*arguments);
-        StageProgress progress(arguments->quiet);
-        const closure::Monitor monitor{[&](const std::string& stage) { progress.show(stage); },
-                                       [&](double share) { progress.show_share(share); }};
-        const Printed printed =
-            arguments->same_chain ? close_several(*arguments, monitor) : close_one(*arguments, monitor);
-        put(arguments->json ? json_text(printed.json) + "\n" : printed.text);
-        if (printed.not_written) std::rethrow_exception(printed.not_written);
+        name_file_of_failure(fmt::format("{}", fmt::join(arguments->records, ", ")),
+                             [&] { close_records(*arguments); });
     });
 }
 

@@ -54,12 +54,11 @@ std::string table_of(const std::vector<scenario::NamedDevice>& devices) {
                             fmt::format("{:.3g} ({:.3g})", f.dead_band_deg_h, f.largest_dead_band_deg_h));
     }
     return text +
-           "\nK: rotation a fringe. Fringes: in a half cycle of the dither. Kick: of the phase by the lock-in, at a "
-           "turn.\n"
-           "M: amplitude of the dither in optical phase. ARW: with turns fully randomised. Dead band: half width "
-           "around\n"
+           "\nK: rotation per fringe. Fringes: in a half cycle of the dither. Kick: of the phase by the lock-in, "
+           "at a turn.\nM: amplitude of the dither in optical phase. ARW: with turns fully randomised. "
+           "Dead band: half width around\n"
            "zero, at this amplitude (and at any). In a scenario, device = \"NAME\" before all sections takes these\n"
-           "constants for defaults; ringlock devices --json tells where each of them comes from.\n";
+           "constants for defaults; ringlock devices --json gives the source of each constant.\n";
 }
 
 nlohmann::ordered_json json_of(const std::vector<scenario::NamedDevice>& devices) {
@@ -88,7 +87,7 @@ nlohmann::ordered_json json_of(const std::vector<scenario::NamedDevice>& devices
 }  // namespace
 
 void add_devices(CLI::App& root) {
-    CLI::App* command = root.add_subcommand("devices", "List the gyros that a scenario can name, and what they are");
+    CLI::App* command = root.add_subcommand("devices", "List the gyros that a scenario can name, with their constants");
     const auto json = std::make_shared<bool>(false);
     command->add_flag("--json", *json, "Print one JSON object, with the source of every constant");
     command->callback([json] {

@@ -52,12 +52,12 @@ std::string reader_text(const study::Experiment& experiment) {
         return "";
     }
     const scenario::StudyReader reader = scenario::study_reader(first);
-    return wrapped(fmt::format(
-               "arms read at {:g} Hz: stripping {}, fraction {}, latched at {:g} Hz; {:.3g} s late, {:.2g} "
-               "of a steady dither left",
-               first.reader.output_hz, reader::stripping_names.at(static_cast<std::size_t>(first.reader.stripping)),
-               reader::fraction_names.at(static_cast<std::size_t>(first.reader.fraction)), reader.latch_hz,
-               reader.delay_s, scenario::reader_residue_relative(first))) +
+    return wrapped(fmt::format("arms read at {:g} Hz: stripping {}, fraction {}, latched at {:g} Hz; {:.3g} s late, "
+                               "{:.2g} of a steady dither left",
+                               first.reader.output_hz,
+                               reader::stripping_names.at(static_cast<std::size_t>(first.reader.stripping)),
+                               reader::fraction_names.at(static_cast<std::size_t>(first.reader.fraction)),
+                               reader.latch_hz, reader.delay_s, scenario::reader_residue_relative(first))) +
            "\n";
 }
 
@@ -185,7 +185,7 @@ std::string design_text(const study::Experiment& experiment, const std::vector<s
     }
     const auto& arms = summaries.front().arms;
     for (std::size_t a = 0; a < arms.size(); ++a) text += fmt::format("({}) {}\n", a + 1, arms[a].name);
-    if (summaries.size() > most_rows) text += "Of the points some are shown; all are in the file and in --json.\n";
+    if (summaries.size() > most_rows) text += "Only some of the points are shown; all are in the file and in --json.\n";
     if (experiment.axes.size() > most_keys_beside) {
         text += "\nKeys\n" + points_table(summaries.size(), {}, key_columns(experiment));
     }

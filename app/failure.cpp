@@ -5,6 +5,7 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "app/output.hpp"
 #include "engine/core/error.hpp"
@@ -32,12 +33,27 @@ void name_file_of_failure(const std::string& file, const std::function<void()>& 
     } catch (const Interrupted&) {
         throw;
     } catch (const std::bad_alloc&) {
-        throw;
+        throw RunError(
+            fmt::format("{}: out of memory; run fewer gyros at a time, store fewer samples, or take a shorter record",
+                        printable(file)));
+    } catch (const std::system_error& error) {
+        throw RunError(fmt::format("{}: the system refused something: {}", printable(file), printable(error.what())));
     } catch (const std::exception& error) {
         throw InputError(
-            fmt::format("{}: holds a value that cannot be evaluated ({}); it is damaged, or was written by "
-                        "another program",
+            fmt::format("{}: holds a value that cannot be evaluated ({}); it is damaged, "
+                        "or was written by another program",
                         printable(file), printable(error.what())));
+    }
+}
+
+void name_file_of_values(const std::string& file, const std::function<void()>& evaluate) {
+    try {
+        evaluate();
+    } catch (const InputError& error) {
+        const std::string name = printable(file);
+        const std::string_view message = error.what();
+        if (message.find(name) != std::string_view::npos) throw;
+        throw InputError(fmt::format("{}: {}", name, message));
     }
 }
 

@@ -16,8 +16,12 @@ struct EndQuietly {
 };
 
 /// Calls `work`, which uses values of a file. An exception of a library, which does not know the file, becomes an
-/// InputError that names the file: one of its values is beyond the range that can be evaluated.
+/// InputError that names the file: one of its values is beyond the range that can be evaluated. A lack of memory or of
+/// another resource of the system becomes a RunError that names it.
 void name_file_of_failure(const std::string& file, const std::function<void()>& work);
+
+/// Evaluates values of a file. An InputError of the evaluation, which does not know the file, names it afterwards.
+void name_file_of_values(const std::string& file, const std::function<void()>& evaluate);
 
 /// Writes the failure to standard error and returns the exit status for it.
 int tell_failure(const std::exception_ptr& failure);

@@ -11,8 +11,10 @@
 #include "analysis/quantity/unit.hpp"
 #include "analysis/record/mapped_columns.hpp"
 #include "analysis/record/record.hpp"
+#include "analysis/text/words.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/failure.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
@@ -81,7 +83,7 @@ record::MappedLog parse_log(const ImportArguments& arguments) {
         throw InputError(fmt::format("--unit {}: no column of --column has a unit", arguments.unit));
     }
     if (arguments.unit.empty()) {
-        throw InputError(fmt::format("--unit is missing: say in which unit the {} are, such as {}",
+        throw InputError(fmt::format("--unit is missing: give the unit of the {}, such as {}",
                                      of_rate ? "rates" : "angles",
                                      of_rate ? "deg/h, deg/s or rad/s" : "arcsec, deg or rad"));
     }
@@ -114,9 +116,20 @@ record::Record read(const ImportArguments& arguments) {
                                         {"--delimiter", !arguments.text.delimiter.empty()}}) {
         if (!given) continue;
         throw InputError(fmt::format(
-            "{}: needs --column NAME=QUANTITY; without it the file itself says what its columns are", option));
+            "{}: needs --column NAME=QUANTITY; without --column the file itself must declare its columns", option));
     }
     return record::read_record(arguments.data, arguments.follow_links ? store::Links::follow : store::Links::refuse);
+}
+
+void import_data(const ImportArguments& arguments) {
+    refuse_same_files({{"DATA", arguments.data, NamedFile::Use::input}, {"-o", arguments.out, NamedFile::Use::output}});
+    record::RecordWriter writer(arguments.out);
+    record::Record record = read(arguments);
+    take_declared(arguments.declared, record);
+    refuse_errors(arguments.data, record);
+    tell_warnings(arguments.data, record);
+    writer.write(record);
+    put(fmt::format("{}: {}\n", printable(arguments.out), record_text(record)));
 }
 
 }  // namespace
@@ -126,47 +139,38 @@ void add_import(CLI::App& root) {
     auto arguments = std::make_shared<ImportArguments>();
     command
         ->add_option("DATA", arguments->data,
-                     "samples as text with lines \"# key = value\", a header and rows; with --column a log of any "
-                     "layout, as ringlock allan reads them. Example: ringlock import log.csv -o log.h5 --column "
-                     "gx=rate --unit deg/s --rate 200 --time t --time-unit ms")
+                     "samples as text with lines \"# key = value\", a header and rows; "
+                     "with --column a log of any layout, as ringlock allan reads them. Example: ringlock "
+                     "import log.csv -o log.h5 --column gx=rate --unit deg/s --rate 200 --time t --time-unit ms")
         ->required();
     command->add_option("-o,--output", arguments->out, "record to write (.h5)")->required();
     command
         ->add_option("--column", arguments->columns,
-                     "NAME=QUANTITY: a column, by name, number or dataset, and what it becomes: rate, "
-                     "angle_increment_arcsec, angle_arcsec, quarter_count, accel_x, accel_y, accel_z, temperature_c; "
-                     "may be given several times")
+                     "NAME=QUANTITY: a column, by name, number or dataset, and its quantity in the record: "
+                     "rate, angle_increment_arcsec, angle_arcsec, quarter_count, accel_x, accel_y, accel_z, "
+                     "temperature_c; may be given several times")
         ->take_all()
         ->allow_extra_args(false);
     command->add_option("--unit", arguments->unit,
                         "unit of the gyro's column: arcsec, deg, rad of an angle; deg/h, deg/s, rad/s of a rate; "
                         "counts, with --scale");
     command->add_option("--scale", arguments->scale,
-                        "size of one number of the gyro's column: with --unit counts a number and a unit "
-                        "(0.25arcsec), with another unit a plain factor");
+                        "size of one number of the gyro's column: "
+                        "with --unit counts a number and a unit (0.25arcsec), with another unit a plain factor");
     command->add_option("--rate", arguments->rate_hz, "samples a second [Hz]");
     add_follow_links(*command, arguments->follow_links);
     command->add_option("--time", arguments->time,
-                        "column of the times of the samples, or two, as in sec,nsec: samples whose rows are left out "
-                        "are missing in the record");
+                        "column of the times of the samples, or two, as in sec,nsec: "
+                        "samples whose rows are left out are missing in the record");
     add_text_options(*command, arguments->text);
     command
         ->add_option("--declare", arguments->declared,
-                     "KEY=NUMBER: a constant of the gyro as /declared has it, such as scale_factor_arcsec=0.6 or "
-                     "dither_frequency_hz=400; may be given several times")
+                     "KEY=NUMBER: a constant of the gyro as /declared has it, "
+                     "such as scale_factor_arcsec=0.6 or dither_frequency_hz=400; may be given several times")
         ->take_all()
         ->allow_extra_args(false);
-    command->callback([arguments] {
-        refuse_same_files(
-            {{"DATA", arguments->data, NamedFile::Use::input}, {"-o", arguments->out, NamedFile::Use::output}});
-        record::RecordWriter writer(arguments->out);
-        record::Record record = read(*arguments);
-        take_declared(arguments->declared, record);
-        refuse_errors(arguments->data, record);
-        tell_warnings(arguments->data, record);
-        writer.write(record);
-        put(fmt::format("{}: {}\n", printable(arguments->out), record_text(record)));
-    });
+    command->callback(
+        [arguments] { name_file_of_failure(text::name_of_file(arguments->data), [&] { import_data(*arguments); }); });
 }
 
 }  // namespace ringlock::app

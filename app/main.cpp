@@ -32,8 +32,10 @@ void refuse_unknown_command(const CLI::App& root, int argc, char** argv) {
         if (command->get_name() == argv[1]) return;
         known += (known.empty() ? "" : ", ") + command->get_name();
     }
-    throw ringlock::InputError(fmt::format("\"{}\" is no command; there are {}; ringlock --help says what they do",
-                                           ringlock::printable(argv[1]), known));
+    throw ringlock::InputError(
+        fmt::format("\"{}\" is not a command; the commands are {}; "
+                    "ringlock --help describes them",
+                    ringlock::printable(argv[1]), known));
 }
 
 }  // namespace
@@ -45,14 +47,14 @@ int main(int argc, char** argv) {
     // A file that outgrows its limit (ulimit -f) is an error of writing, reported and cleaned up like a full disk.
     std::signal(SIGXFSZ, SIG_IGN);
     CLI::App root{
-        "ringlock: which cure for the lock-in of a dithered ring laser gyro, when and how well.\n"
-        "Simulates ensembles of dithered gyros, compares uncompensated, noise-injected and compensated outputs, and\n"
-        "computes Allan deviation and angle random walk.",
+        "ringlock: simulation and analysis of the lock-in of dithered ring laser gyros.\n"
+        "Simulates ensembles of dithered gyros, compares uncompensated, noise-injected and compensated outputs,\n"
+        "computes Allan deviation and angle random walk, and identifies error sources in measured records.",
         "ringlock"};
     root.set_version_flag("--version", fmt::format("ringlock {} ({})", ringlock::version(), ringlock::git_hash()));
     root.require_subcommand(1);
     root.failure_message([](const CLI::App*, const CLI::Error& error) {
-        return fmt::format("ringlock: error: {}; --help says what there is\n", ringlock::printable(error.what()));
+        return fmt::format("ringlock: error: {}; --help lists the options\n", ringlock::printable(error.what()));
     });
     root.footer("Exit status: 0 done; 1 the run failed; 2 the input or the command line is wrong.");
     app::add_run(root, {argv, static_cast<std::size_t>(argc)});

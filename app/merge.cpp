@@ -15,6 +15,7 @@
 #include "analysis/study/result/result_file.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/failure.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/run_text.hpp"
@@ -42,8 +43,8 @@ std::vector<std::filesystem::path> files_of(const MergeArguments& arguments) {
     if (files.empty()) files = parts::shard_files(arguments.out);
     if (files.empty()) {
         throw InputError(
-            fmt::format("{0}: there is no shard {0}.shard-I-of-N beside it; name the shards, or make them "
-                        "with ringlock run --shard I/N -o {0}",
+            fmt::format("{0}: there is no shard {0}.shard-I-of-N; name the shards, "
+                        "or make them with ringlock run --shard I/N -o {0}",
                         arguments.out));
     }
     return files;
@@ -67,9 +68,8 @@ void merge(const MergeArguments& arguments, std::span<const char* const> command
     }
     if (!missing.empty()) {
         throw InputError(fmt::format(
-            "{}: gyros of {} shard{} are missing: {}; run these with ringlock run --shard I/N "
-            "-o {}",
-            arguments.out, missing.size(), missing.size() == 1 ? "" : "s", list_of(missing), arguments.out));
+            "{}: gyros of {} shard{} are missing: {}; run these with ringlock run --shard I/N -o {}", arguments.out,
+            missing.size(), missing.size() == 1 ? "" : "s", list_of(missing), arguments.out));
     }
     std::vector<NamedFile> named = {{"OUT.h5", arguments.out, NamedFile::Use::output}};
     for (const std::filesystem::path& file : files) named.push_back({"SHARD", file, NamedFile::Use::input});
@@ -86,7 +86,8 @@ void merge(const MergeArguments& arguments, std::span<const char* const> command
     provenance.turns_per_s = static_cast<double>(plan.turns()) / provenance.wall_s;
     provenance.instruction_set = simd::active_target();
     check_interrupt();
-    const std::vector<study::Summary> summaries = study::summarise(plan);
+    std::vector<study::Summary> summaries;
+    name_file_of_values(arguments.out, [&] { summaries = study::summarise(plan); });
     put(arguments.json ? experiment_json(plan, summaries, provenance) : experiment_text(plan, summaries, provenance));
     if (plan.scenario.output.angle_record) {
         shards.finished().each_samples([&](const study::SampledAngles& samples) {
@@ -106,7 +107,7 @@ void merge(const MergeArguments& arguments, std::span<const char* const> command
 void add_merge(CLI::App& root, std::span<const char* const> command_line) {
     CLI::App* command = root.add_subcommand("merge", "Make one result of the shards of a run (run --shard)");
     auto arguments = std::make_shared<MergeArguments>();
-    command->add_option("OUT.h5", arguments->out, "result file: what one run would have written")->required();
+    command->add_option("OUT.h5", arguments->out, "result file: that of a run without shards")->required();
     command->add_option("SHARD", arguments->shards, "the shards (default: all OUT.h5.shard-I-of-N)");
     command->add_flag("--missing", arguments->missing, "print the shards that must be run (again), and end");
     command->add_option("--threads", arguments->threads, "threads (0: all cores)")
@@ -114,7 +115,8 @@ void add_merge(CLI::App& root, std::span<const char* const> command_line) {
         ->type_name("N");
     command->add_flag("--json", arguments->json, "print one JSON object instead of a table");
     command->add_flag("-q,--quiet", arguments->quiet, "nothing on standard error");
-    command->callback([arguments, command_line] { merge(*arguments, command_line); });
+    command->callback(
+        [arguments, command_line] { name_file_of_failure(arguments->out, [&] { merge(*arguments, command_line); }); });
 }
 
 }  // namespace ringlock::app

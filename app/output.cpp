@@ -11,6 +11,7 @@
 #include <system_error>
 #include <vector>
 
+#include "analysis/report/render.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/printable.hpp"
 #include "engine/core/waiting.hpp"
@@ -56,9 +57,7 @@ void tell(std::string_view text) { draw_over(safe(text)); }
 
 std::unique_ptr<AtomicPath> claim_figure(const std::filesystem::path& path) {
     if (path.empty()) return nullptr;
-    if (path.extension() != ".svg") {
-        throw InputError(fmt::format("--plot {}: the name of a figure must end in .svg", printable(path)));
-    }
+    report::picture_of(path.string(), "--plot");
     return std::make_unique<AtomicPath>(path);
 }
 

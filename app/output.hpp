@@ -24,7 +24,7 @@ void tell(std::string_view text);
 void draw_over(std::string_view text);
 
 /// Claims the figure of --plot, so that it is known before a run, not after it, that it cannot be written; null for an
-/// empty path. It must end in .svg: a figure replaces the file it finds. Throws InputError.
+/// empty path. It must end in .svg, .png or .pdf: a figure replaces the file it finds. Throws InputError.
 std::unique_ptr<AtomicPath> claim_figure(const std::filesystem::path& path);
 
 /// Opens standard streams that the caller has closed (on nothing), so that no other file gets their descriptors and

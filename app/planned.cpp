@@ -17,10 +17,10 @@ void add_planned(CLI::App& root) {
         command->allow_extras();
         const std::string text = name;
         command->callback([text] {
-            throw InputError(fmt::format(
-                "the command \"{}\" is not there yet; there are run, merge, status, submit, analyze, allan, "
-                "validate, import, record, replay, devices and closure",
-                text));
+            throw InputError(
+                fmt::format("the command \"{}\" is not available yet; the commands are run, merge, status, submit, "
+                            "analyze, allan, validate, import, record, replay, devices and closure",
+                            text));
         });
     }
 }

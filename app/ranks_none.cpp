@@ -13,8 +13,8 @@ void with_ranks(const std::function<void(const Ranks&)>& work) {
         const char* size = std::getenv(name);
         if (size == nullptr || std::string_view(size) == "1") continue;
         throw InputError(
-            fmt::format("run: is one of {} processes of mpirun, but this program was built without MPI; build it with "
-                        "-DRINGLOCK_MPI=ON, or start one process with --threads",
+            fmt::format("run: is one of {} processes of mpirun, but this program was built without MPI; "
+                        "build it with -DRINGLOCK_MPI=ON, or start one process with --threads",
                         size));
     }
     work({});

@@ -11,6 +11,7 @@
 #include "analysis/instrument/simulate.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/failure.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
@@ -63,10 +64,12 @@ void run(const RecordArguments& arguments) {
 }  // namespace
 
 void add_record(CLI::App& root) {
-    CLI::App* command = root.add_subcommand("record", "Write what an instrumented gyro of a scenario would record");
+    CLI::App* command = root.add_subcommand("record", "Simulate the record of an instrumented gyro of a scenario");
     auto arguments = std::make_shared<RecordArguments>();
     command
-        ->add_option("SCENARIO.toml", arguments->scenario, "what to simulate; its section [record] says what is kept")
+        ->add_option("SCENARIO.toml", arguments->scenario,
+                     "scenario to simulate; "
+                     "its section [record] selects the data")
         ->required();
     command->add_option("-o,--output", arguments->out, "record to write (.h5)")->required();
     command->add_option("--gyro", arguments->gyro, "number of the gyro in the ensemble, from 0")
@@ -75,7 +78,7 @@ void add_record(CLI::App& root) {
     add_settings(*command, arguments->changes);
     command->add_option("--seed", arguments->changes.seed, "replaces ensemble.seed")->type_name("S");
     command->add_flag("--json", arguments->json, "print one JSON object instead of a line");
-    command->callback([arguments] { run(*arguments); });
+    command->callback([arguments] { name_file_of_failure(arguments->scenario, [&] { run(*arguments); }); });
 }
 
 }  // namespace ringlock::app

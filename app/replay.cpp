@@ -24,6 +24,7 @@
 #include "analysis/study/result/result_file.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/failure.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/room.hpp"
@@ -55,25 +56,23 @@ std::string names_of(const std::vector<scenario::Arm>& arms) {
 std::size_t arm_of(const ReplayArguments& arguments, const study::Experiment& experiment) {
     const auto& arms = experiment.scenario.arms;
     const std::string there = fmt::format("{} has {}", arguments.result, names_of(arms));
-    if (!arguments.arm) throw InputError(fmt::format("replay: say with --arm which arm: {}", there));
+    if (!arguments.arm) throw InputError(fmt::format("replay: give the arm with --arm: {}", there));
     for (std::size_t i = 0; i < arms.size(); ++i) {
         if (arms[i].name == *arguments.arm) return i;
     }
-    throw InputError(fmt::format("--arm {}: no arm of the result; {}", *arguments.arm, there));
+    throw InputError(fmt::format("--arm {}: is not an arm of the result; {}", *arguments.arm, there));
 }
 
 /// Points are counted from 1, as tables and errors do.
 std::size_t point_of(const ReplayArguments& arguments, const study::Experiment& experiment) {
     const auto points = static_cast<std::int64_t>(experiment.points.size());
-    const std::string there = experiment.has_design()
-                                  ? fmt::format("{} has the points 1 to {}", arguments.result, points)
-                                  : fmt::format(
-                                        "{} has no design, which is one point, 1; leave "
-                                        "--point out",
-                                        arguments.result);
+    const std::string there =
+        experiment.has_design()
+            ? fmt::format("{} has the points 1 to {}", arguments.result, points)
+            : fmt::format("{} has no design and only the point 1; leave --point out", arguments.result);
     if (!arguments.point) {
         if (points == 1) return 0;
-        throw InputError(fmt::format("replay: say with --point at which point of the design: {}", there));
+        throw InputError(fmt::format("replay: give the point of the design with --point: {}", there));
     }
     const std::int64_t point = whole_number("--point", *arguments.point, points, "from 1 on: " + there);
     if (point == 0) throw InputError(fmt::format("--point 0: must be a whole number from 1 on: {}", there));
@@ -85,10 +84,10 @@ void need_angles_at_turns(const study::GyroOfResult& of) {
     const scenario::Scenario& scenario = of.study().scenario;
     if (!scenario::reads_arms(scenario)) return;
     throw InputError(
-        fmt::format("{}: its arms were read by readers (reader.output_hz = {:g}), and a replay goes from turn to turn "
-                    "of the dither, where these have no outputs to compare with. Run its scenario with --set "
-                    "reader.output_hz=0 into another result and replay that, which has the same gyros; `ringlock "
-                    "record` writes the outputs of a reader",
+        fmt::format("{}: its arms were read by readers (reader.output_hz = {:g}), "
+                    "and a replay goes from turn to turn of the dither, where these have no outputs to compare with. "
+                    "Run its scenario with --set reader.output_hz=0 into another result and replay that, "
+                    "which has the same gyros; `ringlock record` writes the outputs of a reader",
                     printable(of.result), scenario.reader.output_hz));
 }
 
@@ -99,7 +98,7 @@ std::int64_t gyro_of(const ReplayArguments& arguments, const study::Experiment& 
     if (const std::int64_t rates = experiment.scenario.input.sweep_points; rates > 1) {
         there += fmt::format(": {} at each of {} rates, one rate after the other", gyros / rates, rates);
     }
-    if (!arguments.gyro) throw InputError(fmt::format("replay: say with --gyro which gyro: {}", there));
+    if (!arguments.gyro) throw InputError(fmt::format("replay: give the gyro with --gyro: {}", there));
     return whole_number("--gyro", *arguments.gyro, gyros - 1, "from 0 on: " + there);
 }
 
@@ -111,8 +110,8 @@ double seconds(std::string_view option, const std::optional<std::string>& text, 
     const auto [end, error] = std::from_chars(text->data(), last, value);
     if (error != std::errc() || end != last || !std::isfinite(value)) {
         throw InputError(
-            fmt::format("{} {}: must be a number of seconds since the start of the record, negative while "
-                        "the gyro settles",
+            fmt::format("{} {}: must be a number of seconds since the start of the record, "
+                        "negative while the gyro settles",
                         option, *text));
     }
     return value;
@@ -168,7 +167,7 @@ std::string in_words(const Told& told) {
     if (told.compared) {
         agrees += fmt::format(", {} of {} samples of the record", figures.samples, told.replay.schedule().samples);
     }
-    line("as stored, to the bit", agrees);
+    line("identical to the stored values", agrees);
     if (!told.compared) line("angle record", "not stored (output.angle_record = false), so not compared");
     return text;
 }
@@ -270,7 +269,8 @@ void add_replay(CLI::App& root, std::span<const char* const> command_line) {
     command->add_option("--to", arguments->to, "write turns up to this time, and end there")->type_name("S");
     command->add_flag("--json", arguments->json, "print one JSON object instead of text");
     command->add_flag("-q,--quiet", arguments->quiet, "no text and no progress");
-    command->callback([arguments, command_line] { run(*arguments, command_line); });
+    command->callback(
+        [arguments, command_line] { name_file_of_failure(arguments->result, [&] { run(*arguments, command_line); }); });
 }
 
 }  // namespace ringlock::app

@@ -28,8 +28,8 @@ void check_room(const std::filesystem::path& out, const Needs& needs, bool quiet
     const std::uint64_t disk_bytes = needs.disk_bytes();
     if (!unknown && disk_bytes > disk.available) {
         throw InputError(
-            fmt::format("{}: about {:.2g} GB of the disk would be taken, and {:.2g} GB are free; {}, or give "
-                        "a place on another disk with -o",
+            fmt::format("{}: about {:.2g} GB of the disk would be taken, and {:.2g} GB are free; "
+                        "{}, or give a place on another disk with -o",
                         printable(out), in_gb(disk_bytes), in_gb(disk.available), needs.less_disk));
     }
     if (quiet) return;

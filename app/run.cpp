@@ -9,6 +9,7 @@
 #include "app/arguments.hpp"
 #include "app/batch.hpp"
 #include "app/command.hpp"
+#include "app/failure.hpp"
 #include "app/output.hpp"
 #include "app/ranks.hpp"
 #include "app/run_member.hpp"
@@ -43,7 +44,9 @@ void run(const RunArguments& arguments, std::span<const char* const> command_lin
     if (is_batch(arguments)) {
         return with_ranks([&](const Ranks& ranks) {
             if (ranks.leader)
-                throw InputError("run: a batch is not for several processes of mpirun; start one for each scenario");
+                throw InputError(
+                    "run: several processes of mpirun cannot run a batch; "
+                    "start one mpirun for each scenario");
             if (!ranks.member) run_batch(arguments, command_line);
             if (ranks.member) ranks.member->next_order();
         });
@@ -67,8 +70,9 @@ void add_run(CLI::App& root, std::span<const char* const> command_line) {
     CLI::App* command = root.add_subcommand("run", "Simulate the ensemble of a scenario and compare its arms");
     auto arguments = std::make_shared<RunArguments>();
     command->add_option("SCENARIO.toml", arguments->scenarios,
-                        "what to simulate; an empty file is the device of Gao & Deng 2007. Several are a batch: one "
-                        "after the other, those that are finished left out");
+                        "scenario to simulate; an empty file is the device of Gao & Deng 2007. "
+                        "Several scenarios are a batch: they run one after the other, "
+                        "and those that are finished are left out");
     command->add_option("-o,--output", arguments->out,
                         "result file (default: the scenario's name with .h5, here), or the folder of a batch");
     command->add_option("--threads", arguments->threads, "threads (0: all cores); results do not depend on it")
@@ -78,15 +82,15 @@ void add_run(CLI::App& root, std::span<const char* const> command_line) {
     command->add_option("--seed", arguments->changes.seed, "replaces ensemble.seed")->type_name("S");
     command->add_option("--plot", arguments->plot, "also draw the figure into this SVG file");
     command
-        ->add_option(
-            "--checkpoint-every", arguments->checkpoint_every,
-            "seconds between checkpoints, which keep finished gyros in OUTPUT.parts; 0: each block of gyros by "
-            "itself; never: none")
+        ->add_option("--checkpoint-every", arguments->checkpoint_every,
+                     "seconds between checkpoints, which keep finished gyros in OUTPUT.parts; 0: "
+                     "each block of gyros by itself; never: none")
         ->capture_default_str()
         ->type_name("S");
-    CLI::Option* resume =
-        command->add_flag("--resume", arguments->resume, "go on with a run that was interrupted; without one, begin");
-    command->add_flag("--discard", arguments->discard, "begin anew, and remove what an interrupted run has kept")
+    CLI::Option* resume = command->add_flag("--resume", arguments->resume,
+                                            "continue a run that was interrupted, "
+                                            "or begin if there is none");
+    command->add_flag("--discard", arguments->discard, "begin anew and remove the checkpoints of an interrupted run")
         ->excludes(resume);
     command
         ->add_option("--shard", arguments->shard,
@@ -96,12 +100,14 @@ void add_run(CLI::App& root, std::span<const char* const> command_line) {
     command->add_flag("-q,--quiet", arguments->quiet, "no progress on standard error");
     // A flag, so that it does not take the word after it for its value.
     command
-        ->add_flag(
-            "--print-schema{toml}", arguments->print_schema,
-            "print every key of a scenario with default, bounds and meaning, and end; =toml (default), =markdown "
-            "or =json")
+        ->add_flag("--print-schema{toml}", arguments->print_schema,
+                   "print every key of a scenario with default, bounds and meaning, and end; =toml (default), "
+                   "=markdown or =json")
         ->check(CLI::IsMember({"toml", "markdown", "json"}));
-    command->callback([arguments, command_line] { run(*arguments, command_line); });
+    command->callback([arguments, command_line] {
+        name_file_of_failure(fmt::format("{}", fmt::join(arguments->scenarios, ", ")),
+                             [&] { run(*arguments, command_line); });
+    });
 }
 
 }  // namespace ringlock::app

@@ -70,11 +70,11 @@ void run_member(const RunArguments& arguments, const std::string& scenario_file,
         }
     } catch (const Interrupted&) {
         if (keep()) throw EndQuietly{ended_by_signal + interrupt_signal()};
-        throw RunError(fmt::format("rank {}: not all that it had finished could be kept", rank));
+        throw RunError(fmt::format("rank {}: not all of its finished gyros could be kept", rank));
     } catch (const RunError& error) {
         const bool all = keep();
         throw RunError(fmt::format("rank {}: {}{}", rank, error.what(),
-                                   all ? "" : "; not all that it had finished could be kept"));
+                                   all ? "" : "; not all of its finished gyros could be kept"));
     }
 }
 

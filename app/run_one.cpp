@@ -111,7 +111,7 @@ class Outcome {
         write_samples();
         check_interrupt();
         writer.finish(experiment, summaries, provenance_);
-        if (figure_) report::write_svg(*figure_, experiment_figure(experiment, summaries));
+        if (figure_) report::write_figure(*figure_, experiment_figure(experiment, summaries));
         if (!arguments_.quiet) tell(fmt::format("result: {}\n", printable(writer.path())));
     }
 
@@ -215,7 +215,7 @@ void refuse_what_does_not_go_together(const RunArguments& arguments, const scena
                                       const Ranks& ranks) {
     if (ranks.leader && arguments.checkpoint_every == "never") {
         throw InputError(
-            "--checkpoint-every never: the processes of mpirun hand on what they finish as checkpoints; give seconds");
+            "--checkpoint-every never: the processes of mpirun pass on finished gyros as checkpoints; give seconds");
     }
     if (arguments.shard.empty()) return;
     if (scenario::asks(scenario.stop)) {
@@ -301,8 +301,8 @@ bool run_one(const RunArguments& arguments, const std::string& scenario_file, co
     std::error_code unknown;
     if (shard && !is_there && std::filesystem::exists(task.target, unknown)) {
         throw InputError(
-            fmt::format("{}: the file is there and is no shard of this run; it is kept. Give another name "
-                        "with -o, or remove it",
+            fmt::format("{}: the file exists and is not a shard of this run; it is kept. "
+                        "Give another name with -o, or remove it",
                         printable(task.target)));
     }
     if (shard) {

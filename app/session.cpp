@@ -98,8 +98,8 @@ std::string Session::after(const std::string& what, bool all_kept) const {
     std::string text = what;
     if (task_.leader) {
         return text + fmt::format(
-                          "; what its {} processes had finished is kept in {}: the same command with --resume "
-                          "goes on from there",
+                          "; the finished gyros of its {} processes are kept in {}: "
+                          "the same command with --resume goes on from there",
                           1 + task_.leader->members(), printable(folder_.path()));
     }
     if (gyros == 0) {
@@ -108,8 +108,8 @@ std::string Session::after(const std::string& what, bool all_kept) const {
         text += fmt::format("; {} of {} are kept in {}: the same command with --resume goes on from there", gyros,
                             gyros_text(all_gyros_), printable(folder_.path()));
     } else {
-        text += fmt::format("; {} could not all be kept in {}: --resume goes on from what is there", gyros_text(gyros),
-                            printable(folder_.path()));
+        text += fmt::format("; {} could not all be kept in {}: --resume goes on from those that are there",
+                            gyros_text(gyros), printable(folder_.path()));
     }
     if (const auto block_s = checkpoints_.mean_block_s()) {
         text += fmt::format("; a block of up to {} takes a thread about {}, and blocks under way are lost",

@@ -16,6 +16,7 @@
 #include "analysis/parts/part_files.hpp"
 #include "analysis/parts/shard.hpp"
 #include "app/command.hpp"
+#include "app/failure.hpp"
 #include "app/output.hpp"
 #include "app/run_text.hpp"
 #include "engine/core/error.hpp"
@@ -93,8 +94,10 @@ std::vector<StatusLine> lines_of(const fs::path& out) {
         add(parts::shard_file(out, shard), "shard " + parts::to_string(shard));
     }
     if (lines.empty()) {
-        throw InputError(fmt::format("{}: there is no result of that name, no run that writes it and no shard of it",
-                                     printable(out)));
+        throw InputError(
+            fmt::format("{}: there is no result of that name, no run that writes it and no shard of it; "
+                        "give the name that ringlock run has with -o",
+                        printable(out)));
     }
     return lines;
 }
@@ -146,12 +149,13 @@ void tell_status(const StatusArguments& arguments) {
 }  // namespace
 
 void add_status(CLI::App& root) {
-    CLI::App* command =
-        root.add_subcommand("status", "Tell how far a run, its shards or what was left of it is, from any terminal");
+    CLI::App* command = root.add_subcommand("status",
+                                            "Show the progress of a run, of its shards or of an interrupted run, "
+                                            "from any terminal");
     auto arguments = std::make_shared<StatusArguments>();
     command->add_option("OUT.h5", arguments->out, "the result that is, or will be, written")->required();
     command->add_flag("--json", arguments->json, "print one JSON object instead of lines");
-    command->callback([arguments] { tell_status(*arguments); });
+    command->callback([arguments] { name_file_of_failure(arguments->out, [&] { tell_status(*arguments); }); });
 }
 
 }  // namespace ringlock::app

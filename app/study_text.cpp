@@ -272,7 +272,7 @@ std::string pairs_text(const study::Summary& summary) {
         }
         table.add_row(row);
     }
-    return "\n" + table.text() + (alike ? "= : these cannot be told apart (95 %)\n" : "");
+    return "\n" + table.text() + (alike ? "= : no significant difference (95 %)\n" : "");
 }
 
 /// Where the arm stands on the staircase.

@@ -14,6 +14,7 @@
 #include "analysis/study/room.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/failure.hpp"
 #include "app/files.hpp"
 #include "app/output.hpp"
 #include "app/run_text.hpp"
@@ -53,14 +54,14 @@ std::int64_t blocks_of(const study::Experiment& plan) {
 std::int64_t minutes(double seconds) { return static_cast<std::int64_t>(std::ceil(seconds / 60.0)); }
 
 void submit(const SubmitArguments& arguments) {
-    if (!arguments.slurm) throw InputError("submit: say for which batch system; there is --slurm");
+    if (!arguments.slurm) throw InputError("submit: name the batch system; there is --slurm");
     const double shard_s = duration_s("--shards-of", arguments.shards_of);
     const int threads = thread_count(arguments.threads);
     const scenario::Scenario scenario = load_scenario(arguments.scenario, arguments.changes);
     if (scenario::asks(scenario.stop)) {
         throw InputError(
-            "submit: a lot with a stopping rule grows as a whole and cannot be divided; give ensemble.gyros and no "
-            "[stop]");
+            "submit: a lot with a stopping rule grows as a whole and cannot be divided; "
+            "give ensemble.gyros and no [stop]");
     }
     const fs::path result =
         arguments.out ? fs::path(*arguments.out) : fs::path(arguments.scenario).filename().replace_extension(".h5");
@@ -101,14 +102,14 @@ void submit(const SubmitArguments& arguments) {
     constexpr std::int64_t array_by_default = 1000;
     if (shards > array_by_default) {
         tell(
-            fmt::format("{} shards: Slurm takes arrays of up to {} unless MaxArraySize says more; longer --shards-of "
-                        "makes fewer\n",
+            fmt::format("{} shards: Slurm takes arrays of up to {} unless MaxArraySize says more; "
+                        "longer --shards-of makes fewer\n",
                         shards, array_by_default));
     }
     if (shards < wanted) {
         tell(
-            fmt::format("{} would be shorter than a block of gyros for each thread takes; fewer --threads make more "
-                        "shards\n",
+            fmt::format("{} is shorter than the time of a block of gyros for each thread; "
+                        "fewer --threads make more shards\n",
                         arguments.shards_of));
     }
 }
@@ -118,7 +119,7 @@ void submit(const SubmitArguments& arguments) {
 void add_submit(CLI::App& root) {
     CLI::App* command = root.add_subcommand("submit", "Print a script that runs a scenario in shards on a cluster");
     auto arguments = std::make_shared<SubmitArguments>();
-    command->add_option("SCENARIO.toml", arguments->scenario, "what to simulate")->required();
+    command->add_option("SCENARIO.toml", arguments->scenario, "scenario to simulate")->required();
     command->add_flag("--slurm", arguments->slurm,
                       "for Slurm: bash SCRIPT submits an array of shards and the merge that waits for them");
     command->add_option("--shards-of", arguments->shards_of, "how long a shard is to take: 90s, 20min, 2h")
@@ -131,7 +132,7 @@ void add_submit(CLI::App& root) {
     add_settings(*command, arguments->changes);
     command->add_option("--seed", arguments->changes.seed, "replaces ensemble.seed")->type_name("S");
     command->add_flag("-q,--quiet", arguments->quiet, "nothing on standard error");
-    command->callback([arguments] { submit(*arguments); });
+    command->callback([arguments] { name_file_of_failure(arguments->scenario, [&] { submit(*arguments); }); });
 }
 
 }  // namespace ringlock::app

@@ -12,15 +12,15 @@ namespace ringlock::app {
 
 void add_text_options(CLI::App& command, TextArguments& arguments) {
     command.add_option("--time-unit", arguments.time_unit,
-                       "s | ms | us | ns | iso | mjd: unit of the times; else that of the header, ISO dates where they "
-                       "stand there, or s");
+                       "s | ms | us | ns | iso | mjd: unit of the times; default: the unit in the header, "
+                       "ISO dates where the column has them, or s");
     command.add_option("--header", arguments.header,
-                       "yes | no | N: whether the first line of a text has the names of the columns, or which line; "
-                       "else it is found");
-    command.add_option("--skip", arguments.skip, "Lines at the start of a text that do not count");
+                       "yes | no | N: whether the first line of a text has the names of the columns, "
+                       "or the number of the line that has them; default: detected");
+    command.add_option("--skip", arguments.skip, "lines to skip at the start of a text");
     command.add_option("--delimiter", arguments.delimiter,
-                       "comma | semicolon | tab | space | a character: what parts the columns of a text; else it is "
-                       "found");
+                       "comma | semicolon | tab | space | a character: delimiter of the columns of a text; "
+                       "default: detected");
 }
 
 text::Options text_options(const TextArguments& arguments) {

@@ -14,6 +14,7 @@
 #include "analysis/study/result/result_file.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
+#include "app/failure.hpp"
 #include "app/output.hpp"
 #include "app/record_output.hpp"
 #include "app/run_text.hpp"
@@ -53,7 +54,7 @@ void validate(const std::string& path, const Changes& changes, store::Links link
     const std::filesystem::path extension = std::filesystem::path(path).extension();
     if (!changes.settings.empty() && extension != ".toml") {
         throw InputError(
-            fmt::format("--set: {} is no scenario (.toml), and only keys of these can be set", printable(path)));
+            fmt::format("--set: {} is not a scenario (.toml); only keys of scenarios can be set", printable(path)));
     }
     if (store::is_part(path)) return validate_part(path);
     if (record::is_hdf5(path) || extension == ".h5" || extension == ".hdf5") {
@@ -67,8 +68,8 @@ void validate(const std::string& path, const Changes& changes, store::Links link
                                    experiment.gyros(), experiment.scenario.arms.size()));
         }
         throw InputError(
-            fmt::format("{}: /: attribute format is \"{}\"; it says what the file is and must be "
-                        "\"ringlock-result\" or \"rlg-record\"",
+            fmt::format("{}: /: attribute format is \"{}\"; it names the kind of file and must be \"ringlock-result\" "
+                        "or \"rlg-record\"",
                         printable(path), printable(format)));
     }
     if (extension == ".toml") {
@@ -77,8 +78,8 @@ void validate(const std::string& path, const Changes& changes, store::Links link
     }
     if (const auto container = record::container_of(path); container != record::Container::text) {
         throw InputError(
-            fmt::format("{}: is {}, which is no record by itself: ringlock import --column NAME=QUANTITY makes "
-                        "one of it, and ringlock allan reads it as it is",
+            fmt::format("{}: is {}, which is not a record: convert it with ringlock import --column NAME=QUANTITY, "
+                        "or read it with ringlock allan",
                         printable(path), record::name_of(container)));
     }
     if (extension == ".csv") return validate_record(path);
@@ -94,7 +95,7 @@ void validate(const std::string& path, const Changes& changes, store::Links link
 
 void add_validate(CLI::App& root) {
     CLI::App* command =
-        root.add_subcommand("validate", "Say what is wrong in a scenario, record, result or shard, and where");
+        root.add_subcommand("validate", "Check a scenario, record, result or shard, and name each error and its place");
     struct Arguments {
         std::string file;
         Changes changes;
@@ -106,8 +107,10 @@ void add_validate(CLI::App& root) {
     add_settings(*command, arguments->changes);
     add_follow_links(*command, arguments->follow_links);
     command->callback([arguments] {
-        validate(arguments->file, arguments->changes,
-                 arguments->follow_links ? store::Links::follow : store::Links::refuse);
+        name_file_of_failure(arguments->file, [&] {
+            validate(arguments->file, arguments->changes,
+                     arguments->follow_links ? store::Links::follow : store::Links::refuse);
+        });
     });
 }
 

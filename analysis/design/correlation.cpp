@@ -58,7 +58,7 @@ GaussianCopula::GaussianCopula(std::span<const Factor> factors, std::span<const 
         const Eigen::Index j = index_of(factors, c.second, c);
         if (i == j) throw InputError(fmt::format("correlation of {} with itself: leave it out", c.first));
         if (given(i, j) != 0) {
-            throw InputError(fmt::format("correlation of {} and {}: is there twice; leave one out", c.first, c.second));
+            throw InputError(fmt::format("correlation of {} and {}: is given twice; leave one out", c.first, c.second));
         }
         if (!(std::abs(c.value) <= 1.0)) {
             throw InputError(
@@ -66,8 +66,8 @@ GaussianCopula::GaussianCopula(std::span<const Factor> factors, std::span<const 
         }
         if (std::abs(c.value) == 1.0) {
             throw InputError(
-                fmt::format("correlation of {} and {}: {} must lie above -1 and below 1; two factors that "
-                            "tell each other are one, leave the other out",
+                fmt::format("correlation of {} and {}: {} must lie above -1 and below 1; "
+                            "two factors that determine each other are one factor; leave one of them out",
                             c.first, c.second, c.value));
         }
         given(i, j) = given(j, i) = 1;
@@ -78,8 +78,7 @@ GaussianCopula::GaussianCopula(std::span<const Factor> factors, std::span<const 
     if (eigen.eigenvalues()[0] < least_eigenvalue || cholesky.info() != Eigen::Success) {
         throw InputError(
             fmt::format("the correlations of {} contradict each other: no factors can have them all (the "
-                        "smallest eigenvalue of their matrix is {:.3g} and must be above 0); bring them "
-                        "nearer to 0",
+                        "smallest eigenvalue of their matrix is {:.3g} and must be above 0); bring them nearer to 0",
                         contradicting(factors, eigen.eigenvectors().col(0)), eigen.eigenvalues()[0]));
     }
     factor_ = cholesky.matrixL();

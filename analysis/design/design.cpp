@@ -108,15 +108,15 @@ std::uint64_t point_count(const Plan& plan, std::uint64_t limit) {
     const GaussianCopula copula(plan.factors, plan.correlations, plan.correlation_of);
     if (!of_levels(plan.kind)) {
         if (plan.points == 0) {
-            throw InputError(fmt::format("a {} of no points: say how many there shall be", name_of(plan.kind)));
+            throw InputError(fmt::format("a {} of no points: give the number of points", name_of(plan.kind)));
         }
         if (plan.points > limit) refuse_count(plan, fmt::format("{}", plan.points), limit);
         return plan.points;
     }
     if (!plan.correlations.empty()) {
         throw InputError(
-            fmt::format("a {} has no correlations, its values are as they are given: leave the correlation "
-                        "of {} and {} out",
+            fmt::format("a {} has no correlations, because its values are given: "
+                        "leave the correlation of {} and {} out",
                         name_of(plan.kind), plan.correlations.front().first, plan.correlations.front().second));
     }
     const std::uint64_t count = plan.kind == Kind::grid ? grid_count(plan, limit) : list_count(plan, limit);
@@ -140,7 +140,7 @@ Points make_points(const Plan& plan, std::uint64_t limit) {
 Points at_quantiles(const Points& unit, std::span<const Factor> factors) {
     check(factors);
     if (unit.dimensions != factors.size()) {
-        throw InputError(fmt::format("points in {} dimensions for {} factors: there must be one a factor",
+        throw InputError(fmt::format("points in {} dimensions for {} factors: there must be one dimension per factor",
                                      unit.dimensions, factors.size()));
     }
     Points points = unit;

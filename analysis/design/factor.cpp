@@ -67,7 +67,7 @@ void check_finite(const Factor& f, const char* what, double value) {
 void check_above_zero(const Factor& f, const char* what, double value) {
     check_finite(f, what, value);
     if (value <= 0.0) {
-        refuse(f, fmt::format("{} = {} must be above 0; what does not vary is no factor", what, value));
+        refuse(f, fmt::format("{} = {} must be above 0; a quantity that does not vary is not a factor", what, value));
     }
 }
 
@@ -81,7 +81,7 @@ void check_in_order(const Factor& f, double from, double to) {
 void check_value(const Factor& f, double value) {
     check_finite(f, "a value", value);
     if (value < f.lower || value > f.upper) {
-        refuse(f, fmt::format("the value {} lies outside of what is allowed, {} to {}", value, f.lower, f.upper));
+        refuse(f, fmt::format("the value {} lies outside of the allowed range, {} to {}", value, f.lower, f.upper));
     }
 }
 
@@ -175,7 +175,7 @@ double level(const Factor& factor, std::uint64_t index) {
 }
 
 void check(const Factor& factor) {
-    if (factor.key.empty()) refuse(factor, "every factor must name what it varies");
+    if (factor.key.empty()) refuse(factor, "every factor must name the key that it varies");
     // Not a number is neither.
     if (!(factor.lower < factor.upper) && !(factor.lower == factor.upper)) {
         refuse(factor, fmt::format("bounds {} to {} are not in order", factor.lower, factor.upper));
@@ -184,10 +184,10 @@ void check(const Factor& factor) {
     const Tails t = tails(factor);
     if (!(t.within >= least_share_within_bounds)) {
         refuse(factor,
-               fmt::format(
-                   "only {:.2g} of its distribution lies within what is allowed, {} to {} ({:.3g} below, {:.3g} "
-                   "above), and {} at least must; move or narrow the distribution",
-                   std::max(t.within, 0.0), factor.lower, factor.upper, t.below, t.above, least_share_within_bounds));
+               fmt::format("only {:.2g} of its distribution lies within the allowed range, {} to {} ({:.3g} below, "
+                           "{:.3g} above), but at least {} must; move or narrow the distribution",
+                           std::max(t.within, 0.0), factor.lower, factor.upper, t.below, t.above,
+                           least_share_within_bounds));
     }
 }
 
@@ -196,7 +196,7 @@ void check(std::span<const Factor> factors) {
     std::unordered_set<std::string> keys;
     for (const Factor& f : factors) {
         check(f);
-        if (!keys.insert(f.key).second) refuse(f, "is there twice; give all that it takes in one place");
+        if (!keys.insert(f.key).second) refuse(f, "is given twice; give all its values in one place");
     }
 }
 

@@ -235,7 +235,7 @@ OutputIndices of_output(const Evaluations& e, std::size_t number, const Sensitiv
     const double variance = constant || kept.empty() ? 0.0 : variance_of(sums.data(), n);
     if (!kept.empty()) result.variance = variance * scale * scale;
     if (kept.size() < fewest_base_points) {
-        result.absent = fmt::format("only {} of {} base points have finite values throughout, and {} at least must",
+        result.absent = fmt::format("only {} of {} base points have finite values throughout, but at least {} must",
                                     kept.size(), e.base_points, fewest_base_points);
         return result;
     }
@@ -281,8 +281,8 @@ OutputIndices of_output(const Evaluations& e, std::size_t number, const Sensitiv
 void check_sizes(const Evaluations& e) {
     if (e.base_points == 0 || e.factors == 0 || e.outputs == 0) {
         throw InputError(
-            fmt::format("sensitivity indices of {} base points, {} factors and {} outputs: there must be "
-                        "one of each at least",
+            fmt::format("sensitivity indices of {} base points, {} factors and {} outputs: "
+                        "there must be one of each at least",
                         e.base_points, e.factors, e.outputs));
     }
     // By division: products of sizes that are wrong may overflow.
@@ -290,8 +290,8 @@ void check_sizes(const Evaluations& e) {
     if (size % e.outputs != 0 || (size / e.outputs) % e.base_points != 0 || size / e.outputs / e.base_points < 2 ||
         size / e.outputs / e.base_points - 2 != e.factors) {
         throw InputError(
-            fmt::format("{} values of {} outputs at {} base points of {} factors: there must be outputs x "
-                        "base points x (factors + 2)",
+            fmt::format("{} values of {} outputs at {} base points of {} factors: "
+                        "there must be outputs x base points x (factors + 2)",
                         size, e.outputs, e.base_points, e.factors));
     }
     if (e.noise_variance.empty()) return;
@@ -302,8 +302,7 @@ void check_sizes(const Evaluations& e) {
     for (std::size_t i = 0; i < size; ++i) {
         if (std::isfinite(e.values[i]) && !(e.noise_variance[i] >= 0.0 && std::isfinite(e.noise_variance[i]))) {
             throw InputError(
-                fmt::format("noise variance {} of output {} at evaluation {}: must be finite and not below "
-                            "0",
+                fmt::format("noise variance {} of output {} at evaluation {}: must be finite and not below 0",
                             e.noise_variance[i], i % e.outputs, i / e.outputs));
         }
     }
@@ -330,8 +329,8 @@ Points sensitivity_points(std::uint64_t base_points, std::uint64_t factors, std:
     }
     if (base_points > limit / (factors + 2)) {
         throw InputError(
-            fmt::format("sensitivity indices of {} factors at {} base points take {} evaluations each: {} "
-                        "evaluations is the limit; ask for {} base points or fewer",
+            fmt::format("sensitivity indices of {} factors at {} base points take {} evaluations each: "
+                        "{} evaluations is the limit; ask for {} base points or fewer",
                         factors, base_points, factors + 2, limit, limit / (factors + 2)));
     }
     const Points both = sobol(base_points, 2 * factors, seed, limit);

@@ -57,9 +57,7 @@ Points room_for(std::uint64_t count, std::uint64_t dimensions, std::uint64_t lim
     }
     Points points;
     const std::string what = fmt::format(
-        "a design of {} points in {} dimensions: memory does not hold it; ask for "
-        "fewer points",
-        count, dimensions);
+        "a design of {} points in {} dimensions: memory does not hold it; ask for fewer points", count, dimensions);
     if (count > points.values.max_size() / dimensions) throw InputError(what);
     points.count = count;
     points.dimensions = dimensions;
@@ -99,8 +97,8 @@ std::uint64_t most_sobol_dimensions() { return boost::random::default_sobol_tabl
 Points sobol(std::uint64_t count, std::uint64_t dimensions, std::uint64_t seed, std::uint64_t limit) {
     if (dimensions > most_sobol_dimensions()) {
         throw InputError(
-            fmt::format("a Sobol' sequence in {} dimensions: direction numbers are known for {}; vary "
-                        "fewer factors or take a Latin hypercube",
+            fmt::format("a Sobol' sequence in {} dimensions: direction numbers are known for {}; "
+                        "vary fewer factors or take a Latin hypercube",
                         dimensions, most_sobol_dimensions()));
     }
     Points points = room_for(count, dimensions, limit);

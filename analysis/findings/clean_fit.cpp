@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/findings/decided.hpp"
 #include "analysis/findings/events.hpp"
 #include "analysis/findings/thresholds.hpp"
 #include "analysis/noise/likelihood.hpp"
@@ -78,6 +79,17 @@ std::optional<Finding> jump_instead_of_walk(const std::vector<double>& rate, con
 
 }  // namespace
 
+void decide(const std::vector<double>& rate, const SearchOptions& options, CleanFit& out) {
+    if (out.noise.rrw_deg_h_rt_h.resolved && out.noise.sinusoids.empty()) {
+        out.instead_of_walk = jump_instead_of_walk(rate, options);
+        if (out.instead_of_walk) out.noise.rrw_deg_h_rt_h = {};
+    }
+    const std::string why = why_withheld(out.searched);
+    if (why.empty()) return;
+    out.noise.described = false;
+    out.noise.reason = why;
+}
+
 CleanFit fit_without_events(std::span<const double> angle_arcsec, double tau0_s, bool of_angles,
                             const SearchOptions& options) {
     std::vector<double> rate;
@@ -95,15 +107,7 @@ CleanFit fit_without_events(std::span<const double> angle_arcsec, double tau0_s,
     } else {
         out.noise = noise::fit_noise(angle_arcsec, tau0_s);
     }
-    if (out.noise.rrw_deg_h_rt_h.resolved && out.noise.sinusoids.empty()) {
-        out.instead_of_walk = jump_instead_of_walk(out.searched.rate, options);
-        if (out.instead_of_walk) out.noise.rrw_deg_h_rt_h = {};
-    }
-    const std::string why = why_withheld(out.searched);
-    if (!why.empty()) {
-        out.noise.described = false;
-        out.noise.reason = why;
-    }
+    decide(out.searched.rate, options, out);
     return out;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "analysis/findings/events.hpp"
+#include "analysis/findings/median.hpp"
 #include "analysis/findings/stretches.hpp"
 #include "analysis/findings/thresholds.hpp"
 #include "analysis/noise/decomposition.hpp"
@@ -31,6 +32,36 @@ Noise noise_of(std::span<const double> rate) {
     return out;
 }
 
+/// The rates without gross values that stand alone, each replaced by the mean of its neighbours. The whitening of a
+/// record with a random walk or a flicker spreads such a value over many rates, which would look like a disturbed
+/// stretch.
+std::vector<double> without_isolated(std::vector<double> rate) {
+    constexpr double gross = 8.0;                          // usual deviations: chance makes one in 1e15 so large
+    constexpr double deviations_in_median = 0.6744897502;  // of the size of a normal deviate
+    constexpr std::size_t near = 32;
+    constexpr std::size_t most_near = 4;  // more of them within `near` rates are a disturbed stretch
+    constexpr int passes = 3;             // an angle that is off moves two rates
+    const std::size_t n = rate.size();
+    for (int pass = 0; pass < passes; ++pass) {
+        std::vector<double> contrast(n, 0.0);
+        for (std::size_t i = 1; i + 1 < n; ++i) contrast[i] = std::abs(rate[i] - 0.5 * (rate[i - 1] + rate[i + 1]));
+        const double most = gross * median_of(contrast) / deviations_in_median;
+        std::vector<std::size_t> found;
+        for (std::size_t i = 1; i + 1 < n; ++i) {
+            if (contrast[i] > most && contrast[i] >= contrast[i - 1] && contrast[i] > contrast[i + 1])
+                found.push_back(i);
+        }
+        for (std::size_t k = 0; k < found.size(); ++k) {
+            const bool crowded = k + most_near < found.size() && found[k + most_near] - found[k] <= near;
+            const bool crowded_before = k >= most_near && found[k] - found[k - most_near] <= near;
+            if (crowded || crowded_before) continue;
+            rate[found[k]] = 0.5 * (rate[found[k] - 1] + rate[found[k] + 1]);
+        }
+        if (found.empty()) break;
+    }
+    return rate;
+}
+
 class Search {
    public:
     Search(std::span<const double> rate, bool of_angles, const SearchOptions& options)
@@ -43,7 +74,7 @@ class Search {
     Searched run() {
         for (int round = 0;; ++round) {
             const Noise noise = noise_of(out_.rate);
-            if (round == 0) out_.findings = disturbed_stretches(whitened(noise.residual, noise.variance), options_);
+            if (round == 0) find_disturbed(noise);
             if (!out_.findings.empty() && round == 0) break;
             if (!take_events(noise)) {
                 take_outliers_of_tail(noise);
@@ -152,6 +183,16 @@ class Search {
             const bool two = doublet.excess > pulse.excess;
             const std::size_t at = two ? doublet.at : pulse.at;
             take_one(two ? Event::doublet : Event::pulse, at + n - size, two ? doublets : pulses, at);
+        }
+    }
+
+    void find_disturbed(const Noise& noise) {
+        const std::vector<double> usual = without_isolated(out_.rate);
+        if (usual == out_.rate) {
+            out_.findings = disturbed_stretches(whitened(noise.residual, noise.variance), options_);
+        } else {
+            const Noise of_usual = noise_of(usual);
+            out_.findings = disturbed_stretches(whitened(of_usual.residual, of_usual.variance), options_);
         }
     }
 

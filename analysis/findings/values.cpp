@@ -184,7 +184,7 @@ std::optional<Wraps> find_wraps(std::span<const double> values) {
     const double reach = deviations * steps.spread;
     // A range that is hardly larger than the steps wraps all the time, and nobody can undo that.
     for (const double modulus : moduli()) {
-        if (range > modulus || range < 0.9 * modulus || 4.0 * reach > modulus) continue;
+        if (range > modulus || range < 0.9 * modulus || 2.0 * reach > modulus) continue;
         Wraps wraps{modulus, {}};
         bool clean = true;
         for_each_excess(values, steps.usual, [&](std::size_t i, double step) {

@@ -175,8 +175,7 @@ Extent extent_of(const Scenario& s, std::int64_t gyro) {
     const double rows = extent.rows = samples ? s.ensemble.duration_s * s.record.rate_hz : 2.0 * cycles;
     if (!(rows <= static_cast<double>(most_rows)) || !(2.0 * cycles <= 1e12)) {
         throw InputError(
-            fmt::format("key \"ensemble.duration_s\" = {:g}: a record of {:.3g} rows; at most {} are "
-                        "allowed",
+            fmt::format("key \"ensemble.duration_s\" = {:g}: a record of {:.3g} rows; at most {} are allowed",
                         s.ensemble.duration_s, rows, most_rows));
     }
     if (samples && rows < 1.0) {

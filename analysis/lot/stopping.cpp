@@ -89,10 +89,10 @@ std::optional<std::int64_t> StoppingRule::next(std::int64_t gyros) const {
 Decision StoppingRule::decide(std::int64_t gyros, std::span<const ArwColumn> arws,
                               std::span<const YieldCount> yields) const {
     if (gyros < 1 || next(gyros - 1) != gyros) {
-        throw InputError(fmt::format(
-            "a stopping rule asked at {} gyros: it may look at 16, 32, 64, ... and at {}, the most, only, or its "
-            "intervals would not hold what they say",
-            gyros, most_gyros_));
+        throw InputError(
+            fmt::format("a stopping rule asked at {} gyros: it may look at 16, 32, 64, ... and at {}, the most, only; "
+                        "otherwise its intervals do not have their confidence level",
+                        gyros, most_gyros_));
     }
     if (precision_.arw_relative && arws.empty()) {
         throw InputError("arw_relative is asked for, but no arm's random walk is given to judge it by");

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/noise/lost_information.hpp"
+
 namespace ringlock::noise {
 namespace {
 
@@ -17,6 +19,9 @@ void fit_variances(Decomposition& d) {
     const Likelihood likelihood(d.noise);
     d.five = likelihood.maximise(model_of(five_terms));
     d.markov = d.noise.samples < fewest_samples ? Markov{} : find_markov(likelihood, d.five);
+    if (d.noise.lost != nullptr) {
+        d.markov.evidence /= d.noise.lost->inflation(model_of(five_terms | correlated_bit), correlated);
+    }
 }
 
 /// Lines and variances in turns.

@@ -24,13 +24,13 @@ double degrees_of_freedom(const Maximum& at, std::size_t term) {
     return std::isfinite(degrees) ? degrees : 1.0;
 }
 
-/// Where the deviance, all else free, has risen by so much; on a scale u on which the parameter is value(u), from u = 0
-/// at the maximum in steps of about `step`.
+/// Where the deviance, all else free, has risen by so much (of the samples that are there); on a scale u on which the
+/// parameter is value(u), from u = 0 at the maximum in steps of about `step`.
 template <class Value>
 double where_risen(const Likelihood& likelihood, const Model& model, const Maximum& best, std::size_t parameter,
                    double rise, double step, double farthest, const Value& value) {
     // The root of the rise is nearly a straight line.
-    const double wanted = std::sqrt(rise);
+    const double wanted = std::sqrt(rise * best.inflation[parameter]);
     const auto root = [&](double u) {
         const Maximum there = likelihood.maximise(model, &best.theta, parameter, value(u));
         return std::sqrt(std::max(0.0, there.deviance - best.deviance));
@@ -86,7 +86,8 @@ std::optional<double> upper_limit(const Likelihood& likelihood, const Model& mod
                                   std::size_t term) {
     const auto rise = [&](double value) {
         const Maximum there = likelihood.maximise(model, &best.theta, term, value);
-        return there.deviance - best.deviance - quantile_deviance(degrees_of_freedom(there, term), 0.05);
+        return (there.deviance - best.deviance) / there.inflation[term] -
+               quantile_deviance(degrees_of_freedom(there, term), 0.05);
     };
     double inside = best.theta[term];
     const double spread = std::sqrt(best.covariance[term][term]);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/noise/lost_information.hpp"
+
 namespace ringlock::noise {
 namespace {
 
@@ -95,6 +97,15 @@ std::vector<Eigen::Index> movable(const Model& model, const Parameters& theta, s
         out.push_back(static_cast<Eigen::Index>(log_time));
     }
     return out;
+}
+
+/// Variances of a record with missing samples: correlations are taken to be those of a whole one.
+void widen(const LostInformation& lost, const std::vector<Eigen::Index>& inside, Maximum& out) {
+    const std::vector<std::size_t> terms(inside.begin(), inside.end());
+    for (const std::size_t i : terms) out.inflation[i] = lost.inflation(terms, i);
+    for (const std::size_t i : terms) {
+        for (const std::size_t k : terms) out.covariance[i][k] *= std::sqrt(out.inflation[i] * out.inflation[k]);
+    }
 }
 
 }  // namespace
@@ -278,6 +289,7 @@ Maximum Likelihood::maximise(const Model& model, const Parameters* start, std::s
                 inverse(a, b) * scale(a) * scale(b);
         }
     }
+    if (lost_ != nullptr) widen(*lost_, inside, out);
     // V = 1/information: 2 V^2 over the variance of V
     double variance = 0.0;
     for (Eigen::Index a = 0; a < count; ++a) {
@@ -290,6 +302,10 @@ Maximum Likelihood::maximise(const Model& model, const Parameters* start, std::s
     }
     const double relative_variance = variance * out.ramp_variance * out.ramp_variance;
     if (relative_variance > 2e-9) out.ramp_degrees = 2.0 / relative_variance;
+    if (lost_ != nullptr) {
+        out.ramp_variance *= lost_->ramp_inflation;
+        out.ramp_degrees = std::max(1.0, out.ramp_degrees);  // a variance that is hardly known has few of them
+    }
     return out;
 }
 

@@ -27,6 +27,9 @@ struct Maximum {
     double deviance = 0.0;       ///< -2 ln L up to a constant of the record
     std::array<Parameters, parameter_count> covariance{};  ///< of theta, inverse Fisher information
     std::array<double, 2> corner{};                        ///< expected end errors, even and odd coefficients
+    /// Of the parameters' variances by what missing samples take of the information, see LostInformation; covariance
+    /// and ramp_variance have it.
+    Parameters inflation = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
 };
 
 /// Gaussian likelihood of a cosine spectrum whose coefficients are independent but for two directions.
@@ -38,7 +41,8 @@ struct Maximum {
 /// within log_times(); no random numbers, so the same record always gives the same answer.
 class Likelihood {
    public:
-    explicit Likelihood(const Spectrum& spectrum) : bins_(spectrum.bins), samples_(spectrum.samples) {}
+    explicit Likelihood(const Spectrum& spectrum)
+        : bins_(spectrum.bins), samples_(spectrum.samples), lost_(spectrum.lost) {}
 
     /// Maximum over the parameters of the model. `fixed` < parameter_count holds that one at fixed_value. `start`:
     /// where to begin; a model with correlated noise, whose likelihood has several maxima over its time, wants it.
@@ -46,6 +50,7 @@ class Likelihood {
                      double fixed_value = 0.0) const;
     const std::vector<Bin>& bins() const { return bins_; }
     std::size_t samples() const { return samples_; }
+    const LostInformation* lost() const { return lost_.get(); }
 
    private:
     struct State;
@@ -54,6 +59,7 @@ class Likelihood {
 
     const std::vector<Bin>& bins_;
     std::size_t samples_;
+    std::shared_ptr<const LostInformation> lost_;
 };
 
 }  // namespace ringlock::noise

@@ -63,6 +63,7 @@ void Spectrum::sum_bins() {
             const double u = corner(j);
             bin.count += 1.0;
             bin.power += value * value;
+            if (!spread.empty()) bin.power += spread[j - 1];
             bin.corner2[parity] += u * u;
             bin.corner_data[parity] += u * value;
             if (parity == 1) {

@@ -1,11 +1,14 @@
 #pragma once
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "analysis/noise/shapes.hpp"
 
 namespace ringlock::noise {
+
+struct LostInformation;
 
 /// Sums over neighbouring cosine coefficients across which the model's variance hardly changes; all the likelihood
 /// needs. Index 0 of pairs: even coefficients, 1: odd.
@@ -27,6 +30,10 @@ struct Spectrum {
     std::vector<double> z;  ///< coefficients 1...n-1 (z[0] belongs to frequency 1/(2 n tau0)), unit of the rate
     std::vector<Bin> bins;
     std::size_t samples = 0;  ///< rates used: the longest length with small prime factors, at most 2 % fewer
+    /// Of a record with missing samples, whose z are expectations: their variances given the samples that are there,
+    /// which are added to the powers; and what is not known of the parameters, if it has been computed.
+    std::vector<double> spread;
+    std::shared_ptr<const LostInformation> lost;
 
     void sum_bins();                     ///< anew, after a change of z
     double corner(std::size_t j) const;  ///< u of coefficient j >= 1

@@ -1,5 +1,7 @@
 #include "analysis/noise/subsets.hpp"
 
+#include <bit>
+
 namespace ringlock::noise {
 
 Model model_of(Mask mask) {
@@ -7,6 +9,11 @@ Model model_of(Mask mask) {
     for (std::size_t i = 0; i < term_count; ++i) m.has[i] = ((mask >> i) & 1u) != 0;
     m.ramp = (mask & ramp_bit) != 0;
     return m;
+}
+
+double Prices::of(Mask bit) const {
+    if (bit == ramp_bit) return ramp;
+    return bit == correlated_bit ? correlated : variance[static_cast<std::size_t>(std::countr_zero(bit))];
 }
 
 double Prices::of_all(Mask mask) const {

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <limits>
 #include <vector>
 
@@ -16,11 +17,12 @@ Model model_of(Mask mask);
 
 /// What a term must lower the deviance by.
 struct Prices {
-    double variance = 0.0;  ///< half a chi-squared with one degree of freedom: a variance on its boundary
-    double ramp = 0.0;      ///< chi-squared with one degree of freedom
+    /// Half a chi-squared with one degree of freedom: a variance on its boundary.
+    std::array<double, noise::correlated> variance{};
+    double ramp = 0.0;                                            ///< chi-squared with one degree of freedom
     double correlated = std::numeric_limits<double>::infinity();  ///< also for the search over its time
 
-    double of(Mask bit) const { return bit == ramp_bit ? ramp : bit == correlated_bit ? correlated : variance; }
+    double of(Mask bit) const;
     double of_all(Mask mask) const;
 };
 

@@ -182,8 +182,8 @@ void Checkpoints::collect(std::span<study::Study> points, std::int64_t first, st
     const std::vector<study::Stretch> gaps = of_shard(finished_.take_up(points, first, last));
     if (gaps.empty()) return;
     throw RunError(
-        fmt::format("{}: {} gyros from gyro {} on were simulated by another process, but are in no file that "
-                    "it has reported",
+        fmt::format("{}: {} gyros from gyro {} on were simulated by another process, "
+                    "but no file that it reported holds them",
                     printable(path_), gaps.front().last - gaps.front().first, gaps.front().first));
 }
 
@@ -343,7 +343,7 @@ void Checkpoints::wait_out(const std::string& problem, int error) {
         }
     }
     if (tells) {
-        tell_(fmt::format("{}; the run waits for it, and tries again every second; what is finished stays in memory",
+        tell_(fmt::format("{}; the run waits for it and tries again every second; finished gyros stay in memory",
                           problem));
     }
     for (const auto until = now + between_tries; Clock::now() < until; std::this_thread::sleep_for(20ms)) {

@@ -130,8 +130,8 @@ Folder::Folder(const fs::path& output, const Manifest& manifest, Beginning begin
         const std::vector<fs::path> found = files();
         if (!found.empty() && beginning == Beginning::refuse) {
             throw InputError(
-                fmt::format("{}: holds finished gyros of a run of {} that was interrupted; go on with "
-                            "--resume, or begin anew with --discard",
+                fmt::format("{}: holds finished gyros of a run of {} that was interrupted; "
+                            "go on with --resume, or begin anew with --discard",
                             printable(path_), printable(output)));
         }
         if (beginning == Beginning::discard) {
@@ -149,9 +149,8 @@ Folder::Folder(const fs::path& output, const Manifest& manifest, Beginning begin
             }
             if (!other.empty()) {
                 throw InputError(
-                    fmt::format("{}: holds finished gyros of another run, which cannot be resumed by this "
-                                "one; they differ in\n  {}\nRun what was run before, or begin anew with "
-                                "--discard",
+                    fmt::format("{}: holds finished gyros of another run, which cannot be resumed by this one; "
+                                "they differ in\n  {}\nRun the same scenario as before, or begin anew with --discard",
                                 printable(path_), fmt::join(other, "\n  ")));
             }
         }
@@ -176,13 +175,13 @@ void Folder::lock_or_refuse() {
         if (mkdir(path_.c_str(), 0777) != 0) {
             if (errno != EEXIST) {
                 throw InputError(
-                    fmt::format("{}: cannot be made: {}; it keeps what is finished of a run. Name an output "
-                                "in a folder that can be written",
+                    fmt::format("{}: cannot be made: {}; it keeps the finished gyros of a run. "
+                                "Name an output in a folder that can be written",
                                 printable(path_), system_text(errno)));
             }
             const std::vector<fs::path> there = contents(path_);
             if (!fs::is_directory(path_) || !std::all_of(there.begin(), there.end(), is_of_run)) {
-                throw InputError(fmt::format("{}: is there and is no folder of a run; it is kept. Name another output",
+                throw InputError(fmt::format("{}: exists and is not a folder of a run; it is kept. Name another output",
                                              printable(path_)));
             }
         }

@@ -61,7 +61,7 @@ std::string to_json(const Manifest& manifest) {
 
 Manifest parse_manifest(std::string_view text, std::string_view from) try {
     const auto json = nlohmann::json::parse(text);
-    if (json.at("format") != format_name) throw InputError(fmt::format("{}: is no part of a run of ringlock", from));
+    if (json.at("format") != format_name) throw InputError(fmt::format("{}: is not a part of a run of ringlock", from));
     if (json.at("format_version") != format_version) {
         throw InputError(fmt::format("{}: is of another version of ringlock (format {}, here {})", from,
                                      json_text(json.at("format_version")), format_version));
@@ -73,7 +73,7 @@ Manifest parse_manifest(std::string_view text, std::string_view from) try {
     manifest.scenario = scenario::parse_string(json.at("scenario").get<std::string>(), from, {}, no_rules);
     return manifest;
 } catch (const nlohmann::json::exception& error) {
-    throw InputError(fmt::format("{}: says not of which run it is: {}", from, error.what()));
+    throw InputError(fmt::format("{}: does not say of which run it is: {}", from, error.what()));
 }
 
 std::vector<std::string> differences(const Manifest& before, const Manifest& now) {

@@ -36,7 +36,7 @@ Manifest read_manifest(const std::filesystem::path& file) {
         if (kind == manifest_record) manifest = parse_manifest(as_text(content), printable(file));
         return false;
     });
-    if (!manifest) throw InputError(fmt::format("{}: says not of which run it is", printable(file)));
+    if (!manifest) throw InputError(fmt::format("{}: does not say of which run it is", printable(file)));
     return *manifest;
 }
 
@@ -82,7 +82,7 @@ void FinishedGyros::put_into(study::Study& study, const study::FinishedBlock& bl
     bool fits = block.first_gyro >= 0 && block.arms.size() == study.arms.size() &&
                 static_cast<std::size_t>(block.first_gyro) + block.gyros.size() <= study.gyros.size();
     for (const auto& arm : block.arms) fits = fits && arm.size() == block.gyros.size();
-    if (!fits) throw InputError("a block of gyros does not fit the scenario that it is said to be of");
+    if (!fits) throw InputError("a block of gyros does not fit the scenario that its file names");
     study::take_up(study, block);
 }
 

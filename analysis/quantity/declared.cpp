@@ -52,8 +52,8 @@ void refuse_contradiction(const std::string& file, const std::string& column,
     const std::optional<Unit> declared = unit_text ? find_unit(*unit_text) : unit_in_name(column);
     if (!declared || are_same(*declared, given)) return;
     throw InputError(
-        fmt::format("{}: column {} is declared to be in {}, which contradicts {} {}; correct the option, or the file "
-                    "where it is wrong",
+        fmt::format("{}: column {} is declared to be in {}, which contradicts {} {}; correct the option, "
+                    "or the file where it is wrong",
                     printable(file), printable(column), declared->name, option, given.name));
 }
 

@@ -22,8 +22,8 @@ Size parse_size(const std::string& scale) {
     const auto [end, error] = std::from_chars(scale.data(), last, size.number);
     if (error != std::errc() || !(size.number > 0.0) || !std::isfinite(size.number)) {
         throw InputError(
-            fmt::format("--scale '{}': must be a positive number, with its unit where the data are counts, such as "
-                        "0.25arcsec",
+            fmt::format("--scale '{}': must be a positive number, with its unit where the data are counts, "
+                        "such as 0.25arcsec",
                         scale));
     }
     size.unit = std::string_view(end, static_cast<std::size_t>(last - end));

@@ -65,7 +65,7 @@ const Dataset* named(const Asked& asked, const std::string& name, const std::vec
     if (matches.size() == 1) return matches.front();
     std::vector<std::string> names;
     for (const Dataset* d : matches) names.push_back(printable(d->path));
-    throw InputError(fmt::format("{}: '{}' is the name of several datasets; say which: {}", printable(asked.file),
+    throw InputError(fmt::format("{}: '{}' is the name of several datasets; choose one: {}", printable(asked.file),
                                  printable(name), listed(names)));
 }
 
@@ -98,8 +98,8 @@ std::optional<Bracketed> in_brackets(const Asked& asked) {
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), out.index);
     if ((!row && !inside.starts_with(":,")) || error != std::errc{} || end != digits.data() + digits.size()) {
         throw InputError(
-            fmt::format("{}: {} '{}': in brackets must stand [I,:] for row I or [:,J] for column J of a "
-                        "two-dimensional dataset, counted from 0",
+            fmt::format("{}: {} '{}': in brackets must stand [I,:] for row I "
+                        "or [:,J] for column J of a two-dimensional dataset, counted from 0",
                         printable(asked.file), asked.option, printable(text)));
     }
     return out;
@@ -119,8 +119,7 @@ Slice slice(const Asked& asked, const Bracketed& of, const Dataset& table) {
     check_not_empty(asked, table);
     if (of.row && table.field_is_array) {
         throw InputError(
-            fmt::format("{}: dataset {}: time runs along its records, so that only columns of it are "
-                        "series; give {}",
+            fmt::format("{}: dataset {}: time runs along its records, so that only columns of it are series; give {}",
                         printable(asked.file), printable(table.path), slices_of(asked.option, of.name, table)));
     }
     const std::uint64_t side = table.sides[of.row ? 0 : 1];
@@ -135,7 +134,7 @@ Slice slice(const Asked& asked, const Bracketed& of, const Dataset& table) {
 
 [[noreturn]] void refuse_without_brackets(const Asked& asked, const Dataset& table) {
     check_not_empty(asked, table);
-    throw InputError(fmt::format("{}: dataset {} has {}, and one of them is wanted; say which with {}, counted from 0",
+    throw InputError(fmt::format("{}: dataset {} has {}, but only one is read; choose it with {}, counted from 0",
                                  printable(asked.file), printable(table.path), shape_of(table),
                                  slices_of(asked.option, asked.name, table)));
 }
@@ -150,8 +149,7 @@ Slice find(const Asked& asked, const std::vector<Dataset>& series, const std::ve
         if (const Dataset* found = named(asked, of->name, series)) {
             if (found->sides.size() == 2) return slice(asked, *of, *found);
             throw InputError(
-                fmt::format("{}: {} '{}': dataset {} has one dimension and no rows and columns; leave the "
-                            "brackets out",
+                fmt::format("{}: {} '{}': dataset {} has one dimension and no rows and columns; leave the brackets out",
                             printable(asked.file), asked.option, printable(asked.name), printable(found->path)));
         }
     }
@@ -183,6 +181,15 @@ namespace {
 
 }  // namespace
 
+std::vector<std::string> names_of_times(const std::string& asked) {
+    int depth = 0;
+    for (std::size_t i = 0; i < asked.size(); ++i) {
+        depth += asked[i] == '[' ? 1 : asked[i] == ']' ? -1 : 0;
+        if (asked[i] == ',' && depth == 0) return {asked.substr(0, i), asked.substr(i + 1)};
+    }
+    return {asked};
+}
+
 Choice choose_datasets(const SeriesRequest& request, const Contents& there) {
     const std::string& file = request.path;
     std::vector<Dataset> series;
@@ -194,13 +201,24 @@ Choice choose_datasets(const SeriesRequest& request, const Contents& there) {
         if (there.datasets.empty()) refuse_without_numbers(file, there.others);
         return find({file, option, name}, series, tables, there.others);
     };
-    if (request.time) choice.time = find_asked("--time", *request.time);
+    if (request.time) {
+        const std::vector<std::string> names = names_of_times(*request.time);
+        choice.time = find_asked("--time", names[0]);
+        if (names.size() > 1) choice.nanoseconds = find_asked("--time", names[1]);
+        if (choice.nanoseconds && choice.nanoseconds->name() == choice.time->name()) {
+            throw InputError(fmt::format("{}: --time {}: is one dataset twice; seconds and nanoseconds are two",
+                                         printable(file), printable(*request.time)));
+        }
+    }
     if (request.column) {
         choice.column = find_asked("--column", *request.column);
         return choice;
     }
     if (there.datasets.empty()) refuse_without_numbers(file, there.others);
-    const auto is_out = [&](const Dataset& d) { return d.is_alias || (choice.time && d.path == choice.time->of.path); };
+    const auto is_out = [&](const Dataset& d) {
+        return d.is_alias || (choice.time && d.path == choice.time->of.path) ||
+               (choice.nanoseconds && d.path == choice.nanoseconds->of.path);
+    };
     std::erase_if(series, is_out);
     std::erase_if(tables, [](const Dataset& d) { return d.is_alias; });
     if (series.size() == 1) {
@@ -214,9 +232,9 @@ Choice choose_datasets(const SeriesRequest& request, const Contents& there) {
     for (const Dataset& d : tables) {
         names.push_back(fmt::format("{}{}", printable(d.path), d.field_is_array ? "[:,J]" : "[I,:] or [:,J]"));
     }
-    throw InputError(fmt::format("{}: has {} datasets{}; say which with --column ({})", printable(file), names.size(),
-                                 choice.time ? fmt::format(" beside {}, the time", printable(choice.time->name())) : "",
-                                 listed(names)));
+    throw InputError(fmt::format(
+        "{}: has {} datasets{}; choose one with --column ({})", printable(file), names.size(),
+        choice.time ? fmt::format(" in addition to {}, the time", printable(choice.time->name())) : "", listed(names)));
 }
 
 }  // namespace ringlock::record

@@ -47,7 +47,11 @@ struct Slice {
 struct Choice {
     Slice column;
     std::optional<Slice> time;
+    std::optional<Slice> nanoseconds;  ///< behind the seconds of `time`, where --time names two
 };
+
+/// The names in `--time SECONDS,NANOSECONDS`; one where there is no comma outside of brackets.
+std::vector<std::string> names_of_times(const std::string& asked);
 
 /// A name without the brackets at its end.
 std::string without_brackets(const std::string& name);

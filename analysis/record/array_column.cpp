@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
+#include "analysis/record/joined_times.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::record {
@@ -29,8 +31,8 @@ void hand_on(std::uint64_t value, const ArrayColumn& column, std::size_t element
     constexpr std::int64_t largest = std::numeric_limits<std::int64_t>::max();
     if (value > static_cast<std::uint64_t>(largest)) {
         throw InputError(
-            fmt::format("{} is {}; allowed are counts up to {}. Subtract a constant; where it was a "
-                        "negative number, write signed integers",
+            fmt::format("{} is {}; allowed are counts up to {}. Subtract a constant; "
+                        "where it was a negative number, write signed integers",
                         column.place(element), value, largest));
     }
     rows.count(static_cast<std::int64_t>(value));
@@ -108,6 +110,23 @@ SeriesInfo stream_column(const SeriesRequest& request, ArrayColumn& column, Arra
     SeriesInfo info = rows.finish();
     info.column = column.name();
     return info;
+}
+
+SeriesInfo stream_choice(const SeriesRequest& request, const Choice& choice,
+                         const std::function<std::unique_ptr<ArrayColumn>(const Slice&)>& open, const TakePiece& take) {
+    const std::unique_ptr<ArrayColumn> column = open(choice.column);
+    std::unique_ptr<ArrayColumn> time = choice.time ? open(*choice.time) : nullptr;
+    if (!choice.nanoseconds) return stream_column(request, *column, time.get(), take);
+    if (request.time_unit.value_or("s") != "s") {
+        throw InputError(fmt::format(
+            "--time-unit {}: of the two columns of times the first has seconds, the second nanoseconds; leave the "
+            "option out",
+            *request.time_unit));
+    }
+    JoinedTimes joined(std::move(time), open(*choice.nanoseconds));
+    SeriesRequest in_ns = request;
+    in_ns.time_unit = "ns";
+    return stream_column(in_ns, *column, &joined, take);
 }
 
 }  // namespace ringlock::record

@@ -1,9 +1,11 @@
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
 
+#include "analysis/record/array_choice.hpp"
 #include "analysis/record/series.hpp"
 #include "analysis/record/series_rows.hpp"
 
@@ -33,5 +35,10 @@ class ArrayColumn {
 /// Hands the values of a column on, by their times where there are some. Throws InputError, naming file, dataset and
 /// element, where the two differ in length, a value is infinite, or a whole number beyond 63 bits.
 SeriesInfo stream_column(const SeriesRequest& request, ArrayColumn& column, ArrayColumn* time, const TakePiece& take);
+
+/// The same of the columns that were chosen, which `open` opens. Times in seconds and nanoseconds become nanoseconds:
+/// throws InputError where the request has another unit.
+SeriesInfo stream_choice(const SeriesRequest& request, const Choice& choice,
+                         const std::function<std::unique_ptr<ArrayColumn>(const Slice&)>& open, const TakePiece& take);
 
 }  // namespace ringlock::record

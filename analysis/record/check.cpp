@@ -45,7 +45,7 @@ class Checker {
         check_track("/environment", "temperature_c", record_.temperature_c);
         check_track("/reference", "input_rate_deg_h", record_.input_rate_deg_h);
         for (const std::string& name : record_.ignored) {
-            warn(name, "means nothing in a record and is left aside");
+            warn(name, "has no meaning in a record and is ignored");
         }
         check_gaps();
         return std::move(findings_);
@@ -90,14 +90,13 @@ class Checker {
         }
         report(Severity::error, column, bad, [&](std::size_t i) {
             return fmt::format(
-                "is {}; every value must be a finite number (cut the record there, or fill the gap "
-                "knowingly)",
+                "is {}; every value must be a finite number (cut the record there, or fill the gap knowingly)",
                 values[i]);
         });
         report(Severity::error, column, huge, [&](std::size_t i) {
             return fmt::format(
-                "is {}; no reading is beyond {:g}, and beside one no other counts (look for the row in what "
-                "wrote the record)",
+                "is {}; no reading can be beyond {:g}, and with it in a sum no other reading counts (look "
+                "for the row in the program that wrote the record)",
                 values[i], largest);
         });
         return bad.count == 0 && huge.count == 0;
@@ -234,8 +233,8 @@ class Checker {
         });
         report(Severity::error, "/turns/direction", repeated, [&](std::size_t i) {
             return fmt::format(
-                "is {:+} as the row before; minima and maxima must alternate (a row is missing or stands "
-                "twice; cut the record there)",
+                "is {:+} as the row before; minima and maxima must alternate (a row is missing or stands twice; "
+                "cut the record there)",
                 direction[i]);
         });
         return wrong.count == 0 && repeated.count == 0;
@@ -251,7 +250,7 @@ class Checker {
             if (radii[i] <= least * usual || !std::isfinite(radii[i])) dark.note(i);
         }
         report(Severity::error, "/turns/sin and cos", dark, [&](std::size_t i) {
-            return fmt::format("are {} and {}: no phase can be told from a circle of radius {}", t.sine[i], t.cosine[i],
+            return fmt::format("are {} and {}: no phase can be read from a circle of radius {}", t.sine[i], t.cosine[i],
                                radii[i]);
         });
         constexpr std::size_t enough = 4;
@@ -346,8 +345,8 @@ class Checker {
         }
         report(Severity::error, "/turns/quarter_count", jumps, [&](std::size_t i) {
             return fmt::format(
-                "jumps: {} counts since the row before, {:.0f} off the half cycles around it, which "
-                "differ by {:.3g} rms among themselves; cut the record there",
+                "jumps: {} counts since the row before, {:.0f} off the half cycles around it, "
+                "which differ by {:.3g} rms among themselves; cut the record there",
                 t.quarter_count[i] - t.quarter_count[i - 1], off[i - 1], usual);
         });
         return jumps.count == 0;
@@ -376,24 +375,23 @@ class Checker {
         const double share = static_cast<double>(other.count) / static_cast<double>(n);
         if (share <= 0.03) return;
         if (runs_backwards(t)) {
-            error(
-                "/turns/sin",
-                "turns the other way than quarter_count, in all quadrants: sin and cos are swapped, or one of them or "
-                "the count has the wrong sign; write sin = sin psi, cos = cos psi, quarter_count = floor(psi/(pi/2)) "
-                "of the same phase psi");
+            error("/turns/sin",
+                  "turns the other way than quarter_count, in all quadrants: sin and cos are swapped, "
+                  "or one of them or the count has the wrong sign; write sin = sin psi, cos = cos psi, "
+                  "quarter_count = floor(psi/(pi/2)) of the same phase psi");
             return;
         }
         if (const double times = acceleration_over_swing(t); std::abs(std::log(times)) > std::log(2.0)) {
             error("/turns/quarter_count",
-                  fmt::format("swings by so little or so much that accelerations are {:.3g} times those of such a "
-                              "swing, and names other quarter fringes than the detectors: it must count quarter "
-                              "fringes, four to a fringe",
+                  fmt::format("swings by so little or so much that accelerations are {:.3g} times those "
+                              "of such a swing, and names other quarter fringes than the detectors: "
+                              "it must count quarter fringes, four to a fringe",
                               times));
             return;
         }
         warn(row("/turns/quarter_count", other.first),
-             fmt::format("names another quarter fringe than the detectors, here and at {:.3g} % of the turns (counts "
-                         "may have been missed)",
+             fmt::format("names another quarter fringe than the detectors, here and at {:.3g} % "
+                         "of the turns (counts may have been missed)",
                          100.0 * share));
     }
 
@@ -442,8 +440,8 @@ class Checker {
         const std::string column = fmt::format("/samples/{}", name_of(s.kind));
         const bool counted = s.kind == SampleKind::quarter_count;
         if (counted ? !s.values.empty() : !s.counts.empty()) {
-            error("/samples", fmt::format("has {} beside {}; must have one of them", counted ? "angles" : "counts",
-                                          name_of(s.kind)));
+            error("/samples", fmt::format("has {} in addition to {}; must have one of them",
+                                          counted ? "angles" : "counts", name_of(s.kind)));
         }
         const std::size_t n = s.size();
         if (n == 0) error(column, "has no rows");
@@ -456,7 +454,7 @@ class Checker {
             finite_or_missing(witness, values, std::numeric_limits<double>::infinity(), ignored);
             const bool known = std::any_of(witness_names.begin(), witness_names.end(),
                                            [&, &called = name](const char* one) { return called == one; });
-            if (!known) warn(witness, "is no witness that a record has; it is left aside");
+            if (!known) warn(witness, "is not a witness of a record and is ignored");
         }
         if (!all_finite || n == 0) return;
         constexpr std::size_t enough = 3;
@@ -520,10 +518,9 @@ class Checker {
             const double early = std::max(0.0, track.time_s.front() - first_s);
             const double late = std::max(0.0, last_s - track.time_s.back());
             if (!(duration > 0.0) || !std::isfinite(duration) || early + late <= slack * duration) return;
-            warn(time,
-                 fmt::format("goes from {:.6g} to {:.6g} s, {} from {:.6g} to {:.6g} s; beyond its ends the value "
-                             "there is taken",
-                             track.time_s.front(), track.time_s.back(), what, first_s, last_s));
+            warn(time, fmt::format("goes from {:.6g} to {:.6g} s, {} from {:.6g} to {:.6g} s; "
+                                   "beyond its ends the values at the ends are used",
+                                   track.time_s.front(), track.time_s.back(), what, first_s, last_s));
         };
         if (record_.turns && !record_.turns->time_s.empty()) {
             covers(record_.turns->time_s.front(), record_.turns->time_s.back(), "the turns");

@@ -69,8 +69,7 @@ class CsvReader {
         }
         if (!rate_given_) {
             throw InputError(
-                fmt::format("{}: says no rate; add a line \"# rate_hz = NUMBER\", samples a second, at the "
-                            "top",
+                fmt::format("{}: declares no rate; add a line \"# rate_hz = NUMBER\", samples a second, at the top",
                             printable(path_)));
         }
         if (times_) place_rows();
@@ -89,7 +88,7 @@ class CsvReader {
         const std::string value(text::trimmed(text.substr(equals + 1)));
         if (!is_identifier(key)) return;  // a sentence
         if (!keys_.insert(key).second)
-            fail(fmt::format("{} stands twice; leave one of the lines out", text::shown(key)));
+            fail(fmt::format("{} is given twice; leave one of the lines out", text::shown(key)));
         if (key == "format") {
             if (value != format_name) fail(fmt::format("format = '{}': must be {}", text::shown(value), format_name));
         } else if (key == "format_version") {
@@ -146,8 +145,8 @@ class CsvReader {
     void header(bool has_row) {
         if (!table_.layout().has_header) {
             fail(
-                fmt::format("has numbers where the names of the columns must stand; put a row such as \"{}\" above "
-                            "them",
+                fmt::format("has numbers where the names of the columns must stand; "
+                            "put a row such as \"{}\" above them",
                             name_of(SampleKind::angle_increment_arcsec)));
         }
         for (const text::Column& column : table_.layout().columns) columns_.push_back({column.name});
@@ -170,7 +169,7 @@ class CsvReader {
                 column.into = &samples_.witnesses[witness];
             }
             if (column.target != Target::none && !first) {
-                fail(fmt::format("column {} stands twice; rename or remove one", text::shown(column.name)));
+                fail(fmt::format("column {} is there twice; rename or remove one", text::shown(column.name)));
             }
             check_unit(column, table_.layout().columns[k].unit);
             if (column.target == Target::none && !(times_ && times_->has(k))) {
@@ -186,13 +185,13 @@ class CsvReader {
         for (const Column& column : columns_) names.push_back(text::shown(column.name));
         if (turns) {
             fail(
-                fmt::format("has columns of turns: {}; only samples have a text form, turns must be written as HDF5 "
-                            "(docs/record.md)",
+                fmt::format("has columns of turns: {}; only samples have a text form, "
+                            "turns must be written as HDF5 (docs/record.md)",
                             listed(names)));
         }
         fail(
-            fmt::format("has no column of samples; columns are {}; one of angle_increment_arcsec, angle_arcsec and "
-                        "quarter_count is needed",
+            fmt::format("has no column of samples; columns are {}; one of angle_increment_arcsec, "
+                        "angle_arcsec and quarter_count is needed",
                         listed(names)));
     }
 
@@ -200,8 +199,8 @@ class CsvReader {
         const bool angle = column.target == Target::value;
         if (!angle || unit.empty() || unit == "arcsec" || unit == "as") return;
         fail(
-            fmt::format("column {} is said to be in {}; a record has its angles in arcsec. Read it with `ringlock "
-                        "import --column {}=QUANTITY --unit`",
+            fmt::format("column {} is declared to be in {}; a record has its angles in arcsec. "
+                        "Read it with `ringlock import --column {}=QUANTITY --unit`",
                         column.name, text::shown(unit), column.name));
     }
 
@@ -252,9 +251,8 @@ class CsvReader {
 
     [[noreturn]] void refuse_gap_of_counts(const Gap& gap) const {
         throw InputError(
-            fmt::format("{}:{}: column {}: {} samples are missing between {} and {}; counts are whole numbers, of "
-                        "which none can say that it is missing. Cut the record there, or write the angle as "
-                        "angle_arcsec",
+            fmt::format("{}:{}: column {}: {} samples are missing between {} and {}; counts are whole numbers, "
+                        "which cannot mark a missing sample. Cut the record there, or write the angle as angle_arcsec",
                         printable(path_), gap.line, name_of(samples_.kind), gap.samples, gap.from, gap.to));
     }
 
@@ -289,8 +287,8 @@ class CsvReader {
         if (!text::parse_number(field, value, table_.layout().dialect.decimal_comma) ||
             value != std::nearbyint(value) || !(std::abs(value) <= largest)) {
             fail(
-                fmt::format("column {}: {}; a count must be a whole number, and none can be missing. Cut the record "
-                            "there; leaving the row out would shift all later times",
+                fmt::format("column {}: {}; a count must be a whole number and cannot be missing. "
+                            "Cut the record there; leaving the row out would shift all later times",
                             column.name, field.empty() ? "is empty" : fmt::format("is '{}'", text::shown(field))));
         }
         samples_.counts.push_back(static_cast<std::int64_t>(value));

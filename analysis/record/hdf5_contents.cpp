@@ -27,8 +27,8 @@ std::string why_no_numbers(hid_t type) {
         case H5T_BITFIELD:
             return "holds bit fields; write them as integers";
         case H5T_REFERENCE:
-            return "holds references to other datasets (of MATLAB a cell or an array of structs); write the numbers "
-                   "themselves into a dataset of their own";
+            return "holds references to other datasets (of MATLAB a cell or an array of structs); "
+                   "write the numbers themselves into a dataset of their own";
         case H5T_VLEN:
             return "holds rows of varying length; write one number an element";
         case H5T_ARRAY:
@@ -106,8 +106,8 @@ class Listing {
         try {
             const std::string why = store::refused_link();
             if (!there && !why.empty()) {
-                found_.others.push_back({shown_path(name), why + ", which is not read; name that file, or give "
-                                                                 "--follow-links to a command that has it"});
+                found_.others.push_back({shown_path(name), why + ", which is not read; name that file, "
+                                                                 "or give --follow-links to a command that has it"});
             }
         } catch (const std::bad_alloc&) {
             return -1;
@@ -175,8 +175,8 @@ class Listing {
             field.field.emplace_back(name.get());
             if (of.sides.size() == 2 && !of.is_series()) {
                 found_.others.push_back({field.path,
-                                         "is a field of a table of two dimensions; write the records as a "
-                                         "dataset of one dimension"});
+                                         "is a field of a table of two dimensions; "
+                                         "write the records as a dataset of one dimension"});
                 continue;
             }
             add_values(field, member, depth + 1);

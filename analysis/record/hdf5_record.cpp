@@ -35,8 +35,8 @@ store::Dataset open_column(const store::Group& group, const std::string& name) {
     double rows = 1.0;
     for (const std::uint64_t extent : shape) rows *= static_cast<double>(extent);
     if (8.0 * columns * rows > memory_bytes()) {
-        fail(dataset, fmt::format("has {} rows, more than memory is free for (is the file damaged?); cut the "
-                                  "record into pieces",
+        fail(dataset, fmt::format("has {} rows, more than memory is free for (is the file damaged?); "
+                                  "cut the record into pieces",
                                   rows));
     }
     return dataset;
@@ -90,8 +90,8 @@ std::string text(const store::Node& node, const char* name) {
 
 void check_format(const store::File& file) {
     if (!file.has_attribute("format")) {
-        fail(file, fmt::format("attribute format is missing; a record has format = \"{}\" and format_version = {} "
-                               "(docs/record.md)",
+        fail(file, fmt::format("attribute format is missing; "
+                               "a record has format = \"{}\" and format_version = {} (docs/record.md)",
                                format_name, format_version));
     }
     const std::string format = text(file, "format");
@@ -328,8 +328,8 @@ const std::string& refuse_to_lose(const std::string& path) {
         }
     }
     if (record) return path;
-    throw InputError(
-        fmt::format("cannot write {}: it is there and no rlg-record in HDF5; name another file or move it away", path));
+    throw InputError(fmt::format(
+        "cannot write {}: it exists and is not an rlg-record in HDF5; name another file or move it away", path));
 }
 
 }  // namespace

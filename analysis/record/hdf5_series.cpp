@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <type_traits>
 #include <vector>
@@ -179,8 +180,8 @@ class Hdf5Column final : public ArrayColumn {
         if (H5Sselect_hyperslab(space_, H5S_SELECT_SET, start, nullptr, count, nullptr) < 0 ||
             H5Dread(dataset_, memory_type, memory, space_, H5P_DEFAULT, into) < 0) {
             throw InputError(
-                fmt::format("{}: elements {} to {} cannot be read as numbers; is the file damaged, or "
-                            "packed by a filter that is not installed?",
+                fmt::format("{}: elements {} to {} cannot be read as numbers; "
+                            "is the file damaged, or packed by a filter that is not installed?",
                             label(), first, first + size - 1));
         }
         // Of a virtual dataset the library reads zeros where it does not find the source.
@@ -221,16 +222,15 @@ SeriesInfo stream_hdf5_file(const store::GuardedPath& guarded, const SeriesReque
     const hid_t file = opened.library_id();
     const std::string& path = request.path;
     std::vector<std::string> asked;
-    for (const auto& name : {request.column, request.time}) {
-        if (name) asked.push_back(*name);
+    if (request.column) asked.push_back(*request.column);
+    if (request.time) {
+        for (const std::string& name : names_of_times(*request.time)) asked.push_back(name);
     }
     const Choice choice = choose_datasets(request, hdf5_contents(file, path, asked));
-    Hdf5Column column(file, path, choice.column);
-    std::optional<Hdf5Column> time;
-    if (choice.time) time.emplace(file, path, *choice.time);
     const std::optional<double> rate_hz = rate_above(file, path, choice.column.of.dataset);
     const std::optional<std::string> unit = unit_of(opened, choice.column.of);
-    SeriesInfo info = stream_column(request, column, time ? &*time : nullptr, take);
+    SeriesInfo info = stream_choice(
+        request, choice, [&](const Slice& slice) { return std::make_unique<Hdf5Column>(file, path, slice); }, take);
     info.rate_hz = rate_hz;
     info.unit = unit;
     return info;

@@ -62,8 +62,8 @@ Series read_column(const MappedLog& log, const MappedColumn& mapped, bool again)
     if (series.missing == 0 || mapped.quantity != name_of(SampleKind::quarter_count)) return series;
     const auto at = std::find_if(series.values.begin(), series.values.end(), [](double v) { return std::isnan(v); });
     throw InputError(fmt::format(
-        "{}: column {}: {} of {} values are missing, the first is sample {}; counts are whole numbers, of which none "
-        "can say that it is missing. Cut the record there, or import the angle as angle_arcsec",
+        "{}: column {}: {} of {} values are missing, the first is sample {}; counts are whole numbers, "
+        "which cannot mark a missing sample. Cut the record there, or import the angle as angle_arcsec",
         printable(log.path), printable(series.column), series.missing, series.n, at - series.values.begin() + 1));
 }
 

@@ -1,24 +1,23 @@
 #include <fmt/format.h>
 #include <matio.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <filesystem>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "analysis/record/array_choice.hpp"
 #include "analysis/record/array_column.hpp"
+#include "analysis/record/mat_elements.hpp"
 #include "analysis/record/readers.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/printable.hpp"
-#include "engine/core/waiting.hpp"
 #include "engine/store/guard.hpp"
 
 /// Files of MATLAB 5 to 7 (and Octave's save -v7). Those of MATLAB 7.3 are HDF5.
@@ -28,99 +27,8 @@ namespace {
 using MatFile = std::unique_ptr<mat_t, int (*)(mat_t*)>;
 using Variable = std::unique_ptr<matvar_t, void (*)(matvar_t*)>;
 
-/// Compares the sizes of the parts that a file claims with the size of the file: the library reads zeros in place of
-/// data that are cut off.
-///
-/// The format is that of "MAT-File Format" (The MathWorks): behind a head of 128 bytes elements of a type, a length and
-/// so many bytes; a matrix is made of elements for its class, sides, name and numbers, each padded to 8 bytes.
-class MatElements {
-   public:
-    explicit MatElements(const std::string& path) : path_(path), file_(open_to_read(path)) {
-        std::error_code unknown;
-        const auto bytes = std::filesystem::file_size(path, unknown);
-        std::array<char, 2> order{};
-        if (unknown || !file_.valid() || pread(file_.get(), order.data(), 2, 126) != 2) fail_cut();
-        size_ = bytes;
-        swapped_ = order[0] == 'M';
-    }
-
-    void check() const {
-        for (std::uint64_t at = head_bytes; at < size_;) {
-            const Tag tag = tag_at(at, size_);
-            if (tag.type == matrix) check_matrix(tag);
-            at = tag.begin + tag.bytes;
-        }
-    }
-
-   private:
-    static constexpr std::uint64_t head_bytes = 128;
-    static constexpr std::uint32_t matrix = 14;
-
-    /// An element: its content is [begin, begin + bytes).
-    struct Tag {
-        std::uint32_t type = 0;
-        std::uint64_t begin = 0;
-        std::uint64_t bytes = 0;
-        std::uint64_t next = 0;  ///< where the one behind it begins, in a matrix
-    };
-
-    [[noreturn]] void fail_cut() const {
-        throw InputError(
-            fmt::format("{}: is cut off or damaged: it ends within one of its variables", printable(path_)));
-    }
-
-    std::uint32_t word_at(std::uint64_t at) const {
-        std::array<unsigned char, 4> bytes{};
-        if (pread(file_.get(), bytes.data(), bytes.size(), static_cast<off_t>(at)) != 4) fail_cut();
-        std::uint32_t word = 0;
-        for (std::size_t i = 0; i < 4; ++i) word |= std::uint32_t{bytes[swapped_ ? 3 - i : i]} << (8 * i);
-        return word;
-    }
-
-    Tag tag_at(std::uint64_t at, std::uint64_t end) const {
-        if (at + 8 > end) fail_cut();
-        Tag tag{word_at(at), at + 8, 0, 0};
-        if (tag.type >> 16U != 0) {  // a short one: type, length and up to four bytes in eight
-            tag.bytes = tag.type >> 16U;
-            tag.type &= 0xffffU;
-            tag.begin = at + 4;
-            tag.next = at + 8;
-        } else {
-            tag.bytes = word_at(at + 4);
-            tag.next = tag.begin + (tag.bytes + 7) / 8 * 8;
-        }
-        if (tag.begin + tag.bytes > end) fail_cut();
-        return tag;
-    }
-
-    /// Whether it has as many numbers as its sides say.
-    void check_matrix(const Tag& whole) const {
-        const std::uint64_t end = whole.begin + whole.bytes;
-        if (whole.bytes == 0) return;
-        const Tag flags = tag_at(whole.begin, end);
-        const std::uint32_t of = word_at(flags.begin) & 0xffU;
-        constexpr std::uint32_t first_number = 6;  // classes of doubles to 64-bit integers
-        constexpr std::uint32_t last_number = 15;
-        if (of < first_number || of > last_number) return;
-        const Tag sides = tag_at(flags.next, end);
-        double values = 1.0;
-        for (std::uint64_t at = sides.begin; at + 4 <= sides.begin + sides.bytes; at += 4) values *= word_at(at);
-        const Tag name = tag_at(sides.next, end);
-        if (values == 0.0) return;
-        const Tag numbers = tag_at(name.next, end);
-        constexpr std::array<double, 14> size_of = {0, 1, 1, 2, 2, 4, 4, 4, 0, 8, 0, 0, 8, 8};  // by type
-        const double each = numbers.type < size_of.size() ? size_of[numbers.type] : 0.0;
-        if (each == 0.0 || values * each > static_cast<double>(numbers.bytes)) fail_cut();
-    }
-
-    std::string path_;
-    Descriptor file_;
-    std::uint64_t size_ = 0;
-    bool swapped_ = false;
-};
-
 MatFile open_mat(const std::string& path) {
-    MatElements(path).check();
+    check_mat_elements(path);
     // The library would print, and end the program.
     Mat_LogInitFunc("ringlock", [](int, char*) {});
     MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY), Mat_Close);
@@ -173,17 +81,17 @@ std::string why_not(const matvar_t& variable) {
     return "";
 }
 
+/// The library may find another variable in a damaged file than check_mat_elements() has seen.
 void check_mat_size(const std::string& path, const std::string& name, const std::vector<std::uint64_t>& sides) {
     std::error_code unknown;
     const auto there = static_cast<double>(std::filesystem::file_size(path, unknown));
     // MATLAB writes whole numbers with as few bytes as they need, and packs its data with deflate (RFC 1951).
     constexpr double greatest_ratio = 1032.0;
-    constexpr double small = 1048576.0;
     const double values = static_cast<double>(sides[0]) * static_cast<double>(sides[1]);
-    if (unknown || values <= std::max(small, greatest_ratio * there)) return;
+    if (unknown || values <= greatest_ratio * there) return;
     throw InputError(
-        fmt::format("{}: dataset {}: says that it has {:.10g} values, which the file of {:.4g} bytes cannot "
-                    "hold: it is damaged",
+        fmt::format("{}: dataset {}: says that it has {:.10g} values, which the file of {:.4g} bytes cannot hold: "
+                    "it is damaged",
                     printable(path), printable(name), values, there));
 }
 
@@ -308,10 +216,8 @@ class MatColumn final : public ArrayColumn {
 
 SeriesInfo stream_mat_file(const SeriesRequest& request, const TakePiece& take) {
     const Choice choice = choose_datasets(request, variables_of(request.path));
-    MatColumn column(request.path, choice.column);
-    std::optional<MatColumn> time;
-    if (choice.time) time.emplace(request.path, *choice.time);
-    return stream_column(request, column, time ? &*time : nullptr, take);
+    return stream_choice(
+        request, choice, [&](const Slice& slice) { return std::make_unique<MatColumn>(request.path, slice); }, take);
 }
 
 }  // namespace

@@ -142,8 +142,7 @@ void add_array(const NpyHeader& head, const std::string& file, const std::string
     needed += values;
     if (bytes && needed > static_cast<double>(*bytes)) {
         throw InputError(fmt::format(
-            "{}: dataset {}: says that its values take {:.15g} bytes, and there are {}: it is "
-            "cut off or damaged",
+            "{}: dataset {}: says that its values take {:.15g} bytes, and there are {}: it is cut off or damaged",
             printable(file), printable(name), values, *bytes - std::min<std::uint64_t>(*bytes, head.bytes)));
     }
     for (const NpyField& field : head.fields) {

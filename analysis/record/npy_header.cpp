@@ -220,7 +220,7 @@ void set_type(NpyHeader& head, const Literal& value, const LiteralReader& reader
 
 std::size_t npy_header_bytes(std::string_view preamble, const std::string& where) {
     if (preamble.size() < npy_preamble_bytes || !preamble.starts_with(npy_magic)) {
-        throw InputError(fmt::format("{}: is no array of NumPy, or is cut off in its head", where));
+        throw InputError(fmt::format("{}: is not an array of NumPy, or is cut off in its head", where));
     }
     const auto byte = [&](std::size_t i) { return static_cast<std::size_t>(static_cast<unsigned char>(preamble[i])); };
     const std::size_t version = byte(6);
@@ -244,7 +244,7 @@ NpyHeader parse_npy_header(std::string_view bytes, const std::string& where) {
     const std::size_t begin = bytes[6] == 1 ? 10 : 12;
     LiteralReader reader(bytes.substr(begin, all - begin), where);
     const Literal dictionary = reader.all();
-    if (dictionary.kind != Literal::Kind::dictionary) reader.fail("is no dictionary");
+    if (dictionary.kind != Literal::Kind::dictionary) reader.fail("is not a dictionary");
     NpyHeader head;
     head.bytes = all;
     bool has_order = false;

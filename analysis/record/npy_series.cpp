@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "analysis/record/npy_column.hpp"
@@ -142,6 +143,21 @@ struct Entry {
     NpyHeader head;
 };
 
+/// Refuses, by its head, an array that would take minutes to unpack and is no measurement: noise does not pack so well.
+void refuse_absurd_packing(const std::string& where, const NpyHeader& head, const std::string& path) {
+    constexpr double small_bytes = 100e6;
+    constexpr double most_ratio = 200.0;
+    double bytes = static_cast<double>(head.element_bytes);
+    for (const std::uint64_t side : head.shape) bytes *= static_cast<double>(side);
+    std::error_code unknown;
+    const auto there = static_cast<double>(std::filesystem::file_size(path, unknown));
+    if (unknown || bytes <= std::max(small_bytes, most_ratio * there)) return;
+    throw InputError(
+        fmt::format("{}: unpacks to {:.4g} bytes, more than {:g} times the archive of {:.4g} bytes, which no measured "
+                    "series does; if it is one, unpack it and give the array (.npy)",
+                    where, bytes, most_ratio, there));
+}
+
 std::map<std::string, Entry> entries_of(const std::string& path, Contents& contents) {
     constexpr std::string_view ending = ".npy";
     std::map<std::string, Entry> entries;
@@ -158,6 +174,7 @@ std::map<std::string, Entry> entries_of(const std::string& path, Contents& conte
         const std::string where = fmt::format("{}: dataset {}", printable(path), printable(name));
         NpyHeader head = header_of(source, where);
         add_array(head, path, name, zip->bytes(), contents);
+        refuse_absurd_packing(where, head, path);
         entries[name] = {zip->number(), std::move(head)};
     }
     return entries;
@@ -175,9 +192,7 @@ SeriesInfo stream_archive(const SeriesRequest& request, const TakePiece& take) {
         const Entry& entry = entries.at(slice.of.dataset);
         return npy_column(request.path, slice, entry.head, std::make_unique<EntrySource>(request.path, entry.number));
     };
-    const std::unique_ptr<ArrayColumn> column = open(choice.column);
-    const std::unique_ptr<ArrayColumn> time = choice.time ? open(*choice.time) : nullptr;
-    return stream_column(request, *column, time.get(), take);
+    return stream_choice(request, choice, open, take);
 }
 
 /// The array of a .npy file has no name of its own: a request may be brackets alone or begin with the name of the file.
@@ -202,14 +217,17 @@ SeriesInfo stream_npy_series(const SeriesRequest& request, const TakePiece& take
     add_array(head, request.path, name, unknown ? std::nullopt : std::optional<std::uint64_t>(bytes), contents);
     SeriesRequest named = request;
     named.column = named_array(request.column, request.path);
-    named.time = named_array(request.time, request.path);
+    if (request.time) {
+        named.time = "";
+        for (const std::string& part : names_of_times(*request.time)) {
+            *named.time += (named.time->empty() ? "" : ",") + *named_array(part, request.path);
+        }
+    }
     const Choice choice = choose_datasets(named, contents);
     const auto open = [&](const Slice& slice) {
         return npy_column(request.path, slice, head, std::make_unique<FileSource>(request.path));
     };
-    const std::unique_ptr<ArrayColumn> column = open(choice.column);
-    const std::unique_ptr<ArrayColumn> time = choice.time ? open(*choice.time) : nullptr;
-    return stream_column(request, *column, time.get(), take);
+    return stream_choice(request, choice, open, take);
 }
 
 SeriesInfo stream_npz_series(const SeriesRequest& request, const TakePiece& take) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "analysis/record/container.hpp"
 #include "analysis/record/readers.hpp"
@@ -12,6 +13,15 @@
 #include "engine/core/printable.hpp"
 
 namespace ringlock::record {
+
+std::optional<std::size_t> SeriesInfo::line_of(std::size_t datum) const {
+    const auto next = std::upper_bound(lines.begin(), lines.end(), datum,
+                                       [](std::size_t wanted, const DatumLine& run) { return wanted < run.datum; });
+    if (next == lines.begin()) return std::nullopt;
+    const DatumLine& run = *std::prev(next);
+    return run.line + (datum - run.datum);
+}
+
 namespace {
 
 /// The first value that is so large that deviations, which sum squares of sums of values, would overflow.
@@ -59,8 +69,8 @@ SeriesInfo stream_pieces(const SeriesRequest& request, const TakePiece& take) {
     const std::string file = text::name_of_file(request.path);
     if (request.time && (!(request.rate_hz > 0.0) || !std::isfinite(request.rate_hz))) {
         throw InputError(
-            fmt::format("{}: time stamps need the sampling rate that they should keep, a positive number "
-                        "[Hz]; found {}",
+            fmt::format("{}: time stamps need the sampling rate that they should keep, "
+                        "a positive number [Hz]; found {}",
                         printable(file), request.rate_hz));
     }
     const Container container = container_of(request.path);
@@ -109,8 +119,8 @@ class Collector {
         constexpr double bytes_a_value = 3.0 * sizeof(double);
         if (bytes_a_value * static_cast<double>(values) <= memory_bytes()) return;
         throw InputError(
-            fmt::format("{}: has more values than memory is free for ({} and more, those that "
-                        "are missing included); cut the record into pieces",
+            fmt::format("{}: has more values than memory is free for ({} and more, those that are missing included); "
+                        "cut the record into pieces",
                         printable(file_), values));
     }
 

@@ -34,7 +34,13 @@ struct SeriesRequest {
     text::Options text = {};  ///< what is said of the dialect of a text
 };
 
-/// What is known of a series once it has been read.
+/// A datum, counted from 0 with those that are missing, and the line of the file, from 1, on which it stands.
+struct DatumLine {
+    std::size_t datum = 0;
+    std::size_t line = 0;
+};
+
+/// Properties of a series that are known once it has been read.
 struct SeriesInfo {
     std::string column;                    ///< its name, or its number from 1 where columns have no names
     std::optional<double> rate_hz;         ///< where the file says so
@@ -42,6 +48,12 @@ struct SeriesInfo {
     std::size_t n = 0;                     ///< values, those that are missing included
     std::size_t missing = 0;               ///< how many of them are
     bool rounded = false;                  ///< whole numbers of which some are beyond 2^53, where doubles lose digits
+    /// Of a text, the first datum of each run of data that stand on lines one after the other; empty where there are
+    /// more than 100 000 runs.
+    std::vector<DatumLine> lines = {};
+
+    /// Line of a datum that is in the file; nothing where the file has no lines.
+    std::optional<std::size_t> line_of(std::size_t datum) const;
 };
 
 struct Series : SeriesInfo {

@@ -27,6 +27,7 @@ void SeriesRows::begin_grid() {
     begun_ = true;
     for (const Waiting& row : waiting_) {
         fill(row.at);
+        line_ = row.line;
         if (row.kind == Waiting::Kind::value) {
             value(row.value);
         } else if (row.kind == Waiting::Kind::count) {

@@ -42,18 +42,23 @@ class SeriesRows {
     }
     void time(double time, std::size_t row) { this->time(text::Stamp::of(time), row); }
     void time(std::int64_t time, std::size_t row) { this->time(text::Stamp{time, 0.0}, row); }
+    /// The line of the file on which the next value stands, where the file has lines.
+    void line(std::size_t line) { line_ = line; }
     void value(double value) {
-        if (stamped_ && !place({Waiting::Kind::value, value, 0, {}})) return;
+        if (stamped_ && !place({Waiting::Kind::value, value, 0, {}, line_})) return;
+        note_line();
         all_whole_ = false;
         push(value, 0);
     }
     void count(std::int64_t count) {
-        if (stamped_ && !place({Waiting::Kind::count, 0.0, count, {}})) return;
+        if (stamped_ && !place({Waiting::Kind::count, 0.0, count, {}, line_})) return;
+        note_line();
         beyond_doubles_ = beyond_doubles_ || is_beyond_doubles(count);
         push(static_cast<double>(count), count);
     }
     void missing() {
-        if (stamped_ && !place({Waiting::Kind::missing, 0.0, 0, {}})) return;
+        if (stamped_ && !place({Waiting::Kind::missing, 0.0, 0, {}, line_})) return;
+        note_line();
         leave_out();
     }
 
@@ -67,6 +72,7 @@ class SeriesRows {
         double value;
         std::int64_t count;
         StampedRow at;
+        std::size_t line;
     };
     /// Fills what is left out before the row whose time was given; false where the row waits.
     bool place(const Waiting& row);
@@ -75,6 +81,21 @@ class SeriesRows {
     void leave_out() {
         ++info_.missing;
         push(std::numeric_limits<double>::quiet_NaN(), 0);
+    }
+    /// Of the datum that is pushed next.
+    void note_line() {
+        // A stream of any length is read in little memory: lines are kept while they come in few runs.
+        constexpr std::size_t most_runs = 100000;
+        if (line_ == 0 || lines_given_up_) return;
+        if (info_.lines.size() == most_runs) {
+            info_.lines = {};
+            lines_given_up_ = true;
+            return;
+        }
+        const std::size_t datum = info_.n + filled_;
+        if (info_.lines.empty() || datum - last_datum_ != line_ - last_line_) info_.lines.push_back({datum, line_});
+        last_datum_ = datum;
+        last_line_ = line_;
     }
     void push(double value, std::int64_t count) {
         values_[filled_] = value;
@@ -87,7 +108,11 @@ class SeriesRows {
     std::optional<TimeGrid> grid_;
     StampedRow stamp_;
     bool stamped_ = false;  ///< the next row has a time
-    bool begun_ = false;    ///< the grid is known
+    std::size_t line_ = 0;  ///< of the next row; 0: the file has none
+    std::size_t last_datum_ = 0;
+    std::size_t last_line_ = 0;
+    bool lines_given_up_ = false;
+    bool begun_ = false;  ///< the grid is known
     std::vector<Waiting> waiting_;
     std::vector<double> values_;
     std::vector<std::int64_t> counts_;

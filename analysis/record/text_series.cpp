@@ -37,6 +37,7 @@ class TextSeries {
         if (!columns().empty()) choose(more);
         for (; more; more = table_.next()) {
             if (times_) rows_.time(times_->of(table_), table_.line());
+            rows_.line(table_.line());
             value(table_.fields()[value_column_]);
         }
         return finish();
@@ -76,7 +77,7 @@ class TextSeries {
         } else if (columns().size() == of_time + 1) {
             while (times_ && times_->has(value_column_)) ++value_column_;
         } else {
-            throw InputError(fmt::format("{}: has {} {}{}; say which with --column ({})", place(layout.line()),
+            throw InputError(fmt::format("{}: has {} {}{}; choose one with --column ({})", place(layout.line()),
                                          columns().size(), columns().size() == 1 ? "column" : "columns",
                                          times_ ? fmt::format(", of which {} is the time", times_->name()) : "",
                                          text::columns_text(layout)));
@@ -106,8 +107,8 @@ class TextSeries {
         double value = 0.0;
         if (!text::parse_value(field, value, table_.layout().dialect.decimal_comma)) {
             throw InputError(
-                fmt::format("{}: '{}' is not a number (a double, in plain notation{}); where a value is missing, say "
-                            "nan",
+                fmt::format("{}: '{}' is not a number (a double, in plain notation{}); "
+                            "where a value is missing, say nan",
                             place_of_value(), text::shown(field),
                             table_.layout().dialect.decimal_comma ? " with a decimal comma" : ""));
         }
@@ -133,9 +134,8 @@ class TextSeries {
     void note_too_large(std::string_view field) {
         if (!too_large_.empty()) return;
         too_large_ = fmt::format(
-            "{}: {} is beyond 64 bits; in a column of whole numbers, which are kept to "
-            "the last digit, allowed are {} to {}. Subtract a constant, or write numbers with a "
-            "decimal point, which are rounded to doubles",
+            "{}: {} is beyond 64 bits; in a column of whole numbers, which are kept to the last digit, allowed "
+            "are {} to {}. Subtract a constant, or write numbers with a decimal point, which are rounded to doubles",
             place_of_value(), text::shown(field), std::numeric_limits<std::int64_t>::min(),
             std::numeric_limits<std::int64_t>::max());
     }

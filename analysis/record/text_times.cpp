@@ -37,8 +37,8 @@ TextTimes::TextTimes(const text::Layout& layout, const std::vector<std::string_v
         name_ += (name_.empty() ? "" : ",") + names_.back();
     }
     if (where_.size() > 1 && where_[0] == where_[1]) {
-        throw InputError(fmt::format("{}: --time {}: is one column twice; seconds and nanoseconds are two", file_,
-                                     text::shown(*request.time)));
+        throw InputError(fmt::format("{}: --time {}: names one column twice; seconds and nanoseconds are two columns",
+                                     file_, text::shown(*request.time)));
     }
     find_unit(layout, first, request);
 }
@@ -69,8 +69,8 @@ void TextTimes::find_unit(const text::Layout& layout, const std::vector<std::str
         }
     } else if (unit_ != *declared) {
         throw InputError(
-            fmt::format("{}:{}: column {} declares its times to be in {}, which contradicts --time-unit "
-                        "{}; leave the option out, or correct the header",
+            fmt::format("{}:{}: column {} declares its times to be in {}, which contradicts --time-unit {}; "
+                        "leave the option out, or correct the header",
                         file_, layout.line(), name_, declared->name, unit_.name));
     }
 }
@@ -93,11 +93,12 @@ text::Stamp TextTimes::of_one(const text::Table& table, std::size_t column) cons
     if (text::parse_stamp(field, unit_.iso, table.layout().dialect.decimal_comma, stamp)) return stamp;
     if (unit_.iso) {
         fail(table, column,
-             fmt::format("'{}' is no date such as 2024-05-01T12:00:00.5Z, as the other times are", text::shown(field)));
+             fmt::format("'{}' is not a date such as 2024-05-01T12:00:00.5Z, but the other times are dates",
+                         text::shown(field)));
     }
     fail(table, column,
-         fmt::format("'{}' is not a number; times must be numbers of seconds, of the unit of --time-unit, or ISO dates "
-                     "(2024-05-01T12:00:00.5Z)",
+         fmt::format("'{}' is not a number; times must be numbers of seconds, of the unit of --time-unit, "
+                     "or ISO dates (2024-05-01T12:00:00.5Z)",
                      text::shown(field)));
 }
 
@@ -107,7 +108,8 @@ text::Stamp TextTimes::of_two(const text::Table& table) const {
         text::Stamp stamp;
         const std::string both = fmt::format("{} {}", table.fields()[where_[0]], second);
         if (text::parse_stamp(both, true, false, stamp)) return stamp;
-        fail(table, 0, fmt::format("'{}' is no date and time of day such as 2024-05-01 12:00:00.5", text::shown(both)));
+        fail(table, 0,
+             fmt::format("'{}' is not a date and time of day such as 2024-05-01 12:00:00.5", text::shown(both)));
     }
     text::Stamp stamp = of_one(table, 0);
     text::Stamp nanoseconds;
@@ -118,7 +120,8 @@ text::Stamp TextTimes::of_two(const text::Table& table) const {
     const double value = nanoseconds.value();
     if (value < 0.0 || value >= in_a_second) {
         fail(table, 1,
-             fmt::format("is {}; nanoseconds beside seconds must be from 0 to 999999999", text::shown(second)));
+             fmt::format("is {}; nanoseconds next to a column of seconds must be from 0 to 999999999",
+                         text::shown(second)));
     }
     stamp.part += value * ns_s;  // NaN where they are missing
     return stamp;

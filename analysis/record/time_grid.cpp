@@ -42,16 +42,16 @@ void TimeGrid::check_order(const text::Stamp& stamp, std::size_t row, const Stam
     const double value = stamp.value();
     if (!std::isfinite(value)) {
         throw InputError(
-            fmt::format("{}: {}; every row needs its time, for it says where the row belongs. Leave rows without a "
-                        "time out",
+            fmt::format("{}: {}; every row needs its time, for it says where the row belongs. "
+                        "Leave rows without a time out",
                         place_(row), std::isnan(value) ? "has no time" : "the time is infinite"));
     }
     if (row == before.row) return;  // the first
     const double ahead = stamp.since(before.stamp);
     if (ahead > 0.0) return;
     throw InputError(
-        fmt::format("{}: the time {} {} {} of the row before it ({}); times must increase from row to row. Remove the "
-                    "repeated rows, or sort them",
+        fmt::format("{}: the time {} {} {} of the row before it ({}); times must increase from row to row. "
+                    "Remove the repeated rows, or sort them",
                     place_(row), said({stamp, row}), ahead == 0.0 ? "repeats the" : "is before the", said(before),
                     place_(before.row)));
 }
@@ -208,8 +208,8 @@ void TimeGrid::check_left_out(const text::Stamp& stamp, std::size_t row, double 
     if (left_out_ <= most) return;
     throw InputError(
         fmt::format("{}: the time {} leaves {:.6g} samples out since {} of the row before it ({}), {:.6g} in all; "
-                    "allowed are {:g}: 20 for each row so far, or 1e6. Is the time in {} and the rate {} Hz? Where the "
-                    "times are in ns, say, {}. Else cut the record at the gap",
+                    "allowed are {:g}: 20 for each row so far, or 1e6. Is the time in {} and the rate {} Hz? "
+                    "Where the times are in ns, say, {}. Else cut the record at the gap",
                     place_(row), said({stamp, row}), steps - 1.0, said(last_), place_(last_.row), left_out_, most,
                     unit_.name, rate_hz_, unit_advice("ns")));
 }
@@ -307,19 +307,20 @@ bool TimeGrid::contradicts_rate() const {
 
 void TimeGrid::fail_rate(std::size_t row, double slope) const {
     throw InputError(
-        fmt::format("{}: up to here the times say {:.8g} samples a second, gaps allowed for, which "
-                    "contradicts the rate of {} Hz by more than {:g} of it; give the rate that the instrument "
-                    "had, and times in seconds; of others {}",
+        fmt::format("{}: up to here the times say {:.8g} samples a second, "
+                    "gaps allowed for, which contradicts the rate of {} Hz by more than {:g} of it; "
+                    "give the rate that the instrument had, and times in seconds; for other units {}",
                     place_(row), rate_hz_ / (1.0 + slope), rate_hz_, rate_tolerance, unit_advice("ms")));
 }
 
 void TimeGrid::fail_off_grid(const StampedRow& row, const StampedRow& before, double off) const {
     if (contradicts_rate()) fail_rate(last_.row, drift().slope);
     throw InputError(
-        fmt::format("{}: the time {} is {:.6g} sampling intervals (1/rate = {:.6g} s) after {} of the row before it "
-                    "({}), and {:.3g} intervals off the grid of the rows near by; allowed is a whole number of "
-                    "intervals, give or take {}. Give the rate that the instrument had, and times in seconds (of "
-                    "others {}); samples that are not uniform must be resampled knowingly",
+        fmt::format("{}: the time {} is {:.6g} sampling intervals (1/rate = {:.6g} s) "
+                    "after {} of the row before it ({}), and {:.3g} intervals off the grid of the rows near by; "
+                    "allowed is a whole number of intervals, give or take {}. "
+                    "Give the rate that the instrument had, and times in seconds (for other units {}); "
+                    "samples that are not uniform must be resampled knowingly",
                     place_(row.row), said(row), row.stamp.since(before.stamp) * per_unit_, 1.0 / rate_hz_, said(before),
                     place_(before.row), off, furthest_off, unit_advice("ms")));
 }
@@ -328,8 +329,8 @@ void TimeGrid::check_rate() const {
     if (contradicts_rate()) fail_rate(last_.row, drift().slope);
     if (rows_ >= rows_to_judge_steps && fewest_steps_ > 1.0) {
         throw InputError(fmt::format(
-            "{}: up to here no two rows are closer than {} intervals of the rate of {} Hz; the "
-            "rate is too high, or the times are not in {} ({})",
+            "{}: up to here no two rows are closer than {} intervals of the rate of {} Hz; "
+            "the rate is too high, or the times are not in {} ({})",
             place_(last_.row), fewest_steps_, rate_hz_, unit_.name == "s" ? "seconds" : unit_.name, unit_advice("ms")));
     }
 }

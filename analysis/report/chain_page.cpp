@@ -42,11 +42,11 @@ std::string in_address(std::string_view name) {
 
 void add_chain_rates(const closure::Chain& chain, std::string& page) {
     page +=
-        "## What each record says of the source\n\nGains are those of the log-likelihood: of the likeliest rate of all "
-        "records over no source at all, and of what explains\nthe record most by itself over that rate.\n\n";
+        "## The source in each record\n\nThe gains are gains of the log-likelihood: that of the likeliest rate "
+        "of all records over no source, and that of the best\nexplanation of the record by itself over that rate.\n\n";
     page +=
-        "| record | rate found alone [Hz] | own rate near the shared one [Hz] | gain over no source | gain of its own "
-        "|\n|---|---|---|---|---|\n";
+        "| record | rate found alone [Hz] | own rate near the shared one [Hz] | gain over no source | gain "
+        "of its own |\n|---|---|---|---|---|\n";
     for (const closure::ChainRecord& record : chain.records) {
         const std::string alone = record.alone_hz ? fmt::format("{:.8g}", *record.alone_hz) : "none";
         const std::string near =
@@ -57,15 +57,15 @@ void add_chain_rates(const closure::Chain& chain, std::string& page) {
     }
     if (chain.freedom > 0) {
         page += fmt::format(
-            "\nThe records' own rates differ from their mean by a chi-squared of {:.3g} of {} degrees of freedom, by "
-            "chance p {}.\n",
+            "\nThe records' own rates differ from their mean by a chi-squared of {:.3g} of {} degrees of freedom, "
+            "by chance p {}.\n",
             chain.chi2, chain.freedom, closure::probability(chain.p_value));
     }
     page +=
-        "\n## Rates of the source\n\nReadings at all of these rates leave the same pattern in the records. The sum is "
-        "that of the log-likelihoods of all records, less that of\nthe likeliest rate; within 4, and above twice the "
-        "record's rate, the records do not tell it from that.\n\n| rate [Hz] | sum | of each record | told apart "
-        "|\n|---|---|---|---|\n";
+        "\n## Rates of the source\n\nSamples taken at any of these rates leave the same pattern in the records. "
+        "The sum is the log-likelihood of all records minus that\nof the likeliest rate. A rate is tied "
+        "with the likeliest rate if the sum is above -4, or if the rate is above twice that of the record.\n"
+        "\n| rate [Hz] | sum | of each record | distinguished |\n|---|---|---|---|\n";
     for (const closure::ChainRate& rate : chain.rates) {
         std::string of_records;
         for (const double value : rate.log_likelihood) {
@@ -85,7 +85,7 @@ void add_chain_rates(const closure::Chain& chain, std::string& page) {
 void write_chain_page(const std::filesystem::path& folder, const closure::Chain& chain,
                       const std::vector<std::string>& folders, const nlohmann::json& object) {
     closure::check_chain_folder(folder);  // again: the computation may have taken hours
-    std::string page = fmt::format("# What was found in {} records of one data chain\n\n**{}.**\n\n",
+    std::string page = fmt::format("# Error sources in {} records of one data chain\n\n**{}.**\n\n",
                                    chain.records.size(), closure::verdict_sentence(chain));
     const std::vector<std::string> against = closure::contradictions(chain);
     for (const std::string& line : against) page += fmt::format("- {}\n", escaped(line));

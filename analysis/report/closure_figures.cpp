@@ -84,8 +84,8 @@ Picture over_time(const std::string& source, const record::Record& record, const
     Picture picture{
         .file = "record.svg",
         .caption =
-            fmt::format("The record over time, mean rates over {:.3g} s, and what is deterministic in the model. "
-                        "Vertical lines are the times at which effects set in.",
+            fmt::format("The record over time as mean rates over {:.3g} s, and the deterministic part of the model. "
+                        "Vertical lines mark the times at which effects begin.",
                         rates.interval_s),
         .figure = {
             .title = fmt::format("Rate of {} over time", source), .x_label = "time [s]", .y_label = "rate [deg/h]"}};
@@ -127,15 +127,13 @@ void add_lines(const std::string& source, const record::Record& record, const Cl
         if (std::abs(shown_hz - hz) > near.resolution_hz) {
             folded = fmt::format(" The record shows a line of {:.6g} Hz there.", hz);
         }
-        Picture picture{
-            .file = fmt::format("line-{}.svg", drawn),
-            .caption = fmt::format(
-                "Spectrum of the record about the line of `{}` at {:.6g} Hz; the resolution of the record is {:.2g} "
-                "Hz.{}",
-                step.effect->name(), shown_hz, near.resolution_hz, folded),
-            .figure = {.title = fmt::format("Spectrum of {} about {:.6g} Hz", source, shown_hz),
-                       .x_label = "frequency [Hz]",
-                       .y_label = "amplitude [deg/h]"}};
+        Picture picture{.file = fmt::format("line-{}.svg", drawn),
+                        .caption = fmt::format("Spectrum of the record about the line of `{}` at {:.6g} Hz; "
+                                               "the resolution of the record is {:.2g} Hz.{}",
+                                               step.effect->name(), shown_hz, near.resolution_hz, folded),
+                        .figure = {.title = fmt::format("Spectrum of {} about {:.6g} Hz", source, shown_hz),
+                                   .x_label = "frequency [Hz]",
+                                   .y_label = "amplitude [deg/h]"}};
         picture.figure.curves.push_back(
             {.label = "measured", .x = near.hz, .y = near.amplitude_deg_h, .style = Curve::Style::line});
         const double high = *std::max_element(near.amplitude_deg_h.begin(), near.amplitude_deg_h.end());
@@ -157,13 +155,12 @@ std::vector<Picture> closure_pictures(const std::string& source, const record::R
         Picture picture;
         picture.file = file;
         picture.caption = fmt::format(
-            "{}: circles are the record, the band is the range of simulations of the closed model. Circles outside of "
-            "it show what the model lacks.{}{}",
+            "{}: circles are the record, the band is the range of simulations of the closed model. "
+            "Circles outside of the band show structure that the model lacks.{}{}",
             title, statistic->base.empty() ? "" : " The dashed line is the base model without the effects.",
             statistic->measured_whole.empty()
                 ? ""
-                : " Disturbed stretches are left out of the circles and of the simulations alike; the thin line has "
-                  "them.");
+                : " Circles and simulations leave out disturbed stretches; the thin line includes them.");
         picture.figure = {.title = fmt::format("{} of {}", title, source),
                           .x_label = fmt::format("{} [{}]", statistic->x_name, statistic->x_unit),
                           .y_label = y_label,
@@ -177,8 +174,8 @@ std::vector<Picture> closure_pictures(const std::string& source, const record::R
     Picture folded{
         .file = "folded.svg",
         .caption =
-            "Change of the angle across a turn, by the phase at which it turns: the kick of the lock-in. Markers are "
-            "the record, bands the range of simulations of the closed model.",
+            "Change of the angle across a turn, by the phase at which it turns: "
+            "the kick of the lock-in. Markers are the record, bands the range of simulations of the closed model.",
         .figure = {.title = fmt::format("Change of {} across its turns, by their phase", source),
                    .x_label = "phase at the turn [rad]",
                    .y_label = "gain less its mean [mrad of phase]"}};
@@ -197,9 +194,9 @@ std::vector<Picture> closure_pictures(const std::string& source, const record::R
 
     Picture steps{.file = "steps.svg",
                   .caption =
-                      "Held-out one-step error of the base model and after each effect; the dashed line is the "
-                      "error that the noise of the last model alone leaves. An effect that does not change the next "
-                      "reading, such as a rounding of the values, leaves the error as it was.",
+                      "Held-out one-step error of the base model and after each effect; the dashed line is the error "
+                      "that the noise of the last model alone gives. An effect that does not change the next reading, "
+                      "such as a rounding of the values, does not change the error.",
                   .figure = {.title = fmt::format("Held-out error of {}, step by step", source),
                              .x_label = "effects in the model",
                              .y_label = fmt::format("rms one-step error [{}]", closure.unit),

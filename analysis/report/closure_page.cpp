@@ -45,15 +45,18 @@ std::string value_text(const Estimate& e) {
 }
 
 void add_steps(const Closure& closure, std::string& page) {
-    page += "## What was added\n\n";
+    page += "## Effects\n\n";
     if (closure.steps.empty()) {
-        page += "No effect of the library: the record asks for none, or none is what is missing.\n\n";
+        page +=
+            "No effect was added: the record does not need one, "
+            "or no effect of the library explains its structure.\n\n";
         return;
     }
     page += fmt::format(
-        "One row for each effect that the record asks for, in the order in which they were added. The held-out error "
-        "is the rms error\nof one-step predictions [{}] in parts of the record that nothing was fitted to; p is the "
-        "probability that chance alone looks like\nthe effect, all that was searched counted.\n\n",
+        "Each row is an effect that the record supports, in the order in which the effects were added. "
+        "The held-out error is the rms error\n"
+        "of one-step predictions [{}] in parts of the record that were not used for the fit. p is the probability "
+        "that chance alone looks\nlike the effect, with the look-elsewhere correction for the whole search.\n\n",
         closure.unit);
     page += "| step | effect | parameters | held-out error before | after | log-score gained | p |\n";
     page += "|---|---|---|---|---|---|---|\n";
@@ -70,48 +73,48 @@ void add_steps(const Closure& closure, std::string& page) {
     page += "\n";
     if (closure.steps.front().heldout_error_before < closure.heldout_before) {
         page +=
-            "Effects that only stood in for one of these were dropped again: the first row does not begin at the base "
-            "model.\n\n";
+            "Effects that were only placeholders for one of these were removed again, "
+            "so that the first row does not begin at the base model.\n\n";
     }
-    page += "What to do about each:\n\n";
+    page += "Advice for each effect:\n\n";
     for (const Step& step : closure.steps) {
         page += fmt::format("- `{}`: {}\n", step.effect->name(), step.effect->advice());
     }
     page += "\n";
     for (const Step& step : closure.steps) {
         if (step.confounded_with.empty()) continue;
-        page += fmt::format("This record cannot tell `{}` from `{}`. What would: {}.\n\n", step.effect->name(),
-                            fmt::join(closure::names_of(step.confounded_with), "`, `"), step.experiment);
+        page += fmt::format(
+            "`{}` is tied with `{}`: the record supports these effects equally well. "
+            "To distinguish them: {}.\n\n",
+            step.effect->name(), fmt::join(closure::names_of(step.confounded_with), "`, `"), step.experiment);
     }
 }
 
 void add_closed(const closure::ClosedScenario& closed, std::string& page) {
     const std::vector<std::string> placeholders = closed.placeholders();
     if (placeholders.empty() && closed.not_held.empty()) return;
-    page += "## How far closed.toml goes\n\n";
+    page += "## Limits of closed.toml\n\n";
     if (!placeholders.empty()) {
         page += fmt::format(
-            "The record neither declares nor determines {} of its values. Those of the standard gyro stand in their "
-            "place: `{}`.\n\n",
+            "The record neither declares nor determines {} of its values. "
+            "Placeholders with the values of the standard gyro are: `{}`.\n\n",
             placeholders.size(), fmt::join(placeholders, "`, `"));
     }
     if (closed.not_held.empty()) return;
-    page += "A scenario cannot hold all that was found. It is without:\n\n";
+    page += "A scenario cannot hold all findings. It does not contain:\n\n";
     for (const std::string& finding : closed.not_held) page += fmt::format("- {}\n", cell(finding));
     page += "\n";
 }
 
 void add_predictive(const Predictive& predictive, std::string& page) {
-    page += "## Does the closed model make such records?\n\n";
+    page += "## Predictive check\n\n";
     if (predictive.simulations > 0) {
         page += fmt::format(
-            "The device of `closed.toml` was simulated {} times over the length and the input of this record, with "
-            "parameters "
-            "drawn about their\nestimates by their standard errors, and every simulation looked at as the record was. "
-            "p "
-            "is the rank of the record's largest deviation\nfrom the simulations among their own largest: {:.2g} where "
-            "no "
-            "simulation is as far out as the record, and not less.\n\n",
+            "The device of `closed.toml` was simulated {} times over the length and the input of this record, "
+            "with parameters drawn about their\n"
+            "estimates by their standard errors, and every simulation was analysed like the record. p is the rank "
+            "of the record's largest deviation\nfrom the simulations among their own largest deviations. "
+            "Its least value, {:.2g}, means that no simulation deviates as far as the record.\n\n",
             predictive.simulations, 1.0 / (predictive.simulations + 1.0));
         page += "| statistic | points | p | largest deviation |\n|---|---|---|---|\n";
         for (const PredictiveStatistic& s : predictive.statistics) {
@@ -130,17 +133,17 @@ void add_predictive(const Predictive& predictive, std::string& page) {
 void write_closure_page(const std::filesystem::path& folder, const std::string& source, const record::Record& record,
                         const Closure& closure, const Predictive& predictive) {
     std::string page =
-        fmt::format("# What was found in {}\n\n**{}.**\n\n", markdown(source), closure::verdict_sentence(closure));
+        fmt::format("# Error sources in {}\n\n**{}.**\n\n", markdown(source), closure::verdict_sentence(closure));
     page += fmt::format(
-        "A gyro without anything beyond its base equation foretells the next reading to {:.6g} {} rms, the model found "
-        "here to {:.6g} {};\nits noise alone would leave {:.6g} {}. A record with nothing to find gets another verdict "
-        "than that with a probability of {:.2g}.\n\n",
+        "The base model predicts the next reading to {:.6g} {} rms, the model found here to {:.6g} {};\n"
+        "its noise alone gives {:.6g} {}. A record without a further error source gets a verdict other "
+        "than `nothing_missing` with a\nprobability of {:.2g}.\n\n",
         closure.heldout_before, closure.unit, closure.heldout_after, closure.unit, closure.noise_floor, closure.unit,
         closure.level);
     add_steps(closure, page);
     page +=
-        "## The base model\n\nFitted with all effects above; ± one standard error.\n\n| parameter | value "
-        "|\n|---|---|\n";
+        "## The base model\n"
+        "\nFitted with all effects above; ± one standard error.\n\n| parameter | value |\n|---|---|\n";
     for (const Estimate& e : closure.base) page += fmt::format("| `{}` | {} |\n", e.name, cell(value_text(e)));
     page += "\n";
     add_closed(closure::closed_scenario(record, closure), page);
@@ -163,9 +166,11 @@ void write_closure_page(const std::filesystem::path& folder, const std::string& 
     }
     if (!problem.empty()) page += fmt::format("Figures are missing: {}\n\n", problem);
 
-    page += "## What is left of the record\n\n";
-    page += "The residual of the last model held against all that the record has; each p counts its own searches.\n\n";
-    page += "| where | held against | p | most |\n|---|---|---|---|\n";
+    page += "## Tests of the residual\n\n";
+    page +=
+        "Each row is one test of the residual of the last model; its p includes the look-elsewhere correction "
+        "for its own search.\n\n";
+    page += "| where | test | p | largest |\n|---|---|---|---|\n";
     for (const closure::ResidualTest& test : closure.tests) {
         page += fmt::format("| {} | {} | {} | {} |\n", closure::name_of(test.where), cell(test.view),
                             closure::probability(test.p_value), cell(test.detail));
@@ -175,9 +180,9 @@ void write_closure_page(const std::filesystem::path& folder, const std::string& 
     for (const std::string& note : closure.notes) page += fmt::format("- {}\n", cell(note));
     if (!closure.notes.empty()) page += "\n";
     page +=
-        "## The files\n\n- `closed.toml`: the device as fitted, for `ringlock run` and `ringlock record`\n- "
-        "`closure.h5`: parameters, one-step predictions, scores, the predictive check point by point\n- "
-        "`closure.json`: this page for programs\n";
+        "## The files\n\n- `closed.toml`: the device as fitted, for `ringlock run` and `ringlock record`\n"
+        "- `closure.h5`: parameters, one-step predictions, scores, the predictive check point by point\n"
+        "- `closure.json`: the content of this page for programs\n";
     write_text(folder / "report.md", closure::sealed(page, closure::Comment::markup));
 }
 

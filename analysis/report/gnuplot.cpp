@@ -106,6 +106,20 @@ int run(int in, int out, int err) {
 
 }  // namespace
 
+std::string literal(std::string_view text) {
+    std::string out = "\"";
+    for (const char c : text) {
+        const auto byte = static_cast<unsigned char>(c);
+        const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == ' ';
+        if (plain || byte < 0x20 || byte == 0x7F) {
+            out += plain ? c : ' ';
+        } else {
+            out += fmt::format("\\{:03o}", byte);
+        }
+    }
+    return out + "\"";
+}
+
 std::string run_gnuplot(const std::string& script, const std::string& shown_as) {
     const Descriptor in = readable(script);
     const Descriptor out = memory_file("gnuplot-figure");

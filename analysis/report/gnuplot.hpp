@@ -1,7 +1,12 @@
 #pragma once
 #include <string>
+#include <string_view>
 
 namespace ringlock::report {
+
+/// A literal of gnuplot. All but letters and blanks is written as octal codes (digits too, they would prolong a code):
+/// nothing in it can end the string, be expanded or be run.
+std::string literal(std::string_view text);
 
 /// Runs gnuplot on a script whose figure goes to standard output, and returns the figure, complete.
 ///

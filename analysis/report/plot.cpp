@@ -14,6 +14,7 @@
 
 #include "analysis/report/code_points.hpp"
 #include "analysis/report/gnuplot.hpp"
+#include "analysis/report/render.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::report {
@@ -34,22 +35,6 @@ struct Marker {
 // colours: a pair comes back only after 42 curves.
 constexpr std::array<Marker, 7> markers = {{{6, 1.35}, {5, 0.8}, {8, 1.4}, {13, 0.8}, {4, 1.15}, {7, 0.55}, {10, 1.1}}};
 constexpr std::array<std::string_view, 3> dashes = {"(12,6)", "(4,4)", "(14,4,3,4)"};
-
-/// A literal of gnuplot. All but letters and blanks is written as octal codes (digits too, they would prolong a code):
-/// nothing in it can end the string, be expanded or be run.
-std::string literal(std::string_view text) {
-    std::string out = "\"";
-    for (const char c : text) {
-        const auto byte = static_cast<unsigned char>(c);
-        const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == ' ';
-        if (plain || byte < 0x20 || byte == 0x7F) {
-            out += plain ? c : ' ';
-        } else {
-            out += fmt::format("\\{:03o}", byte);
-        }
-    }
-    return out + "\"";
-}
 
 /// Breaks a title that one line cannot hold at blanks.
 std::string literal_lines(std::string_view text, std::size_t limit) {
@@ -206,8 +191,9 @@ Plotted plotted(const Curve& curve, std::size_t index, std::size_t rank, std::si
         rows += '\n';
     }
     const std::string_view colour =
-        dashed ? theory_colours[rank % theory_colours.size()] : colours[rank % colours.size()];
-    const std::string title = literal(curve.label + (any ? "" : " (nothing to show)"));
+        dashed ? theory_colours[rank % theory_colours.size()] : colours[curve.colour.value_or(rank) % colours.size()];
+    const std::string title =
+        curve.in_legend() ? "title " + literal(curve.label + (any ? "" : " (nothing to show)")) : "notitle";
     const std::string block = fmt::format("$curve{}", index);
 
     Plotted out;
@@ -226,19 +212,18 @@ Plotted plotted(const Curve& curve, std::size_t index, std::size_t rank, std::si
                     fmt::format("{} using 1:{} with lines linewidth 1.2 linecolor '{}' notitle, ", block, edge, colour);
             }
         }
-        out.plots +=
-            fmt::format("{} with filledcurves fillstyle transparent solid 0.3 noborder linecolor '{}' title {}",
-                        any ? block + " using 1:3:4" : "NaN", colour, title);
+        out.plots += fmt::format("{} with filledcurves fillstyle transparent solid 0.3 noborder linecolor '{}' {}",
+                                 any ? block + " using 1:3:4" : "NaN", colour, title);
     } else if (curve.style == Curve::Style::points) {
-        const Marker marker = markers[rank % markers.size()];
-        out.plots += fmt::format("{} with points pointtype {} pointsize {} linewidth 2 linecolor '{}' title {}", what,
+        const Marker marker = markers[curve.colour.value_or(rank) % markers.size()];
+        out.plots += fmt::format("{} with points pointtype {} pointsize {} linewidth 2 linecolor '{}' {}", what,
                                  marker.type, marker.size, colour, title);
     } else if (dashed) {
-        out.plots += fmt::format("{} with lines dashtype {} linewidth 1.8 linecolor '{}' title {}", what,
+        out.plots += fmt::format("{} with lines dashtype {} linewidth 1.8 linecolor '{}' {}", what,
                                  dashes[rank % dashes.size()], colour, title);
     } else {
-        const double wide = std::min(5.0, 2.0 + 1.2 * static_cast<double>(above));
-        out.plots += fmt::format("{} with lines linewidth {:.1f} linecolor '{}' title {}", what, wide, colour, title);
+        const double wide = curve.colour ? 1.5 : std::min(5.0, 2.0 + 1.2 * static_cast<double>(above));
+        out.plots += fmt::format("{} with lines linewidth {:.1f} linecolor '{}' {}", what, wide, colour, title);
     }
     return out;
 }
@@ -290,7 +275,9 @@ std::string script(const Figure& figure) {
     if (plots.empty()) plots = "NaN notitle";
 
     const std::size_t columns = std::clamp<std::size_t>(900 / (70 + 8 * longest), 1, 3);
-    const int rows = static_cast<int>((order.size() + columns - 1) / columns);
+    const auto entries = static_cast<std::size_t>(
+        std::count_if(order.begin(), order.end(), [](const Curve* c) { return c->in_legend(); }));
+    const int rows = static_cast<int>((entries + columns - 1) / columns);
     const int height = height_px + legend_row_px * std::max(0, rows - 4);
     return fmt::format(
                "set encoding utf8\n"
@@ -315,8 +302,13 @@ std::string draw_svg(const Figure& figure, const std::string& shown_as) {
     return run_gnuplot(script(figure), shown_as);
 }
 
-void write_svg(AtomicPath& target, const Figure& figure) {
-    write_text(target, draw_svg(figure, target.target().string()));
+void write_drawing(AtomicPath& target, const std::string& svg) {
+    const std::string file = target.target().string();
+    write_text(target, rendered(svg, picture_of(file, "figure"), file));
+}
+
+void write_figure(AtomicPath& target, const Figure& figure) {
+    write_drawing(target, draw_svg(figure, target.target().string()));
 }
 
 void write_svg(const std::filesystem::path& path, const Figure& figure) {
@@ -326,7 +318,7 @@ void write_svg(const std::filesystem::path& path, const Figure& figure) {
     } catch (const InputError& error) {
         throw RunError(error.what());
     }
-    write_svg(*target, figure);
+    write_text(*target, draw_svg(figure, target->target().string()));
 }
 
 }  // namespace ringlock::report

@@ -1,5 +1,7 @@
 #pragma once
+#include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,6 +23,12 @@ struct Curve {
         {};  ///< lower ends of the error bars in units of y; empty: no bars. NaN: none on that side
     std::vector<double> hi = {};  ///< upper ends, likewise
     Style style = Style::points;
+    /// Number of the colour; without it curves of a kind have one after the other. A line with a colour of its own is
+    /// thin, for it belongs to the curve of that colour.
+    std::optional<std::size_t> colour = {};
+
+    /// A curve without a label has no entry in the legend.
+    bool in_legend() const { return !label.empty(); }
 };
 
 struct Figure {
@@ -43,9 +51,12 @@ struct Figure {
 /// fails.
 std::string draw_svg(const Figure& figure, const std::string& shown_as);
 
-/// Draws it into a file that is claimed, complete or not at all. Throws RunError, too, when the file cannot be written.
-void write_svg(AtomicPath& target, const Figure& figure);
-/// The same, the file claimed now.
+/// Writes an SVG that is drawn into a file that is claimed, as SVG, PNG or PDF by the ending of its name, complete or
+/// not at all. Throws RunError, too, when the file cannot be written.
+void write_drawing(AtomicPath& target, const std::string& svg);
+/// Draws a figure and writes it so.
+void write_figure(AtomicPath& target, const Figure& figure);
+/// Draws it as SVG, the file claimed now.
 void write_svg(const std::filesystem::path& path, const Figure& figure);
 
 }  // namespace ringlock::report

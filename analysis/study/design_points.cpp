@@ -35,7 +35,7 @@ std::string key_of(std::size_t variation, std::string_view name) {
 /// Why a key cannot vary; empty where it can.
 std::string why_not(const std::string& path) {
     const scenario::Key* key = scenario::find_key(path);
-    if (key == nullptr) return "is no key of a scenario; `ringlock run --print-schema` prints all of them";
+    if (key == nullptr) return "is not a key of a scenario; `ringlock run --print-schema` prints all of them";
     const bool number = key->type == scenario::Type::real || key->type == scenario::Type::integer;
     if (!number) return fmt::format("is {}; a design varies numbers", scenario::allowed_text(*key));
     if (path.starts_with("propagation.")) return "is about how the equation is solved and does not vary";
@@ -143,8 +143,7 @@ std::vector<Complaint> complaints_of_design(const Scenario& scenario) {
     }
     if (wanted.kind == scenario::DesignKind::none) {
         complain("design.kind",
-                 "does not say what to do with [[design.vary]]; set \"grid\", \"list\", "
-                 "\"latin_hypercube\" or \"sobol\"");
+                 "does not say how [[design.vary]] is used; set \"grid\", \"list\", \"latin_hypercube\" or \"sobol\"");
     }
     if (scenario.input.sweep_points > 1) {
         complain("input.sweep_points", "a sweep and a design exclude each other; vary input.rate_deg_h in the design");
@@ -190,7 +189,7 @@ std::vector<Complaint> complaints_of_design(const Scenario& scenario) {
             const double value = design::level(factor, level);
             if (value == std::round(value)) continue;
             found.push_back({{key_of(i, "values"), key_of(i, "points"), key_of(i, "key")},
-                             fmt::format("{} is a whole number, and {:g} is none; give values", v.key, value)});
+                             fmt::format("{} is a whole number, but {:g} is not; give values", v.key, value)});
             break;
         }
     }
@@ -305,15 +304,14 @@ std::vector<Complaint> complaints_of_specification(const Scenario& scenario, con
         const bool all = std::all_of(axis.values.begin(), axis.values.end(), [](double value) { return value == 0.0; });
         if (some && !all) {
             found.push_back({{key_of(i, "key")},
-                             fmt::format("{} is 0 at some points, which do not ask for it, and not at others; leave 0 "
-                                         "out",
+                             fmt::format("{} is 0 at some points, where it is no limit, and not at others; leave 0 out",
                                          axis.key)});
         }
         const bool time = axis.key == "specification.at_s" || axis.key == "specification.after_s";
         if (time && scenario.design.sensitivity_base_points > 0) {
             found.push_back({{key_of(i, "key")},
-                             fmt::format("{} sets which figure is meant, and an index is of one figure; leave it out, "
-                                         "or the indices",
+                             fmt::format("{} selects the figure, and an index is that of one figure; "
+                                         "leave it out, or the indices",
                                          axis.key)});
         }
     }
@@ -373,8 +371,8 @@ std::vector<Complaint> complaints(const Scenario& scenario) {
         std::vector<std::string> keys{"output.angle_record"};
         for (std::string& key : keys_of_axes(axes)) keys.push_back(std::move(key));
         found.push_back({std::move(keys),
-                         "records of different lengths or sampling intervals have no place in one "
-                         "dataset; set output.angle_record = false"});
+                         "records of different lengths or sampling intervals have no place in one dataset; "
+                         "set output.angle_record = false"});
     }
     return found;
 }

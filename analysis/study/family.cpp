@@ -79,10 +79,10 @@ std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesyste
     const Study& study = experiment.points[point];
     const std::size_t gyros = study.gyros.size();  // of every point as many
     if (!study.scenario.output.angle_record) {
-        throw InputError(fmt::format(
-            "{}: holds no angle records, which other deviations than its own are made of; run the scenario with "
-            "output.angle_record = true",
-            printable(path)));
+        throw InputError(
+            fmt::format("{}: holds no angle records, from which deviations other than its own are computed; "
+                        "run the scenario with output.angle_record = true",
+                        printable(path)));
     }
     return store::guarded(path, [&](const store::GuardedPath& guarded) {
         const store::File file = store::File::open(guarded);

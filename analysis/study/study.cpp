@@ -335,7 +335,7 @@ void predict_noise(std::span<Study> studies, int threads, const ensemble::Monito
     std::atomic<std::int64_t> done = 0;
     const auto tell = [&](std::int64_t predicted) {
         if (monitor.observer)
-            monitor.observer->stage(fmt::format("predicting what noise does, {}/{}", predicted, predictions));
+            monitor.observer->stage(fmt::format("predicting the effect of the noise, {}/{}", predicted, predictions));
     };
     tell(0);
     ensemble::on_threads(threads, [&] {

@@ -47,7 +47,7 @@ std::size_t find_column(const Layout& layout, const std::string& asked, const st
     if (found.size() > 1) {
         std::vector<std::string> numbers;
         for (const std::size_t k : found) numbers.push_back(std::to_string(k + 1));
-        throw InputError(fmt::format("{}:{}: '{}' is the name of several columns: {}; say which by its number", file,
+        throw InputError(fmt::format("{}:{}: '{}' is the name of several columns: {}; choose one by its number", file,
                                      layout.line(), shown(asked), listed(numbers)));
     }
     std::vector<std::string> names;

@@ -64,7 +64,7 @@ class Finder {
         } else if (!d.decimal_comma && (d.delimiter == ',' || d.by_space())) {
             return;
         }
-        note(fmt::format("columns are taken to be parted by {}{}; --delimiter says otherwise", name_of(d),
+        note(fmt::format("columns are taken to be separated by {}{}; --delimiter overrides this", name_of(d),
                          d.decimal_comma ? ", and commas in numbers for decimal commas" : ""));
     }
 
@@ -77,7 +77,7 @@ class Finder {
 
     void take_header(std::size_t line) {
         if (line > sample_.size() || trimmed(sample_[line - 1]).empty()) {
-            fail(line, fmt::format("--header {}: there is no text in that line, which cannot be the header", line));
+            fail(line, fmt::format("--header {}: that line has no text and cannot be the header", line));
         }
         const std::string_view text = sample_[line - 1];
         const std::string_view named = is_comment(text, evidence_.dialect) ? without_mark(text) : text;
@@ -86,10 +86,9 @@ class Finder {
         const std::size_t columns = evidence_.columns > 0 ? evidence_.columns : divider_.divide(named, true).size();
         const std::vector<std::string> names = headings(named, evidence_.dialect, columns, evidence_.last_empty);
         if (names.empty()) {
-            fail(line,
-                 fmt::format("has {} fields where rows have {}, and cannot be their header; columns are parted by "
-                             "{} (--delimiter)",
-                             divider_.divide(named, true).size(), columns, name_of(evidence_.dialect)));
+            fail(line, fmt::format("has {} fields where rows have {}, and cannot be their header; "
+                                   "columns are separated by {} (--delimiter)",
+                                   divider_.divide(named, true).size(), columns, name_of(evidence_.dialect)));
         }
         name_columns(names, line);
         if (first_ < candidates_.lines.size() && is_units(candidates_.lines[first_])) take_units(first_++);
@@ -251,7 +250,7 @@ class Finder {
     void note_header() {
         std::vector<std::string> names;
         for (const Column& column : out_.columns) names.push_back(shown(column.heading));
-        note(fmt::format("line {} is taken for the header: {}; --header and --skip say otherwise", out_.header_line,
+        note(fmt::format("line {} is taken for the header: {}; --header and --skip override this", out_.header_line,
                          listed(names)));
     }
 
@@ -335,7 +334,7 @@ class Finder {
                              candidates_.numbers[above > 0 ? above - 1 : 0]));
         }
         if (left_aside == 0) return;
-        note(fmt::format("{} of text above the table, from line {} on, {} left aside",
+        note(fmt::format("{} of text above the table, from line {} on, {} ignored",
                          left_aside == 1 ? "a line" : fmt::format("{} lines", left_aside), candidates_.numbers[0],
                          left_aside == 1 ? "is" : "are"));
     }

@@ -25,8 +25,8 @@ void Lines::refuse_zeros(std::size_t from, std::size_t count) {
     const std::string_view text(buffer_.data() + begin_, before);
     const auto line = number_ + 1 + static_cast<std::size_t>(std::count(text.begin(), text.end(), end_of_line_));
     throw InputError(
-        fmt::format("{}:{}: holds a zero byte: the file is binary, or damaged (where a disk was full, say); text, HDF5 "
-                    "and packed text are read",
+        fmt::format("{}:{}: holds a zero byte: the file is binary, or damaged (where a disk was full, say); "
+                    "text, HDF5 and packed text are read",
                     name_, line));
 }
 

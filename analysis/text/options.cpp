@@ -30,8 +30,8 @@ void set_delimiter(Options& options, const std::string& word) {
                         word.find_first_of("\"#.+-0123456789") == std::string::npos;
     if (!usable) {
         throw InputError(
-            fmt::format("--delimiter {}: must be comma, semicolon, tab, space or one character that is "
-                        "part of no number, such as '|'",
+            fmt::format("--delimiter {}: must be comma, semicolon, tab, "
+                        "space or one character that is part of no number, such as '|'",
                         shown(word)));
     }
     options.delimiter = word[0];

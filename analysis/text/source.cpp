@@ -43,7 +43,7 @@ class File final : public Source {
 void refuse(const Identity& identity, const std::string& name, bool unpacked) {
     if (identity.kind.empty()) return;
     throw InputError(
-        fmt::format("{}: {}is {}; {}", name, unpacked ? "what is packed in it " : "", identity.kind, identity.advice));
+        fmt::format("{}: {}is {}; {}", name, unpacked ? "its unpacked content " : "", identity.kind, identity.advice));
 }
 
 }  // namespace

@@ -69,7 +69,7 @@ void Table::fail(const std::string& what) const { throw InputError(fmt::format("
 
 void Table::refuse_width() const {
     const std::size_t found = fields_->size();
-    fail(fmt::format("has {} {} where the {} has {}; columns are parted by {}", found,
+    fail(fmt::format("has {} {} where the {} has {}; columns are separated by {}", found,
                      found == 1 ? "column" : "columns", layout_.has_header ? "header" : "first row",
                      layout_.columns.size(), name_of(layout_.dialect)));
 }
@@ -88,8 +88,8 @@ bool Table::next() {
         fields_ = &divider_.divide(text);
         if (divider_.broken() != 0) {
             fail(
-                fmt::format("column {}: the quotes around it do not close, or text follows them; a quote within "
-                            "quotes is written \"\"",
+                fmt::format("column {}: the quotes around it do not close, or text follows them; "
+                            "a quote within quotes is written \"\"",
                             divider_.broken()));
         }
         if (fields_->size() != layout_.columns.size()) refuse_width();

@@ -35,8 +35,8 @@ class Unpacking : public Source {
 
     [[noreturn]] void fail_damaged(std::string_view why) const {
         throw InputError(
-            fmt::format("{}: is packed with {} and damaged within its first {} bytes ({}); take another "
-                        "copy, or see what `{} -t` says",
+            fmt::format("{}: is packed with {} and damaged within its first {} bytes ({}); take another copy, "
+                        "or check it with `{} -t`",
                         name_, program_, read_bytes_, why, program_));
     }
     [[noreturn]] void fail_early() const {
@@ -47,8 +47,8 @@ class Unpacking : public Source {
     }
     [[noreturn]] void fail_window() const {
         throw InputError(
-            fmt::format("{}: is packed with {} so that unpacking wants more than 64 MB at a time; unpack "
-                        "it yourself, or pack it with a smaller window",
+            fmt::format("{}: is packed with {} so that unpacking needs more than 64 MB at a time; "
+                        "unpack it yourself, or pack it with a smaller window",
                         name_, program_));
     }
 

@@ -400,8 +400,8 @@ void Exact::solve(const readout::LaneReadings& readings, std::size_t first, std:
     if (!HWY_DYNAMIC_DISPATCH(observe_lanes)(calibration_.lanes, tables_, parts_, readings, first, last, begun_,
                                              changed_, turns_, state_, errors)) {
         throw RunError(
-            "compensated_exact: the phase does not reverse near a turn of the dither; the input rate is too high for "
-            "it");
+            "compensated_exact: the phase does not reverse near a turn of the dither; "
+            "the input rate is too high for it");
     }
     changed_ = false;
 }

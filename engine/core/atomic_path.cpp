@@ -36,7 +36,7 @@ fs::path resolve(const fs::path& target) {
         throw InputError(fmt::format("cannot write {}: it is a directory; name a file in it", printable(target)));
     if (fs::exists(status) && !fs::is_regular_file(status))
         throw InputError(
-            fmt::format("cannot write {}: it is there and no regular file; name another", printable(target)));
+            fmt::format("cannot write {}: it exists and is not a regular file; name another file", printable(target)));
     return resolved;
 }
 
@@ -120,7 +120,7 @@ void remove_abandoned(const fs::path& target) {
         const pid_t process = writer_of(entry->path().filename().string(), name, this_host);
         if (process == 0 || kill(process, 0) == 0 || errno != ESRCH || !is_abandoned(entry->path())) continue;
         if (unlink(entry->path().c_str()) != 0) continue;
-        notice(fmt::format("removed {}, which a run that was killed had left", printable(entry->path())));
+        notice(fmt::format("removed {}, which was left by a run that was killed", printable(entry->path())));
     }
 }
 
@@ -268,8 +268,8 @@ void AtomicPath::replace_found() {
         // For example for another user's file in a folder like /tmp: the error is known only now, after the work.
         const int failed = errno;
         note_written(aside);
-        throw RunError(fmt::format("cannot write {}: {}; what was to be written is in {}", printable(target_),
-                                   reason(failed), printable(aside)));
+        throw RunError(fmt::format("cannot write {}: {}; the new content is in {}", printable(target_), reason(failed),
+                                   printable(aside)));
     }
     note_written(target_);
 }
@@ -298,8 +298,8 @@ void AtomicPath::refuse_to_replace(std::string_view what_happened) {
     if (!beside.empty()) note_written(beside);
     throw RunError(fmt::format("cannot write {}: somebody has {} since this run began, and it is kept; {}",
                                printable(target_), what_happened,
-                               beside.empty() ? std::string("what was to be written could not be kept beside it")
-                                              : fmt::format("what was to be written is in {}", printable(beside))));
+                               beside.empty() ? std::string("the new content could not be kept next to it")
+                                              : fmt::format("the new content is in {}", printable(beside))));
 }
 
 void write_text(const fs::path& path, std::string_view text) {

@@ -125,7 +125,7 @@ void note_written(const std::filesystem::path& path) {
     std::string names;
     for (const std::string& name : written) names += (names.empty() ? "" : ", ") + name;
     farewell_text =
-        all_farewells.emplace_back(fmt::format("ringlock: interrupted; written before, and whole: {}\n", names))
+        all_farewells.emplace_back(fmt::format("ringlock: interrupted; these files were complete before: {}\n", names))
             .c_str();
 }
 

@@ -64,7 +64,8 @@ NoiseEffectiveness predict_noise_effectiveness(const gyro::Setup& setup, const I
     if (!drift && noise.drive) drift = followed_drift(chain, setup, *noise.drive);
     if (!drift) {
         found.reason =
-            "the phases hardly come round, or the noise has so long a memory: a prediction would take minutes";
+            "the phases hardly change from turn to turn, or the memory of the noise is too long: "
+            "a prediction would take minutes";
         return found;
     }
     found.arw_over_theory = std::sqrt(drift->variance_rad2 / gyro::randomised_kick_variance_rad2(setup));

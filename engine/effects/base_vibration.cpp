@@ -18,8 +18,8 @@ class BaseVibration final : public Effect {
     std::string_view name() const override { return "base_vibration"; }
     std::string_view summary() const override { return "A line in the input rate, from a base that vibrates."; }
     std::string_view advice() const override {
-        return "Measure the rotation of the base at this frequency with the gyro at rest, on another table or on "
-               "isolators: a line that stays is the gyro's own.";
+        return "Measure the rotation of the base at this frequency with the gyro at rest, "
+               "on another table or on isolators: a line that stays is the gyro's own.";
     }
     std::string_view equation() const override {
         return "rate = A sin(2 pi f t + phase), integrated exactly over each interval.";

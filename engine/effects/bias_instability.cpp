@@ -90,14 +90,14 @@ class BiasInstability final : public Effect {
         return "Flicker (1/f) rate noise for averaging times of 0.1 s to 1e6 s, stationary from the start.";
     }
     std::string_view advice() const override {
-        return "Record for ten times the longest averaging time that matters, at constant temperature; compensation of "
-               "the lock-in does not lower this noise.";
+        return "Record for ten times the longest averaging time that matters, at constant temperature; "
+               "compensation of the lock-in does not lower this noise.";
     }
     std::string_view equation() const override {
-        return "Two-sided power spectral density B^2/(2 pi f), Allan deviation sqrt(2 ln 2/pi) B = 0.664 B (IEEE Std "
-               "952-1997, annex C, bias instability), as a sum of first-order Gauss-Markov rates with correlation "
-               "times "
-               "of 0.01 s, 0.1 s, ... 1e7 s, each of variance B^2 ln(10)/pi.";
+        return "Two-sided power spectral density B^2/(2 pi f), Allan deviation sqrt(2 ln 2/pi) "
+               "B = 0.664 B (IEEE Std 952-1997, annex C, bias instability), "
+               "as a sum of first-order Gauss-Markov rates with correlation times of 0.01 s, 0.1 s, ... "
+               "1e7 s, each of variance B^2 ln(10)/pi.";
     }
     std::span<const Parameter> parameters() const override { return bias_instability_parameters; }
     bool active(const Values& values) const override { return values.at("deg_h") != 0.0; }

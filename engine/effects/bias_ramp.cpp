@@ -15,8 +15,8 @@ class BiasRamp final : public Effect {
     std::string_view name() const override { return "bias_ramp"; }
     std::string_view summary() const override { return "A bias that grows linearly in time, from zero at the start."; }
     std::string_view advice() const override {
-        return "Repeat the record after a warm-up of several hours, with the temperature recorded: a ramp that goes "
-               "with the temperature belongs in its model.";
+        return "Repeat the record after a warm-up of several hours, with the temperature recorded: "
+               "a ramp that follows the temperature belongs in the model of the temperature.";
     }
     std::string_view equation() const override {
         return "rate = R t; Allan deviation R tau / sqrt(2) (IEEE Std 952-1997, annex C, rate ramp).";

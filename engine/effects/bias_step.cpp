@@ -17,8 +17,8 @@ class BiasStep final : public Effect {
     std::string_view name() const override { return "bias_step"; }
     std::string_view summary() const override { return "A step of the bias at a known time."; }
     std::string_view advice() const override {
-        return "Look at the log of the test bench at this time (supply, path-length control, handling), and repeat the "
-               "record to see whether a step returns.";
+        return "Look at the log of the test bench at this time (supply, path-length control, "
+               "handling), and repeat the record to see whether a step returns.";
     }
     std::string_view equation() const override { return "rate = step for t >= time, else 0."; }
     Follows follows() const override { return Follows::time; }

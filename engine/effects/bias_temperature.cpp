@@ -17,12 +17,12 @@ class BiasTemperature final : public Effect {
         return "A bias that follows the temperature of section [environment].";
     }
     std::string_view advice() const override {
-        return "Calibrate the bias over the range of temperatures, in both directions, and compensate it by the "
-               "thermometer nearest to the block.";
+        return "Calibrate the bias over the range of temperatures, in both directions, "
+               "and compensate it by the thermometer nearest to the block.";
     }
     std::string_view equation() const override {
-        return "rate = deg_h_per_k dT, dT the temperature less that at the start; the temperature is linear over each "
-               "half cycle.";
+        return "rate = deg_h_per_k dT, dT the temperature less that at the start; "
+               "the temperature is linear over each half cycle.";
     }
     Follows follows() const override { return Follows::temperature; }
     std::span<const Parameter> parameters() const override { return bias_temperature_parameters; }

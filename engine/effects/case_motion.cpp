@@ -71,15 +71,14 @@ class CaseMotion final : public Effect {
         return "Rotation of the case that an accelerometer sees as well; in records of samples only.";
     }
     std::string_view advice() const override {
-        return "Mount the gyro on a quieter pier, or subtract the motion that the accelerometers see; record the "
-               "witnesses at the rate of the gyro.";
+        return "Mount the gyro on a quieter pier, or subtract the motion that the accelerometers see; "
+               "record the witnesses at the rate of the gyro.";
     }
     std::string_view equation() const override {
-        return "angle = a resonance driven by white noise, a second-order autoregression of that centre, width and "
-               "rms; "
-               "the "
-               "accelerometer, tilted, reads g (sqrt(C) angle + sqrt(1 - C) other), the other independent of the angle "
-               "and like it: C is their coherence (Bendat and Piersol, \"Random Data\", 2010, section 6.1).";
+        return "angle = a resonance driven by white noise, a second-order autoregression of that centre, "
+               "width and rms; the accelerometer, tilted, reads g (sqrt(C) angle + sqrt(1 - C) other), "
+               "the other independent of the angle and like it: C is their coherence (Bendat and Piersol, "
+               "\"Random Data\", 2010, section 6.1).";
     }
     std::span<const Parameter> parameters() const override { return case_motion_parameters; }
     bool active(const Values& values) const override { return values.at("rms_arcsec") != 0.0; }

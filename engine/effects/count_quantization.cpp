@@ -41,11 +41,9 @@ class CountQuantization final : public Effect {
                "the random walk by its root.";
     }
     std::string_view equation() const override {
-        return "angle = floor(angle/step) step at the end of each sample. Where the angle moves by a step or more from "
-               "sample to "
-               "sample the error is white and uniform, of variance step^2/12 (Widrow and Kollar, \"Quantization "
-               "Noise\", "
-               "2008, chapter 4).";
+        return "angle = floor(angle/step) step at the end of each sample. "
+               "Where the angle moves by a step or more from sample to sample the error is white and uniform, "
+               "of variance step^2/12 (Widrow and Kollar, \"Quantization Noise\", 2008, chapter 4).";
     }
     std::span<const Parameter> parameters() const override { return count_quantization_parameters; }
     bool active(const Values& values) const override { return values.at("step_arcsec") != 0.0; }

@@ -17,8 +17,8 @@ class DetectorPhaseOffset final : public Effect {
         return "The coupling acts at another phase than the one the detectors see.";
     }
     std::string_view advice() const override {
-        return "Give the compensator this phase, or align the detectors with the fringes anew: with an offset it "
-               "removes only the cosine of the phase from each kick.";
+        return "Give the compensator this phase, or align the detectors with the fringes anew: "
+               "with an offset it removes only the cosine of the phase from each kick.";
     }
     std::string_view equation() const override {
         return "psi' = C (rate + dither rate) + b sin(psi + phase), psi as the detectors see it (Gao and Deng 2007, "

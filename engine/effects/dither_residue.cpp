@@ -53,17 +53,17 @@ class DitherResidue final : public Effect {
    public:
     std::string_view name() const override { return "dither_residue"; }
     std::string_view summary() const override {
-        return "Dither that was not stripped whole, at its frequency or its alias; in records of samples only.";
+        return "Dither that was not stripped completely, at its frequency or its alias; in records of samples only.";
     }
     std::string_view advice() const override {
-        return "Learn gain and delay of the dither reference anew, or lengthen the filter that strips the dither; the "
-               "line is no rotation of the base.";
+        return "Estimate gain and delay of the dither reference again, or lengthen the filter that strips the dither; "
+               "the line is not a rotation of the base.";
     }
     std::string_view equation() const override {
-        return "angle = A sin(2 pi (f t + d t^2/2 + d_2 t^3/6 + ...)), t from the middle of the record: what an error "
-               "of gain or delay of the dither's pick-off leaves (Killpatrick, IEEE Spectrum 4(10), 44, 1967), as the "
-               "frequency follows the temperature of the springs. In increments A becomes 2 A "
-               "|sin(pi f/rate)|; above half the rate it shows at its alias.";
+        return "angle = A sin(2 pi (f t + d t^2/2 + d_2 t^3/6 + ...)), t from the middle of the record: "
+               "the residue of an error of gain or delay of the dither's pick-off (Killpatrick, "
+               "IEEE Spectrum 4(10), 44, 1967), as the frequency follows the temperature of the springs. "
+               "In increments A becomes 2 A |sin(pi f/rate)|; above half the rate it shows at its alias.";
     }
     std::span<const Parameter> parameters() const override { return dither_residue_parameters; }
     bool active(const Values& values) const override { return values.at("amplitude_arcsec") != 0.0; }

@@ -20,10 +20,9 @@ class DitherSecondHarmonic final : public Effect {
                "or a spring that is not linear.";
     }
     std::string_view equation() const override {
-        return "g = C rate + A w (s sin(w t) + ratio sin(2 w t + phase)), t from each turn of the dither on, s = +1 in "
-               "positive "
-               "and -1 in negative half cycles (docs/physics.md). Swings and turns of the dither angle stay where they "
-               "are.";
+        return "g = C rate + A w (s sin(w t) + ratio sin(2 w t + phase)), t from each turn of the dither on, "
+               "s = +1 in positive and -1 in negative half cycles (docs/physics.md). "
+               "Swings and turns of the dither angle stay where they are.";
     }
     std::span<const Parameter> parameters() const override { return dither_second_harmonic_parameters; }
     bool active(const Values& values) const override { return values.at("ratio") != 0.0; }

@@ -17,13 +17,12 @@ class LockinTemperature final : public Effect {
         return "The lock-in threshold follows the temperature of section [environment].";
     }
     std::string_view advice() const override {
-        return "Calibrate the lock-in threshold over the range of temperatures, and let the compensator follow the "
-               "thermometer.";
+        return "Calibrate the lock-in threshold over the range of temperatures, "
+               "and let the compensator follow the thermometer.";
     }
     std::string_view equation() const override {
-        return "Threshold Omega_L (1 + relative_per_k dT), dT the temperature less that at the start; constant over "
-               "each "
-               "half cycle.";
+        return "Threshold Omega_L (1 + relative_per_k dT), dT the temperature less that at the start; "
+               "constant over each half cycle.";
     }
     Follows follows() const override { return Follows::temperature; }
     std::span<const Parameter> parameters() const override { return lockin_temperature_parameters; }

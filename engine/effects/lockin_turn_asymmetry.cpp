@@ -16,13 +16,12 @@ class LockinTurnAsymmetry final : public Effect {
         return "The lock-in threshold differs between the turns of the dither.";
     }
     std::string_view advice() const override {
-        return "Let the compensator take a threshold of its own for minima and maxima, and look for a bending of the "
-               "block at the ends of the swing.";
+        return "Let the compensator take a threshold of its own for minima and maxima, "
+               "and look for a bending of the block at the ends of the swing.";
     }
     std::string_view equation() const override {
-        return "Threshold Omega_L (1 + ratio cos(w t)), t from a minimum of the phase on: where the dither bends the "
-               "path of the "
-               "beams, the light scattered back depends on the dither angle.";
+        return "Threshold Omega_L (1 + ratio cos(w t)), t from a minimum of the phase on: "
+               "where the dither bends the path of the beams, the light scattered back depends on the dither angle.";
     }
     std::span<const Parameter> parameters() const override { return lockin_turn_asymmetry_parameters; }
     bool active(const Values& values) const override { return values.at("ratio") != 0.0; }

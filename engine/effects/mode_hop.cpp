@@ -22,18 +22,18 @@ class ModeHop final : public Effect {
    public:
     std::string_view name() const override { return "mode_hop"; }
     std::string_view summary() const override {
-        return "The laser hops to another longitudinal mode: bias, threshold and phase of the coupling step at one "
-               "time.";
+        return "The laser hops to another longitudinal mode: "
+               "bias, threshold and phase of the coupling step at one time.";
     }
     std::string_view advice() const override {
-        return "Look at the path-length control and the temperature at this time: its range ended there, or a reset "
-               "was due.";
+        return "Look at the path-length control and the temperature at this time: its range ended there, "
+               "or a reset was due.";
     }
     std::string_view equation() const override {
-        return "For t >= time: rate = step, threshold Omega_L (1 + threshold_ratio), coupling b F(psi + phase), since "
-               "backscatter depends on wavelength and path (Aronowitz, \"Fundamentals of the Ring Laser Gyro\", in "
-               "Optical Gyros and their Application, RTO AGARDograph 339, 1999). Threshold and phase change with the "
-               "half cycle whose middle comes first after the time.";
+        return "For t >= time: rate = step, threshold Omega_L (1 + threshold_ratio), coupling b F(psi + phase), "
+               "since backscatter depends on wavelength and path (Aronowitz, \"Fundamentals of the Ring Laser Gyro\", "
+               "in Optical Gyros and their Application, RTO AGARDograph 339, 1999). "
+               "Threshold and phase change with the half cycle whose middle comes first after the time.";
     }
     std::span<const Parameter> parameters() const override { return mode_hop_parameters; }
     bool active(const Values& values) const override {

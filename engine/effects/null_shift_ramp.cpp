@@ -17,13 +17,13 @@ class NullShiftRamp final : public Effect {
         return "A bias in proportion to the slope of the temperature of section [environment].";
     }
     std::string_view advice() const override {
-        return "Repeat the record with a slower change of temperature: a bias that goes with the slope halves with it, "
-               "one that goes with the temperature does not.";
+        return "Repeat the record with a slower change of temperature: a bias in proportion to the slope halves "
+               "with it, but a bias that follows the temperature does not.";
     }
     std::string_view equation() const override {
-        return "rate = deg_h_per_k_h dT/dt, in K/h: gradients in the block go with the temperature's slope and shift "
-               "the null by the flow of the gas (IEEE Std 647-2006, thermal sensitivities of the bias). The angle is "
-               "that coefficient times the change of the temperature.";
+        return "rate = deg_h_per_k_h dT/dt, in K/h: gradients in the block are proportional "
+               "to the temperature's slope and shift the null by the flow of the gas (IEEE Std 647-2006, "
+               "thermal sensitivities of the bias). The angle is that coefficient times the change of the temperature.";
     }
     std::span<const Parameter> parameters() const override { return null_shift_ramp_parameters; }
     bool active(const Values& values) const override { return values.at("deg_h_per_k_h") != 0.0; }

@@ -53,17 +53,16 @@ class QuantumNoise final : public Effect {
    public:
     std::string_view name() const override { return "quantum_noise"; }
     std::string_view summary() const override {
-        return "White rate noise of spontaneous emission, independent of the phase at the turns: the floor under every "
-               "arm.";
+        return "White rate noise of spontaneous emission, independent of the phase at the turns: "
+               "the floor under every arm.";
     }
     std::string_view advice() const override {
-        return "Raise the power of the laser or lower the losses: no dither and no compensation lowers this noise; it "
-               "is the floor of every arm.";
+        return "Raise the power of the laser or lower the losses: no dither and no compensation lowers this noise; "
+               "it is the floor of every arm.";
     }
     std::string_view equation() const override {
-        return "The angle gained in an interval dt is normal with variance N^2 dt and independent from interval to "
-               "interval "
-               "(IEEE Std 952-1997, annex C, angle random walk).";
+        return "The angle gained in an interval dt is normal with variance N^2 dt and independent from interval "
+               "to interval (IEEE Std 952-1997, annex C, angle random walk).";
     }
     std::span<const Parameter> parameters() const override { return quantum_noise_parameters; }
     bool active(const Values& values) const override { return values.at("deg_rt_h") != 0.0; }

@@ -40,8 +40,8 @@ class RateRandomWalk final : public Effect {
     std::string_view name() const override { return "rate_random_walk"; }
     std::string_view summary() const override { return "Rate that wanders as a random walk, from zero at the start."; }
     std::string_view advice() const override {
-        return "Record for longer, at constant temperature, and look for a slow cause: pressure, supply, path-length "
-               "control.";
+        return "Record for longer, at constant temperature, and look for a slow cause: pressure, supply, "
+               "path-length control.";
     }
     std::string_view equation() const override {
         return "dr = K dW; Allan variance K^2 tau / 3 (IEEE Std 952-1997, annex C, rate random walk).";

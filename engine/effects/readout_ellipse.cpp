@@ -19,13 +19,12 @@ class ReadoutEllipse final : public Effect {
         return "The quadrature detectors trace an ellipse in place of a circle.";
     }
     std::string_view advice() const override {
-        return "Fit the ellipse of the detectors before the phase is taken from them, and correct gains, offsets and "
-               "their phase.";
+        return "Fit the ellipse of the detectors before the phase is taken from them, and correct gains, "
+               "offsets and their phase.";
     }
     std::string_view equation() const override {
         return "sin = (1 + gain) sin(psi) + offset_sin, cos = cos(psi + orthogonality) + offset_cos (Heydemann, "
-               "Applied "
-               "Optics 20, 3382, 1981, with the sine as the reference).";
+               "Applied Optics 20, 3382, 1981, with the sine as the reference).";
     }
     std::span<const Parameter> parameters() const override { return readout_ellipse_parameters; }
     bool active(const Values& values) const override {

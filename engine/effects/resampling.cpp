@@ -59,11 +59,8 @@ class Resampling final : public Effect {
     }
     std::string_view equation() const override {
         return "The angle at the ends of the record's samples is linear between those of samples taken at from_hz: "
-               "white "
-               "rate "
-               "noise N^2 has over a record interval the variance (N^2/from) sum of (shares of source intervals)^2, "
-               "which "
-               "beats with the distance of the rates (docs/effects.md).";
+               "white rate noise N^2 has over a record interval the variance (N^2/from) "
+               "sum of (shares of source intervals)^2, which beats with the distance of the rates (docs/effects.md).";
     }
     std::span<const Parameter> parameters() const override { return resampling_parameters; }
     bool active(const Values& values) const override { return values.at("from_hz") != 0.0; }

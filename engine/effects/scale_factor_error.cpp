@@ -15,16 +15,15 @@ class ScaleFactorError final : public Effect {
     std::string_view name() const override { return "scale_factor_error"; }
     std::string_view summary() const override { return "The gyro puts out more angle than it is turned by."; }
     std::string_view advice() const override {
-        return "Calibrate the scale factor on a rate table at several rates of either sign; its error follows the "
-               "input of the record alone.";
+        return "Calibrate the scale factor on a rate table at several rates of either sign; "
+               "its error follows the input of the record alone.";
     }
     /// The light counts C (1 + relative) for C. In the output of the input rate this leaves an error of `relative`
     /// times the angle. Every swing of the dither becomes longer by the same factor, which is equivalent to a dither of
     /// another amplitude: at the minima of the dither angle, where the output is taken, the swings cancel.
     std::string_view equation() const override {
-        return "rate = relative times the input rate. The swings of the dither grow as well, but cancel over each "
-               "cycle: "
-               "that is a larger dither.peak_rate_deg_s, and left to it (docs/effects.md).";
+        return "rate = relative times the input rate. The swings of the dither grow as well, but cancel "
+               "over each cycle: that is a larger dither.peak_rate_deg_s and is left to that key (docs/effects.md).";
     }
     Follows follows() const override { return Follows::input_rate; }
     std::span<const Parameter> parameters() const override { return scale_factor_error_parameters; }

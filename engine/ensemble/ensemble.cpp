@@ -166,8 +166,8 @@ void simulate(const scenario::Scenario& scenario, std::span<const scenario::Arm>
     }
     if (read && !read->complete()) {
         throw TrajectoryFailure{
-            "the turns of its dither come more than a cycle early, so that its reader has put out "
-            "too little; inject less noise"};
+            "the turns of its dither are more than a cycle early, so that its reader has too few outputs; "
+            "inject less noise"};
     }
     progress.enter(BlockStage::output);
     sink.finish({first, block.setups(), counted * schedule.turns(), block.tables_remade(),

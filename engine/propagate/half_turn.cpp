@@ -300,8 +300,7 @@ void exact_half_turns(std::span<const HalfTurnProblem> problems, std::span<HalfT
             if (std::isnan(start)) {
                 throw RunError(
                     fmt::format("turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s and a coupling "
-                                "of {:.4g} rad/s has "
-                                "no fast middle; use propagation.method = \"direct\"",
+                                "of {:.4g} rad/s has no fast middle; use propagation.method = \"direct\"",
                                 problem.half.amplitude_rad / units::pi, problem.half.rate_rad_s, problem.b_rad_s));
             }
             prepare(batch, lane, problem, start);

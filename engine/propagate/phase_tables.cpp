@@ -35,8 +35,8 @@ Upright upright(const gyro::HalfCycle& half, const gyro::Coupling& coupling, int
     turn.fast_from_s = gyro::fast_motion_from_s(turn.half, gyro::strength_with_harmonics_rad_s(coupling));
     if (std::isnan(turn.fast_from_s)) {
         throw RunError(
-            fmt::format("turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s and a coupling of {:.4g} "
-                        "rad/s has no fast middle; use propagation.method = \"direct\"",
+            fmt::format("turn map: a half cycle of {:.1f} fringes at an input of {:.4g} rad/s "
+                        "and a coupling of {:.4g} rad/s has no fast middle; use propagation.method = \"direct\"",
                         half.amplitude_rad / units::pi, half.rate_rad_s, coupling.b_rad_s));
     }
     return turn;
@@ -297,8 +297,8 @@ void finish(PhaseTables::LanePart& part, double sign) {
 void PhaseTables::make(std::size_t lane, const gyro::Device& device, const HalfCycleRanges& wanted) {
     if (wanted.amplitude_change_rad.highest > wanted.amplitude_change_rad.lowest) {
         throw RunError(
-            "turn map: series in the phase, for a coupling with a second harmonic, have no amplitude that changes over "
-            "a half cycle");
+            "turn map: series in the phase, for a coupling with a second harmonic, "
+            "have no amplitude that changes over a half cycle");
     }
     ++made_;
     ranges_[lane] = wanted;
@@ -331,9 +331,9 @@ void PhaseTables::make(std::size_t lane, const gyro::Device& device, const HalfC
                 const std::size_t largest = *std::max_element(terms.begin(), terms.end());
                 if (largest >= most_nodes || harmonics >= most_harmonics) {
                     throw RunError(fmt::format(
-                        "turn map: {} harmonics and {} nodes over amplitudes {:.6g} to {:.6g} rad and rates {:.6g} to "
-                        "{:.6g} rad/s leave an error of {:.3g} rad, above {:.3g}; raise "
-                        "propagation.turn_map_tolerance_rad or narrow the spread of amplitudes and rates",
+                        "turn map: {} harmonics and {} nodes over amplitudes {:.6g} to {:.6g} rad "
+                        "and rates {:.6g} to {:.6g} rad/s leave an error of {:.3g} rad, above {:.3g}; "
+                        "raise propagation.turn_map_tolerance_rad or narrow the spread of amplitudes and rates",
                         harmonics, largest, ranges[0].lowest, ranges[0].highest, ranges[1].lowest, ranges[1].highest,
                         error, tolerance_rad_));
                 }

@@ -218,9 +218,9 @@ void TurnTables::make(std::size_t lane, const gyro::Device& device, const HalfCy
                 if (error <= tolerance_rad_) break;
                 if (largest >= most_nodes) {
                     throw RunError(fmt::format(
-                        "turn map: {} nodes over amplitudes {:.6g} to {:.6g} rad and rates {:.6g} to {:.6g} rad/s "
-                        "leave an error of {:.3g} rad, above {:.3g}; raise propagation.turn_map_tolerance_rad or "
-                        "narrow the spread of amplitudes and rates",
+                        "turn map: {} nodes over amplitudes {:.6g} to {:.6g} rad "
+                        "and rates {:.6g} to {:.6g} rad/s leave an error of {:.3g} rad, above {:.3g}; "
+                        "raise propagation.turn_map_tolerance_rad or narrow the spread of amplitudes and rates",
                         largest, ranges[0].lowest, ranges[0].highest, ranges[1].lowest, ranges[1].highest, error,
                         tolerance_rad_));
                 }

@@ -36,6 +36,8 @@ enum class Purpose : std::uint64_t {
     latched_detectors = 22,
     dither_reference = 23,
     white_rate_between_turns = 24,
+    missing_rates = 25,
+    lost_information = 26,
 };
 
 /// Who draws: the study's seed and the gyro's number.

@@ -219,8 +219,7 @@ class Reader {
         if (!tables) {
             return note(
                 name.source().begin,
-                fmt::format("key \"{}\" = {}: must be tables, not {}; write [[{}]] and its keys below, once for "
-                            "each",
+                fmt::format("key \"{}\" = {}: must be tables, not {}; write [[{}]] and its keys below, once for each",
                             section.name, value_text(node), type_text(node), section.name));
         }
         section.elements->resize(scenario_, 0);
@@ -330,7 +329,7 @@ class Reader {
             try {
                 Arm arm = parse_arm(element.as_string()->get());
                 if (std::find(arms.begin(), arms.end(), arm) != arms.end()) {
-                    wrong(key, element, "stands twice; an arm is run once");
+                    wrong(key, element, "is given twice; an arm is run once");
                 }
                 arms.push_back(std::move(arm));
             } catch (const InputError& error) {
@@ -390,10 +389,10 @@ class Reader {
         for (const effects::Effect* effect : effects::registry()) known.emplace_back(effect->name());
         const auto planned = effects::planned();
         const bool is_planned = std::find(planned.begin(), planned.end(), name.str()) != planned.end();
-        note(name.source().begin,
-             fmt::format("section [effects.{}]: {}; effects are: {}", name_text(name.str()),
-                         is_planned ? "known but not there yet" : "unknown effect" + did_you_mean(name.str(), known),
-                         fmt::join(known, ", ")));
+        note(name.source().begin, fmt::format("section [effects.{}]: {}; effects are: {}", name_text(name.str()),
+                                              is_planned ? "known but not available yet"
+                                                         : "unknown effect" + did_you_mean(name.str(), known),
+                                              fmt::join(known, ", ")));
     }
 
     static const Section* find_section(std::string_view name) {
@@ -428,9 +427,15 @@ class Reader {
 /// toml++ 3.3 follows a dotted key by recursion without a limit, and a key of some 30 000 parts overflows the stack.
 /// A key has at most three parts here, so that a run of dots is refused before it is parsed. Dots side by side are
 /// decoration, and so is a line of comment.
-void refuse_deep_keys(std::string_view text, std::string_view name) {
+///
+/// A file with more keys, sections or values than any scenario has is refused, too, before there is a table of all.
+void refuse_before_parsing(std::string_view text, std::string_view name) {
     constexpr int most = 32;
+    constexpr int most_keys = 20000;
+    constexpr int most_values = 500000;
     int dots = 0;
+    int keys = 0;
+    int values = 0;
     std::size_t line = 1;
     std::size_t column = 0;
     bool blank = true;     // nothing on this line yet
@@ -439,6 +444,13 @@ void refuse_deep_keys(std::string_view text, std::string_view name) {
         const char c = text[i];
         ++column;
         comment = comment || (blank && c == '#');
+        if (!comment && (c == '=' || (blank && c == '['))) ++keys;
+        if (!comment && c == ',') ++values;
+        if (keys > most_keys || values > most_values) {
+            const std::string much = keys > most_keys ? fmt::format("{} keys and sections", most_keys)
+                                                      : fmt::format("{} values", most_values);
+            throw InputError(fmt::format("{}:{}:{}: more than {}: not a scenario", name, line, column, much));
+        }
         blank = blank && (c == ' ' || c == '\t');
         if (c == '\n') {
             ++line;
@@ -482,7 +494,7 @@ toml::table parse_setting(const std::string& setting) {
                       });
     if (word) value = in_quotes(value);
     const std::string text = setting.substr(0, equals) + " = " + value;
-    refuse_deep_keys(text, "--set " + setting);
+    refuse_before_parsing(text, printable("--set " + setting));
     try {
         return toml::parse(text);
     } catch (const toml::parse_error& error) {
@@ -497,7 +509,7 @@ Scenario parse_string(std::string_view text, std::string_view name, std::span<co
                       const Rules& rules) {
     std::vector<std::pair<std::string, toml::table>> set;
     for (const std::string& setting : settings) set.emplace_back(setting, parse_setting(setting));
-    refuse_deep_keys(text, name);
+    refuse_before_parsing(text, printable(name));
     toml::table root;
     try {
         root = toml::parse(text, name);

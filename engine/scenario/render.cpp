@@ -144,10 +144,10 @@ std::string to_toml(const Scenario& scenario) { return write(scenario, false); }
 std::string to_toml(const Scenario& scenario, const Remarks& remarks) { return write(scenario, false, remarks); }
 
 std::string schema_text() {
-    return comment("Every key of a ringlock scenario at its default. A scenario needs to name only what differs.") +
+    return comment("Every key of a ringlock scenario at its default. A scenario names only the keys that differ.") +
            comment(
-               "device = \"NAME\", before all sections, takes the constants of a known gyro for defaults; ringlock "
-               "devices lists them.") +
+               "device = \"NAME\", before all sections, takes the constants of a known gyro for defaults; "
+               "ringlock devices lists them.") +
            '\n' + write(Scenario{}, true);
 }
 
@@ -156,17 +156,17 @@ std::string schema_markdown() {
         "# Scenario keys\n\n"
         "<!-- Made by `ringlock run --print-schema=markdown`; a test compares the two. -->\n\n";
     out += wrapped(
-        "A scenario is a TOML file. A key that is not named has its default, so an empty file is valid: it is the "
-        "device of Gao and Deng (2007) with the default ensemble. Every key carries its unit in its name. An "
-        "unknown key, a wrong type or a value out of bounds is an error that names file, line, column, key and "
-        "value; all of a file's errors are reported at once. Integers are accepted where a float is wanted. "
+        "A scenario is a TOML file. A key that is not named has its default, so an empty file is valid: "
+        "it is the device of Gao and Deng (2007) with the default ensemble. Every key carries its unit in its name. "
+        "An unknown key, a wrong type or a value out of bounds is an error that names file, line, column, "
+        "key and value; all errors of a file are reported at once. Integers are accepted for floats. "
         "`ringlock run --print-schema` prints a commented file with every default.",
         "", "");
     out +=
         '\n' + wrapped(
-                   "`device = \"NAME\"` at the top of a scenario, before all sections, takes the constants of a known "
-                   "gyro for defaults; keys of the scenario override them one by one. `ringlock devices` lists the "
-                   "gyros and where their constants come from.",
+                   "`device = \"NAME\"` at the top of a scenario, before all sections, "
+                   "takes the constants of a known gyro for defaults; keys of the scenario override them one by one. "
+                   "`ringlock devices` lists the gyros and where their constants come from.",
                    "", "");
     for (const Section& section : schema()) {
         const std::string heading =

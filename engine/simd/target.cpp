@@ -34,7 +34,7 @@ void use_target(const std::string& wanted) {
         hwy::GetChosenTarget().Update(hwy::SupportedTargets());
         return;
     }
-    throw RunError(fmt::format("instruction set {}: not in this program or not on this machine", wanted));
+    throw RunError(fmt::format("instruction set {}: this program or this machine does not have it", wanted));
 }
 
 void use_best_target() {

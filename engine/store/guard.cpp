@@ -23,6 +23,7 @@
 #include "engine/core/system_text.hpp"
 #include "engine/core/waiting.hpp"
 #include "engine/store/library.hpp"
+#include "engine/store/without_trial.hpp"
 
 namespace ringlock::store {
 namespace {
@@ -208,6 +209,7 @@ void judge(const Trial& of, int status, const std::string& reported) {
 
 void try_reading(const std::filesystem::path& path, Links links, const std::function<void(const GuardedPath&)>& read) {
     if (trial) return read(GuardedPath(path));
+    if (is_without_trial()) return;
     std::error_code unreachable;
     const auto status = std::filesystem::status(path, unreachable);
     if (!std::filesystem::exists(status)) {

@@ -60,13 +60,14 @@ class StorageCheck {
         if (files.size() > most) names.push_back(fmt::format("{} more", files.size() - most));
         if (links_in_force() == Links::refuse) {
             fail(
-                fmt::format("{} another file ({}), and only the file that was named is read. Give --follow-links to a "
-                            "command that has it, or make one file with h5repack",
+                fmt::format("{} another file ({}), and only the file that was named is read. "
+                            "Give --follow-links to a command that has it, or make one file with h5repack",
                             how, fmt::join(names, ", ")));
         }
         for (const std::string& other : files) {
             if (!detail::is_readable_beside(dataset_, other)) {
-                fail(fmt::format("{} the file {}, which is not there or no regular file", how, printable(other)));
+                fail(fmt::format("{} the file {}, which does not exist or is not a regular file", how,
+                                 printable(other)));
             }
         }
         return true;
@@ -134,8 +135,8 @@ class StorageCheck {
     }
     [[noreturn]] void fail_more(double bytes, double file_bytes) const {
         fail(
-            fmt::format("says that its values take {:.4g} bytes, which the file of {:.4g} bytes cannot hold: it is "
-                        "damaged",
+            fmt::format("says that its values take {:.4g} bytes, which the file of {:.4g} bytes cannot hold: "
+                        "it is damaged",
                         bytes, file_bytes));
     }
 

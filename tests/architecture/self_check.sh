@@ -112,6 +112,25 @@ expect 2 "no sources" effect_names.sh engine/attic
 rm engine/effects/registry.cpp
 expect 2 "no effects" effect_names.sh engine
 
+# message_fault STATUS WORDS LINE: the clean tree with LINE added to a source.
+message_fault() {
+    clean_tree
+    echo 'complain("the record is short");' >app/main.cpp
+    printf '%s\n' "$3" >>engine/gyro/device.cpp
+    expect "$1" "$2" messages.sh
+}
+message_fault 0 "1 texts have plain words" '// "a word beside a word" in a comment, and "beside" in a key'
+message_fault 1 "engine/gyro/device.cpp:4: a gap beside it" 'warn("a gap beside it");'
+message_fault 1 "engine/gyro/device.cpp:4: what was left" $'warn("what was "\n     "left");'
+message_fault 1 "in addition to" 'warn("a gap Beside it");'
+message_fault 1 "begins with Of" 'warn("Rows. Of turns, the last");'
+message_fault 1 "device.cpp:5: the model foretells it" $'int rows = 1\'000; char quote = \'"\';\nwarn(R"a(the model\nforetells it)a");'
+message_fault 0 "2 texts have plain words" 'warn("coursework, an intellect, what remains, Often");'
+clean_tree
+expect 2 "no texts" messages.sh
+rm -rf "$folder"/{engine,analysis,app,tests}
+expect 2 "no sources" messages.sh
+
 # text_fault STATUS WORDS LINE: a fresh repository whose one file has LINE. Slashes and words are put together here, for
 # this file is read by the same check.
 text_fault() {

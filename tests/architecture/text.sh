@@ -46,4 +46,9 @@ if git grep --untracked -nE 'H5Fope[n]|Mat_Ope[n]|archive_read_ope[n]' -- engine
     echo "^ opens a file without the guard"
     bad=1
 fi
+# In the program no file is read without its trial.
+if git grep --untracked -n 'WithoutTria[l]' -- engine analysis app ':!engine/store/without_trial.*'; then
+    echo "^ reads a file without its trial"
+    bad=1
+fi
 exit $bad

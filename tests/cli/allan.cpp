@@ -199,7 +199,7 @@ TEST_F(AllanCommand, DrawsTheDeviationsAndTheFit) {
     const std::string svg = contents(figure);
     EXPECT_THAT(svg, HasSubstr("oadev"));
     EXPECT_THAT(svg, HasSubstr(">fit<"));
-    EXPECT_EQ(run(data + " --rate 1 --kind phase --plot figure.png").status, 2);
+    EXPECT_EQ(run(data + " --rate 1 --kind phase --plot figure.gif").status, 2);
 }
 
 // One record in every kind and unit gives one answer.
@@ -325,7 +325,7 @@ TEST_F(AllanCommand, FaultsAreFoundBeforeCoefficientsAreClaimed) {
     EXPECT_EQ(glitch["findings"][0]["row"], 778);
     EXPECT_NEAR(glitch["findings"][0]["size"], 100.0, 5.0);
     EXPECT_NEAR(glitch["noise"]["arw_deg_rt_h"]["value"], n, 0.005 * n);
-    EXPECT_THAT(run(write(values) + options).out, HasSubstr("row 778       outlier"));
+    EXPECT_THAT(run(write(values) + options).out, HasSubstr("row 778 (line 778)     outlier"));
     values[777] -= 100.0;
     for (std::size_t i = 600; i < values.size(); ++i) values[i] += 2.0;
     const auto jump = json_of();

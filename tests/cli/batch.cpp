@@ -101,7 +101,8 @@ TEST_F(BatchCommand, InterruptedItKeepsWhatIsDoneAndGoesOn) {
 TEST_F(BatchCommand, WhatMakesNoSenseIsRefusedBeforeAnything) {
     fs::create_directory(directory_ / "twice");
     write("twice/a.toml", "");
-    EXPECT_THAT(run({"run", "a.toml", "twice/a.toml", "-o", "out"}).err, HasSubstr("would both be written"));
+    EXPECT_THAT(run({"run", "a.toml", "twice/a.toml", "-o", "out"}).err,
+                HasSubstr("the results of both would be written"));
     EXPECT_EQ(run({"run", "a.toml", "b.toml", "-o", "out", "--shard", "1/2"}).status, 2);
     EXPECT_EQ(run({"run", "a.toml", "b.toml", "-o", "out", "--plot", "a.svg"}).status, 2);
     EXPECT_FALSE(fs::exists(directory_ / "out"));

@@ -60,7 +60,7 @@ TEST_F(ClosureProgram, LeavesAReport) {
     EXPECT_EQ(printed.at("predictive").at("simulations"), 39);
     EXPECT_EQ(nlohmann::json::parse(read("found/closure.json")), printed);
     const std::string page = read("found/report.md");
-    EXPECT_THAT(page, AllOf(HasSubstr("# What was found in r.h5"), HasSubstr("## The base model"),
+    EXPECT_THAT(page, AllOf(HasSubstr("# Error sources in r.h5"), HasSubstr("## The base model"),
                             HasSubstr("Allan deviation"), HasSubstr("`closed.toml`")));
     for (const char* file : {"closed.toml", "closure.h5"}) EXPECT_TRUE(has(std::string("found/") + file)) << file;
     EXPECT_EQ(run({"validate", "found/closed.toml"}).status, 0);
@@ -181,7 +181,7 @@ TEST_F(ChainProgram, RefusesWhatIsNoChain) {
     write("s.toml", "[ensemble]\nduration_s = 8\ngyros = 1\n");
     ASSERT_EQ(run({"record", "s.toml", "-o", "turns.h5"}).status, 0);
     EXPECT_THAT(refused({"closure", "x.csv", "y.csv"}), AllOf(HasSubstr("x.csv, y.csv"), HasSubstr("--same-chain")));
-    EXPECT_THAT(refused({"closure", "--same-chain", "x.csv"}), HasSubstr("two records or more"));
+    EXPECT_THAT(refused({"closure", "--same-chain", "x.csv"}), HasSubstr("two or more records"));
     EXPECT_THAT(refused({"closure", "--same-chain", "x.csv", "./x.csv"}), HasSubstr("same file"));
     EXPECT_THAT(refused({"closure", "--same-chain", "x.csv", "fast.csv"}),
                 AllOf(HasSubstr("fast.csv: has 200 samples a second"), HasSubstr("read this one by itself")));

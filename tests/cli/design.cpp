@@ -210,7 +210,7 @@ TEST_F(DesignCommand, DesignsThatCannotBeAreRefused) {
         expect_refused({"validate", "bad.toml"}, AllOf(HasSubstr(parts)...));
     };
     refused("150, 300", "-150, 300", "bad.toml:12:10", "gyro.lockin_threshold_deg_h", "-150");
-    refused("gyro.lockin_threshold_deg_h", "gyro.lockin_treshold_deg_h", "bad.toml:11:7", "is no key");
+    refused("gyro.lockin_threshold_deg_h", "gyro.lockin_treshold_deg_h", "bad.toml:11:7", "is not a key");
     refused("points = 3", "points = 0", "bad.toml:15:8", "noise_injection.turn_phase_rms_rad", "a range of 0 points");
     refused("\"grid\"", "\"grit\"", "bad.toml:9:8", "grit", "latin_hypercube");
     refused("points = 3", "points = 3\nvalue = 2", "bad.toml:18:1", "value");
@@ -348,8 +348,9 @@ to = 0.3
                 0.0, 1e-12);
     EXPECT_EQ(printed({"analyze", "i.h5", "--json"}), out);
     const Outcome table = run({"analyze", "i.h5"});
-    for (const char* text : {"noise_injected+compensated, log_arw_deg_rt_h: Sobol' indices", "first order",
-                             "total order", "calibration.threshold_error_relative", "Of the points some are shown"}) {
+    for (const char* text :
+         {"noise_injected+compensated, log_arw_deg_rt_h: Sobol' indices", "first order", "total order",
+          "calibration.threshold_error_relative", "Only some of the points are shown"}) {
         EXPECT_THAT(table.out, HasSubstr(text));
     }
     expect_narrow(table.out);

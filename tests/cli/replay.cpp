@@ -391,9 +391,9 @@ TEST_F(ReplayCommand, SumsUpInWords) {
     const Outcome r = run({"replay", "s.h5", "--arm", "noise_injected+compensated", "--gyro", "2"});
     ASSERT_EQ(r.status, 0) << r.err;
     EXPECT_THAT(r.out, StartsWith("s.h5: arm noise_injected+compensated, gyro 2\n"));
-    for (const char* text :
-         {"input_rate_deg_h:", "lockin_threshold_deg_h:", "turns:", "lock-in from turn to turn, rms:",
-          "the compensator leaves, rms:", "angle error at the end:", "as stored, to the bit:", "31 of 31 samples"}) {
+    for (const char* text : {"input_rate_deg_h:", "lockin_threshold_deg_h:", "turns:",
+                             "lock-in from turn to turn, rms:", "the compensator leaves, rms:",
+                             "angle error at the end:", "identical to the stored values:", "31 of 31 samples"}) {
         EXPECT_THAT(r.out, HasSubstr(text));
     }
     EXPECT_THAT(r.out, Not(HasSubstr("nan")));

@@ -80,7 +80,7 @@ TEST(AtomicFile, TargetsThatCannotBeWrittenAreRefusedAtOnce) {
     EXPECT_THAT(message_of<InputError>([&] { AtomicFile(directory / "none/out.h5"); }),
                 AllOf(HasSubstr("none/out.h5"), HasSubstr("No such file or directory"), HasSubstr("mkdir -p")));
     EXPECT_THAT(message_of<InputError>([&] { AtomicFile(directory.path()); }), HasSubstr("it is a directory"));
-    EXPECT_THAT(message_of<InputError>([&] { AtomicFile("/dev/full"); }), HasSubstr("no regular file"));
+    EXPECT_THAT(message_of<InputError>([&] { AtomicFile("/dev/full"); }), HasSubstr("not a regular file"));
     EXPECT_THAT(message_of<InputError>([&] { AtomicFile(""); }), HasSubstr("empty"));
     std::ofstream(directory / "file") << "x";
     EXPECT_THAT(message_of<InputError>([&] { AtomicFile(directory / "file/out.h5"); }), HasSubstr("Not a directory"));

@@ -131,7 +131,7 @@ TEST(Interrupt, WhatIsThereAlreadyIsNamed) {
     });
     EXPECT_EQ(number, SIGINT);
     EXPECT_THAT(read(directory / "err"),
-                testing::HasSubstr("written before, and whole: " + (directory / "a.txt").string()));
+                testing::HasSubstr("these files were complete before: " + (directory / "a.txt").string()));
     EXPECT_EQ(read(directory / "a.txt"), "whole");
 }
 

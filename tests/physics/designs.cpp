@@ -265,7 +265,7 @@ constexpr const char* grid = "[output]\nangle_record = false\n[design]\nkind = \
 
 TEST(Designs, KeysThatCannotVaryAreRefused) {
     const auto refused = [](const std::string& key) { return complaint(grid + ("\"" + key + "\"\nvalues = [1.0]\n")); };
-    EXPECT_THAT(refused("gyro.lockin_treshold_deg_h"), AllOf(HasSubstr("s.toml:6:7"), HasSubstr("is no key")));
+    EXPECT_THAT(refused("gyro.lockin_treshold_deg_h"), AllOf(HasSubstr("s.toml:6:7"), HasSubstr("is not a key")));
     EXPECT_THAT(refused("readout.model"), HasSubstr("a design varies numbers"));
     EXPECT_THAT(refused("output.angle_record"), HasSubstr("a design varies numbers"));
     EXPECT_THAT(refused("input.profile_time_s"), HasSubstr("a design varies numbers"));
@@ -273,7 +273,7 @@ TEST(Designs, KeysThatCannotVaryAreRefused) {
     EXPECT_THAT(refused("ensemble.seed"), HasSubstr("the same at all points"));
     EXPECT_THAT(refused("propagation.direct_tolerance_rad"), HasSubstr("does not vary"));
     EXPECT_THAT(refused("design.points"), HasSubstr("of the design itself"));
-    EXPECT_THAT(refused("design.vary.from"), HasSubstr("is no key"));
+    EXPECT_THAT(refused("design.vary.from"), HasSubstr("is not a key"));
     EXPECT_THAT(refused("record.rate_hz"), HasSubstr("ringlock record"));
     EXPECT_THAT(refused("input.sweep_points"), HasSubstr("vary input.rate_deg_h"));
 }
@@ -302,7 +302,7 @@ TEST(Designs, WhatIsWrongWithADesignIsSaid) {
     const std::string normal = "[[design.vary]]\nkey = " + key + "distribution = \"normal\"\n";
     EXPECT_THAT(complaint(sobol + "points = 8\n" + normal + "mean = -1e4\nsd = 10.0\n"),
                 HasSubstr("only 0 of its distribution lies within"));
-    EXPECT_THAT(complaint(sobol + normal + "mean = 300.0\nsd = 10.0\n"), HasSubstr("say how many"));
+    EXPECT_THAT(complaint(sobol + normal + "mean = 300.0\nsd = 10.0\n"), HasSubstr("give the number of points"));
     EXPECT_THAT(complaint(sobol + "points = 8\n" + normal + "mean = 300.0\nsd = 0.0\n"), HasSubstr("sd"));
     EXPECT_THAT(complaint(sobol + "points = 1500000\n" + normal + "mean = 300.0\nsd = 10.0\n"),
                 AllOf(HasSubstr("design.points"), HasSubstr("of memory, and the machine has")));
@@ -333,7 +333,7 @@ TEST(Designs, AllPointsAskForTheSameFigures) {
         complaint("[output]\nangle_record = false\n[specification]\nbias_stability_deg_h = 1.0\n[design]\nkind = "
                   "\"sobol\"\nsensitivity_base_points = 16\n[[design.vary]]\nkey = \"specification.at_s\"\n"
                   "values = [50.0, 100.0]\n"),
-        HasSubstr("an index is of one figure"));
+        HasSubstr("an index is that of one figure"));
 }
 
 }  // namespace

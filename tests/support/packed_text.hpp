@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -60,8 +61,10 @@ inline std::string xzed(const std::string& text, int window_log = 0) {
     lzma_filter filters[] = {{LZMA_FILTER_LZMA2, &options}, {LZMA_VLI_UNKNOWN, nullptr}};
     std::string out(lzma_stream_buffer_bound(text.size()), '\0');
     std::size_t size = 0;
-    lzma_stream_buffer_encode(filters, LZMA_CHECK_CRC64, nullptr, reinterpret_cast<const std::uint8_t*>(text.data()),
-                              text.size(), reinterpret_cast<std::uint8_t*>(out.data()), &size, out.size());
+    const lzma_ret done = lzma_stream_buffer_encode(filters, LZMA_CHECK_CRC64, nullptr,
+                                                    reinterpret_cast<const std::uint8_t*>(text.data()), text.size(),
+                                                    reinterpret_cast<std::uint8_t*>(out.data()), &size, out.size());
+    if (done != LZMA_OK) throw std::runtime_error("xz: the text could not be packed");
     out.resize(size);
     return out;
 }

@@ -46,6 +46,21 @@ TEST_F(AllanRecord, HeaderNamesColumnsAndOtherColumnsMayHoldText) {
     EXPECT_THAT(record::read_series(file("rate_deg_h\n1\n2\n"), std::nullopt).values, ElementsAre(1.0, 2.0));
 }
 
+TEST_F(AllanRecord, EveryDatumHasItsLine) {
+    const auto s = record::read_series(file("# a note\nrate\n1\n\n2\n3\n# more\nnan\n5\n"), std::nullopt);
+    ASSERT_EQ(s.n, 5U);
+    EXPECT_EQ(s.lines.size(), 3U);
+    const std::vector<std::size_t> lines = {3, 5, 6, 8, 9};
+    for (std::size_t datum = 0; datum < 5; ++datum) EXPECT_EQ(s.line_of(datum), lines[datum]) << datum;
+    // Rows that are left out, by their times, are data without a line of their own.
+    const auto gaps =
+        record::read_series({.path = file("t,x\n0,1\n1,2\n4,3\n5,4\n"), .column = "x", .time = "t", .rate_hz = 1.0});
+    ASSERT_EQ(gaps.n, 6U);
+    EXPECT_EQ(gaps.line_of(1), 3U);
+    EXPECT_EQ(gaps.line_of(4), 4U);
+    EXPECT_EQ(gaps.line_of(5), 5U);
+}
+
 TEST_F(AllanRecord, ReadsTheRateOfAnRlgRecord) {
     const auto s = record::read_series(
         file("# format = rlg-record\n# rate_hz = 100\nangle_increment_arcsec,accel_x\n0.5,1\n-0.5,2\n"),

@@ -1,3 +1,9 @@
+#include <zlib.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "tests/support/array_files.hpp"
 #include "tests/unit/allan_record_support.hpp"
 
@@ -62,6 +68,45 @@ TEST_F(AllanRecordMatlab, AFileThatIsCutOffIsNamed) {
     for (std::size_t length = 128; length < whole.size(); length += 97) {
         EXPECT_THAT(error_of(file(whole.substr(0, length), "cut.mat")), HasSubstr("cut.mat")) << length;
     }
+}
+
+/// A packed variable whose matrix claims `rows` values in `claimed` bytes, with `there` of its numbers.
+std::string packed_claim(std::uint32_t rows, std::uint32_t claimed, const std::vector<double>& there) {
+    const auto words = [](const std::vector<std::uint32_t>& all) { return test::bytes_of(all); };
+    const std::string numbers = test::bytes_of(there);
+    const std::string matrix =
+        words({14, claimed, 6, 8, 6, 0, 5, 8, rows, 1, (1U << 16U) | 1U, 'x', 9, 8 * rows}) + numbers;
+    std::string packed(compressBound(static_cast<uLong>(matrix.size())), '\0');
+    uLongf size = static_cast<uLongf>(packed.size());
+    compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(matrix.data()),
+             static_cast<uLong>(matrix.size()));
+    packed.resize(size);
+    std::string head = "MATLAB 5.0 MAT-file";
+    head.resize(124, ' ');
+    return head + std::string("\0\1IM", 4) + words({15, static_cast<std::uint32_t>(size)}) + packed;
+}
+
+TEST_F(AllanRecordMatlab, APackedVariableClaimsNoMoreThanItUnpacksTo) {
+    const std::vector<double> two = {1.5, 2.5};
+    const std::uint32_t heads = 48;  // of the elements within a matrix
+    EXPECT_THAT(record::read_series(file(packed_claim(2, heads + 16, two), "good.mat"), "x").values,
+                ElementsAre(1.5, 2.5));
+    // More values than its numbers have bytes, than what is unpacked has, and than any packing could hold.
+    EXPECT_THAT(error_of(file(packed_claim(1000, heads + 16, two), "bad.mat"), "x"), HasSubstr("bad.mat: is cut off"));
+    EXPECT_THAT(error_of(file(packed_claim(1000, heads + 8000, two), "bad.mat"), "x"),
+                HasSubstr("bad.mat: is cut off"));
+    const std::vector<double> zeros(2000);
+    EXPECT_THAT(error_of(file(packed_claim(200'000'000, heads + 1'600'000'000, zeros), "bad.mat"), "x"),
+                AllOf(HasSubstr("bad.mat: says that a variable of"), HasSubstr("no packing can")));
+}
+
+TEST_F(AllanRecordMatlab, AMatrixOfNoBytesClaimsNothing) {
+    const std::string head = std::string("MATLAB 5.0 MAT-file") + std::string(105, ' ') + std::string("\0\1IM", 4);
+    // The library reads on behind its end.
+    const std::string path =
+        file(head + test::bytes_of<std::uint32_t>({14, 0, 6, 8, 12, 0, 5, 8, 0xffffffff, 1, 1, 0, 16, 16, 1, 2, 3, 4}),
+             "bad.mat");
+    EXPECT_THAT(error_of(path), HasSubstr("bad.mat: dataset /: says that it has 4294967295 values"));
 }
 
 /// MATLAB 7.3 writes HDF5 behind a block of its own of 512 bytes.

@@ -12,6 +12,7 @@ using test::AllanRecord;
 using test::bytes_of;
 using test::npy;
 using test::npy_dictionary;
+using test::write_zip;
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -44,6 +45,33 @@ TEST_F(AllanRecordNumpy, NumbersOfEverySizeAndByteOrder) {
     expect(">u2", bytes_of<std::uint16_t>({1, 2, 100}, true));
     expect("<u4", bytes_of<std::uint32_t>({1, 2, 100}));
     expect(">u8", bytes_of<std::uint64_t>({1, 2, 100}, true));
+}
+
+// Since 1970 a double resolves 2e-7 s: whole seconds and nanoseconds keep their digits.
+TEST_F(AllanRecordNumpy, SecondsAndNanosecondsAreOneTime) {
+    const std::string path = file("", "log.npz");
+    const std::int32_t start = 1700000000;
+    write_zip(path,
+              {{"gx.npy", npy(npy_dictionary("'<f8'", "(4,)"), bytes_of<double>({1, 2, 3, 4}))},
+               {"sec.npy",
+                npy(npy_dictionary("'<i4'", "(4,)"), bytes_of<std::int32_t>({start, start, start + 1, start + 1}))},
+               {"nsec.npy",
+                npy(npy_dictionary("'<u4'", "(4,)"), bytes_of<std::uint32_t>({999'999'000, 999'999'500, 0, 1000}))},
+               {"bad.npy",
+                npy(npy_dictionary("'<u4'", "(4,)"), bytes_of<std::uint32_t>({999'999'000, 1'000'000'500, 0, 1000}))}});
+    const auto request = [&](const std::string& time) {
+        return record::SeriesRequest{.path = path, .column = "gx", .time = time, .rate_hz = 2e6};
+    };
+    const auto s = record::read_series(request("sec,nsec"));
+    ASSERT_EQ(s.values.size(), 5U);
+    EXPECT_EQ(s.missing, 1U);
+    EXPECT_TRUE(std::isnan(s.values[3]));
+    EXPECT_THAT(error_of(request("sec,bad")),
+                AllOf(HasSubstr("bad, element 1"), HasSubstr("1000000500"), HasSubstr("nanoseconds")));
+    EXPECT_THAT(error_of(request("sec,sec")), HasSubstr("twice"));
+    auto in_ms = request("sec,nsec");
+    in_ms.time_unit = "ms";
+    EXPECT_THAT(error_of(in_ms), HasSubstr("--time-unit ms"));
 }
 
 TEST_F(AllanRecordNumpy, HalvesAtTheirEnds) {
@@ -155,6 +183,14 @@ TEST_F(AllanRecordNumpy, ArchivesHoldArraysByName) {
         EXPECT_THAT(values(path, "m[:,0]"), ElementsAre(1.0, 3.0));
         EXPECT_THAT(error_of(path), AllOf(HasSubstr("/t"), HasSubstr("/gyro/x"), HasSubstr("/m[I,:]")));
     }
+}
+
+TEST_F(AllanRecordNumpy, AnArchiveThatUnpacksToFarTooMuchIsRefusedByItsHead) {
+    const std::string path = file("", "bomb.npz");
+    constexpr std::size_t bytes = 110'000'000;
+    test::write_zip(path, {{"x.npy", npy(npy_dictionary("'|i1'", "(110000000,)"), std::string(bytes, '\0'))}});
+    EXPECT_THAT(error_of(path),
+                AllOf(HasSubstr("bomb.npz: dataset /x: unpacks to 1.1e+08 bytes"), HasSubstr("more than 200 times")));
 }
 
 TEST_F(AllanRecordNumpy, ArchivesThatAreNoneAreNamed) {

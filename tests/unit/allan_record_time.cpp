@@ -248,7 +248,7 @@ TEST_F(AllanRecordTime, UnitsOfTimes) {
     }
     EXPECT_THAT(error_of(in_unit(1.0, "ms")), HasSubstr("say --time-unit s"));
     EXPECT_THAT(error_of(in_unit(1.0, "fortnight")), AllOf(HasSubstr("fortnight"), HasSubstr("mjd")));
-    EXPECT_THAT(error_of(in_unit(1.0, "iso")), AllOf(HasSubstr("is no date"), HasSubstr("data.txt:1")));
+    EXPECT_THAT(error_of(in_unit(1.0, "iso")), AllOf(HasSubstr("is not a date"), HasSubstr("data.txt:1")));
     record::SeriesRequest days = request({60431.0, 60431.25, 60431.75, 60432.0}, 4.0 / 86400.0);
     days.time_unit = "mjd";
     EXPECT_THAT(record::read_series(days).values, same_numbers({1.0, 2.0, nan, 3.0, 4.0}));
@@ -310,7 +310,7 @@ TEST_F(AllanRecordTime, DatesAreTimes) {
     };
     for (const char* date : {"2024-13-01T00:00:00", "2024-02-30", "2024-05-01T12:61:00", "yesterday", "17",
                              "2024-05-01T12:00:00.5+2", "2024-05-01T12:00:00.5ZZ"}) {
-        EXPECT_THAT(refused(date), AllOf(HasSubstr("dates.csv:3: column t"), HasSubstr(date), HasSubstr("no date")));
+        EXPECT_THAT(refused(date), AllOf(HasSubstr("dates.csv:3: column t"), HasSubstr(date), HasSubstr("not a date")));
     }
     EXPECT_THAT(refused("2024-05-01T11:00:00"), AllOf(HasSubstr("2024-05-01T11:00:00Z is before"), HasSubstr(":2:")));
 }

@@ -263,9 +263,9 @@ TEST(DesignFactors, WhatCannotBeIsRefusedByName) {
                             of(Triangular{1.0, 1.0, 1.0})}) {
         EXPECT_THAT(refusal(f), HasSubstr("ensemble.threshold"));
     }
-    EXPECT_THAT(refusal({.key = "", .takes = Values{{1.0}}}), HasSubstr("must name what it varies"));
+    EXPECT_THAT(refusal({.key = "", .takes = Values{{1.0}}}), HasSubstr("must name the key that it varies"));
     EXPECT_THAT(refusal({.key = "x", .takes = Values{{1.0, 3.0}}, .lower = 0.0, .upper = 2.0}),
-                HasSubstr("the value 3 lies outside of what is allowed, 0 to 2"));
+                HasSubstr("the value 3 lies outside of the allowed range, 0 to 2"));
     EXPECT_THAT(refusal({.key = "x", .takes = Range{1.0, 3.0, 3}, .lower = 2.0}),
                 HasSubstr("the value 1 lies outside"));
     EXPECT_THAT(refusal({.key = "x", .takes = Values{{1.0}}, .lower = 2.0, .upper = 1.0}), HasSubstr("not in order"));
@@ -278,13 +278,13 @@ TEST(DesignFactors, WhatCannotBeIsRefusedByName) {
 
 TEST(DesignFactors, ADistributionOutsideOfItsBoundsIsRefused) {
     EXPECT_THAT(refusal({.key = "gain", .takes = Uniform{3.0, 4.0}, .lower = 0.0, .upper = 2.0}),
-                HasSubstr("factor gain: only 0 of its distribution lies within what is allowed, 0 to 2"));
+                HasSubstr("factor gain: only 0 of its distribution lies within the allowed range, 0 to 2"));
     for (const Factor& f : {Factor{.key = "x", .takes = Normal{0.0, 1.0}, .lower = 60.0},
                             Factor{.key = "x", .takes = Lognormal{1.0, 0.1}, .upper = 0.0},
                             Factor{.key = "x", .takes = Lognormal{1.0, 0.1}, .upper = -1.0},
                             Factor{.key = "x", .takes = Triangular{0.0, 1.0, 2.0}, .lower = 2.0},
                             Factor{.key = "x", .takes = Normal{0.0, 1.0}, .lower = 1.0, .upper = 1.0}}) {
-        EXPECT_THAT(refusal(f), HasSubstr("lies within what is allowed"));
+        EXPECT_THAT(refusal(f), HasSubstr("lies within the allowed range"));
     }
     // 1 - Phi(2.3) = 0.0107, 1 - Phi(2.4) = 0.0082; the limit is 0.01.
     EXPECT_NO_THROW(check({.key = "x", .takes = Normal{0.0, 1.0}, .lower = 2.3}));
@@ -293,7 +293,7 @@ TEST(DesignFactors, ADistributionOutsideOfItsBoundsIsRefused) {
 
 TEST(DesignFactors, FactorsHaveKeysOfTheirOwn) {
     const std::vector<Factor> twice = {{.key = "a", .takes = Values{{1.0}}}, {.key = "a", .takes = Normal{}}};
-    EXPECT_THAT(message_of<InputError>([&] { check(twice); }), HasSubstr("factor a: is there twice"));
+    EXPECT_THAT(message_of<InputError>([&] { check(twice); }), HasSubstr("factor a: is given twice"));
     EXPECT_THROW(check(std::vector<Factor>{}), InputError);
 }
 

@@ -467,7 +467,7 @@ TEST(Correlations, ThatCannotBeAreRefusedByName) {
     EXPECT_THAT(refusal({{"a", "z", 0.5}}), HasSubstr("correlation of a and z: no factor has the key z"));
     EXPECT_THAT(refusal({{"levels", "a", 0.5}}), HasSubstr("levels has values and no distribution"));
     EXPECT_THAT(refusal({{"a", "a", 0.5}}), HasSubstr("a with itself"));
-    EXPECT_THAT(refusal({{"a", "b", 0.5}, {"b", "a", 0.5}}), HasSubstr("is there twice"));
+    EXPECT_THAT(refusal({{"a", "b", 0.5}, {"b", "a", 0.5}}), HasSubstr("is given twice"));
     for (const double value : {1.5, -1.5, std::nan(""), 1.0, -1.0}) {
         EXPECT_THAT(refusal({{"a", "b", value}}), AllOf(HasSubstr("a and b"), HasSubstr("above -1 and below 1")));
     }

@@ -149,7 +149,7 @@ TEST_F(RunFolder, OfThatNameThatIsNoneIsKept) {
     fs::create_directory(path_);
     std::ofstream(path_ / "letter.txt") << "mine";
     for (const Beginning beginning : {Beginning::refuse, Beginning::resume, Beginning::discard}) {
-        EXPECT_THAT(test::message_of<InputError>([&] { folder(beginning); }), HasSubstr("no folder of a run"));
+        EXPECT_THAT(test::message_of<InputError>([&] { folder(beginning); }), HasSubstr("not a folder of a run"));
     }
     EXPECT_TRUE(fs::exists(path_ / "letter.txt"));
     fs::remove_all(path_);

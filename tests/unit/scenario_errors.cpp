@@ -200,7 +200,8 @@ const BadCase bad_cases[] = {
      "arms of \"ideal\", \"uncompensated\", "},
     {"OneArmWithoutList", "[arms]\nnames = \"ideal\"",
      "key \"arms.names\" = \"ideal\": must be a list of different arms of"},
-    {"ArmTwice", "[arms]\nnames = [\"ideal\", \"ideal\"]", "s.toml:2:19: key \"arms.names\" = \"ideal\": stands twice"},
+    {"ArmTwice", "[arms]\nnames = [\"ideal\", \"ideal\"]",
+     "s.toml:2:19: key \"arms.names\" = \"ideal\": is given twice"},
     {"ArmThatIsANumber", "[arms]\nnames = [1]", "s.toml:2:10: key \"arms.names\" = 1: must be the name of an arm"},
     {"UnknownArm", "[arms]\nnames = [\"idael\"]",
      "s.toml:2:10: key \"arms.names\" = \"idael\": arm \"idael\": unknown arm (did you mean \"ideal\"?); arms are: "
@@ -268,6 +269,22 @@ TEST_F(ScenarioFile, OversizedOnesAreRefusedBeforeTheyAreParsed) {
     const auto path = dir_ / "big.toml";
     std::ofstream(path) << "# " << std::string(17 << 20, 'x');
     EXPECT_THAT(file_complaint(path), HasSubstr("is larger than 16 MiB: not a scenario"));
+    {
+        std::ofstream keys(path);
+        for (int i = 0; i < 30000; ++i) keys << "key_" << i << " = 1\n";
+    }
+    EXPECT_THAT(file_complaint(path), StartsWith(path.string() + ":20001:11: more than 20000 keys and sections"));
+    {
+        std::ofstream sections(path);
+        for (int i = 0; i < 30000; ++i) sections << "[s" << i << "]\n";
+    }
+    EXPECT_THAT(file_complaint(path), StartsWith(path.string() + ":20001:1: more than 20000 keys and sections"));
+    {
+        std::ofstream values(path);
+        values << "x = [";
+        for (int i = 0; i < 600000; ++i) values << "1,";
+    }
+    EXPECT_THAT(file_complaint(path), HasSubstr(": more than 500000 values: not a scenario"));
 }
 
 }  // namespace

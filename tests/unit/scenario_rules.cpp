@@ -281,7 +281,7 @@ TEST(ScenarioRules, KeysOfADriveNeedADrive) {
     for (const char* key : {"resonator_q = 50.0", "form = \"white\"", "distribution = \"binary\"",
                             "hold_half_cycles = 2", "modulation_hz = 2.0", "amplitude_loop_hz = 1.0"}) {
         EXPECT_THAT(complaint(std::string("[noise_injection]\n") + key),
-                    AllOf(HasSubstr("s.toml:2:"), HasSubstr("model = \"drive\" only")))
+                    AllOf(HasSubstr("s.toml:2:"), HasSubstr("only with noise_injection.model = \"drive\"")))
             << key;
         EXPECT_EQ(complaint(std::string("[noise_injection]\nmodel = \"drive\"\n") + key), "") << key;
     }

@@ -128,7 +128,7 @@ TEST(TextSource, OtherFilesAreCalledByTheirNames) {
         EXPECT_THAT(message_of<InputError>([&] { read_all(bytes); }), AllOf(HasSubstr("data: is"), HasSubstr(said)));
     }
     EXPECT_THAT(message_of<InputError>([] { read_all(packed(packed("1\n", Packer::xz), Packer::gzip)); }),
-                AllOf(HasSubstr("what is packed in it is packed with xz"), HasSubstr("unpack")));
+                AllOf(HasSubstr("its unpacked content is packed with xz"), HasSubstr("unpack")));
     EXPECT_EQ(identify("1,2,3\n").kind, "");
     EXPECT_EQ(identify("").kind, "");
 }

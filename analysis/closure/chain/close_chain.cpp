@@ -71,10 +71,10 @@ void report_shared(std::vector<std::unique_ptr<RecordInChain>>& records, Chain& 
     for (std::size_t r = 0; r < records.size(); ++r) {
         ChainRecord& said = chain.records[r];
         if (!said.near_shared) {
-            said.closure.notes.push_back(fmt::format(
-                "the source of {:.8g} Hz that other records of the data chain show explains no more of this "
-                "record than chance does",
-                source.from_hz));
+            said.closure.notes.push_back(
+                fmt::format("the source of {:.8g} Hz, which other records of the data chain show, "
+                            "explains this record no better than chance",
+                            source.from_hz));
             continue;
         }
         source.p_value = p_of_source(said.gain_of_shared);
@@ -82,13 +82,17 @@ void report_shared(std::vector<std::unique_ptr<RecordInChain>>& records, Chain& 
         const bool has = std::any_of(said.closure.steps.begin(), said.closure.steps.end(),
                                      [&](const Step& step) { return step.effect == chain.effect; });
         std::string note = fmt::format(
-            "the rate of the source is that of the data chain, which {} records show; it is held here", showing);
+            "the rate of the source is taken from the data chain, in which {} records show it, "
+            "and is held fixed for this record",
+            showing);
         if (showing == 1)
-            note = "no other record of the data chain shows the source: its rate is held as by this record alone";
+            note =
+                "no other record of the data chain shows the source: its rate is held at the estimate "
+                "from this record alone";
         if (!has) {
             note = fmt::format(
-                "with the source of {:.8g} Hz that other records of the data chain show, {} was not added "
-                "to the model of this record",
+                "with the source of {:.8g} Hz, which other records of the data chain show, "
+                "{} was not added to the model of this record",
                 source.from_hz, chain.effect->name());
         }
         said.closure.notes.push_back(std::move(note));
@@ -114,15 +118,15 @@ std::vector<double> Chain::tied_hz() const {
 void refuse_no_chain(std::span<const NamedRecord> records) {
     if (records.size() < 2) {
         throw InputError(fmt::format(
-            "a data chain needs two records or more of one box, and there {} {}; name the other records too",
+            "a data chain needs two or more records of one box, but there {} {}; name the other records too",
             records.size() == 1 ? "is" : "are", records.size()));
     }
     std::vector<double> rates_hz;
     for (const NamedRecord& of : records) {
         if (of.record->turns || !of.record->samples) {
             throw InputError(fmt::format(
-                "{}: is a record of turns, each with a time of its own, which no data chain resamples; several records "
-                "of one data chain are records of samples. Read it by itself",
+                "{}: is a record of turns, each with its own time, and a data chain does not resample turns; "
+                "the records of one data chain must be records of samples. Read this one by itself",
                 of.name));
         }
         std::string note;
@@ -131,14 +135,14 @@ void refuse_no_chain(std::span<const NamedRecord> records) {
         const double first_hz = records.front().record->samples->rate_hz;
         if (rate_hz != first_hz) {
             throw InputError(fmt::format(
-                "{}: has {:.10g} samples a second and {} has {:.10g}; one data chain gives all its records the same "
-                "rate. Name records of one rate, or read this one by itself",
+                "{}: has {:.10g} samples a second and {} has {:.10g}; all records "
+                "of one data chain must have the same rate. Name records of one rate, or read this one by itself",
                 of.name, rate_hz, records.front().name, first_hz));
         }
         if (rates_hz.back() != rates_hz.front()) {
             throw InputError(fmt::format(
-                "{}: the reader that it declares asks for sums at {:.10g} Hz, that of {} at {:.10g} Hz; one data chain "
-                "gives all its records the same rate. Name records of one reader, or read this one by itself",
+                "{}: the reader that it declares asks for sums at {:.10g} Hz, that of {} at {:.10g} Hz; all records "
+                "of one data chain must have the same rate. Name records of one reader, or read this one by itself",
                 of.name, rates_hz.back(), records.front().name, rates_hz.front()));
         }
     }

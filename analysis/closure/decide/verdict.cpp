@@ -28,18 +28,18 @@ std::string experiment_for(const effects::Effect& effect, const std::vector<cons
         return count([quantity](const effects::Effect* e) { return e->follows() == quantity; }) > 0;
     };
     if (count([](const effects::Effect* e) { return on_samples(*e) == OnSamples::angle_line; }) > 0) {
-        return "declare the dither's frequency if the record does not, or record with another dither frequency or "
-               "sampling rate";
+        return "declare the dither's frequency if the record does not, "
+               "or record with another dither frequency or sampling rate";
     }
     if (follow(effects::Follows::temperature)) {
-        return "record with the temperature changed against time: held, then stepped up and down";
+        return "record with a temperature that does not follow time: constant, then stepped up and down";
     }
     if (follow(effects::Follows::input_rate)) return "record at three input rates or more, of both signs";
     if (count([](const effects::Effect* e) { return configured_by(*e).dither_shape; }) > 1) {
         return "record the accelerations on both sides of the turns";
     }
     if (count([](const effects::Effect* e) { return configured_by(*e).coupling; }) > 0) {
-        return "record with more injected noise, so that all phases come at all turns, or for longer";
+        return "record with more injected noise, so that all phases occur at all turns, or for longer";
     }
     const auto changes_kicks = [](const effects::Effect* e) {
         return e->changes().threshold || e->changes().coupling_phase;

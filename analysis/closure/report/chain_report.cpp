@@ -78,14 +78,14 @@ std::string verdict_sentence(const Chain& chain) {
     }
     if (!chain.shared && !chain.contradicted()) {
         return fmt::format(
-            "data chain of {} records: none of them knows the rate of the source with an error; each report is that of "
-            "its record alone",
+            "data chain of {} records: none of them gives the rate of the source with a standard error; "
+            "each report is that of its record alone",
             count);
     }
     if (!chain.shared) {
         return fmt::format(
-            "data chain of {} records: they contradict each other, as no one source explains them; each report is that "
-            "of its record alone",
+            "data chain of {} records: they contradict each other, because no single source explains all of them; "
+            "each report is that of its record alone",
             count);
     }
     const auto showing = std::count_if(chain.records.begin(), chain.records.end(),
@@ -99,8 +99,9 @@ std::string verdict_sentence(const Chain& chain) {
                            chain.shared->sd_hz, seen);
     }
     return fmt::format(
-        "data chain of {} records: one source, likeliest of {:.10g} Hz, {}; they cannot tell it from {} Hz", count,
-        chain.shared->hz, seen, hz_list(tied));
+        "data chain of {} records: one source, most likely of {:.10g} Hz, {}; "
+        "tied with {} Hz (the records support these rates equally well)",
+        count, chain.shared->hz, seen, hz_list(tied));
 }
 
 std::vector<std::string> contradictions(const Chain& chain) {
@@ -111,10 +112,10 @@ std::vector<std::string> contradictions(const Chain& chain) {
         if (!record.contradicts) continue;
         const std::string other = record.likeliest_hz ? fmt::format("a source of {:.8g} Hz", *record.likeliest_hz)
                                                       : std::string("no source at all");
-        all.push_back(fmt::format(
-            "{}: {} is likelier than the {:.8g} Hz that all records together favour, by {:.1f} in the log-likelihood "
-            "(by chance: p {})",
-            record.name, other, hz, record.gain_alone, probability(record.p_alone)));
+        all.push_back(
+            fmt::format("{}: {} is more likely than the {:.8g} Hz that all records together favour, "
+                        "by {:.1f} in the log-likelihood (by chance: p {})",
+                        record.name, other, hz, record.gain_alone, probability(record.p_alone)));
     }
     if (chain.contradicted() && all.empty()) {
         all.push_back(
@@ -136,8 +137,8 @@ std::string to_text(const Chain& chain) {
     std::size_t width = std::string_view("record").size();
     for (const ChainRecord& record : chain.records) width = std::max(width, record.name.size());
     text +=
-        "\ngains of the log-likelihood: of the likeliest rate of all records over no source, and of what explains a "
-        "record most over that rate\n";
+        "\ngains of the log-likelihood: of the likeliest rate of all records over no source, "
+        "and of the best explanation of each record by itself over that rate\n";
     text += fmt::format("{:<{}}  {:>12}  {:>28}  {:>14}  {:>10}\n", "record", width, "alone [Hz]",
                         "near the shared one [Hz]", "over no source", "of its own");
     for (const ChainRecord& record : chain.records) {
@@ -148,7 +149,7 @@ std::string to_text(const Chain& chain) {
         text += fmt::format("{:<{}}  {:>12}  {:>28}  {:>+14.1f}  {:>+10.1f}\n", record.name, width, alone, near,
                             record.gain_of_shared, record.gain_alone);
     }
-    text += "\nlog-likelihood by the rate of the source, of all records (of each):\n";
+    text += "\nlog-likelihood by the rate of the source, sum of all records (each record):\n";
     for (const ChainRate& rate : chain.rates) {
         std::string of_records;
         for (const double value : rate.log_likelihood) {

@@ -98,8 +98,8 @@ class Filler {
             to = *declared;
             remark(key, "Declared by the record.");
         } else {
-            remark(key, fmt::format("{}the record neither declares nor determines it; the value is that of the "
-                                    "standard gyro.",
+            remark(key, fmt::format("{}the record neither declares nor determines it; "
+                                    "the value is that of the standard gyro.",
                                     placeholder_mark));
         }
     }
@@ -137,7 +137,7 @@ class Filler {
         double& noise = s.readout.detector_noise_relative;
         const double standard = noise;
         if (take_estimate("readout.detector_noise_relative", "readout_noise_rad", noise) && noise > most_noise) {
-            cannot_hold(fmt::format("detector noise of {:.3g}, more than a scenario may have", noise));
+            cannot_hold(fmt::format("detector noise of {:.3g}, which is more than a scenario allows", noise));
         }
         noise = std::clamp(noise, 0.0, most_noise);
         const double injected = estimated(closure_.base, "injected_noise_rad", 0.0);
@@ -184,8 +184,7 @@ class Filler {
         const record::Samples& samples = *record_.samples;
         const record::Declared& declared = record_.declared;
         s.gyro.lockin_threshold_deg_h = 0.0;
-        std::string threshold =
-            "Zero, as the white noises that were fitted contain what the lock-in leaves in samples.";
+        std::string threshold = "Zero, because the fitted white noises contain the effect of the lock-in on samples.";
         if (declared.lockin_threshold_deg_h) {
             threshold += fmt::format(" The record declares {:.6g} deg/h.", *declared.lockin_threshold_deg_h);
         }
@@ -240,7 +239,7 @@ class Filler {
         if (reader.fraction == reader::Fraction::ideal) {
             reader.reference_noise_arcsec = plain_reader_.reference_noise_arcsec;
         } else {
-            remark(key, "Declared by the record, as all of its reader.");
+            remark(key, "Declared by the record, as are all keys of its reader.");
         }
         remark("reader.stripping", "Declared by the record.");
         remark("reader.latch_hz", "Declared by the record.");
@@ -257,7 +256,8 @@ class Filler {
             remark("reader.reference_noise_arcsec", plain_remark_);
             closed_.remarks.erase("reader.stripping");
             closed_.remarks.erase("reader.latch_hz");
-            cannot_hold(fmt::format("the declared reader together with what was found: {}", complaint.problem));
+            cannot_hold(
+                fmt::format("the declared reader together with the effects that were found: {}", complaint.problem));
             return;
         }
     }
@@ -275,8 +275,8 @@ class Filler {
         const double rate_deg_h = record_.declared.input_rate_deg_h.value_or(0.0);
         cannot_hold(fmt::format("the mean rate: {}", found->problem));
         scenario().input.rate_deg_h = scenario().input.sweep_stop_deg_h = rate_deg_h;
-        remark(key, fmt::format("{}the mean rate that was fitted is none that a dithered gyro follows; the value is "
-                                "the declared input rate, or zero.",
+        remark(key, fmt::format("{}a dithered gyro cannot follow the fitted mean rate; "
+                                "the value is the declared input rate, or zero.",
                                 placeholder_mark));
     }
 
@@ -305,7 +305,7 @@ class Filler {
         const auto found = scenario().effects.find(name);
         if (found == scenario().effects.end()) return cannot_hold(sentence);
         if (!taken_.insert(name).second) {
-            return cannot_hold(fmt::format("{} (a scenario has each effect once)", sentence));
+            return cannot_hold(fmt::format("{} (a scenario holds each effect only once)", sentence));
         }
         effects::Values values = found->second;
         for (const Estimate& estimate : step.parameters) {
@@ -334,7 +334,7 @@ class Filler {
 
     /// A tie is a finding that no scenario can contain: the scenario has one of the effects.
     void tie(const std::string& name, const effects::Effect& other) {
-        cannot_hold(fmt::format("{} explains the record as well as {}, which stands here", other.name(), name));
+        cannot_hold(fmt::format("{} explains the record as well as {}, which this scenario has", other.name(), name));
     }
 
     const record::Record& record_;
@@ -369,10 +369,10 @@ ClosedScenario closed_scenario(const record::Record& record, const Closure& clos
 
 std::string to_toml(const ClosedScenario& closed, const std::string& source, Verdict verdict) {
     using scenario::toml_comment;
-    std::string text = toml_comment(fmt::format("What was found in {}: {}.", source, name_of(verdict)));
+    std::string text = toml_comment(fmt::format("Result of ringlock closure for {}: {}.", source, name_of(verdict)));
     text += toml_comment(
-        "The device as fitted, with the effects that were added. A remark says where a value comes from; values "
-        "without one are defaults.");
+        "The device as fitted, with the effects that were added. A comment gives the origin of a value; "
+        "values without a comment are defaults.");
     for (const std::string& key : closed.placeholders()) text += toml_comment("Placeholder: " + key);
     for (const std::string& finding : closed.not_held) text += toml_comment("Not in this scenario: " + finding);
     return text + "\n" + scenario::to_toml(closed.scenario, closed.remarks);

@@ -64,7 +64,7 @@ std::string why_not(fs::path folder) {
     std::error_code error;
     folder = fs::absolute(folder, error);
     while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
-    if (!fs::is_directory(folder, error)) return fmt::format("{} is there and no folder", printable(folder));
+    if (!fs::is_directory(folder, error)) return fmt::format("{} exists and is not a folder", printable(folder));
     if (access(folder.c_str(), W_OK | X_OK) == 0) return "";
     return fmt::format("{}: {}", printable(folder), std::generic_category().message(errno));
 }
@@ -72,7 +72,7 @@ std::string why_not(fs::path folder) {
 void check_files(const fs::path& folder, const std::vector<fs::path>& files) {
     if (const std::string why = why_not(folder); !why.empty()) {
         throw InputError(
-            fmt::format("{}: the closed loop's files cannot be written there: {}; give another folder with -o",
+            fmt::format("{}: the files of the closed loop cannot be written there: {}; give another folder with -o",
                         printable(folder), why));
     }
     std::string others;
@@ -83,8 +83,8 @@ void check_files(const fs::path& folder, const std::vector<fs::path>& files) {
     }
     if (others.empty()) return;
     throw InputError(
-        fmt::format("{}: {} would be replaced, which ringlock closure has not written, or which somebody has changed "
-                    "since; it is kept. Give another folder with -o, or move it away",
+        fmt::format("{}: {} would be replaced, but ringlock closure did not write it, or it was changed since; "
+                    "it is kept. Give another folder with -o, or move the file away",
                     printable(folder), others));
 }
 

@@ -68,7 +68,7 @@ std::vector<PredictiveStatistic> blank(bool turns) {
         if (!turns) break;
         all.push_back(
             {.name = fmt::format("folded_{}", kind),
-             .description = fmt::format("what the angle gains across {} by the phase there, three harmonics", kind),
+             .description = fmt::format("change of the angle across {} by the phase there, three harmonics", kind),
              .x_name = "phase at the turn",
              .x_unit = "rad",
              .unit = "rad"});
@@ -389,7 +389,7 @@ std::vector<std::string> left_out(const Closure& closure) {
         const auto effect = known.find(step.name());
         for (const Estimate& estimate : step.parameters) {
             if (effect != known.end() && effect->second.contains(estimate.name)) continue;
-            notes.push_back(fmt::format("{} of {} is no parameter of a scenario: it is not simulated", estimate.name,
+            notes.push_back(fmt::format("{} of {} is not a parameter of a scenario and is not simulated", estimate.name,
                                         step.effect->name()));
         }
         if (step.effect->changes().threshold && step.effect->follows() == effects::Follows::temperature) {
@@ -578,8 +578,10 @@ Predictive simulated_check(const record::Record& record, const Closure& closure,
         out.simulations = wanted;
         out.turns = std::llround(each) * wanted;
         if (wanted < simulations) {
-            out.notes.push_back(fmt::format("{} simulations and not {}, as the record is long: no p below {:.2g}",
-                                            wanted, simulations, 1.0 / (wanted + 1.0)));
+            out.notes.push_back(
+                fmt::format("{} simulations instead of {}, because the record is long: "
+                            "p cannot be below {:.2g}",
+                            wanted, simulations, 1.0 / (wanted + 1.0)));
         }
         Curves whole;
         if (samples && !closure.disturbed.empty()) whole = samples->look_at_whole(samples->measured().increment);
@@ -610,9 +612,11 @@ Predictive simulated_check(const record::Record& record, const Closure& closure,
         }
         out.statistics = std::move(statistics);
     } catch (const InputError& error) {
-        out.notes.push_back(fmt::format("no predictive check, the closed model cannot be simulated: {}", error.what()));
+        out.notes.push_back(
+            fmt::format("no predictive check, because the closed model cannot be simulated: {}", error.what()));
     } catch (const RunError& error) {
-        out.notes.push_back(fmt::format("no predictive check, the closed model cannot be simulated: {}", error.what()));
+        out.notes.push_back(
+            fmt::format("no predictive check, because the closed model cannot be simulated: {}", error.what()));
     }
     return out;
 }

@@ -93,13 +93,13 @@ nlohmann::json to_json(const ClosedScenario& closed) {
 std::string verdict_sentence(const Closure& closure) {
     switch (closure.verdict) {
         case Verdict::nothing_missing:
-            return "nothing missing: what the base model leaves of this record is chance";
+            return "nothing missing: the residual of the base model is consistent with chance";
         case Verdict::closed:
-            return "closed: with the effects below, what is left of this record is chance";
+            return "closed: with the effects below, the residual is consistent with chance";
         case Verdict::unexplained:
             break;
     }
-    return fmt::format("unexplained: structure is left that no effect of the library takes away, in {}: {}",
+    return fmt::format("unexplained: the residual has structure that no effect of the library explains, in {}: {}",
                        name_of(closure.unexplained->where), closure.unexplained->description());
 }
 
@@ -120,16 +120,16 @@ std::string to_text(const Closure& closure) {
         line(fmt::format("  held-out error {:.6g} -> {:.6g} {}, log-score {:+.1f}", step.heldout_error_before,
                          step.heldout_error_after, closure.unit, step.heldout_log_score_gain));
         if (!step.confounded_with.empty()) {
-            line(fmt::format("  this record cannot tell it from: {}", fmt::join(names_of(step.confounded_with), ", ")));
-            line(fmt::format("  what would: {}", step.experiment));
+            line(fmt::format("  tied with: {} (the record supports these effects equally well)",
+                             fmt::join(names_of(step.confounded_with), ", ")));
+            line(fmt::format("  to distinguish them: {}", step.experiment));
         }
     }
     line("");
-    line(fmt::format(
-        "held-out one-step error: {:.6g} {} before, {:.6g} after; the fitted noise alone would leave {:.6g}",
-        closure.heldout_before, closure.unit, closure.heldout_after, closure.noise_floor));
+    line(fmt::format("held-out one-step error: {:.6g} {} before, {:.6g} after; the fitted noise alone gives {:.6g}",
+                     closure.heldout_before, closure.unit, closure.heldout_after, closure.noise_floor));
     line("");
-    line("residual held against:");
+    line("tests of the residual:");
     for (const ResidualTest& test : closure.tests) {
         line(fmt::format("  {:<11} {:<62} p {}", name_of(test.where), test.view, probability(test.p_value)));
     }
@@ -186,7 +186,7 @@ void write_predictive(store::File& h5, const Predictive& predictive) {
         if (!statistic.base.empty()) {
             group.write("base", statistic.base, {statistic.unit, "mean of simulations of the base model alone"});
         }
-        group.write("p_value", statistic.p_value, {"1", "of the point by itself, both sides"});
+        group.write("p_value", statistic.p_value, {"1", "of this point alone, two-sided"});
     }
 }
 
@@ -199,8 +199,8 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
     std::filesystem::create_directories(folder, failed);
     if (failed) {
         throw InputError(
-            fmt::format("{}: the folder for the closed loop's files cannot be made ({}); give another "
-                        "with -o",
+            fmt::format("{}: the folder for the files of the closed loop cannot be made ({}); "
+                        "give another folder with -o",
                         printable(folder), failed.message()));
     }
     store::AtomicFile file(folder / "closure.h5");
@@ -229,9 +229,9 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
     const Residual& r = closure.residual;
     residual.write("time_s", r.time_s, {"s", "time of the prediction"});
     residual.write("innovation", r.innovation, {closure.unit, "measured less predicted one step before"});
-    residual.write("sd", r.sd, {closure.unit, "standard deviation that the model foretells"});
+    residual.write("sd", r.sd, {closure.unit, "standard deviation that the model predicts"});
     std::vector<std::int8_t> reported(r.reported.begin(), r.reported.end());
-    residual.write("reported", reported, {"1", "1: held out, used for nothing but the report"});
+    residual.write("reported", reported, {"1", "1: held out, used only for the report"});
     store::Group scores = h5.create_group("scores");
     std::vector<std::string> steps{"base"};
     std::vector<double> errors{closure.heldout_before};

@@ -56,7 +56,7 @@ constexpr std::array real_columns = {
                        [](Turn t) { return t.lockin_error_rad; }},
     TurnColumn<double>{"truth/lockin_step_rad", "rad", "the same since the turn before",
                        [](Turn t) { return t.lockin_step_rad; }},
-    TurnColumn<double>{"truth/left_step_rad", "rad", "what the compensator leaves of lockin_step_rad",
+    TurnColumn<double>{"truth/left_step_rad", "rad", "lockin_step_rad after compensation",
                        [](Turn t) { return t.left_step_rad; }},
     TurnColumn<double>{"truth/rotation_arcsec", "arcsec",
                        "rotation of the case and by the rates of effects, since the first turn of the run",
@@ -117,10 +117,10 @@ struct PulseColumn {
 
 constexpr std::array pulse_columns = {
     PulseColumn{"readings/pulses_before_s", "s",
-                "pulses before the detectors were sampled, nearest first, from that instant; 0: not told apart",
+                "pulses before the detectors were sampled, nearest first, from that instant; 0: not resolved",
                 [](Turn t) -> const double* { return t.pulses_before_s; }},
     PulseColumn{"readings/pulses_after_s", "s",
-                "pulses after the detectors were sampled, nearest first, from that instant; 0: not told apart",
+                "pulses after the detectors were sampled, nearest first, from that instant; 0: not resolved",
                 [](Turn t) -> const double* { return t.pulses_after_s; }},
 };
 
@@ -152,8 +152,8 @@ std::filesystem::path keep_other_files(const std::filesystem::path& path, const 
     }
     if (!same) {
         throw InputError(
-            fmt::format("{}: the file is there and is not a replay of this gyro, arm and result; it is kept. Give "
-                        "another name with -o, or remove it",
+            fmt::format("{}: the file exists and is not a replay of this gyro, arm and result; it is kept. "
+                        "Give another name with -o, or remove it",
                         printable(path)));
     }
     return path;
@@ -233,11 +233,11 @@ void StoredGyro::fail(const std::string& what, double stored, double replayed) c
     const std::string why =
         by != here
             ? fmt::format("it was written by {}, and this is {}; replay it with the program that wrote it", by, here)
-            : "it was changed after it was written, or written on another machine, whose C library rounds "
-              "elementary functions in another way; run its scenario anew";
+            : "it was changed after it was written, or written on another machine, "
+              "whose C library rounds elementary functions in another way; run its scenario anew";
     throw RunError(
-        fmt::format("{}: the replay is not what the result has stored: {} is {:.17g} there and {:.17g} in "
-                    "the replay. About the result: {}",
+        fmt::format("{}: the replay differs from the stored result: {} is {:.17g} there and {:.17g} in the replay. "
+                    "About the result: {}",
                     of_.text(), what, stored, replayed, why));
 }
 

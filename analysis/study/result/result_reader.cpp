@@ -46,8 +46,8 @@ void check_values(const store::Dataset& dataset, const std::vector<double>& valu
         const bool too_free = allowed.words == freedom.words && v > 0.0 && v < least_freedom;
         if (std::isnan(v) ? allowed.nan : v >= allowed.least && v <= allowed.most && !too_free) continue;
         throw InputError(
-            fmt::format("{}: dataset {}: element {} (counted from 0, row by row) is {}; must be {}: the "
-                        "result is damaged",
+            fmt::format("{}: dataset {}: element {} (counted from 0, row by row) is {}; must be {}: "
+                        "the result is damaged",
                         printable(dataset.file()), printable(dataset.path()), i, v, allowed.words));
     }
 }
@@ -245,8 +245,8 @@ std::vector<Axis> read_axes(const store::File& file, const scenario::Scenario& s
         for (std::size_t p = 0; p < drawn.size(); ++p) {
             if (std::abs(axis.values[p] - drawn[p]) <= rounding * scale) continue;
             throw InputError(fmt::format(
-                "{}: dataset {}/{} holds {:.10g} for point {}, where the scenario's design has {:.10g}: the result is "
-                "damaged",
+                "{}: dataset {}/{} holds {:.10g} for point {}, where the scenario's design has {:.10g}: "
+                "the result is damaged",
                 printable(design.file()), printable(design.path()), axis.key, axis.values[p], p + 1, drawn[p]));
         }
     }
@@ -300,8 +300,7 @@ void check_size(const store::File& file, const scenario::Scenario& scenario, std
     const auto wanted = static_cast<double>(points) * static_cast<double>(ensemble::total_gyros(scenario));
     if (rows.shape().size() != 1 || static_cast<double>(rows.shape()[0]) != wanted) {
         throw InputError(
-            fmt::format("{}: dataset {} has the shape [{}], and the scenario has {:.10g} gyros: the result "
-                        "is damaged",
+            fmt::format("{}: dataset {} has the shape [{}], and the scenario has {:.10g} gyros: the result is damaged",
                         printable(file.file()), printable(rows.path()), fmt::join(rows.shape(), ", "), wanted));
     }
     const double needed = static_cast<double>(points) * static_cast<double>(expected_memory_bytes(scenario));
@@ -311,8 +310,8 @@ void check_size(const store::File& file, const scenario::Scenario& scenario, std
     constexpr double greatest_ratio = 64.0;  // size in memory over that of the file, even if h5repack has packed it
     if (!unknown && needed > fixed_bytes + greatest_ratio * there) {
         throw InputError(
-            fmt::format("{}: dataset /scenario asks for {:.10g} gyros, which the file of {:.4g} bytes "
-                        "cannot hold: the result is damaged",
+            fmt::format("{}: dataset /scenario asks for {:.10g} gyros, which the file of {:.4g} bytes cannot hold: "
+                        "the result is damaged",
                         printable(file.file()), wanted, there));
     }
     store::expect_memory(2.0 * needed);
@@ -322,8 +321,8 @@ Experiment read_experiment(const store::File& file) {
     const std::string& path = file.file();
     if (!layout::is_result(file)) {
         throw InputError(
-            fmt::format("{}: not a ringlock result (attribute \"format\" is not \"{}\"); results are written by "
-                        "ringlock run",
+            fmt::format("{}: not a ringlock result (attribute \"format\" is not \"{}\"); "
+                        "results are written by ringlock run",
                         printable(path), layout::format_name));
     }
     const std::int64_t version = file.int_attribute("format_version");

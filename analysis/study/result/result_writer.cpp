@@ -88,7 +88,7 @@ class FigureWriter {
         for (std::size_t point = 0; point < points_; ++point) values.push_back(value(point));
         constexpr bool text = std::is_same_v<Element, std::string>;
         rows_->write(base + after, values,
-                     {text ? "" : std::string(scenario::unit_of(base)), "of each point; FORMAT.md says what it is"});
+                     {text ? "" : std::string(scenario::unit_of(base)), "of each point; described in FORMAT.md"});
     }
 
    private:
@@ -425,8 +425,8 @@ std::filesystem::path refuse_to_lose(const std::filesystem::path& path, const Ex
     std::error_code unreachable;  // claiming the output reports the error if this is no file
     if (std::filesystem::is_regular_file(path, unreachable) && !is_result_of(path, experiment)) {
         throw InputError(
-            fmt::format("{}: the file is there and is not a result of this scenario and seed; it is kept. Give "
-                        "another name with -o, or remove it",
+            fmt::format("{}: the file exists and is not a result of this scenario and seed; it is kept. "
+                        "Give another name with -o, or remove it",
                         printable(path)));
     }
     return path;

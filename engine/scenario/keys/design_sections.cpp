@@ -38,28 +38,28 @@ std::vector<Section> design_sections() {
     };
     return {
         {"design",
-         "Points of the study: scenarios that differ in the keys of [[design.vary]] and share their random numbers "
-         "gyro by gyro. ensemble.gyros gyros are run at each.",
+         "Points of the study: scenarios that differ in the keys of [[design.vary]] "
+         "and share their random numbers gyro by gyro. ensemble.gyros gyros are run at each.",
          {
              key(RINGLOCK_KEY(design, kind), none,
-                 "none: the scenario alone; grid: every combination of values and ranges, the last key changes "
-                 "fastest; list: the i-th value of every key; latin_hypercube and sobol (Owen's scrambling): so many "
-                 "points of the distributions, values and ranges, seeded by ensemble.seed."),
+                 "none: the scenario alone; grid: every combination of values and ranges, the last key "
+                 "changes fastest; list: the i-th value of every key; latin_hypercube and sobol (Owen's scrambling): "
+                 "design.points points of the distributions, values and ranges, seeded by ensemble.seed."),
              key(RINGLOCK_KEY(design, points),
                  between<std::int64_t>(0, 100'000'000, "0: as many as a grid or list has"),
                  "Points of a Latin hypercube or a Sobol' sequence (powers of 2 are balanced best)."),
              key(RINGLOCK_KEY(design, sensitivity_base_points), between<std::int64_t>(0, 1'000'000, "0: no indices"),
-                 "Base points n of Sobol' sensitivity indices, of a sobol design in the place of points: n (k + 2) "
-                 "points for k keys."),
+                 "Base points n of Sobol' sensitivity indices, of a sobol design in the place of points: "
+                 "n (k + 2) points for k keys."),
          }},
         {"design.vary",
-         "A key that the design varies: with values, or from, to and points (and scale), or a distribution over the "
-         "lot that the key's bounds cut off: normal (mean, sd), uniform (from, to), lognormal (median, sd_relative), "
-         "triangular (from, mode, to).",
+         "A key that the design varies: with values, or from, to and points (and scale), "
+         "or a distribution over the lot that the key's bounds cut off: "
+         "normal (mean, sd), uniform (from, to), lognormal (median, sd_relative), triangular (from, mode, to).",
          {
              key(RINGLOCK_ELEMENT_KEY(design, vary, key), none,
-                 "Path of a numeric key of the scenario, as in gyro.lockin_threshold_deg_h; numbers below are in its "
-                 "unit. ensemble.gyros, ensemble.seed and propagation.* do not vary."),
+                 "Path of a numeric key of the scenario, as in gyro.lockin_threshold_deg_h; "
+                 "numbers below are in its unit. ensemble.gyros, ensemble.seed and propagation.* do not vary."),
              key(RINGLOCK_ELEMENT_KEY(design, vary, values), any, "Values, in the order of the points of a list."),
              key(RINGLOCK_ELEMENT_KEY(design, vary, from), any, "First value of a range; lowest of a distribution."),
              key(RINGLOCK_ELEMENT_KEY(design, vary, to), any, "Last value of a range; highest of a distribution."),
@@ -85,7 +85,7 @@ std::vector<Section> design_sections() {
          },
          correlations},
         {"stop",
-         "When the lot is large enough: gyros are added at 16, 32, 64, ... until every precision asked for is reached. "
+         "Stopping rule of the lot: gyros are added at 16, 32, 64, ... until every requested precision is reached. "
          "ensemble.gyros is not used then.",
          {
              key(RINGLOCK_KEY(stop, arw_relative), zero_or(1e-4, 1.0, "0: not asked for"),
@@ -93,10 +93,10 @@ std::vector<Section> design_sections() {
              key(RINGLOCK_KEY(stop, yield_absolute), zero_or(1e-4, 0.49, "0: not asked for"),
                  "Half width of the 95 % interval of every arm's yield: 0.02 is +-2 %. Needs a [specification]."),
              key(RINGLOCK_KEY(stop, most_gyros), between<std::int64_t>(1, 10'000'000, "each one's results are kept"),
-                 "The lot ends there in any case; of a design, at every point."),
+                 "The lot ends at this number in any case; in a design, at every point."),
              key(RINGLOCK_KEY(stop, most_hours), between(0.0, 1e5, "0: no limit"),
-                 "Wall time after which no gyros are added; asked at the numbers of gyros above only, so that a run "
-                 "can take up to twice as long."),
+                 "Wall time after which no gyros are added; it is checked only at the numbers of gyros above, "
+                 "so that a run can take up to twice as long."),
          }},
     };
 }

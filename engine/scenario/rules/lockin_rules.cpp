@@ -24,8 +24,8 @@ Finding effects_leave_a_threshold(const Scenario& s) {
     keys.insert(keys.end(), {"environment.temperature_ramp_k_per_h", "environment.temperature_swing_k",
                              "environment.profile_temperature_k", "ensemble.duration_s", "ensemble.settle_s"});
     return Complaint{std::move(keys),
-                     fmt::format("the temperature changes by up to {:g} K, the threshold by {:g} of itself; it must "
-                                 "not change by more than {:g}",
+                     fmt::format("the temperature changes by up to {:g} K, the threshold by {:g} of itself; "
+                                 "it must not change by more than {:g}",
                                  exposure(s).temperature_change_k, change, most)};
 }
 

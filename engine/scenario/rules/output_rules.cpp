@@ -37,8 +37,7 @@ Finding run_holds_samples(const Scenario& s) {
     if (s.ensemble.duration_s >= fewest_samples * s.output.sample_interval_s) return {};
     return Complaint{
         {"ensemble.duration_s", "output.sample_interval_s"},
-        fmt::format("a run of {:g} s must hold at least {:g} samples of {:g} s each (an Allan deviation needs "
-                    "them)",
+        fmt::format("a run of {:g} s must hold at least {:g} samples of {:g} s each (an Allan deviation needs them)",
                     s.ensemble.duration_s, fewest_samples, s.output.sample_interval_s)};
 }
 
@@ -47,9 +46,9 @@ Finding run_outlasts_the_reader(const Scenario& s) {
     if (s.ensemble.duration_s >= fewest_samples * fit_s) return {};
     return Complaint{
         {"ensemble.duration_s", "reader.output_hz", "reader.fir_order", "reader.stripping"},
-        fmt::format("noise coefficients are fitted to samples no closer than a dither cycle and ten times the "
-                    "length of the reader's filter (docs/reader.md), here {:.4g} s, and a run of {:g} s does not hold "
-                    "{:g} of them; set a longer ensemble.duration_s or a shorter filter",
+        fmt::format("noise coefficients are fitted to samples no closer than a dither cycle "
+                    "and ten times the length of the reader's filter (docs/reader.md), here {:.4g} s, and a run "
+                    "of {:g} s does not hold {:g} of them; set a longer ensemble.duration_s or a shorter filter",
                     fit_s, s.ensemble.duration_s, fewest_samples)};
 }
 
@@ -83,7 +82,7 @@ Finding averaging_times_fit(const Scenario& s) {
     for (const double tau_s : s.output.tau_s) {
         if (has_deviation_at(s, tau_s)) continue;
         return Complaint{{"output.tau_s", "ensemble.duration_s", output_key(s)},
-                         fmt::format("an averaging time of {:g} s is not there: {}", tau_s, deviations_text(s))};
+                         fmt::format("an averaging time of {:g} s is not available: {}", tau_s, deviations_text(s))};
     }
     return {};
 }
@@ -105,23 +104,24 @@ Finding angle_times_fit(const Scenario& s) {
 Finding specification_can_be_met(const Scenario& s) {
     const Specification& wanted = s.specification;
     if (wanted.bias_stability_deg_h > 0.0 && !has_deviation_at(s, wanted.at_s)) {
-        return Complaint{{"specification.at_s", "specification.bias_stability_deg_h", "ensemble.duration_s"},
-                         fmt::format("an averaging time of {:g} s is not there: {}", wanted.at_s, deviations_text(s))};
+        return Complaint{
+            {"specification.at_s", "specification.bias_stability_deg_h", "ensemble.duration_s"},
+            fmt::format("an averaging time of {:g} s is not available: {}", wanted.at_s, deviations_text(s))};
     }
     constexpr double fewest_increments = 32.0;  // of a record that a random walk is fitted to, noise::Options
     const double fit_interval_s = std::max(s.output.sample_interval_s, least_fit_interval_s(s));
     if (wanted.arw_deg_rt_h > 0.0 && s.ensemble.duration_s < fewest_increments * fit_interval_s) {
         return Complaint{{"specification.arw_deg_rt_h", "ensemble.duration_s", "output.sample_interval_s"},
-                         fmt::format("no arm can show that it meets it: a random walk is fitted to {:g} samples or "
-                                     "more, and the record has {:.0f}; set a longer ensemble.duration_s or a shorter "
-                                     "output.sample_interval_s{}",
+                         fmt::format("no arm can show that it meets it: "
+                                     "a random walk is fitted to {:g} samples or more, and the record has {:.0f}; "
+                                     "set a longer ensemble.duration_s or a shorter output.sample_interval_s{}",
                                      fewest_increments, std::floor(s.ensemble.duration_s / fit_interval_s),
                                      reads_arms(s) ? " or filter of the reader" : "")};
     }
     if (wanted.angle_error_arcsec > 0.0 && wanted.after_s > s.ensemble.duration_s) {
         return Complaint{{"specification.after_s", "specification.angle_error_arcsec", "ensemble.duration_s"},
-                         fmt::format("the record ends after {:g} s; ask for an earlier time or set a longer "
-                                     "ensemble.duration_s",
+                         fmt::format("the record ends after {:g} s; "
+                                     "ask for an earlier time or set a longer ensemble.duration_s",
                                      s.ensemble.duration_s)};
     }
     double white = 0.0;
@@ -144,9 +144,9 @@ Finding scale_factor_has_a_sweep(const Scenario& s) {
     constexpr std::int64_t fewest_rates = 3;  // of a line with an estimate of its error, as in study::scale_factor
     if (s.specification.scale_factor_error_ppm == 0.0 || s.input.sweep_points >= fewest_rates) return {};
     return Complaint{{"specification.scale_factor_error_ppm", "input.sweep_points"},
-                     fmt::format("a scale factor error is that of a straight line through the rates of a sweep, and "
-                                 "input.sweep_points = {}; set input.sweep_points to {} or more and "
-                                 "input.sweep_stop_deg_h to the last rate, or leave the limit out (0)",
+                     fmt::format("a scale factor error is that of a straight line through the rates of a sweep, "
+                                 "and input.sweep_points = {}; set input.sweep_points to {} or more "
+                                 "and input.sweep_stop_deg_h to the last rate, or leave the limit out (0)",
                                  s.input.sweep_points, fewest_rates)};
 }
 
@@ -160,11 +160,10 @@ constexpr std::array all_output_rules = {
          "and half of the record.",
          averaging_times_fit},
     Rule{"Times asked for angles (at most 100) are within the record.", angle_times_fit},
-    Rule{"A specification asks for averaging and other times that the record has, for no less random walk than effects "
-         "make by themselves, and for one of records of 32 samples or more only.",
+    Rule{"A specification uses averaging and other times within the record. It does not ask for less random walk "
+         "than effects make by themselves, and it limits the random walk only in records of 32 samples or more.",
          specification_can_be_met},
-    Rule{"A specification of the scale factor error is one of a sweep of three rates or more.",
-         scale_factor_has_a_sweep},
+    Rule{"A specification of the scale factor error needs a sweep of three rates or more.", scale_factor_has_a_sweep},
 };
 
 }  // namespace

@@ -38,8 +38,8 @@ Finding dither_reverses_the_rate(const Scenario& s) {
         });
     keys.insert(keys.end(), {"ensemble.dither_asymmetry_sd_ratio", "ensemble.dither_amplitude_sd_relative"});
     return Complaint{std::move(keys),
-                     fmt::format("the input rate of {:g} deg/h must stay below {:g} deg/h, half of the smallest peak "
-                                 "rate of the dither (the rate must reverse in every half cycle)",
+                     fmt::format("the input rate of {:g} deg/h must stay below {:g} deg/h, half "
+                                 "of the smallest peak rate of the dither (the rate must reverse in every half cycle)",
                                  rate, 0.5 * smallest)};
 }
 
@@ -68,10 +68,10 @@ Finding dither_reverses_effects(const Scenario& s) {
         keys.emplace_back(key);
     }
     return Complaint{std::move(keys),
-                     fmt::format("effects take the rate to as much as {:g} deg/h within {:g} sigma, input included; it "
-                                 "must stay below {:g} deg/h, {:g} of the smallest peak rate of the dither (the rate "
-                                 "must reverse in every half cycle); make the effects smaller or the run shorter, or "
-                                 "set a stronger dither",
+                     fmt::format("effects take the rate to as much as {:g} deg/h within {:g} sigma, input included; "
+                                 "it must stay below {:g} deg/h, {:g} of the smallest peak rate "
+                                 "of the dither (the rate must reverse in every half cycle); "
+                                 "make the effects smaller or the run shorter, or set a stronger dither",
                                  rate, sigmas, most * smallest, most)};
 }
 
@@ -107,14 +107,14 @@ constexpr std::array all_rate_rules = {
     Rule{"The input rate, over the whole sweep, stays below half of the dither's smallest peak rate (six standard "
          "deviations of its spread and the asymmetry taken off), so that the rate reverses in every half cycle.",
          dither_reverses_the_rate},
-    Rule{"Input rate and effects together, six standard deviations of random rates taken, stay below 0.9 of that peak "
-         "rate over the run.",
+    Rule{"Input rate and effects together, six standard deviations of random rates taken, "
+         "stay below 0.9 of that peak rate over the run.",
          dither_reverses_effects},
-    Rule{"Input rate and effects move the turn of the phase away from that of the dither by no more than 2250 rad of "
-         "phase: so far the readout follows it.",
+    Rule{"Input rate and effects move the turn of the phase away from that of the dither by no more than 2250 rad "
+         "of phase: the readout follows it up to there.",
          turns_are_reached},
-    Rule{"Wander and drift of the dither's amplitude stay within half of it over the run, six standard deviations "
-         "taken.",
+    Rule{"Wander and drift of the dither's amplitude stay within half of it over the run, "
+         "six standard deviations taken.",
          amplitude_stays},
 };
 

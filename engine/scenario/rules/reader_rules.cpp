@@ -66,8 +66,7 @@ Finding ticks_make_outputs(const Scenario& s) {
         if (ratio > 0.5 && std::abs(ratio - std::round(ratio)) < 1e-9 * ratio) return {};
         return Complaint{
             {"reader.latch_hz", outputs.key},
-            fmt::format("{:g} Hz are not a whole multiple of the {:g} Hz at which {}, and these are every "
-                        "so many ticks; set {:g}, or 0 for the same rate",
+            fmt::format("{:g} Hz are not a whole multiple of the {:g} Hz at which {}; set {:g}, or 0 for the same rate",
                         s.reader.latch_hz, outputs.hz, outputs.what, outputs.hz * std::max(1.0, std::round(ratio)))};
     });
 }
@@ -82,8 +81,8 @@ Finding filter_fits(const Scenario& s) {
         const double latched_hz = outputs.latch_hz(s);
         if (cutoff_hz < 0.5 * latched_hz) return {};
         return Complaint{{"reader.fir_cutoff_hz", "reader.latch_hz", outputs.key},
-                         fmt::format("a cut-off of {:g} Hz is not below half of the latching rate, {:g} Hz; set a "
-                                     "higher reader.latch_hz",
+                         fmt::format("a cut-off of {:g} Hz is not below half of the latching rate, {:g} Hz; "
+                                     "set a higher reader.latch_hz",
                                      cutoff_hz, 0.5 * latched_hz)};
     });
 }
@@ -94,8 +93,8 @@ Finding filter_sees_the_dither(const Scenario& s) {
         const double latched_hz = outputs.latch_hz(s);
         if (s.dither.frequency_hz < 0.5 * latched_hz) return {};
         return Complaint{{"reader.latch_hz", outputs.key, "dither.frequency_hz"},
-                         fmt::format("a low-pass filter takes out a dither of {:g} Hz where more than {:g} ticks a "
-                                     "second are latched, and there are {:g}; set a higher reader.latch_hz",
+                         fmt::format("a low-pass filter takes out a dither of {:g} Hz where more than {:g} ticks "
+                                     "a second are latched, and there are {:g}; set a higher reader.latch_hz",
                                      s.dither.frequency_hz, 2.0 * s.dither.frequency_hz, latched_hz)};
     });
 }
@@ -108,8 +107,9 @@ Finding notch_fits(const Scenario& s) {
         const double room_hz = std::min(alias_hz, 0.5 * latched_hz - alias_hz);
         if (room_hz >= 2.0 * s.reader.notch_bandwidth_hz) return {};
         return Complaint{{"reader.notch_bandwidth_hz", "reader.latch_hz", outputs.key, "dither.frequency_hz"},
-                         fmt::format("ticks at {:g} Hz see the dither at {:g} Hz, within two bandwidths of zero or of "
-                                     "half the latching rate, where a canceller cannot tell it from a rotation",
+                         fmt::format("ticks at {:g} Hz see the dither at {:g} Hz, "
+                                     "within two bandwidths of zero or of half the latching rate, "
+                                     "where a canceller cannot distinguish it from a rotation",
                                      latched_hz, alias_hz)};
     });
 }
@@ -126,10 +126,10 @@ Finding reference_is_in_time(const Scenario& s) {
 Finding studies_are_stripped(const Scenario& s) {
     if (!reads_arms(s) || s.reader.stripping != Stripping::none) return {};
     return Complaint{{"reader.stripping", "reader.output_hz"},
-                     fmt::format("every output of a study's arms would contain the dither, {:.4g} arcsec of it, and "
-                                 "random walk, mean rate and yield would be those of the dither; set another "
-                                 "stripping, or take reader.output_hz out and record single gyros with `ringlock "
-                                 "record`",
+                     fmt::format("every output of a study's arms would contain the dither, {:.4g} arcsec of it, "
+                                 "and random walk, mean rate and yield would be those of the dither; "
+                                 "set another stripping, or take reader.output_hz out and record single gyros "
+                                 "with `ringlock record`",
                                  phase_amplitude_rad(s) / units::two_pi * s.gyro.scale_factor_arcsec)};
 }
 
@@ -156,25 +156,25 @@ Finding warm_up_ends(const Scenario& s) {
     if (warm_up_s <= most_records * s.ensemble.duration_s) return {};
     return Complaint{{"reader.reference_learning_s", "reader.notch_bandwidth_hz", "reader.fir_order",
                       "ensemble.duration_s", "reader.output_hz"},
-                     fmt::format("the readers of a study are simulated for {:.3g} s before they are fit for use, more "
-                                 "than {:g} times the record of {:g} s; let the reference be learnt faster, the notch "
-                                 "be wider or the filter shorter, or set a longer ensemble.duration_s",
+                     fmt::format("the readers of a study are simulated for {:.3g} s before they are fit for use, "
+                                 "more than {:g} times the record of {:g} s; let the reference be learnt faster, "
+                                 "the notch be wider or the filter shorter, or set a longer ensemble.duration_s",
                                  warm_up_s, most_records, s.ensemble.duration_s)};
 }
 
 constexpr std::array all_reader_rules = {
-    Rule{"The rate of the reader's ticks is a whole multiple of that of the samples, and of that at which the arms of "
-         "a study are read.",
+    Rule{"The rate of the reader's ticks is a whole multiple of that of the samples, "
+         "and of that at which the arms of a study are read.",
          ticks_make_outputs},
     Rule{"The reader's low-pass filter has an even order and a cut-off below half of the latching rate.", filter_fits},
     Rule{"A reader that has only a low-pass filter against the dither latches more than twice a dither cycle.",
          filter_sees_the_dither},
-    Rule{"The reader's adaptive canceller sees the dither at a frequency apart from zero and from half of the "
-         "latching rate.",
+    Rule{"The reader's adaptive canceller sees the dither at a frequency apart from zero and from half "
+         "of the latching rate.",
          notch_fits},
     Rule{"The reference of the dither is late by less than a quarter of a cycle.", reference_is_in_time},
     Rule{"The dither is taken out of the arms of a study that are read (reader.output_hz).", studies_are_stripped},
-    Rule{"From an output of a study's readers to the next a gyro turns by no more than 1e9 fringes.",
+    Rule{"A gyro turns by no more than 1e9 fringes from an output of a study's readers to the next.",
          outputs_can_be_counted},
     Rule{"The readers of a study are fit for use within ten times the duration of its record.", warm_up_ends},
 };

@@ -36,8 +36,8 @@ Finding keys_are_the_instruments(const Scenario& s) {
     if (r.adc_bits != standard.adc_bits) key = "readout.adc_bits";
     if (key.empty()) return {};
     return Complaint{{std::string(key), "readout.model"},
-                     fmt::format("{} is a property of the instrument, which this readout model leaves out; set "
-                                 "readout.model = \"instrument\"",
+                     fmt::format("{} is a property of the instrument, which this readout model leaves out; "
+                                 "set readout.model = \"instrument\"",
                                  key)};
 }
 
@@ -84,8 +84,8 @@ Finding pulses_see_one_acceleration(const Scenario& s) {
         return Complaint{
             std::move(keys),
             fmt::format("arm \"{}\" extrapolates from four pulses, among which the two unlike half cycles "
-                        "of the dither meet where the rate is {:g} deg/h: its phases would be wrong by {:.2g} "
-                        "rad, and {:g} is the most; make rate or asymmetry smaller, or leave the arm out",
+                        "of the dither meet where the rate is {:g} deg/h: its phases would be wrong by {:.2g} rad, "
+                        "and {:g} is the most; make rate or asymmetry smaller, or leave the arm out",
                         arm.name, rate, wrong_rad, most_rad)};
     }
     return {};
@@ -104,9 +104,9 @@ Finding clock_tells_pulses_apart(const Scenario& s) {
         {"readout.clock_hz", "dither.peak_rate_deg_s", "dither.frequency_hz", "gyro.scale_factor_arcsec",
          "readout.model"},
         fmt::format(
-            "the phase is a quarter fringe from a turn after {:.3g} s, so that a clock of {:g} Hz does not tell "
-            "the pulses on its two sides apart, between which the instrument finds the turn; set "
-            "readout.clock_hz to {:.3g} or more, or to 0 for continuous time",
+            "the phase is a quarter fringe from a turn after {:.3g} s, so that a clock "
+            "of {:g} Hz does not resolve the pulses on its two sides, between which the instrument finds the turn; "
+            "set readout.clock_hz to {:.3g} or more, or to 0 for continuous time",
             quarter_s, r.clock_hz, least_ticks / quarter_s)};
 }
 
@@ -117,10 +117,10 @@ Finding pulses_come_before_the_middle(const Scenario& s) {
     return Complaint{
         {"gyro.scale_factor_arcsec", "dither.peak_rate_deg_s", "dither.frequency_hz", "gyro.lockin_threshold_deg_h",
          "input.rate_deg_h", "input.sweep_stop_deg_h", "readout.model", "arms.names"},
-        "the phase can go through too few quarter fringes between a turn and the middle of a half cycle for the four "
-        "pulses on either side of a turn that the electronics time, after input rate, lock-in and the spread of the "
-        "gyros have taken their part; set a stronger dither, or readout.model = \"latched\" without arms that need "
-        "pulses"};
+        "the phase can go through too few quarter fringes between a turn and the middle of a half cycle "
+        "for the four pulses on either side of a turn that the electronics time, after input rate, "
+        "lock-in and the spread of the gyros have taken their part; set a stronger dither, "
+        "or readout.model = \"latched\" without arms that need pulses"};
 }
 
 /// Largest rate of the phase in fringes a second: the dither's, with its spread, and the input.
@@ -140,9 +140,10 @@ Finding comparators_follow_the_fringes(const Scenario& s) {
     return Complaint{
         {"readout.detector_bandwidth_hz", "dither.peak_rate_deg_s", "gyro.scale_factor_arcsec",
          "readout.comparator_hysteresis_relative", "readout.comparator_noise_relative"},
-        fmt::format("a bandwidth of {:g} Hz leaves {:.3g} of the fringes' amplitude where the dither is fastest ({:g} "
-                    "fringes a second); the bandwidth must exceed that rate, and what is left the comparators' "
-                    "hysteresis and six sigma of their noise, {:.3g}, or the counter loses fringes",
+        fmt::format("a bandwidth of {:g} Hz leaves {:.3g} of the fringes' amplitude "
+                    "where the dither is fastest ({:g} fringes a second); the bandwidth must exceed that rate, "
+                    "and the remaining amplitude must exceed the comparators' hysteresis "
+                    "and six sigma of their noise, {:.3g}, or the counter loses fringes",
                     r.detector_bandwidth_hz, left, beat, needed)};
 }
 
@@ -154,8 +155,8 @@ Finding comparators_do_not_chatter(const Scenario& s) {
         return {};
     }
     return Complaint{{"readout.comparator_hysteresis_relative", "readout.comparator_noise_relative"},
-                     fmt::format("comparators with noise of {:g} switch back and forth where the phase is slow; their "
-                                 "hysteresis of {:g} must be at least {:g} times the noise",
+                     fmt::format("comparators with noise of {:g} switch back and forth where the phase is slow; "
+                                 "their hysteresis of {:g} must be at least {:g} times the noise",
                                  r.comparator_noise_relative, r.comparator_hysteresis_relative, least)};
 }
 
@@ -176,23 +177,20 @@ constexpr std::array all_readout_rules = {
     Rule{"An ideal readout has no ellipse to correct.", ideal_detectors_need_no_correction},
     Rule{"Keys that only the instrument has stay at their defaults with other readout models.",
          keys_are_the_instruments},
-    Rule{"compensated_extrapolated and compensated_adaptive need the times of pulses, which the latched readout does "
-         "not keep.",
+    Rule{"compensated_extrapolated and compensated_adaptive need the times of pulses, "
+         "which the latched readout does not keep.",
          pulses_are_there},
-    Rule{"Where compensated_extrapolated extrapolates, the two half cycles of an asymmetric dither do not meet among "
-         "its "
-         "pulses: rate and asymmetry together leave its phases right to 1 rad.",
+    Rule{"The phases of compensated_extrapolated are right to 1 rad with rate and asymmetry together: "
+         "the two half cycles of an asymmetric dither do not meet among its pulses.",
          pulses_see_one_acceleration},
     Rule{"The instrument's clock has two ticks or more in the time from a turn to a quarter fringe.",
          clock_tells_pulses_apart},
-    Rule{
-        "Where pulses are timed (by the instrument, or for those arms) the phase goes through 8 rad from a turn to the "
-        "middle of the half cycle, even against the lock-in.",
-        pulses_come_before_the_middle},
-    Rule{
-        "The instrument's bandwidth exceeds the fastest rate of fringes, and leaves there more of their amplitude than "
-        "hysteresis and six standard deviations of the comparators' noise.",
-        comparators_follow_the_fringes},
+    Rule{"Where pulses are timed (by the instrument, or for those arms) "
+         "the phase goes through 8 rad from a turn to the middle of the half cycle, even against the lock-in.",
+         pulses_come_before_the_middle},
+    Rule{"The instrument's bandwidth exceeds the fastest rate of fringes, and the amplitude that remains "
+         "at that rate exceeds the hysteresis and six standard deviations of the comparators' noise.",
+         comparators_follow_the_fringes},
     Rule{"The instrument's comparators have a hysteresis of at least four standard deviations of their noise.",
          comparators_do_not_chatter},
     Rule{"The instrument's detectors, with six standard deviations of their noise, stay within the converter's range "

@@ -9,12 +9,12 @@ namespace {
 Finding turns_are_not_compensated(const Scenario& s) {
     if (s.record.kind == RecordKind::samples || s.record.trajectory.compensator == Compensator::none) return {};
     return Complaint{{"record.trajectory", "record.kind"},
-                     "a record of turns holds what the electronics see of them, before any compensation; record an arm "
-                     "without compensator, or samples"};
+                     "a record of turns holds the readings of the electronics before any compensation; "
+                     "record an arm without compensator, or samples"};
 }
 
 constexpr std::array all_record_rules = {
-    Rule{"A record of turns is one of an arm without compensator.", turns_are_not_compensated},
+    Rule{"A record of turns is that of an arm without compensator.", turns_are_not_compensated},
 };
 
 }  // namespace

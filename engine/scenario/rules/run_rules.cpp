@@ -56,8 +56,8 @@ Finding temperatures_are_a_profile(const Scenario& s) {
 Finding sweep_goes_somewhere(const Scenario& s) {
     if (s.input.sweep_points == 1 || s.input.sweep_stop_deg_h != s.input.rate_deg_h) return {};
     return Complaint{{"input.sweep_points", "input.sweep_stop_deg_h"},
-                     fmt::format("a sweep of {} points must end at another rate than it starts from ({:g} deg/h); set "
-                                 "input.sweep_stop_deg_h",
+                     fmt::format("a sweep of {} points must end at another rate than it starts from ({:g} deg/h); "
+                                 "set input.sweep_stop_deg_h",
                                  s.input.sweep_points, s.input.rate_deg_h)};
 }
 
@@ -116,25 +116,26 @@ Finding lot_can_grow(const Scenario& s) {
     }
     if (s.stop.yield_absolute > 0.0 && s.ensemble.turn_ons > 1) {
         return refuse("ensemble.turn_ons",
-                      "a yield is a share of gyros, and the rule counts turn-ons; set it to 1, or "
-                      "leave out stop.yield_absolute");
+                      "a yield is a share of gyros, and the rule counts turn-ons; "
+                      "set it to 1, or leave out stop.yield_absolute");
     }
     return {};
 }
 
 constexpr std::array all_run_rules = {
-    Rule{"A profile of the input rate has as many times as rates, in order of time, and there is no sweep beside it.",
+    Rule{"A profile of the input rate has as many times as rates, in order of time, and excludes a sweep.",
          profile_is_a_profile},
-    Rule{"A profile of the temperature has as many times as temperatures, in order of time, and neither ramp nor swing "
-         "beside it.",
+    Rule{"A profile of the temperature has as many times as temperatures, in order of time, "
+         "and excludes ramp and swing.",
          temperatures_are_a_profile},
     Rule{"A sweep of more than one point ends at another rate than it starts from.", sweep_goes_somewhere},
     Rule{"The gyros of all points of the sweep are at most 100000000.", sweep_is_not_too_large},
-    Rule{"The half cycles of all gyros, those before the record with them, are at most 1e18.", turns_can_be_counted},
-    Rule{"Gyros that are switched on several times are a whole number of gyros; of a lot with a stopping rule the "
-         "turn-ons divide 16.",
+    Rule{"The half cycles of all gyros, including those before the record, are at most 1e18.", turns_can_be_counted},
+    Rule{"Gyros that are switched on several times are a whole number of gyros; "
+         "in a lot with a stopping rule the number of turn-ons divides 16.",
          turn_ons_are_whole},
-    Rule{"A lot with a stopping rule has no sweep and no angle records, and for a yield a specification.",
+    Rule{"A lot with a stopping rule has no sweep and no angle records; "
+         "a stopping rule for a yield needs a specification.",
          lot_can_grow},
 };
 

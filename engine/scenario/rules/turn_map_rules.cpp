@@ -27,8 +27,9 @@ Finding turn_map_has_fringes(const Scenario& s) {
     if (s.propagation.method != PropagationMethod::turn_map || fringes >= fewest) return {};
     return Complaint{
         {"dither.peak_rate_deg_s", "dither.frequency_hz", "gyro.scale_factor_arcsec", "propagation.method"},
-        fmt::format("{:.3g} fringes in a half cycle of the dither; the turn map needs at least {:g} (turns "
-                    "must be far apart in phase); set propagation.method = \"direct\" or a stronger dither",
+        fmt::format("{:.3g} fringes in a half cycle of the dither; "
+                    "the turn map needs at least {:g} (turns must be far apart in phase); "
+                    "set propagation.method = \"direct\" or a stronger dither",
                     fringes, fewest)};
 }
 
@@ -39,8 +40,8 @@ Finding turn_map_has_small_kicks(const Scenario& s) {
     return Complaint{
         {"gyro.lockin_threshold_deg_h", "dither.peak_rate_deg_s", "dither.frequency_hz", "gyro.scale_factor_arcsec",
          "propagation.method"},
-        fmt::format("lock-in moves the phase by up to {:.3g} rad at a turn; the turn map needs less than {:g} "
-                    "rad; set propagation.method = \"direct\" or a stronger dither",
+        fmt::format("lock-in moves the phase by up to {:.3g} rad at a turn; "
+                    "the turn map needs less than {:g} rad; set propagation.method = \"direct\" or a stronger dither",
                     kick, largest)};
 }
 
@@ -63,9 +64,9 @@ Finding turn_map_has_fast_middles(const Scenario& s) {
     }
     return Complaint{
         std::move(keys),
-        fmt::format("the phase can go through too few fringes between a zero-rate point and the middle of a half cycle "
-                    "for the turn map, which needs 10 rad there, after injected noise, effects and the spread of the "
-                    "gyros have taken their part; {} or a stronger dither",
+        fmt::format("the phase can go through too few fringes between a zero-rate point "
+                    "and the middle of a half cycle for the turn map, which needs 10 rad there, after injected noise, "
+                    "effects and the spread of the gyros have taken their part; {} or a stronger dither",
                     way_without_tables(s))};
 }
 
@@ -80,24 +81,23 @@ Finding turn_map_has_narrow_tables(const Scenario& s) {
     }
     return Complaint{
         std::move(keys),
-        fmt::format("the tables of the turn map cannot hold a tolerance of {:g} rad over the amplitudes and rates that "
-                    "they must cover: at a high input rate the phase at which the rate reverses moves by many radians "
-                    "with either (docs/turn-map.md); lower the input rate, or what makes rate and amplitude vary, "
-                    "raise propagation.turn_map_tolerance_rad or {}",
+        fmt::format("the tables of the turn map cannot hold a tolerance of {:g} rad over the amplitudes "
+                    "and rates that they must cover: at a high input rate the phase at which the rate reverses moves "
+                    "by many radians with either (docs/turn-map.md); lower the input rate or the variation "
+                    "of rate and amplitude, raise propagation.turn_map_tolerance_rad or {}",
                     s.propagation.turn_map_tolerance_rad, way_without_tables(s))};
 }
 
 constexpr std::array all_turn_map_rules = {
     Rule{"The turn map needs at least 10 fringes in a half cycle: 2 Omega_D / (K w_D) >= 10.", turn_map_has_fringes},
     Rule{"The turn map needs kicks below 1 rad: 2 pi Omega_L / sqrt(K Omega_D w_D) < 1.", turn_map_has_small_kicks},
-    Rule{
-        "The turn map needs a phase that goes through at least 10 rad from a zero-rate point to the middle of the half "
-        "cycle, and a rate there of at least 4 b (b: coupling), after rates, injected noise, effects, the spread of "
-        "the gyros and the room of the tables have taken their part (docs/turn-map.md).",
-        turn_map_has_fast_middles},
-    Rule{"The tables of the turn map hold turn_map_tolerance_rad, by an estimate on the safe side, over the rates of "
-         "128 turns and the amplitudes that noise, wander and drift make: the wider these and the higher the input "
-         "rate, the more terms it takes (docs/turn-map.md).",
+    Rule{"The turn map needs a phase that goes through at least 10 rad from a zero-rate point to the middle "
+         "of the half cycle, and a rate there of at least 4 b (b: coupling), after rates, injected noise, "
+         "effects, the spread of the gyros and the room of the tables have taken their part (docs/turn-map.md).",
+         turn_map_has_fast_middles},
+    Rule{"The tables of the turn map hold turn_map_tolerance_rad, by an estimate on the safe side, "
+         "over the rates of 128 turns and the amplitudes that noise, wander and drift make: "
+         "the wider these and the higher the input rate, the more terms it takes (docs/turn-map.md).",
          turn_map_has_narrow_tables},
 };
 

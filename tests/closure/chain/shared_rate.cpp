@@ -103,7 +103,7 @@ TEST(DataChain, IsOfRecordsOfSamplesAtOneRate) {
     record::Record turns;
     turns.turns.emplace();
     EXPECT_EQ(refused({{"a.csv", &a}, {"c.csv", &a}}), "");
-    EXPECT_THAT(refused({{"a.csv", &a}}), HasSubstr("two records or more"));
+    EXPECT_THAT(refused({{"a.csv", &a}}), HasSubstr("two or more records"));
     EXPECT_THAT(refused({{"a.csv", &a}, {"b.csv", &b}}),
                 HasSubstr("b.csv: has 200 samples a second and a.csv has 100"));
     EXPECT_THAT(refused({{"a.csv", &a}, {"t.h5", &turns}}), HasSubstr("t.h5: is a record of turns"));

@@ -41,7 +41,7 @@ TEST(Verdict, FollowsFromStepsAndResidual) {
 TEST(Advice, GoesByWhatTiedEffectsFollow) {
     const auto* ramp = effects::find("bias_ramp");
     const auto* temperature = effects::find("bias_temperature");
-    EXPECT_THAT(experiment_for(*ramp, {temperature}), HasSubstr("temperature changed against time"));
+    EXPECT_THAT(experiment_for(*ramp, {temperature}), HasSubstr("temperature that does not follow time"));
     EXPECT_EQ(experiment_for(*temperature, {ramp}), experiment_for(*ramp, {temperature}));
     EXPECT_THAT(experiment_for(*ramp, {effects::find("scale_factor_error")}), HasSubstr("three input rates"));
     EXPECT_THAT(experiment_for(*effects::find("dither_asymmetry"), {effects::find("dither_second_harmonic")}),

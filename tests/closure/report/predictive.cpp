@@ -95,8 +95,8 @@ TEST_F(Predictively, ARightModelMakesSuchRecords) {
     ringlock::closure::write_closure(folder_, "r.h5", record, closure, predictive);
     report::write_closure_page(folder_, "r.h5", record, closure, predictive);
     const std::string page = contents(folder_ / "report.md");
-    for (const char* part : {"nothing missing", "## What was added", "`lockin_threshold_deg_h`", "39 times",
-                             "## What is left of the record", "closed.toml"}) {
+    for (const char* part : {"nothing missing", "## Effects", "`lockin_threshold_deg_h`", "39 times",
+                             "## Tests of the residual", "closed.toml"}) {
         EXPECT_THAT(page, HasSubstr(part));
     }
     for (const char* figure : {"allan.svg", "spectrum.svg", "folded.svg", "steps.svg"}) {
@@ -212,7 +212,7 @@ TEST(ClosedScenario, SaysWhatIsAPlaceholderAndWhatItCannotHold) {
                                                       HasSubstr("25 % of the record")));
     EXPECT_TRUE(scenario::check(closed.scenario).empty());
     const std::string text = to_toml(closed, "a\nb.h5", closure.verdict);
-    EXPECT_THAT(text, HasSubstr("# What was found in a\\x0ab.h5: closed."));
+    EXPECT_THAT(text, HasSubstr("# Result of ringlock closure for a\\x0ab.h5: closed."));
     EXPECT_THAT(text, HasSubstr("# Placeholder: gyro.scale_factor_arcsec"));
     EXPECT_EQ(scenario::parse_string(text, "closed.toml"), closed.scenario);
 }

@@ -126,7 +126,7 @@ TEST(LongTurnLoop, AVibrationIsNotTakenForItsBeat) {
     ASSERT_FALSE(closure.steps.empty());
     EXPECT_LT(deviation(closure.steps[0].parameters, "frequency_hz", 60.5), 4.0);
     EXPECT_LT(deviation(closure.steps[0].parameters, "rate_deg_h", 0.008), 4.0);
-    EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("base_vibration of 60.5 Hz: one of 1.17")));
+    EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("base_vibration of 60.5 Hz: a frequency of 1.17")));
 }
 
 TEST(LongTurnLoop, ASwingOfTheAmplitudeIsTheDithersOwn) {
@@ -142,7 +142,8 @@ TEST(LongTurnLoop, ASwingOfTheAmplitudeIsTheDithersOwn) {
         truths.push_back(truth);
     }
     for (const Closure& closure : close_where_nothing_is_missing("amplitude swings", truths)) {
-        EXPECT_THAT(closure.notes, testing::Contains(testing::HasSubstr("amplitude swings by 0.001 of itself")));
+        EXPECT_THAT(closure.notes,
+                    testing::Contains(testing::HasSubstr("amplitude has a relative modulation of 0.001")));
     }
 }
 

@@ -60,8 +60,8 @@ bool is_harmonic_of_dither(const Step& step, const record::Record& record, const
     for (int k = 2; k <= by.harmonics; ++k) {
         if (!is_at(hz, k * dither_hz) || *arcsec > by.most_harmonic * dither_arcsec(record.declared)) continue;
         why = fmt::format(
-            "a line of {:.3g} arcsec at {:.6g} Hz is harmonic {} of the dither, which the declared reader leaves in "
-            "the samples",
+            "a line of {:.3g} arcsec at {:.6g} Hz is harmonic {} of the dither, "
+            "which the declared reader leaves in the samples",
             *arcsec, hz, k);
         return true;
     }
@@ -102,11 +102,10 @@ record::Record summed_for_reader(const record::Record& record, std::string& note
     };
     to.values = sums(samples.values, 1.0);
     for (auto& [name, values] : to.witnesses) values = sums(values, 1.0 / static_cast<double>(each));
-    note =
-        fmt::format("samples are summed by {} to {:.6g} Hz: {}", each, to.rate_hz,
-                    filtered ? "the declared low-pass filter passes nothing faster"
-                             : "the declared reader leaves the noise of the dither, which readings in one half cycle "
-                               "have in common");
+    note = fmt::format("samples are summed by {} to {:.6g} Hz: {}", each, to.rate_hz,
+                       filtered ? "the declared low-pass filter passes nothing faster"
+                                : "the declared reader leaves the noise of the dither, "
+                                  "which readings in one half cycle have in common");
     return summed;
 }
 
@@ -164,8 +163,7 @@ bool accounted_by_reader(const Step& step, const record::Record& record, std::st
         const double from_hz = value_of(step, effects::Role::sampled);
         if (stripping != Stripping::whole_cycle || !is_at(from_hz, dither_hz)) return false;
         why = fmt::format(
-            "the declared reader counts over whole cycles of the dither: the samples are interpolated "
-            "from {:.6g} Hz",
+            "the declared reader counts over whole cycles of the dither: the samples are interpolated from {:.6g} Hz",
             from_hz);
         return true;
     }
@@ -180,9 +178,10 @@ bool accounted_by_reader(const Step& step, const record::Record& record, std::st
     if (record.reader->settings.reference_learning_s > 0.0) most += record.reader->settings.reference_noise_arcsec;
     for (int k = 1; k <= options.samples.reader.harmonics; ++k) {
         if (!is_at(hz, k * dither_hz) || *amplitude_arcsec > most) continue;
-        why =
-            fmt::format("a line of {:.3g} arcsec at {:.6g} Hz is within what the declared reader leaves of the dither",
-                        *amplitude_arcsec, hz);
+        why = fmt::format(
+            "a line of {:.3g} arcsec at {:.6g} Hz is not larger than the dither "
+            "that the declared reader leaves in the samples",
+            *amplitude_arcsec, hz);
         return true;
     }
     return false;

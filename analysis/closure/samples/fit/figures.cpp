@@ -327,7 +327,7 @@ void take_motion(const SampleFit& fit, const AddedEffect& added, std::vector<Est
                                                                         : squares_sd / all_of_it;
     } else {
         notes.push_back(
-            "the motion is known by its witness alone: its own spectrum does not stand out from the noise, "
+            "the motion is known only from its witness: its own spectrum does not exceed the noise, "
             "so that coherence, rms, centre and width have no standard error");
     }
     take("coherence", seen ? coherence : told.coherence, coherence_sd);

@@ -50,7 +50,8 @@ std::vector<double> SampleLoop::chosen_increments() const {
 void SampleLoop::take_lattice(Closure& closure) {
     if (series_.counted) {
         closure.notes.push_back(
-            fmt::format("the data are integer counts: their steps of {:.6g} arcsec are expected and no missing effect",
+            fmt::format("the data are integer counts: their steps of {:.6g} arcsec are expected "
+                        "and are not a missing effect",
                         counted_step()));
         find_coarse_steps(closure);
         if (rounded_.drawn()) closure.heldout_before = score(*now_.fit).error;
@@ -69,10 +70,10 @@ void SampleLoop::take_lattice(Closure& closure) {
     }
     const bool blurred = lattice_.step_arcsec > options.samples.loop.coarser_than_printed * lattice_.printed_arcsec;
     if (blurred) {
-        closure.notes.push_back(fmt::format(
-            "values are written in steps of {:.6g} arcsec; beneath them is a coarser one, of which {:.0f} % "
-            "of the characteristic function is left",
-            lattice_.printed_arcsec, 100.0 * lattice_.strength));
+        closure.notes.push_back(
+            fmt::format("values are written in steps of {:.6g} arcsec; under them is a coarser step, "
+                        "of whose characteristic function {:.0f} % remains",
+                        lattice_.printed_arcsec, 100.0 * lattice_.strength));
     }
     AddedEffect added(*effect, next_id_++);
     Step& taken = added.step;
@@ -98,8 +99,8 @@ void SampleLoop::find_coarse_steps(Closure& closure) {
     if (noise.dither || noise.count_error.harmonics > 0 || !RoundedSamples::show(*now_.fit, step)) return;
     now_.fit = rounded_.begin(*now_.fit, step);
     closure.notes.push_back(
-        fmt::format("steps of {:.6g} arcsec are large beside the noise, and their rounding follows the angle: what "
-                    "was rounded is drawn by the model, and white_angle_arcsec is the noise before it was rounded",
+        fmt::format("steps of {:.6g} arcsec are large compared with the noise, and their rounding follows the angle: "
+                    "the model draws the values before rounding, and white_angle_arcsec is the noise before rounding",
                     step));
 }
 
@@ -184,8 +185,8 @@ void SampleLoop::take(const SampleChoice& choice, Closure& closure) {
         added.hz = now_.lines_hz.back();
         if (best.wanders) {
             now_.notes.push_back(
-                fmt::format("the line at {:.6g} Hz does not keep its phase over the record; it is "
-                            "modelled as a narrow resonance and predicted from the samples before",
+                fmt::format("the line at {:.6g} Hz does not keep its phase over the record; "
+                            "it is modelled as a narrow resonance and predicted from the preceding samples",
                             now_.lines_hz.back()));
         }
     }

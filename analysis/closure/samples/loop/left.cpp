@@ -165,8 +165,8 @@ bool SampleLoop::keep_names(int first_id, const std::function<bool(const AddedEf
     for (std::size_t k = now_.added.size(); k-- > 0;) {
         if (!since(now_.added[k]) || stays(now_.added[k])) continue;
         closure.notes.push_back(
-            fmt::format("{} was fitted only as a placeholder for structure that no effect of the library explains, and "
-                        "is not reported",
+            fmt::format("{} was fitted only as a placeholder for structure that no effect of the library explains, "
+                        "and is not reported",
                         now_.added[k].effect().name()));
         now_.added.erase(now_.added.begin() + static_cast<std::ptrdiff_t>(k));
     }

@@ -51,8 +51,7 @@ std::string note_of(const SampleNoise::CountError& error) {
 
 std::string note_of_late(const SampleNoise::Resonance& noise) {
     return fmt::format(
-        "{}: {:.3g} arcsec rms of the amplitude's noise, {:.3g} Hz wide, as zero crossings have it that are measured "
-        "late",
+        "{}: {:.3g} arcsec rms of the amplitude's noise, {:.3g} Hz wide, as in zero crossings that are measured late",
         note_on_late, noise.arcsec, noise.width_hz);
 }
 
@@ -172,14 +171,15 @@ void SampleLoop::begin(Closure& closure) {
         reported_[i] = whole_[i] && !chosen_[i] ? 1 : 0;
     }
     if (series_.scale_factor_assumed) {
-        closure.notes.push_back(fmt::format(
-            "the record declares no scale factor; {:g} arcsec per fringe assumed, with which all rates scale",
-            series_.scale_factor_arcsec));
+        closure.notes.push_back(
+            fmt::format("the record declares no scale factor; {:g} arcsec per fringe is assumed, "
+                        "and all rates are proportional to it",
+                        series_.scale_factor_arcsec));
     }
     if (series_.input_late_s > 0.0) {
         closure.notes.push_back(
-            fmt::format("the known input goes with the samples {:.3g} s later: their times are not those "
-                        "of the ends of their intervals",
+            fmt::format("the known input agrees with the samples best when it is {:.3g} s later: "
+                        "the times of the samples are not the ends of their intervals",
                         series_.input_late_s));
     }
     now_ = {};
@@ -196,8 +196,8 @@ void SampleLoop::begin(Closure& closure) {
         }
         now_.fit = fit_base(closure);
         closure.notes.push_back(fmt::format(
-            "{:.1f} % of the record is disturbed, up to {:.3g} times the usual variance, most at {:.6g} s; nothing is "
-            "fitted to it, held-out errors leave it out ({:.6g} arcsec before with it)",
+            "{:.1f} % of the record is disturbed, with up to {:.3g} times the usual variance, most at {:.6g} s; "
+            "fits and held-out errors leave it out (with it the held-out error of the base model is {:.6g} arcsec)",
             100.0 * disturbed_.share, disturbed_.worst, disturbed_.at_s, with));
         closure.heldout_before = score_of(*now_.fit, reported_, 0.0).error;
     }
@@ -234,11 +234,11 @@ void SampleLoop::take_gaps(Closure& closure) const {
     }
     const Rows all = rows_about_gaps(series_.missing);
     const auto left_out = std::count(all.begin(), all.end(), 1);
-    closure.notes.push_back(fmt::format(
-        "{} samples are missing in {} gap{}, the first at {:.6g} s; with the rows behind {} that find the angle again "
-        "{} of {} rows count for nothing",
-        count, closure.gaps.size(), closure.gaps.size() == 1 ? "" : "s", closure.gaps.front().from_s,
-        closure.gaps.size() == 1 ? "it" : "them", left_out, all.size()));
+    closure.notes.push_back(
+        fmt::format("{} samples are missing in {} gap{}, the first at {:.6g} s; "
+                    "with the rows after {} in which the angle is estimated anew, {} of {} rows are not used",
+                    count, closure.gaps.size(), closure.gaps.size() == 1 ? "" : "s", closure.gaps.front().from_s,
+                    closure.gaps.size() == 1 ? "it" : "them", left_out, all.size()));
 }
 
 /// Fills in the report: errors on the held-out blocks, and parameters of a last fit to the whole record.
@@ -279,8 +279,7 @@ void SampleLoop::finish(Closure& closure) {
         std::string why;
         if (beat && may_be_of_beat(step, *beat)) {
             why = fmt::format(
-                "{} was fitted only as a placeholder for lines of the beat of the input rate, and is not "
-                "reported",
+                "{} was fitted only as a placeholder for lines of the beat of the input rate, and is not reported",
                 step.effect->name());
         } else if (!accounted_by_reader(step, record_, why)) {
             closure.notes.insert(closure.notes.end(), figures.step_notes[k].begin(), figures.step_notes[k].end());

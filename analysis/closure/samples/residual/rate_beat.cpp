@@ -73,16 +73,15 @@ bool may_be_of_beat(const Step& step, const RateBeat& beat) {
 
 std::string text_of(const RateBeat& beat) {
     std::string text = fmt::format(
-        "at the beat of the input rate with the dither, {:.6g} Hz, and its multiples the residual has lines ({:.3g} "
-        "deg/h at the first)",
+        "the residual has lines at the beat of the input rate with the dither, {:.6g} Hz, "
+        "and at its multiples ({:.3g} deg/h at the first)",
         beat.hz, beat.rate_deg_h);
     if (beat.most_deg_h > 0.0) {
-        text += fmt::format(
-            ", as lock-in makes them that no noise randomises: up to {:.3g} deg/h in the declared "
-            "device",
-            beat.most_deg_h);
+        text +=
+            fmt::format(", as lock-in that no noise randomises makes them: up to {:.3g} deg/h in the declared device",
+                        beat.most_deg_h);
     } else {
-        text += ", as lock-in makes them that no noise randomises";
+        text += ", as lock-in that no noise randomises makes them";
     }
     return text;
 }

@@ -124,8 +124,8 @@ ResidualTest RoundedSamples::test(const SampleFit& fit) const {
     }
     const double z =
         (std::abs(off - said) - options.samples.rounded.filters_off * said) / std::sqrt(std::max(of_squares, 1e-300));
-    return {Where::amplitude, "rounded increments beside what is foretold of them", z > 0.0 ? chi2_tail(z * z, 1) : 1.0,
-            fmt::format("off by {:.3g} of what is said", std::sqrt(off / std::max(said, 1e-300)))};
+    return {Where::amplitude, "rounded increments against their prediction", z > 0.0 ? chi2_tail(z * z, 1) : 1.0,
+            fmt::format("{:.3g} times the predicted rms", std::sqrt(off / std::max(said, 1e-300)))};
 }
 
 SampleScore RoundedSamples::score_of(const SampleFit& fit, const Rows& reported) const {

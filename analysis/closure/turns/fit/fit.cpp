@@ -531,7 +531,7 @@ void TurnFit::finish() {
     if (moved_) find_columns();
     whiten();
     log_likelihood_ = -objective(parameters_, rest_);
-    if (!std::isfinite(log_likelihood_)) throw RunError("the likelihood of these phases is no number");
+    if (!std::isfinite(log_likelihood_)) throw RunError("the likelihood of these phases is not a number");
     is_ready_ = true;
 }
 

@@ -138,8 +138,9 @@ std::string note_on_frequency(const TurnFit& without, const TurnFit& with, const
     }
     if (others.empty()) return {};
     return fmt::format(
-        "{} of {:.4g} Hz: one of {} Hz would explain nearly as much, since the lock-in's kicks let either be seen "
-        "at the other by the beat of the input rate; a record at another input rate would tell",
+        "{} of {:.4g} Hz: a frequency of {} Hz explains the record nearly as well, "
+        "because the kicks of the lock-in shift either frequency to the other by the beat of the input rate; "
+        "to distinguish them, record at another input rate",
         effect.name(), *hz, others);
 }
 

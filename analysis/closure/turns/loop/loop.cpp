@@ -66,21 +66,21 @@ void TurnLoop::fit_base() {
         now_ = problem_.fit({});
     } catch (const RunError&) {
         throw InputError(
-            "/turns: the lock-in threshold is too high for the number of fringes in a half cycle: the phase never runs "
-            "freely, so that its motion cannot be followed; record with more dither, or declare lock-in threshold and "
-            "scale factor where they are wrong or missing");
+            "/turns: the lock-in threshold is too high for the number of fringes in a half cycle: "
+            "the phase never runs freely, so that its motion cannot be followed; "
+            "record with more dither, or declare lock-in threshold and scale factor where they are wrong or missing");
     }
     const TurnSeries& series = now_->series();
     if (!series.scale_factor_declared) {
         closure_.notes.push_back(
-            fmt::format("the record declares no scale factor; {:g} arcsec per fringe assumed, with "
-                        "which all rates scale",
+            fmt::format("the record declares no scale factor; {:g} arcsec per fringe is assumed, "
+                        "and all rates are proportional to it",
                         series.setup.scale_factor_arcsec));
     }
     if (!series.all_phases_come) {
         closure_.notes.push_back(
-            "turns come at a part of the fringe only, as in a locked gyro: bias and threshold are told together, and "
-            "the dither's shape is not looked for");
+            "the turns occur in only a part of the fringe, as in a locked gyro: "
+            "bias and threshold are determined only together, and the shape of the dither is not estimated");
     }
     closure_.heldout_before = heldout(*now_->fit).error_rad;
     base_log_likelihood_ = now_->log_likelihood();
@@ -226,7 +226,7 @@ void TurnLoop::verify_model() {
     monitor_.tell("testing the residual");
     if (is_rounding(heldout(*now_->fit).error_rad)) {
         closure_.notes.push_back(
-            fmt::format("what the model leaves is below {:g} rad, where numbers are rounded: it is not tested",
+            fmt::format("the residual is below {:g} rad, the size of rounding errors, and is not tested",
                         options.turns.loop.rounding_rad));
     } else {
         test_residual();
@@ -237,7 +237,8 @@ void TurnLoop::verify_model() {
 void TurnLoop::finish() {
     if (is_of_even_density(now_->fit->innovations(), now_->fit->rows())) {
         closure_.notes.push_back(
-            "the injected noise is flatter than a normal one: the size of the residual over the phase is not tested");
+            "the distribution of the injected noise is flatter than a normal distribution: "
+            "the size of the residual over the phase is not tested");
     }
     for (const Step& step : closure_.steps) {
         if (!step.note.empty()) closure_.notes.push_back(step.note);

@@ -86,8 +86,8 @@ class HalfKick {
         const double time_s = gyro::fast_motion_from_s(half, gyro::strength_with_harmonics_rad_s(upright_coupling()));
         if (!std::isnan(time_s)) return time_s;
         throw RunError(
-            fmt::format("a half cycle of {:.1f} fringes at an input of {:.4g} rad/s and a coupling of "
-                        "{:.4g} rad/s has no fast middle",
+            fmt::format("a half cycle of {:.1f} fringes at an input of {:.4g} rad/s "
+                        "and a coupling of {:.4g} rad/s has no fast middle",
                         half.amplitude_rad / units::pi, half.rate_rad_s, problem_.b_rad_s));
     }
     propagate::Stretch stretch(double theta_rad, double end_s) const {

@@ -392,7 +392,8 @@ TurnModel::Prediction TurnModel::predict(const TurnParameters& parameters) const
         frame.before_slope[i] = before * kick.before_slope;
         if (parameters.shape) frame.shape_left[i] = before * kick.before_weighted;
         if (!(std::abs(frame.before_slope[i]) < 1.0)) {
-            throw RunError("lock-in so strong that a turn's phase does not tell the phase without it");
+            throw RunError(
+                "the lock-in is so strong that the phase without it cannot be computed from the phase at a turn");
         }
         frame.kick_slope[i] = before * kick.before_slope + after * kick.after_slope;
     }

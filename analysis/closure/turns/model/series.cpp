@@ -204,8 +204,8 @@ void take_rotation_from_swings(double half_swing_rad, TurnSeries& series) {
         const double share = std::abs(series.relative_rate(rate_deg_h(i)));
         if (share < most_share) continue;
         throw InputError(fmt::format(
-            "/turns: at turn {} the gyro rotates by {:.4g} deg/h, {:.0f} % of the dither's peak rate; the "
-            "phase must reverse well within each half cycle: records with more than {:.0f} % are not closed",
+            "/turns: at turn {} the gyro rotates by {:.4g} deg/h, {:.0f} % of the dither's peak rate; "
+            "the phase must reverse well within each half cycle, and the closed loop accepts at most {:.0f} %",
             i, rate_deg_h(i), 100.0 * share, 100.0 * most_share));
     }
 }

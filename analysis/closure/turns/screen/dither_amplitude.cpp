@@ -108,15 +108,15 @@ std::vector<std::string> notes_on_amplitude(const Fitted& fitted) {
     std::vector<std::string> notes;
     for (const AmplitudeSwing& swing : fitted.fit->parameters().swings) {
         notes.push_back(fmt::format(
-            "the dither's amplitude swings by {:.2g} of itself at {:.4g} Hz, which the model follows; a vibration of "
-            "the base at {:.6g} Hz would look the same; closed.toml is without it",
+            "the dither's amplitude has a relative modulation of {:.2g} at {:.4g} Hz, which the model follows; "
+            "a vibration of the base at {:.6g} Hz would look the same; closed.toml does not contain it",
             std::hypot(swing.cosine_rad, swing.sine_rad) / series.amplitude_rad, std::abs(swing.hz),
             0.5 / series.interval_s - std::abs(swing.hz)));
     }
     if (fitted.fit->parameters().wander_forgets > 0.0) {
         notes.push_back(
-            fmt::format("the wander of the dither's amplitude is forgotten within {:.3g} s, as by a resonator that "
-                        "noise drives; closed.toml has a walk of the same steps in its place",
+            fmt::format("the wander of the dither's amplitude decays within {:.3g} s, "
+                        "as in a resonator that noise drives; closed.toml has a random walk of the same steps instead",
                         series.interval_s / fitted.fit->parameters().wander_forgets));
     }
     return notes;

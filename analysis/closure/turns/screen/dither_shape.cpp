@@ -348,10 +348,9 @@ std::string note_on_acceleration(const record::Turns& turns, const TurnFit& fit)
     const auto even = dither_shape(turns, fit).even;
     if (!even || !(std::abs(even->value) > std::max(of_shape.noted, of_shape.noted_sd * even->sd))) return {};
     return fmt::format(
-        "the phase's accelerations at the turns are {:.2g} % {} than those of a sine of the counted swing, as a third "
-        "harmonic of the dither's rate of {:.2g} % would make them, or counts lost in fast phase; the threshold is "
-        "then "
-        "{:.6g} deg/h",
+        "the phase's accelerations at the turns are {:.2g} % {} than those of a sine of the counted swing, "
+        "as a third harmonic of the dither's rate of {:.2g} % would make them, or counts lost in fast phase; "
+        "the threshold is then {:.6g} deg/h",
         100.0 * std::abs(std::expm1(even->value)), even->value > 0.0 ? "greater" : "smaller",
         100.0 * 0.375 * even->value, fit.parameters().threshold_deg_h * std::exp(0.5 * even->value));
 }
