@@ -7,8 +7,8 @@ namespace ringlock::fuzz {
 
 struct Hdf5File {
     std::string bytes;
-    bool is_result = false;            ///< of ringlock run
-    std::vector<std::string> columns;  ///< of a log; a record and a result have none
+    bool is_result = false;                 ///< of ringlock run
+    std::vector<std::string> columns = {};  ///< of a log; a record and a result have none
 };
 
 /// Logs of plain and packed datasets, of records, of enumerations, with links and attributes, in the old and in the new
