@@ -72,7 +72,7 @@ Claims::Claims(const Likelihood& likelihood, const Decomposition& parts, const O
     }
     // A term too weak to be claimed still moves the others when it is left out, by as much as their standard
     // errors, where several terms vie for a few coefficients at low frequencies: values of such records are of all
-    // terms. Likewise beside correlated noise that is not claimed but cannot be excluded.
+    // terms. The same holds with correlated noise that is not claimed but cannot be excluded.
     const bool drifts = (claimed_ & drifting) != 0 || (fits_.all() & correlated_bit) != 0;
     terms_ = drifts ? fits_.all() : best_;
     model_ = model_of(terms_);

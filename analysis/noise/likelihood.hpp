@@ -27,8 +27,8 @@ struct Maximum {
     double deviance = 0.0;       ///< -2 ln L up to a constant of the record
     std::array<Parameters, parameter_count> covariance{};  ///< of theta, inverse Fisher information
     std::array<double, 2> corner{};                        ///< expected end errors, even and odd coefficients
-    /// Of the parameters' variances by what missing samples take of the information, see LostInformation; covariance
-    /// and ramp_variance have it.
+    /// Factors by which missing samples increase the variances of the parameters, see LostInformation; covariance and
+    /// ramp_variance include them.
     Parameters inflation = {1.0, 1.0, 1.0, 1.0, 1.0, 1.0};
 };
 

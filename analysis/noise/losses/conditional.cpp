@@ -114,8 +114,9 @@ Pair Conditional::times_precision(const CoefficientNoise& noise, const Pair& mis
     return missing_of(std::move(z));
 }
 
-/// Within a long gap missing rates are nearly as free as those of a record of its length: their covariance is that of
-/// the noise, but for what is slower than the gap. Single missing rates are all alike.
+/// Multiplies by an approximate inverse of the conditional precision. The missing rates of a long gap have nearly the
+/// covariance of a record of the length of the gap: that of the noise, without fluctuations slower than the gap. Single
+/// missing rates all have the same precision and need no preconditioner.
 Pair Conditional::preconditioned(const CoefficientNoise& noise, const Pair& rest) {
     constexpr double long_gap = 4.0;
     if (length_ < long_gap) return rest;

@@ -235,14 +235,14 @@ void TurnFit::shape_noise() {
         const TurnKicks kicks = model_->mean_kicks(parameters_);
         const Innovations now(prediction_.frame, model_->noise(parameters_), rest_);
         std::vector<double> counted_rad;
-        std::vector<double> foretold_rad(rest_.size());
+        std::vector<double> predicted_rad(rest_.size());
         for (std::size_t i = 0; i < rest_.size(); ++i) {
             const double innovation_rad = now.white[i] * now.sd_rad[i];
             const double psi = model_->phase_rad()[i];
-            foretold_rad[i] = psi - kicks.at(series.direction[i], psi).before_rad - innovation_rad;
+            predicted_rad[i] = psi - kicks.at(series.direction[i], psi).before_rad - innovation_rad;
             if (rows_[i]) counted_rad.push_back(innovation_rad);
         }
-        auto shape = NoiseShape::of(counted_rad, kicks, series.direction, foretold_rad);
+        auto shape = NoiseShape::of(counted_rad, kicks, series.direction, predicted_rad);
         // A density that was given may be that of the residual of another model.
         if (!shape && !parameters_.shape) return;
         parameters_.shape = std::move(shape);

@@ -36,11 +36,11 @@ NoiseShape::Table NoiseShape::by_phase(const TurnKicks& kicks, int direction, st
     double variance = 0.0;
     for (const double size : sizes_rad) variance += size * size / static_cast<double>(sizes_rad.size());
     const double weight = 0.5 / static_cast<double>(sizes_rad.size());
-    return Table([&](double foretold_rad) {
+    return Table([&](double predicted_rad) {
         Lefts left = Lefts::Zero();
         for (const double size : sizes_rad) {
             for (const double v : {size, -size}) {
-                const Complex turned = std::polar(1.0, kicks.phase_after(direction, foretold_rad + v));
+                const Complex turned = std::polar(1.0, kicks.phase_after(direction, predicted_rad + v));
                 const double through = 1.0 - kicks.at(direction, turned).before_slope;
                 Complex harmonic = weight;
                 for (Eigen::Index k = 0; k < left.size(); ++k) {
@@ -54,21 +54,22 @@ NoiseShape::Table NoiseShape::by_phase(const TurnKicks& kicks, int direction, st
 }
 
 NoiseShape::Left NoiseShape::at(std::size_t turn) const {
-    const Lefts lefts = (is_minimum_[turn] != 0 ? at_minima_ : at_maxima_)->at(foretold_rad_[turn]);
+    const Lefts lefts = (is_minimum_[turn] != 0 ? at_minima_ : at_maxima_)->at(predicted_rad_[turn]);
     Left left;
     std::copy(lefts.begin(), lefts.end(), left.begin());
     return left;
 }
 
 std::shared_ptr<const NoiseShape> NoiseShape::of(std::span<const double> counted_rad, const TurnKicks& kicks,
-                                                 std::span<const int> direction, std::span<const double> foretold_rad) {
+                                                 std::span<const int> direction,
+                                                 std::span<const double> predicted_rad) {
     if (!is_of_even_density(counted_rad)) return nullptr;
     const std::vector<double> sizes = sizes_of(counted_rad);
     auto shape = std::make_shared<NoiseShape>();
     shape->at_minima_ = std::make_unique<const Table>(by_phase(kicks, 1, sizes));
     shape->at_maxima_ = std::make_unique<const Table>(by_phase(kicks, -1, sizes));
     for (const int way : direction) shape->is_minimum_.push_back(way > 0 ? 1 : 0);
-    shape->foretold_rad_.assign(foretold_rad.begin(), foretold_rad.end());
+    shape->predicted_rad_.assign(predicted_rad.begin(), predicted_rad.end());
     return shape;
 }
 

@@ -27,10 +27,10 @@ class NoiseShape {
     using Left = TurnKicks::Weights;  ///< for harmonics 1, 2, ...
 
     /// \param counted_rad  innovations that determine the density
-    /// \param foretold_rad  predicted phases without the phase that the lock-in adds before the turn
+    /// \param predicted_rad  predicted phases without the phase that the lock-in adds before the turn
     /// \return null if the innovations are not flatter than normal ones beyond doubt
     static std::shared_ptr<const NoiseShape> of(std::span<const double> counted_rad, const TurnKicks& kicks,
-                                                std::span<const int> direction, std::span<const double> foretold_rad);
+                                                std::span<const int> direction, std::span<const double> predicted_rad);
 
     Left at(std::size_t turn) const;
 
@@ -41,7 +41,7 @@ class NoiseShape {
 
     std::unique_ptr<const Table> at_minima_, at_maxima_;
     std::vector<std::uint8_t> is_minimum_;
-    std::vector<double> foretold_rad_;
+    std::vector<double> predicted_rad_;
 };
 
 }  // namespace ringlock::closure

@@ -47,14 +47,14 @@ PhaseTable<Harmonics> size_by_phase(const TurnKicks& kicks, int direction, doubl
     constexpr double end = 5.0;
     const int points = static_cast<int>(std::ceil(2.0 * end * std::max(2.0, 2.0 * sd_rad)));
     const double step = 2.0 * end / points;
-    return PhaseTable<Harmonics>([&](double foretold_rad) {
+    return PhaseTable<Harmonics>([&](double predicted_rad) {
         Harmonics mean = Harmonics::Zero();
         for (int k = 0; k <= points; ++k) {
             const double deviate = k * step - end;
             const double weight = 0.5 * deviate * step * std::exp(-0.5 * deviate * deviate) / std::sqrt(units::two_pi);
             const double size_rad = sd_rad * size_of(deviate);
             for (const double innovation_rad : {size_rad, -size_rad}) {
-                mean += weight * harmonics_of(kicks.phase_after(direction, foretold_rad + innovation_rad));
+                mean += weight * harmonics_of(kicks.phase_after(direction, predicted_rad + innovation_rad));
             }
         }
         return mean;
