@@ -16,7 +16,7 @@
 
 #include "analysis/study/design_points.hpp"
 #include "engine/core/error.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 
 namespace ringlock::app {
 namespace {

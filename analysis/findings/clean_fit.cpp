@@ -11,10 +11,10 @@
 #include "analysis/findings/decided.hpp"
 #include "analysis/findings/events.hpp"
 #include "analysis/findings/thresholds.hpp"
-#include "analysis/noise/likelihood.hpp"
-#include "analysis/noise/line.hpp"
-#include "analysis/noise/spectrum.hpp"
-#include "analysis/noise/subsets.hpp"
+#include "analysis/noise/model/likelihood.hpp"
+#include "analysis/noise/model/line.hpp"
+#include "analysis/noise/model/spectrum.hpp"
+#include "analysis/noise/model/subsets.hpp"
 
 namespace ringlock::findings {
 namespace {

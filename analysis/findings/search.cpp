@@ -8,9 +8,9 @@
 #include "analysis/findings/stretches.hpp"
 #include "analysis/findings/thresholds.hpp"
 #include "analysis/noise/decomposition.hpp"
-#include "analysis/noise/line.hpp"
-#include "analysis/noise/spectrum.hpp"
-#include "analysis/noise/subsets.hpp"
+#include "analysis/noise/model/line.hpp"
+#include "analysis/noise/model/spectrum.hpp"
+#include "analysis/noise/model/subsets.hpp"
 
 namespace ringlock::findings {
 namespace {

@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "analysis/noise/interval.hpp"
-#include "analysis/noise/lost_information.hpp"
+#include "analysis/noise/model/lost_information.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::noise {

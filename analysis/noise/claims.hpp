@@ -1,8 +1,8 @@
 #pragma once
 #include "analysis/noise/decomposition.hpp"
 #include "analysis/noise/fit.hpp"
-#include "analysis/noise/likelihood.hpp"
-#include "analysis/noise/subsets.hpp"
+#include "analysis/noise/model/likelihood.hpp"
+#include "analysis/noise/model/subsets.hpp"
 
 namespace ringlock::noise {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/noise/lost_information.hpp"
+#include "analysis/noise/model/lost_information.hpp"
 
 namespace ringlock::noise {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 #include <vector>
 
-#include "analysis/noise/line.hpp"
-#include "analysis/noise/markov.hpp"
+#include "analysis/noise/model/line.hpp"
+#include "analysis/noise/model/markov.hpp"
 
 namespace ringlock::noise {
 

@@ -7,7 +7,7 @@
 
 #include "analysis/noise/claims.hpp"
 #include "analysis/noise/decomposition.hpp"
-#include "analysis/noise/rounding.hpp"
+#include "analysis/noise/model/rounding.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::noise {

@@ -2,7 +2,7 @@
 #include <span>
 #include <string>
 
-#include "analysis/noise/line.hpp"
+#include "analysis/noise/model/line.hpp"
 
 namespace ringlock::noise {
 

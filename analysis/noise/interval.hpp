@@ -1,7 +1,7 @@
 #pragma once
 #include <optional>
 
-#include "analysis/noise/likelihood.hpp"
+#include "analysis/noise/model/likelihood.hpp"
 
 namespace ringlock::noise {
 

@@ -18,7 +18,7 @@
 #include "analysis/parts/part_files.hpp"
 #include "analysis/parts/team.hpp"
 #include "analysis/study/experiment.hpp"
-#include "engine/ensemble/progress.hpp"
+#include "engine/ensemble/progress/progress.hpp"
 
 namespace ringlock::parts {
 

@@ -8,9 +8,9 @@
 #include "engine/core/error.hpp"
 #include "engine/core/json_text.hpp"
 #include "engine/core/version.hpp"
-#include "engine/scenario/differences.hpp"
-#include "engine/scenario/parse.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/differences.hpp"
+#include "engine/scenario/text/parse.hpp"
+#include "engine/scenario/text/render.hpp"
 
 namespace ringlock::parts {
 

@@ -7,7 +7,7 @@
 
 #include "analysis/study/study.hpp"
 #include "engine/ensemble/block_source.hpp"
-#include "engine/ensemble/observer.hpp"
+#include "engine/ensemble/progress/observer.hpp"
 
 /// Several processes that simulate one run together. One of them leads: it holds the folder of the run, decides which
 /// gyros are simulated next and writes the result. The others are its members; each writes the blocks that it has

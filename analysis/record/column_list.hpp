@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/record/series.hpp"
+#include "analysis/record/series/series.hpp"
 
 namespace ringlock::record {
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string_view>
 
-#include "analysis/record/npy_header.hpp"
+#include "analysis/record/arrays/npy_header.hpp"
 #include "analysis/record/record.hpp"
 #include "analysis/text/words.hpp"
 

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "analysis/record/readers.hpp"
-#include "analysis/record/text_times.hpp"
+#include "analysis/record/series/text_times.hpp"
 #include "analysis/text/numbers.hpp"
 #include "analysis/text/table.hpp"
 #include "engine/core/error.hpp"

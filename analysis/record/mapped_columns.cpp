@@ -7,7 +7,7 @@
 #include <set>
 
 #include "analysis/record/readers.hpp"
-#include "analysis/record/series.hpp"
+#include "analysis/record/series/series.hpp"
 #include "analysis/text/words.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/printable.hpp"

@@ -2,8 +2,8 @@
 #include <array>
 
 #include "analysis/record/record.hpp"
-#include "analysis/record/series.hpp"
-#include "analysis/record/series_rows.hpp"
+#include "analysis/record/series/series.hpp"
+#include "analysis/record/series/series_rows.hpp"
 #include "analysis/text/words.hpp"
 
 /// The kinds of file behind read_series and read_record.

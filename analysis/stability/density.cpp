@@ -6,8 +6,8 @@
 #include <numbers>
 #include <unsupported/Eigen/FFT>
 
-#include "analysis/noise/shapes.hpp"
-#include "analysis/noise/spectrum.hpp"
+#include "analysis/noise/model/shapes.hpp"
+#include "analysis/noise/model/spectrum.hpp"
 #include "engine/core/units.hpp"
 
 namespace ringlock::stability {

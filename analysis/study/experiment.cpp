@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "analysis/lot/stopping.hpp"
-#include "analysis/study/lot_figures.hpp"
+#include "analysis/study/figures/lot_figures.hpp"
 
 namespace ringlock::study {
 

@@ -8,7 +8,7 @@
 
 #include "analysis/lot/pairs.hpp"
 #include "analysis/study/design_points.hpp"
-#include "analysis/study/scale_factor.hpp"
+#include "analysis/study/figures/scale_factor.hpp"
 #include "analysis/study/study.hpp"
 #include "analysis/study/summary.hpp"
 

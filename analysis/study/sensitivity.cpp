@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "analysis/study/lot_figures.hpp"
+#include "analysis/study/figures/lot_figures.hpp"
 
 namespace ringlock::study {
 

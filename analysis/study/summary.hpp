@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "analysis/lot/mean.hpp"
-#include "analysis/study/lot_figures.hpp"
-#include "analysis/study/repeatability.hpp"
-#include "analysis/study/scale_factor.hpp"
+#include "analysis/study/figures/lot_figures.hpp"
+#include "analysis/study/figures/repeatability.hpp"
+#include "analysis/study/figures/scale_factor.hpp"
 #include "analysis/study/study.hpp"
 
 namespace ringlock::study {

@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <string>
 
-#include "analysis/text/layout.hpp"
+#include "analysis/text/layout/layout.hpp"
 
 namespace ringlock::text {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "analysis/text/fields.hpp"
-#include "analysis/text/layout.hpp"
-#include "analysis/text/lines.hpp"
+#include "analysis/text/layout/layout.hpp"
+#include "analysis/text/source/lines.hpp"
 
 namespace ringlock::text {
 

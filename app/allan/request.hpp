@@ -7,10 +7,10 @@
 #include "analysis/allan/allan.hpp"
 #include "analysis/allan/sums/phase.hpp"
 #include "analysis/quantity/unit.hpp"
-#include "analysis/record/series.hpp"
+#include "analysis/record/series/series.hpp"
+#include "app/allan/output/coefficient_table.hpp"
 #include "app/allan/sampling.hpp"
 #include "app/allan/taus.hpp"
-#include "app/coefficient_table.hpp"
 #include "app/text_arguments.hpp"
 #include "app/wrap_argument.hpp"
 

@@ -15,8 +15,8 @@
 #include "analysis/findings/values.hpp"
 #include "analysis/noise/fit.hpp"
 #include "analysis/quantity/declared.hpp"
-#include "analysis/record/series.hpp"
-#include "app/allan_noise.hpp"
+#include "analysis/record/series/series.hpp"
+#include "app/allan/allan_noise.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/printable.hpp"
 

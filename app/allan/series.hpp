@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "app/allan/output/allan_output.hpp"
 #include "app/allan/repeated_input.hpp"
 #include "app/allan/request.hpp"
 #include "app/allan/series_names.hpp"
-#include "app/allan_output.hpp"
 
 namespace ringlock::app {
 

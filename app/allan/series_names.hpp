@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/record/series.hpp"
+#include "analysis/record/series/series.hpp"
 #include "app/allan/repeated_input.hpp"
 
 namespace ringlock::app {

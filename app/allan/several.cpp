@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "analysis/report/table.hpp"
-#include "app/allan/explain.hpp"
-#include "app/allan_figure.hpp"
+#include "app/allan/output/allan_figure.hpp"
+#include "app/allan/output/explain.hpp"
 #include "engine/core/json_text.hpp"
 #include "engine/core/printable.hpp"
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "analysis/report/plot.hpp"
-#include "app/allan/hat_output.hpp"
-#include "app/allan_output.hpp"
+#include "app/allan/output/allan_output.hpp"
+#include "app/allan/output/hat_output.hpp"
 
 namespace ringlock::app {
 

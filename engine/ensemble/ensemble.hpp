@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/ensemble/block_source.hpp"
-#include "engine/ensemble/observer.hpp"
+#include "engine/ensemble/progress/observer.hpp"
 #include "engine/gyro/setup.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/scenario.hpp"

@@ -7,7 +7,7 @@
 #include <array>
 
 #include "engine/core/error.hpp"
-#include "engine/scenario/text.hpp"
+#include "engine/scenario/text/text.hpp"
 
 namespace ringlock::scenario {
 namespace {

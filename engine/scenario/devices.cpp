@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 
 namespace ringlock::scenario {
 

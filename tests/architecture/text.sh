@@ -42,7 +42,7 @@ check "open end; write it into the changelog or do it" '(^|[^[:alnum:]_])(TOD[O]
 # Files that somebody names are opened behind store::guarded() alone: by File::open(), which takes nothing but its
 # permission, and by the reader of MAT-files within it.
 if git grep --untracked -nE 'H5Fope[n]|Mat_Ope[n]|archive_read_ope[n]' -- engine analysis app ':!engine/store' \
-    ':!analysis/record/mat_series.cpp' ':!analysis/record/npy_series.cpp'; then
+    ':!analysis/record/arrays/mat_series.cpp' ':!analysis/record/arrays/npy_series.cpp'; then
     echo "^ opens a file without the guard"
     bad=1
 fi

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "analysis/noise/fit.hpp"
-#include "analysis/noise/shapes.hpp"
+#include "analysis/noise/model/shapes.hpp"
 #include "tests/bench/exact_flicker.hpp"
 #include "tests/bench/page.hpp"
 #include "tests/unit/allan_support.hpp"

@@ -19,7 +19,7 @@
 #include "engine/propagate/phase_tables.hpp"
 #include "engine/propagate/rotation.hpp"
 #include "engine/propagate/turn_tables.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "engine/simd/target.hpp"
 #include "tests/bench/noisy_dither.hpp"
 #include "tests/support/drive.hpp"

@@ -35,7 +35,7 @@
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/devices.hpp"
 #include "engine/scenario/injected_noise.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "tests/bench/page.hpp"
 #include "tests/support/limits.hpp"
 

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "analysis/study/experiment.hpp"
-#include "analysis/study/room.hpp"
-#include "engine/scenario/parse.hpp"
+#include "analysis/study/needs/room.hpp"
+#include "engine/scenario/text/parse.hpp"
 
 namespace ringlock {
 namespace {

@@ -16,7 +16,7 @@
 #include "engine/gyro/theory.hpp"
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/injected_noise.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 
 namespace ringlock {
 namespace {

@@ -9,7 +9,7 @@
 #include <random>
 #include <string>
 
-#include "analysis/record/series.hpp"
+#include "analysis/record/series/series.hpp"
 #include "tests/support/packed_text.hpp"
 
 namespace {

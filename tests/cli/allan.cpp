@@ -13,6 +13,7 @@
 
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_test {
 namespace {
 
 using namespace ringlock;
@@ -482,3 +483,4 @@ TEST_F(AllanCommand, MeasuredRecordIsNotGivenCoefficients) {
 }
 
 }  // namespace
+}  // namespace allan_test

@@ -12,6 +12,7 @@
 #include "tests/cli/program.hpp"
 
 // Faults that `ringlock allan` takes from the deviations when it is asked to: wraps, outliers, jumps, stretches.
+namespace allan_clean_test {
 namespace {
 
 using namespace ringlock;
@@ -139,3 +140,4 @@ TEST_F(AllanClean, NeedsAUnitAndARecordThatIsKept) {
 }
 
 }  // namespace
+}  // namespace allan_clean_test

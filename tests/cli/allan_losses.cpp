@@ -12,6 +12,8 @@
 #include "tests/cli/program.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_losses_test {
+
 using namespace ringlock;
 using testing::HasSubstr;
 
@@ -88,3 +90,5 @@ TEST_F(AllanLossesCommand, WhereHardlyAnyDataAreThereTheLongestPartIsFittedAndTh
     EXPECT_TRUE(json["noise_filled_in"].is_null());
     EXPECT_THAT(allan(rates, false).out, HasSubstr("more than 400000 intervals, less than a quarter of its data"));
 }
+
+}  // namespace allan_losses_test

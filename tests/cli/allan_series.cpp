@@ -15,6 +15,7 @@
 #include "tests/cli/program.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_series_test {
 namespace {
 
 using namespace ringlock;
@@ -462,3 +463,4 @@ TEST_F(AllanSeries, FiguresOfSeveralSeriesAndOtherForms) {
 }
 
 }  // namespace
+}  // namespace allan_series_test

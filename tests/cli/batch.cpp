@@ -9,6 +9,7 @@
 #include "tests/cli/program.hpp"
 
 namespace ringlock {
+namespace batch_test {
 namespace {
 
 using nlohmann::json;
@@ -111,4 +112,5 @@ TEST_F(BatchCommand, WhatMakesNoSenseIsRefusedBeforeAnything) {
 }
 
 }  // namespace
+}  // namespace batch_test
 }  // namespace ringlock

@@ -17,6 +17,7 @@
 #include "tests/cli/program.hpp"
 
 namespace ringlock::test {
+namespace closure_test {
 namespace {
 
 using testing::AllOf;
@@ -233,4 +234,5 @@ TEST_F(ChainProgram, TellsWhatTheRecordsShare) {
 }
 
 }  // namespace
+}  // namespace closure_test
 }  // namespace ringlock::test

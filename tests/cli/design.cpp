@@ -15,6 +15,7 @@
 #include "tests/cli/result_data.hpp"
 
 namespace ringlock {
+namespace design_test {
 namespace {
 
 using nlohmann::json;
@@ -357,4 +358,5 @@ to = 0.3
 }
 
 }  // namespace
+}  // namespace design_test
 }  // namespace ringlock

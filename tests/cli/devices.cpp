@@ -6,6 +6,7 @@
 #include "tests/cli/program.hpp"
 
 namespace ringlock {
+namespace devices_test {
 namespace {
 
 using nlohmann::json;
@@ -50,4 +51,5 @@ TEST_F(DevicesCommand, UnknownDeviceIsRefusedWithTheKnown) {
 }
 
 }  // namespace
+}  // namespace devices_test
 }  // namespace ringlock

@@ -18,6 +18,7 @@
 #include "tests/cli/program.hpp"
 
 namespace ringlock::test {
+namespace files_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -241,4 +242,5 @@ TEST_F(CommandSignals, AFigureThatIsNotDoneIsNotWaitedFor) {
 }
 
 }  // namespace
+}  // namespace files_test
 }  // namespace ringlock::test

@@ -14,6 +14,7 @@
 
 // Names of files, columns and keys that hold what would control a terminal, break a line, or be markup.
 namespace ringlock::test {
+namespace hostile_names_test {
 namespace {
 
 using testing::HasSubstr;
@@ -163,4 +164,5 @@ TEST_F(HostileNames, ManyUnknownNamesAreSummedUp) {
 }
 
 }  // namespace
+}  // namespace hostile_names_test
 }  // namespace ringlock::test

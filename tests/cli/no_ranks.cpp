@@ -6,6 +6,7 @@
 
 // A program without MPI that mpirun starts several times: each would simulate all of the run.
 namespace ringlock {
+namespace no_ranks_test {
 namespace {
 
 using testing::HasSubstr;
@@ -27,4 +28,5 @@ TEST_F(NoRanks, OneAloneIsARun) {
 }
 
 }  // namespace
+}  // namespace no_ranks_test
 }  // namespace ringlock

@@ -12,6 +12,7 @@
 
 // Processes of mpirun that simulate one run: the file is the one that a single process writes.
 namespace ringlock {
+namespace ranks_test {
 namespace {
 
 using test::design;
@@ -183,4 +184,5 @@ TEST_F(Ranks, AFinishedRunDoesNothing) {
 }
 
 }  // namespace
+}  // namespace ranks_test
 }  // namespace ringlock

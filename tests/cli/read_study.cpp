@@ -10,6 +10,7 @@
 #include "tests/support/open_file.hpp"
 
 namespace ringlock {
+namespace read_study_test {
 namespace {
 
 using nlohmann::json;
@@ -141,4 +142,5 @@ TEST_F(ReadStudy, TimesBelowASampleWantARunThatHasThem) {
 }
 
 }  // namespace
+}  // namespace read_study_test
 }  // namespace ringlock

@@ -12,6 +12,7 @@
 #include "tests/unit/record_support.hpp"
 
 namespace ringlock::test {
+namespace record_test {
 namespace {
 
 using testing::AllOf;
@@ -251,4 +252,5 @@ TEST_F(RecordProgram, AFullDiskLeavesNothing) {
 }
 
 }  // namespace
+}  // namespace record_test
 }  // namespace ringlock::test

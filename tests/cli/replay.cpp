@@ -25,6 +25,7 @@
 #include "tests/support/open_file.hpp"
 
 namespace ringlock {
+namespace replay_test {
 namespace {
 
 using nlohmann::json;
@@ -580,4 +581,5 @@ TEST_F(ReplayCommand, AFullDiskLeavesNothing) {
 }
 
 }  // namespace
+}  // namespace replay_test
 }  // namespace ringlock

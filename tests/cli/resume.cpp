@@ -19,6 +19,7 @@
 
 // Runs that are interrupted, divided and put together again: the file is the one that an undisturbed run writes.
 namespace ringlock {
+namespace resume_test {
 namespace {
 
 using nlohmann::json;
@@ -387,4 +388,5 @@ TEST_F(LongKills, AtAHundredRandomMomentsEndInTheSameFile) {
 }
 
 }  // namespace
+}  // namespace resume_test
 }  // namespace ringlock

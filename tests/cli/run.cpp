@@ -12,6 +12,7 @@
 #include "tests/cli/result_data.hpp"
 
 namespace ringlock {
+namespace run_test {
 namespace {
 
 using nlohmann::json;
@@ -546,4 +547,5 @@ TEST_F(RunCommand, DataAreTheSameToTheBitForAnyNumberOfThreads) {
 }
 
 }  // namespace
+}  // namespace run_test
 }  // namespace ringlock

@@ -11,6 +11,7 @@
 // The script of `ringlock submit`, with a program in the place of Slurm's sbatch that runs jobs at once, one after the
 // other. tools/slurm-check tries the script on a real Slurm.
 namespace ringlock {
+namespace submit_test {
 namespace {
 
 using test::growing;
@@ -125,4 +126,5 @@ TEST_F(Submit, RefusesWhatCannotBeDividedOrIsNoTime) {
 }
 
 }  // namespace
+}  // namespace submit_test
 }  // namespace ringlock

@@ -15,6 +15,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::store {
+namespace atomic_file_test {
 namespace {
 
 using test::message_of;
@@ -172,4 +173,5 @@ TEST(AtomicFile, AFullDiskShowsAtCommitAtTheLatest) {
 }
 
 }  // namespace
+}  // namespace atomic_file_test
 }  // namespace ringlock::store

@@ -21,6 +21,7 @@
 
 // Files of somebody else: made, changed or left behind by others, they are not lost.
 namespace ringlock {
+namespace atomic_path_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -246,4 +247,5 @@ TEST_F(AtomicPathTest, ALinkByTheNameOfAPartialFileStays) {
 }
 
 }  // namespace
+}  // namespace atomic_path_test
 }  // namespace ringlock

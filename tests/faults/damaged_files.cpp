@@ -11,6 +11,7 @@
 // Files of every kind with bytes changed and parts cut off, doubled, emptied or lengthened: the commands that only read
 // say something about each of them, and neither crash nor hang nor take memory that the file does not explain.
 namespace ringlock::test {
+namespace damaged_files_test {
 namespace {
 
 /// A whole file and the commands that read it.
@@ -71,4 +72,5 @@ class LongDamagedFiles : public DamagedFiles {};
 TEST_F(LongDamagedFiles, ThousandsOfEveryKindAreAnswered) { damage(400, 200, 2); }
 
 }  // namespace
+}  // namespace damaged_files_test
 }  // namespace ringlock::test

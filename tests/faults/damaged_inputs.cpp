@@ -9,13 +9,14 @@
 #include <string>
 #include <vector>
 
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/render.hpp"
 #include "tests/faults/damage.hpp"
 #include "tests/support/packed_text.hpp"
 #include "tests/unit/result_support.hpp"
 
 // Damaged files under the commands that make something of them or would write over them. A refusal leaves nothing.
 namespace ringlock::test {
+namespace damaged_inputs_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -163,4 +164,5 @@ class LongDamagedInputs : public DamagedInputs {};
 TEST_F(LongDamagedInputs, HundredsOfEveryKindAreAnswered) { damage(200, 100, 50, 4); }
 
 }  // namespace
+}  // namespace damaged_inputs_test
 }  // namespace ringlock::test

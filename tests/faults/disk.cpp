@@ -16,6 +16,7 @@
 // then (tests/support/disk_faults.cpp), so that no privileges are needed. Nothing that was finished may be lost without
 // a word, and whatever is written is what an undisturbed run writes.
 namespace ringlock {
+namespace disk_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -209,4 +210,5 @@ TEST_F(Disk, PartsThatRotAreToldOfAndSimulatedAgain) {
 }
 
 }  // namespace
+}  // namespace disk_test
 }  // namespace ringlock

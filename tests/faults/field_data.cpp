@@ -9,6 +9,7 @@
 #include "tests/support/packed_text.hpp"
 
 namespace ringlock::test {
+namespace field_data_test {
 namespace {
 
 using testing::AllOf;
@@ -89,4 +90,5 @@ TEST_F(FieldData, EndlessLinesAndDamagedRowsAreNamed) {
 }
 
 }  // namespace
+}  // namespace field_data_test
 }  // namespace ringlock::test

@@ -21,6 +21,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock {
+namespace interrupt_test {
 namespace {
 
 TEST(Interrupt, TheFirstSignalSetsTheFlag) {
@@ -206,4 +207,5 @@ TEST(Interrupt, MoreFilesThanTheHandlerHoldsAreStillWritten) {
 }
 
 }  // namespace
+}  // namespace interrupt_test
 }  // namespace ringlock

@@ -15,6 +15,7 @@
 // Faults that the head or the first part of a file shows: they are refused in memory that has nothing to do with what
 // the head claims, or with how much follows. None of them takes a second of the processor.
 namespace ringlock::test {
+namespace refusals_test {
 namespace {
 
 using testing::AllOf;
@@ -114,4 +115,5 @@ TEST_F(Refusals, AScenarioOfUnknownKeysIsRefusedEarly) {
 }
 
 }  // namespace
+}  // namespace refusals_test
 }  // namespace ringlock::test

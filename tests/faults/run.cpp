@@ -7,6 +7,7 @@
 
 // What goes wrong outside of the program while it runs: signals and full disks. Nothing half-written may be left.
 namespace ringlock {
+namespace run_test {
 namespace {
 
 using test::Outcome;
@@ -192,4 +193,5 @@ TEST_F(RunFaults, TooLittleMemoryIsAFailureThatSaysSo) {
 }
 
 }  // namespace
+}  // namespace run_test
 }  // namespace ringlock

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "analysis/record/record.hpp"
-#include "analysis/record/series.hpp"
+#include "analysis/record/series/series.hpp"
 #include "analysis/study/result/result_file.hpp"
 #include "engine/core/error.hpp"
 #include "tests/fuzz/fuzz.hpp"

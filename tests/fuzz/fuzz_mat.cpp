@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/record/series.hpp"
+#include "analysis/record/series/series.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 namespace {

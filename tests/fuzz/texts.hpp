@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/record/series.hpp"
+#include "analysis/record/series/series.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 /// Texts of the field for the programs of this room.

@@ -10,6 +10,7 @@
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace adaptive_test {
 namespace {
 
 using simd::lanes;
@@ -134,4 +135,5 @@ TEST(Adaptive, HowReadingsAreCutIntoPiecesDoesNotMatter) {
 }
 
 }  // namespace
+}  // namespace adaptive_test
 }  // namespace ringlock::test

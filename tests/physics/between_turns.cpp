@@ -13,6 +13,7 @@
 #include "tests/support/devices.hpp"
 
 namespace ringlock::test {
+namespace between_turns_test {
 namespace {
 
 random::LaneIdentities identities(std::uint64_t seed) {
@@ -131,4 +132,5 @@ TEST(BetweenTurns, HarmonicsOfDitherAndCouplingCount) {
 }
 
 }  // namespace
+}  // namespace between_turns_test
 }  // namespace ringlock::test

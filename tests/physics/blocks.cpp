@@ -18,6 +18,7 @@
 #include "tests/support/gyro_records.hpp"
 
 namespace ringlock::test {
+namespace blocks_test {
 namespace {
 
 scenario::Scenario quiet() {
@@ -312,4 +313,5 @@ TEST(Ensemble, AFailureOfTheSinkIsTheRunsNotAGyros) {
 }
 
 }  // namespace
+}  // namespace blocks_test
 }  // namespace ringlock::test

@@ -11,6 +11,7 @@
 #include "tests/support/drive.hpp"
 
 namespace ringlock::test {
+namespace compensation_test {
 namespace {
 
 /// Standard deviations [rad] of the lock-in error gained over blocks of cycles, before and after compensation. The
@@ -165,4 +166,5 @@ TEST(Compensation, TheInvertedTurnMapLeavesNothing) {
 }
 
 }  // namespace
+}  // namespace compensation_test
 }  // namespace ringlock::test

@@ -17,6 +17,7 @@
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace compensators_learned_test {
 namespace {
 
 using simd::lanes;
@@ -430,4 +431,5 @@ TEST(LearningCompensators, LaneMatesAndInstructionSetsDoNotMatter) {
 }
 
 }  // namespace
+}  // namespace compensators_learned_test
 }  // namespace ringlock::test

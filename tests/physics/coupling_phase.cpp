@@ -16,6 +16,7 @@
 
 // A phase of the coupling that jumps from half cycle to half cycle: psi goes on, psi + phase jumps.
 namespace ringlock::test {
+namespace coupling_phase_test {
 namespace {
 
 constexpr std::size_t half_cycles = 10;
@@ -266,4 +267,5 @@ TEST(CouplingPhase, MovesThePulses) {
 }
 
 }  // namespace
+}  // namespace coupling_phase_test
 }  // namespace ringlock::test

@@ -10,11 +10,12 @@
 #include "analysis/study/experiment.hpp"
 #include "analysis/study/result/result_file.hpp"
 #include "engine/core/error.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "tests/support/open_file.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock {
+namespace designs_test {
 namespace {
 
 using test::TemporaryDirectory;
@@ -337,4 +338,5 @@ TEST(Designs, AllPointsAskForTheSameFigures) {
 }
 
 }  // namespace
+}  // namespace designs_test
 }  // namespace ringlock

@@ -10,6 +10,7 @@
 #include "tests/support/drive.hpp"
 
 namespace ringlock::test {
+namespace devices_test {
 namespace {
 
 struct Error {
@@ -95,4 +96,5 @@ TEST(Devices, TurnsOfTenFringesAreThoseOfTheEquation) {
 }
 
 }  // namespace
+}  // namespace devices_test
 }  // namespace ringlock::test

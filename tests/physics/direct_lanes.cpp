@@ -10,6 +10,7 @@
 #include "tests/support/series_integrator.hpp"
 
 namespace ringlock::test {
+namespace direct_lanes_test {
 namespace {
 
 using propagate::Stretch;
@@ -145,4 +146,5 @@ TEST(DirectLanes, GoThroughTheTurnsOfADriveAsTheTurnMapDoes) {
 }
 
 }  // namespace
+}  // namespace direct_lanes_test
 }  // namespace ringlock::test

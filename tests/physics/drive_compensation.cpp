@@ -5,10 +5,11 @@
 
 #include "analysis/study/study.hpp"
 #include "analysis/study/summary.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace drive_compensation_test {
 namespace {
 
 const std::string exact = "noise_injected+compensated_exact";
@@ -55,4 +56,5 @@ TEST(DriveCompensation, TheAccelerationAfterTheTurnIsKnownThere) {
 }
 
 }  // namespace
+}  // namespace drive_compensation_test
 }  // namespace ringlock::test

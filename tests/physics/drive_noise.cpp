@@ -13,6 +13,7 @@
 #include "tests/support/devices.hpp"
 
 namespace ringlock::test {
+namespace drive_noise_test {
 namespace {
 
 using gyro::DriveNoise;
@@ -345,4 +346,5 @@ TEST(DriveNoise, TurnsOfGrowingAmplitudesAreThoseOfTheEquation) {
 }
 
 }  // namespace
+}  // namespace drive_noise_test
 }  // namespace ringlock::test

@@ -10,6 +10,7 @@
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace ellipse_correction_test {
 namespace {
 
 using simd::lanes;
@@ -144,4 +145,5 @@ TEST(EllipseCorrection, CuresTheBiasOfAnOffset) {
 }
 
 }  // namespace
+}  // namespace ellipse_correction_test
 }  // namespace ringlock::test

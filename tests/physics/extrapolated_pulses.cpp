@@ -9,6 +9,7 @@
 #include "tests/physics/readout_support.hpp"
 
 namespace ringlock::test {
+namespace extrapolated_pulses_test {
 namespace {
 
 constexpr int pulse_numbers[] = {4, 6, 16, 64};
@@ -157,4 +158,5 @@ TEST(ExtrapolationFromMorePulses, IsLimitedByTheAmplitudeBehindInjectedNoise) {
 }
 
 }  // namespace
+}  // namespace extrapolated_pulses_test
 }  // namespace ringlock::test

@@ -15,6 +15,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::test {
+namespace growing_lots_test {
 namespace {
 
 using testing::HasSubstr;
@@ -233,4 +234,5 @@ TEST(DecidingKeys, TheThresholdDecidesTheRandomWalkAndTheCalibrationTheCompensat
 }
 
 }  // namespace
+}  // namespace growing_lots_test
 }  // namespace ringlock::test

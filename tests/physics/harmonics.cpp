@@ -9,6 +9,7 @@
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace harmonics_test {
 namespace {
 
 gyro::Setup with(std::string_view effect, const effects::Values& values, gyro::Setup setup = paper_device()) {
@@ -104,4 +105,5 @@ TEST(LockinSecondHarmonic, ItsPhaseIsThatOfTwicePsiWhateverTheCouplingPhase) {
 }
 
 }  // namespace
+}  // namespace harmonics_test
 }  // namespace ringlock::test

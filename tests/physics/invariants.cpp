@@ -8,6 +8,7 @@
 #include "tests/support/drive.hpp"
 
 namespace ringlock::test {
+namespace invariants_test {
 namespace {
 
 class Invariants : public ::testing::TestWithParam<Method> {};
@@ -213,4 +214,5 @@ TEST(Invariants, PropagatorsStayTogetherThroughANoisyDrive) { expect_together(60
 TEST(LongInvariants, PropagatorsStayTogetherThroughALongNoisyDrive) { expect_together(20000); }
 
 }  // namespace
+}  // namespace invariants_test
 }  // namespace ringlock::test

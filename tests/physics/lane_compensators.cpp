@@ -13,6 +13,7 @@
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace lane_compensators_test {
 namespace {
 
 using simd::lanes;
@@ -384,4 +385,5 @@ TEST(ExactCompensator, AVeryShortFirstPieceCostsItsFirstTurnsOnly) {
 }
 
 }  // namespace
+}  // namespace lane_compensators_test
 }  // namespace ringlock::test

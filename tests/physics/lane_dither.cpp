@@ -9,6 +9,7 @@
 #include "tests/support/drive.hpp"
 
 namespace ringlock::test {
+namespace lane_dither_test {
 namespace {
 
 using simd::lanes;
@@ -296,4 +297,5 @@ TEST(LaneDither, PiecesOfAnySizeGiveTheSameBits) {
 }
 
 }  // namespace
+}  // namespace lane_dither_test
 }  // namespace ringlock::test

@@ -11,6 +11,7 @@
 #include "tests/physics/readout_support.hpp"
 
 namespace ringlock::test {
+namespace lane_electronics_test {
 namespace {
 
 using simd::lanes;
@@ -285,4 +286,5 @@ TEST(LaneElectronics, LanesAndPiecesDoNotMatter) {
 }
 
 }  // namespace
+}  // namespace lane_electronics_test
 }  // namespace ringlock::test

@@ -8,6 +8,7 @@
 #include "tests/physics/readout_support.hpp"
 
 namespace ringlock::test {
+namespace lane_pulses_test {
 namespace {
 
 using simd::lanes;
@@ -201,4 +202,5 @@ TEST(LaneReadout, AccelerationsKnowWholeTicksOnly) {
 }
 
 }  // namespace
+}  // namespace lane_pulses_test
 }  // namespace ringlock::test

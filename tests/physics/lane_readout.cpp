@@ -9,6 +9,7 @@
 #include "tests/physics/readout_support.hpp"
 
 namespace ringlock::test {
+namespace lane_readout_test {
 namespace {
 
 using simd::lanes;
@@ -86,4 +87,5 @@ TEST(LaneReadout, RefusesATurnWithoutReversal) {
 }
 
 }  // namespace
+}  // namespace lane_readout_test
 }  // namespace ringlock::test

@@ -10,9 +10,10 @@
 #include "engine/core/units.hpp"
 #include "engine/ensemble/draw.hpp"
 #include "engine/gyro/theory.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 
 namespace ringlock::test {
+namespace limits_test {
 namespace {
 
 scenario::Scenario what_limits(const std::vector<std::string>& arms) {
@@ -157,4 +158,5 @@ TEST_F(LongLimits, TheAdaptiveCompensatorStaysThereBeyondTheMemoryOfTheSize) {
 }
 
 }  // namespace
+}  // namespace limits_test
 }  // namespace ringlock::test

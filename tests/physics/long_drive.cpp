@@ -8,6 +8,7 @@
 #include <cstdio>
 
 namespace ringlock::test {
+namespace long_drive_test {
 namespace {
 
 struct Summary {
@@ -46,4 +47,5 @@ TEST(LongDriveDifference, MedianIsAMicroradianAfterAMillionTurns) {
 }
 
 }  // namespace
+}  // namespace long_drive_test
 }  // namespace ringlock::test

@@ -14,6 +14,7 @@
 #include "engine/scenario/check.hpp"
 
 namespace ringlock::test {
+namespace lot_studies_test {
 namespace {
 
 scenario::Scenario short_study(const std::vector<std::string>& arms) {
@@ -281,4 +282,5 @@ TEST(LotStudies, AnAngleAtTheEndIsToldThoughTheRecordIsOfWholeSamples) {
 }
 
 }  // namespace
+}  // namespace lot_studies_test
 }  // namespace ringlock::test

@@ -14,6 +14,7 @@
 
 // A mode hop in the middle of a run: bias, threshold and phase of the coupling step at one time.
 namespace ringlock::test {
+namespace mode_hop_test {
 namespace {
 
 constexpr std::size_t half_cycles = 20;
@@ -118,4 +119,5 @@ TEST(ModeHop, LeavesTheSameOutputByBothPropagators) {
 }
 
 }  // namespace
+}  // namespace mode_hop_test
 }  // namespace ringlock::test

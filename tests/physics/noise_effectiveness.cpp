@@ -7,10 +7,11 @@
 #include "analysis/study/study.hpp"
 #include "analysis/study/summary.hpp"
 #include "engine/ensemble/draw.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace noise_effectiveness_test {
 namespace {
 
 scenario::Scenario noisy(const std::string& device, double rate_deg_h, const std::string& noise) {
@@ -182,4 +183,5 @@ TEST(NoiseEffectiveness, TheExactRandomWalkIsThatOfTheTurnMapAtAKickOfOneRadian)
 }
 
 }  // namespace
+}  // namespace noise_effectiveness_test
 }  // namespace ringlock::test

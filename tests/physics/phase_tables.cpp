@@ -15,6 +15,7 @@
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace phase_tables_test {
 namespace {
 
 using propagate::HalfCycleRanges;
@@ -282,4 +283,5 @@ TEST(PhaseTables, TheInstructionSetMakesNoDifference) {
 }
 
 }  // namespace
+}  // namespace phase_tables_test
 }  // namespace ringlock::test

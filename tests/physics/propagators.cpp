@@ -10,6 +10,7 @@
 #include "tests/support/odeint.hpp"
 
 namespace ringlock::test {
+namespace propagators_test {
 namespace {
 
 /// Worst difference [rad] between turn map and direct integrator over random half cycles: +-5 % of amplitude,
@@ -147,4 +148,5 @@ TEST(Propagators, TurnMapRefusesADitherWithTooFewFringes) {
 }
 
 }  // namespace
+}  // namespace propagators_test
 }  // namespace ringlock::test

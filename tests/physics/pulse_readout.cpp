@@ -16,6 +16,7 @@
 #include "tests/support/limits.hpp"
 
 namespace ringlock::test {
+namespace pulse_readout_test {
 namespace {
 
 using readout::Wanted;
@@ -452,4 +453,5 @@ TEST(FractionRecovery, AWrongCouplingCostsSecondOrderOnly) {
 }
 
 }  // namespace
+}  // namespace pulse_readout_test
 }  // namespace ringlock::test

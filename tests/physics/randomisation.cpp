@@ -7,6 +7,7 @@
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace randomisation_test {
 namespace {
 
 struct Outcome {
@@ -130,4 +131,5 @@ TEST(Randomisation, IncrementsOverSinglePeriodsReadTooLow) {
 }
 
 }  // namespace
+}  // namespace randomisation_test
 }  // namespace ringlock::test

@@ -10,6 +10,7 @@
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace rate_errors_test {
 namespace {
 
 constexpr double injected_rms_rad = 3.0;
@@ -301,4 +302,5 @@ TEST(BiasBehindInjectedNoise, ADetectorOffsetLeavesKappaOverTheRootOfTwoACycle) 
 }
 
 }  // namespace
+}  // namespace rate_errors_test
 }  // namespace ringlock::test

@@ -13,10 +13,11 @@
 #include "analysis/study/summary.hpp"
 #include "engine/core/units.hpp"
 #include "engine/scenario/check.hpp"
-#include "engine/scenario/parse.hpp"
 #include "engine/scenario/read_arms.hpp"
+#include "engine/scenario/text/parse.hpp"
 
 namespace ringlock::study {
+namespace read_studies_test {
 namespace {
 
 using scenario::Scenario;
@@ -255,4 +256,5 @@ TEST(ReadStudies, AnswerTheirScenario) {
 }
 
 }  // namespace
+}  // namespace read_studies_test
 }  // namespace ringlock::study

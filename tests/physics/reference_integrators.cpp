@@ -22,6 +22,7 @@ struct boost::numeric::odeint::vector_space_norm_inf<ringlock::test::Quad> {
 };
 
 namespace ringlock::test {
+namespace reference_integrators_test {
 namespace {
 
 /// What double precision leaves, whatever the tolerance: at the second turn the plain phase is up to 16000 rad, a sum
@@ -208,4 +209,5 @@ TEST(ReferenceIntegrators, CvodeTellsWhyItGaveUp) {
 }
 
 }  // namespace
+}  // namespace reference_integrators_test
 }  // namespace ringlock::test

@@ -10,6 +10,7 @@
 #include "tests/support/turn_path.hpp"
 
 namespace ringlock::test {
+namespace replication_test {
 namespace {
 
 using replication::CorrectionDensity;
@@ -314,4 +315,5 @@ TEST(Replication, AtThePublishedDeviceNeitherCoefficientsGiveTheCorrections) {
 }
 
 }  // namespace
+}  // namespace replication_test
 }  // namespace ringlock::test

@@ -9,6 +9,7 @@
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace rotation_test {
 namespace {
 
 gyro::Setup at_rate(double rate_deg_h, double threshold_deg_h = 300.0) {
@@ -294,4 +295,5 @@ TEST(Rotation, WhatHasNoFastMiddleIsRefused) {
 }
 
 }  // namespace
+}  // namespace rotation_test
 }  // namespace ringlock::test

@@ -10,11 +10,12 @@
 
 #include "analysis/study/result/result_file.hpp"
 #include "analysis/study/summary.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "tests/support/gyro_records.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::test {
+namespace studies_test {
 namespace {
 
 scenario::Scenario from_file(const std::string& name) {
@@ -493,4 +494,5 @@ TEST(Claims, ALimitCountsTheKicksThatSingleCyclesDoNotSee) {
 }
 
 }  // namespace
+}  // namespace studies_test
 }  // namespace ringlock::test

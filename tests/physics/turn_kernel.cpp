@@ -16,6 +16,7 @@
 #include "tests/support/long_drive.hpp"
 
 namespace ringlock::test {
+namespace turn_kernel_test {
 namespace {
 
 using propagate::Range;
@@ -370,4 +371,5 @@ TEST(TurnKernel, FollowsStrongCouplingToo) {
 }
 
 }  // namespace
+}  // namespace turn_kernel_test
 }  // namespace ringlock::test

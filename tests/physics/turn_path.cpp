@@ -9,6 +9,7 @@
 #include "tests/physics/support.hpp"
 
 namespace ringlock::test {
+namespace turn_path_test {
 namespace {
 
 struct Scene {
@@ -94,4 +95,5 @@ TEST(TurnPath, RefusesATurnWithoutReversal) {
 }
 
 }  // namespace
+}  // namespace turn_path_test
 }  // namespace ringlock::test

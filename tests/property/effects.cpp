@@ -8,12 +8,13 @@
 #include "engine/effects/effect.hpp"
 #include "engine/ensemble/block.hpp"
 #include "engine/gyro/device.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/render.hpp"
 #include "engine/simd/target.hpp"
 #include "tests/property/random_scenario.hpp"
 #include "tests/support/gyro_records.hpp"
 
 namespace ringlock::effects {
+namespace effects_test {
 namespace {
 
 using scenario::Scenario;
@@ -210,4 +211,5 @@ TEST(EffectProperty, MissedCountsAreTheSameOnAllInstructionSets) {
 }
 
 }  // namespace
+}  // namespace effects_test
 }  // namespace ringlock::effects

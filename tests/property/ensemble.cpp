@@ -8,12 +8,13 @@
 #include "engine/ensemble/draw.hpp"
 #include "engine/ensemble/schedule.hpp"
 #include "engine/scenario/check.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/render.hpp"
 #include "engine/simd/target.hpp"
 #include "tests/property/random_scenario.hpp"
 #include "tests/support/gyro_records.hpp"
 
 namespace ringlock::ensemble {
+namespace ensemble_test {
 namespace {
 
 using scenario::Scenario;
@@ -191,4 +192,5 @@ TEST(EnsembleProperty, AnglesScaleWithTheScaleFactor) {
 }
 
 }  // namespace
+}  // namespace ensemble_test
 }  // namespace ringlock::ensemble

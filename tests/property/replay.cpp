@@ -15,10 +15,11 @@
 
 #include "analysis/study/study.hpp"
 #include "engine/core/units.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/render.hpp"
 #include "tests/property/random_scenario.hpp"
 
 namespace ringlock::study {
+namespace replay_test {
 namespace {
 
 using scenario::Scenario;
@@ -266,4 +267,5 @@ TEST(ReplayProperty, PartsOfAReplayAreRowsOfTheWhole) {
 }
 
 }  // namespace
+}  // namespace replay_test
 }  // namespace ringlock::study

@@ -8,11 +8,12 @@
 
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/render.hpp"
 #include "tests/property/random_scenario.hpp"
 #include "tests/support/gyro_records.hpp"
 
 namespace ringlock::test {
+namespace small_devices_test {
 namespace {
 
 using scenario::Scenario;
@@ -113,4 +114,5 @@ TEST(SmallDevices, AreRefusedJustWhereTheTurnMapEnds) {
 }
 
 }  // namespace
+}  // namespace small_devices_test
 }  // namespace ringlock::test

@@ -10,6 +10,7 @@
 // Symmetries of psi' = g(t) + b sin(psi + e) over one half cycle, whose g is the same seen from both ends. They follow
 // from the equation alone, so that each propagator can be held against itself.
 namespace ringlock::test {
+namespace symmetry_test {
 namespace {
 
 struct Case {
@@ -115,4 +116,5 @@ INSTANTIATE_TEST_SUITE_P(Propagators, Symmetry, testing::Values("direct", "turn_
                          [](const auto& name) { return std::string(name.param); });
 
 }  // namespace
+}  // namespace symmetry_test
 }  // namespace ringlock::test

@@ -9,12 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "analysis/record/series.hpp"
+#include "analysis/record/series/series.hpp"
 #include "engine/core/notice.hpp"
 #include "tests/support/packed_text.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::test {
+namespace text_dialects_test {
 namespace {
 
 /// What a table is, however it is written.
@@ -168,4 +169,5 @@ TEST(TextDialects, TablesComeBackAsTheyWereWritten) {
 }
 
 }  // namespace
+}  // namespace text_dialects_test
 }  // namespace ringlock::test

@@ -22,10 +22,11 @@
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/devices.hpp"
 #include "engine/scenario/keys/schema.hpp"
-#include "engine/scenario/parse.hpp"
 #include "engine/scenario/read_arms.hpp"
+#include "engine/scenario/text/parse.hpp"
 
 namespace ringlock::test {
+namespace validated_runs_test {
 namespace {
 
 using scenario::Key;
@@ -545,4 +546,5 @@ TEST(LongValidatedRuns, MoreCornersOfTheSchemaAreRefusedOrRun) { corners_are_ref
 TEST(LongValidatedRuns, CornersOfTheSchemaAreRefusedOrRun) { corners_are_refused_or_run(1000, 3000); }
 
 }  // namespace
+}  // namespace validated_runs_test
 }  // namespace ringlock::test

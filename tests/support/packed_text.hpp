@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/text/source.hpp"
+#include "analysis/text/source/source.hpp"
 #include "engine/core/error.hpp"
 
 /// Texts as other programs pack and encode them.

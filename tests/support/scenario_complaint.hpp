@@ -3,7 +3,7 @@
 #include <string_view>
 
 #include "engine/core/error.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 
 namespace ringlock::scenario {
 

@@ -7,6 +7,7 @@
 #include "analysis/noise/fit.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_bounded_record_test {
 namespace {
 
 using namespace ringlock;
@@ -106,3 +107,4 @@ TEST(AllanBoundedRecord, SuitsTheFitOfNoiseCoefficients) {
 }
 
 }  // namespace
+}  // namespace allan_bounded_record_test

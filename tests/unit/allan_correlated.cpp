@@ -3,9 +3,10 @@
 #include <cmath>
 
 #include "analysis/noise/fit.hpp"
-#include "analysis/noise/shapes.hpp"
+#include "analysis/noise/model/shapes.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_correlated_test {
 namespace {
 
 using namespace ringlock;
@@ -123,3 +124,4 @@ TEST(AllanCorrelated, DoesNotTakeTheirPlace) {
 }
 
 }  // namespace
+}  // namespace allan_correlated_test

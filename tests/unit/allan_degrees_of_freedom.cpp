@@ -6,6 +6,7 @@
 
 #include "analysis/allan/statistics/degrees_of_freedom.hpp"
 
+namespace allan_degrees_of_freedom_test {
 namespace {
 
 using ringlock::allan::degrees_of_freedom;
@@ -119,3 +120,4 @@ TEST(AllanDegreesOfFreedom, RefusesWhatHasNoVariance) {
 }
 
 }  // namespace
+}  // namespace allan_degrees_of_freedom_test

@@ -11,6 +11,7 @@
 #include "engine/core/error.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_deviation_test {
 namespace {
 
 using namespace ringlock;
@@ -206,3 +207,4 @@ TEST(AllanDeviation, FactorListsAndErrors) {
 }
 
 }  // namespace
+}  // namespace allan_deviation_test

@@ -6,6 +6,7 @@
 #include "engine/core/error.hpp"
 #include "engine/random/stream.hpp"
 
+namespace allan_ensemble_test {
 namespace {
 
 using namespace ringlock;
@@ -65,3 +66,4 @@ TEST(AllanEnsemble, RefusesNothingAndNan) {
 }
 
 }  // namespace
+}  // namespace allan_ensemble_test

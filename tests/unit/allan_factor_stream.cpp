@@ -12,6 +12,7 @@
 #include "engine/random/stream.hpp"
 
 namespace ringlock::allan {
+namespace allan_factor_stream_test {
 namespace {
 
 /// Counts of random walks of very different sizes, one a lane; that of the last lane wraps around.
@@ -111,4 +112,5 @@ TEST(FactorStream, RefusesWhatHasNoDifference) {
 }
 
 }  // namespace
+}  // namespace allan_factor_stream_test
 }  // namespace ringlock::allan

@@ -10,6 +10,7 @@
 #include "tests/unit/allan_support.hpp"
 
 /// Records of which samples are missing.
+namespace allan_gaps_test {
 namespace {
 
 using namespace ringlock;
@@ -210,3 +211,4 @@ TEST(AllanGaps, VariancesStayUnbiased) {
 }
 
 }  // namespace
+}  // namespace allan_gaps_test

@@ -17,6 +17,8 @@
 #include "engine/core/error.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_losses_test {
+
 using namespace ringlock;
 using allan::Kind;
 using noise::Gap;
@@ -347,3 +349,5 @@ TEST(AllanLosses, RecordsThatCannotBeFittedSayWhy) {
     EXPECT_THROW(noise::fit_and_complete(infinite, 1.0), InputError);
     EXPECT_THROW(noise::fit_and_complete({{1.0, 2.0}, {}}, 0.0), InputError);
 }
+
+}  // namespace allan_losses_test

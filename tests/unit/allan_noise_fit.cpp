@@ -8,6 +8,7 @@
 #include "engine/core/error.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_noise_fit_test {
 namespace {
 
 using namespace ringlock;
@@ -287,3 +288,4 @@ TEST(AllanNoiseFit, WrongArgumentsAreInputErrors) {
 }
 
 }  // namespace
+}  // namespace allan_noise_fit_test

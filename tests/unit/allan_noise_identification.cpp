@@ -9,6 +9,7 @@
 #include "analysis/allan/statistics/noise_identification.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_noise_identification_test {
 namespace {
 
 using namespace ringlock;
@@ -89,3 +90,4 @@ TEST(NoiseIdentification, ManyPointsStandAlone) {
 }
 
 }  // namespace
+}  // namespace allan_noise_identification_test

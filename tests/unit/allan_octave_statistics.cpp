@@ -12,6 +12,7 @@
 #include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_octave_statistics_test {
 namespace {
 
 using namespace ringlock;
@@ -201,3 +202,4 @@ TEST(AllanOctaveStatistics, NoiseIsToldAndIntervalsCover) {
 }
 
 }  // namespace
+}  // namespace allan_octave_statistics_test

@@ -12,6 +12,7 @@
 #include "engine/core/error.hpp"
 #include "engine/simd/target.hpp"
 
+namespace allan_octave_stream_test {
 namespace {
 
 using namespace ringlock;
@@ -279,3 +280,4 @@ TEST(AllanOctaveDeviation, SaysNothingOfWhatIsNotThere) {
 }
 
 }  // namespace
+}  // namespace allan_octave_stream_test

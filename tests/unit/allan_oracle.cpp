@@ -13,6 +13,7 @@
 #include "engine/simd/target.hpp"
 
 /// The estimators against their definitions in quadruple precision.
+namespace allan_oracle_test {
 namespace {
 
 using namespace ringlock;
@@ -148,3 +149,4 @@ TEST(AllanOracle, BitsDependNeitherOnTheInstructionSetNorOnThreads) {
 }
 
 }  // namespace
+}  // namespace allan_oracle_test

@@ -11,6 +11,7 @@
 #include "tests/support/allan_oracle.hpp"
 
 /// The sums of the modified and the Hadamard total deviation: all pieces together, against each on its own.
+namespace allan_pieces_test {
 namespace {
 
 using namespace ringlock;
@@ -126,3 +127,4 @@ TEST(AllanPieces, ShorterThanOnePieceHasNone) {
 }
 
 }  // namespace
+}  // namespace allan_pieces_test

@@ -11,6 +11,7 @@
 #include "tests/unit/allan_record_support.hpp"
 
 // Series as text: columns, values, what is missing, whole numbers, streams.
+namespace allan_record_test {
 namespace {
 
 using namespace ringlock;
@@ -300,3 +301,4 @@ TEST(AllanRecordMeasured, LaserGyroRecordIsReadWhole) {
 }
 
 }  // namespace
+}  // namespace allan_record_test

@@ -3,6 +3,7 @@
 #include "tests/unit/allan_record_support.hpp"
 
 // Fields of records, enumerations, and what else is no plain dataset of HDF5.
+namespace allan_record_compound_test {
 namespace {
 
 using namespace ringlock;
@@ -108,3 +109,4 @@ TEST_F(AllanRecordCompound, AValueWithoutASquareIsNamed) {
 }
 
 }  // namespace
+}  // namespace allan_record_compound_test

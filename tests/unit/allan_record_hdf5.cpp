@@ -7,6 +7,7 @@
 #include "tests/unit/allan_record_support.hpp"
 
 // Series as datasets of HDF5 files.
+namespace allan_record_hdf5_test {
 namespace {
 
 using namespace ringlock;
@@ -276,3 +277,4 @@ TEST_F(AllanRecordHdf5, OverwrittenBytesNeverCrash) {
 }
 
 }  // namespace
+}  // namespace allan_record_hdf5_test

@@ -6,6 +6,7 @@
 #include "tests/unit/allan_record_support.hpp"
 
 // How a file leads to others, and what it claims and cannot hold.
+namespace allan_record_links_test {
 namespace {
 
 using namespace ringlock;
@@ -154,3 +155,4 @@ TEST_F(AllanRecordLinks, NamesAreShownWrittenOut) {
 }
 
 }  // namespace
+}  // namespace allan_record_links_test

@@ -8,6 +8,7 @@
 #include "tests/unit/allan_record_support.hpp"
 
 // Series as variables of MATLAB: version 5 by the library, version 7.3 as HDF5.
+namespace allan_record_matlab_test {
 namespace {
 
 using namespace ringlock;
@@ -139,3 +140,4 @@ TEST_F(AllanRecordMatlab, Version73IsReadAsHdf5) {
 }
 
 }  // namespace
+}  // namespace allan_record_matlab_test

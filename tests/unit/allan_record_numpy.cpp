@@ -5,6 +5,7 @@
 #include "tests/unit/allan_record_support.hpp"
 
 // Series as arrays of NumPy.
+namespace allan_record_numpy_test {
 namespace {
 
 using namespace ringlock;
@@ -204,3 +205,4 @@ TEST_F(AllanRecordNumpy, ArchivesThatAreNoneAreNamed) {
 }
 
 }  // namespace
+}  // namespace allan_record_numpy_test

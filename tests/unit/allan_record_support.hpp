@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/record/series.hpp"
+#include "analysis/record/series/series.hpp"
 #include "engine/core/error.hpp"
 #include "tests/support/temporary_directory.hpp"
 

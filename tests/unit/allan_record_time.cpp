@@ -6,6 +6,7 @@
 #include "tests/unit/allan_record_support.hpp"
 
 // Rows placed by their time stamps.
+namespace allan_record_time_test {
 namespace {
 
 using namespace ringlock;
@@ -333,3 +334,4 @@ TEST_F(AllanRecordTime, SecondsAndNanosecondsMayBeTwoColumns) {
 }
 
 }  // namespace
+}  // namespace allan_record_time_test

@@ -10,6 +10,7 @@
 #include "tests/unit/allan_support.hpp"
 
 /// Published values of the Allan family, to every printed digit.
+namespace allan_references_test {
 namespace {
 
 using namespace ringlock;
@@ -264,3 +265,4 @@ TEST(AllanReferences, TermsAreThoseOfStable32) {
 }
 
 }  // namespace
+}  // namespace allan_references_test

@@ -9,6 +9,7 @@
 #include "engine/core/error.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_running_test {
 namespace {
 
 using namespace ringlock;
@@ -182,3 +183,4 @@ TEST(AllanRunning, RefusesWhatItCannot) {
 }
 
 }  // namespace
+}  // namespace allan_running_test

@@ -6,9 +6,10 @@
 #include <numbers>
 
 #include "analysis/noise/fit.hpp"
-#include "analysis/noise/line.hpp"
+#include "analysis/noise/model/line.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_sinusoids_test {
 namespace {
 
 using namespace ringlock;
@@ -172,3 +173,4 @@ TEST(AllanSinusoids, SymmetriesOfARecord) {
 }
 
 }  // namespace
+}  // namespace allan_sinusoids_test

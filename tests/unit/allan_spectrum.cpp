@@ -4,10 +4,11 @@
 #include <cmath>
 #include <numbers>
 
-#include "analysis/noise/likelihood.hpp"
-#include "analysis/noise/spectrum.hpp"
+#include "analysis/noise/model/likelihood.hpp"
+#include "analysis/noise/model/spectrum.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace allan_spectrum_test {
 namespace {
 
 using namespace ringlock;
@@ -211,3 +212,4 @@ TEST(AllanSpectrum, MaximumWithCorrelatedNoiseIsAMaximum) {
 }
 
 }  // namespace
+}  // namespace allan_spectrum_test

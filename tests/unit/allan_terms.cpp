@@ -5,6 +5,7 @@
 
 #include "analysis/noise/allan_variance.hpp"
 
+namespace allan_terms_test {
 namespace {
 
 using namespace ringlock;
@@ -63,3 +64,4 @@ TEST(AllanTerms, CorrelatedNoiseAndSinusoidsAreWhatIntegrationGives) {
 }
 
 }  // namespace
+}  // namespace allan_terms_test

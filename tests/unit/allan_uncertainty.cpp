@@ -9,6 +9,7 @@
 #include "analysis/allan/statistics/degrees_of_freedom.hpp"
 #include "analysis/allan/uncertainty.hpp"
 
+namespace allan_uncertainty_test {
 namespace {
 
 using namespace ringlock;
@@ -143,3 +144,4 @@ TEST(Uncertainty, IsSmoothInTau) {
 }
 
 }  // namespace
+}  // namespace allan_uncertainty_test

@@ -12,6 +12,7 @@
 #include "engine/core/error.hpp"
 
 namespace ringlock::app {
+namespace app_failure_test {
 namespace {
 
 using testing::AllOf;
@@ -62,4 +63,5 @@ TEST(NameFileOfValues, AnErrorOfTheEvaluationNamesTheFileOnce) {
 }
 
 }  // namespace
+}  // namespace app_failure_test
 }  // namespace ringlock::app

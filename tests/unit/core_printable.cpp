@@ -5,6 +5,7 @@
 #include "engine/core/json_text.hpp"
 #include "engine/core/printable.hpp"
 
+namespace core_printable_test {
 namespace {
 
 using ringlock::json_text;
@@ -58,3 +59,4 @@ TEST(JsonText, AnyBytesMakeJson) {
 }
 
 }  // namespace
+}  // namespace core_printable_test

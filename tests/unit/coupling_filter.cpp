@@ -10,6 +10,7 @@
 #include <random>
 
 namespace ringlock::test {
+namespace coupling_filter_test {
 namespace {
 
 using compensate::CouplingFilter;
@@ -168,4 +169,5 @@ TEST(CouplingFilter, NoiseThatIsToldWrongByAFactorOfTwoDoesNotMatter) {
 }
 
 }  // namespace
+}  // namespace coupling_filter_test
 }  // namespace ringlock::test

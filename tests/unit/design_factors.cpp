@@ -16,6 +16,7 @@
 #include "tests/support/expect_throw.hpp"
 
 namespace ringlock::test {
+namespace design_factors_test {
 namespace {
 
 using namespace design;
@@ -298,4 +299,5 @@ TEST(DesignFactors, FactorsHaveKeysOfTheirOwn) {
 }
 
 }  // namespace
+}  // namespace design_factors_test
 }  // namespace ringlock::test

@@ -21,6 +21,7 @@
 #include "tests/support/expect_throw.hpp"
 
 namespace ringlock::test {
+namespace design_points_test {
 namespace {
 
 using namespace design;
@@ -478,4 +479,5 @@ TEST(Correlations, ThatCannotBeAreRefusedByName) {
 }
 
 }  // namespace
+}  // namespace design_points_test
 }  // namespace ringlock::test

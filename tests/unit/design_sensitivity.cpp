@@ -18,6 +18,7 @@
 #include "tests/support/sensitivity_functions.hpp"
 
 namespace ringlock::test {
+namespace design_sensitivity_test {
 namespace {
 
 using namespace design;
@@ -322,4 +323,5 @@ TEST(SensitivityIndices, RefuseWhatDoesNotFit) {
 }
 
 }  // namespace
+}  // namespace design_sensitivity_test
 }  // namespace ringlock::test

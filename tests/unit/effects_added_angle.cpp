@@ -11,6 +11,7 @@
 #include "engine/effects/effect.hpp"
 
 namespace ringlock::effects {
+namespace effects_added_angle_test {
 namespace {
 
 /// The rate [deg/h] that an effect's equation names, at one time.
@@ -170,4 +171,5 @@ TEST(BaseVibration, AddsUpToTheSameAngleLateInALongRun) {
 }
 
 }  // namespace
+}  // namespace effects_added_angle_test
 }  // namespace ringlock::effects

@@ -8,6 +8,7 @@
 #include "engine/effects/effect.hpp"
 
 namespace ringlock::effects {
+namespace effects_page_test {
 namespace {
 
 std::string_view name_of(Role role) {
@@ -57,4 +58,5 @@ TEST(EffectsPage, HasARowForEveryEffectWithItsParametersRolesAndBounds) {
 }
 
 }  // namespace
+}  // namespace effects_page_test
 }  // namespace ringlock::effects

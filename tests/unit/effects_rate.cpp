@@ -8,6 +8,7 @@
 #include "engine/effects/effect.hpp"
 
 namespace ringlock::effects {
+namespace effects_rate_test {
 namespace {
 
 std::unique_ptr<RateProcess> make(std::string_view name, const Values& values, std::uint64_t gyro = 0) {
@@ -239,4 +240,5 @@ TEST(RateProcesses, RepeatForOneIdentityAndDifferBetweenGyros) {
 }
 
 }  // namespace
+}  // namespace effects_rate_test
 }  // namespace ringlock::effects

@@ -5,6 +5,7 @@
 #include "engine/effects/effect.hpp"
 
 namespace ringlock::effects {
+namespace effects_registry_test {
 namespace {
 
 Values defaults_of(const Effect& effect) {
@@ -186,4 +187,5 @@ TEST(EffectRegistry, ConstantsOfTheGyroAreLeftAloneByDefaults) {
 }
 
 }  // namespace
+}  // namespace effects_registry_test
 }  // namespace ringlock::effects

@@ -6,6 +6,7 @@
 #include "engine/effects/effect.hpp"
 
 namespace ringlock::effects {
+namespace effects_samples_test {
 namespace {
 
 Values values_of(const Effect& effect, const Values& given) {
@@ -84,4 +85,5 @@ TEST(SampleStages, ActWhereTheirEffectSays) {
 }
 
 }  // namespace
+}  // namespace effects_samples_test
 }  // namespace ringlock::effects

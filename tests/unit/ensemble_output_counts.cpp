@@ -7,6 +7,7 @@
 #include "engine/ensemble/output_counts.hpp"
 
 namespace ringlock::test {
+namespace ensemble_output_counts_test {
 namespace {
 
 using simd::lanes;
@@ -128,4 +129,5 @@ TEST(OutputCounts, OfOneAngleAreThoseOfTheAngleToHalfACount) {
 }
 
 }  // namespace
+}  // namespace ensemble_output_counts_test
 }  // namespace ringlock::test

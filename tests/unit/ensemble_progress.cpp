@@ -9,8 +9,9 @@
 #include <thread>
 #include <vector>
 
-#include "engine/ensemble/progress.hpp"
+#include "engine/ensemble/progress/progress.hpp"
 
+namespace ensemble_progress_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -249,3 +250,4 @@ TEST_F(EnsembleProgress, CountsFromManyThreads) {
 }
 
 }  // namespace
+}  // namespace ensemble_progress_test

@@ -14,9 +14,10 @@
 #include <string>
 #include <vector>
 
-#include "engine/ensemble/progress.hpp"
-#include "engine/ensemble/time_left.hpp"
+#include "engine/ensemble/progress/progress.hpp"
+#include "engine/ensemble/progress/time_left.hpp"
 
+namespace ensemble_time_left_test {
 namespace {
 
 using ringlock::ensemble::BlockStage;
@@ -338,3 +339,4 @@ TEST(EnsembleTimeLeft, TheFirstLineOfAShortRunIsNoHoursAway) {
 }
 
 }  // namespace
+}  // namespace ensemble_time_left_test

@@ -10,6 +10,7 @@
 #include "analysis/findings/search.hpp"
 #include "engine/core/units.hpp"
 
+namespace findings_events_test {
 namespace {
 
 using namespace ringlock::findings;
@@ -185,3 +186,4 @@ TEST(Search, ShortOrConstantSeriesAreLeftAlone) {
 }
 
 }  // namespace
+}  // namespace findings_events_test

@@ -9,6 +9,7 @@
 
 #include "analysis/findings/values.hpp"
 
+namespace findings_values_test {
 namespace {
 
 using namespace ringlock::findings;
@@ -90,3 +91,4 @@ TEST(FoundValues, WrapsAreUndone) {
 }
 
 }  // namespace
+}  // namespace findings_values_test

@@ -12,6 +12,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock {
+namespace free_memory_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -99,4 +100,5 @@ TEST(FreeMemoryOfThisMachine, IsThereAndNotMoreThanTheMachineHas) {
 }
 
 }  // namespace
+}  // namespace free_memory_test
 }  // namespace ringlock

@@ -13,6 +13,7 @@
 #include "tests/support/expect_throw.hpp"
 
 namespace ringlock::lot {
+namespace lot_means_pairs_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -213,4 +214,5 @@ TEST(LotPairs, MatrixComparesEveryArmWithEveryOther) {
 }
 
 }  // namespace
+}  // namespace lot_means_pairs_test
 }  // namespace ringlock::lot

@@ -12,6 +12,7 @@
 #include "tests/support/expect_throw.hpp"
 
 namespace ringlock::lot {
+namespace lot_share_quantile_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -218,4 +219,5 @@ TEST(LotQuantile, OfDegenerateLots) {
 }
 
 }  // namespace
+}  // namespace lot_share_quantile_test
 }  // namespace ringlock::lot

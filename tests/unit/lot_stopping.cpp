@@ -13,6 +13,7 @@
 #include "tests/support/expect_throw.hpp"
 
 namespace ringlock::lot {
+namespace lot_stopping_test {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -199,4 +200,5 @@ TEST(LotStopping, IntervalsOfStoppedLotsHoldTheTruth) {
 }
 
 }  // namespace
+}  // namespace lot_stopping_test
 }  // namespace ringlock::lot

@@ -5,6 +5,7 @@
 #include <cmath>
 
 namespace ringlock::readout {
+namespace missed_counts_test {
 namespace {
 
 random::LaneIdentities block_of(std::uint64_t first_gyro) {
@@ -102,4 +103,5 @@ TEST(MissedCounts, NextToImpossibleOnesDoNotCome) {
 }
 
 }  // namespace
+}  // namespace missed_counts_test
 }  // namespace ringlock::readout

@@ -15,6 +15,7 @@
 #include "engine/simd/target.hpp"
 
 namespace ringlock::test {
+namespace normals_between_test {
 namespace {
 
 using Values = std::vector<double>;
@@ -82,4 +83,5 @@ TEST(NormalsBetween, FarAwayAreAtTheBound) {
 }
 
 }  // namespace
+}  // namespace normals_between_test
 }  // namespace ringlock::test

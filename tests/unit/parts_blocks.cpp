@@ -13,6 +13,7 @@
 #include "tests/unit/result_support.hpp"
 
 namespace ringlock::parts {
+namespace parts_blocks_test {
 namespace {
 
 /// Keeps blocks and samples in memory.
@@ -147,4 +148,5 @@ TEST(FinishedBlockRecord, KeepsEveryFieldOfANoiseFit) {
 }
 
 }  // namespace
+}  // namespace parts_blocks_test
 }  // namespace ringlock::parts

@@ -22,6 +22,7 @@
 #include "tests/unit/result_support.hpp"
 
 namespace ringlock::parts {
+namespace parts_folder_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -188,4 +189,5 @@ TEST_F(RunFolder, SamplesComeBackWithTheirBlocks) {
 }
 
 }  // namespace
+}  // namespace parts_folder_test
 }  // namespace ringlock::parts

@@ -14,6 +14,7 @@
 #include "tests/support/expect_throw.hpp"
 
 namespace ringlock::parts {
+namespace parts_shards_test {
 namespace {
 
 using Gyros = std::vector<std::int64_t>;
@@ -113,4 +114,5 @@ TEST(Manifest, IsRefusedWhereItIsNone) {
 }
 
 }  // namespace
+}  // namespace parts_shards_test
 }  // namespace ringlock::parts

@@ -13,6 +13,7 @@
 #include "engine/gyro/theory.hpp"
 
 namespace ringlock::test {
+namespace phase_bound_test {
 namespace {
 
 constexpr double quarter_rad = 0.5 * std::numbers::pi;
@@ -157,4 +158,5 @@ TEST(PhaseBound, OfThePapersDevice) {
 }
 
 }  // namespace
+}  // namespace phase_bound_test
 }  // namespace ringlock::test

@@ -9,6 +9,7 @@
 #include "analysis/quantity/unit.hpp"
 #include "engine/core/error.hpp"
 
+namespace quantity_units_test {
 namespace {
 
 using namespace ringlock;
@@ -126,3 +127,4 @@ TEST(Units, AContradictionNamesBoth) {
 }
 
 }  // namespace
+}  // namespace quantity_units_test

@@ -17,6 +17,7 @@
 #include "engine/simd/target.hpp"
 
 namespace ringlock::test {
+namespace random_normals_test {
 namespace {
 
 using random::LaneIdentities;
@@ -330,4 +331,5 @@ TEST_F(RandomNormals, GyrosPurposesAndSeedsDoNotCorrelate) {
 }
 
 }  // namespace
+}  // namespace random_normals_test
 }  // namespace ringlock::test

@@ -15,6 +15,7 @@
 #include "engine/reader/whole_cycle.hpp"
 
 namespace ringlock::reader {
+namespace reader_strippers_test {
 namespace {
 
 constexpr double dither_hz = 397.3;
@@ -217,4 +218,5 @@ TEST(Strippers, CountsAtMovedCrossingsAreWhole) {
 }
 
 }  // namespace
+}  // namespace reader_strippers_test
 }  // namespace ringlock::reader

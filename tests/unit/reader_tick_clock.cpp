@@ -7,6 +7,7 @@
 #include "engine/reader/tick_clock.hpp"
 
 namespace ringlock::reader {
+namespace reader_tick_clock_test {
 namespace {
 
 using Exact = boost::multiprecision::cpp_bin_float_50;
@@ -40,4 +41,5 @@ TEST(TickClock, TicksBeforeTheFirstTurnHaveTimesToo) {
 }
 
 }  // namespace
+}  // namespace reader_tick_clock_test
 }  // namespace ringlock::reader

@@ -9,6 +9,7 @@
 #include "tests/unit/record_support.hpp"
 
 namespace ringlock::record {
+namespace record_check_test {
 namespace {
 
 using test::full_record;
@@ -266,4 +267,5 @@ TEST(RecordTrack, IsLinearBetweenItsRowsAndConstantBeyond) {
 }
 
 }  // namespace
+}  // namespace record_check_test
 }  // namespace ringlock::record

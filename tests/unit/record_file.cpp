@@ -9,13 +9,14 @@
 #include <random>
 
 #include "analysis/record/record.hpp"
-#include "analysis/record/series.hpp"
+#include "analysis/record/series/series.hpp"
 #include "engine/core/error.hpp"
 #include "tests/support/expect_throw.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/unit/record_support.hpp"
 
 namespace ringlock::record {
+namespace record_file_test {
 namespace {
 
 using test::expect_equal;
@@ -530,4 +531,5 @@ TEST_F(RecordFile, RealDataAreRead) {
 }
 
 }  // namespace
+}  // namespace record_file_test
 }  // namespace ringlock::record

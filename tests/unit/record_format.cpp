@@ -7,6 +7,7 @@
 #include "tests/unit/record_support.hpp"
 
 namespace ringlock::record {
+namespace record_format_test {
 namespace {
 
 TEST(RecordFormat, HoldsWhatThePageSays) {
@@ -25,4 +26,5 @@ TEST(RecordFormat, HoldsWhatThePageSays) {
 }
 
 }  // namespace
+}  // namespace record_format_test
 }  // namespace ringlock::record

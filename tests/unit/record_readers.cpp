@@ -10,11 +10,12 @@
 #include "engine/core/error.hpp"
 #include "engine/core/units.hpp"
 #include "engine/scenario/check.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "tests/support/expect_throw.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::instrument {
+namespace record_readers_test {
 namespace {
 
 using scenario::Scenario;
@@ -253,4 +254,5 @@ TEST(Readers, BreakRulesWithTheKeysNamed) {
 }
 
 }  // namespace
+}  // namespace record_readers_test
 }  // namespace ringlock::instrument

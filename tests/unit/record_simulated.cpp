@@ -15,6 +15,7 @@
 #include "tests/support/expect_throw.hpp"
 
 namespace ringlock::instrument {
+namespace record_simulated_test {
 namespace {
 
 using scenario::Scenario;
@@ -289,4 +290,5 @@ TEST(SimulatedRecord, RefusesWhatCannotBe) {
 }
 
 }  // namespace
+}  // namespace record_simulated_test
 }  // namespace ringlock::instrument

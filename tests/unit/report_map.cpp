@@ -9,6 +9,7 @@
 #include "analysis/report/render.hpp"
 #include "engine/core/error.hpp"
 
+namespace report_map_test {
 namespace {
 
 using namespace ringlock;
@@ -114,3 +115,4 @@ TEST(CurvesOfAPlot, ThatBelongTogetherShareAColourAndAnEntry) {
 }
 
 }  // namespace
+}  // namespace report_map_test

@@ -14,6 +14,7 @@
 #include "analysis/report/plot.hpp"
 #include "engine/core/error.hpp"
 
+namespace report_plot_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -261,3 +262,4 @@ TEST_F(ReportPlot, NamesAFileThatCannotBeWritten) {
 }
 
 }  // namespace
+}  // namespace report_plot_test

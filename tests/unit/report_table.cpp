@@ -4,6 +4,7 @@
 
 #include "analysis/report/table.hpp"
 
+namespace report_table_test {
 namespace {
 
 using ringlock::report::Align;
@@ -49,3 +50,4 @@ TEST(ReportTable, RefusesCellsThatDoNotFit) {
 }
 
 }  // namespace
+}  // namespace report_table_test

@@ -21,6 +21,7 @@
 #include "tests/unit/result_support.hpp"
 
 namespace ringlock::study {
+namespace result_damage_test {
 namespace {
 
 using test::bytes;
@@ -280,4 +281,5 @@ TEST_F(DamagedDesign, WrongShapesAreNamed) {
 }
 
 }  // namespace
+}  // namespace result_damage_test
 }  // namespace ringlock::study

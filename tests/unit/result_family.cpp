@@ -20,6 +20,7 @@
 #include "tests/unit/result_support.hpp"
 
 namespace ringlock::study {
+namespace result_family_test {
 namespace {
 
 using test::ResultFile;
@@ -145,4 +146,5 @@ TEST_F(ResultFile, FactorsThatRecordsDoNotHaveAreRefused) {
 }
 
 }  // namespace
+}  // namespace result_family_test
 }  // namespace ringlock::study

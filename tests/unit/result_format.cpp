@@ -22,6 +22,7 @@
 #include "tests/unit/result_support.hpp"
 
 namespace ringlock::study {
+namespace result_format_test {
 namespace {
 
 using test::compare;
@@ -332,4 +333,5 @@ TEST_F(ResultFile, AReplayHoldsNoPulsesWhereNoneAreTimed) {
 }
 
 }  // namespace
+}  // namespace result_format_test
 }  // namespace ringlock::study

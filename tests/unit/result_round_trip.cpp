@@ -7,11 +7,12 @@
 #include <optional>
 
 #include "analysis/study/result/result_file.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "tests/support/open_file.hpp"
 #include "tests/unit/result_support.hpp"
 
 namespace ringlock::study {
+namespace result_round_trip_test {
 namespace {
 
 using test::ResultFile;
@@ -184,4 +185,5 @@ TEST(ClosedForm, IsThereWhereNoEffectAddsARateThatVaries) {
 }
 
 }  // namespace
+}  // namespace result_round_trip_test
 }  // namespace ringlock::study

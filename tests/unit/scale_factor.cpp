@@ -1,5 +1,5 @@
 // The straight line through a sweep: closed forms, and whether the intervals hold what they say.
-#include "analysis/study/scale_factor.hpp"
+#include "analysis/study/figures/scale_factor.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,6 +10,7 @@
 #include "engine/random/stream.hpp"
 
 namespace ringlock::study {
+namespace scale_factor_test {
 namespace {
 
 random::NormalStream normals(std::uint64_t trial) {
@@ -183,4 +184,5 @@ TEST(ScaleFactor, NothingIsSeenWhereThereIsNothing) {
 }
 
 }  // namespace
+}  // namespace scale_factor_test
 }  // namespace ringlock::study

@@ -6,10 +6,11 @@
 
 #include "engine/core/error.hpp"
 #include "engine/scenario/keys/schema.hpp"
-#include "engine/scenario/parse.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/parse.hpp"
+#include "engine/scenario/text/render.hpp"
 
 namespace ringlock::scenario {
+namespace scenario_design_test {
 namespace {
 
 using testing::AllOf;
@@ -115,4 +116,5 @@ TEST(KeyUnits, AreTheEndsOfNames) {
 }
 
 }  // namespace
+}  // namespace scenario_design_test
 }  // namespace ringlock::scenario

@@ -7,12 +7,13 @@
 #include "engine/scenario/active_effects.hpp"
 #include "engine/scenario/devices.hpp"
 #include "engine/scenario/keys/schema.hpp"
-#include "engine/scenario/parse.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/parse.hpp"
+#include "engine/scenario/text/render.hpp"
 #include "tests/support/devices.hpp"
 #include "tests/support/expect_throw.hpp"
 
 namespace ringlock::scenario {
+namespace scenario_devices_test {
 namespace {
 
 using test::message_of;
@@ -123,4 +124,5 @@ TEST(Devices, ErrorsNameOnlyKeysOfTheScenario) {
 }
 
 }  // namespace
+}  // namespace scenario_devices_test
 }  // namespace ringlock::scenario

@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "engine/core/error.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "tests/support/scenario_complaint.hpp"
 
 namespace ringlock::scenario {
+namespace scenario_errors_test {
 namespace {
 
 using testing::AllOf;
@@ -288,4 +289,5 @@ TEST_F(ScenarioFile, OversizedOnesAreRefusedBeforeTheyAreParsed) {
 }
 
 }  // namespace
+}  // namespace scenario_errors_test
 }  // namespace ringlock::scenario

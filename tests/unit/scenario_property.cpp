@@ -9,10 +9,11 @@
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/check.hpp"
 #include "engine/scenario/keys/schema.hpp"
-#include "engine/scenario/parse.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/parse.hpp"
+#include "engine/scenario/text/render.hpp"
 
 namespace ringlock::scenario {
+namespace scenario_property_test {
 namespace {
 
 using Random = std::mt19937_64;
@@ -160,4 +161,5 @@ TEST(ScenarioProperty, ShuffledLinesAreParsedOrRefused) {
 }
 
 }  // namespace
+}  // namespace scenario_property_test
 }  // namespace ringlock::scenario

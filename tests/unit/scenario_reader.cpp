@@ -6,11 +6,12 @@
 
 #include "engine/core/error.hpp"
 #include "engine/ensemble/schedule.hpp"
-#include "engine/scenario/parse.hpp"
 #include "engine/scenario/read_arms.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "tests/support/scenario_complaint.hpp"
 
 namespace ringlock::scenario {
+namespace scenario_reader_test {
 namespace {
 
 using testing::AllOf;
@@ -125,4 +126,5 @@ TEST(ScenarioReader, RulesOfRecordsHoldForStudies) {
 }
 
 }  // namespace
+}  // namespace scenario_reader_test
 }  // namespace ringlock::scenario

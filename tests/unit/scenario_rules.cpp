@@ -5,11 +5,12 @@
 
 #include "engine/core/error.hpp"
 #include "engine/scenario/check.hpp"
-#include "engine/scenario/parse.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/parse.hpp"
+#include "engine/scenario/text/render.hpp"
 #include "tests/support/scenario_complaint.hpp"
 
 namespace ringlock::scenario {
+namespace scenario_rules_test {
 namespace {
 
 using testing::AllOf;
@@ -439,4 +440,5 @@ TEST(ScenarioRules, UnlikeHalfCyclesDoNotMeetAmongThePulsesOfAnExtrapolation) {
 }
 
 }  // namespace
+}  // namespace scenario_rules_test
 }  // namespace ringlock::scenario

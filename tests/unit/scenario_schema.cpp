@@ -10,10 +10,11 @@
 #include "engine/effects/effect.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/keys/schema.hpp"
-#include "engine/scenario/parse.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/parse.hpp"
+#include "engine/scenario/text/render.hpp"
 
 namespace ringlock::scenario {
+namespace scenario_schema_test {
 namespace {
 
 using testing::HasSubstr;
@@ -162,4 +163,5 @@ TEST(InputSweep, IsEvenlySpacedWithBothEnds) {
 }
 
 }  // namespace
+}  // namespace scenario_schema_test
 }  // namespace ringlock::scenario

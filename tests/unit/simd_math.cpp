@@ -19,6 +19,7 @@
 #include "tests/support/simd_probe.hpp"
 
 namespace ringlock::test {
+namespace simd_math_test {
 namespace {
 
 __extension__ typedef __float128 Quad;
@@ -450,4 +451,5 @@ TEST_F(SimdMath, EveryInstructionSetHasTheSameBits) {
 }
 
 }  // namespace
+}  // namespace simd_math_test
 }  // namespace ringlock::test

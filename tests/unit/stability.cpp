@@ -15,6 +15,7 @@
 #include "analysis/stability/three_cornered_hat.hpp"
 #include "tests/unit/allan_support.hpp"
 
+namespace stability_test {
 namespace {
 
 using namespace ringlock;
@@ -189,3 +190,4 @@ TEST(Stability, LongRecordsHaveNoMoreWindowsThanAsked) {
 }
 
 }  // namespace
+}  // namespace stability_test

@@ -19,6 +19,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::store {
+namespace store_hdf5_test {
 namespace {
 
 using test::message_of;
@@ -255,4 +256,5 @@ TEST_F(StoreHdf5, RowsMayBeWrittenFromManyThreads) {
 }
 
 }  // namespace
+}  // namespace store_hdf5_test
 }  // namespace ringlock::store

@@ -17,6 +17,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::store {
+namespace store_part_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -144,4 +145,5 @@ TEST_F(PartFile, RecordsOfTheKindOfTheEndAreAMistake) {
 }
 
 }  // namespace
+}  // namespace store_part_file_test
 }  // namespace ringlock::store

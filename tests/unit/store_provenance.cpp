@@ -10,6 +10,7 @@
 #include "tests/support/temporary_directory.hpp"
 
 namespace ringlock::store {
+namespace store_provenance_test {
 namespace {
 
 TEST(StoreProvenance, SaysWhatRanWhereAndWhen) {
@@ -74,4 +75,5 @@ TEST(StoreProvenance, AFileWithoutIsRefused) {
 }
 
 }  // namespace
+}  // namespace store_provenance_test
 }  // namespace ringlock::store

@@ -4,12 +4,13 @@
 #include <string>
 
 #include "analysis/study/experiment.hpp"
+#include "analysis/study/needs/room.hpp"
 #include "analysis/study/result/result_file.hpp"
-#include "analysis/study/room.hpp"
 #include "engine/reader/latch.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 
 namespace ringlock::study {
+namespace study_room_test {
 namespace {
 
 scenario::Scenario parsed(const std::string& text) { return scenario::parse_string(text, "room.toml", {}, complaints); }
@@ -73,4 +74,5 @@ TEST(StudyRoom, MillionsOfGyrosAndYearsAreEstimatedWithoutBeingTaken) {
 }
 
 }  // namespace
+}  // namespace study_room_test
 }  // namespace ringlock::study

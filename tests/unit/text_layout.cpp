@@ -6,9 +6,9 @@
 #include <limits>
 
 #include "analysis/text/columns.hpp"
+#include "analysis/text/layout/units.hpp"
 #include "analysis/text/numbers.hpp"
 #include "analysis/text/table.hpp"
-#include "analysis/text/units.hpp"
 #include "analysis/text/words.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/notice.hpp"
@@ -16,6 +16,7 @@
 #include "tests/support/packed_text.hpp"
 
 namespace ringlock::text {
+namespace text_layout_test {
 namespace {
 
 using test::message_of;
@@ -234,4 +235,5 @@ TEST(TextLayout, ColumnsAreFoundByNameOrNumber) {
 }
 
 }  // namespace
+}  // namespace text_layout_test
 }  // namespace ringlock::text

@@ -9,13 +9,14 @@
 #include <string>
 #include <vector>
 
-#include "analysis/text/identify.hpp"
-#include "analysis/text/lines.hpp"
-#include "analysis/text/source.hpp"
+#include "analysis/text/source/identify.hpp"
+#include "analysis/text/source/lines.hpp"
+#include "analysis/text/source/source.hpp"
 #include "tests/support/expect_throw.hpp"
 #include "tests/support/packed_text.hpp"
 
 namespace ringlock::text {
+namespace text_source_test {
 namespace {
 
 using test::message_of;
@@ -151,4 +152,5 @@ TEST(TextLines, EveryEndOfLineIsOne) {
 }
 
 }  // namespace
+}  // namespace text_source_test
 }  // namespace ringlock::text

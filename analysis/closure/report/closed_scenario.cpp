@@ -16,7 +16,7 @@
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
 #include "engine/scenario/check.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/render.hpp"
 
 namespace ringlock::closure {
 

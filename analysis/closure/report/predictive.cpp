@@ -23,7 +23,7 @@
 #include "analysis/closure/turns/model/series.hpp"
 #include "analysis/closure/turns/model/side_by_side.hpp"
 #include "analysis/instrument/simulate.hpp"
-#include "analysis/noise/spectrum.hpp"
+#include "analysis/noise/model/spectrum.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/core/units.hpp"

@@ -5,7 +5,7 @@
 
 #include "analysis/noise/losses/cosine_pair.hpp"
 #include "analysis/noise/losses/lossy_rates.hpp"
-#include "analysis/noise/spectrum.hpp"
+#include "analysis/noise/model/spectrum.hpp"
 #include "engine/random/stream.hpp"
 
 namespace ringlock::noise {

@@ -4,7 +4,7 @@
 
 #include "analysis/noise/losses/conditional.hpp"
 #include "analysis/noise/losses/lossy_rates.hpp"
-#include "analysis/noise/spectrum.hpp"
+#include "analysis/noise/model/spectrum.hpp"
 
 namespace ringlock::noise {
 

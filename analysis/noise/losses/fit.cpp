@@ -10,7 +10,7 @@
 #include "analysis/noise/decomposition.hpp"
 #include "analysis/noise/losses/present_information.hpp"
 #include "analysis/noise/losses/settle.hpp"
-#include "analysis/noise/rounding.hpp"
+#include "analysis/noise/model/rounding.hpp"
 #include "engine/core/error.hpp"
 
 namespace ringlock::noise {

@@ -3,8 +3,8 @@
 #include <span>
 
 #include "analysis/noise/losses/conditional.hpp"
-#include "analysis/noise/lost_information.hpp"
-#include "analysis/noise/spectrum.hpp"
+#include "analysis/noise/model/lost_information.hpp"
+#include "analysis/noise/model/spectrum.hpp"
 
 namespace ringlock::noise {
 

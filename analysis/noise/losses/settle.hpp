@@ -2,8 +2,8 @@
 #include <functional>
 #include <vector>
 
-#include "analysis/noise/line.hpp"
 #include "analysis/noise/losses/filling.hpp"
+#include "analysis/noise/model/line.hpp"
 
 namespace ringlock::noise {
 

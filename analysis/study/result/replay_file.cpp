@@ -18,7 +18,7 @@
 #include "engine/core/error.hpp"
 #include "engine/core/printable.hpp"
 #include "engine/core/version.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/render.hpp"
 #include "engine/store/hdf5.hpp"
 
 namespace ringlock::study {

@@ -16,7 +16,7 @@
 #include "engine/core/error.hpp"
 #include "engine/core/printable.hpp"
 #include "engine/ensemble/draw.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 
 namespace ringlock::study {
 

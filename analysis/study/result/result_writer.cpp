@@ -15,9 +15,9 @@
 #include "engine/core/error.hpp"
 #include "engine/core/printable.hpp"
 #include "engine/scenario/keys/schema.hpp"
-#include "engine/scenario/parse.hpp"
 #include "engine/scenario/read_arms.hpp"
-#include "engine/scenario/render.hpp"
+#include "engine/scenario/text/parse.hpp"
+#include "engine/scenario/text/render.hpp"
 
 namespace ringlock::study {
 

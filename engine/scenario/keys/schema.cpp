@@ -11,7 +11,7 @@
 #include "engine/effects/effect.hpp"
 #include "engine/scenario/arm.hpp"
 #include "engine/scenario/keys/sections.hpp"
-#include "engine/scenario/text.hpp"
+#include "engine/scenario/text/text.hpp"
 
 namespace ringlock::scenario {
 namespace {

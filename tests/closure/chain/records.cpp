@@ -12,6 +12,7 @@
 #include "tests/closure/generator/samples.hpp"
 
 namespace ringlock::test::closure {
+namespace chain_records_test {
 namespace {
 
 using ringlock::closure::Chain;
@@ -134,4 +135,5 @@ TEST(LongDataChain, SharesNothingWhereNoRecordShowsASource) {
 }
 
 }  // namespace
+}  // namespace chain_records_test
 }  // namespace ringlock::test::closure

@@ -13,6 +13,7 @@
 #include "engine/core/error.hpp"
 
 namespace ringlock::test::closure {
+namespace chain_shared_rate_test {
 namespace {
 
 using namespace ringlock::closure;
@@ -110,4 +111,5 @@ TEST(DataChain, IsOfRecordsOfSamplesAtOneRate) {
 }
 
 }  // namespace
+}  // namespace chain_shared_rate_test
 }  // namespace ringlock::test::closure

@@ -13,6 +13,7 @@
 #include "analysis/closure/samples/screen/screen.hpp"
 
 namespace ringlock::test::closure {
+namespace decide_effect_queries_test {
 namespace {
 
 using namespace ringlock::closure;
@@ -172,4 +173,5 @@ TEST(EffectQueries, OneEffectContainsAnotherWhereItIsThatOneAtSomeSizesOfZero) {
 }
 
 }  // namespace
+}  // namespace decide_effect_queries_test
 }  // namespace ringlock::test::closure

@@ -9,6 +9,7 @@
 #include "analysis/closure/types.hpp"
 
 namespace ringlock::test::closure {
+namespace decide_sets_test {
 namespace {
 
 using ringlock::closure::EffectSet;
@@ -80,4 +81,5 @@ TEST(Naming, AnAlternativeIsListedOnceWithItsBestSet) {
 }
 
 }  // namespace
+}  // namespace decide_sets_test
 }  // namespace ringlock::test::closure

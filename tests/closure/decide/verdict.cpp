@@ -12,6 +12,7 @@
 #include "analysis/closure/options.hpp"
 
 namespace ringlock::test::closure {
+namespace decide_verdict_test {
 namespace {
 
 using ringlock::closure::Closure;
@@ -121,4 +122,5 @@ TEST(Evidence, AnAdditionIsToldByARecordThatCouldShowIt) {
 }
 
 }  // namespace
+}  // namespace decide_verdict_test
 }  // namespace ringlock::test::closure

@@ -9,6 +9,7 @@
 #include "tests/closure/generator/generator.hpp"
 #include "tests/support/direct.hpp"
 
+namespace generator_against_engine_test {
 namespace {
 
 using namespace ringlock;
@@ -100,3 +101,4 @@ TEST(ClosureAgainstEngine, TurnPhasesAgree) {
 }
 
 }  // namespace
+}  // namespace generator_against_engine_test

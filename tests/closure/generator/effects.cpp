@@ -12,6 +12,7 @@
 #include "tests/closure/generator/keys.hpp"
 #include "tests/support/temporary_directory.hpp"
 
+namespace generator_effects_test {
 namespace {
 
 using namespace ringlock;
@@ -570,3 +571,4 @@ TEST(ClosureKeys, SetWhatTheyName) {
 }
 
 }  // namespace
+}  // namespace generator_effects_test

@@ -9,6 +9,7 @@
 #include "tests/closure/generator/fringes.hpp"
 #include "tests/closure/generator/generator.hpp"
 
+namespace generator_equation_test {
 namespace {
 
 using namespace ringlock::test::closure;
@@ -287,3 +288,4 @@ TEST(ClosureEquation, RandomisedTurnsWalkByTheFormula) {
 }
 
 }  // namespace
+}  // namespace generator_equation_test

@@ -11,6 +11,7 @@
 #include "engine/core/error.hpp"
 #include "tests/closure/generator/samples.hpp"
 
+namespace generator_samples_made_test {
 namespace {
 
 using namespace ringlock;
@@ -311,3 +312,4 @@ TEST(ClosureSamples, RefuseWhatMakesNoSense) {
 }
 
 }  // namespace
+}  // namespace generator_samples_made_test

@@ -18,14 +18,15 @@
 #include "engine/core/units.hpp"
 #include "engine/effects/effect.hpp"
 #include "engine/scenario/check.hpp"
-#include "engine/scenario/parse.hpp"
 #include "engine/scenario/scenario.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "engine/store/hdf5.hpp"
 #include "tests/closure/generator/plain_gyro.hpp"
 #include "tests/closure/generator/samples.hpp"
 #include "tests/support/open_file.hpp"
 
 namespace ringlock::test::closure {
+namespace report_predictive_test {
 namespace {
 
 using ringlock::closure::check_predictive;
@@ -327,4 +328,5 @@ TEST_F(LongPredictively, PIsAsRareAsItSays) {
 }
 
 }  // namespace
+}  // namespace report_predictive_test
 }  // namespace ringlock::test::closure

@@ -16,6 +16,7 @@
 #include "tests/closure/generator/samples.hpp"
 #include "tests/closure/heldout.hpp"
 
+namespace samples_closed_test {
 namespace {
 
 using namespace ringlock;
@@ -378,3 +379,4 @@ TEST(LongSampleClosure, ARealGyroOnAVehicle) {
 }
 
 }  // namespace
+}  // namespace samples_closed_test

@@ -16,6 +16,7 @@
 #include "engine/core/error.hpp"
 #include "tests/closure/generator/samples.hpp"
 
+namespace samples_gaps_test {
 namespace {
 
 using namespace ringlock;
@@ -158,3 +159,4 @@ TEST(SampleGaps, MoreThanHalfMissingIsAnError) {
 }
 
 }  // namespace
+}  // namespace samples_gaps_test

@@ -17,9 +17,10 @@
 #include "engine/core/units.hpp"
 #include "engine/random/stream.hpp"
 #include "engine/scenario/devices.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 
 namespace ringlock::closure {
+namespace samples_readers_test {
 namespace {
 
 using reader::Stripping;
@@ -325,4 +326,5 @@ TEST(SampleReaders, AFilterLongerThanTheRecordIsLeftOut) {
 }
 
 }  // namespace
+}  // namespace samples_readers_test
 }  // namespace ringlock::closure

@@ -13,6 +13,7 @@
 #include "tests/closure/generator/samples.hpp"
 
 namespace ringlock::test::closure {
+namespace samples_resampled_test {
 namespace {
 
 using ringlock::closure::close_samples;
@@ -235,4 +236,5 @@ TEST(LongResampledRecords, LinesAreThoseOfTheSource) {
 }
 
 }  // namespace
+}  // namespace samples_resampled_test
 }  // namespace ringlock::test::closure

@@ -17,6 +17,7 @@
 #include "tests/closure/heldout.hpp"
 
 namespace ringlock::test::closure {
+namespace samples_rounded_test {
 namespace {
 
 using ringlock::closure::close_samples;
@@ -228,4 +229,5 @@ TEST(LongRoundedRecords, EffectsBeneathStepsOfTwentyTimesTheNoiseAreNamed) {
 }
 
 }  // namespace
+}  // namespace samples_rounded_test
 }  // namespace ringlock::test::closure

@@ -19,6 +19,7 @@
 #include "tests/closure/suite/sample_suite.hpp"
 
 namespace ringlock::test::closure {
+namespace samples_suite_test {
 namespace {
 
 Outcome judged(const SampleCase& of) { return judge(of, make(of)); }
@@ -554,4 +555,5 @@ TEST(SampleFilter, ManyBesideOneAnotherAreWhatEachIsAlone) {
 }
 
 }  // namespace
+}  // namespace samples_suite_test
 }  // namespace ringlock::test::closure

@@ -22,7 +22,7 @@
 #include "engine/effects/effect.hpp"
 #include "engine/gyro/theory.hpp"
 #include "engine/scenario/check.hpp"
-#include "engine/scenario/parse.hpp"
+#include "engine/scenario/text/parse.hpp"
 #include "tests/closure/generator/generator.hpp"
 #include "tests/closure/generator/keys.hpp"
 #include "tests/closure/generator/plain_gyro.hpp"

@@ -17,6 +17,7 @@
 #include "tests/closure/generator/generator.hpp"
 
 namespace ringlock::test::closure {
+namespace turns_changes_test {
 namespace {
 
 using namespace ringlock::closure;
@@ -261,4 +262,5 @@ TEST_F(LongHop, IsFoundAndFittedInAllThatItChanges) {
 }
 
 }  // namespace
+}  // namespace turns_changes_test
 }  // namespace ringlock::test::closure

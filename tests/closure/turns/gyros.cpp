@@ -10,6 +10,7 @@
 #include "tests/closure/told.hpp"
 
 namespace ringlock::test::closure {
+namespace turns_gyros_test {
 namespace {
 
 using ringlock::closure::close_loop;
@@ -274,4 +275,5 @@ TEST(LongTurnLoop, LockedGyrosTellTheirThresholdsWithHonestErrors) {
 }
 
 }  // namespace
+}  // namespace turns_gyros_test
 }  // namespace ringlock::test::closure

@@ -21,6 +21,7 @@
 #include "tests/closure/told.hpp"
 
 namespace ringlock::test::closure {
+namespace turns_loop_test {
 namespace {
 
 using ringlock::closure::close_loop;
@@ -499,4 +500,5 @@ TEST(LongTurnLoop, ARateThatJumpsFarAboveTheNoiseIsNoRandomRate) {
 }
 
 }  // namespace
+}  // namespace turns_loop_test
 }  // namespace ringlock::test::closure

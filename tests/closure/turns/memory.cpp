@@ -14,6 +14,7 @@
 #include "engine/scenario/scenario.hpp"
 
 namespace ringlock::test::closure {
+namespace turns_memory_test {
 namespace {
 
 using namespace ringlock::closure;
@@ -166,4 +167,5 @@ TEST(SideBySide, AWaitingThreadBeginsNothingElse) {
 }
 
 }  // namespace
+}  // namespace turns_memory_test
 }  // namespace ringlock::test::closure

@@ -21,6 +21,7 @@
 #include "tests/closure/generator/generator.hpp"
 
 namespace ringlock::test::closure {
+namespace turns_model_test {
 namespace {
 
 using namespace ringlock::closure;
@@ -516,4 +517,5 @@ TEST(NoiseShape, IsNoneOfNormalNoise) {
 }
 
 }  // namespace
+}  // namespace turns_model_test
 }  // namespace ringlock::test::closure

@@ -9,6 +9,7 @@
 #include "tests/closure/suite/suite.hpp"
 
 namespace ringlock::test::closure {
+namespace turns_named_test {
 namespace {
 
 /// Two records, at rest and with a moving input, of an effect at six times its detection limit.
@@ -56,4 +57,5 @@ TEST(LongHopOrStep, AreToldApartWhereTheRecordCouldShowTheDifference) {
 }
 
 }  // namespace
+}  // namespace turns_named_test
 }  // namespace ringlock::test::closure

@@ -21,6 +21,7 @@
 #include "tests/closure/generator/generator.hpp"
 
 namespace ringlock::test::closure {
+namespace turns_suite_test {
 namespace {
 
 constexpr std::size_t turns = 8000;
@@ -566,4 +567,5 @@ TEST(TwoStates, ManyJumpsCostLessThanTheirPlaces) {
 }
 
 }  // namespace
+}  // namespace turns_suite_test
 }  // namespace ringlock::test::closure
