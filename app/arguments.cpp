@@ -14,31 +14,12 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/allan_run/deviations.hpp"
 #include "analysis/study/design_points.hpp"
 #include "engine/core/error.hpp"
 #include "engine/scenario/text/parse.hpp"
 
 namespace ringlock::app {
-namespace {
-
-/// The number at the beginning of a text and the rest of the text; nothing where the text does not begin with a number.
-template <class T>
-std::optional<std::pair<T, std::string_view>> leading_number(std::string_view text) {
-    T value{};
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc()) return std::nullopt;
-    return std::pair{value, text.substr(static_cast<std::size_t>(end - text.data()))};
-}
-
-/// Seconds in a unit of time; 0 if the text names no unit of time.
-double seconds_in(std::string_view unit) {
-    if (unit == "ms") return 1e-3;
-    if (unit == "s") return 1.0;
-    if (unit == "min") return 60.0;
-    return unit == "h" ? 3600.0 : 0.0;
-}
-
-}  // namespace
 
 std::int64_t whole_number(std::string_view option, const std::string& text, std::int64_t largest,
                           std::string_view allowed) {
@@ -78,48 +59,8 @@ scenario::Scenario load_scenario(const std::string& file, const Changes& changes
     return scenario::parse_file(file, settings, study::complaints);
 }
 
-std::vector<std::string> split(const std::string& text) {
-    std::vector<std::string> parts;
-    std::size_t begin = 0;
-    for (;;) {
-        const std::size_t comma = text.find(',', begin);
-        std::string part = text.substr(begin, comma == std::string::npos ? comma : comma - begin);
-        part.erase(0, part.find_first_not_of(' '));
-        part.erase(part.find_last_not_of(' ') + 1);
-        parts.push_back(part);
-        if (comma == std::string::npos) return parts;
-        begin = comma + 1;
-    }
-}
-
-std::string known_deviations() {
-    std::string list;
-    for (const allan::Traits& t : allan::all_estimators) list += fmt::format("{}{}", list.empty() ? "" : ", ", t.name);
-    return list;
-}
-
 std::vector<allan::Estimator> parse_deviations(const std::string& list) {
-    std::vector<allan::Estimator> out;
-    for (const std::string& part : split(list)) {
-        const auto estimator = allan::estimator_named(part);
-        if (!estimator) {
-            throw InputError(fmt::format("--dev '{}' is not known; there are {}", part, known_deviations()));
-        }
-        if (std::find(out.begin(), out.end(), *estimator) == out.end()) out.push_back(*estimator);
-    }
-    return out;
-}
-
-std::optional<AveragingTime> averaging_time(const std::string& text) {
-    if (const auto factor = leading_number<std::int64_t>(text); factor && factor->second.empty()) {
-        if (factor->first < 1) return std::nullopt;
-        return AveragingTime{text, std::nullopt, factor->first};
-    }
-    const auto number = leading_number<double>(text);
-    if (!number) return std::nullopt;
-    const double time_s = number->first * seconds_in(number->second);
-    if (!(time_s > 0.0) || !std::isfinite(time_s)) return std::nullopt;
-    return AveragingTime{text, time_s, 0};
+    return allan_run::deviations_named(allan_run::split(list), "--dev");
 }
 
 std::vector<AveragingTime> parse_averaging_times(std::string_view option, const std::string& list) {
@@ -129,7 +70,7 @@ std::vector<AveragingTime> parse_averaging_times(std::string_view option, const 
     if (list.find_first_not_of(' ') == std::string::npos) {
         throw InputError(fmt::format("{}: the list is empty; say {}", option, allowed));
     }
-    const std::vector<std::string> parts = split(list);
+    const std::vector<std::string> parts = allan_run::split(list);
     constexpr std::size_t most = 100;
     if (parts.size() > most) {
         throw InputError(

@@ -23,7 +23,10 @@ void add_status(CLI::App& root);
 void add_submit(CLI::App& root);
 /// `command_line` as for add_run().
 void add_replay(CLI::App& root, std::span<const char* const> command_line);
-/// Commands with reserved names that are not built yet: their message says so.
-void add_planned(CLI::App& root);
+void add_export(CLI::App& root);
+void add_new(CLI::App& root);
+void add_completion(CLI::App& root);
+void add_man(CLI::App& root);
+void add_report(CLI::App& root);
 
 }  // namespace ringlock::app

@@ -43,22 +43,21 @@ DeviceFigures figures_of(const scenario::NamedDevice& device) {
 
 std::string table_of(const std::vector<scenario::NamedDevice>& devices) {
     std::string text = fmt::format(
-        "{:<16}{:>9}{:>9}{:>11}{:>9}{:>8}{:>8}{:>15}{:>18}\n{:<16}{:>9}{:>9}{:>11}{:>9}{:>8}{:>8}{:>15}{:>18}\n",
+        "{:<15}{:>8}{:>9}{:>10}{:>8}{:>7}{:>7}{:>14}{:>18}\n{:<15}{:>8}{:>9}{:>10}{:>8}{:>7}{:>7}{:>14}{:>18}\n",
         "device", "K", "fringes", "threshold", "dither", "kick", "M", "ARW", "dead band", "", "[arcsec]", "[1/half]",
         "[deg/h]", "[Hz]", "[rad]", "[rad]", "[deg/sqrt(h)]", "(at most) [deg/h]");
     for (const scenario::NamedDevice& device : devices) {
         const DeviceFigures f = figures_of(device);
-        text += fmt::format("{:<16}{:>9.4g}{:>9.0f}{:>11.4g}{:>9.4g}{:>8.3f}{:>8.0f}{:>15.4g}{:>18}\n", device.name,
+        text += fmt::format("{:<15}{:>8.4g}{:>9.0f}{:>10.4g}{:>8.4g}{:>7.3f}{:>7.0f}{:>14.4g}{:>18}\n", device.name,
                             f.scale_factor_arcsec, f.fringes_per_half_cycle, f.lockin_threshold_deg_h,
                             f.dither_frequency_hz, f.kick_rad, f.modulation_depth_rad, f.arw_deg_rt_h,
                             fmt::format("{:.3g} ({:.3g})", f.dead_band_deg_h, f.largest_dead_band_deg_h));
     }
     return text +
-           "\nK: rotation per fringe. Fringes: in a half cycle of the dither. Kick: of the phase by the lock-in, "
-           "at a turn.\nM: amplitude of the dither in optical phase. ARW: with turns fully randomised. "
-           "Dead band: half width around\n"
-           "zero, at this amplitude (and at any). In a scenario, device = \"NAME\" before all sections takes these\n"
-           "constants for defaults; ringlock devices --json gives the source of each constant.\n";
+           "\nK: rotation per fringe. Fringes: in a half cycle of the dither. Kick: of the phase by the lock-in,\n"
+           "at a turn. M: amplitude of the dither in optical phase. ARW: with turns fully randomised. Dead\n"
+           "band: half width around zero, at this amplitude (and at any). In a scenario, device = \"NAME\"\n"
+           "before all sections takes these constants for defaults; --json gives the source of each.\n";
 }
 
 nlohmann::ordered_json json_of(const std::vector<scenario::NamedDevice>& devices) {

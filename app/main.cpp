@@ -12,10 +12,11 @@
 #include "app/command.hpp"
 #include "app/failure.hpp"
 #include "app/output.hpp"
+#include "app/terminal/command_line.hpp"
+#include "app/terminal/versions.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/interrupt.hpp"
 #include "engine/core/printable.hpp"
-#include "engine/core/version.hpp"
 
 namespace {
 
@@ -48,13 +49,22 @@ int main(int argc, char** argv) {
     std::signal(SIGXFSZ, SIG_IGN);
     CLI::App root{
         "ringlock: simulation and analysis of the lock-in of dithered ring laser gyros.\n"
-        "Simulates ensembles of dithered gyros, compares uncompensated, noise-injected and compensated outputs,\n"
-        "computes Allan deviation and angle random walk, and identifies error sources in measured records.",
+        "Simulates ensembles of dithered gyros, compares uncompensated, noise-injected and compensated\n"
+        "outputs, computes Allan deviation and angle random walk, and identifies error sources in measured\n"
+        "records.",
         "ringlock"};
-    root.set_version_flag("--version", fmt::format("ringlock {} ({})", ringlock::version(), ringlock::git_hash()));
+    root.set_version_flag(
+        "--version",
+        [] {
+            std::string text = app::version_text();
+            text.pop_back();  // CLI11 ends the line
+            return text;
+        },
+        "Print the version, how the program was built, and its libraries, and end");
     root.require_subcommand(1);
     root.failure_message([](const CLI::App*, const CLI::Error& error) {
-        return fmt::format("ringlock: error: {}; --help lists the options\n", ringlock::printable(error.what()));
+        return app::coloured(
+            fmt::format("ringlock: error: {}; --help lists the options\n", ringlock::printable(error.what())));
     });
     root.footer("Exit status: 0 done; 1 the run failed; 2 the input or the command line is wrong.");
     app::add_run(root, {argv, static_cast<std::size_t>(argc)});
@@ -69,7 +79,12 @@ int main(int argc, char** argv) {
     app::add_status(root);
     app::add_submit(root);
     app::add_replay(root, {argv, static_cast<std::size_t>(argc)});
-    app::add_planned(root);
+    app::add_export(root);
+    app::add_new(root);
+    app::add_completion(root);
+    app::add_man(root);
+    app::add_report(root);
+    app::finish_help(root);
     try {
         const ringlock::InterruptGuard guard;
         refuse_unknown_command(root, argc, argv);

@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "analysis/report/render.hpp"
@@ -35,7 +37,27 @@ std::string safe(std::string_view message) {
     return without_controls(text);
 }
 
+/// Whether standard error is a terminal that shows colours and whose user wants them (no-color.org).
+bool has_colours() {
+    const char* const refused = std::getenv("NO_COLOR");
+    const char* const terminal = std::getenv("TERM");
+    if (refused != nullptr && *refused != '\0') return false;
+    return isatty(STDERR_FILENO) == 1 && terminal != nullptr && std::string_view(terminal) != "dumb";
+}
+
 }  // namespace
+
+std::string coloured(std::string message) {
+    constexpr std::string_view name = "ringlock: ";
+    constexpr std::string_view red = "\x1b[1;31m";
+    constexpr std::string_view yellow = "\x1b[1;33m";
+    if (!message.starts_with(name) || !has_colours()) return message;
+    for (const auto& [word, colour] : {std::pair{std::string_view("error:"), red}, {"warning:", yellow}}) {
+        if (message.compare(name.size(), word.size(), word) != 0) continue;
+        message.replace(name.size(), word.size(), fmt::format("{}{}\x1b[0m", colour, word));
+    }
+    return message;
+}
 
 void remember_arguments(std::span<const char* const> arguments) {
     for (const std::string_view argument : arguments.subspan(std::min<std::size_t>(1, arguments.size()))) {
@@ -53,7 +75,7 @@ void draw_over(std::string_view text) {
     if (std::fwrite(text.data(), 1, text.size(), stderr) != text.size()) std::clearerr(stderr);
 }
 
-void tell(std::string_view text) { draw_over(safe(text)); }
+void tell(std::string_view text) { draw_over(coloured(safe(text))); }
 
 std::unique_ptr<AtomicPath> claim_figure(const std::filesystem::path& path) {
     if (path.empty()) return nullptr;

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "engine/core/atomic_path.hpp"
@@ -18,6 +19,10 @@ void put(std::string_view text);
 
 /// Writes information for people to standard error, escaped likewise. A failure to write it does not change the run.
 void tell(std::string_view text);
+
+/// A message for standard error whose "error:" or "warning:" at the beginning has a colour, where that is a terminal
+/// and the environment does not refuse colours by NO_COLOR. Everything else in it has been escaped before.
+std::string coloured(std::string message);
 
 /// Writes to standard error a text that controls the terminal: a line that is drawn anew. Foreign text in it has gone
 /// through printable().

@@ -1,5 +1,5 @@
 # Compiler settings that every ringlock target shares.
-if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
 endif()
 set(CMAKE_CXX_STANDARD 20)
@@ -15,6 +15,13 @@ target_include_directories(ringlock_options INTERFACE "${PROJECT_SOURCE_DIR}")
 target_compile_options(ringlock_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -ffp-contract=off
   $<$<BOOL:${RINGLOCK_WERROR}>:-Werror>)
+
+# What the library is made of can be in a shared one only if its code does not depend on its place in memory.
+function(ringlock_part_of_library target)
+  if(BUILD_SHARED_LIBS OR RINGLOCK_PYTHON)
+    set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  endif()
+endfunction()
 
 # Headers from outside the repository that most sources include, for target_precompile_headers: half of a build's time is
 # spent on reading them. Headers of the repository are left out, for a change to one would rebuild the whole target.

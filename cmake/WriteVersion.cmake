@@ -4,5 +4,7 @@ execute_process(COMMAND git -C "${SOURCE_DIR}" describe --always --dirty --abbre
 if(NOT hash)
   set(hash "unknown")
 endif()
+execute_process(COMMAND git -C "${SOURCE_DIR}" log -1 --format=%cs
+                OUTPUT_VARIABLE RINGLOCK_COMMIT_DATE OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 set(RINGLOCK_GIT_HASH "${hash}")
 configure_file("${SOURCE_DIR}/engine/core/version.cpp.in" "${OUTPUT}" @ONLY)

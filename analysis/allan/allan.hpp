@@ -43,11 +43,12 @@ struct Options {
 /// \param factors  averaging factors, each 1...largest_factor(); in any order
 /// \return one point for each factor, in their order; factors for which gaps leave no term are missing
 ///
-/// Definitions: NIST SP1065 sections 5.2.2 to 5.2.18, as named in estimator.hpp; docs/allan.md writes them out. A term
-/// that needs a missing point is left out of the mean; the differences of rates of which a tenth at most is missing are
-/// taken from the means of the others (gapped_rates.hpp). Noise is identified at each factor (noise_identification.hpp;
-/// gaps are bridged by straight lines for that), intervals are those of uncertainty.hpp. Throws InputError where a
-/// factor has no term in a record of that length, tau0 is not positive or the confidence outside (0, 1).
+/// Definitions: NIST SP1065 sections 5.2.2 to 5.2.18, as named in estimator.hpp; docs/dev/allan-deviations.md writes
+/// them out. A term that needs a missing point is left out of the mean; the differences of rates of which a tenth at
+/// most is missing are taken from the means of the others (gapped_rates.hpp). Noise is identified at each factor
+/// (noise_identification.hpp; gaps are bridged by straight lines for that), intervals are those of uncertainty.hpp.
+/// Throws InputError where a factor has no term in a record of that length, tau0 is not positive or the confidence
+/// outside (0, 1).
 std::vector<Point> deviation(Estimator estimator, const Phase& phase, double tau0_s,
                              std::span<const std::int64_t> factors, const Options& options = {});
 

@@ -31,7 +31,8 @@ struct Octave {
     std::int64_t terms = 0;  ///< squares in the sum, >= 1
 };
 
-/// Running Allan sums of up to simd::lanes gyros at every octave of averaging time; docs/allan.md has the method.
+/// Running Allan sums of up to simd::lanes gyros at every octave of averaging time; docs/dev/allan-streams.md has the
+/// method.
 ///
 /// Phase comes as fixed-point counts that may wrap around in two's complement: only differences count. A second
 /// difference x_{i+2m} - 2 x_{i+m} + x_i must fit 64 bits. All sums are exact, so that they do not depend on the pieces

@@ -13,8 +13,8 @@ namespace ringlock::allan {
 ///
 /// The estimator is the overlapping one with a stride of tau/8: S_m = sum over i = 0, s, 2s, ... of the squared
 /// differences at step m, s = max(1, m/8). Memory grows with the logarithm of the record, about 5 KB for every octave.
-/// docs/allan.md gives the cost of the stride: next to nothing for rate noise, a factor of m/8 in degrees of freedom
-/// for white phase noise.
+/// docs/dev/allan-streams.md gives the cost of the stride: next to nothing for rate noise, a factor of m/8 in degrees
+/// of freedom for white phase noise.
 class RunningDeviation {
    public:
     /// \param kind       kind of the samples

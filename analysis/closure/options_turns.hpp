@@ -31,7 +31,7 @@ struct TurnOptions {
         /// have two thirds of their length and more; nearer to the peak rate the phase hardly reverses.
         double most_rotation = 0.5;
         /// Least mean swing of the phase over a half cycle [rad]: somewhat less than the 62.8 rad of ten fringes, the
-        /// fewest that the turn map is made for (docs/turn-map.md).
+        /// fewest that the turn map is made for (docs/dev/turn-map.md).
         double least_swing_rad = 60.0;
 
         /// Oscillations within this of the dither's frequency belong to its amplitude: relative to that frequency [1],

@@ -6,7 +6,7 @@
 
 namespace ringlock::noise {
 
-/// Which terms of a record are claimed, and how well each is known (docs/allan.md, "What is claimed").
+/// Which terms of a record are claimed, and how well each is known (docs/dev/allan-coefficients.md, "Claims").
 class Claims {
    public:
     /// \param likelihood  of the noise of the parts; outlives the claims, as the parts do

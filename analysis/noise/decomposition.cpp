@@ -60,7 +60,7 @@ Decomposition decompose(Spectrum spectrum, double significance) {
         const std::vector<double> variance = coefficient_variances(out.noise, maximum(out, significance));
         const std::vector<double> rest = residual(out.noise, maximum(out, significance));
         std::optional<Line> line = finder.strongest(rest, variance, out.lines);
-        // A line that is there has also raised the variances that it is held against.
+        // A line that is there has also raised the variances with which it is compared.
         if (!line || line->gain < 0.5 * price) break;
         finder.refine(*line, rest, variance);
         Decomposition with = out;

@@ -41,8 +41,8 @@ struct Correlated {
 
 struct Options {
     double significance = 1e-3;           ///< of the likelihood-ratio test that a term must pass, with its search
-    double nuisance_significance = 1e-2;  ///< of the same test: where correlated noise passes, the others are told
-                                          ///< beside it, claimed or not
+    double nuisance_significance = 1e-2;  ///< of the same test: where correlated noise passes, the others are
+                                          ///< estimated together with it, claimed or not
     double misfit_threshold = 2e-3;       ///< p below which each of the goodness-of-fit tests rejects
     std::size_t fewest_samples = 32;      ///< increments below which nothing is fitted
 };
@@ -81,7 +81,7 @@ struct NoiseFit {
 ///
 /// \param angle_arcsec  accumulated angle at uniform instants, length n + 1 for n increments, any offset and slope;
 /// finite \param tau0_s        sampling interval [s], > 0 \return every coefficient with interval or limit; see
-/// docs/allan.md for the method
+/// docs/dev/allan-coefficients.md for the method
 ///
 /// A term is resolved if it belongs to the best subset of all (deviance plus the test's threshold for each term) and if
 /// all the others together cannot take its place (likelihood ratio against the full model without it, half chi-squared

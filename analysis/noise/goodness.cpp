@@ -22,7 +22,7 @@ double kolmogorov_tail(double t) {
     return std::clamp(2.0 * sum, 0.0, 1.0);
 }
 
-/// Upper tail of the squares beside a line: whether what was taken for one is broad.
+/// Upper tail of the squares next to a line: whether the supposed line is broad.
 double broadness(std::span<const double> w, const Line& line) {
     constexpr std::ptrdiff_t beside = 12;
     const auto middle = static_cast<std::ptrdiff_t>(std::llround(line.index));

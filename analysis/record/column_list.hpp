@@ -10,7 +10,7 @@ namespace ringlock::record {
 ///
 /// A name of the file that is the whole list goes before its parts, so that a column called "a,b" is found without
 /// quotes; in a list with others it is quoted, x,"a,b". `request` says which file, and how a text is written; its
-/// column is of no account. Numbers and names are not looked up otherwise. Throws InputError where a name is empty or a
+/// column is ignored. Numbers and names are not looked up otherwise. Throws InputError where a name is empty or a
 /// quote does not close, and as read_series() does where the file cannot be opened.
 std::vector<std::string> columns_of_list(const SeriesRequest& request, const std::string& list);
 

@@ -145,10 +145,8 @@ void add_lines(const std::string& source, const record::Record& record, const Cl
 
 }  // namespace
 
-std::vector<Picture> closure_pictures(const std::string& source, const record::Record& record, const Closure& closure,
-                                      const Predictive& predictive) {
+std::vector<Picture> predictive_pictures(const std::string& source, const Predictive& predictive) {
     std::vector<Picture> all;
-    all.push_back(over_time(source, record, closure));
     const auto logarithmic = [&](const char* name, const char* file, const char* title, const char* y_label) {
         const PredictiveStatistic* statistic = find(predictive, name);
         if (statistic == nullptr) return;
@@ -189,9 +187,10 @@ std::vector<Picture> closure_pictures(const std::string& source, const record::R
         add_band(in_mrad, kind, predictive.simulations, folded.figure);
     }
     if (!folded.figure.curves.empty()) all.push_back(std::move(folded));
+    return all;
+}
 
-    add_lines(source, record, closure, all);
-
+Picture step_picture(const std::string& source, const Closure& closure) {
     Picture steps{.file = "steps.svg",
                   .caption =
                       "Held-out one-step error of the base model and after each effect; the dashed line is the error "
@@ -218,7 +217,15 @@ std::vector<Picture> closure_pictures(const std::string& source, const record::R
                                    .x = {0.0, last},
                                    .y = {closure.noise_floor, closure.noise_floor},
                                    .style = Curve::Style::dashed});
-    all.push_back(std::move(steps));
+    return steps;
+}
+
+std::vector<Picture> closure_pictures(const std::string& source, const record::Record& record, const Closure& closure,
+                                      const Predictive& predictive) {
+    std::vector<Picture> all{over_time(source, record, closure)};
+    for (Picture& picture : predictive_pictures(source, predictive)) all.push_back(std::move(picture));
+    add_lines(source, record, closure, all);
+    all.push_back(step_picture(source, closure));
     return all;
 }
 

@@ -22,4 +22,10 @@ struct Picture {
 std::vector<Picture> closure_pictures(const std::string& source, const record::Record& record,
                                       const closure::Closure& closure, const closure::Predictive& predictive);
 
+/// Those of the predictive check alone.
+std::vector<Picture> predictive_pictures(const std::string& source, const closure::Predictive& predictive);
+
+/// The held-out error step by step alone.
+Picture step_picture(const std::string& source, const closure::Closure& closure);
+
 }  // namespace ringlock::report

@@ -37,13 +37,6 @@ std::string cell(std::string_view text) {
     return out;
 }
 
-std::string value_text(const Estimate& e) {
-    if (!e.text.empty()) return e.text;
-    if (!std::isfinite(e.value)) return "not known";
-    if (!std::isfinite(e.sd)) return fmt::format("{:.6g}", e.value);
-    return fmt::format("{:.6g} ± {:.2g}", e.value, e.sd);
-}
-
 void add_steps(const Closure& closure, std::string& page) {
     page += "## Effects\n\n";
     if (closure.steps.empty()) {
@@ -64,7 +57,7 @@ void add_steps(const Closure& closure, std::string& page) {
         const Step& step = closure.steps[k];
         std::string parameters;
         for (const Estimate& e : step.parameters) {
-            parameters += fmt::format("{}`{}` {}", parameters.empty() ? "" : "; ", e.name, cell(value_text(e)));
+            parameters += fmt::format("{}`{}` {}", parameters.empty() ? "" : "; ", e.name, cell(estimate_text(e)));
         }
         page += fmt::format("| {} | `{}` | {} | {:.6g} | {:.6g} | {:.1f} | {} |\n", k + 1, step.effect->name(),
                             parameters, step.heldout_error_before, step.heldout_error_after,
@@ -130,6 +123,13 @@ void add_predictive(const Predictive& predictive, std::string& page) {
 
 }  // namespace
 
+std::string estimate_text(const Estimate& e) {
+    if (!e.text.empty()) return e.text;
+    if (!std::isfinite(e.value)) return "not known";
+    if (!std::isfinite(e.sd)) return fmt::format("{:.6g}", e.value);
+    return fmt::format("{:.6g} ± {:.2g}", e.value, e.sd);
+}
+
 void write_closure_page(const std::filesystem::path& folder, const std::string& source, const record::Record& record,
                         const Closure& closure, const Predictive& predictive) {
     std::string page =
@@ -144,7 +144,7 @@ void write_closure_page(const std::filesystem::path& folder, const std::string& 
     page +=
         "## The base model\n"
         "\nFitted with all effects above; ± one standard error.\n\n| parameter | value |\n|---|---|\n";
-    for (const Estimate& e : closure.base) page += fmt::format("| `{}` | {} |\n", e.name, cell(value_text(e)));
+    for (const Estimate& e : closure.base) page += fmt::format("| `{}` | {} |\n", e.name, cell(estimate_text(e)));
     page += "\n";
     add_closed(closure::closed_scenario(record, closure), page);
     add_predictive(predictive, page);

@@ -24,7 +24,7 @@ constexpr int width_px = 900;
 constexpr int height_px = 620;
 constexpr int legend_row_px = 24;
 
-// Okabe and Ito, told apart by the colour-blind too; black is kept for theory, yellow is too pale on white.
+// Okabe and Ito, distinguishable for the colour-blind too; black is kept for theory, yellow is too pale on white.
 constexpr std::array<std::string_view, 6> colours = {"#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"};
 constexpr std::array<std::string_view, 3> theory_colours = {"#000000", "#666666", "#999999"};
 struct Marker {

@@ -7,7 +7,8 @@ namespace ringlock::report {
 /// Forms of a picture.
 enum class PictureForm { svg, png, pdf };
 
-/// Whether this build of the program makes PNG and PDF.
+/// Whether PNG and PDF can be drawn: librsvg is known to this build and installed where it runs. The first call loads
+/// it.
 bool renders_pictures();
 
 /// The form that the ending of a file's name stands for: .svg, .png or .pdf, in small letters or capitals. `option`

@@ -44,9 +44,10 @@ std::string Table::text(std::size_t indent) const {
     }
 
     std::string out;
-    const auto add_line = [&](const auto& cell_of) {
+    const auto add_line = [&](std::size_t begin, std::size_t end, const auto& cell_of) {
         std::string line(indent, ' ');
-        for (std::size_t i = 0; i < columns_.size(); ++i) {
+        for (std::size_t i = 0; i < end; ++i) {
+            if (i > 0 && i < begin) continue;
             const std::string& cell = cell_of(i);
             const std::string padding(widths[i] - code_points(cell), ' ');
             if (i > 0) line += "  ";
@@ -55,8 +56,21 @@ std::string Table::text(std::size_t indent) const {
         line.erase(line.find_last_not_of(' ') + 1);
         out += line + '\n';
     };
-    if (headed) add_line([&](std::size_t i) -> const std::string& { return columns_[i].header; });
-    for (const auto& row : rows_) add_line([&](std::size_t i) -> const std::string& { return row[i]; });
+    for (std::size_t begin = 0; begin == 0 || begin < columns_.size();) {
+        // The first column and those from `begin` on that fit the window next to it, but one at least.
+        std::size_t used = indent + (widths.empty() ? 0 : widths[0]);
+        std::size_t end = std::max<std::size_t>(begin, 1);
+        const std::size_t least = end + 1;
+        while (end < columns_.size() && (end < least || used + 2 + widths[end] <= window_columns)) {
+            used += 2 + widths[end++];
+        }
+        if (begin > 0) out += '\n';
+        if (headed) add_line(begin, end, [&](std::size_t i) -> const std::string& { return columns_[i].header; });
+        for (const auto& row : rows_) {
+            add_line(begin, end, [&](std::size_t i) -> const std::string& { return row[i]; });
+        }
+        begin = end;
+    }
     return out;
 }
 

@@ -5,7 +5,7 @@
 
 #include "analysis/noise/fit.hpp"
 
-/// Further views of series: spectral densities, deviations over time windows, differences of three.
+/// Further analyses of series: spectral densities, deviations over time windows, differences of three.
 namespace ringlock::stability {
 
 /// Spectral density of a rate at one frequency.

@@ -79,7 +79,7 @@ design::Factor factor_of(const Variation& v) {
     };
     factor.lower = bound(key.bounds.min);
     factor.upper = bound(key.bounds.max);
-    // A bound that is excluded, or 0 that is allowed besides: the key itself says so when the point is set.
+    // A bound that is excluded, or 0 that is allowed as well: the key itself says so when the point is set.
     if (key.bounds.or_zero && factor.lower > 0.0) factor.lower = 0.0;
     if (key.bounds.min_excluded) factor.lower = std::nextafter(factor.lower, factor.upper);
     return factor;

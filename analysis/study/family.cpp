@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "analysis/allan/allan.hpp"
 #include "analysis/allan/sums/phase.hpp"
@@ -70,6 +71,14 @@ store::Dataset records_of(const store::File& file, const Study& study, std::size
     return angles;
 }
 
+/// \param purpose  ends the sentence "no angle records, from which ..."
+void need_angle_records(const std::filesystem::path& path, const Study& study, std::string_view purpose) {
+    if (study.scenario.output.angle_record) return;
+    throw InputError(
+        fmt::format("{}: holds no angle records, from which {}; run the scenario with output.angle_record = true",
+                    printable(path), purpose));
+}
+
 }  // namespace
 
 std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesystem::path& path,
@@ -78,12 +87,7 @@ std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesyste
                                                             std::span<const std::int64_t> factors) {
     const Study& study = experiment.points[point];
     const std::size_t gyros = study.gyros.size();  // of every point as many
-    if (!study.scenario.output.angle_record) {
-        throw InputError(
-            fmt::format("{}: holds no angle records, from which deviations other than its own are computed; "
-                        "run the scenario with output.angle_record = true",
-                        printable(path)));
-    }
+    need_angle_records(path, study, "deviations other than its own are computed");
     return store::guarded(path, [&](const store::GuardedPath& guarded) {
         const store::File file = store::File::open(guarded);
         std::vector<std::vector<FamilyDeviation>> out;
@@ -100,6 +104,22 @@ std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesyste
             out.push_back(of_arm(angles, rows, study.schedule.sample_interval_s, estimators, factors));
         }
         return out;
+    });
+}
+
+std::vector<double> angle_samples(const std::filesystem::path& path, const Experiment& experiment, std::size_t point,
+                                  std::size_t arm) {
+    const Study& study = experiment.points[point];
+    need_angle_records(path, study, "samples are taken");
+    return store::guarded(path, [&](const store::GuardedPath& guarded) {
+        const store::File file = store::File::open(guarded);
+        const store::Dataset angles = records_of(file, study, experiment.points.size(), arm);
+        const std::size_t gyros = study.gyros.size();
+        if (!store::is_trial()) return angles.read_rows<double>(point * gyros, gyros);
+        for (std::size_t row = 0; row < gyros; ++row) {
+            static_cast<void>(angles.read_rows<double>(point * gyros + row, 1));
+        }
+        return std::vector<double>();
     });
 }
 

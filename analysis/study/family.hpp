@@ -28,4 +28,9 @@ std::vector<std::vector<FamilyDeviation>> family_deviations(const std::filesyste
                                                             std::span<const allan::Estimator> estimators,
                                                             std::span<const std::int64_t> factors = {});
 
+/// Angle samples of all gyros of an arm at a point of a result, [gyro][sample] in arcsec. Throws InputError where the
+/// file has none or is damaged.
+std::vector<double> angle_samples(const std::filesystem::path& path, const Experiment& experiment, std::size_t point,
+                                  std::size_t arm);
+
 }  // namespace ringlock::study

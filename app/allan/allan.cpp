@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/report/render.hpp"
+#include "analysis/allan_run/deviations.hpp"
 #include "analysis/text/words.hpp"
 #include "app/allan/output/hat_output.hpp"
 #include "app/allan/output/outputs.hpp"
@@ -66,9 +66,7 @@ std::vector<AnalysedSeries> analyse_all(const AllanArguments& a, const AllanRequ
 
 void add_output_options(CLI::App& sub, AllanArguments& a) {
     sub.add_option("--plot", a.plot,
-                   report::renders_pictures()
-                       ? "Also draw the figure into this file: .svg, .png or .pdf"
-                       : "Also draw the figure into this file: .svg (this build has no librsvg for .png and .pdf)");
+                   "Also draw the figure into this file: .svg, or .png and .pdf where librsvg is installed");
     sub.add_option("--csv", a.csv, "Also write the deviations of all series into this table");
     sub.add_option("--psd", a.psd, "Also write the power spectral density of the rate: a table (.csv) or a figure")
         ->allow_extra_args(false);
@@ -128,7 +126,8 @@ void add_allan(CLI::App& root) {
                     "Column or dataset, named alike, of the times of the samples: rows left out become gaps; of text "
                     "two columns, as in sec,nsec or date,time");
     add_text_options(*sub, a->text);
-    sub->add_option("--dev", a->dev, "Deviations, comma between: " + known_deviations())->capture_default_str();
+    sub->add_option("--dev", a->dev, "Deviations, comma between: " + allan_run::known_deviations())
+        ->capture_default_str();
     sub->add_option("--tau", a->tau, "octave | decade | all | averaging factors M,M,... | times with a unit 0.5s,10min")
         ->capture_default_str();
     sub->add_option("--confidence", a->confidence, "Level of the intervals of the deviation")->capture_default_str();

@@ -23,7 +23,7 @@ namespace {
                     std::generic_category().message(error)));
 }
 
-/// Standard input becomes a file with what is left of it.
+/// Standard input becomes a file with the rest of it.
 void keep_standard_input() {
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::tmpfile(), &std::fclose);
     if (!file) fail_to_keep(errno);

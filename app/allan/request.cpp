@@ -65,19 +65,19 @@ AllanRequest allan_request(const AllanArguments& a) {
     out.unit_is_of_file = out.unit && a.unit != "counts" && a.scale.empty();
     if (!a.arw_unit.empty()) {
         if (!out.unit) throw InputError(fmt::format("--arw-unit {}: needs --unit, the unit of the data", a.arw_unit));
-        out.walk_unit = &walk_unit(a.arw_unit, out.unit->instrument);
+        out.walk_unit = &allan_run::walk_unit(a.arw_unit, out.unit->instrument, "--arw-unit");
     }
     out.sampling = sampling_of(a.rate, a.tau0);
     if (!(a.confidence > 0.0 && a.confidence < 1.0)) {
         throw InputError(fmt::format("--confidence {}: must lie between 0 and 1, such as 0.6827", a.confidence));
     }
     out.options = {.confidence = a.confidence, .bias = parse_bias(a.bias)};
-    out.taus = parse_tau(a.tau);
+    out.taus = allan_run::parse_tau(a.tau, "--tau");
     out.series.follow_links = a.follow_links;
     if (!a.time.empty()) out.series.time = a.time;
     out.series.time_unit = time_unit_of(a.text, out.series.time.has_value());
     out.series.text = text_options(a.text);
-    out.wrap = parse_wrap(a.wrap);
+    out.wrap = allan_run::parse_wrap(a.wrap, "--wrap");
     out.clean = a.clean;
     if (out.clean && !out.unit) {
         throw InputError("--clean: needs --unit, the unit of the data: faults are searched for with the coefficients");

@@ -1,18 +1,13 @@
 #pragma once
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "analysis/allan/allan.hpp"
-#include "analysis/allan/sums/phase.hpp"
-#include "analysis/quantity/unit.hpp"
+#include "analysis/allan_run/run.hpp"
 #include "analysis/record/series/series.hpp"
-#include "app/allan/output/coefficient_table.hpp"
 #include "app/allan/sampling.hpp"
-#include "app/allan/taus.hpp"
 #include "app/text_arguments.hpp"
-#include "app/wrap_argument.hpp"
 
 namespace ringlock::app {
 
@@ -50,22 +45,11 @@ struct AllanArguments {
 };
 
 /// The same, checked, as far as it can be before a file is read.
-struct AllanRequest {
-    allan::Kind kind = allan::Kind::phase;
-    std::string kind_name;
-    std::optional<quantity::Unit> unit;
+struct AllanRequest : allan_run::Request {
     bool unit_is_of_file = false;  ///< --unit names the unit of the numbers as they stand in the file
-    const WalkUnit* walk_unit = nullptr;
-    std::vector<allan::Estimator> estimators;
-    TauChoice taus;
-    allan::Options options;  ///< confidence and bias
     Sampling sampling;
-    WrapChoice wrap;
-    bool clean = false;  ///< deviations, too, are of the data without outliers, jumps, wraps and disturbed stretches
     bool stream = false;
     record::SeriesRequest series;  ///< but for path, column and rate
-
-    double scale() const { return unit ? unit->factor : 1.0; }
 };
 
 /// Throws InputError.

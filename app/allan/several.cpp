@@ -86,7 +86,7 @@ std::string series_text(const std::vector<AllanOutput>& series, bool explain, co
 std::string series_json(const std::vector<AllanOutput>& series, bool explain, const std::optional<HatOutput>& hat) {
     std::vector<nlohmann::ordered_json> objects;
     for (const AllanOutput& s : series) {
-        objects.push_back(allan_object(s));
+        objects.push_back(allan_run::allan_object(s));
         if (explain) objects.back()["explanation"] = explanation(s);
     }
     if (series.size() == 1) return json_text(objects.front()) + "\n";

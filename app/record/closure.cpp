@@ -21,6 +21,7 @@
 #include "analysis/closure/report/closed_scenario.hpp"
 #include "analysis/closure/report/folder.hpp"
 #include "analysis/closure/report/report.hpp"
+#include "analysis/instrument/declare.hpp"
 #include "analysis/record/record.hpp"
 #include "analysis/report/chain_page.hpp"
 #include "analysis/report/closure_page.hpp"
@@ -39,17 +40,6 @@
 namespace ringlock::app {
 
 namespace {
-
-/// The scenario supplies the values that the record does not declare.
-void declare(record::Declared& declared, const scenario::Scenario& model) {
-    const auto fill = [](std::optional<double>& to, double value) {
-        if (!to) to = value;
-    };
-    fill(declared.scale_factor_arcsec, model.gyro.scale_factor_arcsec);
-    fill(declared.lockin_threshold_deg_h, model.gyro.lockin_threshold_deg_h);
-    fill(declared.dither_frequency_hz, model.dither.frequency_hz);
-    fill(declared.dither_peak_rate_deg_s, model.dither.peak_rate_deg_s);
-}
 
 struct ClosureArguments {
     std::vector<std::string> records;
@@ -118,7 +108,7 @@ record::Record record_of(const std::string& path, const ClosureArguments& argume
     record::Record record =
         record::read_record(path, arguments.follow_links ? store::Links::follow : store::Links::refuse);
     tell_warnings(path, record);
-    if (!arguments.model.empty()) declare(record.declared, scenario::parse_file(arguments.model));
+    if (!arguments.model.empty()) instrument::declare(record.declared, scenario::parse_file(arguments.model));
     return record;
 }
 

@@ -12,6 +12,7 @@
 
 #include "analysis/parts/folder.hpp"
 #include "analysis/parts/shard.hpp"
+#include "analysis/study/experiment_json.hpp"
 #include "analysis/study/result/result_file.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
@@ -88,7 +89,8 @@ void merge(const MergeArguments& arguments, std::span<const char* const> command
     check_interrupt();
     std::vector<study::Summary> summaries;
     name_file_of_values(arguments.out, [&] { summaries = study::summarise(plan); });
-    put(arguments.json ? experiment_json(plan, summaries, provenance) : experiment_text(plan, summaries, provenance));
+    put(arguments.json ? study::experiment_json(plan, summaries, provenance)
+                       : experiment_text(plan, summaries, provenance));
     if (plan.scenario.output.angle_record) {
         shards.finished().each_samples([&](const study::SampledAngles& samples) {
             check_interrupt();

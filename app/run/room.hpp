@@ -12,7 +12,7 @@ struct Needs {
     std::uint64_t memory_bytes = 0;
     std::function<std::uint64_t()> disk_bytes;  ///< size of the output; called if the memory suffices
     std::string less_memory;                    ///< advice where the memory does not suffice, as in "take fewer gyros"
-    std::string less_disk;  ///< advice where the disk does not suffice, besides writing the output elsewhere
+    std::string less_disk;  ///< advice where the disk does not suffice, other than writing the output elsewhere
 };
 
 /// Throws InputError if the command needs more than the free memory or the free space on the disk of the output.

@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "analysis/study/experiment_json.hpp"
 #include "app/arguments.hpp"
 #include "app/command.hpp"
 #include "app/failure.hpp"
@@ -57,7 +58,7 @@ void run(const RunArguments& arguments, std::span<const char* const> command_lin
             return run_member(arguments, scenario, output_of(arguments), *ranks.member, threads_of(arguments, ranks));
         }
         const auto print = [&](const auto& experiment, const auto& summaries, const auto& provenance) {
-            put(arguments.json ? experiment_json(experiment, summaries, provenance)
+            put(arguments.json ? study::experiment_json(experiment, summaries, provenance)
                                : experiment_text(experiment, summaries, provenance));
         };
         run_one(arguments, scenario, output_of(arguments), command_line, print, ranks);

@@ -15,6 +15,7 @@
 #include "analysis/parts/folder.hpp"
 #include "analysis/parts/part_files.hpp"
 #include "analysis/parts/shard.hpp"
+#include "analysis/record/record.hpp"
 #include "app/command.hpp"
 #include "app/failure.hpp"
 #include "app/output.hpp"
@@ -74,6 +75,11 @@ std::optional<StatusLine> line_of(const fs::path& output, const std::string& nam
             finished.add_file(output);
             line.gyros = finished.gyros();
             line.of_gyros = line.gyros;
+        } else if (!record::is_hdf5(output) || record::hdf5_format(output) != "ringlock-result") {
+            throw InputError(
+                fmt::format("{}: the file is neither a result nor a shard of ringlock run, so that there is no run to "
+                            "report; give the name that ringlock run has with -o",
+                            printable(output)));
         }
     } else if (fs::is_directory(folder, unknown)) {
         line.state = "interrupted";

@@ -13,7 +13,9 @@
 #include <vector>
 
 #include "analysis/allan/estimator.hpp"
+#include "analysis/allan_run/deviations.hpp"
 #include "analysis/report/plot.hpp"
+#include "analysis/study/experiment_json.hpp"
 #include "analysis/study/family.hpp"
 #include "analysis/study/result/result_file.hpp"
 #include "app/arguments.hpp"
@@ -162,7 +164,7 @@ void analyze(const AnalyzeArguments& arguments) {
         const store::Provenance provenance = study::read_provenance(arguments.file);
         const Analysis analysis = evaluate(arguments, experiment);
         if (figure) report::write_figure(*figure, experiment_figure(experiment, analysis.summaries));
-        text = arguments.json ? experiment_json(experiment, analysis.summaries, provenance)
+        text = arguments.json ? study::experiment_json(experiment, analysis.summaries, provenance)
                               : text_of(experiment, analysis, provenance);
     });
     put(text);
@@ -175,8 +177,9 @@ void add_analyze(CLI::App& root) {
         root.add_subcommand("analyze", "Compare the arms of a result: Allan deviation, noise, rate error");
     auto arguments = std::make_shared<AnalyzeArguments>();
     command->add_option("OUT.h5", arguments->file, "result of ringlock run")->required();
-    command->add_option("--dev", arguments->dev,
-                        "also these deviations of the angle records, separated by commas: " + known_deviations());
+    command->add_option(
+        "--dev", arguments->dev,
+        "also these deviations of the angle records, separated by commas: " + allan_run::known_deviations());
     command->add_option("--tau", arguments->tau,
                         "also the Allan deviation of the angle records at these averaging times, separated "
                         "by commas: times with a unit (100s, 2min, 1h) or averaging factors M of stored samples");

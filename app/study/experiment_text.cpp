@@ -5,8 +5,10 @@
 #include <cstddef>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "analysis/report/passage.hpp"
 #include "analysis/report/table.hpp"
 #include "analysis/study/reader_facts.hpp"
 #include "analysis/study/sensitivity.hpp"
@@ -18,11 +20,10 @@ namespace ringlock::app {
 
 namespace {
 
-/// Widest line of a table.
+/// Widest line of a text.
 constexpr std::size_t most_columns = 100;
 
-/// Rows of a long design that are shown; all are in the file and in --json.
-constexpr std::size_t most_rows = 40;
+using report::Passage;
 
 /// Lines broken between words where they are wider than a table.
 std::string wrapped(const std::string& text) {
@@ -85,7 +86,15 @@ std::string yield_cell(const study::ArmSummary& arm) {
 
 std::string rate_cell(const study::ArmSummary& arm) { return rate_text(arm.rate_error_deg_h.mean); }
 
-std::size_t width(const std::string& table) { return table.find('\n'); }
+std::size_t width(const report::Table& table) { return table.text().find('\n'); }
+
+/// Several tables below one heading, without empty lines between them.
+void add_tables(const std::string& heading, const std::vector<report::Table>& tables, std::vector<Passage>& out) {
+    if (tables.empty()) return;
+    Passage passage{.heading = heading, .table = tables.front()};
+    for (std::size_t i = 1; i < tables.size(); ++i) passage.notes += tables[i].text();
+    out.push_back(std::move(passage));
+}
 
 /// A column of a table of points.
 struct PointColumn {
@@ -94,10 +103,10 @@ struct PointColumn {
 };
 
 /// One row for each point. Every table begins with the columns `leading`; the other columns are divided among several
-/// tables, one below the other, where the page is too narrow for one.
-std::string points_table(std::size_t points, const std::vector<PointColumn>& leading,
-                         const std::vector<PointColumn>& columns) {
-    const std::size_t step = (points + most_rows - 1) / most_rows;
+/// tables, one below the other, where the layout is too narrow for one.
+std::vector<report::Table> points_tables(std::size_t points, const std::vector<PointColumn>& leading,
+                                         const std::vector<PointColumn>& columns, const DesignLayout& layout) {
+    const std::size_t step = (points + layout.most_rows - 1) / layout.most_rows;
     const auto table_of = [&](std::size_t first, std::size_t last) {
         std::vector<PointColumn> shown = leading;
         shown.insert(shown.end(), columns.begin() + static_cast<std::ptrdiff_t>(first),
@@ -110,41 +119,46 @@ std::string points_table(std::size_t points, const std::vector<PointColumn>& lea
             for (const PointColumn& column : shown) row.push_back(column.cell(p));
             table.add_row(row);
         }
-        return table.text();
+        return table;
     };
-    std::string text;
+    std::vector<report::Table> tables;
     for (std::size_t first = 0; first < columns.size();) {
         std::size_t last = columns.size();
-        while (last > first + 1 && width(table_of(first, last)) > most_columns) --last;
-        text += table_of(first, last);
+        while (last > first + 1 && width(table_of(first, last)) > layout.most_columns) --last;
+        tables.push_back(table_of(first, last));
         first = last;
     }
-    return text;
+    return tables;
 }
 
 /// Most keys that are printed next to the figures; more keys have tables of their own.
 constexpr std::size_t most_keys_beside = 4;
 
-std::vector<PointColumn> key_columns(const study::Experiment& experiment) {
+std::vector<PointColumn> key_columns(const study::Experiment& experiment, const DesignLayout& layout) {
     std::vector<PointColumn> columns;
     for (std::size_t k = 0; k < experiment.axes.size(); ++k) {
-        columns.push_back({fmt::format("[{}]", k + 1), [&values = experiment.axes[k].values](std::size_t p) {
-                               return fmt::format("{:.5g}", values[p]);
-                           }});
+        const study::Axis& axis = experiment.axes[k];
+        const std::string name =
+            layout.names ? fmt::format("{} [{}]", axis.key, axis.unit) : fmt::format("[{}]", k + 1);
+        columns.push_back(
+            {name, [&values = experiment.axes[k].values](std::size_t p) { return fmt::format("{:.5g}", values[p]); }});
     }
     return columns;
 }
 
 /// One figure of all arms, points down.
 template <class Cell>
-std::string figure_table(const study::Experiment& experiment, const std::vector<study::Summary>& summaries,
-                         Cell&& cell) {
+std::vector<report::Table> figure_tables(const study::Experiment& experiment,
+                                         const std::vector<study::Summary>& summaries, const DesignLayout& layout,
+                                         Cell&& cell) {
     const bool beside = experiment.axes.size() <= most_keys_beside;
     std::vector<PointColumn> arms;
     for (std::size_t a = 0; a < summaries.front().arms.size(); ++a) {
-        arms.push_back({fmt::format("({})", a + 1), [&, a](std::size_t p) { return cell(summaries[p].arms[a]); }});
+        const std::string name = layout.names ? summaries.front().arms[a].name : fmt::format("({})", a + 1);
+        arms.push_back({name, [&, a](std::size_t p) { return cell(summaries[p].arms[a]); }});
     }
-    return points_table(summaries.size(), beside ? key_columns(experiment) : std::vector<PointColumn>{}, arms);
+    return points_tables(summaries.size(), beside ? key_columns(experiment, layout) : std::vector<PointColumn>{}, arms,
+                         layout);
 }
 
 std::string index_cell(const design::Index& index) {
@@ -152,17 +166,16 @@ std::string index_cell(const design::Index& index) {
 }
 
 /// The keys that decide, arm by arm and figure by figure.
-std::string sensitivity_text(const study::Experiment& experiment) {
-    std::string text;
+void add_sensitivity(const study::Experiment& experiment, std::vector<Passage>& out) {
     for (const study::ArmSensitivity& arm : study::sensitivity(experiment)) {
         for (const study::SensitiveFigure& figure : arm.figures) {
             const design::OutputIndices& found = figure.indices;
-            text += fmt::format("\n{}, {}: Sobol' indices, 95 %", arm.arm, figure.name);
-            text += "\n";
+            Passage& passage = out.emplace_back();
+            passage.heading = fmt::format("{}, {}: Sobol' indices, 95 %", arm.arm, figure.name);
             if (found.noise_share)
-                text += fmt::format("estimation noise is {:.2g} of the variance\n", *found.noise_share);
+                passage.before = fmt::format("estimation noise is {:.2g} of the variance\n", *found.noise_share);
             if (!found.absent.empty()) {
-                text += "none: " + found.absent + "\n";
+                passage.before += "none: " + found.absent + "\n";
                 continue;
             }
             report::Table table({{"key", report::Align::left},
@@ -172,33 +185,20 @@ std::string sensitivity_text(const study::Experiment& experiment) {
                 table.add_row(
                     {experiment.axes[k].key, index_cell(found.factors[k].first), index_cell(found.factors[k].total)});
             }
-            text += table.text();
+            passage.table = std::move(table);
         }
     }
-    return text;
 }
 
-std::string design_text(const study::Experiment& experiment, const std::vector<study::Summary>& summaries) {
+/// The numbers that stand for keys and arms in the tables.
+std::string legend_text(const study::Experiment& experiment, const std::vector<study::Summary>& summaries) {
     std::string text;
     for (std::size_t k = 0; k < experiment.axes.size(); ++k) {
         text += fmt::format("[{}] {} [{}]\n", k + 1, experiment.axes[k].key, experiment.axes[k].unit);
     }
     const auto& arms = summaries.front().arms;
     for (std::size_t a = 0; a < arms.size(); ++a) text += fmt::format("({}) {}\n", a + 1, arms[a].name);
-    if (summaries.size() > most_rows) text += "Only some of the points are shown; all are in the file and in --json.\n";
-    if (experiment.axes.size() > most_keys_beside) {
-        text += "\nKeys\n" + points_table(summaries.size(), {}, key_columns(experiment));
-    }
-    text += "\nAngle random walk, median of the gyros [deg/sqrt(h)]\n";
-    text +=
-        figure_table(experiment, summaries, [](const study::ArmSummary& arm) { return walk_cell(arm.arw_deg_rt_h); });
-    text += "\nMean rate less the input rate [deg/h]\n";
-    text += figure_table(experiment, summaries, rate_cell);
-    if (arms.front().yield) {
-        text += "\nGyros that meet the specification [%]\n";
-        text += figure_table(experiment, summaries, yield_cell);
-    }
-    return text + sensitivity_text(experiment);
+    return text;
 }
 
 report::Figure design_figure(const study::Experiment& experiment, const std::vector<study::Summary>& summaries) {
@@ -227,6 +227,29 @@ report::Figure design_figure(const study::Experiment& experiment, const std::vec
 
 }  // namespace
 
+std::vector<report::Passage> design_passages(const study::Experiment& experiment,
+                                             const std::vector<study::Summary>& summaries, const DesignLayout& layout) {
+    std::vector<Passage> all;
+    const auto& arms = summaries.front().arms;
+    Passage first{.notes = layout.names ? "" : legend_text(experiment, summaries)};
+    if (summaries.size() > layout.most_rows) {
+        first.notes += "Only some of the points are shown; all are in the file and in --json.\n";
+    }
+    if (!first.notes.empty()) all.push_back(std::move(first));
+    if (experiment.axes.size() > most_keys_beside) {
+        add_tables("Keys", points_tables(summaries.size(), {}, key_columns(experiment, layout), layout), all);
+    }
+    const auto add = [&](const char* heading, auto&& cell) {
+        add_tables(heading, figure_tables(experiment, summaries, layout, cell), all);
+    };
+    add("Angle random walk, median of the gyros [deg/sqrt(h)]",
+        [](const study::ArmSummary& arm) { return walk_cell(arm.arw_deg_rt_h); });
+    add("Mean rate less the input rate [deg/h]", rate_cell);
+    if (arms.front().yield) add("Gyros that meet the specification [%]", yield_cell);
+    add_sensitivity(experiment, all);
+    return all;
+}
+
 std::string experiment_text(const study::Experiment& experiment, const std::vector<study::Summary>& summaries,
                             const store::Provenance& provenance) {
     std::string growth;
@@ -236,7 +259,7 @@ std::string experiment_text(const study::Experiment& experiment, const std::vect
                  "\n\n";
     }
     return heading(experiment, provenance) + growth +
-           (experiment.has_design() ? design_text(experiment, summaries)
+           (experiment.has_design() ? report::text_of(design_passages(experiment, summaries, DesignLayout{}))
                                     : study_text(experiment.points.front(), summaries.front()));
 }
 

@@ -1,8 +1,10 @@
 #pragma once
+#include <cstddef>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "analysis/report/passage.hpp"
 #include "analysis/report/plot.hpp"
 #include "analysis/study/experiment.hpp"
 #include "analysis/study/summary.hpp"
@@ -10,11 +12,6 @@
 #include "engine/store/provenance.hpp"
 
 namespace ringlock::app {
-
-/// The output of `run` and `analyze` with --json: one object and a newline; figures that the data do not resolve are
-/// null.
-std::string experiment_json(const study::Experiment& experiment, const std::vector<study::Summary>& summaries,
-                            const store::Provenance& provenance);
 
 /// The arm comparison with theory next to it, for people; for a design, its points one below the other.
 std::string experiment_text(const study::Experiment& experiment, const std::vector<study::Summary>& summaries,
@@ -35,6 +32,20 @@ std::string family_text(const study::Summary& summary);
 
 /// A rate [deg/h] in the one notation of a column; a value that rounds to zero has no sign.
 std::string rate_text(double rate_deg_h);
+
+/// How the points of a design are shown.
+struct DesignLayout {
+    std::size_t most_columns = 100;  ///< of a table as text; wider ones are divided
+    std::size_t most_rows = 40;      ///< of a table; of a longer design some points are left out
+    bool names = false;              ///< keys and arms by their names, and not by numbers
+};
+
+/// The tables of a design: random walks, rate errors and yields of all points, and the keys that decide.
+std::vector<report::Passage> design_passages(const study::Experiment& experiment,
+                                             const std::vector<study::Summary>& summaries, const DesignLayout& layout);
+
+/// The tables of one study with their notes.
+std::vector<report::Passage> study_passages(const study::Study& study, const study::Summary& summary);
 
 /// The text of one study, below its heading.
 std::string study_text(const study::Study& study, const study::Summary& summary);

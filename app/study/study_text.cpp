@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
 
+#include "analysis/report/passage.hpp"
 #include "analysis/report/table.hpp"
 #include "app/study/study_output.hpp"
 #include "engine/core/printable.hpp"
@@ -33,8 +37,10 @@ std::string narrow_interval(std::optional<double> lo, std::optional<double> hi) 
     return lo && hi ? fmt::format("{:.3g}..{:.3g}", *lo, *hi) : "-";
 }
 
+using report::Passage;
+
 /// Random walks, and below them biases: both fit 100 columns.
-std::string arm_tables(const study::Summary& summary) {
+void add_arm_tables(const study::Summary& summary, std::vector<Passage>& out) {
     report::Table walks({{"arm", report::Align::left},
                          {"ARW", report::Align::right},
                          {"95 % of median", report::Align::right},
@@ -55,13 +61,13 @@ std::string arm_tables(const study::Summary& summary) {
                        fmt::format("{} .. {}", rate_text(arm.rate_error_deg_h.lo), rate_text(arm.rate_error_deg_h.hi)),
                        floor ? fmt::format("{:.3g}", *floor->median) : "none"});
     }
-    return "Angle random walk [deg/sqrt(h)], and over that of theory\n" + walks.text() +
-           "\nMean rate less the input rate, and bias instability [deg/h]\n" + rates.text();
+    out.push_back({.heading = "Angle random walk [deg/sqrt(h)], and over that of theory", .table = walks});
+    out.push_back({.heading = "Mean rate less the input rate, and bias instability [deg/h]", .table = rates});
 }
 
 /// Scatter of averages from gyro to gyro, and of turn-ons.
-std::string scatter_text(const study::Summary& summary) {
-    if (summary.arms.front().scatter.empty()) return "";
+void add_scatter(const study::Summary& summary, std::vector<Passage>& out) {
+    if (summary.arms.front().scatter.empty()) return;
     std::vector<report::Column> columns{{"arm", report::Align::left}};
     for (const study::AverageScatter& average : summary.arms.front().scatter) {
         columns.push_back({fmt::format("{:.4g} s", average.after_s), report::Align::right});
@@ -77,7 +83,7 @@ std::string scatter_text(const study::Summary& summary) {
         if (turn_ons) row.push_back(fmt::format("{:.3g}", arm.turn_on_repeatability->sd_deg_h));
         table.add_row(row);
     }
-    return "\nScatter over the gyros of rates averaged from the start on [deg/h]\n" + table.text();
+    out.push_back({.heading = "Scatter over the gyros of rates averaged from the start on [deg/h]", .table = table});
 }
 
 /// The terms of the theory, and why arms have no random walk.
@@ -101,8 +107,8 @@ std::string percent_cell(const lot::Share& share) {
 }
 
 /// Gyros that pass the specification, limit by limit.
-std::string yield_text(const study::Summary& summary) {
-    if (!summary.arms.front().yield) return "";
+void add_yields(const study::Summary& summary, std::vector<Passage>& out) {
+    if (!summary.arms.front().yield) return;
     report::Table table(
         {{"arm", report::Align::left}, {"limit", report::Align::left}, {"pass [%], 95 %", report::Align::right}});
     for (const study::ArmSummary& arm : summary.arms) {
@@ -112,7 +118,7 @@ std::string yield_text(const study::Summary& summary) {
             table.add_row({"", fmt::format("{} {:g}{}", limit.name, limit.most, most), percent_cell(limit.share)});
         }
     }
-    return "\nSpecification\n" + table.text();
+    out.push_back({.heading = "Specification", .table = table});
 }
 
 void add_deviation(report::Table& table, const std::string& arm, const study::EnsemblePoint& p) {
@@ -127,9 +133,8 @@ report::Table deviation_table() {
 }
 
 /// Deviations at the averaging times that the scenario requests, one row an arm.
-std::string scenario_times_text(const study::Study& study, const study::Summary& summary) {
-    if (study.scenario.output.tau_s.empty()) return "";
-    std::string text = "\nAllan deviation [deg/h], 68.27 % intervals\n";
+void add_scenario_times(const study::Study& study, const study::Summary& summary, std::vector<Passage>& out) {
+    if (study.scenario.output.tau_s.empty()) return;
     std::vector<std::int64_t> asked;
     for (const double tau_s : study.scenario.output.tau_s) asked.push_back(ensemble::outputs_in(study.schedule, tau_s));
     std::sort(asked.begin(), asked.end());
@@ -141,7 +146,7 @@ std::string scenario_times_text(const study::Study& study, const study::Summary&
             add_deviation(table, arm.name, arm.allan[i]);
         }
     }
-    return text + table.text();
+    out.push_back({.heading = "Allan deviation [deg/h], 68.27 % intervals", .table = table});
 }
 
 std::string signed_cell(const study::SignedFigure& figure) {
@@ -155,8 +160,8 @@ std::string size_cell(const study::SizeFigure& figure) {
 }
 
 /// The straight line through the rates of a sweep, arm by arm.
-std::string scale_factor_text(const study::Study& study, const study::Summary& summary) {
-    if (!summary.arms.front().scale_factor) return "";
+void add_scale_factor(const study::Study& study, const study::Summary& summary, std::vector<Passage>& out) {
+    if (!summary.arms.front().scale_factor) return;
     report::Table slopes({{"arm", report::Align::left},
                           {"scale factor error [ppm]", report::Align::right},
                           {"repeatability [ppm]", report::Align::right},
@@ -182,11 +187,12 @@ std::string scale_factor_text(const study::Study& study, const study::Summary& s
                          line.gyro_deviation_hi_deg_h),
              fmt::format("{:.3g}", line.scatter_deg_h)});
     }
-    return fmt::format(
-        "\nStraight lines through the rates, {} gyros at each, full scale {:.4g} deg/h; in brackets 95 % intervals,\n"
-        "of one gyro's largest deviation 68 % of the gyros (docs/scale-factor.md)\n{}\n{}",
-        study.scenario.ensemble.gyros, summary.arms.front().scale_factor->full_scale_deg_h, slopes.text(),
-        deviations.text());
+    out.push_back({.heading = fmt::format(
+                       "Straight lines through the rates, {} gyros at each, full scale {:.4g} deg/h; in brackets 95 % "
+                       "intervals,\nof one gyro's largest deviation 68 % of the gyros (docs/scale-factor.md)",
+                       study.scenario.ensemble.gyros, summary.arms.front().scale_factor->full_scale_deg_h),
+                   .table = slopes});
+    out.push_back({.table = deviations});
 }
 
 std::string optional_cell(const std::optional<double>& value, const char* absent = "-") {
@@ -194,8 +200,8 @@ std::string optional_cell(const std::optional<double>& value, const char* absent
 }
 
 /// Effect of the injected noise, predicted and measured.
-std::string noise_text(const study::ArmSummary& arm) {
-    if (!arm.noise_effectiveness) return "";
+void add_noise(const study::ArmSummary& arm, std::vector<Passage>& out) {
+    if (!arm.noise_effectiveness) return;
     const dither::NoiseEffectiveness& predicted = arm.noise_effectiveness->predicted;
     const auto& seen = arm.noise_effectiveness->measured;
     const bool steady = seen.bias_deg_h.has_value();
@@ -222,11 +228,11 @@ std::string noise_text(const study::ArmSummary& arm) {
     std::string notes = predicted.reason.empty() ? "" : fmt::format("({})\n", printable(predicted.reason));
     const std::string& why = arm.noise_effectiveness->not_randomised;
     if (!why.empty()) notes += fmt::format("warning: the injected noise does not randomise the turns: {}\n", why);
-    return "\n" + table.text() + notes;
+    out.push_back({.table = table, .notes = notes});
 }
 
 /// Random walk of noise_injected over that of each other arm with injected noise: the reduction by the compensators.
-std::string reduction_text(const study::Summary& summary) {
+void add_reduction(const study::Summary& summary, std::vector<Passage>& out) {
     report::Table table({{"random walk of noise_injected over that of", report::Align::left},
                          {"ratio", report::Align::right},
                          {"95 %", report::Align::right}});
@@ -240,16 +246,16 @@ std::string reduction_text(const study::Summary& summary) {
                        known ? fmt::format("{:.4g}", *reduction->ratio) : fmt::format("> {:.2g}", reduction->lo),
                        known ? fmt::format("{:.4g} .. {:.4g}", reduction->lo, *reduction->hi) : "-"});
     }
-    return any ? "\n" + table.text() : "";
+    if (any) out.push_back({.table = table});
 }
 
 /// Random walks gyro by gyro, every arm over every other.
-std::string pairs_text(const study::Summary& summary) {
+void add_pairs(const study::Summary& summary, std::vector<Passage>& out) {
     std::vector<std::string> names;
     for (const study::ArmSummary& arm : summary.arms) {
         if (arm.arw_deg_rt_h.median) names.push_back(arm.name);
     }
-    if (names.size() < 3) return "";  // one ratio follows from the medians
+    if (names.size() < 3) return;  // one ratio follows from the medians
     std::vector<report::Column> columns{{"random walk, gyro by gyro: row over column", report::Align::left}};
     for (std::size_t i = 0; i < names.size(); ++i)
         columns.push_back({fmt::format("({})", i + 1), report::Align::right});
@@ -272,12 +278,12 @@ std::string pairs_text(const study::Summary& summary) {
         }
         table.add_row(row);
     }
-    return "\n" + table.text() + (alike ? "= : no significant difference (95 %)\n" : "");
+    out.push_back({.table = table, .notes = alike ? "= : no significant difference (95 %)\n" : ""});
 }
 
 /// Where the arm stands on the staircase.
-std::string steps_text(const study::ArmSummary& arm) {
-    if (arm.steps.empty()) return "";
+void add_steps(const study::ArmSummary& arm, std::vector<Passage>& out) {
+    if (arm.steps.empty()) return;
     report::Table table({{"step n", report::Align::right},
                          {"output deg/h", report::Align::right},
                          {"from input deg/h", report::Align::right},
@@ -286,12 +292,11 @@ std::string steps_text(const study::ArmSummary& arm) {
         table.add_row({fmt::format("{}", step.order), rate_text(step.output_rate_deg_h),
                        fmt::format("{:.3f}", step.first_deg_h), fmt::format("{:.3f}", step.last_deg_h)});
     }
-    return fmt::format("\n{}: all gyros locked to n fringes a dither cycle (closed form)\n{}\n", arm.name,
-                       table.text());
+    out.push_back({.heading = fmt::format("{}: all gyros locked to n fringes a dither cycle (closed form)", arm.name),
+                   .table = table});
 }
 
-std::string sweep_text(const study::Study& study, const study::Summary& summary) {
-    std::string text;
+void add_sweep(const study::Study& study, const study::Summary& summary, std::vector<Passage>& out) {
     const auto& points = summary.arms.front().sweep;
     // Every rate of a short sweep, some of a long one; all are in the file and in --json.
     constexpr std::size_t most_rows = 21;
@@ -312,7 +317,8 @@ std::string sweep_text(const study::Study& study, const study::Summary& summary)
         }
         table.add_row(row);
     }
-    text += "Mean output rate [deg/h]\n" + table.text() + "\n";
+    out.push_back({.heading = "Mean output rate [deg/h]", .table = table});
+    std::string text;
     for (const study::ArmSummary& arm : summary.arms) {
         const auto edge = study::locked_up_to_deg_h(arm);
         if (edge) {
@@ -322,12 +328,19 @@ std::string sweep_text(const study::Study& study, const study::Summary& summary)
             text += fmt::format("{}: not locked at any rate of the sweep\n", arm.name);
         }
     }
-    for (const study::ArmSummary& arm : summary.arms) text += steps_text(arm);
+    const std::size_t before_steps = out.size();
+    for (const study::ArmSummary& arm : summary.arms) add_steps(arm, out);
     const auto& input = study.scenario.input;
-    text += fmt::format("Rates are {:.4g} deg/h apart.\n", std::abs(input.sweep_stop_deg_h - input.rate_deg_h) /
-                                                               static_cast<double>(input.sweep_points - 1));
-    text += scale_factor_text(study, summary);
-    return text;
+    const std::string apart =
+        fmt::format("Rates are {:.4g} deg/h apart.\n",
+                    std::abs(input.sweep_stop_deg_h - input.rate_deg_h) / static_cast<double>(input.sweep_points - 1));
+    if (out.size() > before_steps) {
+        out.insert(out.begin() + static_cast<std::ptrdiff_t>(before_steps), {.notes = text});
+        out.push_back({.notes = apart});
+    } else {
+        out.push_back({.notes = text + apart});
+    }
+    add_scale_factor(study, summary, out);
 }
 
 }  // namespace
@@ -360,13 +373,22 @@ std::string family_text(const study::Summary& summary) {
     return text;
 }
 
+std::vector<report::Passage> study_passages(const study::Study& study, const study::Summary& summary) {
+    std::vector<Passage> all;
+    add_arm_tables(summary, all);
+    add_scatter(summary, all);
+    all.push_back({.notes = walk_notes(summary)});
+    add_reduction(summary, all);
+    add_pairs(summary, all);
+    add_scenario_times(study, summary, all);
+    add_yields(summary, all);
+    for (const study::ArmSummary& arm : summary.arms) add_noise(arm, all);
+    if (!summary.arms.front().sweep.empty()) add_sweep(study, summary, all);
+    return all;
+}
+
 std::string study_text(const study::Study& study, const study::Summary& summary) {
-    std::string text = arm_tables(summary) + scatter_text(summary) + "\n" + walk_notes(summary) +
-                       reduction_text(summary) + pairs_text(summary) + scenario_times_text(study, summary) +
-                       yield_text(summary);
-    for (const study::ArmSummary& arm : summary.arms) text += noise_text(arm);
-    if (!summary.arms.front().sweep.empty()) text += "\n" + sweep_text(study, summary);
-    return text + family_text(summary);
+    return report::text_of(study_passages(study, summary)) + family_text(summary);
 }
 
 std::string asked_text(const study::Study& study, const study::Summary& summary, std::span<const AveragingTime> asked) {

@@ -6,7 +6,7 @@ namespace ringlock::compensate {
 /// Size and phase of one gyro's coupling from the bends of its pulses, by a Kalman filter: the size drifts, with a
 /// slope that changes slowly; the phase depends on the mirrors and is nearly constant. The memory of the filter follows
 /// from the information on the coupling in the turns: at the instrument's defaults some minutes for the size and hours
-/// for the phase (docs/compensation.md).
+/// for the phase (docs/dev/compensation.md).
 ///
 /// A mode hop may step the phase, which a filter with that memory would follow only slowly. The filter begins anew
 /// where a mean over `short_memory_turns` contradicts it by more than six sigmas. While both agree, such a mean wanders
@@ -17,9 +17,9 @@ class CouplingFilter {
     using Coupling = readout::FractionRecovery::Coupling;
     using Bends = readout::FractionRecovery::Bends;
 
-    /// \param told start value; it has no influence once the bends determine the coupling better
-    explicit CouplingFilter(const Coupling& told, double contradiction_sigmas = six_sigmas)
-        : sigmas_(contradiction_sigmas), b_rad_s_(told.b_rad_s), phase_rad_(told.phase_rad) {}
+    /// \param start initial value; it has no influence once the bends determine the coupling better
+    explicit CouplingFilter(const Coupling& start, double contradiction_sigmas = six_sigmas)
+        : sigmas_(contradiction_sigmas), b_rad_s_(start.b_rad_s), phase_rad_(start.phase_rad) {}
 
     /// Takes the normal equations of `turns` turns over `duration_s` for the coupling of the tables. False where they
     /// contain too little information to begin with: further turns must be added first.

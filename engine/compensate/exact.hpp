@@ -8,8 +8,8 @@ namespace ringlock::compensate {
 
 /// The turn map inverted: the exact lock-in error of a half cycle from the phases measured at its two turns.
 ///
-/// With z and shift of the half turn (docs/turn-map.md), and the phases at the dither's turns at its beginning and end
-/// turned upright, x_0 = s psi_0 and x_1 = -s psi_1, a half cycle of sign s gains
+/// With z and shift of the half turn (docs/dev/turn-map.md), and the phases at the dither's turns at its beginning and
+/// end turned upright, x_0 = s psi_0 and x_1 = -s psi_1, a half cycle of sign s gains
 ///
 ///     s (2 shift + 2 arg[(1 + z exp(-i x_0)) (1 - z exp(-i x_1))])
 ///

@@ -25,7 +25,7 @@ namespace ringlock::compensate {
 /// (1.13 with three: the sum of the above over psi_0), for any threshold; the estimate is 1.07 times the kick and has a
 /// correlation of 0.81 with it, so that 0.61 times the estimate would leave 0.59. The default instrument's comparators
 /// and clock add 0.015 rad a cycle, 0.0002 deg/sqrt(h); the amplitudes of half cycles, of which the mean is known, a
-/// tenth of that behind injected noise of 3 rad. Errors with more pulses: docs/readout.md.
+/// tenth of that behind injected noise of 3 rad. Errors with more pulses: docs/dev/readout.md.
 class Extrapolated final : public LaneCompensator {
    public:
     /// `electronics`: as the readings' pulses were taken; noise and hysteresis are known to the operator.

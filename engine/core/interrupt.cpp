@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "engine/core/error.hpp"
+#include "engine/core/stop.hpp"
 
 namespace ringlock {
 namespace {
@@ -161,6 +162,12 @@ InterruptGuard::~InterruptGuard() {
     if (descriptor >= 0) close(descriptor);
     stop_requested = false;
 }
+
+StopByRequest::StopByRequest() { stop_requested = false; }
+
+StopByRequest::~StopByRequest() { stop_requested = false; }
+
+void StopByRequest::request() { stop_requested = true; }
 
 HoldEnd::HoldEnd() { ++holds; }
 

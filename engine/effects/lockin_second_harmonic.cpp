@@ -22,7 +22,8 @@ class LockinSecondHarmonic final : public Effect {
     }
     std::string_view equation() const override {
         return "psi' = C (rate + dither rate) + b sin(psi) + ratio b sin(2 psi + phase), psi as the detectors see it; "
-               "the kick of a turn at the second harmonic is ratio/sqrt(2) of that at the first (docs/turn-map.md).";
+               "the kick of a turn at the second harmonic is ratio/sqrt(2) of that at the first "
+               "(docs/dev/turn-map.md).";
     }
     std::span<const Parameter> parameters() const override { return lockin_second_harmonic_parameters; }
     bool active(const Values& values) const override { return values.at("ratio") != 0.0; }

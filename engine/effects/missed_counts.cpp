@@ -23,7 +23,7 @@ class MissedCounts final : public Effect {
         return "At each turn, with that probability, the count has fallen behind by one quarter fringe "
                "in the direction of motion of the half cycle before, for good. An angle interpolated "
                "from the quadrature stays on the branch nearest to the quarter that the counter names: "
-               "it is wrong by whole fringes, and only once two counts or more are missing (docs/readout.md).";
+               "it is wrong by whole fringes, and only once two counts or more are missing (docs/dev/readout.md).";
     }
     std::span<const Parameter> parameters() const override { return missed_counts_parameters; }
     bool active(const Values& values) const override { return values.at("probability_per_turn") != 0.0; }

@@ -2,8 +2,8 @@
 #include "engine/gyro/half_cycle.hpp"
 
 /// Where the phase of a half cycle runs fast: its rate is large compared with the coupling and changes little in a
-/// fringe. There the turn map takes it for a plain rotation (docs/turn-map.md). Where motion is nowhere fast enough to
-/// do so without error the rotation begins in the middle, where the map needs it only as a smooth choice of
+/// fringe. There the turn map takes it for a plain rotation (docs/dev/turn-map.md). Where motion is nowhere fast enough
+/// to do so without error the rotation begins in the middle, where the map needs it only as a smooth choice of
 /// coordinates.
 namespace ringlock::gyro {
 

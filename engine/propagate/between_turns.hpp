@@ -22,7 +22,7 @@ struct PassedHalfCycle {
 ///
 /// Within some ten fringes of the nearer turn the equation of motion is integrated from there. Farther away the motion
 /// is a rotation in the frame of fast_frame.hpp, and its state in the middle gives it everywhere. The error is below
-/// 1e-8 rad, and below 1e-9 rad for the gyros of `ringlock devices`; docs/turn-map.md, "Between turns".
+/// 1e-8 rad, and below 1e-9 rad for the gyros of `ringlock devices`; docs/dev/turn-map.md, "Between turns".
 double lockin_between_turns_fringes(const PassedHalfCycle& passed, double t_s);
 
 }  // namespace ringlock::propagate

@@ -11,7 +11,7 @@ namespace ringlock::propagate {
 ///     phi = theta + 2 Re sum_k p_k exp(i k theta),      theta = psi + coupling phase,
 ///
 /// turns at a rate that does not depend on phi. An asymptotic series in the coupling over the rate and in the change of
-/// the rate within a fringe; derived in docs/turn-map.md. Without second harmonic it is that of half_turn.hpp.
+/// the rate within a fringe; derived in docs/dev/turn-map.md. Without second harmonic it is that of half_turn.hpp.
 class FastFrame {
    public:
     /// The frame of a half cycle at `t_s` from its first turn, where motion must be fast (fast_motion_from_s()).

@@ -11,7 +11,7 @@ namespace ringlock::propagate {
 ///
 ///     phi_middle = psi_turn + (plain phase to the middle) + shift + 2 arg(1 + z exp(-i psi_turn)).
 ///
-/// `psi` includes the coupling phase; the half cycle has sign +1. Derived in docs/turn-map.md.
+/// `psi` includes the coupling phase; the half cycle has sign +1. Derived in docs/dev/turn-map.md.
 struct HalfTurn {
     double shift_rad = 0.0;
     std::complex<double> z;

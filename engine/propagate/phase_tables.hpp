@@ -22,7 +22,7 @@ namespace ringlock::propagate {
 ///
 /// each with functions of its own for the two signs of half cycles. The shift, the mean of the way back, is taken out
 /// of the angle because it may be large and grow with the amplitude. The nodes are integrated through every fringe,
-/// with integrate(). The series of a gyro depend on its device and ranges alone. Derived in docs/turn-map.md.
+/// with integrate(). The series of a gyro depend on its device and ranges alone. Derived in docs/dev/turn-map.md.
 class PhaseTables {
    public:
     static constexpr std::size_t variables = 3;

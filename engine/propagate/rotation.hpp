@@ -6,7 +6,7 @@
 #include "engine/gyro/half_cycle.hpp"
 
 /// Mean rates without simulation: a drive that repeats itself is one Moebius map of the circle a cycle, and the
-/// rotation number of that map is the mean rate. Derived in docs/turn-map.md, "Whole turns and cycles".
+/// rotation number of that map is the mean rate. Derived in docs/dev/turn-map.md, "Whole turns and cycles".
 namespace ringlock::propagate {
 
 /// A Moebius map of the unit circle, w -> (alpha w + beta)/(conj(beta) w + conj(alpha)), together with the whole

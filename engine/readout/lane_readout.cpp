@@ -187,7 +187,7 @@ bool read_all(const ReadoutConstants& constants, std::span<const PulseTables> pu
                 store(side_acceleration(1, after, scale_after), readings.accel_after_rad_s2[i]);
                 if (timed) {
                     // Half-way between the nearest pulses on either side, in whole ticks; weighed as half cycles last,
-                    // with the root of the acceleration, where they differ (docs/readout.md).
+                    // with the root of the acceleration, where they differ (docs/dev/readout.md).
                     const V after_s = load(constants.duration_s[after_side]);
                     const V before_s = load(constants.duration_s[1 - after_side]);
                     const V weight = after_s / (after_s + before_s);

@@ -2,7 +2,7 @@
 #include "engine/gyro/setup.hpp"
 #include "engine/readout/electronics.hpp"
 
-/// Lower bound of the error of any estimator of the phase at a zero-rate point (docs/compensation.md).
+/// Lower bound of the error of any estimator of the phase at a zero-rate point (docs/dev/compensation.md).
 namespace ringlock::readout {
 
 /// Knowledge about a turn in addition to the readings.

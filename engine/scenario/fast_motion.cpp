@@ -151,8 +151,8 @@ Point fastest_corner(const Point& low, const Point& high, std::size_t which) {
 }
 
 /// Whether polynomials hold a half turn's kick over these ranges. Its phase is that of the zero-rate point against the
-/// turn. It varies with amplitude and rate, and this variation determines the number of terms (docs/turn-map.md).
-/// Powers of high orders lose digits besides: a term of order k counts (1 + sqrt(2))^k times in the rounding.
+/// turn. It varies with amplitude and rate, and this variation determines the number of terms (docs/dev/turn-map.md).
+/// Powers of high orders also lose digits: a term of order k counts (1 + sqrt(2))^k times in the rounding.
 bool holds_kick(const gyro::Device& device, double sign, int end, const Point& low, const Point& high, double kick_rad,
                 double harmonics, std::size_t most_nodes, double tolerance_rad) {
     constexpr double rounding = 1e-15;  // of a radian, and of each that the phase goes through

@@ -81,7 +81,7 @@ void limit_memory(double file_bytes, Links links) {
 #endif
 }
 
-/// What is left to do is to tell how it ended.
+/// The guard can then report how the child ended.
 void lift_memory_limit() {
     if (memory_limit_bytes == 0.0) return;
     memory_limit_bytes = 1e18;
@@ -135,7 +135,7 @@ struct Trial {
     limit_memory(what.file_bytes, what.links);
     const auto end = [&](Ending ending, std::string_view message) {
         lift_memory_limit();
-        // What was left out may be the cause of what went wrong.
+        // The parts that were left out may be the cause of the failure.
         if (left_out) ending = Ending::fine;
         report(what.report_to, ending, ending == Ending::fine ? "" : message);
         _exit(0);

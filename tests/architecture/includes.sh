@@ -7,7 +7,10 @@ cd "${1:?usage: includes.sh ROOT}"
 
 # What a room may include beside itself. A room that is not here is an error, so that a new one is placed on purpose.
 declare -A may=(
-    [engine/core]=""
+    # Headers of the library that others install and include: standard library alone, and those of one another as
+    # <ringlock/...>. The engine throws their exceptions.
+    [library/include]=""
+    [engine/core]="library/include"
     [engine/simd]="engine/core"
     [engine/gyro]="engine/core engine/simd"
     [engine/random]="engine/core engine/simd"
@@ -33,6 +36,8 @@ declare -A may=(
     [analysis/record]="analysis/allan analysis/allan/sums analysis/noise analysis/text engine/core engine/reader
         engine/store"
     [analysis/findings]="analysis/allan/sums analysis/noise analysis/noise/losses engine/core"
+    [analysis/allan_run]="analysis/allan analysis/allan/sums analysis/findings analysis/noise analysis/quantity
+        analysis/record engine/core"
     [analysis/stability]="analysis/allan analysis/allan/sums analysis/noise engine/core"
     [analysis/instrument]="analysis/record engine/*"
     [analysis/study]="analysis/allan analysis/allan/sums analysis/design analysis/lot analysis/noise engine/*"
@@ -73,9 +78,14 @@ declare -A may=(
     [analysis/closure/report]="analysis/closure analysis/closure/stats analysis/closure/decide
         analysis/closure/turns/model analysis/closure/samples/model analysis/instrument analysis/record
         analysis/noise analysis/allan engine/*"
+    [analysis/export]="engine/core engine/scenario engine/store"
+    [analysis/report/page]="analysis/report engine/core"
     [analysis/report]="analysis/* engine/*"
     [app]="analysis/* engine/*"
-    [tests]="app analysis/* engine/*"
+    [library]="library/include analysis/* engine/*"
+    # The module for Python sees the library as everybody else does.
+    [python]=""
+    [tests]="app analysis/* engine/* library/include"
 )
 
 bad=0
@@ -84,13 +94,14 @@ complain() {
     bad=$((bad + 1))
 }
 
-# The room of a path: its folder in the closed loop and in the Allan family, two folders deep elsewhere in engine and
-# analysis, one in the rest.
+# The room of a path: its folder in the closed loop, the Allan family and the reports, two folders deep elsewhere in engine and
+# analysis and for the installed headers of the library, one in the rest.
 room_of() {
     case "$1" in
-        analysis/closure/* | analysis/allan/*)
+        analysis/closure/* | analysis/allan/* | analysis/report/*)
             room="${1%/*}"
             ;;
+        library/include/*) room=library/include ;;
         engine/*/* | analysis/*/*)
             local rest="${1#*/}"
             room="${1%%/*}/${rest%%/*}"
@@ -115,7 +126,7 @@ allowed() {
 }
 
 sources=()
-for top in engine analysis app tests; do
+for top in engine analysis app library python tests; do
     if [[ -d $top ]]; then
         mapfile -t -O "${#sources[@]}" sources < <(find "$top" -type f \
             \( -name '*.[ch]' -o -name '*.[ch]pp' -o -name '*.cc' -o -name '*.[ch]xx' -o -name '*.hh' -o -name '*.[it]pp' \
@@ -168,7 +179,7 @@ while IFS=: read -r file line text; do
     mark="${BASH_REMATCH[1]}"
     target="${BASH_REMATCH[2]}"
     ours=no
-    case "$target" in engine/* | analysis/* | app/* | tests/*) ours=yes ;; esac
+    case "$target" in engine/* | analysis/* | app/* | library/* | python/* | tests/*) ours=yes ;; esac
     if [[ $mark == "<" ]]; then
         [[ $ours == yes ]] || continue
         complain "$file:$line: <$target> is ours and wants quotes"

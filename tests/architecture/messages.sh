@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # `messages.sh ROOT` fails where a text for users has a word that only the authors understand. Texts are the literals of
-# engine/, analysis/ and app/ that have a space: literals without one are keys, names and units. Adjacent literals are
+# engine/, analysis/, app/ and library/ that have a space: literals without one are keys, names and units. Adjacent literals are
 # one text.
 set -euo pipefail
 cd "${1:?usage: messages.sh ROOT}"
 
 folders=()
-for folder in engine analysis app; do
+for folder in engine analysis app library; do
     if [[ -d $folder ]]; then folders+=("$folder"); fi
 done
 if [[ ${#folders[@]} -eq 0 ]]; then

@@ -66,6 +66,9 @@ include_fault "without HWY_AFTER_NAMESPACE" engine/gyro/device.cpp 'HWY_BEFORE_N
 include_fault "sources are called" engine/gyro/device.h '#pragma once'
 include_fault "room 'engine/attic' has no line" engine/attic/old.cpp '// nothing'
 include_fault "room 'engine' has no line" engine/loose.cpp '// nothing'
+include_fault "library/include must not include engine/core" library/include/ringlock/units.hpp \
+    '#include "engine/core/units.hpp"'
+include_fault "python must not include engine/core" python/module.cpp '#include "engine/core/units.hpp"'
 include_fault "is not beside it" engine/ensemble/device.cpp '#include "engine/gyro/device.hpp"'
 
 # number_fault STATUS WORDS LINE [ENTRY]: a room of the closed loop whose source has LINE, and a list with ENTRY.
@@ -154,6 +157,69 @@ if command -v git >/dev/null; then
     expect 1 "without the guard" text.sh
     mkdir "$folder/below"
     folder="$folder/below" expect 77 "skipped" text.sh
+fi
+
+# prose_fault STATUS WORDS FILE TEXT: a folder with one file of prose, under the limits of tools/prose.
+prose_fault() {
+    cd "$here"
+    rm -rf "$folder"
+    mkdir -p "$folder"
+    # shellcheck disable=SC2016
+    printf '| old word | counted forms |\n|---|---|\n| `gain` | `gain of a score`, `gains` |\n' >"$folder/terms.md"
+    printf '%b\n' "$4" >"$folder/$3"
+    expect "$1" "$2" ../../tools/prose --check --list --terms "$folder/terms.md"
+}
+if command -v python3 >/dev/null; then
+    words="$(printf 'word %.0s' {1..20})"
+    prose_fault 0 " 2   0.00   0.00     0" page.md 'A gain.'
+    prose_fault 1 "exceeds: what" page.md 'What is what, and what not'
+    prose_fault 1 "page.md:3: besides" page.md '\n\nA page, besides'
+    prose_fault 1 "page.md:1: gain of a score" page.md 'the gain of\na score'
+    prose_fault 1 "exceeds: longest" page.md "$words$words"
+    prose_fault 0 " 2   0.00" page.md "A page\n\n| beside |\n\n\`\`\`\nbeside\n\`\`\`\n\n    beside\n\n<!-- block a -->\ngains\n<!-- end a -->"
+    prose_fault 0 " 2   0.00" page.md "A [page](beside.md) \`beside\`"
+    prose_fault 0 " 2   0.00" a.cpp '// A comment\nconst char* beside = "// beside"; char c = 0x1\x272;'
+    prose_fault 1 "a.cpp:2: beside" a.cpp 'char c = \x27"\x27;\nint a = 1; // beside'
+    prose_fault 1 "a.cpp:2: beside" a.cpp '/* A comment\n beside */'
+    prose_fault 1 "CMakeLists.txt:1: beside" CMakeLists.txt 'set(a "# besides") # beside'
+    prose_fault 1 "a.sh:2: beside" a.sh "echo \"# besides \${#a}\"\n# beside"
+    prose_fault 0 " 0   0.00" a.sh 'cat <<EOF\n# beside\nEOF'
+    prose_fault 1 "a.py:2: beside" a.py 'a = "# besides"\n# beside'
+    prose_fault 1 "a.py:2: beside" a.py '"""A module\nbeside"""'
+    prose_fault 2 "no table" terms.md '# Terms'
+    expect 2 "does not exist" ../../tools/prose "$folder/attic"
+fi
+
+# link_fault STATUS WORDS TEXT [FILE]: a repository of two pages and a source, with TEXT at the end of FILE.
+link_fault() {
+    cd "$here"
+    rm -rf "$folder"
+    mkdir -p "$folder"/{docs,engine}
+    printf '# Index\n\n[Page](page.md#a-heading-of-two_words)\n' >"$folder/docs/README.md"
+    # shellcheck disable=SC2016
+    printf '# A heading: of `two_words`\n\n## Twice\n\n## Twice\n' >"$folder/docs/page.md"
+    echo '// docs/page.md, "Twice"' >"$folder/engine/a.cpp"
+    printf '%b\n' "$3" >>"$folder/${4-docs/page.md}"
+    expect "$1" "$2" ../../tools/links
+}
+if command -v python3 >/dev/null; then
+    link_fault 0 "lead somewhere" '[a](#twice-1) [b](../engine/a.cpp) ![c](../engine) [d](https://nowhere.example/x#y)'
+    link_fault 0 "lead somewhere" "\`\`\`\n[a](none.md)\n\`\`\`\n\`[a](none.md)\`, \`none/a.cpp\`, docs/page.mdx"
+    link_fault 0 "lead somewhere" "\`engine/{a,a}.cpp\` \`engine/*.cpp:7\` \`engine/NAME.cpp\` \`docs/\` \`results/a.h5\`"
+    link_fault 1 "docs/page.md:7: link leads nowhere: none.md" '\n[a](none.md)'
+    link_fault 1 "link leads nowhere: figures/none.svg" '[![a](figures/none.svg)](page.md)'
+    link_fault 1 "no such heading: #twice-2" '[a](#twice-2)'
+    link_fault 1 "no such heading: README.md#Index" '[a](README.md#Index)'
+    link_fault 1 "leaves the repository" '[a](../../..)'
+    link_fault 1 "no such path: engine/b.cpp" "see \`engine/{a,b}.cpp\`"
+    link_fault 1 "no such path: docs/figures/a.svg" "see \`docs/figures/a.svg --quick\`"
+    link_fault 1 "docs/loose.md:1: not reachable" 'A page' docs/loose.md
+    link_fault 1 "engine/a.cpp:2: no such page: docs/none.md" '// (docs/none.md)' engine/a.cpp
+    link_fault 1 'engine/a.cpp:2: no such heading: docs/page.md, "Thrice"' '// docs/page.md, "Thrice"' engine/a.cpp
+    rm -rf "$folder"/{docs,engine}
+    expect 2 "no links" ../../tools/links
+    rmdir "$folder"
+    expect 2 "is no folder" ../../tools/links
 fi
 
 if [[ $bad -eq 0 ]]; then

@@ -162,7 +162,7 @@ void print_mixture(const Mixture& mixture, std::size_t records) {
         return *std::ranges::find_if(columns, [&](const Column& c) { return c.estimator == e && c.m == m; });
     };
     fmt::print("\n**{}**\n\n| m | % of the second in the variance |", mixture.name);
-    for (const int alpha : kinds) fmt::print(" % told {} |", alpha);
+    for (const int alpha : kinds) fmt::print(" % identified as {} |", alpha);
     for (const Estimator e : shown) fmt::print(" {} |", allan::name(e));
     fmt::print("\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (std::int64_t m = 1; m <= 64; m *= 2) {
@@ -221,6 +221,8 @@ int main(int argc, char** argv) {
     fmt::print("\n| edf | % covered, noise known | % covered, noise identified |\n|---|---|---|\n");
     fmt::print("| 10 and more | {} | {} |\n", summary.many_known.text(), summary.many_told.text());
     fmt::print("| fewer | {} | {} |\n", summary.few_known.text(), summary.few_told.text());
-    fmt::print("\nTwo noises of equal Allan variance at m = 16: what is told, and % covered.\n");
+    fmt::print(
+        "\nTwo noises of equal Allan variance at m = 16: share of records by identified kind (alpha), and % "
+        "covered.\n");
     for (const Mixture& mixture : mixtures) print_mixture(mixture, records);
 }

@@ -201,7 +201,7 @@ void print(const Study& study) {
 void titles() {
     fmt::print("{} records of each kind.\n\n", records);
     head({"record", "", "resolved", "68.27 % intervals that hold", "those of as many unbroken data", "mean/truth",
-          "sd/truth", "sd over that of as many unbroken data", "sd over the Cramer-Rao bound of what is there",
+          "sd/truth", "sd over that of as many unbroken data", "sd over the Cramer-Rao bound of the present data",
           "half width over sd", "withheld"});
 }
 

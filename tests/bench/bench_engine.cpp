@@ -2,7 +2,7 @@
 //
 //   bench_engine [--quick] [--markdown]
 //
-// --quick measures the accuracy over fewer turns; --markdown prints a table for docs/performance.md.
+// --quick measures the accuracy over fewer turns; --markdown prints a table for docs/dev/performance.md.
 #include <fmt/format.h>
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/global_control.h>
@@ -534,7 +534,7 @@ int main(int argc, char** argv) {
     }
     fmt::print(
         "\nMachine: {}; instruction set {}; {}; tables to {:.0e} rad a turn. Times are medians of rounds in which "
-        "the contenders take turns, a gyro at a time on one thread.\n",
+        "all methods take turns, a gyro at a time on one thread.\n",
         processor(), simd::active_target(), "GCC " __VERSION__, table_tolerance_rad);
     fmt::print(stderr, "(checksum {:.6g})\n", sink);
     return 0;

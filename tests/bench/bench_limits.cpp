@@ -1,4 +1,4 @@
-// The figures of docs/compensation.md, one block of Markdown after another.
+// The figures of results/compensation/tables.md, one block of Markdown after another.
 //
 //   bench_limits [BLOCK [FIGURE.svg]]
 //
@@ -292,7 +292,7 @@ Shown shown(scenario::Scenario scenario, std::size_t turns) {
     return shown;
 }
 
-/// Of the size of the coupling that the adaptive compensator learns, in the long run (docs/compensation.md).
+/// Of the size of the coupling that the adaptive compensator learns, in the long run (docs/dev/compensation.md).
 struct SizeMemory {
     double seconds = 0.0;
     double known_to = 0.0;  ///< relative
@@ -350,7 +350,7 @@ void devices() {
     }
 }
 
-/// What the filter of the coupling makes of its turns in the long run, see docs/compensation.md.
+/// What the filter of the coupling makes of its turns in the long run, see docs/dev/compensation.md.
 void learning() {
     using Filter = compensate::CouplingFilter;
     head({"", "shown by a turn", "memory of the size [s]", "size known to [1e-3]", "memory of the phase [h]",
@@ -375,7 +375,7 @@ void learning() {
     for (const Point& point : detector_noise_points()) line("noise " + point.label, point.scenario);
     for (const Point& point : clock_points()) line("clock " + point.label, point.scenario);
     line("injected 30 rad", injected_noise_points().back().scenario);
-    fmt::print("\nMean over 16 gyros and 262144 turns of what bends show beside the true coupling:\n\n");
+    fmt::print("\nEstimate from the bends less the true coupling, mean over 16 gyros and 262144 turns:\n\n");
     head({"clock", "size [1e-3]", "phase [1e-3 rad]"});
     for (const Point& point : clock_points()) {
         if (point.label != "1 MHz" && point.label != "3 MHz" && point.label != "100 MHz") continue;
@@ -518,7 +518,7 @@ const std::pair<const char*, std::function<void()>> blocks[] = {
      }},
     {"converter", [] { table("converter", converter_points(), Reference::own); }},
     {"clock", [] { table("clock", clock_points(), Reference::own); }},
-    {"threshold", [] { table("told too large by", threshold_points(), Reference::first); }},
+    {"threshold", [] { table("threshold too large by", threshold_points(), Reference::first); }},
     {"injected-noise", [] { table("injected noise", injected_noise_points(), Reference::own); }},
     {"coupling-phase", coupling_phase},
     {"phase-from", [] { table("phase from", phase_from_points(), Reference::last); }},

@@ -1,4 +1,4 @@
-// The figures of docs/replication.md, one block of Markdown after another.
+// The figures of results/replication/tables.md, one block of Markdown after another.
 //
 //   bench_replication [BLOCK [RESULT.h5]]
 //

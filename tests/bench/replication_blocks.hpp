@@ -4,7 +4,7 @@
 
 #include "tests/support/replication.hpp"
 
-/// The blocks of docs/replication.md; each prints its tables to standard output.
+/// The blocks of results/replication/tables.md; each prints its tables to standard output.
 namespace ringlock::bench::replication {
 
 namespace rp = ringlock::test::replication;

@@ -451,7 +451,7 @@ TEST_F(AllanSeries, FiguresOfSeveralSeriesAndOtherForms) {
     const test::Outcome pdf = allan("imu.csv", with({"--column", "x", "--plot", "f.PDF"}));
     if (png.status == 2) {
         EXPECT_THAT(png.err, AllOf(HasSubstr("librsvg2-dev"), HasSubstr("rsvg-convert")));
-        GTEST_SKIP() << "this build draws SVG only";
+        GTEST_SKIP() << "librsvg is missing: pictures are SVG only";
     }
     ASSERT_EQ(png.status, 0) << png.err;
     ASSERT_EQ(pdf.status, 0) << pdf.err;

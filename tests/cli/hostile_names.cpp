@@ -101,7 +101,10 @@ TEST_F(HostileNames, JsonParsesWhateverTheNamesAre) {
     const Outcome allan = harmless({"allan", hostile, "--rate", "1", "--kind", "rate", "--column", "gyro", "--json"});
     ASSERT_EQ(allan.status, 0) << allan.err;
     EXPECT_EQ(nlohmann::json::parse(allan.out)["column"], "gyro");
-    const Outcome status = harmless({"status", hostile, "--json"});
+    const std::string result = hostile + ".h5";
+    std::ofstream(directory_ / "s.toml") << "[ensemble]\ngyros = 1\nduration_s = 5.0\n";
+    ASSERT_EQ(harmless({"run", "s.toml", "-q", "-o", result}).status, 0);
+    const Outcome status = harmless({"status", result, "--json"});
     ASSERT_EQ(status.status, 0) << status.err;
     EXPECT_FALSE(nlohmann::json::parse(status.out)["outputs"].empty());
     const std::string text = harmless({"allan", hostile, "--rate", "1", "--kind", "rate", "--column", "gyro"}).out;

@@ -141,6 +141,8 @@ std::string with_arms(const std::string& text, const std::vector<std::string>& a
     return text + "[arms]\nnames = [" + names + "]\n";
 }
 
+class LongReplayCommand : public ReplayCommand {};
+
 TEST_F(ReplayCommand, EveryArmIsItsStoredRecordToTheBit) {
     const auto arms = scenario::arm_names();
     ASSERT_GE(arms.size(), 15U);
@@ -176,7 +178,7 @@ TEST_F(ReplayCommand, EveryArmIsItsStoredRecordToTheBit) {
     }
 }
 
-TEST_F(ReplayCommand, EveryReadoutIsReplayed) {
+TEST_F(LongReplayCommand, EveryReadoutIsReplayed) {
     const std::vector<std::string> arms{"uncompensated", "compensated", "noise_injected+compensated_exact"};
     for (const char* readout :
          {"model = \"ideal\"\n", "model = \"latched\"\n", "model = \"latched\"\nangle_output = \"quarter_fringe\"\n",

@@ -87,6 +87,8 @@ class Resumed : public test::ProgramTest {
     const Arguments each_block_ = {"run", "s.toml", "-o", "out.h5", "--checkpoint-every", "0"};
 };
 
+class LongResumed : public Resumed {};
+
 TEST_F(Resumed, AKilledRunGoesOnToTheSameFile) {
     for (const char* const scenario : {with_records, statistics_only, read_by_readers, design, growing}) {
         SCOPED_TRACE(scenario);
@@ -101,7 +103,7 @@ TEST_F(Resumed, AKilledRunGoesOnToTheSameFile) {
     }
 }
 
-TEST_F(Resumed, AnyMomentOfAKillIsAsGoodAsAnother) {
+TEST_F(LongResumed, AnyMomentOfAKillIsAsGoodAsAnother) {
     std::mt19937 random(3);
     write_reference(with_records);
     for (int trial = 0; trial < 3; ++trial) {
@@ -208,6 +210,14 @@ TEST_F(Resumed, StatusTellsHowFarItIs) {
     EXPECT_THAT(run({"status", "out.h5"}).out, HasSubstr("out.h5: finished"));
 }
 
+TEST_F(Resumed, StatusRefusesAFileThatNoRunWrites) {
+    write("notes.txt", "not a result\n");
+    const Outcome text = run({"status", "notes.txt"});
+    EXPECT_EQ(text.status, 2);
+    EXPECT_THAT(text.err,
+                AllOf(HasSubstr("notes.txt: the file is neither a result nor a shard"), HasSubstr("with -o")));
+}
+
 TEST_F(Resumed, AnyNumberOfThreadsWritesTheSameFile) {
     if (!has_h5diff()) GTEST_SKIP() << "h5diff (hdf5-tools) is missing";
     for (const char* const scenario : {with_records, read_by_readers, design, growing}) {
@@ -240,7 +250,7 @@ TEST_F(Resumed, AKillCostsNoMoreThanTheLastInterval) {
     EXPECT_GE(status["outputs"][0]["gyros"].get<std::int64_t>(), before);
 }
 
-TEST_F(Resumed, ShardsMakeTheSameFileInAnyOrder) {
+TEST_F(LongResumed, ShardsMakeTheSameFileInAnyOrder) {
     std::mt19937 random(5);
     for (const char* const scenario : {with_records, read_by_readers, design}) {
         write_reference(scenario);
@@ -323,7 +333,7 @@ TEST_F(Resumed, MergingRefusesWhatDoesNotBelongTogether) {
     EXPECT_EQ(run({"merge", "s.toml", "out.h5.shard-1-of-2"}).status, 2);
 }
 
-TEST_F(Resumed, ADamagedShardIsNeverMerged) {
+TEST_F(LongResumed, ADamagedShardIsNeverMerged) {
     write("s.toml", statistics_only);
     ASSERT_EQ(run({"run", "s.toml", "-o", "out.h5", "--shard", "1/1"}).status, 0);
     const std::string whole = read("out.h5.shard-1-of-1");

@@ -378,7 +378,7 @@ Told tell(compensate::LaneCompensator& compensator, const Readings& readings, co
     return told;
 }
 
-TEST(LearningCompensators, PiecesDoNotMatter) {
+TEST(LongLearningCompensators, PiecesDoNotMatter) {
     const Readings readings(3, 4608);  // 18.5 s
     for (const Make& make : makers) {
         const Told reference = tell(*make(readings.setups), readings, {4608});

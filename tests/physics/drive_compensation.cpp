@@ -45,7 +45,7 @@ TEST(DriveCompensation, TheTurnMapIsInvertedWhileTheAmplitudeChanges) {
     }
 }
 
-TEST(DriveCompensation, TheAccelerationAfterTheTurnIsKnownThere) {
+TEST(LongDriveCompensation, TheAccelerationAfterTheTurnIsKnownThere) {
     // Independent turns leave the next half cycle's amplitude to chance; a resonator's goes on from where it is. Of the
     // adaptive compensator the size of the coupling that it has learnt says more than the phase does.
     for (const char* device : {"triangle-20mm", "triangle-51mm"}) {

@@ -351,7 +351,7 @@ TEST(ExactCompensator, DetectorNoiseLeavesItsShare) {
     }
 }
 
-TEST(ExactCompensator, FollowsARateThatVaries) {
+TEST(LongExactCompensator, FollowsARateThatVaries) {
     auto ramp = ideal_readout();
     ramp.effects["bias_ramp"]["deg_h_per_h"] = 1000.0;
     auto vibration = ideal_readout();

@@ -179,7 +179,7 @@ TEST(LaneElectronics, QuarterFringeCounterHasTheQuantisationOfItsStep) {
     EXPECT_NEAR(q_arcsec / (0.125 / std::sqrt(12.0)), 1.0, 4.0 * 0.5 * std::sqrt(0.8 / n));
 }
 
-TEST(LaneElectronics, TheUnwrappedPhaseIsTrueOverALongRun) {
+TEST(LongLaneElectronics, TheUnwrappedPhaseIsTrueOverALongRun) {
     // Plain bookkeeping of one gyro: phases at the dither's turns from half cycles solved one by one, those at the
     // zero-rate points from the path.
     constexpr std::int64_t turns = 20001;

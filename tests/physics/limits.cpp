@@ -1,4 +1,4 @@
-// How far compensators are from what the readout allows (docs/compensation.md).
+// How far compensators are from the bound that the readout allows (docs/dev/compensation.md).
 #include "tests/support/limits.hpp"
 
 #include <gtest/gtest.h>

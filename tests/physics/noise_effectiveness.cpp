@@ -69,7 +69,7 @@ TEST(NoiseEffectiveness, HeldNoiseOfEveryDistributionIsPredicted) {
         noisy("gao-deng-2007", 0.5, drive + "resonator_q = 50.0\nhold_half_cycles = 4\ndistribution = \"binary\"\n"));
 }
 
-TEST(NoiseEffectiveness, WhiteNoiseIsPredicted) {
+TEST(LongNoiseEffectiveness, WhiteNoiseIsPredicted) {
     expect_prediction_holds(noisy("triangle-51mm", 1.0,
                                   "model = \"drive\"\nform = \"white\"\nturn_phase_rms_rad = 10.0\n"
                                   "resonator_q = 200.0\n"));

@@ -100,7 +100,7 @@ Worst worst_cycle(const std::string& arm, double rate_deg_h, double first_phase_
     return worst;
 }
 
-TEST(SingleCycles, AreRightTo1e4thOfADegAnHourBehindTheExactCompensator) {
+TEST(LongSingleCycles, AreRightTo1e4thOfADegAnHourBehindTheExactCompensator) {
     for (const bool injected : {false, true}) {
         Worst all;
         for (int i = 0; i <= 25; ++i) {
@@ -233,7 +233,7 @@ TEST(BiasBehindInjectedNoise, FirstOrderLeavesTheDelaysOfAnAsymmetricDither) {
     }
 }
 
-/// Bias per asymmetry [deg/h] that pulses would leave which are taken for those of one extremum (docs/readout.md).
+/// Bias per asymmetry [deg/h] that pulses would leave which are taken for those of one extremum (docs/dev/readout.md).
 double misplaced_pulses_deg_h() {
     const gyro::Device device(paper_device());
     const double w = units::two_pi * paper_device().dither_frequency_hz;

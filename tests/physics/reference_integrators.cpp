@@ -98,7 +98,7 @@ void against_cvode(int half_cycles, std::uint64_t seed) {
     for (std::size_t k = 0; k < tolerances.size(); ++k) EXPECT_LT(worst[k], 2e3 * tolerances[k] + rounding_rad);
 }
 
-TEST(ReferenceIntegrators, CvodeConvergesToTheDirectIntegrator) { against_cvode(6, 31); }
+TEST(LongReferenceIntegrators, CvodeConvergesToTheDirectIntegrator) { against_cvode(6, 31); }
 TEST(LongReferenceIntegrators, CvodeConvergesToTheDirectIntegratorOverHundredHalfCycles) { against_cvode(100, 32); }
 
 /// Errors against extended precision, of all that the engine has.

@@ -282,7 +282,7 @@ TEST(LongScenarios, WhatIdealReadoutLeavesIsOfTheInjectedNoiseNotOfTables) {
     EXPECT_LT(counts_deg_h, 1e-3 * usual);
 }
 
-TEST(Scenarios, TheDirectIntegratorGivesTheSameStudyAsTheTurnMap) {
+TEST(LongScenarios, TheDirectIntegratorGivesTheSameStudyAsTheTurnMap) {
     // Everything a scenario can ask for at once; 500 turns and two trajectories of two gyros.
     scenario::Scenario scenario;
     scenario.ensemble.gyros = 2;

@@ -12,7 +12,7 @@ using Quad = boost::multiprecision::number<boost::multiprecision::cpp_bin_float_
 /// The equation of motion over one half cycle, solved to 1e-25 rad and better.
 ///
 /// With w = exp(i psi) = x/y the equation is linear, x' = (i g/2) x - (b/2) y, y' = -(b/2) x - (i g/2) y
-/// (docs/turn-map.md), g and b as HalfCycle and Coupling say. That system goes by Taylor series of order 40 through
+/// (docs/dev/turn-map.md), g and b as HalfCycle and Coupling say. That system goes by Taylor series of order 40 through
 /// every fringe from turn to turn, without symmetry, asymptotics or interpolation, and without the sine of the phase
 /// that DirectIntegrator expands. Numbers of `half` and `coupling` are taken as they are; pi, times and phases have all
 /// 113 bits. One such solution holds for every phase. The delay of a half cycle must be less than half a fringe:

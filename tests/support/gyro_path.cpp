@@ -26,7 +26,7 @@ std::unique_ptr<Propagator> make_propagator(const gyro::Device& device, double t
 }
 
 /// Half cycles that run backwards in time as they run forwards: psi(t) -> pi - psi(T - t), less twice the coupling
-/// phase (docs/turn-map.md).
+/// phase (docs/dev/turn-map.md).
 bool reversible(const gyro::Device& device) {
     return device.harmonic_ratio == 0.0 && device.coupling.turn_asymmetry == 0.0 && device.coupling.second_ratio == 0.0;
 }

@@ -6,7 +6,7 @@
 #include "engine/readout/phase_bound.hpp"
 #include "engine/scenario/scenario.hpp"
 
-/// What the readout leaves of the random walk at best, and what compensators leave: for docs/compensation.md.
+/// Smallest random walk that the readout allows, and that of the compensators: for results/compensation/tables.md.
 namespace ringlock::test::limits {
 
 /// Bounds of the phase at a zero-rate point [rad], of the scenario's device without spread.

@@ -35,7 +35,7 @@ struct Exact {
     /// From a turn to the next, whose plain phases are given; the half cycle's own two half turns.
     void step(double sign, double plain_fringes, double next_plain_fringes, const HalfTurn& first,
               const HalfTurn& second) {
-        // docs/turn-map.md, "A half cycle", upright: psi -> -psi where the half cycle is negative.
+        // docs/dev/turn-map.md, "A half cycle", upright: psi -> -psi where the half cycle is negative.
         const double e = device.coupling.phase_rad;
         const double psi = sign * (units::two_pi * plain_fringes + lockin.remainder_rad + e);
         const double to_middle = first.shift_rad + bend_rad(first.z, -psi);

@@ -7,7 +7,7 @@
 #include "engine/gyro/setup.hpp"
 #include "tests/support/gyro_path.hpp"
 
-/// Table 1 of Gao and Deng (2007) against what the equation of motion does: what docs/replication.md reports.
+/// Table 1 of Gao and Deng (2007) against what the equation of motion does: the figures of docs/replication.md.
 namespace ringlock::test::replication {
 
 /// What is cited of the paper's Table 1; nothing else of it is used.

@@ -98,7 +98,7 @@ TEST(AllanCorrelated, PullsNoOtherTermWhereItCannotBeExcluded) {
 }
 
 // Records without it hardly notice: one in a hundred passes by chance. 300 records allow nine (2 % would be 6 +- 2.4).
-TEST(AllanCorrelated, IsLeftOutWhereNothingShowsIt) {
+TEST(LongAllanCorrelated, IsLeftOutWhereNothingShowsIt) {
     int changed = 0;
     for (int k = 0; k < 300; ++k) {
         const Truth truth = k % 2 == 0 ? Truth{.n = 0.3, .b = 0.1} : Truth{.q = 0.3, .n = 0.3, .k = 0.01};

@@ -91,7 +91,7 @@ TEST(FactorStream, HasTheDeviationOfTheStoredRecord) {
         const Point stored = deviation(Estimator::oadev, phase, 0.01, std::vector<std::int64_t>{m}).front();
         EXPECT_EQ(point.m, m);
         EXPECT_DOUBLE_EQ(point.tau_s, 0.01 * static_cast<double>(m));
-        // A stride of tau/8 costs some 0.15 of the standard error; edf tells that (docs/allan.md).
+        // A stride of tau/8 costs some 0.15 of the standard error; edf shows it (docs/dev/allan-streams.md).
         EXPECT_NEAR(point.dev / stored.dev, 1.0, 0.5 / std::sqrt(2.0 * stored.edf)) << m;
         EXPECT_NEAR(point.edf / stored.edf, 1.0, 0.1) << m;
         EXPECT_LT(point.lo, point.dev);

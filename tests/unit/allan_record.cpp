@@ -250,7 +250,7 @@ TEST_F(AllanRecord, AnyTextIsASeriesOrAnError) {
                                             "+",
                                             "."};
     int read = 0, refused = 0;
-    for (int trial = 0; trial < 2000; ++trial) {
+    for (int trial = 0; trial < 1000; ++trial) {
         // Few different parts make texts that agree with themselves now and then.
         const std::size_t kinds = 1 + engine() % parts.size();
         const std::size_t first = engine() % parts.size();
@@ -279,8 +279,8 @@ TEST_F(AllanRecord, AnyTextIsASeriesOrAnError) {
         ++refused;
         EXPECT_THAT(error, HasSubstr("data.txt")) << text;
     }
-    EXPECT_GT(read, 50);
-    EXPECT_GT(refused, 50);
+    EXPECT_GT(read, 25);
+    EXPECT_GT(refused, 25);
 }
 
 // Doubles alone are streamed; who streams is told that they are not all that there was.

@@ -121,7 +121,7 @@ TEST(Uncertainty, DegreesOfTheTotalDeviationAreThoseOfItsForm) {
 
 // What short records stand for is there on long ones: nothing jumps where the one ends and the other begins. An eighth
 // more tau is a fifth fewer degrees, and up to two fifths where few are left.
-TEST(Uncertainty, IsSmoothInTau) {
+TEST(LongUncertainty, IsSmoothInTau) {
     for (const Estimator e : {Estimator::oadev, Estimator::mdev, Estimator::ohdev, Estimator::totdev,
                               Estimator::mtotdev, Estimator::htotdev}) {
         for (const int alpha : {0, -1, -2}) {

@@ -80,7 +80,7 @@ TEST(ReportRender, TheEndingOfTheNameSaysTheForm) {
             EXPECT_THAT(error.what(), AllOf(StartsWith("--plot"), HasSubstr("must end in .svg, .png or .pdf")));
         }
     }
-    if (!report::renders_pictures()) GTEST_SKIP() << "this build draws SVG only";
+    if (!report::renders_pictures()) GTEST_SKIP() << "librsvg is missing: pictures are SVG only";
     EXPECT_EQ(report::picture_of("a.png", "--plot"), PictureForm::png);
     EXPECT_EQ(report::picture_of("b/a.Pdf", "--plot"), PictureForm::pdf);
 }
@@ -90,7 +90,7 @@ TEST(ReportRender, PicturesHaveTwiceTheSizeOfTheDrawing) {
         "<svg xmlns='http://www.w3.org/2000/svg' width='90' height='60'><rect width='45' height='60' "
         "fill='#0072B2'/></svg>";
     EXPECT_EQ(report::rendered(svg, PictureForm::svg, "a.svg"), svg);
-    if (!report::renders_pictures()) GTEST_SKIP() << "this build draws SVG only";
+    if (!report::renders_pictures()) GTEST_SKIP() << "librsvg is missing: pictures are SVG only";
     const std::string png = report::rendered(svg, PictureForm::png, "a.png");
     ASSERT_THAT(png, StartsWith("\x89PNG\r\n\x1a\n"));
     EXPECT_EQ(static_cast<unsigned char>(png[19]), 180);  // width and height, big-endian, at 16 and 20

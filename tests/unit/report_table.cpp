@@ -42,6 +42,26 @@ TEST(ReportTable, LeavesOutEmptyHeadersAndFillsShortRows) {
 
 TEST(ReportTable, WithoutRowsHasOnlyHeaders) { EXPECT_EQ(Table({{"a"}, {"b"}}).text(), "a  b\n"); }
 
+TEST(ReportTable, ContinuesBelowWhatAWindowDoesNotHold) {
+    const std::string wide(45, 'w');
+    Table table({{"arm"}, {"one", Align::right}, {"two"}, {"three", Align::right}, {"four"}});
+    table.add_row({"ideal", wide, wide, "3", "4"});
+    table.add_row({"other", "1", "2", "33", ""});
+    // 5 + 2 + 45 + 2 + 45 = 99 columns; the next one would end beyond 100.
+    const std::string blanks(44, ' ');
+    EXPECT_EQ(table.text(), "arm    " + std::string(42, ' ') + "one  two\n" +  //
+                                "ideal  " + wide + "  " + wide + "\n" +        //
+                                "other  " + blanks + "1  2\n" +                //
+                                "\n"
+                                "arm    three  four\n"
+                                "ideal      3  4\n"
+                                "other     33\n");
+    // A column that is too wide by itself is printed all the same.
+    Table huge({{"a"}, {"b"}, {"c"}});
+    huge.add_row({"x", std::string(120, 'b'), "c"});
+    EXPECT_EQ(huge.text(), "a  b\nx  " + std::string(120, 'b') + "\n\na  c\nx  c\n");
+}
+
 TEST(ReportTable, RefusesCellsThatDoNotFit) {
     Table table({{"a"}});
     EXPECT_THROW(table.add_row({"1", "2"}), std::invalid_argument);

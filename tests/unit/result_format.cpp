@@ -197,7 +197,7 @@ Entries page_of_design(const scenario::Scenario& scenario, const std::map<std::s
         }
     }
     says(
-        "`/arms/ARM/points/NAME`, P: what without a design are the attributes of `/arms/ARM` from "
+        "`/arms/ARM/points/NAME`, P: without a design these are the attributes of `/arms/ARM` from "
         "`arw_deg_rt_h_median` on");
 
     out["/design @"] = {};

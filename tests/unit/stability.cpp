@@ -80,8 +80,8 @@ TEST(Stability, SegmentsWithMissingValuesAreLeftOut) {
     EXPECT_TRUE(stability::welch_density(std::span(rate).subspan(490, 30), 1.0, 30).empty());
 }
 
-// The model has the density of each term as docs/allan.md writes it, far below the sampling rate, where neither
-// averaging nor aliases count: N^2, B^2/(2 pi f), K^2/(2 pi f)^2.
+// The model has the density of each term as docs/dev/allan-coefficients.md writes it, far below the sampling rate,
+// where neither averaging nor aliases count: N^2, B^2/(2 pi f), K^2/(2 pi f)^2.
 TEST(Stability, TheModelHasTheDensitiesOfItsTerms) {
     constexpr double tau0_s = 0.1;
     const std::vector<double> f = {1e-3};

@@ -56,7 +56,7 @@ struct Running {
     }
 };
 
-/// Sum over c = 0...starts-1 of the trapezoidal sums of f(k) over k = c...c+length (docs/allan-totals.md, equation
+/// Sum over c = 0...starts-1 of the trapezoidal sums of f(k) over k = c...c+length (docs/dev/allan-totals.md, equation
 /// (5)): k counts i + 1/2 times at its i-th place from either end, until all windows have it.
 template <class Term>
 HWY_INLINE double sum_over_windows(std::size_t length, std::size_t starts, const Term& f) {
@@ -69,7 +69,7 @@ HWY_INLINE double sum_over_windows(std::size_t length, std::size_t starts, const
 }
 
 /// Sum over k = first...first+starts-1 of the trapezoidal sums over j = 0...length of p[k + j] p[k + length - j]
-/// (docs/allan-totals.md, equation (6)).
+/// (docs/dev/allan-totals.md, equation (6)).
 ///
 /// \param chain  chain[a + 2] = p[a] + p[a - 2] + ...; chain[0] = chain[1] = 0
 double sum_of_mirrored(const double* HWY_RESTRICT p, const double* HWY_RESTRICT chain, std::size_t length,
@@ -119,7 +119,7 @@ class Block {
         return total;
     }
 
-    /// All pieces together: docs/allan-totals.md, equations (4) and (7).
+    /// All pieces together: docs/dev/allan-totals.md, equations (4) and (7).
     double sum() {
         const double* p = p_;
         const std::size_t m = m_;

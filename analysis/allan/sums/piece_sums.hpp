@@ -10,7 +10,7 @@ namespace ringlock::allan {
 /// deviation (5.2.14): every piece of 3m samples less the line through the means of its halves, continued by its mirror
 /// image at both ends; the mean square of the 6m second differences of neighbouring means over m that it has.
 ///
-/// Costs the same for every m (docs/allan-totals.md): pieces that overlap are summed together.
+/// Costs the same for every m (docs/dev/allan-totals.md): pieces that overlap are summed together.
 ///
 /// \param x  samples without gaps
 /// \param m  averaging factor; >= 1

@@ -13,6 +13,7 @@
 #include "engine/core/error.hpp"
 #include "engine/core/json_text.hpp"
 #include "engine/core/printable.hpp"
+#include "engine/scenario/keys/schema.hpp"
 #include "engine/store/atomic_file.hpp"
 
 namespace ringlock::closure {
@@ -99,8 +100,12 @@ std::string verdict_sentence(const Closure& closure) {
         case Verdict::unexplained:
             break;
     }
+    return unexplained_sentence(closure.unexplained->where, closure.unexplained->description());
+}
+
+std::string unexplained_sentence(Where where, const std::string& description) {
     return fmt::format("unexplained: the residual has structure that no effect of the library explains, in {}: {}",
-                       name_of(closure.unexplained->where), closure.unexplained->description());
+                       name_of(where), description);
 }
 
 std::string to_text(const Closure& closure) {
@@ -211,20 +216,23 @@ void write_closure(const std::filesystem::path& folder, const std::string& sourc
     h5.set_attribute("source", std::string_view(source));
     store::Group parameters = h5.create_group("parameters");
     std::vector<std::string> names;
+    std::vector<std::string> units;
     std::vector<double> values;
     std::vector<double> sds;
     const auto add = [&](const std::string& effect, const std::vector<Estimate>& estimates) {
         for (const Estimate& estimate : estimates) {
             names.push_back(effect + "." + estimate.name);
+            units.emplace_back(scenario::unit_of(estimate.name));
             values.push_back(estimate.value);
             sds.push_back(estimate.sd);
         }
     };
     add("base", closure.base);
     for (const Step& step : closure.steps) add(std::string(step.effect->name()), step.parameters);
-    parameters.write("name", names, {"", "effect.parameter; the unit is in the name"});
-    parameters.write("value", values, {"1", "estimate from the whole record"});
-    parameters.write("std", sds, {"1", "standard error"});
+    parameters.write("name", names, {"", "effect.parameter"});
+    parameters.write("unit", units, {"", "unit of value and std in this row; 1 of a pure number"});
+    parameters.write("value", values, {"1", "estimate from the whole record, in the unit of its row"});
+    parameters.write("std", sds, {"1", "standard error, in the unit of its row"});
     store::Group residual = h5.create_group("residual");
     const Residual& r = closure.residual;
     residual.write("time_s", r.time_s, {"s", "time of the prediction"});

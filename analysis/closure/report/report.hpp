@@ -22,6 +22,8 @@ std::string to_text(const Predictive& predictive);
 
 /// The verdict in one sentence, with the location of the remaining structure.
 std::string verdict_sentence(const Closure& closure);
+/// That of the verdict `unexplained`: the structure that is left, and its description.
+std::string unexplained_sentence(Where where, const std::string& description);
 
 /// Writes closure.json, closed.toml and closure.h5 into the folder, which is created if it is missing. Throws
 /// InputError if it cannot be.

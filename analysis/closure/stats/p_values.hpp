@@ -20,7 +20,7 @@ double davies_bound(double chi2, const std::vector<double>& roots, int freedom =
 /// model).
 double cost_of_amplitudes(double gain, int amplitudes);
 
-/// The number of independent places that a search for a step anywhere in white noise is worth at this chi-squared,
+/// The number of independent positions that a search for a step anywhere in white noise is worth at this chi-squared,
 /// except in that share of the record at either end: the probability of the maximum of a standardised Brownian bridge
 /// (Miller and Siegmund, Biometrics 38, 1982, 1011) over that at one place.
 double places_of_step(double chi2, double share_at_ends);
@@ -30,7 +30,7 @@ double places_of_step(double chi2, double share_at_ends);
 /// 1279) over the probability at one place.
 double places_of_frequency(double chi2, double cycles);
 
-/// davies_bound over the p-value at one place: the number of independent places that the search is worth, for any
+/// davies_bound over the p-value at one place: the number of independent positions that the search is worth, for any
 /// number of degrees of freedom.
 double davies_places(double chi2, const std::vector<double>& roots);
 

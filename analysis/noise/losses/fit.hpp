@@ -14,8 +14,8 @@ namespace ringlock::noise {
 /// \param tau0_s  sampling interval [s], > 0
 ///
 /// Maximum of the likelihood of the samples that are there: those that are missing are filled in under the model that
-/// is fitted (docs/allan.md, "Missing samples"). Fewer present increments than options.fewest_samples are not fitted.
-/// Deterministic, whatever the number of threads; throws InputError as fit_noise() does.
+/// is fitted (docs/dev/allan-coefficients.md, "Missing samples"). Fewer present increments than options.fewest_samples
+/// are not fitted. Deterministic, whatever the number of threads; throws InputError as fit_noise() does.
 NoiseFit fit_noise(const allan::Phase& phase, double tau0_s, const Options& options = {});
 
 /// The same of rates, and one way in which the noise of the record may have gone on in its gaps.

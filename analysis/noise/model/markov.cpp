@@ -14,7 +14,7 @@ struct Score {
     double variance = 0.0;  ///< that a step of scoring leads to
 };
 
-/// Scores of a little correlated noise of many times, freed of what the terms that are there would take up.
+/// Scores of a little correlated noise of many correlation times, orthogonal to the terms of the model.
 std::vector<Score> scores(const Likelihood& likelihood, const Maximum& five, double& path_length) {
     const std::vector<Bin>& bins = likelihood.bins();
     const auto rows = static_cast<Eigen::Index>(bins.size());

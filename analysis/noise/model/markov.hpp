@@ -3,7 +3,7 @@
 
 namespace ringlock::noise {
 
-/// Exponentially correlated noise beside the five terms, at its likeliest correlation time.
+/// Exponentially correlated noise in addition to the five terms, at its likeliest correlation time.
 struct Markov {
     double evidence = 0.0;     ///< by how much it lowers the deviance; 0 where the time is not inside its range
     double path_length = 0.0;  ///< of the search, see price()

@@ -2,7 +2,7 @@
 #include <array>
 #include <cstddef>
 
-/// Noise coefficients of a gyro from a record of its angle. docs/allan.md derives what stands here.
+/// Noise coefficients of a gyro from a record of its angle. docs/dev/allan-coefficients.md derives them.
 namespace ringlock::noise {
 
 /// The noises whose variances are fitted; the rate ramp and sinusoids, means and no variances, are treated apart.

@@ -93,7 +93,7 @@ SeriesInfo stream_pieces(const SeriesRequest& request, const TakePiece& take) {
     return info;
 }
 
-/// Keeps the pieces. Whole numbers are kept beside the doubles only from where these lose digits.
+/// Keeps the pieces. Whole numbers are kept in addition to the doubles only from where these lose digits.
 class Collector {
    public:
     Collector(std::string file, Series& into) : file_(std::move(file)), into_(into) {}
@@ -115,7 +115,7 @@ class Collector {
 
    private:
     void check_memory(std::size_t values) const {
-        // A vector that grows holds the old values beside the new ones.
+        // A vector that grows holds the old values and the new ones.
         constexpr double bytes_a_value = 3.0 * sizeof(double);
         if (bytes_a_value * static_cast<double>(values) <= memory_bytes()) return;
         throw InputError(

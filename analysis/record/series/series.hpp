@@ -20,12 +20,12 @@ struct SeriesRequest {
     std::string path;
     /// Name of the column, its number from 1, or the path of a dataset, array or variable, or the end of it, with [I,:]
     /// for row I or [:,J] for column J of a two-dimensional one, counted from 0. Fields of records in a dataset are
-    /// columns: DATASET/FIELD. May be left out where there is only one beside the time.
+    /// columns: DATASET/FIELD. May be left out where there is only one in addition to the time.
     std::optional<std::string> column;
     /// Likewise, a column of the times of the rows. Of text it may be two, with a comma between: seconds and
     /// nanoseconds, or the date and the time of day. Without it rows follow each other without gaps.
     std::optional<std::string> time;
-    double rate_hz = 0.0;  ///< samples a second; needed with `time`, else of no account
+    double rate_hz = 0.0;  ///< samples a second; needed with `time`, else ignored
     /// Whether an HDF5 file may lead to others, by external links, raw data outside or virtual datasets.
     bool follow_links = false;
     /// Unit of the times, one of text::known_time_units; without it that which the header declares, ISO dates where

@@ -74,7 +74,7 @@ class SeriesRows {
         StampedRow at;
         std::size_t line;
     };
-    /// Fills what is left out before the row whose time was given; false where the row waits.
+    /// Fills the missing rows before the row whose time was given; false where the row waits.
     bool place(const Waiting& row);
     void begin_grid();
     void fill(const StampedRow& at);

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <utility>
 
-#include "app/allan/output/coefficient_table.hpp"
 #include "app/allan/output/csv.hpp"
 #include "app/allan/several.hpp"
 #include "app/arguments.hpp"

@@ -11,7 +11,6 @@
 #include <string_view>
 #include <utility>
 
-#include "app/allan/output/coefficient_table.hpp"
 #include "app/allan/several.hpp"
 #include "engine/core/error.hpp"
 #include "engine/core/printable.hpp"
@@ -113,7 +112,8 @@ HatOutput hat_of(const AllanRequest& request, const std::vector<AnalysedSeries>&
         for (std::size_t k = 0; k < 3; ++k) {
             const auto size = static_cast<std::int64_t>(phases[k].x.size());
             points[k] = allan::deviation(estimator, phases[k], tau0_s,
-                                         factors_for(request.taus, estimator, size, tau0_s), request.options);
+                                         allan_run::factors_for(request.taus, estimator, size, tau0_s, "--tau"),
+                                         request.options);
         }
         out.by_estimator.push_back({estimator, stability::three_cornered_hat(points[0], points[1], points[2])});
     }

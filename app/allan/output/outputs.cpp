@@ -76,7 +76,7 @@ AllanFiles::AllanFiles(const AllanArguments& a)
 void AllanFiles::write(const AllanRequest& request, const std::vector<AnalysedSeries>& series) const {
     std::vector<AllanOutput> outputs;
     for (const AnalysedSeries& s : series) outputs.push_back(s.out);
-    // What may be refused comes first, so that nothing is written then.
+    // Texts that may be refused are made first, so that nothing is written then.
     std::vector<std::string> exported_texts;
     for (const auto& [format, file] : exports_) exported_texts.push_back(exported(format, outputs));
     write_densities(request, series, outputs);

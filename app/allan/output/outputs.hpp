@@ -14,14 +14,14 @@
 
 namespace ringlock::app {
 
-/// The files that `ringlock allan` writes in addition to what it prints. They are claimed before the data are read, so
-/// that what cannot be written is known at once.
+/// The files that `ringlock allan` writes in addition to its text. They are claimed before the data are read, so that a
+/// file that cannot be written is known at once.
 class AllanFiles {
    public:
     /// Throws InputError where options do not fit each other, or a file cannot be written or is one that is read.
     explicit AllanFiles(const AllanArguments& arguments);
 
-    /// Whether the data of the series must be kept for what is asked.
+    /// Whether the data of the series must be kept for the outputs that were asked for.
     bool need_data() const { return !densities_.empty() || !maps_.empty(); }
 
     /// Writes all of them. Throws InputError or RunError; each file is complete or not there.

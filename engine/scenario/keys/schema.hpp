@@ -22,7 +22,7 @@ struct Bounds {
     Value min;
     Value max;
     bool min_excluded = false;
-    bool or_zero = false;  ///< 0 is allowed besides
+    bool or_zero = false;  ///< 0 is allowed as well
     std::string why;       ///< the reason, for messages
 };
 

@@ -83,7 +83,7 @@ Finding turn_map_has_narrow_tables(const Scenario& s) {
         std::move(keys),
         fmt::format("the tables of the turn map cannot hold a tolerance of {:g} rad over the amplitudes "
                     "and rates that they must cover: at a high input rate the phase at which the rate reverses moves "
-                    "by many radians with either (docs/turn-map.md); lower the input rate or the variation "
+                    "by many radians with either (docs/dev/turn-map.md); lower the input rate or the variation "
                     "of rate and amplitude, raise propagation.turn_map_tolerance_rad or {}",
                     s.propagation.turn_map_tolerance_rad, way_without_tables(s))};
 }
@@ -93,11 +93,11 @@ constexpr std::array all_turn_map_rules = {
     Rule{"The turn map needs kicks below 1 rad: 2 pi Omega_L / sqrt(K Omega_D w_D) < 1.", turn_map_has_small_kicks},
     Rule{"The turn map needs a phase that goes through at least 10 rad from a zero-rate point to the middle "
          "of the half cycle, and a rate there of at least 4 b (b: coupling), after rates, injected noise, "
-         "effects, the spread of the gyros and the room of the tables have taken their part (docs/turn-map.md).",
+         "effects, the spread of the gyros and the room of the tables have taken their part (docs/dev/turn-map.md).",
          turn_map_has_fast_middles},
     Rule{"The tables of the turn map hold turn_map_tolerance_rad, by an estimate on the safe side, "
          "over the rates of 128 turns and the amplitudes that noise, wander and drift make: "
-         "the wider these and the higher the input rate, the more terms it takes (docs/turn-map.md).",
+         "the wider these and the higher the input rate, the more terms it takes (docs/dev/turn-map.md).",
          turn_map_has_narrow_tables},
 };
 

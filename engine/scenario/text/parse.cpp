@@ -67,7 +67,8 @@ std::string name_text(std::string_view name) {
 /// Walks a parsed file, sets correct values and notes the errors.
 class Reader {
    public:
-    Reader(std::string_view file, const Rules& rules) : file_(printable(file)), rules_(rules) {}
+    Reader(std::string_view file, const Rules& rules, std::string_view setting_word)
+        : file_(printable(file)), rules_(rules), setting_word_(setting_word) {}
 
     /// Settings are applied after the file and replace its values: the text of each, and its parsed table.
     Scenario read(const toml::table& root, const std::vector<std::pair<std::string, toml::table>>& settings) {
@@ -122,7 +123,7 @@ class Reader {
         std::vector<std::string> lines;
         for (const auto& [place, text] : problems_) {
             if (!place.setting.empty()) {
-                lines.push_back(fmt::format("--set {}: {}", printable(place.setting), text));
+                lines.push_back(fmt::format("{} {}: {}", setting_word_, printable(place.setting), text));
             } else if (place.where) {
                 lines.push_back(fmt::format("{}:{}:{}: {}", file_, place.where.line, place.where.column, text));
             } else {
@@ -418,17 +419,49 @@ class Reader {
 
     std::string file_;
     const Rules& rules_;
+    std::string setting_word_;
     Scenario scenario_;
     std::vector<Problem> problems_;
     std::map<std::string, Place> places_;
     std::string setting_;  ///< that is being read; empty: the file
 };
 
-/// toml++ 3.3 follows a dotted key by recursion without a limit, and a key of some 30 000 parts overflows the stack.
-/// A key has at most three parts here, so that a run of dots is refused before it is parsed. Dots side by side are
-/// decoration, and so is a line of comment.
-///
-/// A file with more keys, sections or values than any scenario has is refused, too, before there is a table of all.
+/// A setting as a table. Throws InputError.
+toml::table parse_setting(const std::string& setting, std::string_view word_before) {
+    const auto refuse = [&](std::string_view why) {
+        throw InputError(fmt::format("{} {}: {}", word_before, in_quotes(setting), why));
+    };
+    const std::size_t equals = setting.find('=');
+    if (equals == std::string::npos || equals == 0) {
+        refuse(
+            "must be KEY=VALUE, as in gyro.lockin_threshold_deg_h=140; `ringlock run --print-schema` prints all keys");
+    }
+    const bool one_line = std::none_of(setting.begin(), setting.end(),
+                                       [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '#'; });
+    if (!one_line) refuse("must be one line without comments");
+    std::string value = setting.substr(equals + 1);
+    value.erase(0, value.find_first_not_of(' '));
+    value.erase(value.find_last_not_of(' ') + 1);
+    if (value.empty()) refuse("has no value");
+    // Shells take quotes away: a word that TOML does not define is a string.
+    const bool word = value != "true" && value != "false" && value != "inf" && value != "nan" &&
+                      std::isalpha(static_cast<unsigned char>(value.front())) != 0 &&
+                      std::all_of(value.begin(), value.end(), [](char c) {
+                          return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '+';
+                      });
+    if (word) value = in_quotes(value);
+    const std::string text = setting.substr(0, equals) + " = " + value;
+    refuse_before_parsing(text, fmt::format("{} {}", word_before, printable(setting)));
+    try {
+        return toml::parse(text);
+    } catch (const toml::parse_error& error) {
+        refuse(fmt::format("not valid TOML: {}", printable(std::string(error.description()))));
+    }
+    return {};
+}
+
+}  // namespace
+
 void refuse_before_parsing(std::string_view text, std::string_view name) {
     constexpr int most = 32;
     constexpr int most_keys = 20000;
@@ -469,46 +502,12 @@ void refuse_before_parsing(std::string_view text, std::string_view name) {
     }
 }
 
-/// A setting as a table. Throws InputError.
-toml::table parse_setting(const std::string& setting) {
-    const auto refuse = [&](std::string_view why) {
-        throw InputError(fmt::format("--set {}: {}", in_quotes(setting), why));
-    };
-    const std::size_t equals = setting.find('=');
-    if (equals == std::string::npos || equals == 0) {
-        refuse(
-            "must be KEY=VALUE, as in gyro.lockin_threshold_deg_h=140; `ringlock run --print-schema` prints all keys");
-    }
-    const bool one_line = std::none_of(setting.begin(), setting.end(),
-                                       [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '#'; });
-    if (!one_line) refuse("must be one line without comments");
-    std::string value = setting.substr(equals + 1);
-    value.erase(0, value.find_first_not_of(' '));
-    value.erase(value.find_last_not_of(' ') + 1);
-    if (value.empty()) refuse("has no value");
-    // Shells take quotes away: a word that TOML does not define is a string.
-    const bool word = value != "true" && value != "false" && value != "inf" && value != "nan" &&
-                      std::isalpha(static_cast<unsigned char>(value.front())) != 0 &&
-                      std::all_of(value.begin(), value.end(), [](char c) {
-                          return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '+';
-                      });
-    if (word) value = in_quotes(value);
-    const std::string text = setting.substr(0, equals) + " = " + value;
-    refuse_before_parsing(text, printable("--set " + setting));
-    try {
-        return toml::parse(text);
-    } catch (const toml::parse_error& error) {
-        refuse(fmt::format("not valid TOML: {}", printable(std::string(error.description()))));
-    }
-    return {};
-}
-
-}  // namespace
-
 Scenario parse_string(std::string_view text, std::string_view name, std::span<const std::string> settings,
-                      const Rules& rules) {
+                      const Rules& rules, std::string_view setting_word) {
     std::vector<std::pair<std::string, toml::table>> set;
-    for (const std::string& setting : settings) set.emplace_back(setting, parse_setting(setting));
+    for (const std::string& setting : settings) {
+        set.emplace_back(setting, parse_setting(setting, setting_word));
+    }
     refuse_before_parsing(text, printable(name));
     toml::table root;
     try {
@@ -518,10 +517,10 @@ Scenario parse_string(std::string_view text, std::string_view name, std::span<co
         throw InputError(fmt::format("{}:{}:{}: not valid TOML: {}", printable(name), where.line, where.column,
                                      printable(std::string(error.description()))));
     }
-    return Reader(name, rules).read(root, set);
+    return Reader(name, rules, setting_word).read(root, set);
 }
 
-Scenario parse_file(const std::filesystem::path& path, std::span<const std::string> settings, const Rules& rules) {
+std::string text_of_file(const std::filesystem::path& path) {
     constexpr std::size_t largest = 16 << 20;
     std::error_code ignored;
     if (std::filesystem::is_directory(path, ignored)) {
@@ -540,7 +539,12 @@ Scenario parse_file(const std::filesystem::path& path, std::span<const std::stri
     text.resize(filled);
     if (text.size() > largest)
         throw InputError(fmt::format("{}: is larger than 16 MiB: not a scenario", printable(path)));
-    return parse_string(text, path.string(), settings, rules);
+    return text;
+}
+
+Scenario parse_file(const std::filesystem::path& path, std::span<const std::string> settings, const Rules& rules,
+                    std::string_view setting_word) {
+    return parse_string(text_of_file(path), path.string(), settings, rules, setting_word);
 }
 
 }  // namespace ringlock::scenario

@@ -78,7 +78,7 @@ TEST(SampleReaders, ARecordWithoutEffectMissesNothing) {
 
 // Beside a strong line and a step the base model's innovations do not show the turns; after these are in the model they
 // do.
-TEST(SampleReaders, TurnsAreFoundOnceStrongEffectsAreInTheModel) {
+TEST(LongSampleReaders, TurnsAreFoundOnceStrongEffectsAreInTheModel) {
     scenario::Scenario s = samples_at(100.0, 120.0);
     s.effects.at("bias_step") = {{"step_deg_h", 3.0}, {"time_s", 70.0}};
     s.effects.at("base_vibration").at("rate_deg_h") = 8.0;
@@ -91,7 +91,7 @@ TEST(SampleReaders, TurnsAreFoundOnceStrongEffectsAreInTheModel) {
     }));
 }
 
-TEST(SampleReaders, WholeCyclesAndFiltersAreNoEffects) {
+TEST(LongSampleReaders, WholeCyclesAndFiltersAreNoEffects) {
     for (const Stripping stripping : {Stripping::whole_cycle, Stripping::reference_fir}) {
         scenario::Scenario s = samples_at(100.0, 100.0);
         s.reader.stripping = stripping;
@@ -105,7 +105,7 @@ TEST(SampleReaders, WholeCyclesAndFiltersAreNoEffects) {
 
 // Counts of whole quarter fringes at the zero crossings: their error follows the angle. It is a narrow line and its
 // harmonics, and jumps; noise of the measured dither blurs it.
-TEST(SampleReaders, CountsOverWholeCyclesAreNoEffects) {
+TEST(LongSampleReaders, CountsOverWholeCyclesAreNoEffects) {
     struct Kind {
         const char* arm;
         double rate_hz, duration_s, jitter_arcsec;
@@ -242,7 +242,7 @@ TEST(SampleReaders, BesideADitherThatWasLeftNothingElseIsNamed) {
 
 // A noisy drive: the amplitude of a resonator, between half cycles of unequal length.
 // At 400 samples a second the dither of 266.983 Hz shows at 133.017 Hz, and its second harmonic at 133.966 Hz.
-TEST(SampleReaders, AHarmonicAliasedNextToTheDitherIsAccountedFor) {
+TEST(LongSampleReaders, AHarmonicAliasedNextToTheDitherIsAccountedFor) {
     scenario::Scenario s = scenario::read_device(*scenario::find_device("triangle-51mm")).scenario;
     s.ensemble.gyros = 1;
     s.ensemble.duration_s = 39.0;
@@ -273,7 +273,7 @@ TEST(SampleReaders, BesideTheDitherOfANoisyDriveNothingElseIsNamed) {
 }
 
 // Without injected noise the kicks go on as evenly as the phase does: 30 Hz under 15 deg/h of a gyro of 0.5 arcsec.
-TEST(SampleReaders, WithoutInjectedNoiseTheBeatOfTheInputRateIsNamed) {
+TEST(LongSampleReaders, WithoutInjectedNoiseTheBeatOfTheInputRateIsNamed) {
     scenario::Scenario s = samples_at(100.0, 40.0);
     s.record.trajectory = scenario::parse_arm("uncompensated");
     const record::Record record = instrument::simulate_record(s);

@@ -44,7 +44,7 @@ void expect_only_resampling(const Closure& found) {
 }
 
 // Resampled from below, a third of the samples follow from the others: their rounding was taken for innovations.
-TEST(ResampledRecords, ClosesWhatWasTakenAtALowerRate) {
+TEST(LongResampledRecords, ClosesWhatWasTakenAtALowerRate) {
     for (const double from_hz : {61.8, 83.1}) {
         const Closure found = close_samples(generate_samples(taken_at(from_hz, 5, 10000)));
         expect_only_resampling(found);

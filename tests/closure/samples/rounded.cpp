@@ -103,7 +103,7 @@ TEST(RoundedReadings, AreForetoldWithTheSpreadThatIsSaid) {
 }
 
 // Filters are drawn anew by chance, but that says nearly the same of nearly the same model: a climb sees slopes.
-TEST(RoundedReadings, NearlyTheSameModelsAreNearlyAsLikely) {
+TEST(LongRoundedReadings, NearlyTheSameModelsAreNearlyAsLikely) {
     for (const double noise : {0.25, 0.1, 0.02}) {
         SCOPED_TRACE(noise);
         const SampleTruth truth = counted(noise);

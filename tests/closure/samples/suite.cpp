@@ -445,7 +445,7 @@ TEST(SampleLines, AreFollowedOnACurve) {
 }
 
 // By how many places the search over curves is counted: in noise alone what it finds is not rare.
-TEST(SampleLines, SearchesOverCurvesAreCounted) {
+TEST(LongSampleLines, SearchesOverCurvesAreCounted) {
     constexpr double rate_hz = 100.0;
     std::mt19937_64 random(8);
     std::normal_distribution<double> normal;

@@ -118,7 +118,7 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
             ++missed;
             if (shown(*outcomes[k])) ++though;
         }
-        row("... of those that miss something, such whose record shows it", share_of(though, missed));
+        row("... of those that miss something, records that show the effect", share_of(though, missed));
     };
     missed_though_shown(Kind::single, 1.0);
     row("single effects at twice their limit, named right", count(kind(Kind::single, 2.0), is(Judged::right)));
@@ -161,15 +161,15 @@ void write_figures(std::ostream& out, const std::vector<TableRow>& truths, const
     }
     if (std::any_of(truths.begin(), truths.end(), kind(Kind::mixed, 0.0))) {
         const auto mixed = kind(Kind::mixed, 0.0);
-        row("one effect of 6 times its limit beside one outside the library: `unexplained` with the right place, the "
-            "effect "
-            "named",
+        row("one effect of 6 times its limit and one outside the library: `unexplained` with the right place, the "
+            "effect named",
             count(mixed, is(Judged::right)));
         row("... in a tie that holds it", count(mixed, is(Judged::tie)));
         row("... `unexplained`, the effect not named", count(mixed, [](const Outcome& o) {
                 return o.verdict == "unexplained" && !o.false_name && !o.missing.empty();
             }));
-        row("... a name of nothing that is there", count(mixed, [](const Outcome& o) { return o.false_name; }));
+        row("... an effect named that the record does not contain",
+            count(mixed, [](const Outcome& o) { return o.false_name; }));
     }
     const Totals totals = totals_of(truths, outcomes);
     row("a wrong name with confidence, over all records", share_of(totals.wrong.count, totals.wrong.of));
@@ -216,12 +216,12 @@ void write_confusion(std::ostream& out, std::ostream& matrix, const std::vector<
     }
 }
 
-/// What was neither right nor a tie from twice the limit on, and what the record says of it.
+/// Records from twice the limit on whose answer is neither right nor a tie, with the gains of the log-likelihood.
 void write_misses(std::ostream& out, const std::vector<TableRow>& truths, const Outcomes& outcomes) {
     fmt::print(
         out,
-        "| record | in it | size over its limit | answer | not named | gain of the truth over the base model | over "
-        "the answer | asked for |\n|---|---|---|---|---|---|---|---|\n");
+        "| record | contents | size over its limit | answer | not named | gain of the truth over the base model | over "
+        "the answer | required |\n|---|---|---|---|---|---|---|---|\n");
     const auto nats = [](double gain) { return std::isfinite(gain) ? fmt::format("{:.1f}", gain) : std::string("-"); };
     for (std::size_t k = 0; k < truths.size(); ++k) {
         const TableRow& of = truths[k];

@@ -491,7 +491,7 @@ void expect_unexplained_in_time(const std::vector<Truth>& truths) {
     }
 }
 
-TEST(TurnLoop, AShortRecordOfARateThatJumpsIsUnexplained) { expect_unexplained_in_time({jumping_rate(9, 4000)}); }
+TEST(LongTurnLoop, AShortRecordOfARateThatJumpsIsUnexplained) { expect_unexplained_in_time({jumping_rate(9, 4000)}); }
 
 // Jumps far above the noise: places within a hundredth of the record leave more than a random rate does, and short
 // stays are seen under the noise that the others leave.

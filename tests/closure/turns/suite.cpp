@@ -154,7 +154,7 @@ ringlock::closure::DitherShape shape_of(const Case& of) {
 
 // A gyro that moves and whose turns do not meet all phases alike: what times and accelerations follow of the phase, by
 // pulses of quarter fringes, was not all taken away, and a second harmonic was called an asymmetry.
-TEST(ClosureSuite, AShapeOfTheDitherIsNotCalledAnother) {
+TEST(LongClosureSuite, AShapeOfTheDitherIsNotCalledAnother) {
     Case of{.kind = Kind::single, .truth = {}, .multiple = 30.0, .condition = &conditions[2], .seed = 1887};
     of.truth = {{"dither_second_harmonic", {{"ratio", 6.3363e-4}, {"phase_rad", 1.3093}}}};
     EXPECT_EQ(of.condition->injected_rad, 0.0);

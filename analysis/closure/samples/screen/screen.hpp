@@ -18,7 +18,7 @@ struct SampleCandidate {
     double p_value = 1.0;
     /// Look-elsewhere factor of the search.
     double searched = 1.0;
-    /// Number of places searched, divided by the number that explain as much: the cost of the search where the
+    /// Number of positions searched, divided by the number that explain as much: the cost of the search where the
     /// likelihood is integrated over places. `searched` if not given.
     std::optional<double> places = {};
     int parameters = 1;

@@ -25,7 +25,7 @@ using Complex = std::complex<double>;
 
 /// The phase that the lock-in adds between the turn at one end of a half cycle and its middle, in the frame in which
 /// fast motion is plain rotation, as a function of the angle at that turn (psi and the coupling phase): exact
-/// (docs/turn-map.md).
+/// (docs/dev/turn-map.md).
 class HalfKick {
    public:
     /// \param end  0: the turn at which the half cycle begins, 1: the turn at which it ends
