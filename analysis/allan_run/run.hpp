@@ -15,7 +15,7 @@
 
 namespace ringlock::allan_run {
 
-/// What is asked about a series, checked as far as it can be without the data.
+/// The request for the analysis of a series, checked as far as it can be without the data.
 struct Request {
     allan::Kind kind = allan::Kind::phase;
     std::string kind_name;

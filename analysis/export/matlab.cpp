@@ -119,7 +119,7 @@ struct Fields {
     }
 };
 
-/// What a group or dataset becomes: its value, and what its unit and description are there.
+/// The variable that a group or dataset becomes: its value, its unit and its description.
 struct Converted {
     Variable value, unit, description;
 };

@@ -12,8 +12,9 @@ namespace ringlock::closure {
 /// A report of the closed loop as it was written into a folder or printed with --json.
 struct Report {
     std::string source;  ///< name of the record; empty where only the JSON is there
-    /// Without `base_alone`, `disturbed` and what else closure.json does not hold. `residual` and the steps of
-    /// `predictive` are those of closure.h5. The text of the structure that is left stands in `unexplained_text`.
+    /// Without `base_alone`, `disturbed` and the other members that closure.json lacks. `residual` and the
+    /// steps of `predictive` are those of closure.h5. The text of the structure that is left stands in
+    /// `unexplained_text`.
     Closure closure;
     std::string unexplained_text;
     Predictive predictive;

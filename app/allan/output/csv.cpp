@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "analysis/export/csv.hpp"
+
 namespace ringlock::app {
 namespace {
 
@@ -37,15 +39,7 @@ std::string row_of(const AllanOutput& s, allan::Estimator estimator, const allan
 
 }  // namespace
 
-std::string csv_cell(std::string_view text) {
-    if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
-    std::string out = "\"";
-    for (const char c : text) {
-        out += c;
-        if (c == '"') out += c;
-    }
-    return out + "\"";
-}
+std::string csv_cell(std::string_view text) { return exports::cell_of(text); }
 
 std::string csv_cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
 
